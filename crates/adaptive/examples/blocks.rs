@@ -6,7 +6,7 @@
 //!
 //! Each file is one recording: little-endian doubles. A name that contains `@P.` is a circle of period `P`. Bounds are in per cent
 //! of the range (of the period); 0 is lossless. Numbers are means over the recordings; a CRC-32 per block is counted with blocks of
-//! 512 and 128 rows.
+//! 512 and 128 rows; with starts, what all blocks of a recording share is told once and counted.
 
 use fewbits_adaptive::{
     BlockCodec, Config, CosetConfig, CosetReceiver, CosetSensor, Effort, Sensor, Silence, StreamWriter,
@@ -44,16 +44,42 @@ fn read(file: &Path) -> Result<Recording, Failure> {
     Ok(Recording { samples, period, range })
 }
 
+/// What the blocks of a recording share.
+#[derive(Clone, Copy)]
+enum Shared {
+    Nothing,
+    /// A start that the first block taught; its bytes are counted.
+    Start,
+}
+
 /// Bytes and seconds of writing and reading in blocks of so many rows; the bound is checked.
-fn blocks(recording: &Recording, codec: BlockCodec, delta: f64, rows: usize) -> Result<(usize, f64, f64), Failure> {
+fn blocks(
+    recording: &Recording,
+    codec: BlockCodec,
+    delta: f64,
+    rows: usize,
+    shared: Shared,
+) -> Result<(usize, f64, f64), Failure> {
     let (mut size, mut writing, mut reading) = (0, 0.0, 0.0);
+    let first = &recording.samples[..rows.min(recording.samples.len())];
+    let start = match shared {
+        Shared::Nothing => None,
+        Shared::Start => codec.start(first),
+    };
+    size += start.map_or(0, |start| start.to_bytes().len());
     for samples in recording.samples.chunks(rows) {
-        let start = Instant::now();
-        let bytes = codec.encode(samples)?;
-        writing += start.elapsed().as_secs_f64();
-        let start = Instant::now();
-        let values = codec.decode(&bytes, samples.len())?;
-        reading += start.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let bytes = match &start {
+            Some(start) => codec.encode_from(start, samples, &[])?.bytes,
+            None => codec.encode(samples)?,
+        };
+        writing += clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let values = match &start {
+            Some(start) => codec.decode_from(start, &bytes, samples.len(), &[])?,
+            None => codec.decode(&bytes, samples.len())?,
+        };
+        reading += clock.elapsed().as_secs_f64();
         size += bytes.len();
         for (value, sample) in values.iter().zip(samples) {
             let straight = (value - recording.period.map_or(*sample, |period| sample.rem_euclid(period))).abs();
@@ -122,10 +148,10 @@ fn main() -> Result<(), Failure> {
     files.sort();
     let recordings = files.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
     println!(
-        "bound%  whole  512+crc  128+crc   fast    pco  stream | writes  reads  fast: writes reads (10^6/s) | lossy bits  out%"
+        "bound%  whole  512+crc  128+crc   fast    pco  stream | writes  reads  fast: writes reads (10^6/s) | lossy bits  out% | with starts: 512+crc 128+crc, fast"
     );
     for bound in bounds {
-        let mut sums = [0.0; 8];
+        let mut sums = [0.0; 12];
         let (mut times, mut samples) = ([0.0; 4], 0.0);
         for recording in &recordings {
             let delta = 0.01 * bound * recording.range;
@@ -136,17 +162,24 @@ fn main() -> Result<(), Failure> {
                 BlockCodec::new(recording.period.map_or(Ok(config), |period| config.circular(period))?)
             };
             let n = recording.samples.len();
-            let (whole, writing, reading) = blocks(recording, codec, delta, n)?;
-            let (middle, ..) = blocks(recording, codec, delta, 512)?;
-            let (short, ..) = blocks(recording, codec, delta, 128)?;
-            let (fast, fast_writing, fast_reading) = blocks(recording, codec.with_effort(Effort::Fast), delta, n)?;
+            let quick = codec.with_effort(Effort::Fast);
+            let (whole, writing, reading) = blocks(recording, codec, delta, n, Shared::Nothing)?;
+            let (fast, fast_writing, fast_reading) = blocks(recording, quick, delta, n, Shared::Nothing)?;
+            let in_blocks = |codec, rows, shared| {
+                let (bytes, ..) = blocks(recording, codec, delta, rows, shared)?;
+                Ok::<_, Failure>(bytes + 4 * n.div_ceil(rows))
+            };
             let mut sizes = [
                 whole,
-                middle + 4 * n.div_ceil(512),
-                short + 4 * n.div_ceil(128),
+                in_blocks(codec, 512, Shared::Nothing)?,
+                in_blocks(codec, 128, Shared::Nothing)?,
                 fast,
                 0,
                 0,
+                in_blocks(codec, 512, Shared::Start)?,
+                in_blocks(codec, 128, Shared::Start)?,
+                in_blocks(quick, 512, Shared::Start)?,
+                in_blocks(quick, 128, Shared::Start)?,
             ]
             .map(|b| 8 * b);
             sizes[4] = 8 * plain_pco(recording, delta)?;
@@ -170,7 +203,7 @@ fn main() -> Result<(), Failure> {
         }
         let speed = times.map(|time| 1e-6 * samples / time);
         println!(
-            "{bound:<7} {:.4}  {:.4}   {:.4}  {:.4}  {:.4}  {:.4} | {:.2} {:.2}  {:.1} {:.1} | {:.3} {:.2}",
+            "{bound:<7} {:.4}  {:.4}   {:.4}  {:.4}  {:.4}  {:.4} | {:.2} {:.2}  {:.1} {:.1} | {:.3} {:.2} | {:.4} {:.4}, {:.4} {:.4}",
             sums[0],
             sums[1],
             sums[2],
@@ -181,8 +214,12 @@ fn main() -> Result<(), Failure> {
             speed[1],
             speed[2],
             speed[3],
+            sums[10],
+            sums[11],
             sums[6],
-            sums[7]
+            sums[7],
+            sums[8],
+            sums[9]
         );
     }
     Ok(())

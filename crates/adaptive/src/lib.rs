@@ -26,6 +26,8 @@
 //! | the two halves | [`Sensor`], [`Receiver`] |
 //! | whole bits in a slot, and a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
 //! | many samples at once, each block decodable alone | [`BlockCodec`] |
+//! | what many such blocks have in common, told once | [`Start`] |
+//! | decisions of known probability as bytes | [`arithmetic`] |
 //! | links that lose packets: one lost packet costs the slots until the next | [`CosetSensor`], [`CosetReceiver`] |
 //! | a slot for other filters | [`SlotScheme`] |
 //! | the same number of bits in every slot | [`FixedRate`] |
@@ -58,7 +60,8 @@ mod sensor;
 mod stream;
 mod tuning;
 
-pub use block::{BlockCodec, Effort, JOINT_COLUMNS};
+pub use block::coder as arithmetic;
+pub use block::{BlockCodec, Effort, JOINT_COLUMNS, Start, StartedBlock};
 pub use config::Config;
 pub use coset::{CosetConfig, CosetReceiver, CosetSensor, TOLERATED};
 pub use error::Error;

@@ -3,11 +3,13 @@
 //! ```text
 //! block     := length varint, body, CRC-32 (little-endian) of header's checksum, length and body
 //! body      := varint 2 b                            a plain block: all rows, on the grid, all columns plain
-//!            | varint 2 flags + 1, [rows varint], time, [descriptor per column]
+//!            | varint 2 flags + 1, [rows varint], time, [descriptors], [specials]
 //!              then columns
-//! flags     := time kind (2 bits), rows follow (1), descriptors follow (1)
-//! descriptor:= codec id (4 bits), runs follow (1), a bound of its own follows (1), others follow (1)       plain: codec 2, nothing follows
-//! column    := [bound, 3 bytes] [runs] [others] [length varint, but for the last column] bytes
+//! flags     := time kind (2 bits), rows follow (1), descriptors follow (1), specials follow (1)
+//! descriptors := a bit per column, the first one lowest: whether it is plain (0) or has a descriptor (1); then those
+//! descriptor:= codec id (4 bits), a bound of its own follows (bit 5), others follow (bit 6)       plain: codec 2, nothing follows
+//! specials  := length varint, bytes (module `specials`)
+//! column    := [bound, 3 bytes] [others] [length varint, but for the last column] bytes
 //! others    := number - 1 (byte), how many columns before this one each stands (varints)
 //!
 //! `others` are columns whose restored cells the codec used for the prediction; their rows are those in which this column has values.
@@ -15,10 +17,10 @@
 
 use crate::bound::Bound;
 use crate::codec::{self, CodecId, JOINT_COLUMNS};
-use crate::error::{Damage, Error};
+use crate::error::Damage;
 use crate::header::Header;
 use crate::related;
-use crate::runs::{self, Run, Special};
+use crate::specials::{self, Special, Specials};
 use crate::time::{self, TimeKind};
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint};
 use fewbits_adaptive::Effort;
@@ -47,22 +49,18 @@ impl Block {
 
 const ROWS_FOLLOW: u64 = 4;
 const DESCRIPTORS_FOLLOW: u64 = 8;
-const RUNS_FOLLOW: u8 = 0x10;
+const SPECIALS_FOLLOW: u64 = 16;
 const BOUND_FOLLOWS: u8 = 0x20;
 const OTHERS_FOLLOW: u8 = 0x40;
-const DESCRIPTOR_BITS: u8 = 15 | RUNS_FOLLOW | BOUND_FOLLOWS | OTHERS_FOLLOW;
+const DESCRIPTOR_BITS: u8 = 15 | BOUND_FOLLOWS | OTHERS_FOLLOW;
 const PLAIN: u8 = CodecId::Adaptive as u8;
-
-/// The next smaller double of 12 bits of mantissa, as stored in three bytes.
-pub(crate) fn rounded_down(bound: f64) -> f64 {
-    f64::from_bits(bound.to_bits() & !0xff_ffff_ffff)
-}
 
 struct CodedColumn {
     descriptor: u8,
-    /// Bound, runs and others.
+    /// Bound and others.
     head: Vec<u8>,
     bytes: Vec<u8>,
+    specials: Specials,
     restored: Cells,
 }
 
@@ -79,10 +77,11 @@ fn encode_column(
     own: Option<f64>,
     before: &[Cells],
     effort: Effort,
-) -> Result<CodedColumn, Error> {
+) -> CodedColumn {
     let column = before.len();
     let target = header.target(column, own);
-    let mut specials: Vec<Option<Special>> = cells.iter().map(|cell| Special::of(*cell)).collect();
+    let start = header.start(column, own);
+    let mut specials: Specials = cells.iter().map(|cell| Special::of(*cell)).collect();
     let has_value: Vec<bool> = specials.iter().map(Option::is_none).collect();
     let samples = aligned(cells, &has_value);
     let mut others = match effort {
@@ -91,7 +90,7 @@ fn encode_column(
     };
     let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
     let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-    let coded = codec::encode(&samples, &target, &values, effort);
+    let coded = codec::encode(&samples, &target, start.as_ref(), &values, effort);
     if !coded.uses_others {
         others.clear();
     }
@@ -110,14 +109,6 @@ fn encode_column(
         descriptor |= BOUND_FOLLOWS;
         head.extend_from_slice(&bound.to_be_bytes()[..3]);
     }
-    let runs = runs::runs(&specials);
-    if !runs.is_empty() {
-        descriptor |= RUNS_FOLLOW;
-        runs::push(&runs, &mut head).map_err(|error| Error::Codec {
-            column: header.schema.columns[column].name.clone(),
-            source: error.into(),
-        })?;
-    }
     if !others.is_empty() {
         descriptor |= OTHERS_FOLLOW;
         head.push((others.len() - 1) as u8);
@@ -125,12 +116,13 @@ fn encode_column(
             .iter()
             .for_each(|other| push_varint(&mut head, (column - other) as u64));
     }
-    Ok(CodedColumn {
+    CodedColumn {
         descriptor,
         head,
         bytes: coded.bytes,
-        restored: merged(&runs, &coded.restored, cells.len()),
-    })
+        restored: specials::merged(&specials, &coded.restored),
+        specials,
+    }
 }
 
 /// A block's bytes, and the cells as a reader will restore them.
@@ -140,10 +132,10 @@ pub(crate) fn encode(
     columns: &[Cells],
     own_bounds: &[Option<f64>],
     effort: Effort,
-) -> Result<(Vec<u8>, Vec<Cells>), Error> {
+) -> (Vec<u8>, Vec<Cells>) {
     let (mut coded, mut restored) = (Vec::with_capacity(columns.len()), Vec::with_capacity(columns.len()));
     for (cells, own) in columns.iter().zip(own_bounds) {
-        let mut column = encode_column(header, cells, *own, &restored, effort)?;
+        let mut column = encode_column(header, cells, *own, &restored, effort);
         restored.push(std::mem::take(&mut column.restored));
         coded.push(column);
     }
@@ -151,18 +143,34 @@ pub(crate) fn encode(
     let mut body = Vec::new();
     let plain = coded.iter().all(|column| column.descriptor == PLAIN);
     let whole = ticks.len() == header.schema.rows_per_block;
+    let specials: Vec<Specials> = coded
+        .iter_mut()
+        .map(|column| std::mem::take(&mut column.specials))
+        .collect();
+    let ordinary = specials.iter().flatten().all(Option::is_none);
     match (kind, Bytes(&time).varint()) {
-        (TimeKind::Grid, Ok(block)) if plain && whole => push_varint(&mut body, 2 * block),
+        (TimeKind::Grid, Ok(block)) if plain && whole && ordinary => push_varint(&mut body, 2 * block),
         _ => {
             let rows = if whole { 0 } else { ROWS_FOLLOW };
             let descriptors = if plain { 0 } else { DESCRIPTORS_FOLLOW };
-            push_varint(&mut body, 2 * (kind as u64 | rows | descriptors) + 1);
+            let follow = if ordinary { 0 } else { SPECIALS_FOLLOW };
+            push_varint(&mut body, 2 * (kind as u64 | rows | descriptors | follow) + 1);
             if !whole {
                 push_varint(&mut body, ticks.len() as u64);
             }
             body.extend_from_slice(&time);
             if !plain {
-                body.extend(coded.iter().map(|column| column.descriptor));
+                let has_own: Vec<bool> = coded.iter().map(|column| column.descriptor != PLAIN).collect();
+                body.extend(has_own.chunks(8).map(|eight| {
+                    let bits = eight.iter().enumerate();
+                    bits.fold(0, |byte, (i, own)| byte | u8::from(*own) << i)
+                }));
+                body.extend(coded.iter().map(|column| column.descriptor).filter(|d| *d != PLAIN));
+            }
+            if !ordinary {
+                let bytes = specials::encode(&specials, ticks.len());
+                push_varint(&mut body, bytes.len() as u64);
+                body.extend(bytes);
             }
         }
     }
@@ -174,7 +182,7 @@ pub(crate) fn encode(
         }
         body.extend(column.bytes);
     }
-    Ok((framed(header, body), restored))
+    (framed(header, body), restored)
 }
 
 /// Length, body, checksum.
@@ -225,6 +233,7 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
     let (grid, columns) = (header.grid(), header.schema.columns.len());
     let mut rows = header.schema.rows_per_block;
     let mut descriptors = vec![PLAIN; columns];
+    let mut specials = Vec::new();
     let head = body.varint()?;
     let ticks = if head & 1 == 0 {
         let mut block = Vec::new();
@@ -232,7 +241,7 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
         time::decode(TimeKind::Grid, &mut Bytes(&block), rows, &grid)?
     } else {
         let flags = head >> 1;
-        if flags > 15 {
+        if flags > 31 {
             return Err(Damage::Content("flags"));
         }
         if flags & ROWS_FOLLOW != 0 {
@@ -243,13 +252,23 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
         }
         let ticks = time::decode(TimeKind::from_bits(flags), &mut body, rows, &grid)?;
         if flags & DESCRIPTORS_FOLLOW != 0 {
-            descriptors.copy_from_slice(body.take(columns)?);
+            let has_own = body.take(columns.div_ceil(8))?;
+            for (i, descriptor) in descriptors.iter_mut().enumerate() {
+                if has_own[i / 8] >> (i % 8) & 1 == 1 {
+                    *descriptor = body.byte()?;
+                }
+            }
+        }
+        if flags & SPECIALS_FOLLOW != 0 {
+            let length = body.count(body.0.len(), "length of special cells")?;
+            specials = specials::decode(body.take(length)?, columns, rows)?;
         }
         ticks
     };
+    specials.resize(columns, Specials::new());
     let mut sections = Vec::with_capacity(columns);
-    for (i, descriptor) in descriptors.into_iter().enumerate() {
-        sections.push(read_section(header, &mut body, i, descriptor, rows)?);
+    for (i, (descriptor, specials)) in descriptors.into_iter().zip(specials).enumerate() {
+        sections.push(read_section(header, &mut body, i, descriptor, specials)?);
     }
     // Columns that a wanted one was predicted from are decoded too; they stand before it.
     let mut needed: Vec<bool> = (0..columns).map(&wanted).collect();
@@ -285,7 +304,7 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
 struct Section<'a> {
     id: CodecId,
     own: Option<f64>,
-    runs: Vec<Run>,
+    specials: Specials,
     others: Vec<usize>,
     bytes: &'a [u8],
 }
@@ -295,7 +314,7 @@ fn read_section<'a>(
     body: &mut Bytes<'a>,
     column: usize,
     descriptor: u8,
-    rows: usize,
+    specials: Specials,
 ) -> Result<Section<'a>, Damage> {
     if descriptor & !DESCRIPTOR_BITS != 0 {
         return Err(Damage::Content("descriptor"));
@@ -305,11 +324,6 @@ fn read_section<'a>(
         Some(read_bound(body)?)
     } else {
         None
-    };
-    let runs = if descriptor & RUNS_FOLLOW != 0 {
-        runs::read(body, rows)?
-    } else {
-        Vec::new()
     };
     let mut others = Vec::new();
     if descriptor & OTHERS_FOLLOW != 0 {
@@ -336,7 +350,7 @@ fn read_section<'a>(
     Ok(Section {
         id,
         own,
-        runs,
+        specials,
         others,
         bytes: body.take(length)?,
     })
@@ -345,15 +359,16 @@ fn read_section<'a>(
 impl Section<'_> {
     fn cells(&self, header: &Header, before: &[Cells], rows: usize) -> Result<Cells, Damage> {
         let mut has_value = vec![true; rows];
-        for run in self.runs.iter().filter(|run| !run.special.has_value()) {
-            has_value[run.start..run.start + run.length].fill(false);
+        for (has_value, special) in has_value.iter_mut().zip(&self.specials) {
+            *has_value = special.is_none_or(Special::has_value);
         }
         let count = has_value.iter().filter(|has| **has).count();
         let others: Vec<Vec<f64>> = self.others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
         let others: Vec<&[f64]> = others.iter().map(Vec::as_slice).collect();
         let target = header.target(before.len(), self.own);
-        let values = codec::decode(self.id, self.bytes, count, &target, &others)?;
-        Ok(merged(&self.runs, &values, rows))
+        let start = header.start(before.len(), self.own);
+        let values = codec::decode(self.id, self.bytes, count, &target, start.as_ref(), &others)?;
+        Ok(specials::merged(&self.specials, &values))
     }
 
     fn share_bound(&self, header: &Header, column: usize) -> Option<f64> {
@@ -370,19 +385,4 @@ fn read_bound(body: &mut Bytes<'_>) -> Result<f64, Damage> {
     } else {
         Err(Damage::Content("bound"))
     }
-}
-
-/// Values with the special cells between them.
-fn merged(runs: &[Run], values: &[f64], rows: usize) -> Cells {
-    let mut cells = Vec::with_capacity(rows);
-    let mut values = values.iter().copied();
-    for run in runs {
-        cells.extend(values.by_ref().take(run.start - cells.len()).map(Some));
-        if run.special.has_value() {
-            values.by_ref().take(run.length).for_each(drop);
-        }
-        cells.extend(std::iter::repeat_n(run.special.cell(), run.length));
-    }
-    cells.extend(values.map(Some));
-    cells
 }

@@ -58,15 +58,6 @@ pub enum Error {
     #[cfg(feature = "arrow")]
     #[error("no record batch")]
     Batch(#[from] arrow_schema::ArrowError),
-    /// The codec of values refused a sample that was checked before.
-    #[error("column `{column}` cannot be coded")]
-    Codec {
-        /// Name of the column.
-        column: String,
-        /// Its error.
-        #[source]
-        source: fewbits_adaptive::Error,
-    },
 }
 
 /// Why bytes cannot be decoded.

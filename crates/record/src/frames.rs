@@ -13,7 +13,7 @@
 use crate::block::{self, Block, Cells};
 use crate::bound::Bound;
 use crate::error::{Damage, Error};
-use crate::header::Header;
+use crate::header::{Header, MAX_START};
 use crate::schema::Schema;
 use crate::wire::{Bytes, CHECK_BYTES, checksum};
 use fewbits_adaptive::Effort;
@@ -52,10 +52,8 @@ impl FrameWriter {
     /// # Errors
     /// If `max_bytes` is below [`MIN_FRAME_BYTES`], or the header needs more than 256 pieces.
     pub fn new(schema: Schema, max_bytes: usize) -> Result<Self, Error> {
-        let header = Header::new(schema.clone(), &[], vec![0.0; schema.columns.len()])
-            .to_bytes()
-            .len()
-            + 32;
+        let columns = schema.columns.len();
+        let header = Header::new(schema.clone(), &[], vec![0.0; columns]).to_bytes().len() + 32 + MAX_START * columns;
         let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);
         if max_bytes < least {
             return Err(ArgumentError::new("max_bytes", max_bytes, format!("at least {least} for this header")).into());
@@ -203,7 +201,8 @@ impl FrameWriter {
         let columns = 0..self.columns.len();
         if self.header.is_none() {
             let bounds = columns.clone().map(|i| self.share_bound(i).unwrap_or(0.0)).collect();
-            self.header = Some(Header::new(self.schema.clone(), &self.ticks[..rows], bounds));
+            let header = Header::new(self.schema.clone(), &self.ticks[..rows], bounds);
+            self.header = Some(header.with_starts(&self.columns));
         }
         let Some(header) = &self.header else {
             return Err(Error::Broken);
@@ -212,7 +211,7 @@ impl FrameWriter {
             .map(|i| crate::recorder::own_bound(self.share_bound(i)?, header.share_bounds[i]))
             .collect();
         let cells: Vec<Cells> = self.columns.iter().map(|cells| cells[..rows].to_vec()).collect();
-        Ok(block::encode(header, &self.ticks[..rows], &cells, &own, Effort::Thorough)?.0)
+        Ok(block::encode(header, &self.ticks[..rows], &cells, &own, Effort::Thorough).0)
     }
 }
 

@@ -1,18 +1,22 @@
 //! The header: what every block of a recording is decoded with.
 
-use crate::bound::Bound;
-use crate::codec::Target;
+use crate::bound::{Bound, TENS};
+use crate::codec::{Target, adaptive};
 use crate::error::{Damage, Error};
 use crate::schema::{Column, Schema, TimeBase, TimeFormat};
 use crate::time::Grid;
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_text, push_varint, zigzag};
+use fewbits_adaptive::Start;
 
 /// The first bytes. Like PNG's they contain a byte above 127 and a line end, so that text transfers are noticed.
 const MAGIC: [u8; 7] = *b"\x8bfewb\r\n";
 /// The version of the format.
-pub(crate) const VERSION: u8 = 1;
+pub(crate) const VERSION: u8 = 2;
 /// No header is longer: 4096 columns with names and units.
 pub(crate) const MAX_HEADER: usize = 1 << 24;
+
+/// The start of a column is no longer.
+pub(crate) const MAX_START: usize = 32;
 
 /// The header as it is used.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +26,8 @@ pub(crate) struct Header {
     pub(crate) step: i64,
     /// For columns with a share: the bound of blocks that have none of their own; 0 means lossless.
     pub(crate) share_bounds: Vec<f64>,
+    /// What blocks of each column begin with, if they have no bound of their own.
+    starts: Vec<Option<Start>>,
     /// The header's checksum. The checksums of all blocks begin with it, so a block of another recording is refused.
     pub(crate) check: u32,
 }
@@ -38,16 +44,37 @@ impl Header {
             },
             TimeBase::Clock { tolerance, .. } => Grid::of(ticks, schema.rows_per_block, tolerance),
         };
-        let mut header = Self {
+        let header = Self {
+            starts: vec![None; schema.columns.len()],
             schema,
             origin: grid.origin,
             step: grid.step,
-            share_bounds,
+            share_bounds: share_bounds.into_iter().map(rounded_down).collect(),
             check: 0,
         };
-        let bytes = header.to_bytes();
-        header.check = bytes.last_chunk::<4>().map_or(0, |check| u32::from_le_bytes(*check));
-        header
+        header.checked()
+    }
+
+    /// The same header with starts of columns like these.
+    pub(crate) fn with_starts(mut self, columns: &[Vec<Option<f64>>]) -> Self {
+        let start = |(column, cells): (usize, &Vec<Option<f64>>)| {
+            let finite: Vec<f64> = cells.iter().flatten().copied().filter(|x| x.is_finite()).collect();
+            let start = adaptive::start(&finite, &self.target(column, None))?;
+            (start.to_bytes().len() <= MAX_START).then_some(start)
+        };
+        self.starts = columns.iter().enumerate().map(start).collect();
+        self.checked()
+    }
+
+    fn checked(mut self) -> Self {
+        let bytes = self.to_bytes();
+        self.check = bytes.last_chunk::<4>().map_or(0, |check| u32::from_le_bytes(*check));
+        self
+    }
+
+    /// What a block of a column begins with; blocks with a bound of their own have other indices.
+    pub(crate) fn start(&self, column: usize, own: Option<f64>) -> Option<Start> {
+        self.starts[column].filter(|_| own.is_none())
     }
 
     pub(crate) fn grid(&self) -> Grid {
@@ -90,8 +117,9 @@ impl Header {
         push_varint(&mut body, zigzag(self.origin));
         push_varint(&mut body, zigzag(self.step));
         push_varint(&mut body, self.schema.columns.len() as u64);
-        for (column, share_bound) in self.schema.columns.iter().zip(&self.share_bounds) {
-            push_column(&mut body, column, *share_bound);
+        let columns = self.schema.columns.iter().zip(&self.share_bounds).zip(&self.starts);
+        for ((column, share_bound), start) in columns {
+            push_column(&mut body, column, *share_bound, start.as_ref());
         }
         let mut bytes = MAGIC.to_vec();
         bytes.push(VERSION);
@@ -153,11 +181,12 @@ impl Header {
         let origin = body.signed().map_err(damaged)?;
         let step = body.signed().map_err(damaged)?;
         let count = body.count(body.0.len(), "number of columns").map_err(damaged)?;
-        let (mut columns, mut share_bounds) = (Vec::new(), Vec::new());
+        let (mut columns, mut share_bounds, mut starts) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..count {
-            let (column, share_bound) = read_column(&mut body)?;
+            let (column, share_bound, start) = read_column(&mut body)?;
             columns.push(column);
             share_bounds.push(share_bound);
+            starts.push(start);
         }
         body.finish().map_err(damaged)?;
         Ok(Self {
@@ -165,51 +194,95 @@ impl Header {
             origin,
             step,
             share_bounds,
+            starts,
             check,
         })
     }
 }
 
-/// Flag beside the kind of a bound: a period follows.
-const HAS_PERIOD: u8 = 0x10;
+/// The next smaller double of 12 bits of mantissa, as stored in three bytes.
+pub(crate) fn rounded_down(bound: f64) -> f64 {
+    f64::from_bits(bound.to_bits() & !0xff_ffff_ffff)
+}
 
-fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64) {
+/// Flags beside the kind of a bound: a period follows, a start follows.
+const HAS_PERIOD: u8 = 0x10;
+const HAS_START: u8 = 0x20;
+/// In place of decimals: the double itself follows.
+const DOUBLE: u8 = 0xff;
+
+/// A number that is not negative: its decimals and digits where these are exact, else its bits.
+fn push_number(body: &mut Vec<u8>, number: f64) {
+    let digits = (0_u8..).zip(TENS).find_map(|(decimals, ten)| {
+        let digits = (number * ten).round();
+        (digits < 2f64.powi(42) && digits / ten == number).then_some((decimals, digits as u64))
+    });
+    match digits {
+        Some((decimals, digits)) => {
+            body.push(decimals);
+            push_varint(body, digits);
+        }
+        None => {
+            body.push(DOUBLE);
+            body.extend(number.to_le_bytes());
+        }
+    }
+}
+
+fn read_number(body: &mut Bytes<'_>) -> Result<f64, Damage> {
+    match body.byte()? {
+        DOUBLE => body.f64(),
+        decimals => {
+            let ten = TENS
+                .get(usize::from(decimals))
+                .ok_or(Damage::Content("decimals of a number"))?;
+            Ok(body.varint()? as f64 / ten)
+        }
+    }
+}
+
+fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64, start: Option<&Start>) {
     push_text(body, &column.name);
     push_text(body, &column.unit);
-    let flag = if column.period.is_some() { HAS_PERIOD } else { 0 };
+    let flag = |given: bool, flag: u8| if given { flag } else { 0 };
+    let flags = flag(column.period.is_some(), HAS_PERIOD) | flag(start.is_some(), HAS_START);
     match column.bound {
-        Bound::Lossless => body.push(flag),
+        Bound::Lossless => body.push(flags),
         Bound::Absolute(delta) => {
-            body.push(1 | flag);
-            body.extend(delta.to_le_bytes());
+            body.push(1 | flags);
+            push_number(body, delta);
         }
         Bound::ShareOfRange(share) => {
-            body.push(2 | flag);
-            body.extend(share.to_le_bytes());
-            body.extend(share_bound.to_le_bytes());
+            body.push(2 | flags);
+            push_number(body, share);
+            body.extend_from_slice(&share_bound.to_be_bytes()[..3]);
         }
         Bound::Decimals(places) => {
-            body.push(3 | flag);
+            body.push(3 | flags);
             body.push(places);
         }
     }
     if let Some(period) = column.period {
-        body.extend(period.to_le_bytes());
+        push_number(body, period);
+    }
+    if let Some(start) = start {
+        body.extend(start.to_bytes());
     }
 }
 
-fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64), Error> {
+fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<Start>), Error> {
     let damaged = Error::Header;
     let name = body.text().map_err(damaged)?;
     let unit = body.text().map_err(damaged)?;
     let kind = body.byte().map_err(damaged)?;
     let mut share_bound = 0.0;
-    let bound = match kind & !HAS_PERIOD {
+    let bound = match kind & !(HAS_PERIOD | HAS_START) {
         0 => Bound::Lossless,
-        1 => Bound::Absolute(body.f64().map_err(damaged)?),
+        1 => Bound::Absolute(read_number(body).map_err(damaged)?),
         2 => {
-            let share = body.f64().map_err(damaged)?;
-            share_bound = body.f64().map_err(damaged)?;
+            let share = read_number(body).map_err(damaged)?;
+            let [a, b, c] = body.array().map_err(damaged)?;
+            share_bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
             if !(share_bound >= 0.0 && (2.0 * share_bound).is_finite()) {
                 return Err(damaged(Damage::Content("bound of a share")));
             }
@@ -220,7 +293,15 @@ fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64), Error> {
     };
     let mut column = Column::new(name, bound)?.with_unit(unit)?;
     if kind & HAS_PERIOD != 0 {
-        column = column.with_period(body.f64().map_err(damaged)?)?;
+        column = column.with_period(read_number(body).map_err(damaged)?)?;
     }
-    Ok((column, share_bound))
+    let mut start = None;
+    if kind & HAS_START != 0 {
+        let target = Target {
+            promise: column.promise(share_bound),
+            period: column.period,
+        };
+        start = Some(adaptive::read_start(&mut body.0, &target).map_err(damaged)?);
+    }
+    Ok((column, share_bound, start))
 }

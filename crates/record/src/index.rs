@@ -156,8 +156,28 @@ fn f32_below(value: f64) -> f32 {
     }
 }
 
-fn f32_above(value: f64) -> f32 {
-    -f32_below(-value)
+/// Bytes of a column's ends: the first ones of a big-endian `f32`.
+const SHORT: usize = 3;
+
+/// The nearest number of so many bytes that is not above.
+fn short_below(value: f64) -> f32 {
+    let near = f32_below(value).to_bits();
+    // Without its last byte a negative number is larger.
+    let cut = near & !0xff;
+    f32::from_bits(if near >> 31 == 1 && cut != near {
+        cut + 0x100
+    } else {
+        cut
+    })
+}
+
+fn short_above(value: f64) -> f32 {
+    -short_below(-value)
+}
+
+fn read_short(reader: &mut Bytes<'_>) -> Result<f64, Damage> {
+    let [a, b, c] = reader.array()?;
+    Ok(f64::from(f32::from_be_bytes([a, b, c, 0])))
 }
 
 /// Levels between a column's ends.
@@ -195,7 +215,8 @@ fn level_value(level: u8, ends: (f64, f64)) -> f64 {
 }
 
 /// The content of a segment.
-pub(crate) fn push_segment(entries: &[Entry], columns: usize) -> Vec<u8> {
+pub(crate) fn push_segment(header: &Header, entries: &[Entry]) -> Vec<u8> {
+    let columns = header.schema.columns.len();
     let mut content = Vec::new();
     push_varint(&mut content, entries.len() as u64);
     let mut scales = Vec::with_capacity(columns);
@@ -203,12 +224,12 @@ pub(crate) fn push_segment(entries: &[Entry], columns: usize) -> Vec<u8> {
         let ends = entries.iter().filter_map(|entry| entry.ends[column]);
         let all = ends.reduce(|(l, h), (low, high)| (l.min(low), h.max(high)));
         // Without values the low end is above the high one.
-        let (low, high) = all.map_or((1.0, 0.0), |(low, high)| (f32_below(low), f32_above(high)));
-        content.extend(low.to_le_bytes());
-        content.extend(high.to_le_bytes());
+        let (low, high) = all.map_or((1.0, 0.0), |(low, high)| (short_below(low), short_above(high)));
+        content.extend_from_slice(&low.to_be_bytes()[..SHORT]);
+        content.extend_from_slice(&high.to_be_bytes()[..SHORT]);
         scales.push((f64::from(low), f64::from(high)));
     }
-    let (mut last, mut before) = (0_i64, None);
+    let (mut last, mut before) = (header.origin, None);
     for entry in entries {
         let distance = entry.ticks.0.wrapping_sub(last);
         let shape = (entry.rows, distance, entry.ticks.1.wrapping_sub(entry.ticks.0));
@@ -234,16 +255,15 @@ pub(crate) fn push_segment(entries: &[Entry], columns: usize) -> Vec<u8> {
 }
 
 /// Reads what [`push_segment`] wrote.
-pub(crate) fn read_segment(content: &[u8], columns: usize) -> Result<Vec<Entry>, Damage> {
+pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>, Damage> {
+    let columns = header.schema.columns.len();
     let mut reader = Bytes(content);
     let count = reader.count(BLOCKS_PER_SEGMENT, "number of blocks")?;
     let mut scales = Vec::with_capacity(columns);
     for _ in 0..columns {
-        let low = f64::from(f32::from_le_bytes(reader.array()?));
-        let high = f64::from(f32::from_le_bytes(reader.array()?));
-        scales.push((low, high));
+        scales.push((read_short(&mut reader)?, read_short(&mut reader)?));
     }
-    let (mut entries, mut last, mut before) = (Vec::with_capacity(count), 0_i64, None);
+    let (mut entries, mut last, mut before) = (Vec::with_capacity(count), header.origin, None);
     for _ in 0..count {
         let head = reader.varint()?;
         let mut entry = Entry::damaged(head >> 1, columns);
@@ -272,17 +292,17 @@ pub(crate) fn read_segment(content: &[u8], columns: usize) -> Result<Vec<Entry>,
 }
 
 /// The footer with its trailer.
-pub(crate) fn push_footer(check: u32, segments: &[Segment]) -> Vec<u8> {
+pub(crate) fn push_footer(header: &Header, segments: &[Segment]) -> Vec<u8> {
     let mut content = Vec::new();
     push_varint(&mut content, segments.len() as u64);
     for segment in segments {
         push_varint(&mut content, segment.blocks);
         push_varint(&mut content, segment.length);
         push_varint(&mut content, segment.rows);
-        push_varint(&mut content, zigzag(segment.ticks.0));
+        push_varint(&mut content, zigzag(segment.ticks.0.wrapping_sub(header.origin)));
         push_varint(&mut content, segment.ticks.1.wrapping_sub(segment.ticks.0) as u64);
     }
-    let mut bytes = special(check, FOOTER, &content);
+    let mut bytes = special(header.check, FOOTER, &content);
     let length = bytes.len() as u32;
     bytes.extend(length.to_le_bytes());
     bytes.extend(END);
@@ -290,13 +310,13 @@ pub(crate) fn push_footer(check: u32, segments: &[Segment]) -> Vec<u8> {
 }
 
 /// Reads what [`push_footer`] wrote; the first block begins at `start`.
-pub(crate) fn read_footer(content: &[u8], start: u64) -> Result<Vec<Segment>, Damage> {
+pub(crate) fn read_footer(header: &Header, content: &[u8], start: u64) -> Result<Vec<Segment>, Damage> {
     let mut reader = Bytes(content);
     let count = reader.count(content.len(), "number of segments")?;
     let (mut segments, mut start) = (Vec::new(), start);
     for _ in 0..count {
         let (blocks, length, rows) = (reader.varint()?, reader.varint()?, reader.varint()?);
-        let first = reader.signed()?;
+        let first = header.origin.wrapping_add(reader.signed()?);
         let segment = Segment {
             start,
             blocks,
@@ -315,6 +335,7 @@ pub(crate) fn read_footer(content: &[u8], start: u64) -> Result<Vec<Segment>, Da
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::{Bound, Column, Schema, TimeBase};
 
     #[test]
     fn ends_are_outside_the_values() {
@@ -328,12 +349,15 @@ mod tests {
                 ends: vec![Some(*ends), None, Some((0.3, 0.3))],
             })
             .collect();
-        let read = read_segment(&push_segment(&entries, 3), 3).unwrap();
+        let columns = ["a", "b", "c"].map(|name| Column::new(name, Bound::Lossless).unwrap());
+        let schema = Schema::new(columns.to_vec(), TimeBase::Numbered).unwrap();
+        let header = Header::new(schema, &[3], vec![0.0; 3]);
+        let read = read_segment(&header, &push_segment(&header, &entries)).unwrap();
         for (entry, (low, high)) in read.iter().zip(values) {
             let (l, h) = entry.ends[0].unwrap();
             assert!(l <= low && h >= high, "{l} {low} {high} {h}");
             let (l, h) = entry.ends[2].unwrap();
-            assert!(l <= 0.3 && h >= 0.3 && h - l < 1e-6);
+            assert!(l <= 0.3 && h >= 0.3 && h - l < 1e-4);
             assert_eq!((entry.ends[1], entry.ticks), (None, (-5, 7)));
         }
     }

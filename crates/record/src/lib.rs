@@ -61,9 +61,9 @@ mod playback;
 mod recorder;
 mod related;
 mod resume;
-mod runs;
 mod scan;
 mod schema;
+mod specials;
 mod time;
 mod wire;
 

@@ -202,7 +202,9 @@ pub(crate) fn segments(reader: &mut (impl Read + Seek), header: &Header) -> Resu
     };
     let first = header.to_bytes().len() as u64;
     let found = match index::read_special(header, &bytes) {
-        Ok((index::FOOTER, content, whole)) if whole as u64 == length => index::read_footer(content, first).ok(),
+        Ok((index::FOOTER, content, whole)) if whole as u64 == length => {
+            index::read_footer(header, content, first).ok()
+        }
         _ => None,
     };
     Ok(found.filter(|segments| segments.last().map_or(first, Segment::end) == start))
@@ -218,9 +220,8 @@ pub(crate) fn entries(
     let Some(bytes) = read_at(reader, offset, segment.length)? else {
         return Ok(None);
     };
-    let columns = header.schema.columns.len();
     let found = match index::read_special(header, &bytes) {
-        Ok((index::SEGMENT, content, _)) => index::read_segment(content, columns).ok(),
+        Ok((index::SEGMENT, content, _)) => index::read_segment(header, content).ok(),
         _ => None,
     };
     let total = |entries: &Vec<Entry>| {

@@ -3,7 +3,7 @@
 use crate::block::{self, Cells};
 use crate::bound::Bound;
 use crate::error::Error;
-use crate::header::Header;
+use crate::header::{Header, rounded_down};
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::resume;
 use crate::schema::{Schema, TimeBase};
@@ -25,8 +25,15 @@ pub(crate) fn share_of(share: f64, range: f64) -> f64 {
 
 /// The bound that a block states itself, if the header's is much smaller.
 pub(crate) fn own_bound(bound: f64, of_header: f64) -> Option<f64> {
-    let bound = block::rounded_down(bound);
+    let bound = rounded_down(bound);
     (bound > WIDER * of_header).then_some(bound)
+}
+
+/// Whether a new header says what the blocks begin with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Starts {
+    None,
+    Learned,
 }
 
 /// Writes rows in blocks.
@@ -167,7 +174,7 @@ impl<W: Write> Recorder<W> {
         }
         self.next_tick = tick.wrapping_add(1);
         if self.ticks.len() == self.schema.rows_per_block {
-            self.write_block()?;
+            self.write_block(Starts::Learned)?;
         }
         Ok(())
     }
@@ -189,7 +196,7 @@ impl<W: Write> Recorder<W> {
             return Err(Error::Broken);
         }
         if !self.ticks.is_empty() {
-            self.write_block()?;
+            self.write_block(Starts::Learned)?;
         }
         self.writer.flush().map_err(Error::io("write"))
     }
@@ -199,11 +206,20 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// If writing fails.
     pub fn finish(mut self) -> Result<W, Error> {
-        self.flush()?;
-        self.write_header()?;
+        if self.broken {
+            return Err(Error::Broken);
+        }
+        // The only block says itself what others would share.
+        if !self.ticks.is_empty() {
+            self.write_block(Starts::None)?;
+        }
+        self.write_header(Starts::None)?;
         self.write_segment()?;
-        let check = self.header.as_ref().map_or(0, |header| header.check);
-        self.write(&index::push_footer(check, &self.segments))?;
+        let footer = self
+            .header
+            .as_ref()
+            .map(|header| index::push_footer(header, &self.segments));
+        self.write(&footer.unwrap_or_default())?;
         self.writer.flush().map_err(Error::io("write"))?;
         Ok(self.writer)
     }
@@ -217,14 +233,17 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    fn write_header(&mut self) -> Result<(), Error> {
+    fn write_header(&mut self, starts: Starts) -> Result<(), Error> {
         if self.header.is_some() {
             return Ok(());
         }
         let bounds = (0..self.columns.len())
             .map(|i| self.share_bound(i).unwrap_or(0.0))
             .collect();
-        let header = Header::new(self.schema.clone(), &self.ticks, bounds);
+        let mut header = Header::new(self.schema.clone(), &self.ticks, bounds);
+        if starts == Starts::Learned {
+            header = header.with_starts(&self.columns);
+        }
         self.write(&header.to_bytes())?;
         self.segment_start = self.offset;
         self.header = Some(header);
@@ -243,21 +262,21 @@ impl<W: Write> Recorder<W> {
         Some(share_of(share, range.unwrap_or(0.0)))
     }
 
-    fn write_block(&mut self) -> Result<(), Error> {
+    fn write_block(&mut self, starts: Starts) -> Result<(), Error> {
         for (ends, cells) in self.ends.iter_mut().zip(&self.columns) {
             for value in cells.iter().flatten().filter(|value| value.is_finite()) {
                 let (low, high) = ends.unwrap_or((*value, *value));
                 *ends = Some((low.min(*value), high.max(*value)));
             }
         }
-        self.write_header()?;
+        self.write_header(starts)?;
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
         let own: Vec<Option<f64>> = (0..self.columns.len())
             .map(|i| own_bound(self.share_bound(i)?, header.share_bounds[i]))
             .collect();
-        let (bytes, restored) = block::encode(header, &self.ticks, &self.columns, &own, self.effort)?;
+        let (bytes, restored) = block::encode(header, &self.ticks, &self.columns, &own, self.effort);
         self.write(&bytes)?;
         self.entries.push(Entry::of(bytes.len() as u64, &self.ticks, &restored));
         self.ticks.clear();
@@ -272,9 +291,11 @@ impl<W: Write> Recorder<W> {
         if self.entries.is_empty() {
             return Ok(());
         }
-        let check = self.header.as_ref().map_or(0, |header| header.check);
-        let content = index::push_segment(&self.entries, self.columns.len());
-        let bytes = index::special(check, index::SEGMENT, &content);
+        let Some(header) = &self.header else {
+            return Err(Error::Broken);
+        };
+        let content = index::push_segment(header, &self.entries);
+        let bytes = index::special(header.check, index::SEGMENT, &content);
         self.write(&bytes)?;
         let segment = Segment::new(self.segment_start, bytes.len() as u64, &self.entries);
         self.segment_start = segment.end();

@@ -110,8 +110,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
 }
 
 fn index_agrees(header: &Header, bytes: &[u8], entries: &[Entry]) -> bool {
-    let columns = header.schema.columns.len();
-    let read = index::read_special(header, bytes).and_then(|(_, content, _)| index::read_segment(content, columns));
+    let read = index::read_special(header, bytes).and_then(|(_, content, _)| index::read_segment(header, content));
     read.is_ok_and(|read| {
         read.len() == entries.len()
             && read

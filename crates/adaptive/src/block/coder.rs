@@ -7,16 +7,21 @@
 use fewbits_core::CodecError;
 
 /// Bits of a probability.
-pub(super) const BITS: u32 = 16;
+const BITS: u32 = 16;
 /// An even probability.
 const EVEN: u32 = 1 << (BITS - 1);
 /// Decoders read at most this many bytes beyond the end: what the interval still holds.
 const AHEAD: usize = 8;
 
 /// Either end of the channel: a writer takes the bit that is given, a reader ignores it and returns the bit that was written.
-pub(super) trait Coder {
+pub trait Coder {
     /// Codes one decision; `one` is the probability of `true` in units of `2^-16`, in `1..2^16`.
     fn bit(&mut self, one: u32, bit: bool) -> bool;
+
+    /// Whether more was read than any writer would have left to be read.
+    fn overran(&self) -> bool {
+        false
+    }
 
     /// `width` bits of `value` without a model, the highest first.
     fn raw(&mut self, value: u64, width: u32) -> u64 {
@@ -75,21 +80,22 @@ impl Interval {
 
 /// Writes decisions as bytes.
 #[derive(Debug)]
-pub(super) struct Writer {
+pub struct Writer {
     interval: Interval,
     bytes: Vec<u8>,
 }
 
 impl Writer {
     /// Appends to `bytes`.
-    pub(super) fn new(bytes: Vec<u8>) -> Self {
+    pub fn new(bytes: Vec<u8>) -> Self {
         Self {
             interval: Interval::WHOLE,
             bytes,
         }
     }
 
-    pub(super) fn finish(mut self) -> Vec<u8> {
+    /// The bytes with the shortest end.
+    pub fn finish(mut self) -> Vec<u8> {
         let (end, count) = self.interval.end();
         self.bytes.extend_from_slice(&end.to_be_bytes()[..count]);
         self.bytes
@@ -111,7 +117,7 @@ impl Coder for Writer {
 
 /// Reads what a [`Writer`] wrote; behind the end it reads zeros, and [`finish`](Self::finish) tells.
 #[derive(Debug)]
-pub(super) struct Reader<'a> {
+pub struct Reader<'a> {
     interval: Interval,
     window: u64,
     bytes: &'a [u8],
@@ -120,7 +126,8 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
+    /// Reads all of these bytes.
+    pub fn new(bytes: &'a [u8]) -> Self {
         let mut reader = Self {
             interval: Interval::WHOLE,
             window: 0,
@@ -138,14 +145,11 @@ impl<'a> Reader<'a> {
         self.taken += 1;
     }
 
-    /// Whether more was read than any writer would have left to be read.
-    pub(super) fn overran(&self) -> bool {
-        self.taken > self.bytes.len() + AHEAD
-    }
-
+    /// Checks that the decisions read are all that was written.
+    ///
     /// # Errors
     /// If the bytes are more, fewer or others than a writer of the decisions read would have ended with.
-    pub(super) fn finish(&self) -> Result<(), CodecError> {
+    pub fn finish(&self) -> Result<(), CodecError> {
         let (end, count) = self.interval.end();
         let settled = self.taken - AHEAD;
         let tail = self.bytes.get(settled..).unwrap_or_default();
@@ -171,6 +175,11 @@ impl Coder for Reader<'_> {
             self.take();
         }
         bit
+    }
+
+    #[inline(always)]
+    fn overran(&self) -> bool {
+        self.taken > self.bytes.len() + AHEAD
     }
 }
 

@@ -111,6 +111,10 @@ impl Counts {
         second < first
     }
 
+    pub(super) fn last(&self) -> i64 {
+        self.last
+    }
+
     /// Codes the next index: `wanted` at the writer, `None` at the reader.
     #[inline(always)]
     pub(super) fn code<C: Coder>(&mut self, coder: &mut C, wanted: Option<i64>) -> Result<i64, CodecError> {
@@ -161,7 +165,7 @@ impl Counts {
 }
 
 /// Elias gamma code of a number above zero.
-fn gamma<C: Coder>(coder: &mut C, value: u64) -> Result<u64, CodecError> {
+pub(super) fn gamma<C: Coder>(coder: &mut C, value: u64) -> Result<u64, CodecError> {
     let wanted = 63 - value.max(1).leading_zeros();
     let mut bits = 0;
     while coder.bit(1 << 15, bits < wanted) {

@@ -86,6 +86,20 @@ impl Grid {
         }
     }
 
+    /// Whether the points are as dense, wherever they begin.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Line { .. }, Self::Line { .. }) => true,
+            (
+                Self::Stepped { decimals, unit, .. },
+                Self::Stepped {
+                    decimals: d, unit: u, ..
+                },
+            ) => (decimals, unit) == (d, u),
+            _ => self == other,
+        }
+    }
+
     /// Points of the circle.
     pub(super) fn cells(&self) -> Option<i64> {
         match self {

@@ -69,6 +69,53 @@ fn read_first(reader: &mut Reader<'_>) -> Result<i64, CodecError> {
     Ok(first)
 }
 
+/// Room is made for so many rows before any is read: a damaged number of rows must not exhaust the memory.
+const EXPECTED_ROWS: usize = 4096;
+
+/// The indices behind the first one: `wanted` at the writer, `None` at the reader, which stops where the bytes end too early. Returns all.
+pub(super) fn code_models<C: Coder>(
+    coder: &mut C,
+    model: &mut Model,
+    wanted: Option<&[i64]>,
+    rows: usize,
+    others: Option<&Others<'_>>,
+) -> Result<Vec<i64>, CodecError> {
+    let mut indices = Vec::with_capacity(rows.min(EXPECTED_ROWS));
+    indices.push(model.last());
+    vectorised(
+        #[inline(always)]
+        || {
+            for row in 1..rows {
+                let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
+                indices.push(model.code(coder, wanted.map(|wanted| wanted[row]), steps)?);
+                if coder.overran() {
+                    break;
+                }
+            }
+            Ok::<(), CodecError>(())
+        },
+    )?;
+    Ok(indices)
+}
+
+/// As [`code_models`], by counts.
+pub(super) fn code_counts<C: Coder>(
+    coder: &mut C,
+    counts: &mut Counts,
+    wanted: Option<&[i64]>,
+    rows: usize,
+) -> Result<Vec<i64>, CodecError> {
+    let mut indices = Vec::with_capacity(rows.min(EXPECTED_ROWS));
+    indices.push(counts.last());
+    for row in 1..rows {
+        indices.push(counts.code(coder, wanted.map(|wanted| wanted[row]))?);
+        if coder.overran() {
+            break;
+        }
+    }
+    Ok(indices)
+}
+
 pub(super) fn with_models(
     grid: &Grid,
     indices: &[i64],
@@ -80,16 +127,7 @@ pub(super) fn with_models(
     let mut writer = Writer::new(bytes);
     let first = write_first(&mut writer, indices);
     let mut model = Model::new(indices.len(), first, grid.cells(), others.is_some());
-    vectorised(
-        #[inline(always)]
-        || {
-            for (row, index) in indices.iter().enumerate().skip(1) {
-                let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-                model.code(&mut writer, Some(*index), steps)?;
-            }
-            Ok::<(), CodecError>(())
-        },
-    )?;
+    code_models(&mut writer, &mut model, Some(indices), indices.len(), others)?;
     Ok(writer.finish())
 }
 
@@ -101,21 +139,8 @@ pub(super) fn read_models(
 ) -> Result<Vec<i64>, CodecError> {
     let mut reader = Reader::new(bytes);
     let first = read_first(&mut reader)?;
-    let mut indices = vec![first];
     let mut model = Model::new(rows, first, grid.cells(), others.is_some());
-    vectorised(
-        #[inline(always)]
-        || {
-            for row in 1..rows {
-                let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-                indices.push(model.code(&mut reader, None, steps)?);
-                if reader.overran() {
-                    break;
-                }
-            }
-            Ok::<(), CodecError>(())
-        },
-    )?;
+    let indices = code_models(&mut reader, &mut model, None, rows, others)?;
     reader.finish()?;
     Ok(indices)
 }
@@ -127,10 +152,7 @@ pub(super) fn with_counts(grid: &Grid, indices: &[i64], exceptions: &[(usize, f6
     let first = write_first(&mut writer, indices);
     let second = Counts::prefers_second(indices);
     writer.raw(u64::from(second), 1);
-    let mut counts = Counts::new(first, second);
-    for index in indices.iter().skip(1) {
-        counts.code(&mut writer, Some(*index))?;
-    }
+    code_counts(&mut writer, &mut Counts::new(first, second), Some(indices), indices.len())?;
     Ok(writer.finish())
 }
 
@@ -138,13 +160,7 @@ pub(super) fn read_counts(bytes: &[u8], rows: usize) -> Result<Vec<i64>, CodecEr
     let mut reader = Reader::new(bytes);
     let first = read_first(&mut reader)?;
     let mut counts = Counts::new(first, reader.raw(0, 1) == 1);
-    let mut indices = vec![first];
-    for _ in 1..rows {
-        indices.push(counts.code(&mut reader, None)?);
-        if reader.overran() {
-            break;
-        }
-    }
+    let indices = code_counts(&mut reader, &mut counts, None, rows)?;
     reader.finish()?;
     Ok(indices)
 }

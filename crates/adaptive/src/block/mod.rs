@@ -29,7 +29,7 @@
 //! There is no checksum, no length and no number of rows: a container holds all three. An arithmetic code has no redundancy: most
 //! truncated or damaged blocks decode to wrong samples. Trailing bytes are refused.
 
-mod coder;
+pub mod coder;
 mod counts;
 mod experts;
 mod filters;
@@ -39,6 +39,7 @@ mod indices;
 mod mixer;
 mod model;
 mod priors;
+mod start;
 
 use crate::{Config, Error};
 use fewbits_core::CodecError;
@@ -48,6 +49,7 @@ use grid::{Bytes, DECIMALS, Grid, unzigzag};
 use head::{CIRCLE, Coding, Head, LINE, SAMPLES, invalid, write_head};
 pub use indices::JOINT_COLUMNS;
 use indices::{Others, from_pco_bytes, raw_samples, read_counts, read_models, smallest_pco, with_counts, with_models};
+pub use start::{Start, StartedBlock};
 
 /// Rows from which an anchor of eight bytes is worth it.
 const ANCHORED_ROWS: usize = 1024;
@@ -278,6 +280,30 @@ impl BlockCodec {
         (indices.into_iter().map(|index| index.unwrap_or(first)).collect(), exceptions)
     }
 
+    /// The grid of samples of so many decimals; the steps are read if there are any.
+    fn decimal_grid(&self, decimals: u8, stepped: bool, bytes: &mut Bytes<'_>) -> Result<Grid, CodecError> {
+        if stepped {
+            return Ok(Grid::Stepped {
+                decimals,
+                unit: match i64::try_from(bytes.varint()?) {
+                    Ok(unit @ 1..) => unit,
+                    _ => return Err(invalid("unit", "too large", "1 to 2^63")),
+                },
+                origin: unzigzag(bytes.varint()?),
+            });
+        }
+        let width = Grid::width(self.delta(), fewbits_node::adaptive::TENS[usize::from(decimals)]);
+        let width = width.ok_or_else(|| invalid("decimals", decimals, "a grid not finer than the samples"))?;
+        Ok(Grid::Decimal { decimals, width })
+    }
+
+    fn circle(&self, config: &Config) -> Result<Grid, CodecError> {
+        match config.period() {
+            Some(period) => Ok(Grid::circle(config, period)),
+            None => Err(invalid("grid", "circle", "the grid of a line")),
+        }
+    }
+
     fn read_head(&self, bytes: &mut Bytes<'_>, rows: usize) -> Result<Head, CodecError> {
         let [head] = bytes.array()?;
         let kind = head & 15;
@@ -294,19 +320,7 @@ impl BlockCodec {
         }
         let grid = match (kind, self.accuracy) {
             (SAMPLES, _) => None,
-            (decimals @ 0..DECIMALS, _) if second & 2 == 0 => {
-                let width = Grid::width(self.delta(), fewbits_node::adaptive::TENS[usize::from(decimals)]);
-                let width = width.ok_or_else(|| invalid("decimals", decimals, "a grid not finer than the samples"))?;
-                Some(Grid::Decimal { decimals, width })
-            }
-            (decimals @ 0..DECIMALS, _) => Some(Grid::Stepped {
-                decimals,
-                unit: match i64::try_from(bytes.varint()?) {
-                    Ok(unit @ 1..) => unit,
-                    _ => return Err(invalid("unit", "too large", "1 to 2^63")),
-                },
-                origin: unzigzag(bytes.varint()?),
-            }),
+            (decimals @ 0..DECIMALS, _) => Some(self.decimal_grid(decimals, second & 2 != 0, bytes)?),
             (LINE, Accuracy::Within(config)) => {
                 let anchor = if second & 4 == 0 {
                     0.0
@@ -318,10 +332,7 @@ impl BlockCodec {
                 }
                 Some(Grid::line(config.delta(), anchor))
             }
-            (CIRCLE, Accuracy::Within(config)) => match config.period() {
-                Some(period) => Some(Grid::circle(&config, period)),
-                None => return Err(invalid("grid", "circle", "the grid of a line")),
-            },
+            (CIRCLE, Accuracy::Within(config)) => Some(self.circle(&config)?),
             _ => return Err(invalid("grid", kind, "one of the agreed accuracy")),
         };
         let mut exceptions = Vec::new();

@@ -109,6 +109,10 @@ impl Model {
         }
     }
 
+    pub(super) fn last(&self) -> i64 {
+        self.last
+    }
+
     /// Codes the next index: `wanted` at the writer, `None` at the reader. `others`: differences of other columns. For loops under
     /// [`vectorised`](fewbits_numerics::kernels::vectorised).
     #[inline(always)]

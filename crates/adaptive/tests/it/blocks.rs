@@ -31,6 +31,17 @@ fn check(config: Config, samples: &[f64]) -> usize {
             }
         }
         size = size.max(bytes.len());
+        // The same samples behind a start that some others taught.
+        let some = &samples[..samples.len().min(40)];
+        if let Some(start) = codec.start(some) {
+            let started = codec.encode_from(&start, samples, &[]).unwrap();
+            let again = codec.read_start(&mut start.to_bytes().as_slice()).unwrap();
+            let read = codec.decode_from(&again, &started.bytes, samples.len(), &[]).unwrap();
+            for (value, sample) in read.iter().zip(samples) {
+                let exact = value.to_bits() == sample.to_bits();
+                assert!(exact || distance(&config, *value, *sample) <= config.delta(), "{sample}: {value}");
+            }
+        }
     }
     size
 }
@@ -182,5 +193,53 @@ fn blocks_are_the_same_bytes_everywhere() {
             .iter()
             .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
         assert_eq!((bytes.len(), digest), expected, "{effort:?}");
+    }
+}
+
+/// Blocks of rows of one signal share grid and usual index: each is some bytes shorter, and the start pays from a few blocks on.
+#[test]
+fn a_start_shortens_every_block() {
+    let samples: Vec<f64> = mixed(7, 4096).iter().map(|x| (100.0 * x).round() / 100.0).collect();
+    for (codec, what) in [
+        (BlockCodec::new(Config::new(0.5).unwrap()), "within"),
+        (BlockCodec::lossless(), "lossless"),
+    ] {
+        let start = codec.start(&samples[..128]).unwrap();
+        let (mut alone, mut started) = (0, start.to_bytes().len());
+        for block in samples.chunks(128) {
+            alone += codec.encode(block).unwrap().len();
+            started += codec.encode_from(&start, block, &[]).unwrap().bytes.len();
+        }
+        assert!(started < alone, "{what}: {started} behind a start, {alone} alone");
+    }
+}
+
+/// Any bytes are a start or an error, and any bytes behind one are samples or an error.
+#[test]
+fn starts_and_what_follows_them_are_total() {
+    let codec = BlockCodec::new(Config::new(0.01).unwrap());
+    let samples: Vec<f64> = (0..100).map(|n| f64::from(n % 17) * 0.25).collect();
+    let start = codec.start(&samples).unwrap();
+    let block = codec.encode_from(&start, &samples, &[]).unwrap().bytes;
+    for at in 0..block.len() {
+        for value in [0, 1, 0x7f, 0x80, 0xff] {
+            let mut damaged = block.clone();
+            damaged[at] = value;
+            let _ = codec.decode_from(&start, &damaged, samples.len(), &[]);
+            assert!(codec.decode_from(&start, &damaged, usize::MAX, &[]).is_err());
+            let _ = codec.decode_from(&start, &block[..at], samples.len(), &[]);
+        }
+    }
+    let bytes = start.to_bytes();
+    for at in 0..bytes.len() {
+        for value in 0..=u8::MAX {
+            let mut damaged = bytes.clone();
+            damaged[at] = value;
+            if let Ok(start) = codec.read_start(&mut damaged.as_slice()) {
+                let _ = codec.decode_from(&start, &block, samples.len(), &[]);
+                let _ = codec.encode_from(&start, &samples, &[]).unwrap();
+            }
+        }
+        assert!(codec.read_start(&mut &bytes[..at]).is_err());
     }
 }

@@ -3,7 +3,8 @@
 use super::Target;
 use crate::bound::{Promise, TENS};
 use crate::error::Damage;
-use fewbits_adaptive::{BlockCodec, Config, Effort};
+use fewbits_adaptive::{BlockCodec, Config, Effort, Start};
+use std::borrow::Cow;
 
 /// The codec of a promise. Decimals are rounded before, and then return exactly.
 fn codec(target: &Target) -> Option<BlockCodec> {
@@ -31,25 +32,55 @@ fn rounded(sample: f64, places: u8) -> f64 {
     }
 }
 
-pub(super) fn encode(samples: &[f64], target: &Target, others: &[&[f64]], effort: Effort) -> Option<Vec<u8>> {
-    let codec = codec(target)?.with_effort(effort);
+/// The samples as the codec gets them.
+fn prepared<'a>(samples: &'a [f64], target: &Target) -> Cow<'a, [f64]> {
     match target.promise {
-        Promise::Decimals(places) => {
-            let decimals: Vec<f64> = samples.iter().map(|sample| rounded(*sample, places)).collect();
-            codec.encode_with(&decimals, others).ok()
-        }
-        _ => codec.encode_with(samples, others).ok(),
+        Promise::Decimals(places) => samples.iter().map(|sample| rounded(*sample, places)).collect(),
+        _ => Cow::Borrowed(samples),
     }
 }
 
-/// Whether the bytes were predicted from other columns: bit 6 of a block's first byte.
-pub(super) fn uses_others(bytes: &[u8]) -> bool {
-    bytes.first().is_some_and(|head| head & 0x40 != 0)
+/// What blocks of a column with samples like these may begin with.
+pub(crate) fn start(samples: &[f64], target: &Target) -> Option<Start> {
+    codec(target)?.start(&prepared(samples, target))
 }
 
-pub(super) fn decode(bytes: &[u8], count: usize, target: &Target, others: &[&[f64]]) -> Result<Vec<f64>, Damage> {
+pub(crate) fn read_start(bytes: &mut &[u8], target: &Target) -> Result<Start, Damage> {
+    let start = codec(target).and_then(|codec| codec.read_start(bytes).ok());
+    start.ok_or(Damage::Content("start of blocks"))
+}
+
+/// The bytes, and whether they are predicted from other columns.
+pub(super) fn encode(
+    samples: &[f64],
+    target: &Target,
+    start: Option<&Start>,
+    others: &[&[f64]],
+    effort: Effort,
+) -> Option<(Vec<u8>, bool)> {
+    let codec = codec(target)?.with_effort(effort);
+    let samples = prepared(samples, target);
+    if let Some(start) = start {
+        let block = codec.encode_from(start, &samples, others).ok()?;
+        return Some((block.bytes, block.joint));
+    }
+    let bytes = codec.encode_with(&samples, others).ok()?;
+    // Bit 6 of a block's first byte.
+    let joint = bytes.first().is_some_and(|head| head & 0x40 != 0);
+    Some((bytes, joint))
+}
+
+pub(super) fn decode(
+    bytes: &[u8],
+    count: usize,
+    target: &Target,
+    start: Option<&Start>,
+    others: &[&[f64]],
+) -> Result<Vec<f64>, Damage> {
     let codec = codec(target).ok_or(Damage::Content("bound"))?;
-    codec
-        .decode_with(bytes, count, others)
-        .map_err(|_| Damage::Content("adaptive block"))
+    let values = match start {
+        Some(start) => codec.decode_from(start, bytes, count, others),
+        None => codec.decode_with(bytes, count, others),
+    };
+    values.map_err(|_| Damage::Content("adaptive block"))
 }

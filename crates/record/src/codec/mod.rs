@@ -9,12 +9,12 @@
 //! | 1 | the first bytes of one double, highest first | all samples alike within the promise |
 //! | 2 | a block of `fewbits-adaptive` | everything else |
 
-mod adaptive;
+pub(crate) mod adaptive;
 mod plain;
 
 use crate::bound::Promise;
 use crate::error::Damage;
-use fewbits_adaptive::Effort;
+use fewbits_adaptive::{Effort, Start};
 
 pub(crate) use fewbits_adaptive::JOINT_COLUMNS;
 
@@ -68,13 +68,20 @@ const REPAIR_BYTES: usize = 10;
 
 impl Coded {
     /// Decodes what was coded and compares it with the samples; `None` if it does not decode.
-    fn verified(id: CodecId, bytes: Vec<u8>, samples: &[f64], target: &Target, others: &[&[f64]]) -> Option<Self> {
-        let restored = decode(id, &bytes, samples.len(), target, others).ok()?;
+    fn verified(
+        id: CodecId,
+        bytes: Vec<u8>,
+        samples: &[f64],
+        target: &Target,
+        start: Option<&Start>,
+        others: &[&[f64]],
+    ) -> Option<Self> {
+        let restored = decode(id, &bytes, samples.len(), target, start, others).ok()?;
         let pairs = samples.iter().zip(&restored);
         let broken = pairs.filter(|(sample, value)| !target.holds(**sample, **value)).count();
         Some(Self {
             id,
-            uses_others: id == CodecId::Adaptive && adaptive::uses_others(&bytes),
+            uses_others: !others.is_empty(),
             bytes,
             restored,
             broken,
@@ -88,10 +95,16 @@ impl Coded {
 
 /// A small code of the samples, all finite. It was decoded once, so that what it restores is known.
 ///
-/// `others`: the same rows of other columns, as a reader will have restored them; NaN where they have no value.
-pub(crate) fn encode(samples: &[f64], target: &Target, others: &[&[f64]], effort: Effort) -> Coded {
+/// `start`: what the header says of the column's blocks. `others`: the same rows of other columns, as a reader will have restored them; NaN where they have no value.
+pub(crate) fn encode(
+    samples: &[f64],
+    target: &Target,
+    start: Option<&Start>,
+    others: &[&[f64]],
+    effort: Effort,
+) -> Coded {
     let constant = plain::constant(samples, target)
-        .and_then(|bytes| Coded::verified(CodecId::Constant, bytes, samples, target, &[]))
+        .and_then(|bytes| Coded::verified(CodecId::Constant, bytes, samples, target, None, &[]))
         .filter(|coded| coded.broken == 0);
     let raw = || Coded {
         id: CodecId::Raw,
@@ -101,8 +114,11 @@ pub(crate) fn encode(samples: &[f64], target: &Target, others: &[&[f64]], effort
         uses_others: false,
     };
     constant.unwrap_or_else(|| {
-        adaptive::encode(samples, target, others, effort)
-            .and_then(|bytes| Coded::verified(CodecId::Adaptive, bytes, samples, target, others))
+        adaptive::encode(samples, target, start, others, effort)
+            .and_then(|(bytes, joint)| {
+                let others = if joint { others } else { &[] };
+                Coded::verified(CodecId::Adaptive, bytes, samples, target, start, others)
+            })
             .filter(|coded| coded.cost() < 8 * samples.len())
             .unwrap_or_else(raw)
     })
@@ -117,12 +133,13 @@ pub(crate) fn decode(
     bytes: &[u8],
     count: usize,
     target: &Target,
+    start: Option<&Start>,
     others: &[&[f64]],
 ) -> Result<Vec<f64>, Damage> {
     let values = match id {
         CodecId::Raw => plain::decode_raw(bytes, count),
         CodecId::Constant => plain::decode_constant(bytes, count),
-        CodecId::Adaptive => adaptive::decode(bytes, count, target, others),
+        CodecId::Adaptive => adaptive::decode(bytes, count, target, start, others),
     }?;
     if values.iter().all(|value| value.is_finite()) {
         Ok(values)

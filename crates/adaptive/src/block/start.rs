@@ -1,0 +1,206 @@
+//! What the blocks of one column have in common, told once: their grid, and where their first indices are.
+//!
+//! A container keeps a [`Start`] where every reader has it. A block that begins with it has no head and a short first index; it is one
+//! arithmetic code:
+//!
+//! ```text
+//! with this start (255 of 256; otherwise the byte ff and a block of its own follow)   models (15 of 16) or counts
+//! first index less the usual one: zigzag, its high bits by an Elias gamma code, k low bits   decisions as in other blocks
+//! ```
+//!
+//! The start itself: grid (byte: decimals, or 13 line, 14 circle, 16 more if steps follow), steps (unit and origin as in blocks), usual index
+//! (zigzag varint), `k` (byte).
+
+use super::coder::{Coder, Reader, Writer};
+use super::counts::{Counts, gamma};
+use super::grid::{Bytes, DECIMALS, Grid, push_varint, unzigzag, zigzag};
+use super::head::{CIRCLE, LINE, invalid};
+use super::indices::{Others, code_counts, code_models};
+use super::model::{LARGEST, Model};
+use super::{Accuracy, BlockCodec, Effort, check_rows};
+use crate::Error;
+use fewbits_core::CodecError;
+
+/// Probabilities in units of `2^-16` that a block begins with the start, and that models code it.
+const WITH_START: u32 = 65_280;
+const BY_MODELS: u32 = 61_440;
+/// The first byte of a block of its own: no code that begins with a decision of `WITH_START` begins with it.
+const ALONE: u8 = 255;
+/// Flag beside the grid: steps follow.
+const STEPPED: u8 = 16;
+/// Indices are smaller than `2^47` in zigzag form.
+const MOST_BITS: u8 = 47;
+
+/// What blocks of one column and one accuracy begin with; made by [`BlockCodec::start`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    grid: Grid,
+    /// First indices are expected about this one, in cells of `2^k`.
+    usual: i64,
+    k: u8,
+}
+
+/// A block that began with a [`Start`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StartedBlock {
+    /// The block.
+    pub bytes: Vec<u8>,
+    /// Whether the other columns are needed to decode it; otherwise none must be given.
+    pub joint: bool,
+}
+
+impl Start {
+    /// The bytes that [`BlockCodec::read_start`] reads.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = vec![match self.grid {
+            Grid::Decimal { decimals, .. } => decimals,
+            Grid::Stepped { decimals, .. } => decimals | STEPPED,
+            Grid::Line { .. } => LINE,
+            Grid::Circle { .. } => CIRCLE,
+        }];
+        self.grid.write(&mut bytes);
+        push_varint(&mut bytes, zigzag(self.usual));
+        bytes.push(self.k);
+        bytes
+    }
+
+    fn first_index<C: Coder>(&self, coder: &mut C, wanted: Option<i64>) -> Result<i64, CodecError> {
+        let k = u32::from(self.k);
+        let z = wanted.map_or(0, |index| zigzag(index - self.usual));
+        let high = gamma(coder, (z >> k) + 1)? - 1;
+        let low = coder.raw(z & ((1 << k) - 1), k);
+        let offset = high.checked_mul(1 << k).map(|high| unzigzag(high | low));
+        match offset.and_then(|offset| offset.checked_add(self.usual)) {
+            Some(index) if index.unsigned_abs() <= LARGEST as u64 => Ok(index),
+            _ => Err(invalid("first index", "too large", "at most 2^46 in size")),
+        }
+    }
+}
+
+impl BlockCodec {
+    /// What blocks of samples like these may begin with; `None` where no grid holds them.
+    pub fn start(&self, samples: &[f64]) -> Option<Start> {
+        let grid = match self.grid(samples)? {
+            Grid::Line { step, .. } => Grid::Line { anchor: 0.0, step },
+            grid => grid,
+        };
+        let (mut indices, _) = self.indices(&grid, samples);
+        indices.sort_unstable();
+        let usual = indices[indices.len() / 2];
+        let sizes: u128 = indices.iter().map(|index| u128::from(zigzag(index - usual))).sum();
+        let mean = (sizes / indices.len() as u128) as u64;
+        Some(match grid.cells() {
+            // Around the circle any is as likely.
+            Some(cells) => Start {
+                grid,
+                usual: 0,
+                k: cells.ilog2() as u8,
+            },
+            None => Start {
+                grid,
+                usual,
+                k: (u64::BITS - mean.leading_zeros()).min(u32::from(MOST_BITS)) as u8,
+            },
+        })
+    }
+
+    /// Takes the bytes of [`Start::to_bytes`] of a codec of the same accuracy from the front.
+    ///
+    /// # Errors
+    /// If they are none.
+    pub fn read_start(&self, bytes: &mut &[u8]) -> Result<Start, Error> {
+        let mut reader = Bytes(bytes);
+        let [kind] = reader.array()?;
+        let grid = match (kind & !STEPPED, self.accuracy) {
+            (0..DECIMALS, _) => self.decimal_grid(kind & !STEPPED, kind & STEPPED != 0, &mut reader)?,
+            (LINE, Accuracy::Within(config)) if kind == LINE => Grid::line(config.delta(), 0.0),
+            (CIRCLE, Accuracy::Within(config)) if kind == CIRCLE => self.circle(&config)?,
+            _ => return Err(invalid("grid", kind, "one of the agreed accuracy").into()),
+        };
+        let usual = unzigzag(reader.varint()?);
+        let [k] = reader.array()?;
+        if usual.unsigned_abs() > LARGEST as u64 || k > MOST_BITS {
+            return Err(invalid("usual index", usual, "at most 2^46 in size").into());
+        }
+        *bytes = reader.0;
+        Ok(Start { grid, usual, k })
+    }
+
+    /// As [`encode_with`](Self::encode_with), for a reader that has the start of a codec of the same accuracy.
+    ///
+    /// # Errors
+    /// As [`encode_with`](Self::encode_with).
+    pub fn encode_from(&self, start: &Start, samples: &[f64], others: &[&[f64]]) -> Result<StartedBlock, Error> {
+        check_rows(samples.len(), others)?;
+        let mut found: Vec<StartedBlock> = Vec::new();
+        let (indices, exceptions) = self.indices(&start.grid, samples);
+        if exceptions.is_empty() && !samples.is_empty() {
+            found.push(self.from_start(start, &indices, None)?);
+            if self.effort == Effort::Thorough && !others.is_empty() {
+                found.push(self.from_start(start, &indices, Some(&Others::new(others)))?);
+            }
+        }
+        let is_fine = found
+            .first()
+            .is_none_or(|block| block.bytes.len() > super::FINE * samples.len() / 8);
+        if is_fine || !self.grid(samples).is_some_and(|grid| grid.is_like(&start.grid)) {
+            let alone = self.encode_with(samples, others)?;
+            found.push(StartedBlock {
+                joint: alone.first().is_some_and(|head| head & 64 != 0),
+                bytes: [&[ALONE], alone.as_slice()].concat(),
+            });
+        }
+        let shortest = found.into_iter().min_by_key(|block| block.bytes.len());
+        shortest.ok_or_else(|| invalid("block", "none", "a coding that holds the samples").into())
+    }
+
+    fn from_start(
+        &self,
+        start: &Start,
+        indices: &[i64],
+        others: Option<&Others<'_>>,
+    ) -> Result<StartedBlock, CodecError> {
+        let mut writer = Writer::new(Vec::with_capacity(64 + indices.len() / 2));
+        let models = self.effort == Effort::Thorough;
+        writer.bit(WITH_START, true);
+        writer.bit(BY_MODELS, models);
+        let first = start.first_index(&mut writer, indices.first().copied())?;
+        if models {
+            let mut model = Model::new(indices.len(), first, start.grid.cells(), others.is_some());
+            code_models(&mut writer, &mut model, Some(indices), indices.len(), others)?;
+        } else {
+            let second = Counts::prefers_second(indices);
+            writer.raw(u64::from(second), 1);
+            code_counts(&mut writer, &mut Counts::new(first, second), Some(indices), indices.len())?;
+        }
+        Ok(StartedBlock {
+            bytes: writer.finish(),
+            joint: others.is_some(),
+        })
+    }
+
+    /// The samples of a block of [`encode_from`](Self::encode_from) with the same start, and with the other columns if it is joint.
+    ///
+    /// # Errors
+    /// As [`decode_with`](Self::decode_with).
+    pub fn decode_from(&self, start: &Start, bytes: &[u8], rows: usize, others: &[&[f64]]) -> Result<Vec<f64>, Error> {
+        check_rows(rows, others)?;
+        if rows == 0 || bytes.first() == Some(&ALONE) {
+            return self.decode_with(bytes.get(1..).unwrap_or_default(), rows, others);
+        }
+        let others = (!others.is_empty()).then(|| Others::new(others));
+        let mut reader = Reader::new(bytes);
+        reader.bit(WITH_START, true);
+        let models = reader.bit(BY_MODELS, true);
+        let first = start.first_index(&mut reader, None)?;
+        let indices = if models {
+            let mut model = Model::new(rows, first, start.grid.cells(), others.is_some());
+            code_models(&mut reader, &mut model, None, rows, others.as_ref())?
+        } else {
+            let second = reader.raw(0, 1) == 1;
+            code_counts(&mut reader, &mut Counts::new(first, second), None, rows)?
+        };
+        reader.finish()?;
+        Ok(indices.into_iter().map(|index| start.grid.value(index)).collect())
+    }
+}
