@@ -190,20 +190,21 @@ pub(super) fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, CodecEr
 
 /// Numbers of a pco stream: as many as rows, and nothing after them.
 pub(super) fn from_pco_bytes<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, CodecError> {
-    let mut numbers = vec![T::default(); rows];
-    let mut room = numbers.as_mut_slice();
+    let mut numbers = Vec::new();
     let (file, mut rest) = FileDecompressor::new(bytes).map_err(from_pco)?;
     while let DecompressorItem::Chunk(mut chunk) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)? {
-        let count = chunk.n();
-        let (next, later) = room
-            .split_at_mut_checked(count)
-            .ok_or_else(|| from_pco(format!("{count} rows more")))?;
-        chunk.read(next).map_err(from_pco)?;
-        (room, rest) = (later, chunk.into_src());
+        let (start, count) = (numbers.len(), chunk.n());
+        if count > rows - start {
+            return Err(from_pco(format!("{count} rows more")));
+        }
+        numbers.resize(start + count, T::default());
+        chunk.read(&mut numbers[start..]).map_err(from_pco)?;
+        rest = chunk.into_src();
     }
     // The footer of pco is one byte.
-    if !room.is_empty() || rest.len() != 1 {
-        return Err(from_pco(format!("{} rows too few, {} bytes left", room.len(), rest.len())));
+    if numbers.len() != rows || rest.len() != 1 {
+        let missing = rows - numbers.len();
+        return Err(from_pco(format!("{missing} rows too few, {} bytes left", rest.len())));
     }
     Ok(numbers)
 }

@@ -115,7 +115,7 @@ pub(super) struct Mixer {
 impl Mixer {
     /// For a block of so many rows.
     pub(super) fn new(rows: usize) -> Self {
-        let size = (2 * rows).next_power_of_two().clamp(1 << 9, 1 << 14);
+        let size = (2 * rows.min(1 << 13)).next_power_of_two().max(1 << 9);
         Self {
             log_odds: &LOG_ODDS,
             slots: vec![Slot::default(); CONTEXTS * size],

@@ -130,7 +130,7 @@ fn damaged_blocks_give_the_stated_rows_or_an_error() {
             flipped[bit / 8] ^= 1 << (bit % 8);
             (flipped, 500)
         });
-        let counted = [1, 10, 499, 501, 5000].map(|rows| (bytes.clone(), rows));
+        let counted = [1, 10, 499, 501, 5000, usize::MAX].map(|rows| (bytes.clone(), rows));
         for (damaged, rows) in shortened.chain(flipped).chain(counted) {
             if let Ok(values) = codec.decode(&damaged, rows) {
                 assert_eq!(values.len(), rows);
