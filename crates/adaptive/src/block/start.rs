@@ -135,9 +135,9 @@ impl BlockCodec {
         let mut found: Vec<StartedBlock> = Vec::new();
         let (indices, exceptions) = self.indices(&start.grid, samples);
         if exceptions.is_empty() && !samples.is_empty() {
-            found.push(self.from_start(start, &indices, None)?);
+            found.push(self.started(start, &indices, None)?);
             if self.effort == Effort::Thorough && !others.is_empty() {
-                found.push(self.from_start(start, &indices, Some(&Others::new(others)))?);
+                found.push(self.started(start, &indices, Some(&Others::new(others)))?);
             }
         }
         let is_fine = found
@@ -154,12 +154,7 @@ impl BlockCodec {
         shortest.ok_or_else(|| invalid("block", "none", "a coding that holds the samples").into())
     }
 
-    fn from_start(
-        &self,
-        start: &Start,
-        indices: &[i64],
-        others: Option<&Others<'_>>,
-    ) -> Result<StartedBlock, CodecError> {
+    fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, CodecError> {
         let mut writer = Writer::new(Vec::with_capacity(64 + indices.len() / 2));
         let models = self.effort == Effort::Thorough;
         writer.bit(WITH_START, true);

@@ -6,6 +6,7 @@ use fewbits_link::{Counts, LivePage, Step};
 use fewbits_protocol::SensorHealth;
 use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::process::Command;
 use std::time::Duration;
 
 fn ask(page: &LivePage, path: &str) -> TcpStream {
@@ -26,34 +27,58 @@ fn read_until(stream: &mut TcpStream, text: &str) -> String {
     all
 }
 
+fn page() -> LivePage {
+    LivePage::serve(([127, 0, 0, 1], 0).into(), (0..SENSORS).collect(), 0.1).unwrap()
+}
+
+/// A report, a silence and a loss; the second sensor is dead.
+fn step(slot: u64) -> Step {
+    let observed = [
+        Observation::Received(BitString::from_bytes(vec![0x80], 1).unwrap()),
+        Observation::Nothing,
+        Observation::Lost,
+    ];
+    let mut step = Step::new(slot, observed.to_vec(), vec![((slot as f64 / 7.0).sin() + 1.5, 0.25)]);
+    let (working, excluded) = (0.25, false);
+    step.health = [false, true, false]
+        .map(|dead| SensorHealth {
+            working,
+            dead,
+            excluded,
+        })
+        .to_vec();
+    step
+}
+
 #[test]
 fn page_shows_past_and_coming_slots() {
-    let page = LivePage::serve(([127, 0, 0, 1], 0).into(), (0..SENSORS).collect(), 0.1).unwrap();
-    let step = |slot: u64| {
-        let observed = [
-            Observation::Received(BitString::from_bytes(vec![0x80], 1).unwrap()),
-            Observation::Nothing,
-            Observation::Lost,
-        ];
-        let mut step = Step::new(slot, observed.to_vec(), vec![(1.5, 0.25)]);
-        let (working, excluded) = (0.25, false);
-        step.health = [false, true, false]
-            .map(|dead| SensorHealth {
-                working,
-                dead,
-                excluded,
-            })
-            .to_vec();
-        step
-    };
+    let page = page();
     page.show(&step(41), Counts::default());
     let html = read_until(&mut ask(&page, "/"), "</html>");
     assert!(html.starts_with("HTTP/1.1 200") && html.contains("viewport"));
     let mut events = ask(&page, "/events");
     let past = read_until(&mut events, "}\n");
     assert!(past.contains("text/event-stream") && past.contains("\"slot\":41"), "{past}");
-    assert!(past.contains("\"observed\":[1,-1,-2]") && past.contains("[1.5,0.25]"), "{past}");
+    assert!(past.contains("\"observed\":[1,-1,-2]") && past.contains(",0.25]"), "{past}");
     assert!(past.contains("{\"working\":0.25,\"dead\":true,\"excluded\":false}"), "{past}");
     page.show(&step(42), Counts::default());
     assert!(read_until(&mut events, "}\n").contains("\"slot\":42"));
+}
+
+/// As wide as a phone. Says so and passes where Chromium is missing.
+#[test]
+fn page_is_drawn_by_a_browser() {
+    let page = page();
+    (0..60).for_each(|slot| page.show(&step(slot), Counts::default()));
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live-page.sh");
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = Command::new("bash")
+        .arg(script)
+        .arg(format!("http://{}/", page.address()))
+        .arg(folder.path().join("page.png"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&drawn.stdout);
+    eprintln!("{said}");
+    assert!(drawn.status.success() && (said.starts_with("ok") || said.starts_with("skipped")), "{drawn:?}");
 }
