@@ -1,6 +1,5 @@
 //! The live page, as a browser asks for it.
 
-use crate::world::SENSORS;
 use fewbits_core::{BitString, Observation};
 use fewbits_link::{Counts, LivePage, Step};
 use fewbits_protocol::SensorHealth;
@@ -28,7 +27,7 @@ fn read_until(stream: &mut TcpStream, text: &str) -> String {
 }
 
 fn page() -> LivePage {
-    LivePage::serve(([127, 0, 0, 1], 0).into(), (0..SENSORS).collect(), 0.1).unwrap()
+    LivePage::serve(([127, 0, 0, 1], 0).into(), (0..3).collect(), 0.1).unwrap()
 }
 
 /// A report, a silence and a loss; the second sensor is dead.
