@@ -2,7 +2,7 @@
 //!
 //! For each library crate a package is written to a temporary folder that depends on that crate alone: checked with default
 //! features and with none, then with the example of its front page and with each file in `examples` as its program, which is run. Examples
-//! that read arguments are built only. With `--git` the dependency is on a repository instead of this checkout.
+//! that read arguments are built only, those that share a file with tests are left out. With `--git` the dependency is on a repository instead of this checkout.
 
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
 use clap::Args;
@@ -122,7 +122,11 @@ fn try_crate(package: &Package, root: &Path, target: &Path, options: &Options) -
     for part in &package.targets {
         let path = part.src_path.as_std_path();
         if part.is_example() {
-            programs.push((format!("example {}", part.name), read(path)?));
+            let text = read(path)?;
+            // What shares a file with tests is no program of its own.
+            if !text.contains("#[path") {
+                programs.push((format!("example {}", part.name), text));
+            }
         } else if part.is_lib() {
             programs.extend(front_page(&read(path)?).map(|text| ("front page".to_owned(), text)));
         }
@@ -142,7 +146,14 @@ fn try_crate(package: &Package, root: &Path, target: &Path, options: &Options) -
 /// The first example of a crate's documentation as a program.
 fn front_page(library: &str) -> Option<String> {
     let mut lines = library.lines().map_while(|line| line.strip_prefix("//!"));
-    lines.find(|line| ["```", "```rust"].contains(&line.trim()))?;
+    // A block in another language ends with the fence that a program begins with.
+    loop {
+        let fence = lines.find(|line| line.trim().starts_with("```"))?;
+        if ["```", "```rust"].contains(&fence.trim()) {
+            break;
+        }
+        lines.find(|line| line.trim() == "```")?;
+    }
     let lines = lines.map(|line| line.strip_prefix(' ').unwrap_or(line));
     let shown = lines.take_while(|line| line.trim() != "```");
     let body: Vec<&str> = shown.map(|line| line.strip_prefix("# ").unwrap_or(line)).collect();
@@ -205,7 +216,7 @@ mod tests {
 
     #[test]
     fn front_pages_are_programs() {
-        let page = "//! A.\n//!\n//! ```\n//! use a::b;\n//! # Ok::<(), a::E>(())\n//! ```\n//! C.\n\nmod a;\n";
+        let page = "//! A.\n//!\n//! ```text\n//! x\n//! ```\n//! ```\n//! use a::b;\n//! # Ok::<(), a::E>(())\n//! ```\n//! C.\n\nmod a;\n";
         let program = front_page(page).unwrap();
         assert!(
             program.starts_with("fn main() {\nlet done = (|| {\nuse a::b;\nOk::<(), a::E>(())\n})();"),
