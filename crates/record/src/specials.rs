@@ -134,12 +134,10 @@ fn code<C: Coder>(
         let mut found = 0;
         for (before, column) in present.iter().enumerate() {
             let above = row.checked_sub(1).and_then(|above| all[*column][above]);
-            let left = if found == 0 {
-                0
-            } else if found == before {
-                2
-            } else {
-                1
+            let left = match found {
+                0 => 0,
+                _ if found == before => 2,
+                _ => 1,
             };
             let special = wanted.and_then(|wanted| wanted[*column][row]);
             let counts = match above {

@@ -102,8 +102,8 @@ pub(super) enum Watched {
 }
 
 impl Watched {
-    /// A report's place in its predicted law, `None` if it has none. That of bits is left to the time when all beliefs of the instant are
-    /// there: what no belief waits for is computed many at a time.
+    /// A report's place in its predicted law, `None` if it has none. The place of a bit is computed here, after the update, since no belief of the
+    /// instant depends on it.
     fn residual(&self) -> Option<Residual> {
         match self {
             Self::Bit(bit, arrives) => Residual::of_bit(bit.log_likelihood.exp() / arrives, bit.correction),
