@@ -1,16 +1,17 @@
 //! Structs whose fields say everything about themselves: what a parameter is by default, what a column is measured in.
 
-/// A struct of parameters: range (`garde`), default, after `=> quick` what `--quick` lowers it to, and meaning of a field in one
-/// place. The meaning is the field's documentation; one that is longer than a line may stand above the field instead. Ranges that speak of other fields, of `self`, need the derive where they stand:
-/// `parameters! { self #[derive(Validate)] struct ... }`.
+/// A struct of parameters: limits, default, after `=> quick` what `--quick` lowers it to, and meaning of a field in one place.
+///
+/// Limits are `[low..=high]`, either end may be missing; of a list `[low..=high; least..=most]`, first of its entries, then of its
+/// length. The meaning is the field's documentation; one that is longer than a line may stand above the field instead. What speaks
+/// of several fields is a function behind the struct: `check |p| accept("low", p.low < p.high, || ...);`. A struct `point struct` is an entry of a list or the
+/// settings of several figures: it has no defaults, and its fields may be columns of a row.
 ///
 /// ```
 /// fewbits_experiments::parameters! {
 ///     struct Parameters {
-///         #[garde(range(min = -1.0, max = 1.0))]
-///         a: f64 = 0.9 => "Plant coefficient.",
-///         #[garde(range(min = 2, max = 10_000_000))]
-///         trials: u64 = 4000 => quick 40 => "Simulated runs.",
+///         a: f64 [-1.0..=1.0] = 0.9 => "Plant coefficient.",
+///         trials: u64 [2..=10_000_000] = 4000 => quick 40 => "Simulated runs.",
 ///     }
 /// }
 /// let mut p = Parameters::default();
@@ -20,19 +21,18 @@
 #[macro_export]
 macro_rules! parameters {
     (
-        self #[$validate:meta]
         $(#[$outer:meta])*
         $visible:vis struct $name:ident {
-            $($(#[$attribute:meta])* $shown:vis $field:ident: $type:ty = $default:expr
-                $(=> quick $quick:expr)? $(=> $meaning:literal)?,)*
+            $($(#[doc = $doc:literal])* $(#[serde($($serde:tt)*)])? $shown:vis $field:ident: $type:ty $([$($limits:tt)*])?
+                = $default:expr $(=> quick $quick:expr)? $(=> $meaning:literal)?,)*
         }
+        $(check $check:expr;)?
     ) => {
-        $(#[$outer])*
-        #[derive(::serde::Serialize, ::serde::Deserialize, ::schemars::JsonSchema)]
-        #[$validate]
-        #[serde(deny_unknown_fields)]
-        $visible struct $name {
-            $($(#[$attribute])* $(#[doc = $meaning])? $shown $field: $type,)*
+        $crate::parameters! { @arguments
+            $(#[$outer])*
+            $visible struct $name {
+                $($(#[doc = $doc])* $(#[doc = $meaning])? $(#[serde($($serde)*)])? $shown $field: $type [$($($limits)*)?],)*
+            }
         }
 
         impl Default for $name {
@@ -45,16 +45,72 @@ macro_rules! parameters {
             fn quicken(&mut self) {
                 $($(self.$field = $quick;)?)*
             }
+
+            $(fn check(&self) -> Result<(), $crate::Refusal> {
+                let check: fn(&Self) -> Result<(), $crate::Refusal> = $check;
+                check(self)
+            })?
         }
     };
-    ($($struct:tt)*) => {
-        $crate::parameters! { self #[derive(::garde::Validate)] $($struct)* }
+    (
+        $(#[$outer:meta])*
+        $visible:vis point struct $name:ident {
+            $($(#[doc = $doc:literal])* $(#[serde($($serde:tt)*)])? $shown:vis $field:ident: $type:ty $([$($limits:tt)*])?
+                $(=> $meaning:literal)?,)*
+        }
+    ) => {
+        $crate::parameters! { @arguments
+            $(#[$outer])*
+            $visible struct $name {
+                $($(#[doc = $doc])* $(#[doc = $meaning])? $(#[serde($($serde)*)])? $shown $field: $type [$($($limits)*)?],)*
+            }
+        }
+
+        $crate::rows! { @fields $name $($field: $type [] concat!("" $(, $doc)* $(, $meaning)?),)* }
+    };
+    (@arguments
+        $(#[$outer:meta])*
+        $visible:vis struct $name:ident {
+            $($(#[doc = $doc:literal])* $(#[serde($($serde:tt)*)])? $shown:vis $field:ident: $type:ty [$($limits:tt)*],)*
+        }
+    ) => {
+        $(#[$outer])*
+        #[derive(::serde::Serialize, ::serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        $visible struct $name {
+            $($(#[doc = $doc])* $(#[serde($($serde)*)])? $shown $field: $type,)*
+        }
+
+        impl $crate::Argument for $name {
+            fn fields() -> Vec<$crate::Parameter> {
+                let all = Vec::new();
+                $(let all = $crate::Parameter::of(stringify!($field), concat!("" $(, $doc)*), $crate::limits!($($limits)*))
+                    .add(stringify!($($($serde)*)?), <$type as $crate::Argument>::fields(), all);)*
+                all
+            }
+        }
     };
 }
 
-/// Structs of rows, and structs of lists of them: the fields are the columns, each with its unit and its meaning behind its type.
-/// The meaning is the field's documentation; one that is longer than a line may stand above the field instead. A row that is
-/// compared with references says by which of its fields it is found: `struct Row by "{distance} m"`
+/// The [`Limits`](crate::Limits) of a parameter as [`parameters!`](crate::parameters!) writes them.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! limits {
+    ($($low:literal)? $(..= $high:literal)? $(; $($length:tt)*)?) => {
+        $crate::Limits {
+            low: [$(stringify!($low))?].first().copied(),
+            high: [$(stringify!($high))?].first().copied(),
+            length: [$($crate::limits!($($length)*))?].first().map(|length: &$crate::Limits| (length.low, length.high)),
+        }
+    };
+    ($low:literal .. $(; $($length:tt)*)?) => {
+        $crate::limits!($low $(; $($length)*)?)
+    };
+}
+
+/// Structs of rows, and structs of lists of them ([`Field`](crate::schema::Field)): the fields are the columns, each with its unit
+/// and its meaning behind its type. The meaning is the field's documentation; one that is longer than a line may stand above the
+/// field instead. A row that is compared with references says by which of its fields it is found: `struct Row by "{distance} m"`
 /// ([`Claims::keyed`](crate::Claims::keyed)).
 ///
 /// ```
@@ -69,6 +125,20 @@ macro_rules! parameters {
 /// ```
 #[macro_export]
 macro_rules! rows {
+    (@fields $name:ident $($field:ident: $type:ty [$($unit:tt)?] $meaning:expr,)*) => {
+        impl $crate::schema::Field for $name {
+            fn describe(_: $crate::Column, to: &mut $crate::schema::Described) {
+                $(<$type as $crate::schema::Field>::describe(
+                    $crate::Column::of(stringify!($field), concat!("" $(, $unit)?), $meaning),
+                    to,
+                );)*
+            }
+
+            fn put(&self, to: &mut $crate::schema::Cells) {
+                $($crate::schema::Field::put(&self.$field, to);)*
+            }
+        }
+    };
     (@keyed $name:ident [] [$($field:ident)*]) => {};
     (@keyed $name:ident [$key:literal] [$($field:ident)*]) => {
         impl $crate::claim::Keyed for $name {
@@ -82,15 +152,16 @@ macro_rules! rows {
     ($(
         $(#[$outer:meta])*
         $visible:vis struct $name:ident $(by $key:literal)? {
-            $($(#[$attribute:meta])* $shown:vis $field:ident: $type:ty $([$unit:tt])? $(=> $meaning:literal)?,)*
+            $($(#[doc = $doc:literal])* $shown:vis $field:ident: $type:ty $([$unit:tt])? $(=> $meaning:literal)?,)*
         }
     )*) => {$(
         $crate::rows! { @keyed $name [$($key)?] [$($field)*] }
         $(#[$outer])*
-        #[derive(::serde::Serialize, ::schemars::JsonSchema)]
         $visible struct $name {
-            $($(#[$attribute])* $(#[doc = $meaning])? $(#[schemars(extend("unit" = $unit))])? $shown $field: $type,)*
+            $($(#[doc = $doc])* $(#[doc = $meaning])? $shown $field: $type,)*
         }
+
+        $crate::rows! { @fields $name $($field: $type [$($unit)?] concat!("" $(, $doc)* $(, $meaning)?),)* }
     )*};
 }
 

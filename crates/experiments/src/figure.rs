@@ -1,15 +1,14 @@
 //! What a figure is, and how it is run.
 
+use crate::arguments::{self, Argument, Parameter, Refusal};
 use crate::claim::{Claim, Claims};
 use crate::error::Error;
 use crate::kept::Kept;
 use crate::parameters::{self, Settings};
 use crate::plot::Plot;
-use crate::schema::{self, Fields, Parameter};
+use crate::schema::{self, Field, Fields};
 use crate::table::Tables;
 use fewbits_monte_carlo::{MonteCarlo, Stream};
-use garde::Validate;
-use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value as Json};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -137,10 +136,18 @@ impl Cost {
     };
 }
 
-/// Parameters that `--quick` lowers.
+/// Parameters that `--quick` lowers, and that may depend on each other.
 pub trait Quick {
     /// Reduces effort: the whole figure should then take about a second. The default changes nothing.
     fn quicken(&mut self) {}
+
+    /// Refuses what is beyond the limits of the fields themselves. The default refuses nothing.
+    ///
+    /// # Errors
+    /// If a field does not fit the others.
+    fn check(&self) -> Result<(), Refusal> {
+        Ok(())
+    }
 }
 
 /// A figure or table of a publication, or one of our own: parameters in, rows out, and the claims they must meet.
@@ -148,12 +155,13 @@ pub trait Quick {
 /// A parameter named `trials` or ending in `_trials` is effort: lowering it leaves the meaning of the figure and skips the
 /// claims that need the full count.
 pub trait Figure: Sync {
-    /// A flat struct whose `Default` is the paper's setting unless [`Figure::defaults`] says otherwise, and whose fields have documentation and ranges (`garde`):
+    /// A flat struct whose `Default` is the paper's setting unless [`Figure::defaults`] says otherwise, and whose fields have
+    /// documentation and limits:
     /// [`parameters!`](crate::parameters!) writes it.
-    type Parameters: Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Default + Quick;
+    type Parameters: Serialize + DeserializeOwned + Argument + Default + Quick;
 
     /// `Vec<Row>`, or a struct of such lists (the first is the main table): see [`Tables::of`].
-    type Tables: Serialize + JsonSchema;
+    type Tables: Field;
 
     /// What stands above the figure, unless [`Figure::about`] says so of each value of the type.
     const ABOUT: About = About::of("", "", "");
@@ -281,7 +289,7 @@ impl<F: Figure> AnyFigure for F {
     }
 
     fn parameters(&self) -> Vec<Parameter> {
-        schema::parameters::<F::Parameters>(&parameters::map(&self.defaults()))
+        arguments::described::<F::Parameters>(&parameters::map(&self.defaults()))
     }
 
     fn tables(&self) -> Vec<Fields> {

@@ -14,6 +14,7 @@
 #[macro_use]
 mod fields;
 
+mod arguments;
 pub mod assign;
 pub mod binary;
 pub mod cfwmd;
@@ -33,17 +34,20 @@ pub mod plot;
 mod prelude;
 pub mod real;
 pub mod reference;
-mod schema;
+pub mod schema;
 mod sweep;
 mod table;
 mod words;
 
+#[doc(hidden)]
+pub use arguments::Limits;
+pub use arguments::{Argument, Parameter, Refusal, plain};
 pub use claim::{Claim, Claims, Expected, Verdict};
 pub use error::Error;
 pub use figure::{About, AnyFigure, Context, Cost, Figure, Outcome, Quick};
 pub use kept::Kept;
 pub use measured::Measured;
-pub use schema::{Column, Fields, Parameter, plain};
+pub use schema::{Column, Fields};
 pub use sweep::{Comparison, Tally};
 pub use table::{Table, Tables, Value};
 

@@ -1,13 +1,11 @@
 //! A simulated number and its standard error, as one cell of a row.
 
 use fewbits_monte_carlo::{Estimate, Moments};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Sub;
 
 /// A simulated number and its standard error: two columns (`mse`, `mse_se`) of a table, one mark with its error bar in a plot.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(extend("measured" = true))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     /// The estimate.
     pub value: f64,

@@ -1,8 +1,8 @@
 //! From `--set name=value` to checked parameters.
 
+use crate::Quick;
+use crate::arguments::{self, Argument, Parameter, Refusal, plain};
 use crate::error::Error;
-use crate::schema::{Parameter, plain};
-use garde::Validate;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value as Json};
@@ -10,11 +10,6 @@ use serde_json::{Map, Value as Json};
 /// Whether a parameter is effort: lowering it leaves the meaning of the figure.
 pub(crate) fn is_effort(name: &str) -> bool {
     name == "trials" || name.ends_with("_trials")
-}
-
-/// Refuses a parameter for this reason where the condition does not hold.
-pub(crate) fn accept(holds: bool, reason: impl FnOnce() -> String) -> garde::Result {
-    holds.then_some(()).ok_or_else(|| garde::Error::new(reason()))
 }
 
 /// Whether these parameters are the defaults (but for effort), and whether effort is not below the defaults.
@@ -40,31 +35,27 @@ pub(crate) fn map<P: Serialize>(parameters: &P) -> Map<String, Json> {
     }
 }
 
-/// The parameters that `map` describes, within their ranges.
-pub(crate) fn typed<P: DeserializeOwned + Validate<Context = ()>>(
+/// The parameters that `map` describes, within their limits.
+pub(crate) fn typed<P: DeserializeOwned + Argument + Quick>(
     figure: &'static str,
     map: &Map<String, Json>,
 ) -> Result<P, Error> {
     let json = Json::Object(map.clone());
-    let refuse = |path: String, reason: String| {
-        let path = path.trim_start_matches('.').to_owned();
-        let value = pointed(&json, &path).map(plain).unwrap_or_default();
-        Error::Refused {
-            figure,
-            name: path,
-            value,
-            reason,
-        }
+    let refuse = |Refusal { path, reason }| Error::Refused {
+        figure,
+        value: pointed(&json, &path).map(plain).unwrap_or_default(),
+        name: path,
+        reason,
     };
-    let parameters: P = serde_path_to_error::deserialize(&json)
-        .map_err(|error| refuse(error.path().to_string(), in_words(&error.inner().to_string())))?;
-    match parameters.validate() {
-        Ok(()) => Ok(parameters),
-        Err(report) => match report.iter().next() {
-            Some((path, error)) => Err(refuse(path.to_string(), error.to_string())),
-            None => Ok(parameters),
-        },
-    }
+    let parameters: P = serde_path_to_error::deserialize(&json).map_err(|error| {
+        refuse(Refusal {
+            path: error.path().to_string().trim_start_matches('.').to_owned(),
+            reason: in_words(&error.inner().to_string()),
+        })
+    })?;
+    arguments::within(&P::fields(), map).map_err(&refuse)?;
+    parameters.check().map_err(&refuse)?;
+    Ok(parameters)
 }
 
 /// The reason of a type mismatch without the names of types.
@@ -184,45 +175,26 @@ fn scalar(text: &str) -> Json {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use schemars::JsonSchema;
-    use serde::Deserialize;
 
-    #[derive(Serialize, Deserialize, JsonSchema, Validate)]
-    #[serde(deny_unknown_fields)]
-    struct Point {
-        /// Plant coefficient.
-        #[garde(range(min = -1.0, max = 1.0))]
-        a: f64,
-        /// Noise ratio.
-        #[garde(range(min = 1e-12, max = 1e12))]
-        gamma: f64,
+    parameters! {
+        point struct Point {
+            a: f64 [-1.0..=1.0] => "Plant coefficient.",
+            gamma: f64 [1e-12..=1e12] => "Noise ratio.",
+        }
     }
 
-    #[derive(Serialize, Deserialize, JsonSchema, Validate)]
-    #[serde(deny_unknown_fields)]
-    struct Parameters {
-        /// Plants.
-        #[garde(length(min = 1, max = 9), dive)]
-        points: Vec<Point>,
-        /// Levels.
-        #[garde(length(min = 1), inner(range(min = 2, max = 64)))]
-        levels: Vec<u32>,
-        /// Patterns.
-        #[garde(length(min = 1), inner(length(min = 2)))]
-        patterns: Vec<String>,
-        /// Trials.
-        #[garde(range(min = 1, max = 1_000_000))]
-        trials: u64,
+    parameters! {
+        struct Parameters {
+            points: Vec<Point> [; 1..=9] = vec![Point { a: 0.5, gamma: 0.1 }] => "Plants.",
+            levels: Vec<u32> [2..=64; 1..] = vec![4] => "Levels.",
+            patterns: Vec<String> [; 1..] = vec!["01".to_owned()] => "Patterns.",
+            trials: u64 [1..=1_000_000] = 100 => "Trials.",
+        }
     }
 
     fn described() -> (Map<String, Json>, Vec<Parameter>) {
-        let start = map(&Parameters {
-            points: vec![Point { a: 0.5, gamma: 0.1 }],
-            levels: vec![4],
-            patterns: vec!["01".to_owned()],
-            trials: 100,
-        });
-        let described = crate::schema::parameters::<Parameters>(&start);
+        let start = map(&Parameters::default());
+        let described = arguments::described::<Parameters>(&start);
         (start, described)
     }
 
@@ -242,7 +214,7 @@ mod tests {
         assert_eq!(set("patterns", "01, 10").unwrap().patterns, ["01", "10"]);
         let (_, described) = described();
         assert_eq!(described[0].default, "0.5:0.1");
-        assert_eq!(described[0].range, "1 to 9 entries; a from -1.0 to 1.0; gamma from 1e-12 to 1000000000000.0");
+        assert_eq!(described[0].range, "1 to 9 entries; a from -1.0 to 1.0; gamma from 1e-12 to 1e12");
         assert_eq!(described[1].range, "at least 1 entries; from 2 to 64");
     }
 

@@ -1,25 +1,9 @@
-//! What the fields of parameters and rows say about themselves, read from their derived schema.
+//! What the fields of a row say about themselves: names, units and meanings of columns, and their cells.
 
-use schemars::JsonSchema;
-use schemars::generate::SchemaSettings;
+use crate::measured::Measured;
+use crate::table::Value;
 use serde::Serialize;
-use serde_json::{Map, Value as Json};
 use std::borrow::Cow;
-
-/// A parameter as `describe` shows it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Parameter {
-    /// Name for `--set`.
-    pub name: String,
-    /// Default, as `--set` takes it.
-    pub default: String,
-    /// What is accepted, in words.
-    pub range: String,
-    /// Meaning.
-    pub meaning: String,
-    /// Names of the entries of one point, where the parameter is a list of points.
-    pub entries: Vec<String>,
-}
 
 /// A column: its name in the CSV header, its unit and what it holds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -32,145 +16,176 @@ pub struct Column {
     pub meaning: Cow<'static, str>,
 }
 
+impl Column {
+    /// A column of this name, unit and documentation.
+    pub fn of(name: &str, unit: &'static str, documentation: &str) -> Self {
+        Self {
+            name: name.trim_start_matches("r#").to_owned().into(),
+            unit: unit.into(),
+            meaning: on_one_line(documentation).into(),
+        }
+    }
+}
+
+/// A documentation comment on one line.
+pub(crate) fn on_one_line(documentation: &str) -> String {
+    documentation.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// A table as its rows describe it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fields {
-    /// Name of the field that holds it.
-    pub(crate) key: String,
     /// Name in file names; the main table's is `main`.
     pub name: String,
     /// What it holds.
     pub meaning: String,
     /// Whether it holds measured times.
     pub volatile: bool,
-    /// Path in a row and column.
-    pub(crate) columns: Vec<(Vec<String>, Column)>,
+    pub(crate) columns: Vec<Column>,
 }
 
 impl Fields {
     /// The columns.
     pub fn columns(&self) -> impl Iterator<Item = &Column> {
-        self.columns.iter().map(|(_, column)| column)
+        self.columns.iter()
     }
 }
 
-fn root<T: JsonSchema>() -> Json {
-    let generator = SchemaSettings::draft2020_12()
-        .with(|s| s.inline_subschemas = true)
-        .into_generator();
-    generator.into_root_schema_for::<T>().to_value()
+/// The columns and tables of a type, in the order of its fields.
+#[derive(Debug, Default)]
+pub struct Described {
+    columns: Vec<Column>,
+    pub(crate) tables: Vec<Fields>,
 }
 
-fn properties(schema: &Json) -> impl Iterator<Item = (&String, &Json)> {
-    schema["properties"].as_object().into_iter().flatten()
+/// The cells of a row, or the rows of the tables, in the order in which [`Described`] has columns and tables.
+#[derive(Debug, Default)]
+pub struct Cells {
+    cells: Vec<Value>,
+    pub(crate) tables: Vec<Vec<Vec<Value>>>,
 }
 
-fn text<'a>(schema: &'a Json, key: &str) -> &'a str {
-    schema[key].as_str().unwrap_or_default()
+/// A field of a row (a number, a label, a [`Measured`], an `Option` of these, another row, whose columns are then this row's too)
+/// or of a figure's tables (a list of rows). [`rows!`](crate::rows!) writes it for rows.
+pub trait Field {
+    /// Columns of the field.
+    const COLUMNS: usize = 1;
+
+    /// Adds the columns of a field of this name, or the table.
+    fn describe(about: Column, to: &mut Described) {
+        to.columns.push(about);
+    }
+
+    /// Adds the cells, or the rows of the table.
+    fn put(&self, to: &mut Cells);
 }
 
-/// A description on one line.
-fn meaning(schema: &Json) -> String {
-    text(schema, "description")
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
+/// Fields of one column.
+macro_rules! cells {
+    ($($type:ty: $cell:expr;)*) => {$(
+        impl Field for $type {
+            fn put(&self, to: &mut Cells) {
+                let cell: fn(&Self) -> Value = $cell;
+                to.cells.push(cell(self));
+            }
+        }
+    )*};
+}
+
+fn count<T: Copy + TryInto<i64>>(count: T, number: f64) -> Value {
+    count.try_into().map_or(Value::Number(number), Value::Integer)
+}
+
+cells! {
+    f64: |x| Value::Number(*x);
+    bool: |flag| Value::Text(flag.to_string());
+    u8: |n| Value::Integer((*n).into());
+    u16: |n| Value::Integer((*n).into());
+    u32: |n| Value::Integer((*n).into());
+    i32: |n| Value::Integer((*n).into());
+    i64: |n| Value::Integer(*n);
+    u64: |n| count(*n, *n as f64);
+    usize: |n| count(*n, *n as f64);
+    String: |text| Value::Text(text.clone());
+    &'static str: |text| Value::Text((*text).to_owned());
+    Cow<'static, str>: |text| Value::Text(text.clone().into_owned());
+}
+
+/// A label is its variant in lower case.
+macro_rules! label {
+    ($type:ty) => {
+        impl $crate::schema::Field for $type {
+            fn put(&self, to: &mut $crate::schema::Cells) {
+                format!("{self:?}").to_lowercase().put(to);
+            }
+        }
+    };
+}
+pub(crate) use label;
+
+impl Field for Measured {
+    const COLUMNS: usize = 2;
+
+    fn describe(about: Column, to: &mut Described) {
+        let error = Column {
+            name: format!("{}_se", about.name).into(),
+            unit: about.unit.clone(),
+            meaning: format!("{} (its standard error)", about.meaning).into(),
+        };
+        to.columns.extend([about, error]);
+    }
+
+    fn put(&self, to: &mut Cells) {
+        self.value.put(to);
+        self.standard_error.put(to);
+    }
+}
+
+impl<T: Field> Field for Option<T> {
+    const COLUMNS: usize = T::COLUMNS;
+
+    fn describe(about: Column, to: &mut Described) {
+        T::describe(about, to);
+    }
+
+    fn put(&self, to: &mut Cells) {
+        match self {
+            Some(field) => field.put(to),
+            None => to.cells.extend((0..T::COLUMNS).map(|_| Value::Missing)),
+        }
+    }
+}
+
+/// The main table has no name. One of measured times has the unit `"time"`.
+impl<T: Field> Field for Vec<T> {
+    fn describe(about: Column, to: &mut Described) {
+        let mut row = Described::default();
+        T::describe(Column::of("", "", ""), &mut row);
+        to.tables.push(Fields {
+            name: if to.tables.is_empty() {
+                "main".to_owned()
+            } else {
+                about.name.replace('_', "-")
+            },
+            meaning: about.meaning.into_owned(),
+            volatile: about.unit == "time",
+            columns: row.columns,
+        });
+    }
+
+    fn put(&self, to: &mut Cells) {
+        let cells = |row: &T| {
+            let mut cells = Cells::default();
+            row.put(&mut cells);
+            cells.cells
+        };
+        to.tables.push(self.iter().map(cells).collect());
+    }
 }
 
 /// The tables that `T` describes.
-pub(crate) fn tables<T: JsonSchema>() -> Vec<Fields> {
-    let schema = root::<T>();
-    if schema.get("items").is_some() {
-        return vec![fields("", "main".to_owned(), &schema)];
-    }
-    let named = |(at, (key, schema)): (usize, (&String, &Json))| {
-        let name = if at == 0 {
-            "main".to_owned()
-        } else {
-            key.replace('_', "-")
-        };
-        fields(key, name, schema)
-    };
-    properties(&schema).enumerate().map(named).collect()
-}
-
-fn fields(key: &str, name: String, list: &Json) -> Fields {
-    let mut columns = Vec::new();
-    for (field, schema) in properties(&list["items"]) {
-        let column = |suffix: &str, note: &str| Column {
-            name: format!("{field}{suffix}").into(),
-            unit: text(schema, "unit").to_owned().into(),
-            meaning: format!("{}{note}", meaning(schema)).into(),
-        };
-        let measured = |s: &Json| s["measured"] == true;
-        if measured(schema) || schema["anyOf"].as_array().is_some_and(|any| any.iter().any(measured)) {
-            let path = |part: &str| vec![field.clone(), part.to_owned()];
-            columns.push((path("value"), column("", "")));
-            columns.push((path("standard_error"), column("_se", " (its standard error)")));
-        } else {
-            columns.push((vec![field.clone()], column("", "")));
-        }
-    }
-    Fields {
-        key: key.to_owned(),
-        name,
-        meaning: meaning(list),
-        volatile: list["volatile"] == true,
-        columns,
-    }
-}
-
-/// The parameters that `P` describes, with the given defaults; those without one are not the figure's.
-pub(crate) fn parameters<P: JsonSchema>(defaults: &Map<String, Json>) -> Vec<Parameter> {
-    let schema = root::<P>();
-    properties(&schema)
-        .filter(|(name, _)| defaults.contains_key(name.as_str()))
-        .map(|(name, schema)| {
-            let entry = schema.get("items").unwrap_or(schema);
-            let entries: Vec<String> = properties(entry).map(|(name, _)| name.clone()).collect();
-            let mut range: Vec<String> = length(schema).into_iter().chain(range(entry)).collect();
-            range.extend(properties(entry).filter_map(|(name, s)| Some(format!("{name} {}", self::range(s)?))));
-            Parameter {
-                name: name.clone(),
-                default: defaults.get(name).map(plain).unwrap_or_default(),
-                range: range.join("; "),
-                meaning: meaning(schema),
-                entries,
-            }
-        })
-        .collect()
-}
-
-fn length(schema: &Json) -> Option<String> {
-    match (schema["minItems"].as_u64(), schema["maxItems"].as_u64()) {
-        (None, None) => None,
-        (Some(low), Some(high)) if low == high => Some(format!("{low} entries")),
-        (low, Some(high)) => Some(format!("{} to {high} entries", low.unwrap_or(0))),
-        (Some(low), None) => Some(format!("at least {low} entries")),
-    }
-}
-
-fn range(schema: &Json) -> Option<String> {
-    if let Some(words) = schema["enum"].as_array() {
-        return Some(format!("one of {}", words.iter().map(plain).collect::<Vec<_>>().join(", ")));
-    }
-    let limit = |key: &str| schema.get(key).filter(|v| v.is_number()).map(plain);
-    match (limit("minimum"), limit("maximum")) {
-        (Some(low), Some(high)) => Some(format!("from {low} to {high}")),
-        (Some(low), None) => Some(format!("at least {low}")),
-        (None, Some(high)) => Some(format!("at most {high}")),
-        (None, None) => None,
-    }
-}
-
-/// A value as `--set` takes it: `0.5,0.9` for a list, `0.5:0.1,0.9:0.2` for a list of points.
-pub fn plain(value: &Json) -> String {
-    let joined = |entries: Vec<String>, by: &str| entries.join(by);
-    match value {
-        Json::String(text) => text.clone(),
-        Json::Array(entries) => joined(entries.iter().map(plain).collect(), ","),
-        Json::Object(fields) => joined(fields.values().map(plain).collect(), ":"),
-        Json::Null => "none".to_owned(),
-        other => other.to_string(),
-    }
+pub(crate) fn tables<T: Field>() -> Vec<Fields> {
+    let mut all = Described::default();
+    T::describe(Column::of("", "", ""), &mut all);
+    all.tables
 }

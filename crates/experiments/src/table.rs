@@ -1,14 +1,12 @@
 //! Tables ready to be written: typed rows become named columns with units and meanings.
 //!
 //! A figure's result is a plain value: `Vec<Row>`, or a struct of such lists whose first field is the main table. The fields of
-//! a row *are* the columns: their documentation is the meaning, `#[schemars(extend("unit" = "m"))]` the unit, `Option` may be
-//! empty, a [`Measured`](crate::Measured) fills two columns (`mse`, `mse_se`), and a unit enum is a label. A cell that is not
-//! finite is an error: what did not converge must say so.
+//! a row *are* the columns ([`rows!`](crate::rows!)): their documentation is the meaning, `Option` may be empty, and a
+//! [`Measured`](crate::Measured) fills two columns (`mse`, `mse_se`). A cell that is not finite is an error: what did not converge
+//! must say so.
 
 use crate::error::Error;
-use crate::schema::{self, Column, Fields};
-use ciborium::Value as Cbor;
-use schemars::JsonSchema;
+use crate::schema::{self, Cells, Column, Field, Fields};
 use serde::Serialize;
 use std::borrow::Cow;
 use std::fmt;
@@ -85,26 +83,34 @@ impl Tables {
     /// Turns typed rows into tables.
     ///
     /// # Errors
-    /// If a cell is not finite, or a field is no number, label or [`Measured`](crate::Measured).
-    pub fn of<T: Serialize + JsonSchema>(rows: &T) -> Result<Self, Error> {
-        let bad = |reason: String| Error::Table(reason);
-        let rows = Cbor::serialized(rows).map_err(|error| bad(error.to_string()))?;
+    /// If a cell is not finite, or there is no table.
+    pub fn of<T: Field>(rows: &T) -> Result<Self, Error> {
+        let mut cells = Cells::default();
+        rows.put(&mut cells);
+        Self::filled(schema::tables::<T>(), cells.tables)
+    }
+
+    fn filled(described: Vec<Fields>, rows: Vec<Vec<Vec<Value>>>) -> Result<Self, Error> {
+        let volatile = described.iter().filter(|table| table.volatile);
+        let volatile = volatile.map(|table| table.name.clone().into()).collect();
         let mut tables = Vec::new();
-        let mut volatile = Vec::new();
-        for described in schema::tables::<T>() {
-            let list = match &rows {
-                Cbor::Array(list) => Some(list),
-                other => entry(other, &described.key).and_then(Cbor::as_array),
-            };
-            let list = list.ok_or_else(|| bad(format!("`{}` is no list of rows", described.name)))?;
-            let table = fill(&described, list)?;
-            if described.volatile {
-                volatile.push(described.name.clone().into());
+        for (Fields { name, columns, .. }, rows) in described.into_iter().zip(rows) {
+            for (index, row) in rows.iter().enumerate() {
+                for (column, cell) in columns.iter().zip(row) {
+                    if let Value::Number(number) = cell
+                        && !number.is_finite()
+                    {
+                        return Err(Error::Table(format!(
+                            "{number} in column `{}`, row {index} of `{name}`",
+                            column.name
+                        )));
+                    }
+                }
             }
-            tables.push((Cow::Owned(described.name), table));
+            tables.push((Cow::Owned(name), Table { columns, rows }));
         }
         let mut tables = tables.into_iter();
-        let (_, main) = tables.next().ok_or_else(|| bad("no table".to_owned()))?;
+        let (_, main) = tables.next().ok_or_else(|| Error::Table("no table".to_owned()))?;
         Ok(Self {
             main,
             further: tables.collect(),
@@ -113,87 +119,40 @@ impl Tables {
     }
 }
 
-fn entry<'a>(map: &'a Cbor, key: &str) -> Option<&'a Cbor> {
-    let of = |(name, value): &'a (Cbor, Cbor)| (name.as_text() == Some(key)).then_some(value);
-    map.as_map()?.iter().find_map(of)
-}
-
-fn fill(described: &Fields, list: &[Cbor]) -> Result<Table, Error> {
-    let mut rows = Vec::with_capacity(list.len());
-    for (index, row) in list.iter().enumerate() {
-        let mut cells = Vec::with_capacity(described.columns.len());
-        for (path, column) in &described.columns {
-            let found = path
-                .iter()
-                .try_fold(row, |at, key| entry(at, key))
-                .unwrap_or(&Cbor::Null);
-            let refused = |reason: &str| {
-                Error::Table(format!("{reason} in column `{}`, row {index} of `{}`", column.name, described.name))
-            };
-            cells.push(match found {
-                Cbor::Null => Value::Missing,
-                Cbor::Bool(flag) => Value::Text(flag.to_string()),
-                Cbor::Text(text) => Value::Text(text.clone()),
-                Cbor::Float(number) if number.is_finite() => Value::Number(*number),
-                Cbor::Float(number) => return Err(refused(&format!("{number}"))),
-                Cbor::Integer(integer) => {
-                    Value::Integer(i64::try_from(*integer).map_err(|_| refused("a count beyond 63 bits"))?)
-                }
-                _ => return Err(refused("neither number nor label")),
-            });
-        }
-        rows.push(cells);
-    }
-    let columns = described.columns.iter().map(|(_, column)| column.clone()).collect();
-    Ok(Table { columns, rows })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Measured;
 
-    #[derive(Serialize, JsonSchema)]
-    #[serde(rename_all = "kebab-case")]
+    #[derive(Debug)]
     enum Method {
-        LloydMax,
+        Lloyd,
     }
+    schema::label!(Method);
 
-    #[derive(Serialize, JsonSchema)]
-    struct Key {
-        /// How.
-        method: Method,
-    }
+    rows! {
+        struct Key {
+            method: Method => "How.",
+        }
 
-    #[derive(Serialize, JsonSchema)]
-    struct Row {
-        #[serde(flatten)]
-        key: Key,
-        /// Time.
-        #[schemars(extend("unit" = "s"))]
-        time: f64,
-        /// Squared error.
-        #[schemars(extend("unit" = "m^2"))]
-        mse: Measured,
-        /// Of another.
-        other: Option<Measured>,
-        /// As printed.
-        printed: Option<f64>,
-    }
+        struct Row {
+            key: Key,
+            time: f64 ["s"] => "Time.",
+            /// Squared error,
+            /// in square metres.
+            mse: Measured ["m^2"],
+            other: Option<Measured> => "Of another.",
+            printed: Option<f64> => "As printed.",
+        }
 
-    #[derive(Serialize, JsonSchema)]
-    struct Two {
-        /// Main.
-        rows: Vec<Row>,
-        /// Counts.
-        #[schemars(extend("volatile" = true))]
-        run_times: Vec<Count>,
-    }
+        struct Two {
+            rows: Vec<Row> => "Main.",
+            run_times: Vec<Count> ["time"] => "Counts.",
+        }
 
-    #[derive(Serialize, JsonSchema)]
-    struct Count {
-        /// A count.
-        n: u64,
+        struct Count {
+            n: u64 => "A count.",
+        }
     }
 
     fn row(time: f64) -> Row {
@@ -202,9 +161,7 @@ mod tests {
             standard_error: Some(0.5),
         };
         Row {
-            key: Key {
-                method: Method::LloydMax,
-            },
+            key: Key { method: Method::Lloyd },
             time,
             mse,
             other: None,
@@ -215,24 +172,23 @@ mod tests {
     #[test]
     fn the_fields_are_the_columns() {
         let table = Tables::of(&vec![row(1.0)]).unwrap().main;
-        let mut cells: Vec<_> = table
+        let cells: Vec<_> = table
             .columns()
             .iter()
             .zip(&table.rows()[0])
             .map(|(c, v)| format!("{}[{}]={v}", c.name, c.unit))
             .collect();
-        cells.sort();
         let expected = [
-            "method[]=lloyd-max",
+            "method[]=lloyd",
+            "time[s]=1",
             "mse[m^2]=2",
             "mse_se[m^2]=0.5",
             "other[]=",
             "other_se[]=",
             "printed[]=",
-            "time[s]=1",
         ];
         assert_eq!(cells, expected);
-        assert!(table.columns().iter().all(|c| !c.meaning.is_empty()));
+        assert_eq!(table.columns()[3].meaning, "Squared error, in square metres. (its standard error)");
     }
 
     #[test]

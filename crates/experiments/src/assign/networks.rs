@@ -154,25 +154,22 @@ fn picture(rows: &[Row], label: &str) -> Plot {
 }
 
 /// Refuses moments that no network of positive variances has.
-fn feasible(sensors: usize, mean: f64, std: f64) -> garde::Result {
+fn infeasible(sensors: usize, mean: f64, std: f64) -> Option<String> {
     let most = mean * (sensors as f64 - 1.0).sqrt();
-    accept(std < most, || format!("at a mean of {mean} the deviation must be below {most}"))
+    (std >= most).then(|| format!("at a mean of {mean} the deviation must be below {most}"))
 }
 
 pub struct Spread;
 
-parameters! { self #[derive(Validate)]
+parameters! {
     pub struct SpreadParameters {
-        #[garde(range(min = 2, max = 7))]
-        sensors: usize = 4 => "Number of sensors; all their assignments are enumerated.",
-        #[garde(range(min = 1e-4, max = 10.0))]
-        mean: f64 = 0.03 => "Mean of the noise variances, V^2.",
+        sensors: usize [2..=7] = 4 => "Number of sensors; all their assignments are enumerated.",
+        mean: f64 [1e-4..=10.0] = 0.03 => "Mean of the noise variances, V^2.",
         /// Their population standard deviations, V^2.
-        #[garde(length(min = 1, max = 100), inner(range(min = 0.0, max = 10.0)), inner(custom(|sd: &f64, _: &()| feasible(self.sensors, self.mean, *sd))))]
-        sds: Vec<f64> = vec![0.0, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03],
-        #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 1000 => quick 100 => "Networks at each point.",
+        sds: Vec<f64> [0.0..=10.0; 1..=100] = vec![0.0, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03],
+        trials: u64 [2..=10_000_000] = 1000 => quick 100 => "Networks at each point.",
     }
+    check |p| accept_each("sds", &p.sds, |sd| infeasible(p.sensors, p.mean, *sd));
 }
 
 impl Figure for Spread {
@@ -212,18 +209,15 @@ impl Figure for Spread {
 
 pub struct Mean;
 
-parameters! { self #[derive(Validate)]
+parameters! {
     pub struct MeanParameters {
-        #[garde(range(min = 2, max = 7))]
-        sensors: usize = 4 => "Number of sensors; all their assignments are enumerated.",
+        sensors: usize [2..=7] = 4 => "Number of sensors; all their assignments are enumerated.",
         /// Means of the noise variances, V^2.
-        #[garde(length(min = 1, max = 100), inner(range(min = 1e-4, max = 10.0)), inner(custom(|mean: &f64, _: &()| feasible(self.sensors, *mean, self.sd))))]
-        means: Vec<f64> = vec![0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1],
-        #[garde(range(min = 0.0, max = 10.0))]
-        sd: f64 = 0.015 => "Their population standard deviation, V^2.",
-        #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 1000 => quick 100 => "Networks at each point.",
+        means: Vec<f64> [1e-4..=10.0; 1..=100] = vec![0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1],
+        sd: f64 [0.0..=10.0] = 0.015 => "Their population standard deviation, V^2.",
+        trials: u64 [2..=10_000_000] = 1000 => quick 100 => "Networks at each point.",
     }
+    check |p| accept_each("means", &p.means, |mean| infeasible(p.sensors, *mean, p.sd));
 }
 
 impl Figure for Mean {

@@ -15,8 +15,7 @@ pub struct Landings;
 
 parameters! {
     pub struct LandingParameters {
-        #[garde(range(min = 1e-5, max = 1.0))]
-        step: f64 = 0.002 => "Step of the horizontal axis in units of V.",
+        step: f64 [1e-5..=1.0] = 0.002 => "Step of the horizontal axis in units of V.",
     }
 }
 
@@ -101,10 +100,8 @@ pub struct BitErrors;
 
 parameters! {
     pub struct ErrorParameters {
-        #[garde(range(min = 1e-9, max = 1e3))]
-        variance: f64 = 0.03 => "Noise variance in units of V^2.",
-        #[garde(range(min = 1e-5, max = 1.0))]
-        step: f64 = 0.002 => "Step of the horizontal axis in units of V.",
+        variance: f64 [1e-9..=1e3] = 0.03 => "Noise variance in units of V^2.",
+        step: f64 [1e-5..=1.0] = 0.002 => "Step of the horizontal axis in units of V.",
     }
 }
 

@@ -11,8 +11,7 @@ pub struct Table;
 parameters! {
     pub struct Parameters {
         /// Noise variances of the sensors, in units of V^2; all their assignments are enumerated.
-        #[garde(length(min = 1, max = 8), inner(range(min = 1e-9, max = 1e3)))]
-        variances: Vec<f64> = vec![0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001],
+        variances: Vec<f64> [1e-9..=1e3; 1..=8] = vec![0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001],
     }
 }
 

@@ -16,7 +16,6 @@ pub struct Beyond;
 parameters! {
     pub struct Parameters {
         /// Include the designs with free thresholds and the larger searches, which take most of the time.
-        #[garde(skip)]
         thorough: bool = true => quick false,
     }
 }

@@ -9,8 +9,7 @@ use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 pub struct PrintedBounds;
 
 swept! { 0.0 to 30.0, step => quick 2.0,
-    #[garde(length(min = 1, max = 4), inner(range(min = 1, max = 5)))]
-    bits: Vec<usize> = vec![3, 4] => "Bits, and sensors.",
+    bits: Vec<usize> [1..=5; 1..=4] = vec![3, 4] => "Bits, and sensors.",
 }
 
 #[derive(Clone, Copy)]

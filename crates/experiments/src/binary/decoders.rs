@@ -2,6 +2,7 @@
 
 use super::{Scene, each, sweep, swept};
 use crate::prelude::*;
+use crate::schema::label;
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
 };
@@ -18,14 +19,14 @@ rows! {
     }
 }
 
-#[derive(Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
     /// Uniform on [-1, 1].
     Uniform,
     /// Gaussian of variance 0.1.
     Gaussian,
 }
+label!(Kind);
 
 rows! {
     struct Row by "{snr_db} dB" {

@@ -91,24 +91,22 @@ impl Scene {
 /// Parameters of a sweep over signal-to-noise ratios, in steps of 1 dB by default, behind the figure's own.
 macro_rules! swept {
     ($from:literal to $to:literal $(=> quick $last:literal)?, step => quick $step:literal, $($own:tt)*) => {
-        parameters! { self #[derive(Validate)]
+        parameters! {
             pub struct Parameters {
                 $($own)*
-                #[garde(range(min = -60.0, max = 60.0))]
-                from_db: f64 = $from => "First signal-to-noise ratio, dB.",
-                #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| super::not_below(self.from_db, *to)))]
-                to_db: f64 = $to $(=> quick $last)? => "Last signal-to-noise ratio, dB.",
-                #[garde(range(min = 0.01, max = 60.0))]
-                step_db: f64 = 1.0 => quick $step => "Step, dB.",
+                from_db: f64 [-60.0..=60.0] = $from => "First signal-to-noise ratio, dB.",
+                to_db: f64 [-60.0..=60.0] = $to $(=> quick $last)? => "Last signal-to-noise ratio, dB.",
+                step_db: f64 [0.01..=60.0] = 1.0 => quick $step => "Step, dB.",
             }
+            check |p| super::not_below(p.from_db, p.to_db);
         }
     };
 }
 use swept;
 
 /// Refuses the end of a sweep below its beginning.
-fn not_below(from: f64, to: f64) -> garde::Result {
-    accept(to >= from, || format!("lower than from_db, {from}"))
+fn not_below(from: f64, to: f64) -> Result<(), Refusal> {
+    accept("to_db", to >= from, || format!("lower than from_db, {from}"))
 }
 
 /// `from, from + step, ..., to`.

@@ -7,24 +7,19 @@ use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Optimum;
 
-parameters! { self #[derive(Validate)]
+parameters! {
     pub struct Parameters {
-        #[garde(range(min = 2, max = 4))]
-        bits: usize = 3 => "Bits of the cell index.",
-        #[garde(length(min = 1, max = 6), inner(range(min = 2, max = 10)), inner(custom(|n: &usize, _: &()| enough(*n, self.bits))))]
-        sensors: Vec<usize> = vec![3, 5, 8] => "Numbers of sensors, each at least the number of bits.",
-        #[garde(range(min = -60.0, max = 60.0))]
-        from_db: f64 = 0.0 => "First signal-to-noise ratio, dB.",
-        #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-        to_db: f64 = 30.0 => "Last signal-to-noise ratio, dB.",
-        #[garde(range(min = 0.01, max = 60.0))]
-        step_db: f64 = 1.0 => quick 5.0 => "Step, dB.",
+        bits: usize [2..=4] = 3 => "Bits of the cell index.",
+        sensors: Vec<usize> [2..=10; 1..=6] = vec![3, 5, 8] => "Numbers of sensors, each at least the number of bits.",
+        from_db: f64 [-60.0..=60.0] = 0.0 => "First signal-to-noise ratio, dB.",
+        to_db: f64 [-60.0..=60.0] = 30.0 => "Last signal-to-noise ratio, dB.",
+        step_db: f64 [0.01..=60.0] = 1.0 => quick 5.0 => "Step, dB.",
     }
-}
-
-/// Refuses fewer sensors than bits: no set of full rank.
-fn enough(sensors: usize, bits: usize) -> garde::Result {
-    accept(sensors >= bits, || format!("fewer sensors than the {bits} bits"))
+    check |p| {
+        not_below(p.from_db, p.to_db)?;
+        let bits = p.bits;
+        accept_each("sensors", &p.sensors, |n| (*n < bits).then(|| format!("fewer sensors than the {bits} bits")))
+    };
 }
 
 rows! {

@@ -9,20 +9,18 @@ use fewbits_monte_carlo::parallel;
 
 pub struct Clipping;
 
-parameters! { self #[derive(Validate)]
+parameters! {
     pub struct ClippingParameters {
-        #[garde(range(min = 1, max = 4))]
-        bits: usize = 3 => "Bits of the cell index.",
-        #[garde(range(min = -60.0, max = 60.0))]
-        snr_db: f64 = 18.2 => "Signal-to-noise ratio at which both readings are compared, dB.",
-        #[garde(length(min = 1, max = 10), inner(range(min = 1, max = 15)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
-        masks: Vec<Mask> = vec![4, 6, 3, 3, 3, 3, 2, 2] => "Masks of the sensors that are compared, below 2^bits.",
+        bits: usize [1..=4] = 3 => "Bits of the cell index.",
+        snr_db: f64 [-60.0..=60.0] = 18.2 => "Signal-to-noise ratio at which both readings are compared, dB.",
+        masks: Vec<Mask> [1..=15; 1..=10] = vec![4, 6, 3, 3, 3, 3, 2, 2] => "Masks of the sensors that are compared, below 2^bits.",
     }
+    check |p| fit("masks", &p.masks, p.bits);
 }
 
-/// Refuses a mask of more digits than there are bits.
-fn fits(mask: Mask, bits: usize) -> garde::Result {
-    accept(u64::from(mask) < 1 << bits, || format!("not below 2^{bits}"))
+/// Refuses masks of more digits than there are bits.
+fn fit(name: &str, masks: &[Mask], bits: usize) -> Result<(), Refusal> {
+    accept_each(name, masks, |mask| (u64::from(*mask) >> bits != 0).then(|| format!("not below 2^{bits}")))
 }
 
 rows! {
@@ -177,8 +175,7 @@ fn claim_printed(claims: &mut Claims, what: &str, table: &[Bit], printed: &[&str
 
 parameters! {
     pub struct BitsParameters {
-        #[garde(range(min = 1, max = 8))]
-        bits: usize = 4 => "Bits of the cell index.",
+        bits: usize [1..=8] = 4 => "Bits of the cell index.",
     }
 }
 
@@ -249,13 +246,12 @@ impl Figure for Gray {
 
 pub struct Extra;
 
-parameters! { self #[derive(Validate)]
+parameters! {
     pub struct ExtraParameters {
-        #[garde(range(min = 1, max = 8))]
-        bits: usize = 4 => "Bits of the cell index.",
-        #[garde(length(min = 1, max = 20), inner(range(min = 1, max = 255)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
-        extra: Vec<Mask> = vec![14, 5, 11] => "Masks beyond the Gray basis, below 2^bits.",
+        bits: usize [1..=8] = 4 => "Bits of the cell index.",
+        extra: Vec<Mask> [1..=255; 1..=20] = vec![14, 5, 11] => "Masks beyond the Gray basis, below 2^bits.",
     }
+    check |p| fit("extra", &p.extra, p.bits);
 }
 
 impl Figure for Extra {
@@ -293,10 +289,8 @@ pub struct Response;
 
 parameters! {
     pub struct ResponseParameters {
-        #[garde(length(min = 1, max = 100), inner(range(min = -10.0, max = 10.0)))]
-        thresholds: Vec<f64> = vec![-0.6, -0.2, 0.1, 0.7] => "Where the bit changes, in units of V, increasing.",
-        #[garde(range(min = 1e-6, max = 1e3))]
-        noise_std: f64 = 0.1 => "Noise standard deviation, in units of V.",
+        thresholds: Vec<f64> [-10.0..=10.0; 1..=100] = vec![-0.6, -0.2, 0.1, 0.7] => "Where the bit changes, in units of V, increasing.",
+        noise_std: f64 [1e-6..=1e3] = 0.1 => "Noise standard deviation, in units of V.",
     }
 }
 

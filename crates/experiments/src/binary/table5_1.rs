@@ -11,10 +11,8 @@ pub struct Table;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = -60.0, max = 60.0))]
-        snr_db: f64 = 18.2 => "Signal-to-noise ratio, dB.",
-        #[garde(length(min = 3, max = 10), inner(range(min = 1, max = 7)))]
-        printed: Vec<Mask> = vec![4, 6, 3, 3, 3, 2, 1, 5] => "The printed masks, below 8.",
+        snr_db: f64 [-60.0..=60.0] = 18.2 => "Signal-to-noise ratio, dB.",
+        printed: Vec<Mask> [1..=7; 3..=10] = vec![4, 6, 3, 3, 3, 2, 1, 5] => "The printed masks, below 8.",
     }
 }
 

@@ -9,20 +9,19 @@ pub struct Table;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = -60.0, max = 60.0))]
-        snr_db: f64 = 5.2 => "Signal-to-noise ratio, dB.",
+        snr_db: f64 [-60.0..=60.0] = 5.2 => "Signal-to-noise ratio, dB.",
         /// The printed patterns, eight bits each.
-        #[garde(length(min = 3, max = 3), inner(custom(|text: &String, _: &()| eight_bits(text))))]
-        printed: Vec<String> = ["01100110", "10001110", "01011010"].map(String::from).to_vec(),
+        printed: Vec<String> [; 3..=3] = ["01100110", "10001110", "01011010"].map(String::from).to_vec(),
     }
+    check |p| accept_each("printed", &p.printed, |text| eight_bits(text));
 }
 
 /// Refuses what is no pattern of eight cells.
-fn eight_bits(text: &str) -> garde::Result {
+fn eight_bits(text: &str) -> Option<String> {
     match text.parse::<Pattern>() {
-        Ok(pattern) if pattern.cells() == CELLS => Ok(()),
-        Ok(_) => Err(garde::Error::new("expected eight bits")),
-        Err(error) => Err(garde::Error::new(error)),
+        Ok(pattern) if pattern.cells() == CELLS => None,
+        Ok(_) => Some("expected eight bits".to_owned()),
+        Err(error) => Some(error.to_string()),
     }
 }
 

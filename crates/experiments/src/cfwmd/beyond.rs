@@ -215,8 +215,7 @@ rows! {
     #[derive(Debug, Default)]
     pub struct Times {
         /// Time of a fusion step.
-        #[schemars(extend("volatile" = true))]
-        time: Vec<Time>,
+        time: Vec<Time> ["time"],
     }
 
     #[derive(Debug)]

@@ -56,7 +56,7 @@ impl<S: Setting, M: Main, X: Default> Simulated<S, M, X> {
     }
 }
 
-impl<S: Setting, M: Main, X: Default + Serialize + JsonSchema> Figure for Simulated<S, M, X> {
+impl<S: Setting, M: Main, X: Default + Field> Figure for Simulated<S, M, X> {
     type Parameters = S;
     type Tables = Rows<M, X>;
 

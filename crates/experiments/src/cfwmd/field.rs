@@ -22,8 +22,7 @@ parameters! {
     /// Which trial is shown.
     #[derive(Debug, Clone)]
     pub(super) struct Shown {
-        #[garde(range(max = 1_000_000))]
-        trial: u64 = 1 => "Index of the trial whose truth is drawn.",
+        trial: u64 [..=1_000_000] = 1 => "Index of the trial whose truth is drawn.",
     }
 }
 

@@ -6,7 +6,7 @@ use crate::prelude::*;
 pub(super) const BOTH: [Part; 2] = [Part::Position, Part::Velocity];
 
 /// A kind of main table.
-pub trait Main: Serialize + JsonSchema + Sized {
+pub trait Main: Field + Sized {
     /// The rows of these runs. `printed`: whether printed numbers may stand beside ours.
     fn of(figure: &str, runs: &[&Ensemble], printed: bool) -> Vec<Self>;
 

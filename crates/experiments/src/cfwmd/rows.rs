@@ -1,6 +1,8 @@
 //! What the simulated figures have in common: runs of schemes on common trials, and the rows that come of them.
 
+use crate::Column;
 use crate::prelude::*;
+use crate::schema::{Cells, Described};
 
 /// One trial of one scheme, one entry a step.
 #[derive(Debug, Clone, Default)]
@@ -103,7 +105,6 @@ rows! {
     /// One step of one run.
     #[derive(Debug, Clone)]
     pub struct Step {
-        #[serde(flatten)]
         pub(super) run: Run,
         pub(super) k: usize => "Time step.",
         pub(super) position_rmse: Measured ["m"] => "Root mean squared position error.",
@@ -115,7 +116,6 @@ rows! {
     /// One run, averaged over its steps.
     #[derive(Debug, Clone)]
     pub struct Summary {
-        #[serde(flatten)]
         pub(super) run: Run,
         pub(super) position_rmse: Measured ["m"] => "Root mean squared position error over trials and steps.",
         pub(super) velocity_rmse: Measured ["m/s"] => "Root mean squared velocity error over trials and steps.",
@@ -202,11 +202,17 @@ fn paired(ensembles: &[Ensemble], pairs: &[(&str, &str)]) -> Vec<Paired> {
 }
 
 /// No further tables.
-#[derive(Debug, Default, Serialize, JsonSchema)]
-pub struct Nothing {}
+#[derive(Debug, Default)]
+pub struct Nothing;
+
+impl Field for Nothing {
+    fn describe(_: Column, _: &mut Described) {}
+
+    fn put(&self, _: &mut Cells) {}
+}
 
 /// All tables of a simulated figure.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug)]
 pub struct Rows<M, X = Nothing> {
     /// The figure's own rows.
     pub(super) main: Vec<M>,
@@ -214,8 +220,23 @@ pub struct Rows<M, X = Nothing> {
     pub(super) summary: Vec<Summary>,
     /// Differences of schemes on the same trials.
     pub(super) paired: Vec<Paired>,
-    #[serde(flatten)]
     pub(super) further: X,
+}
+
+impl<M: Field, X: Field> Field for Rows<M, X> {
+    fn describe(about: Column, to: &mut Described) {
+        Vec::<M>::describe(Column::of("main", "", "The figure's own rows."), to);
+        Vec::<Summary>::describe(Column::of("summary", "", "Averages over trials and steps."), to);
+        Vec::<Paired>::describe(Column::of("paired", "", "Differences of schemes on the same trials."), to);
+        X::describe(about, to);
+    }
+
+    fn put(&self, to: &mut Cells) {
+        self.main.put(to);
+        self.summary.put(to);
+        self.paired.put(to);
+        self.further.put(to);
+    }
 }
 
 impl<M, X> Rows<M, X> {

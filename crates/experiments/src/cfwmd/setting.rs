@@ -1,15 +1,14 @@
 //! Parameters of the simulated figures.
 
 use super::rows::Ensemble;
+use crate::Argument;
 use crate::prelude::*;
 use fewbits_core::Gaussian;
 use nalgebra::{Matrix2, Vector2};
-use serde::de::DeserializeOwned;
+use serde::{Serialize, de::DeserializeOwned};
 
 /// Parameters of an experiment whose schemes are simulated on common trials.
-pub trait Setting:
-    Clone + Default + Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Quick + Send + Sync + 'static
-{
+pub trait Setting: Clone + Default + Serialize + DeserializeOwned + Argument + Quick + Send + Sync + 'static {
     /// What is sent, and what is made of it.
     type Scheme: Copy;
 
@@ -47,56 +46,41 @@ pub trait Setting:
     }
 }
 
-/// Refuses a budget of more messages than sensors.
-fn at_most(messages: f64, sensors: u64) -> garde::Result {
-    accept(messages <= sensors as f64, || format!("more messages than the {sensors} sensors send"))
-}
-
 /// Seconds and bytes of so many trials of ten schemes.
 pub(super) fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
     let runs = trials as f64 * steps as f64 * budgets as f64 * 10.0;
     Cost::new(runs * step_seconds, runs * 32.0)
 }
 
-/// A target on a line among identical linear sensors.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Linear {
-    /// Monte-Carlo trials.
-    #[garde(range(min = 2, max = 1_000_000))]
-    pub(super) trials: u64,
-    /// Time steps of a trial.
-    #[garde(range(min = 1, max = 1000))]
-    pub(super) steps: u64,
-    /// Sensors.
-    #[garde(range(min = 1, max = 100))]
-    pub(super) sensors: u64,
-    /// Message budgets, each at most the number of sensors.
-    #[garde(length(min = 1, max = 20), inner(range(min = 1e-3, max = 100.0)), inner(custom(|l: &f64, _: &()| at_most(*l, self.sensors))))]
-    pub(super) messages: Vec<f64>,
-    /// Variance of the acceleration (m²/s⁴).
-    #[garde(range(min = 1e-12, max = 1e6))]
-    pub(super) acceleration_variance: f64,
-    /// Noise variances of what a sensor measures: the position (m²), or position and velocity (m², m²/s²).
-    #[garde(length(min = 1, max = 2), inner(range(min = 1e-6, max = 1e6)))]
-    pub(super) noise_variances: Vec<f64>,
-    /// Mean position (m) and velocity (m/s) at the start.
-    #[garde(length(min = 2, max = 2), inner(range(min = -1e6, max = 1e6)))]
-    pub(super) start: Vec<f64>,
-    /// Variances of position and velocity at the start, from which the truth is drawn; 0 is known.
-    #[garde(length(min = 2, max = 2), inner(range(min = 0.0, max = 1e6)))]
-    pub(super) start_variances: Vec<f64>,
-    /// Correlation of position and velocity at the start.
-    #[garde(range(min = -1.0, max = 1.0))]
-    pub(super) start_correlation: f64,
-    /// Particles of the particle filters.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[garde(range(min = 1, max = 1_000_000))]
-    pub(super) particles: Option<u64>,
-    /// Probabilities that the link loses a message.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[garde(length(min = 1, max = 20), inner(inner(range(min = 0.0, max = 0.99))))]
-    pub(super) losses: Option<Vec<f64>>,
+parameters! {
+    /// A target on a line among identical linear sensors.
+    #[derive(Debug, Clone)]
+    pub point struct Linear {
+        /// Monte-Carlo trials.
+        pub(super) trials: u64 [2..=1_000_000],
+        /// Time steps of a trial.
+        pub(super) steps: u64 [1..=1000],
+        /// Sensors.
+        pub(super) sensors: u64 [1..=100],
+        /// Message budgets, each at most the number of sensors.
+        pub(super) messages: Vec<f64> [1e-3..=100.0; 1..=20],
+        /// Variance of the acceleration (m²/s⁴).
+        pub(super) acceleration_variance: f64 [1e-12..=1e6],
+        /// Noise variances of what a sensor measures: the position (m²), or position and velocity (m², m²/s²).
+        pub(super) noise_variances: Vec<f64> [1e-6..=1e6; 1..=2],
+        /// Mean position (m) and velocity (m/s) at the start.
+        pub(super) start: Vec<f64> [-1e6..=1e6; 2..=2],
+        /// Variances of position and velocity at the start, from which the truth is drawn; 0 is known.
+        pub(super) start_variances: Vec<f64> [0.0..=1e6; 2..=2],
+        /// Correlation of position and velocity at the start.
+        pub(super) start_correlation: f64 [-1.0..=1.0],
+        /// Particles of the particle filters.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub(super) particles: Option<u64> [1..=1_000_000],
+        /// Probabilities that the link loses a message.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub(super) losses: Option<Vec<f64>> [0.0..=0.99; 1..=20],
+    }
 }
 
 impl Linear {
@@ -166,43 +150,40 @@ impl Quick for Linear {
         self.trials = 100;
         self.particles = self.particles.map(|_| 100);
     }
+
+    fn check(&self) -> Result<(), Refusal> {
+        let sensors = self.sensors;
+        let beyond = |l: &f64| (*l > sensors as f64).then(|| format!("more messages than the {sensors} sensors send"));
+        accept_each("messages", &self.messages, beyond)
+    }
 }
 
-/// A target in a plane among nine sensors of received power.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Field {
-    /// Monte-Carlo trials.
-    #[garde(range(min = 2, max = 1_000_000))]
-    pub(super) trials: u64,
-    /// Time steps of a trial.
-    #[garde(range(min = 1, max = 1000))]
-    pub(super) steps: u64,
-    /// Message budgets, each at most nine.
-    #[garde(length(min = 1, max = 20), inner(range(min = 1e-3, max = 9.0)))]
-    pub(super) messages: Vec<f64>,
-    /// Particles of every filter.
-    #[garde(range(min = 2, max = 1_000_000))]
-    pub(super) particles: u64,
-    /// Distance of neighbouring sensors of the 3 by 3 grid (m).
-    #[garde(range(min = 1e-3, max = 1e6))]
-    pub(super) spacing_m: f64,
-    /// Variance of the acceleration of each axis (m²/s⁴).
-    #[garde(range(min = 1e-12, max = 1e6))]
-    pub(super) acceleration_variance: f64,
-    /// Variance of the measurement noise.
-    #[garde(range(min = 1e-6, max = 1e6))]
-    pub(super) noise_variance: f64,
-    /// Prior mean of x (m), its velocity (m/s), y and its velocity.
-    #[garde(length(min = 4, max = 4), inner(range(min = -1e6, max = 1e6)))]
-    pub(super) start: Vec<f64>,
-    /// Prior variances of the same.
-    #[garde(length(min = 4, max = 4), inner(range(min = 1e-9, max = 1e6)))]
-    pub(super) start_variances: Vec<f64>,
-    /// Whether the truth is drawn from the prior; the publication's starts at its mean.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[garde(skip)]
-    pub(super) drawn_start: Option<bool>,
+parameters! {
+    /// A target in a plane among nine sensors of received power.
+    #[derive(Debug, Clone)]
+    pub point struct Field {
+        /// Monte-Carlo trials.
+        pub(super) trials: u64 [2..=1_000_000],
+        /// Time steps of a trial.
+        pub(super) steps: u64 [1..=1000],
+        /// Message budgets, each at most nine.
+        pub(super) messages: Vec<f64> [1e-3..=9.0; 1..=20],
+        /// Particles of every filter.
+        pub(super) particles: u64 [2..=1_000_000],
+        /// Distance of neighbouring sensors of the 3 by 3 grid (m).
+        pub(super) spacing_m: f64 [1e-3..=1e6],
+        /// Variance of the acceleration of each axis (m²/s⁴).
+        pub(super) acceleration_variance: f64 [1e-12..=1e6],
+        /// Variance of the measurement noise.
+        pub(super) noise_variance: f64 [1e-6..=1e6],
+        /// Prior mean of x (m), its velocity (m/s), y and its velocity.
+        pub(super) start: Vec<f64> [-1e6..=1e6; 4..=4],
+        /// Prior variances of the same.
+        pub(super) start_variances: Vec<f64> [1e-9..=1e6; 4..=4],
+        /// Whether the truth is drawn from the prior; the publication's starts at its mean.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub(super) drawn_start: Option<bool>,
+    }
 }
 
 impl Field {

@@ -51,12 +51,9 @@ parameters! {
     #[derive(Debug, Clone)]
     pub struct Parameters {
         /// Number of the random deployment; it is moved on to the next whose belief has two lobes.
-        #[garde(range(max = 1_000_000))]
-        deployment: u64 = 0,
-        #[garde(range(min = 1, max = 20))]
-        nodes: usize = 3 => "Nodes that have sampled.",
-        #[garde(range(min = 10, max = 400))]
-        grid: usize = 160 => "Points of the grid along each axis.",
+        deployment: u64 [..=1_000_000] = 0,
+        nodes: usize [1..=20] = 3 => "Nodes that have sampled.",
+        grid: usize [10..=400] = 160 => "Points of the grid along each axis.",
     }
 }
 

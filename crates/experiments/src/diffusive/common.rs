@@ -31,16 +31,11 @@ parameters! {
     /// Settings of every search.
     #[derive(Debug, Clone)]
     pub struct Settings {
-        #[garde(range(min = 1, max = 100_000))]
-        pub(super) trials: u64 = 200 => quick 8 => "Random deployments, each searched by every scheme.",
-        #[garde(range(min = 2, max = 100_000))]
-        pub(super) nodes: usize = 300 => "Deployed nodes.",
-        #[garde(range(min = 1.0, max = 1e4))]
-        pub(super) prior_sd: f64 = 50.0 => "Standard deviation of the prior about the first node, m.",
-        #[garde(range(min = 0.0, max = 0.99))]
-        pub(super) rate_low: f64 = 0.5 => "Lower end of the rate's prior, kg/s.",
-        #[garde(range(min = 1.01, max = 1e3))]
-        pub(super) rate_high: f64 = 1.5 => "Upper end of the rate's prior, kg/s.",
+        pub(super) trials: u64 [1..=100_000] = 200 => quick 8 => "Random deployments, each searched by every scheme.",
+        pub(super) nodes: usize [2..=100_000] = 300 => "Deployed nodes.",
+        pub(super) prior_sd: f64 [1.0..=1e4] = 50.0 => "Standard deviation of the prior about the first node, m.",
+        pub(super) rate_low: f64 [0.0..=0.99] = 0.5 => "Lower end of the rate's prior, kg/s.",
+        pub(super) rate_high: f64 [1.01..=1e3] = 1.5 => "Upper end of the rate's prior, kg/s.",
     }
 }
 

@@ -23,10 +23,8 @@ parameters! {
     /// Settings of the divergences.
     #[derive(Debug, Clone)]
     pub struct KlParameters {
-        #[garde(range(min = 1, max = 100_000))]
-        trials: u64 = 200 => quick 8 => "Random deployments.",
-        #[garde(length(min = 1), inner(range(min = 1, max = 20)))]
-        nodes: Vec<usize> = vec![1, 2, 3, 4] => "Nodes that have sampled.",
+        trials: u64 [1..=100_000] = 200 => quick 8 => "Random deployments.",
+        nodes: Vec<usize> [1..=20; 1..] = vec![1, 2, 3, 4] => "Nodes that have sampled.",
     }
 }
 

@@ -11,14 +11,10 @@ parameters! {
     /// Settings of the envelope.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        #[garde(range(min = 1, max = 100_000))]
-        trials: u64 = 200 => quick 8 => "Random deployments.",
-        #[garde(range(min = 1, max = 20))]
-        nodes: usize = 3 => "Nodes that have sampled.",
-        #[garde(range(min = 1.0, max = 1e5))]
-        time: f64 = 100.0 => "Time of the envelope after the release began, s.",
-        #[garde(range(min = 1e-8, max = 1.0))]
-        threshold: f64 = 1e-4 => "Threshold of the concentration, kg/m^3.",
+        trials: u64 [1..=100_000] = 200 => quick 8 => "Random deployments.",
+        nodes: usize [1..=20] = 3 => "Nodes that have sampled.",
+        time: f64 [1.0..=1e5] = 100.0 => "Time of the envelope after the release began, s.",
+        threshold: f64 [1e-8..=1.0] = 1e-4 => "Threshold of the concentration, kg/m^3.",
     }
 }
 

@@ -15,14 +15,10 @@ parameters! {
     /// Settings of all placements.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 100 => quick 6 => "Random placements of source and sensors.",
-        #[garde(range(min = 4, max = 200))]
-        sensors: usize = 40 => "Sensors.",
-        #[garde(range(min = 2, max = 10_000))]
-        visit_trials: u64 = 40 => quick 3 => "Placements in which sensors are visited one after the other.",
-        #[garde(range(min = 4, max = 1000))]
-        visit_sensors: usize = 160 => quick 20 => "Sensors of such a placement.",
+        trials: u64 [2..=10_000] = 100 => quick 6 => "Random placements of source and sensors.",
+        sensors: usize [4..=200] = 40 => "Sensors.",
+        visit_trials: u64 [2..=10_000] = 40 => quick 3 => "Placements in which sensors are visited one after the other.",
+        visit_sensors: usize [4..=1000] = 160 => quick 20 => "Sensors of such a placement.",
     }
 }
 

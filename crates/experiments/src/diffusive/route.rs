@@ -2,6 +2,7 @@
 
 use super::common::{A, ALARM, Network, Scheme, Settings};
 use crate::prelude::*;
+use crate::schema::label;
 use fewbits_densities::ellipse;
 use fewbits_diffusive::{Form, Outcome, Rule};
 
@@ -9,12 +10,9 @@ parameters! {
     /// Which deployment is shown.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        #[garde(range(max = 1_000_000))]
-        deployment: u64 = 0 => "Number of the random deployment.",
-        #[garde(range(min = 2, max = 100_000))]
-        nodes: usize = 300 => "Deployed nodes.",
-        #[garde(range(min = 1.0, max = 1000.0))]
-        range: f64 = 15.0 => "Radio range, m.",
+        deployment: u64 [..=1_000_000] = 0 => "Number of the random deployment.",
+        nodes: usize [2..=100_000] = 300 => "Deployed nodes.",
+        range: f64 [1.0..=1000.0] = 15.0 => "Radio range, m.",
     }
 }
 
@@ -42,8 +40,7 @@ impl Parameters {
 }
 
 /// What happens at a node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Event {
     /// The belief arrives.
     Receive,
@@ -60,6 +57,7 @@ enum Event {
     /// The search ends.
     Stop,
 }
+label!(Event);
 
 rows! {
     pub struct TraceRow {

@@ -13,14 +13,10 @@ parameters! {
     /// Settings of the comparison.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        #[garde(range(min = 1, max = 100_000))]
-        trials: u64 = 200 => quick 8 => "Random deployments of the searches.",
-        #[garde(range(min = 1, max = 10_000))]
-        ranking_trials: u64 = 60 => quick 2 => "Random deployments in which candidates are ranked.",
-        #[garde(range(min = 10, max = 2_000))]
-        points: usize = 200 => "Support points of the bounds.",
-        #[garde(range(min = 10, max = 100_000))]
-        draws: usize = 200 => "Draws of the mutual information.",
+        trials: u64 [1..=100_000] = 200 => quick 8 => "Random deployments of the searches.",
+        ranking_trials: u64 [1..=10_000] = 60 => quick 2 => "Random deployments in which candidates are ranked.",
+        points: usize [10..=2_000] = 200 => "Support points of the bounds.",
+        draws: usize [10..=100_000] = 200 => "Draws of the mutual information.",
     }
 }
 

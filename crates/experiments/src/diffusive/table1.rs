@@ -8,14 +8,10 @@ parameters! {
     /// The covariance at which the table is evaluated.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        #[garde(range(min = 0.01, max = 100.0))]
-        variance1: f64 = 2.0 => "Variance of the first coordinate.",
-        #[garde(range(min = 0.01, max = 100.0))]
-        variance2: f64 = 0.5 => "Variance of the second coordinate.",
-        #[garde(range(min = -0.99, max = 0.99))]
-        correlation: f64 = 0.7 => "Correlation.",
-        #[garde(range(min = 1, max = 8))]
-        degree: usize = 4 => "Highest degree.",
+        variance1: f64 [0.01..=100.0] = 2.0 => "Variance of the first coordinate.",
+        variance2: f64 [0.01..=100.0] = 0.5 => "Variance of the second coordinate.",
+        correlation: f64 [-0.99..=0.99] = 0.7 => "Correlation.",
+        degree: usize [1..=8] = 4 => "Highest degree.",
     }
 }
 

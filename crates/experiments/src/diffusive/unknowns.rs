@@ -13,12 +13,9 @@ parameters! {
     /// Settings of both tables.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        #[garde(range(min = 1, max = 10_000))]
-        trials: u64 = 200 => quick 4 => "Random layouts about the source for the comparison of rate models.",
-        #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-        nodes: Vec<usize> = vec![6, 20] => "Nodes of a layout.",
-        #[garde(range(min = 1.0, max = 1000.0))]
-        radius: f64 = 25.0 => "Radius of a layout, m.",
+        trials: u64 [1..=10_000] = 200 => quick 4 => "Random layouts about the source for the comparison of rate models.",
+        nodes: Vec<usize> [1..=100; 1..] = vec![6, 20] => "Nodes of a layout.",
+        radius: f64 [1.0..=1000.0] = 25.0 => "Radius of a layout, m.",
     }
 }
 

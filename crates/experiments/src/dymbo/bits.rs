@@ -7,10 +7,8 @@ use fewbits_monte_carlo::parallel;
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1), dive)]
-        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05)]) => "Plants, `a:gamma`.",
-        #[garde(length(min = 1), inner(range(min = 1, max = 8)))]
-        bits: Vec<usize> = (1..=8).collect() => "Bits a sample.",
+        plants: Vec<Plant> [; 1..] = plants([(0.9, 0.5), (0.9, 0.05)]) => "Plants, `a:gamma`.",
+        bits: Vec<usize> [1..=8; 1..] = (1..=8).collect() => "Bits a sample.",
     }
 }
 
@@ -21,7 +19,6 @@ rows! {
     }
 
     struct Row by "{plant} {bits}" {
-        #[serde(flatten)]
         plant: Plant,
         bits: usize => "Word length.",
         c: f64 => "Information of a word against the sample.",

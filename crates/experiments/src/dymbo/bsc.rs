@@ -10,20 +10,15 @@ const ID: &str = "dymbo-bsc";
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = -0.999_999, max = 0.999_999))]
-        a: f64 = 0.9 => "Plant coefficient.",
-        #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
-        #[garde(length(min = 1), inner(range(min = 0.0, max = 0.499)))]
-        crossover: Vec<f64> = vec![0.0, 0.01, 0.05, 0.1, 0.2, 0.3] => "Probabilities that a bit is inverted.",
-        #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 400 => quick 40 => "Runs of the comparison with the exact posterior.",
+        a: f64 [-0.999_999..=0.999_999] = 0.9 => "Plant coefficient.",
+        gamma: Vec<f64> [1e-4..=1e3; 1..] = vec![0.5, 0.05] => "Process variances over measurement variance.",
+        crossover: Vec<f64> [0.0..=0.499; 1..] = vec![0.0, 0.01, 0.05, 0.1, 0.2, 0.3] => "Probabilities that a bit is inverted.",
+        trials: u64 [2..=10_000_000] = 400 => quick 40 => "Runs of the comparison with the exact posterior.",
     }
 }
 
 rows! {
     pub struct Row by "{plant} {crossover}" {
-        #[serde(flatten)]
         plant: Plant,
         crossover: f64 => "Probability that a bit is inverted.",
         riccati: f64 ["sigma^2"] => "Steady variance computed by the filter that knows.",

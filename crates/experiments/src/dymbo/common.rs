@@ -5,16 +5,15 @@ use fewbits_core::Gaussian;
 use fewbits_dymbo::ScalarPlant;
 use std::f64::consts::FRAC_2_PI;
 
-/// A plant of unit measurement noise.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Plant {
-    /// Plant coefficient; one bit cannot hold an unstable plant.
-    #[garde(range(min = -1.0, max = 1.0))]
-    pub(super) a: f64,
-    /// Process variance over measurement variance.
-    #[garde(range(min = 1e-6, max = 1e3))]
-    pub(super) gamma: f64,
+parameters! {
+    /// A plant of unit measurement noise.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub(super) point struct Plant {
+        /// Plant coefficient; one bit cannot hold an unstable plant.
+        pub(super) a: f64 [-1.0..=1.0],
+        /// Process variance over measurement variance.
+        pub(super) gamma: f64 [1e-6..=1e3],
+    }
 }
 
 impl Plant {

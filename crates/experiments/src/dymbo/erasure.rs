@@ -10,24 +10,17 @@ const ID: &str = "dymbo-erasure";
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = -0.999_999, max = 0.999_999))]
-        a: f64 = 0.9 => "Plant coefficient; the state starts from its stationary law.",
-        #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
-        #[garde(length(min = 1), inner(range(min = 0.0, max = 0.999_999)))]
-        loss: Vec<f64> = vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7] => "Probabilities that a bit is lost.",
-        #[garde(range(min = 1, max = 10_000))]
-        steps: u64 = 1000 => "Steps of a run that are measured.",
-        #[garde(range(max = 10_000))]
-        burn: u64 = 100 => "Steps before them.",
-        #[garde(range(min = 2, max = 100_000_000))]
-        trials: u64 = 2_000 => quick 100 => "Simulated runs.",
+        a: f64 [-0.999_999..=0.999_999] = 0.9 => "Plant coefficient; the state starts from its stationary law.",
+        gamma: Vec<f64> [1e-6..=1e3; 1..] = vec![0.5, 0.05] => "Process variances over measurement variance.",
+        loss: Vec<f64> [0.0..=0.999_999; 1..] = vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7] => "Probabilities that a bit is lost.",
+        steps: u64 [1..=10_000] = 1000 => "Steps of a run that are measured.",
+        burn: u64 [..=10_000] = 100 => "Steps before them.",
+        trials: u64 [2..=100_000_000] = 2_000 => quick 100 => "Simulated runs.",
     }
 }
 
 rows! {
     pub struct Row by "{plant} {loss}" {
-        #[serde(flatten)]
         plant: Plant,
         loss: f64 => "Probability that a bit is lost.",
         trials: u64 => "Simulated runs.",

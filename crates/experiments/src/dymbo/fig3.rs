@@ -5,16 +5,13 @@ use crate::prelude::*;
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]
-        a: Vec<f64> = vec![0.5, 0.9, 0.99] => "Plant coefficients.",
-        #[garde(length(min = 1), inner(range(min = 1e-12, max = 1e12)))]
-        gamma: Vec<f64> = log_spaced(-3.0, 1.0, 81) => "Process variances over measurement variance.",
+        a: Vec<f64> [-1.0..=1.0; 1..] = vec![0.5, 0.9, 0.99] => "Plant coefficients.",
+        gamma: Vec<f64> [1e-12..=1e12; 1..] = log_spaced(-3.0, 1.0, 81) => "Process variances over measurement variance.",
     }
 }
 
 rows! {
     pub struct Row {
-        #[serde(flatten)]
         plant: Plant,
         kf_reduction: f64 ["sigma^2"] => "Steady filtered variance of the Kalman filter.",
         dymbo_reduction: f64 ["sigma^2"] => "Steady filtered variance of the sign-bit filter.",

@@ -12,15 +12,11 @@ fn hundredths(i: i32) -> f64 {
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]
-        a: Vec<f64> = (0..=100).map(hundredths).collect() => "Plant coefficients.",
-        #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e3)))]
-        gamma: Vec<f64> = log_spaced(-3.0, 1.0, 81) => "Process variances over measurement variance.",
-        #[garde(length(min = 1), inner(range(min = 1.000_001, max = 1e6)))]
-        level: Vec<f64> = vec![1.05, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0] => "Losses of the contours.",
+        a: Vec<f64> [-1.0..=1.0; 1..] = (0..=100).map(hundredths).collect() => "Plant coefficients.",
+        gamma: Vec<f64> [1e-6..=1e3; 1..] = log_spaced(-3.0, 1.0, 81) => "Process variances over measurement variance.",
+        level: Vec<f64> [1.000_001..=1e6; 1..] = vec![1.05, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0] => "Losses of the contours.",
         /// Coefficients at which the exact loss is computed as well.
-        #[garde(inner(range(min = -1.0, max = 1.0)))]
-        exact_a: Vec<f64> = (0..=19).map(|i| hundredths(5 * i)).chain([0.99, 1.0]).collect() => quick vec![0.0, 0.5, 0.9, 1.0],
+        exact_a: Vec<f64> [-1.0..=1.0] = (0..=19).map(|i| hundredths(5 * i)).chain([0.99, 1.0]).collect() => quick vec![0.0, 0.5, 0.9, 1.0],
     }
 }
 
@@ -31,7 +27,6 @@ rows! {
     }
 
     struct Row {
-        #[serde(flatten)]
         plant: Plant,
         loss_riccati: f64 => "Steady variance over the Kalman filter's, closed form.",
         loss_true: Option<f64> => "The same with the exact mean squared error.",

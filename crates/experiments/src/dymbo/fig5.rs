@@ -15,16 +15,11 @@ const ID: &str = "dymbo-fig5";
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = -0.999_999, max = 0.999_999))]
-        a: f64 = 0.9 => "Plant coefficient; the state starts from its stationary law.",
-        #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
-        #[garde(range(min = 1e-3, max = 100.0))]
-        tau: f64 = 1.0 => "Resolution of the first message in noise deviations.",
-        #[garde(range(min = 1, max = 10_000))]
-        steps: usize = 50 => "Steps after the first message.",
-        #[garde(range(min = 2, max = 100_000_000))]
-        trials: u64 = 100_000 => quick 5_000 => "Simulated runs.",
+        a: f64 [-0.999_999..=0.999_999] = 0.9 => "Plant coefficient; the state starts from its stationary law.",
+        gamma: Vec<f64> [1e-4..=1e3; 1..] = vec![0.5, 0.05] => "Process variances over measurement variance.",
+        tau: f64 [1e-3..=100.0] = 1.0 => "Resolution of the first message in noise deviations.",
+        steps: usize [1..=10_000] = 50 => "Steps after the first message.",
+        trials: u64 [2..=100_000_000] = 100_000 => quick 5_000 => "Simulated runs.",
     }
 }
 
@@ -35,7 +30,6 @@ rows! {
     }
 
     struct Row by "{plant} {n}" {
-        #[serde(flatten)]
         plant: Plant,
         n: usize => "Step.",
         trials: u64 => "Simulated runs.",
@@ -52,7 +46,6 @@ rows! {
     }
 
     struct Point {
-        #[serde(flatten)]
         plant: Plant,
         n: usize => "Step.",
         theta: f64 ["sigma"] => "State.",

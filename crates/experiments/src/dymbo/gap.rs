@@ -11,14 +11,10 @@ const ID: &str = "dymbo-gap";
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1), dive)]
-        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0), (1.0, 1.0)]) => "Plants, `a:gamma`.",
-        #[garde(range(min = 0.01, max = 10.0))]
-        tau: f64 = 1.0 => "Resolution of the first message in noise deviations.",
-        #[garde(range(min = 1, max = 14))]
-        depth: usize = 12 => quick 8 => "Bits after the first message whose strings are all followed.",
-        #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 400 => quick 50 => "Runs of the steady comparison.",
+        plants: Vec<Plant> [; 1..] = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0), (1.0, 1.0)]) => "Plants, `a:gamma`.",
+        tau: f64 [0.01..=10.0] = 1.0 => "Resolution of the first message in noise deviations.",
+        depth: usize [1..=14] = 12 => quick 8 => "Bits after the first message whose strings are all followed.",
+        trials: u64 [2..=10_000_000] = 400 => quick 50 => "Runs of the steady comparison.",
     }
 }
 
@@ -29,7 +25,6 @@ rows! {
     }
 
     struct Row by "{plant} {n}" {
-        #[serde(flatten)]
         plant: Plant,
         n: usize => "Bits after the first message.",
         mmse: f64 ["sigma^2"] => "Exact minimum mean squared error given the bits.",
@@ -39,7 +34,6 @@ rows! {
     }
 
     struct Steady by "{plant}" {
-        #[serde(flatten)]
         plant: Plant,
         bits: usize => "Bits a sample.",
         exact_mse: f64 ["sigma^2"] => "Exact steady error of the filter.",

@@ -8,10 +8,8 @@ use fewbits_numerics::normal::log_pdf_with;
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
-        sigma: Vec<f64> = vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0] => "Measurement noise deviations.",
-        #[garde(range(min = 1e-6, max = 1e6))]
-        sigma_theta: f64 = 1.0 => "Prior deviation.",
+        sigma: Vec<f64> [1e-6..=1e6; 1..] = vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0] => "Measurement noise deviations.",
+        sigma_theta: f64 [1e-6..=1e6] = 1.0 => "Prior deviation.",
     }
 }
 

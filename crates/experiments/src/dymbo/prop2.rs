@@ -7,14 +7,10 @@ use fewbits_dymbo::{RoundedSample, ScalarPlant, first_message_mse};
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 1e-6, max = 1e6))]
-        sigma: f64 = 1.0 => "Measurement noise deviation.",
-        #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
-        tau: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0, 4.0] => "Resolutions of the first message.",
-        #[garde(range(min = -1.0, max = 1.0))]
-        a: f64 = 0.9 => "Plant coefficient.",
-        #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
+        sigma: f64 [1e-6..=1e6] = 1.0 => "Measurement noise deviation.",
+        tau: Vec<f64> [1e-6..=1e6; 1..] = vec![0.25, 0.5, 1.0, 2.0, 4.0] => "Resolutions of the first message.",
+        a: f64 [-1.0..=1.0] = 0.9 => "Plant coefficient.",
+        gamma: Vec<f64> [1e-4..=1e3; 1..] = vec![0.5, 0.05] => "Process variances over measurement variance.",
     }
 }
 

@@ -29,12 +29,9 @@ const JAYANT: f64 = 1.5;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 0.0, max = 1.0))]
-        gain: f64 = 0.03 => "Step of the logarithm of the process variance per bit.",
-        #[garde(range(min = 0.0, max = 0.4))]
-        flips: f64 = 0.05 => "Probability that a bit is inverted, where bits are.",
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 100 => quick 8 => "Simulated runs of 2000 steps.",
+        gain: f64 [0.0..=1.0] = 0.03 => "Step of the logarithm of the process variance per bit.",
+        flips: f64 [0.0..=0.4] = 0.05 => "Probability that a bit is inverted, where bits are.",
+        trials: u64 [2..=100_000] = 100 => quick 8 => "Simulated runs of 2000 steps.",
     }
 }
 

@@ -7,18 +7,14 @@ use fewbits_monte_carlo::parallel;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = -1.0, max = 1.0))]
-        a: f64 = 0.9 => "Plant coefficient.",
-        #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
-        #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-        sensors: Vec<usize> = vec![1, 2, 3, 4, 5, 7, 10, 14, 20] => "Sensors a slot.",
+        a: f64 [-1.0..=1.0] = 0.9 => "Plant coefficient.",
+        gamma: Vec<f64> [1e-4..=1e3; 1..] = vec![0.5, 0.05] => "Process variances over measurement variance.",
+        sensors: Vec<usize> [1..=100; 1..] = vec![1, 2, 3, 4, 5, 7, 10, 14, 20] => "Sensors a slot.",
     }
 }
 
 rows! {
     pub struct Row by "{plant} {sensors}" {
-        #[serde(flatten)]
         plant: Plant,
         sensors: usize => "Sensors a slot, K.",
         sequential: f64 ["sigma^2"] => "Computed steady variance, one after the other.",

@@ -11,12 +11,9 @@ const ID: &str = "dymbo-smoother";
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1), dive)]
-        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0)]) => "Plants, `a:gamma`.",
-        #[garde(length(min = 1), inner(range(max = 200)))]
-        lag: Vec<usize> = vec![0, 1, 2, 3, 4, 5, 10, 20] => "Steps between the state and the last bit.",
-        #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 400 => quick 20 => "Simulated runs of ten smoothed states.",
+        plants: Vec<Plant> [; 1..] = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0)]) => "Plants, `a:gamma`.",
+        lag: Vec<usize> [..=200; 1..] = vec![0, 1, 2, 3, 4, 5, 10, 20] => "Steps between the state and the last bit.",
+        trials: u64 [2..=10_000_000] = 400 => quick 20 => "Simulated runs of ten smoothed states.",
     }
 }
 
@@ -27,7 +24,6 @@ const STRIDE: usize = 4;
 
 rows! {
     pub struct Row by "{plant} {lag}" {
-        #[serde(flatten)]
         plant: Plant,
         lag: usize => "Steps between the state and the last bit.",
         trials: u64 => "Simulated runs of ten smoothed states.",

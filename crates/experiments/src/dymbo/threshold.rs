@@ -13,26 +13,18 @@ const ID: &str = "dymbo-threshold";
 parameters! {
     pub struct Parameters {
         /// Plants, `a:gamma`; the state starts from its stationary law.
-        #[garde(length(min = 1), custom(stationary), dive)]
-        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (-0.9, 0.5)]),
-        #[garde(range(min = 1, max = 10_000))]
-        steps: u64 = 1000 => "Steps of a run that are measured.",
-        #[garde(range(max = 10_000))]
-        burn: u64 = 100 => "Steps before them.",
-        #[garde(range(min = 2, max = 100_000_000))]
-        trials: u64 = 6_000 => quick 200 => "Simulated runs.",
-        #[garde(range(min = -3.0, max = 3.0))]
-        unstable_a: f64 = 1.2 => "Coefficient of the unstable plant.",
-        #[garde(range(min = 1e-6, max = 1e3))]
-        unstable_gamma: f64 = 0.5 => "Its process variance over measurement variance.",
-        #[garde(range(min = 2, max = 100_000_000))]
-        unstable_trials: u64 = 20_000 => quick 2_000 => "Simulated runs of it.",
+        plants: Vec<Plant> [; 1..] = plants([(0.9, 0.5), (0.9, 0.05), (-0.9, 0.5)]),
+        steps: u64 [1..=10_000] = 1000 => "Steps of a run that are measured.",
+        burn: u64 [..=10_000] = 100 => "Steps before them.",
+        trials: u64 [2..=100_000_000] = 6_000 => quick 200 => "Simulated runs.",
+        unstable_a: f64 [-3.0..=3.0] = 1.2 => "Coefficient of the unstable plant.",
+        unstable_gamma: f64 [1e-6..=1e3] = 0.5 => "Its process variance over measurement variance.",
+        unstable_trials: u64 [2..=100_000_000] = 20_000 => quick 2_000 => "Simulated runs of it.",
     }
-}
-
-fn stationary(plants: &[Plant], (): &()) -> garde::Result {
-    let stable = plants.iter().all(|plant| plant.a.abs() < 1.0);
-    accept(stable, || "a must be above -1 and below 1".to_owned())
+    check |p| {
+        let stable = p.plants.iter().all(|plant| plant.a.abs() < 1.0);
+        accept("plants", stable, || "a must be above -1 and below 1".to_owned())
+    };
 }
 
 rows! {
@@ -42,7 +34,6 @@ rows! {
     }
 
     struct Row by "{plant} {rule}" {
-        #[serde(flatten)]
         plant: Plant,
         rule: &'static str => "Place of the threshold.",
         trials: u64 => "Simulated runs.",

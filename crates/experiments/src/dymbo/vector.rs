@@ -13,25 +13,20 @@ const ID: &str = "dymbo-vector";
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(equal = 4), inner(range(min = -10.0, max = 10.0)), custom(stable))]
-        transition: Vec<f64> = vec![0.95, 0.25, -0.1, 0.9] => "Transition matrix, row by row; stable.",
-        #[garde(range(min = 1e-6, max = 1e6))]
-        process_variance: f64 = 0.3 => "Variance of the process noise of each coordinate.",
-        #[garde(range(min = 1e-6, max = 1e6))]
-        measurement_variance: f64 = 1.0 => "Variance of the measurement noise.",
-        #[garde(range(min = 1, max = 10_000))]
-        steps: usize = 40 => quick 10 => "Steps of a run that are measured.",
-        #[garde(range(min = 2, max = 1_000_000))]
-        trials: u64 = 60 => quick 4 => "Simulated runs.",
+        transition: Vec<f64> [-10.0..=10.0; 4..=4] = vec![0.95, 0.25, -0.1, 0.9] => "Transition matrix, row by row; stable.",
+        process_variance: f64 [1e-6..=1e6] = 0.3 => "Variance of the process noise of each coordinate.",
+        measurement_variance: f64 [1e-6..=1e6] = 1.0 => "Variance of the measurement noise.",
+        steps: usize [1..=10_000] = 40 => quick 10 => "Steps of a run that are measured.",
+        trials: u64 [2..=1_000_000] = 60 => quick 4 => "Simulated runs.",
     }
+    check |p| accept("transition", stable(&p.transition), || "not a stable matrix".to_owned());
 }
 
-fn stable(transition: &[f64], (): &()) -> garde::Result {
+fn stable(transition: &[f64]) -> bool {
     let matrix = Matrix2::from_row_slice(transition.get(..4).unwrap_or(&[0.0; 4]));
-    let stable = LinearGaussian::with_covariance(matrix, Matrix2::identity())
+    LinearGaussian::with_covariance(matrix, Matrix2::identity())
         .and_then(|dynamics| dynamics.stationary_covariance())
-        .is_ok();
-    accept(stable, || "not a stable matrix".to_owned())
+        .is_ok()
 }
 
 /// Steps before the exact posterior has forgotten that it started normal.

@@ -11,8 +11,7 @@ use fewbits_mixture_codec::{Criterion, Reduction, Split};
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 40 => quick 2 => "Worlds.",
+        trials: u64 [2..=10_000] = 40 => quick 2 => "Worlds.",
     }
 }
 

@@ -6,10 +6,8 @@ use fewbits_mixture_codec::divergence::kl_centred_normals;
 parameters! {
     pub struct Parameters {
         /// Ratios of successive standard deviations; 0.96 is printed, 0.97 is meant.
-        #[garde(length(min = 1), inner(range(min = 0.5, max = 2.0)))]
-        ratio: Vec<f64> = vec![0.97, 0.96],
-        #[garde(range(min = 2, max = 1000))]
-        steps: u32 = 20 => "Steps.",
+        ratio: Vec<f64> [0.5..=2.0; 1..] = vec![0.97, 0.96],
+        steps: u32 [2..=1000] = 20 => "Steps.",
     }
 }
 

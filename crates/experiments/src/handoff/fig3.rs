@@ -8,14 +8,10 @@ use nalgebra::{Matrix1, Vector1};
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 1e-6, max = 0.5))]
-        mass: f64 = 0.1 => "Mass of the small lobe.",
-        #[garde(range(min = 0.6, max = 0.9))]
-        lobe: f64 = 0.65 => "Centre of the small lobe of the first density.",
-        #[garde(range(min = 0.6, max = 0.9))]
-        moved_lobe: f64 = 0.85 => "Centre of the small lobe of the second.",
-        #[garde(range(min = 0.3, max = 0.6))]
-        threshold: f64 = 0.5 => "The measurement tells whether the state is above this.",
+        mass: f64 [1e-6..=0.5] = 0.1 => "Mass of the small lobe.",
+        lobe: f64 [0.6..=0.9] = 0.65 => "Centre of the small lobe of the first density.",
+        moved_lobe: f64 [0.6..=0.9] = 0.85 => "Centre of the small lobe of the second.",
+        threshold: f64 [0.3..=0.6] = 0.5 => "The measurement tells whether the state is above this.",
     }
 }
 

@@ -5,10 +5,8 @@ use crate::prelude::*;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 5, max = 10_000))]
-        sensors: usize = 25 => "Sensors in the field.",
-        #[garde(range(min = 2, max = 1000))]
-        steps: usize = 10 => "Steps.",
+        sensors: usize [5..=10_000] = 25 => "Sensors in the field.",
+        steps: usize [2..=1000] = 10 => "Steps.",
     }
 }
 

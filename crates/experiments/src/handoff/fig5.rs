@@ -8,12 +8,9 @@ use fewbits_mixture_codec::Reduction;
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1, max = 3), inner(range(min = 1, max = 10)))]
-        time: Vec<usize> = vec![2, 5, 8] => "Times shown.",
-        #[garde(range(min = 1, max = 60))]
-        components: usize = 5 => "Components of the mixture that would be sent.",
-        #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 20 => "Worlds for the mean distance from a Gaussian.",
+        time: Vec<usize> [1..=10; 1..=3] = vec![2, 5, 8] => "Times shown.",
+        components: usize [1..=60] = 5 => "Components of the mixture that would be sent.",
+        trials: u64 [2..=10_000] = 20 => "Worlds for the mean distance from a Gaussian.",
     }
 }
 

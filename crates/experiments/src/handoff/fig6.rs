@@ -8,8 +8,7 @@ use std::f64::consts::LN_10;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 400 => quick 4 => "Worlds.",
+        trials: u64 [2..=100_000] = 400 => quick 4 => "Worlds.",
     }
 }
 

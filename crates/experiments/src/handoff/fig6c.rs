@@ -14,12 +14,9 @@ use rand_pcg::Pcg64Mcg;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 1, max = 100))]
-        components: usize = 5 => "Components sent.",
-        #[garde(range(min = 2, max = 2000))]
-        points: usize = 250 => "Points of the reference at which densities are compared.",
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 500 => quick 4 => "Worlds.",
+        components: usize [1..=100] = 5 => "Components sent.",
+        points: usize [2..=2000] = 250 => "Points of the reference at which densities are compared.",
+        trials: u64 [2..=100_000] = 500 => quick 4 => "Worlds.",
     }
 }
 

@@ -10,12 +10,9 @@ use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1), inner(range(min = 1, max = 60)))]
-        components: Vec<usize> = vec![1, 3, 5, 10] => "Components.",
-        #[garde(length(min = 1), inner(range(min = 0.01, max = 1.0)))]
-        resolution: Vec<f64> = vec![0.5, 0.35, 0.25, 0.15] => "Resolutions: quantiser steps in standard deviations.",
-        #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 12 => quick 2 => "Worlds, of three beliefs each.",
+        components: Vec<usize> [1..=60; 1..] = vec![1, 3, 5, 10] => "Components.",
+        resolution: Vec<f64> [0.01..=1.0; 1..] = vec![0.5, 0.35, 0.25, 0.15] => "Resolutions: quantiser steps in standard deviations.",
+        trials: u64 [2..=10_000] = 12 => quick 2 => "Worlds, of three beliefs each.",
     }
 }
 

@@ -10,10 +10,8 @@ use std::time::Instant;
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-        components: Vec<usize> = vec![3, 5, 10, 20] => "Components.",
-        #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 10 => quick 2 => "Worlds, of three beliefs each.",
+        components: Vec<usize> [1..=100; 1..] = vec![3, 5, 10, 20] => "Components.",
+        trials: u64 [2..=10_000] = 10 => quick 2 => "Worlds, of three beliefs each.",
     }
 }
 
@@ -21,8 +19,7 @@ rows! {
     pub struct Rows {
         errors: Vec<Row> => "Errors.",
         /// What the methods cost.
-        #[schemars(extend("volatile" = true))]
-        cost: Vec<Time>,
+        cost: Vec<Time> ["time"],
     }
 
     struct Row by "{method}-m{components}" {

@@ -9,13 +9,10 @@ use std::f64::consts::LN_2;
 parameters! {
     /// Settings of Figures 4.2 to 4.5.
     pub struct Parameters {
-        #[garde(range(min = 1, max = 1000))]
-        steps: usize = 15 => "Steps of each stage.",
+        steps: usize [1..=1000] = 15 => "Steps of each stage.",
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[garde(length(min = 1, max = 8), inner(inner(range(min = 0.0, max = 0.06))))]
-        crossovers: Option<Vec<f64>> = None => "Crossover probabilities of the words' bits, natural words, increasing.",
-        #[garde(range(min = 1e-2, max = 1e2))]
-        noise_sd: f64 = 1.0 => "Noise standard deviation of both sensors, in prior standard deviations.",
+        crossovers: Option<Vec<f64>> [0.0..=0.06; 1..=8] = None => "Crossover probabilities of the words' bits, natural words, increasing.",
+        noise_sd: f64 [1e-2..=1e2] = 1.0 => "Noise standard deviation of both sensors, in prior standard deviations.",
     }
 }
 

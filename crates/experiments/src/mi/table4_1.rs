@@ -8,12 +8,9 @@ use fewbits_quantizer_design::{Newton, System, bounds, design};
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 1e-3, max = 1e3))]
-        noise_sd: f64 = 1.0 => "Noise standard deviation of both sensors, in prior standard deviations.",
-        #[garde(range(min = -0.99, max = 0.99))]
-        correlation: f64 = 0.85 => "Noise correlation of the third case.",
-        #[garde(range(min = 1, max = 10_000))]
-        starts: usize = 20 => "Random starts of each joint design.",
+        noise_sd: f64 [1e-3..=1e3] = 1.0 => "Noise standard deviation of both sensors, in prior standard deviations.",
+        correlation: f64 [-0.99..=0.99] = 0.85 => "Noise correlation of the third case.",
+        starts: usize [1..=10_000] = 20 => "Random starts of each joint design.",
     }
 }
 
@@ -45,7 +42,6 @@ rows! {
         case: &'static str => "Noise correlation and levels.",
         method: &'static str => "Criterion of the design, or the baseline.",
         design: &'static str => "How it was reached.",
-        #[serde(flatten)]
         pair: Pair,
         printed_mse: Option<f64> => "The publication's squared error.",
     }

@@ -8,10 +8,8 @@ use fewbits_quantizer_design::{Newton, System, bounds, design};
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 2, max = 2), inner(range(min = 1e-6, max = 1e6)))]
-        noise_variances: Vec<f64> = vec![1.0, 0.5] => "Noise variances of the two sensors, in prior variances.",
-        #[garde(range(min = 1, max = 10_000))]
-        starts: usize = 30 => "Random starts of each joint design.",
+        noise_variances: Vec<f64> [1e-6..=1e6; 2..=2] = vec![1.0, 0.5] => "Noise variances of the two sensors, in prior variances.",
+        starts: usize [1..=10_000] = 30 => "Random starts of each joint design.",
     }
 }
 
@@ -27,7 +25,6 @@ rows! {
     struct Row by "{levels} levels {method}" {
         levels: usize => "Levels of each sensor.",
         method: &'static str => "Criterion and how it was reached.",
-        #[serde(flatten)]
         design: Pair,
         printed_mse: Option<f64> => "The publication's squared error.",
     }

@@ -7,10 +7,8 @@ use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 2, max = 10))]
-        sensors: usize = 9 => quick 6 => "Number of sensors; the greedy chain enumerates `4^sensors` outcomes.",
-        #[garde(range(min = 1e-3, max = 1e3))]
-        noise_sd: f64 = 1.0 => "Noise standard deviation, in prior standard deviations.",
+        sensors: usize [2..=10] = 9 => quick 6 => "Number of sensors; the greedy chain enumerates `4^sensors` outcomes.",
+        noise_sd: f64 [1e-3..=1e3] = 1.0 => "Noise standard deviation, in prior standard deviations.",
     }
 }
 

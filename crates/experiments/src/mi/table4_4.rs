@@ -14,12 +14,9 @@ const PE: Criterion = Criterion::BayesError;
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1, max = 20), inner(range(min = 0.1, max = 16.0)))]
-        signals: Vec<f64> = vec![2.0, 4.0] => "The signals to detect, in noise standard deviations.",
-        #[garde(range(min = 2, max = 9))]
-        sensors: usize = 5 => "Number of sensors; the greedy chain enumerates `4^sensors` outcomes.",
-        #[garde(range(min = 1e-9, max = 0.999))]
-        false_alarm: f64 = 0.01 => "False-alarm probability of the randomised test.",
+        signals: Vec<f64> [0.1..=16.0; 1..=20] = vec![2.0, 4.0] => "The signals to detect, in noise standard deviations.",
+        sensors: usize [2..=9] = 5 => "Number of sensors; the greedy chain enumerates `4^sensors` outcomes.",
+        false_alarm: f64 [1e-9..=0.999] = 0.01 => "False-alarm probability of the randomised test.",
     }
 }
 

@@ -18,10 +18,8 @@ const PRINTED: [(f64, f64); 4] = [(0.0, 1.370), (0.001, 1.358), (0.01, 1.260), (
 parameters! {
     pub struct Parameters {
         /// Crossover probabilities; beyond 0.06 a design of four levels loses a cell (see mi-beyond).
-        #[garde(length(min = 1, max = 100), inner(range(min = 0.0, max = 0.06)))]
-        crossovers: Vec<f64> = PRINTED.map(|p| p.0).to_vec(),
-        #[garde(range(min = 1e-2, max = 1e2))]
-        noise_sd: f64 = 1.0 => "Noise standard deviation, in prior standard deviations.",
+        crossovers: Vec<f64> [0.0..=0.06; 1..=100] = PRINTED.map(|p| p.0).to_vec(),
+        noise_sd: f64 [1e-2..=1e2] = 1.0 => "Noise standard deviation, in prior standard deviations.",
     }
 }
 
@@ -41,7 +39,6 @@ rows! {
         crossover: f64 => "Crossover probability of each bit.",
         labelling: &'static str => "Words of the levels.",
         design: &'static str => "Criterion and how it was reached.",
-        #[serde(flatten)]
         pair: Pair,
         printed_mse: Option<f64> => "The publication's squared error.",
     }

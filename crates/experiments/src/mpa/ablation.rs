@@ -10,10 +10,8 @@ use fewbits_pf_mpa::{
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 3, max = 1000))]
-        particles: usize = 40 => "Particles.",
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 200 => quick 4 => "Trajectories.",
+        particles: usize [3..=1000] = 40 => "Particles.",
+        trials: u64 [2..=100_000] = 200 => quick 4 => "Trajectories.",
     }
 }
 

@@ -170,10 +170,8 @@ pub struct Fig37;
 
 parameters! {
     pub struct Parameters {
-        #[garde(length(min = 1, max = 4), inner(range(min = 1e-8, max = 1.0)))]
-        variance: Vec<f64> = vec![1e-4, 4e-4] => "Variances of the measurements.",
-        #[garde(range(min = 0.0, max = 10.0))]
-        apart: f64 = 0.1 => "Distance of the targets at the start.",
+        variance: Vec<f64> [1e-8..=1.0; 1..=4] = vec![1e-4, 4e-4] => "Variances of the measurements.",
+        apart: f64 [0.0..=10.0] = 0.1 => "Distance of the targets at the start.",
     }
 }
 
@@ -254,8 +252,7 @@ pub struct Table;
 parameters! {
     /// Settings.
     pub struct Effort {
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 400 => quick 10 => "Tracks of each setting.",
+        trials: u64 [2..=100_000] = 400 => quick 10 => "Tracks of each setting.",
     }
 }
 

@@ -9,8 +9,7 @@ use nalgebra::{Matrix4, Vector2};
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 400 => quick 10 => "Free trajectories.",
+        trials: u64 [2..=100_000] = 400 => quick 10 => "Free trajectories.",
     }
 }
 

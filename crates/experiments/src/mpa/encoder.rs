@@ -8,8 +8,7 @@ use fewbits_pf_mpa::Encoder;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 200 => quick 6 => "Trajectories.",
+        trials: u64 [2..=100_000] = 200 => quick 6 => "Trajectories.",
     }
 }
 

@@ -7,14 +7,10 @@ use fewbits_pf_mpa::Target;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 0, max = 10_000))]
-        trajectory: u64 = 0 => "Which trajectory of those that all figures share.",
-        #[garde(range(min = 3, max = 1000))]
-        particles: usize = 40 => "Particles of message passing.",
-        #[garde(range(min = 0.0, max = 80.0))]
-        snr_db: f64 = 50.0 => "Ratio of the powers of range and noise, in decibels.",
-        #[garde(range(min = 2, max = 65_536))]
-        levels: usize = 4 => "Levels of the quantizer.",
+        trajectory: u64 [0..=10_000] = 0 => "Which trajectory of those that all figures share.",
+        particles: usize [3..=1000] = 40 => "Particles of message passing.",
+        snr_db: f64 [0.0..=80.0] = 50.0 => "Ratio of the powers of range and noise, in decibels.",
+        levels: usize [2..=65_536] = 4 => "Levels of the quantizer.",
     }
 }
 

@@ -11,10 +11,8 @@ pub struct Gibbs;
 parameters! {
     /// Settings.
     pub struct Draws {
-        #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 400_000 => quick 5000 => "Draws of the sampler in each case.",
-        #[garde(range(min = 0, max = 1000))]
-        sweeps: usize = 5 => "Sweeps of each draw.",
+        trials: u64 [2..=10_000_000] = 400_000 => quick 5000 => "Draws of the sampler in each case.",
+        sweeps: usize [0..=1000] = 5 => "Sweeps of each draw.",
     }
 }
 

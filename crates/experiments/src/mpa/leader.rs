@@ -10,8 +10,7 @@ use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 160 => quick 3 => "Trajectories of 25 steps.",
+        trials: u64 [2..=100_000] = 160 => quick 3 => "Trajectories of 25 steps.",
     }
 }
 

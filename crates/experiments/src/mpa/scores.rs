@@ -7,11 +7,9 @@ use fewbits_pf_mpa::Reports;
 parameters! {
     /// How many trajectories.
     pub struct Effort {
-        #[garde(range(min = 2, max = 100_000))]
-        pub(super) trials: u64 = 200 => quick 8 => "Trajectories of every tracker but message passing with particles.",
+        pub(super) trials: u64 [2..=100_000] = 200 => quick 8 => "Trajectories of every tracker but message passing with particles.",
         /// Trajectories of message passing with particles, and of the finest grid and largest clouds; the first of the others'.
-        #[garde(range(min = 2, max = 100_000))]
-        pub(super) message_trials: u64 = 60 => quick 3,
+        pub(super) message_trials: u64 [2..=100_000] = 60 => quick 3,
     }
 }
 
@@ -39,7 +37,6 @@ rows! {
         pub(super) method: String => "Tracker and its particles, draws or nodes an axis.",
         pub(super) family: String => "Kind of tracker.",
         pub(super) size: Option<usize> => "Particles, draws, or nodes an axis.",
-        #[serde(flatten)]
         pub(super) score: Score,
     }
 }

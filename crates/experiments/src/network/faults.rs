@@ -15,23 +15,17 @@ const WARM_UP: usize = 20;
 parameters! {
     pub struct Parameters {
         /// Probabilities that a frame is lost.
-        #[garde(length(min = 1), inner(range(min = 0.0, max = 0.8)))]
-        loss: Vec<f64> = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6],
+        loss: Vec<f64> [0.0..=0.8; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6],
         /// Probabilities that a bit is inverted.
-        #[garde(length(min = 1), inner(range(min = 0.0, max = 0.1)))]
-        crossover: Vec<f64> = vec![0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2],
+        crossover: Vec<f64> [0.0..=0.1; 1..] = vec![0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2],
         /// Mean delays of a frame, in slots.
-        #[garde(length(min = 1), inner(range(min = 0.0, max = 10.0)))]
-        delay: Vec<f64> = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8],
+        delay: Vec<f64> [0.0..=10.0; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8],
         /// Sensors of four that die after a quarter of the run.
-        #[garde(length(min = 1), inner(range(min = 0, max = 4)))]
-        deaths: Vec<u32> = vec![0, 1, 2, 3, 4],
+        deaths: Vec<u32> [0..=4; 1..] = vec![0, 1, 2, 3, 4],
         /// Slots of a run.
-        #[garde(range(min = 60, max = 100_000))]
-        slots: usize = 200 => quick 80,
+        slots: usize [60..=100_000] = 200 => quick 80,
         /// Runs at each point.
-        #[garde(range(min = 2, max = 1_000_000))]
-        trials: u64 = 40 => quick 2,
+        trials: u64 [2..=1_000_000] = 40 => quick 2,
     }
 }
 

@@ -7,11 +7,9 @@ use crate::prelude::*;
 parameters! {
     pub struct Parameters {
         /// Slots of a run.
-        #[garde(range(min = 40, max = 100_000))]
-        slots: usize = 300 => quick 60,
+        slots: usize [40..=100_000] = 300 => quick 60,
         /// Runs of each scheme.
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 20 => quick 2,
+        trials: u64 [2..=100_000] = 20 => quick 2,
     }
 }
 

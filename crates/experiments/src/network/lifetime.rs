@@ -8,17 +8,13 @@ use fewbits_network::{Radio, TWO_AA_CELLS};
 parameters! {
     pub struct Parameters {
         /// Lengths of a slot, s.
-        #[garde(length(min = 1), inner(range(min = 0.01, max = 1e4)))]
-        period: Vec<f64> = vec![0.02, 0.1, 1.0],
+        period: Vec<f64> [0.01..=1e4; 1..] = vec![0.02, 0.1, 1.0],
         /// Power of the rest of the node, mW; 6 is that of a node whose processor never sleeps.
-        #[garde(length(min = 1), inner(range(min = 0.0, max = 1e3)))]
-        baseline: Vec<f64> = vec![6.0, 0.1],
+        baseline: Vec<f64> [0.0..=1e3; 1..] = vec![6.0, 0.1],
         /// Slots of a run.
-        #[garde(range(min = 40, max = 100_000))]
-        slots: usize = 200 => quick 60,
+        slots: usize [40..=100_000] = 200 => quick 60,
         /// Runs of each scheme.
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 8 => quick 2,
+        trials: u64 [2..=100_000] = 8 => quick 2,
     }
 }
 

@@ -10,11 +10,9 @@ use fewbits_topology::Deployment;
 parameters! {
     pub struct Parameters {
         /// Nodes, on average ten in range of each.
-        #[garde(length(min = 1), inner(range(min = 2, max = 10_000_000)))]
-        nodes: Vec<u64> = vec![1_000, 10_000, 100_000, 1_000_000] => quick vec![1_000, 10_000],
+        nodes: Vec<u64> [2..=10_000_000; 1..] = vec![1_000, 10_000, 100_000, 1_000_000] => quick vec![1_000, 10_000],
         /// Slots; in each every node sends one bit towards node 0.
-        #[garde(range(min = 1, max = 10_000))]
-        slots: u64 = 2,
+        slots: u64 [1..=10_000] = 2,
     }
 }
 
@@ -51,8 +49,7 @@ rows! {
         /// Counts.
         sizes: Vec<Row>,
         /// Times on this machine.
-        #[schemars(extend("volatile" = true))]
-        times: Vec<Time>,
+        times: Vec<Time> ["time"],
     }
 }
 

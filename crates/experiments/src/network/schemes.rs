@@ -1,9 +1,7 @@
 //! The schemes of the comparison, with their settings and names.
 
-use crate::prelude::*;
-
 /// How sensors learn the question.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Talk {
     Told,
     Echoed,

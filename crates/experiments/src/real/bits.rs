@@ -9,10 +9,8 @@ use fewbits_adaptive::{Replay, Silence};
 parameters! {
     pub struct Parameters {
         #[serde(flatten)]
-        #[garde(dive)]
         source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
-        #[garde(length(min = 1, max = 20), inner(range(min = 0.02, max = 12.0)))]
-        rate: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0] => quick vec![0.5, 2.0] => "Bits per sample, at most.",
+        rate: Vec<f64> [0.02..=12.0; 1..=20] = vec![0.25, 0.5, 1.0, 2.0] => quick vec![0.5, 2.0] => "Bits per sample, at most.",
     }
 }
 

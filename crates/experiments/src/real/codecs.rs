@@ -10,11 +10,9 @@ use pco::standalone::simple_compress;
 parameters! {
     pub struct Parameters {
         #[serde(flatten)]
-        #[garde(dive)]
         source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
         /// Bounds in percent of the range.
-        #[garde(length(min = 1, max = 20), inner(range(min = 1e-4, max = 10.0)))]
-        percent: Vec<f64> = vec![1e-4, 0.01, 0.25, 0.5, 1.0, 2.0] => quick vec![0.25, 1.0],
+        percent: Vec<f64> [1e-4..=10.0; 1..=20] = vec![1e-4, 0.01, 0.25, 0.5, 1.0, 2.0] => quick vec![0.25, 1.0],
     }
 }
 

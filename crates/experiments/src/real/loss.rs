@@ -16,18 +16,12 @@ fn shown() -> Source {
 parameters! {
     pub struct Parameters {
         #[serde(flatten)]
-        #[garde(dive)]
         source: Source = shown() => quick Source { samples: 1000, ..shown() },
-        #[garde(range(min = 0.02, max = 12.0))]
-        rate: f64 = 0.5 => "Bits per sample over a perfect link, which choose delta.",
-        #[garde(length(min = 1, max = 9), inner(range(min = 0.0, max = 0.5)))]
-        loss: Vec<f64> = vec![0.0, 0.01, 0.1] => "Probabilities that a packet is lost.",
-        #[garde(length(min = 1, max = 9), inner(range(min = 2, max = 100_000)))]
-        refresh: Vec<u64> = vec![25, 100, 400] => "Slots from one refresh to the next.",
-        #[garde(range(min = 1, max = 16))]
-        sequence_bits: u32 = 4 => "Bits of the packets' counter.",
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 20 => quick 4 => "Sequences of losses.",
+        rate: f64 [0.02..=12.0] = 0.5 => "Bits per sample over a perfect link, which choose delta.",
+        loss: Vec<f64> [0.0..=0.5; 1..=9] = vec![0.0, 0.01, 0.1] => "Probabilities that a packet is lost.",
+        refresh: Vec<u64> [2..=100_000; 1..=9] = vec![25, 100, 400] => "Slots from one refresh to the next.",
+        sequence_bits: u32 [1..=16] = 4 => "Bits of the packets' counter.",
+        trials: u64 [2..=100_000] = 20 => quick 4 => "Sequences of losses.",
     }
 }
 

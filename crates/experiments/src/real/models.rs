@@ -16,12 +16,9 @@ fn shown() -> Source {
 parameters! {
     pub struct Parameters {
         #[serde(flatten)]
-        #[garde(dive)]
         source: Source = shown() => quick Source { samples: 1000, ..shown() },
-        #[garde(range(min = 0.02, max = 12.0))]
-        rate: f64 = 0.5 => "Bits per sample, at most.",
-        #[garde(range(min = 1, max = 10_000))]
-        every: usize = 10 => "Slots from one row to the next.",
+        rate: f64 [0.02..=12.0] = 0.5 => "Bits per sample, at most.",
+        every: usize [1..=10_000] = 10 => "Slots from one row to the next.",
     }
 }
 

@@ -10,10 +10,8 @@ use fewbits_adaptive::Replay;
 parameters! {
     pub struct Parameters {
         #[serde(flatten)]
-        #[garde(dive)]
         source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
-        #[garde(length(min = 1, max = 20), inner(range(min = 0.005, max = 1.0)))]
-        packets: Vec<f64> = vec![0.03, 0.1, 0.3] => quick vec![0.1] => "Packets per sample, at most.",
+        packets: Vec<f64> [0.005..=1.0; 1..=20] = vec![0.03, 0.1, 0.3] => quick vec![0.1] => "Packets per sample, at most.",
     }
 }
 

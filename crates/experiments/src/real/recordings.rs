@@ -45,15 +45,11 @@ parameters! {
     #[derive(Clone)]
     pub(super) struct Source {
         /// A CSV file with a header line and a row a sample; empty for the synthetic set.
-        #[garde(skip)]
         pub recording: String = String::new(),
         /// Columns; empty for all of the synthetic set, or all of the file but the first.
-        #[garde(skip)]
         pub columns: Vec<String> = Vec::new(),
-        #[garde(skip)]
         pub circular: Vec<String> = vec!["direction".into()] => "Columns on a circle of 360.",
-        #[garde(range(min = 50, max = 100_000))]
-        pub samples: usize = 3800 => "Length of the synthetic signals.",
+        pub samples: usize [50..=100_000] = 3800 => "Length of the synthetic signals.",
     }
 }
 

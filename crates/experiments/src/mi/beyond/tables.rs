@@ -11,13 +11,10 @@ use fewbits_quantizer_design::{
 
 parameters! {
     pub struct Parameters {
-        #[garde(range(min = 1, max = 10_000))]
-        pub(super) contiguous_starts: usize = 20 => quick 8 => "Random starts among contiguous quantizers.",
-        #[garde(range(min = 1, max = 10_000))]
-        pub(super) folded_starts: usize = 60 => quick 24 => "Starts among folded quantizers, besides those with one sensor's cells running round or to and fro.",
+        pub(super) contiguous_starts: usize [1..=10_000] = 20 => quick 8 => "Random starts among contiguous quantizers.",
+        pub(super) folded_starts: usize [1..=10_000] = 60 => quick 24 => "Starts among folded quantizers, besides those with one sensor's cells running round or to and fro.",
         /// Crossovers at which words are compared.
-        #[garde(length(min = 1, max = 20), inner(range(min = 0.0, max = 0.45)))]
-        pub(super) crossovers: Vec<f64> = vec![0.001, 0.01, 0.05, 0.1, 0.2],
+        pub(super) crossovers: Vec<f64> [0.0..=0.45; 1..=20] = vec![0.001, 0.01, 0.05, 0.1, 0.2],
     }
 }
 
