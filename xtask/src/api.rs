@@ -1,8 +1,7 @@
 //! `cargo xtask api`: every public item of the library crates, one file per crate, so that no public change passes unseen.
 
-use cargo_metadata::MetadataCommand;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use thiserror::Error;
 
@@ -33,6 +32,7 @@ pub enum Error {
     #[error("rustdoc failed")]
     Rustdoc,
     /// rustdoc's description of a crate could not be read: `public-api` must fit the toolchain.
+    #[cfg(feature = "api")]
     #[error("{path}: {source}; the version of the crate `public-api` must fit the toolchain's")]
     Description {
         /// The description.
@@ -59,64 +59,91 @@ pub fn as_rustdoc() -> Option<bool> {
     Some(status.is_ok_and(|status| status.success()))
 }
 
-/// Writes `docs/api/<crate>.txt` for every crate that can be published, or compares; `Ok(false)` if a file differs.
+/// Runs this command in an xtask with the feature `api`: what reads rustdoc's descriptions is built for it alone.
 ///
 /// # Errors
-/// If rustdoc fails or a file cannot be read or written.
+/// If cargo cannot be started.
+#[cfg(not(feature = "api"))]
 pub fn run(options: &Options) -> Result<bool, Error> {
-    let metadata = MetadataCommand::new().no_deps().exec()?;
-    let me = std::env::current_exe().map_err(failed(Path::new("xtask")))?;
-    let rustdoc = std::env::var_os("RUSTDOC").unwrap_or_else(|| "rustdoc".into());
-    let status = Command::new("cargo")
-        .args(["doc", "--workspace", "--no-deps", "--lib", "--quiet"])
-        .env("RUSTDOC", me)
-        .env(RUSTDOC, rustdoc)
-        .env("RUSTDOCFLAGS", "-Z unstable-options --output-format json --cap-lints allow")
-        .status()
-        .map_err(failed(Path::new("cargo")))?;
-    if !status.success() {
-        return Err(Error::Rustdoc);
+    let mut cargo = Command::new("cargo");
+    cargo.args(["run", "--quiet", "--package", "xtask", "--features", "api", "--", "api"]);
+    if options.check {
+        cargo.arg("--check");
     }
-    let folder = metadata.workspace_root.as_std_path().join("docs/api");
-    std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
-    let mut same = true;
-    for package in &metadata.packages {
-        let private = package.publish.as_ref().is_some_and(Vec::is_empty);
-        let Some(library) = package.targets.iter().find(|t| t.is_lib()).filter(|_| !private) else {
-            continue;
-        };
-        let description = metadata
-            .target_directory
-            .as_std_path()
-            .join("doc")
-            .join(format!("{}.json", library.name));
-        let listed = list(&description)?;
-        let path = folder.join(format!("{}.txt", package.name));
-        if !options.check {
-            std::fs::write(&path, listed).map_err(failed(&path))?;
-        } else if std::fs::read_to_string(&path).unwrap_or_default() != listed {
-            println!("public items changed: {} (`cargo xtask api` writes it anew)", path.display());
-            same = false;
+    let path = PathBuf::from("cargo");
+    let status = cargo.status().map_err(|source| Error::Io { path, source })?;
+    Ok(status.success())
+}
+
+#[cfg(feature = "api")]
+pub use listing::run;
+
+#[cfg(feature = "api")]
+mod listing {
+    use super::{Error, Options, RUSTDOC};
+    use cargo_metadata::MetadataCommand;
+    use std::path::Path;
+    use std::process::Command;
+
+    /// Writes `docs/api/<crate>.txt` for every crate that can be published, or compares; `Ok(false)` if a file differs.
+    ///
+    /// # Errors
+    /// If rustdoc fails or a file cannot be read or written.
+    pub fn run(options: &Options) -> Result<bool, Error> {
+        let metadata = MetadataCommand::new().no_deps().exec()?;
+        let me = std::env::current_exe().map_err(failed(Path::new("xtask")))?;
+        let rustdoc = std::env::var_os("RUSTDOC").unwrap_or_else(|| "rustdoc".into());
+        let status = Command::new("cargo")
+            .args(["doc", "--workspace", "--no-deps", "--lib", "--quiet"])
+            .env("RUSTDOC", me)
+            .env(RUSTDOC, rustdoc)
+            .env("RUSTDOCFLAGS", "-Z unstable-options --output-format json --cap-lints allow")
+            .status()
+            .map_err(failed(Path::new("cargo")))?;
+        if !status.success() {
+            return Err(Error::Rustdoc);
         }
+        let folder = metadata.workspace_root.as_std_path().join("docs/api");
+        std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+        let mut same = true;
+        for package in &metadata.packages {
+            let private = package.publish.as_ref().is_some_and(Vec::is_empty);
+            let Some(library) = package.targets.iter().find(|t| t.is_lib()).filter(|_| !private) else {
+                continue;
+            };
+            let description = metadata
+                .target_directory
+                .as_std_path()
+                .join("doc")
+                .join(format!("{}.json", library.name));
+            let listed = list(&description)?;
+            let path = folder.join(format!("{}.txt", package.name));
+            if !options.check {
+                std::fs::write(&path, listed).map_err(failed(&path))?;
+            } else if std::fs::read_to_string(&path).unwrap_or_default() != listed {
+                println!("public items changed: {} (`cargo xtask api` writes it anew)", path.display());
+                same = false;
+            }
+        }
+        Ok(same)
     }
-    Ok(same)
-}
 
-fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> Error + use<> {
-    let path = path.to_owned();
-    move |source| Error::Io { path, source }
-}
+    fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> Error + use<> {
+        let path = path.to_owned();
+        move |source| Error::Io { path, source }
+    }
 
-/// One line per public item; derived and blanket implementations are left out.
-fn list(description: &Path) -> Result<String, Error> {
-    let api = public_api::Builder::from_rustdoc_json(description)
-        .omit_blanket_impls(true)
-        .omit_auto_trait_impls(true)
-        .omit_auto_derived_impls(true)
-        .build();
-    let api = api.map_err(|source| Error::Description {
-        path: description.to_owned(),
-        source: Box::new(source),
-    })?;
-    Ok(api.items().map(|item| format!("{item}\n")).collect())
+    /// One line per public item; derived and blanket implementations are left out.
+    fn list(description: &Path) -> Result<String, Error> {
+        let api = public_api::Builder::from_rustdoc_json(description)
+            .omit_blanket_impls(true)
+            .omit_auto_trait_impls(true)
+            .omit_auto_derived_impls(true)
+            .build();
+        let api = api.map_err(|source| Error::Description {
+            path: description.to_owned(),
+            source: Box::new(source),
+        })?;
+        Ok(api.items().map(|item| format!("{item}\n")).collect())
+    }
 }
