@@ -58,7 +58,10 @@ impl<const D: usize> Particles<D> {
             return refuse("log_weights", bad, "log weights below infinity");
         }
         let mut belief = Self::uniform(columns)?;
-        entries("log_weights", log_weights.len(), belief.len())?;
+        if belief.len() != log_weights.len() {
+            let given = format!("{} numbers", log_weights.len());
+            return refuse("log_weights", given, format!("{}, one per particle", belief.len()));
+        }
         belief.reweigh(|_, own| own.copy_from_slice(log_weights))?;
         Ok(belief)
     }
