@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
 
     let table = bank.table(Decoder::Mmse)?;
-    let mut seen = [true, false, true, true, false, true, true, false].map(|b| Observation::Received(b));
+    let mut seen = [true, false, true, true, false, true, true, false].map(Observation::Received);
     println!("estimate {:.4}", table.decode(&seen)?);
     seen[3] = Observation::Lost;
     println!("estimate without sensor 4: {:.4}", table.decode(&seen)?);

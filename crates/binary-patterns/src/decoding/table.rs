@@ -118,7 +118,7 @@ mod tests {
         let table = bank(all.clone()).table(Decoder::Mmse).unwrap();
         let others = bank(all[..2].to_vec()).table(Decoder::Mmse).unwrap();
         for bits in [[false, true], [true, true], [true, false]] {
-            let mut seen = bits.map(|b| Observation::Received(b)).to_vec();
+            let mut seen = bits.map(Observation::Received).to_vec();
             seen.push(Observation::Lost);
             assert!((table.decode(&seen).unwrap() - others.estimate(&bits).unwrap()).abs() < 1e-12);
             assert!(table.decode(&seen[..2]).is_err());
@@ -151,7 +151,7 @@ mod tests {
                         end * given(0) * given(1) * given(2) / f64::from(steps)
                     })
                     .sum();
-                let seen = bits.map(|b| Observation::Received(b));
+                let seen = bits.map(Observation::Received);
                 let (estimate, error) = table.decode_with_error(&seen).unwrap();
                 assert_eq!(estimate, table.estimate(&bits).unwrap());
                 average += probability * error;
