@@ -13,7 +13,7 @@ fn main() {
 
 fn search(bits: usize, sensors: usize) -> LinearSearch {
     let source = Source::uniform(1.0).unwrap();
-    let noise = source.noise_std(18.2).unwrap();
+    let noise = source.noise_deviation(18.2).unwrap();
     LinearSearch::with_deviation(source, Grid::uniform(1.0, bits).unwrap(), noise, sensors).unwrap()
 }
 

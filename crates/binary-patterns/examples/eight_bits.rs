@@ -1,12 +1,12 @@
 //! Eight one-bit sensors about a uniform unknown: the best linear patterns, then breakpoints off the grid.
 
 use fewbits_binary_patterns::search::{LinearSearch, free_breakpoints_of_masks};
-use fewbits_binary_patterns::{Bit, Decoder, Grid, Source, bounds, linear_pattern};
+use fewbits_binary_patterns::{Decoder, Grid, Source, bounds, linear_pattern};
 use fewbits_core::Observation;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let source = Source::uniform(1.0)?;
-    let (grid, noise) = (Grid::uniform(1.0, 3)?, source.noise_std(18.2)?);
+    let (grid, noise) = (Grid::uniform(1.0, 3)?, source.noise_deviation(18.2)?);
     let search = LinearSearch::with_deviation(source, grid.clone(), noise, 8)?;
     let best = search.best()?;
     println!("masks {:?}, squared error {:.7}", best.masks, best.mse);
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
 
     let table = bank.table(Decoder::Mmse)?;
-    let mut seen = [true, false, true, true, false, true, true, false].map(|b| Observation::Received(Bit(b)));
+    let mut seen = [true, false, true, true, false, true, true, false].map(Observation::Received);
     println!("estimate {:.4}", table.decode(&seen)?);
     seen[3] = Observation::Lost;
     println!("estimate without sensor 4: {:.4}", table.decode(&seen)?);

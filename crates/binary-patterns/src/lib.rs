@@ -14,7 +14,7 @@
 //! use fewbits_binary_patterns::search::LinearSearch;
 //! use fewbits_binary_patterns::{Decoder, Grid, Source, bounds};
 //! let source = Source::uniform(1.0)?;
-//! let noise = source.noise_std(18.2)?;
+//! let noise = source.noise_deviation(18.2)?;
 //! let search = LinearSearch::with_deviation(source, Grid::uniform(1.0, 3)?, noise, 8)?;
 //! let best = search.best()?;                                   // of 2702 sets
 //! assert_eq!(best.masks, [2, 2, 3, 3, 3, 3, 4, 6]);
@@ -43,9 +43,8 @@ pub use decoding::decoder::Decoder;
 pub use decoding::table::{LookupTable, MAX_TABLE_SENSORS};
 pub use error::Error;
 pub use observation::bank::{Bank, IMPOSSIBLE, MAX_OUTCOMES};
-pub use observation::report::Bit;
 pub use observation::sensor::PatternSensor;
-pub use observation::source::{Blur, Nodes, Source};
+pub use observation::source::{Nodes, Source, Threshold};
 pub use patterns::count;
 pub use patterns::grid::{Grid, MAX_BITS, MAX_EIGHT_LEVEL_EDGES};
 pub use patterns::linear::{

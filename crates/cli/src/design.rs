@@ -11,7 +11,7 @@ use crate::plot::{Layer, Picture};
 use fewbits_core::Link;
 
 use fewbits_quantizer_design::solve::Rounded;
-use fewbits_quantizer_design::{Adc, AllowedCells, Bits, Noise, Prior, Progress, Request, Scene, Solution};
+use fewbits_quantizer_design::{Adc, AllowedCells, Bits, Noise, ObservationModel, Prior, Progress, Request, Solution};
 use fewbits_record::TimeBase;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
@@ -133,14 +133,14 @@ fn adc(text: &str) -> Result<Adc, Error> {
 }
 
 /// Searches, with a bar on a terminal.
-fn solve(options: &DesignOptions, scene: Scene) -> Result<Solution, Error> {
+fn solve(options: &DesignOptions, model: ObservationModel) -> Result<Solution, Error> {
     let failed = Error::refused("no design");
     let link = Link::PERFECT;
     let bits = bits(&options.bits)?;
     let mut request = match options.criterion {
-        Criterion::Decision => Request::detection(scene, bits, link).map_err(&failed)?,
-        Criterion::Error => Request::estimation(scene, bits, link),
-        Criterion::Information => Request::estimation(scene, bits, link).by_information(),
+        Criterion::Decision => Request::detection(model, bits, link).map_err(&failed)?,
+        Criterion::Error => Request::estimation(model, bits, link),
+        Criterion::Information => Request::estimation(model, bits, link).by_information(),
     };
     request = request.with_links(links(options)?).map_err(&failed)?;
     if options.folded {
@@ -184,10 +184,10 @@ pub(crate) fn run(options: &DesignOptions) -> Result<Ending, Error> {
     } else {
         Noise::equicorrelated_with_deviations(&options.noise, options.correlation)
     };
-    let scene = Scene::new(prior, noise.map_err(Error::refused("--noise and --correlation"))?);
-    let scene = scene.map_err(Error::refused("prior and noise do not go together"))?;
+    let model = ObservationModel::new(prior, noise.map_err(Error::refused("--noise and --correlation"))?);
+    let model = model.map_err(Error::refused("prior and noise do not go together"))?;
     let adc = options.adc.as_deref().map(adc).transpose()?;
-    let solution = solve(options, scene)?;
+    let solution = solve(options, model)?;
     let rounded = adc
         .map(|adc| solution.rounded(&vec![adc; solution.sensors().len()]))
         .transpose()
@@ -231,7 +231,7 @@ fn written(options: &DesignOptions, solution: &Solution, rounded: Option<&Rounde
 
 /// A row of boxes per sensor over the range of its samples; boxes of one word have one colour.
 fn picture(solution: &Solution) -> Picture {
-    let prior = solution.system().scene().prior();
+    let prior = solution.system().model().prior();
     let (mean, reach) = (prior.mean(), 3.5 * prior.deviation());
     let inner = solution.sensors().iter().flat_map(|sensor| sensor.breakpoints.iter());
     let (low, high) = inner.fold((mean - reach, mean + reach), |(low, high), at| (low.min(*at), high.max(*at)));

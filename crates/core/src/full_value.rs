@@ -6,11 +6,10 @@ use crate::gaussian::Gaussian;
 use crate::measurement_noise::MeasurementNoise;
 use crate::number::NumberFormat;
 use crate::observation::{Link, Observation};
-use crate::scheme::Scheme;
+use crate::scheme::AlwaysReporting;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive, within};
 use nalgebra::{Matrix1, SVector, Vector1};
-use rand::Rng;
 
 /// A sensor that sends its scalar measurement in 64 bits: what a Kalman filter receives.
 ///
@@ -66,15 +65,10 @@ impl Factor<1> for SentValue {
     }
 }
 
-impl crate::Deterministic<1> for FullValue {}
-
-impl Scheme<1> for FullValue {
-    type State = ();
+impl AlwaysReporting<1> for FullValue {
     type Feedback = ();
     type Report = f64;
     type Factor = SentValue;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) {}
 
@@ -82,17 +76,11 @@ impl Scheme<1> for FullValue {
         NumberFormat::Double
     }
 
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        (): &(),
-    ) -> Result<Option<f64>, Error> {
-        Ok(Some(finite("measurement", measurement[0])?))
+    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<f64, Error> {
+        Ok(finite("measurement", measurement[0])?)
     }
 
-    fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {
+    fn meaning_of(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {
         let (value, probability) = match observation {
             Observation::Received(value) => {
                 within("crossover", link.crossover(), 0.0, 0.0)?;

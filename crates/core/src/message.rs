@@ -48,6 +48,19 @@ pub trait Message: Sized {
 }
 
 /// Nothing to say: zero bits.
+/// One bit.
+impl Message for bool {
+    type Format = ();
+
+    fn encode(&self, (): &(), writer: &mut BitWriter) -> Result<(), CodecError> {
+        writer.write(u64::from(*self), 1)
+    }
+
+    fn decode((): &(), reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        reader.read_bit()
+    }
+}
+
 impl Message for () {
     type Format = ();
 

@@ -72,3 +72,78 @@ pub trait Scheme<const M: usize> {
 ///
 /// Law ([`crate::laws::scheme::deterministic`]): `encode` draws nothing, and says the same again.
 pub trait Deterministic<const M: usize>: Scheme<M> {}
+
+/// A [`Scheme`] whose sensor remembers nothing, draws no random numbers and reports every sample.
+///
+/// Such a scheme says how a sample becomes a report and what an observation means; it is then a [`Scheme`] and [`Deterministic`].
+pub trait AlwaysReporting<const M: usize> {
+    /// [`Scheme::Feedback`].
+    type Feedback: Message;
+    /// [`Scheme::Report`].
+    type Report: Message;
+    /// [`Scheme::Factor`].
+    type Factor: Factor<M>;
+
+    /// [`Scheme::feedback_format`].
+    fn feedback_format(&self) -> <Self::Feedback as Message>::Format;
+
+    /// [`Scheme::report_format`].
+    fn report_format(&self) -> <Self::Report as Message>::Format;
+
+    /// The report of a sample.
+    ///
+    /// # Errors
+    /// If the sample or the feedback is not finite.
+    fn report_of(&self, sample: &SVector<f64, M>, feedback: &Self::Feedback) -> Result<Self::Report, Error>;
+
+    /// [`Scheme::factor`].
+    ///
+    /// # Errors
+    /// As [`Scheme::factor`].
+    fn meaning_of(
+        &self,
+        feedback: &Self::Feedback,
+        observation: &Observation<Self::Report>,
+        link: &Link,
+    ) -> Result<Self::Factor, Error>;
+}
+
+impl<S: AlwaysReporting<M>, const M: usize> Scheme<M> for S {
+    type State = ();
+    type Feedback = S::Feedback;
+    type Report = S::Report;
+    type Factor = S::Factor;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> <S::Feedback as Message>::Format {
+        AlwaysReporting::feedback_format(self)
+    }
+
+    fn report_format(&self) -> <S::Report as Message>::Format {
+        AlwaysReporting::report_format(self)
+    }
+
+    #[inline]
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        sample: &SVector<f64, M>,
+        feedback: &S::Feedback,
+    ) -> Result<Option<S::Report>, Error> {
+        self.report_of(sample, feedback).map(Some)
+    }
+
+    #[inline]
+    fn factor(
+        &self,
+        feedback: &S::Feedback,
+        observation: &Observation<S::Report>,
+        link: &Link,
+    ) -> Result<S::Factor, Error> {
+        self.meaning_of(feedback, observation, link)
+    }
+}
+
+impl<S: AlwaysReporting<M>, const M: usize> Deterministic<M> for S {}

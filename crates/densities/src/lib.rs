@@ -30,6 +30,36 @@
 //! and the code of a mixture in a few bytes (`fewbits-mixture-codec`); products of mixtures (`fewbits-pf-mpa`); adaptive cells and
 //! Hermite series (`fewbits-diffusive`).
 
+/// [`Belief::mean`](fewbits_core::Belief::mean) and `covariance` by the type's own functions of these names.
+macro_rules! own_moments {
+    () => {
+        fn mean(&self) -> SVector<f64, D> {
+            self.mean()
+        }
+
+        fn covariance(&self) -> SMatrix<f64, D, D> {
+            self.covariance()
+        }
+    };
+}
+
+/// [`Density`](fewbits_core::Density) by the type's own `log_pdf` and `log_pdf_columns`.
+macro_rules! own_log_pdf {
+    () => {
+        fn log_density(&self, state: &SVector<f64, D>) -> f64 {
+            self.log_pdf(state)
+        }
+
+        fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
+            let mut own = vec![0.0; logs.len()];
+            self.log_pdf_columns(*states, &mut own);
+            logs.iter_mut().zip(own).for_each(|(log, x)| *log += x);
+        }
+    };
+}
+
+use {own_log_pdf, own_moments};
+
 mod error;
 mod grids;
 mod kernel_estimate;

@@ -4,14 +4,14 @@ use crate::density::Lpg;
 use crate::rate::RateRange;
 use fewbits_core::{Belief, Density, Gaussian};
 use fewbits_densities::{Component, Mixture};
-use nalgebra::Vector2;
+use nalgebra::SVector;
 
 /// A Gaussian ends here, in standard deviations.
 const ENDS: f64 = 6.5;
 /// A polynomial of the degrees in use reaches a little farther than its Gaussian: as one of this many times the variance.
 const LPG_REACH: f64 = 1.7;
 
-/// Where the source can be, m: the box that the first cells cover, and to which all later ones are cut.
+/// Box that contains the source, m. The first cells cover it, and later cells are cut to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchBox {
     /// Lower corner.
@@ -33,25 +33,22 @@ impl SearchBox {
     }
 }
 
-/// A belief about the position that travels, apart from raw records.
+/// A belief that travels, apart from raw records.
 #[derive(Debug, Clone, PartialEq)]
-pub enum PositionBelief {
+pub enum SentBelief<const D: usize> {
     /// A Gaussian mixture.
-    Mixture(Mixture<2>),
+    Mixture(Mixture<D>),
     /// Polynomial Gaussians.
-    Lpg(Lpg<2>),
+    Lpg(Lpg<D>),
 }
 
-/// A belief about position and rate that travels.
-#[derive(Debug, Clone, PartialEq)]
-pub enum JointBelief {
-    /// A Gaussian mixture.
-    Mixture(Mixture<3>),
-    /// Polynomial Gaussians.
-    Lpg(Lpg<3>),
-}
+/// A belief about the position.
+pub type PositionBelief = SentBelief<2>;
 
-/// What the cells are an update of.
+/// A belief about position and rate.
+pub type JointBelief = SentBelief<3>;
+
+/// Prior of an update over cells.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Prior {
     /// A position prior and all records at once: nothing approximated.
@@ -78,7 +75,7 @@ fn bounds<'a, const D: usize>(parts: impl Iterator<Item = &'a Component<D>>, wid
     hull
 }
 
-impl PositionBelief {
+impl<const D: usize> SentBelief<D> {
     pub(crate) fn bounds(&self) -> SearchBox {
         match self {
             Self::Mixture(mixture) => bounds(mixture.components().iter(), 1.0),
@@ -87,7 +84,7 @@ impl PositionBelief {
     }
 
     /// Mean and covariance.
-    pub fn gaussian(&self) -> Gaussian<2> {
+    pub fn gaussian(&self) -> Gaussian<D> {
         match self {
             Self::Mixture(mixture) => mixture.moment_matched(),
             Self::Lpg(lpg) => Gaussian::from_trusted_parts(lpg.mean(), lpg.covariance()),
@@ -95,7 +92,7 @@ impl PositionBelief {
     }
 
     /// Log density.
-    pub fn log_density(&self, x: &Vector2<f64>) -> f64 {
+    pub fn log_density(&self, x: &SVector<f64, D>) -> f64 {
         match self {
             Self::Mixture(mixture) => mixture.log_pdf(x),
             Self::Lpg(lpg) => lpg.log_density(x),
@@ -104,19 +101,9 @@ impl PositionBelief {
 }
 
 impl JointBelief {
-    pub(crate) fn bounds(&self) -> SearchBox {
-        match self {
-            Self::Mixture(mixture) => bounds(mixture.components().iter(), 1.0),
-            Self::Lpg(lpg) => bounds(lpg.gaussians(), LPG_REACH),
-        }
-    }
-
     /// Mean and covariance of the position.
     pub fn position(&self) -> Gaussian<2> {
-        let (mean, covariance) = match self {
-            Self::Mixture(mixture) => (mixture.mean(), mixture.covariance()),
-            Self::Lpg(lpg) => (lpg.mean(), lpg.covariance()),
-        };
-        Gaussian::from_trusted_parts(mean.xy(), covariance.fixed_view::<2, 2>(0, 0).into_owned())
+        let both = self.gaussian();
+        Gaussian::from_trusted_parts(both.mean().xy(), both.covariance().fixed_view::<2, 2>(0, 0).into_owned())
     }
 }

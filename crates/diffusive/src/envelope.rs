@@ -1,11 +1,11 @@
-//! Where the concentration exceeds a threshold, with the certainty that the belief gives.
+//! The region in which the concentration exceeds a threshold, with probabilities under the belief.
 
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
 use fewbits_models::diffusion::Air;
 use fewbits_models::{Homogeneous, Receptor, SourceModel};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, finite, positive, within};
+use fewbits_numerics::error::{all_finite, finite, positive, refuse, within};
 use fewbits_numerics::golden::maximum;
 use fewbits_numerics::normal::interval;
 use nalgebra::Vector2;
@@ -80,7 +80,7 @@ impl<M: SourceModel + Clone> Envelope<M> {
     pub fn new(posterior: &Posterior, likelihood: &SourceLikelihood<M>) -> Result<Self, Error> {
         let sensor = likelihood.records().first().map(|r| r.sensor().clone());
         let Some(sensor) = sensor else {
-            return Err(ArgumentError::new("records", "empty", "at least one").into());
+            return refuse("records", "empty", "at least one");
         };
         let [x, y] = posterior.cells.columns();
         let weights = posterior.cells.weights();
@@ -116,7 +116,7 @@ impl<M: SourceModel + Clone> Envelope<M> {
                     }
                 }
                 other => {
-                    return Err(ArgumentError::new("rate", format!("{other:?}"), "a known or a joint rate").into());
+                    return refuse("rate", format!("{other:?}"), "a known or a joint rate");
                 }
             };
             points.push(Point {
@@ -128,7 +128,7 @@ impl<M: SourceModel + Clone> Envelope<M> {
         Ok(Self { sensor, points })
     }
 
-    /// The same at another height above the ground, m.
+    /// The envelope at another height above the ground, m.
     ///
     /// # Errors
     /// If it is negative or not finite.
@@ -234,7 +234,7 @@ struct AlongRay<'a, M> {
     receptor: Receptor,
     ray: &'a Vector2<f64>,
     age: f64,
-    /// Where it is highest, and how high. At the source unless sensor and source stand at different heights: a plume comes down.
+    /// Distance and value of the highest concentration. At the source unless sensor and source stand at different heights: a plume comes down.
     peak: (f64, f64),
 }
 
@@ -248,7 +248,7 @@ impl<'a, M: SourceModel> AlongRay<'a, M> {
             peak: (0.0, 0.0),
         };
         along.peak = (0.0, along.at(0.0));
-        if sensor.drop() == 0.0 {
+        if sensor.height_difference() == 0.0 {
             return Ok(along);
         }
         // Distances in even ratios over six decades; then the golden section between the neighbours of the best.

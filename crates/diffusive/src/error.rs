@@ -1,7 +1,7 @@
 //! Errors of this crate.
 
 fewbits_numerics::errors! {
-    /// What the search for a source refuses.
+    /// Errors of the search for a source.
     pub enum Error wraps {
         /// The physics.
         Model(#[from] fewbits_models::Error),

@@ -79,7 +79,7 @@ mod sensor;
 mod target;
 mod walk;
 
-pub use belief::{JointBelief, PositionBelief, Prior, SearchBox};
+pub use belief::{JointBelief, PositionBelief, Prior, SearchBox, SentBelief};
 pub use chain::{Outcome, Search, Status, Step};
 pub use envelope::Envelope;
 pub use error::Error;

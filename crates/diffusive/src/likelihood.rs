@@ -5,7 +5,7 @@ use crate::{Error, Record};
 use fewbits_core::{Columns, Likelihood};
 use fewbits_models::SourceModel;
 use fewbits_models::diffusion::Air;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use nalgebra::{SVector, Vector2};
 
 /// `ln p(samples of all nodes | position)` under a model of the release rate.
@@ -23,7 +23,7 @@ impl<M: SourceModel> SourceLikelihood<M> {
     pub fn new(records: Vec<Record<M>>, rate: RateModel) -> Result<Self, Error> {
         rate.check()?;
         if records.is_empty() {
-            return Err(ArgumentError::new("records", "empty", "at least one").into());
+            return refuse("records", "empty", "at least one");
         }
         Ok(Self { records, rate })
     }

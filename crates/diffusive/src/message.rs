@@ -1,4 +1,4 @@
-//! What travels, as bits.
+//! Messages between nodes: raw records or a belief, as bits.
 
 use crate::belief::{JointBelief, PositionBelief};
 use crate::density::Lpg;
@@ -82,7 +82,7 @@ impl Wire {
     }
 }
 
-/// What one node sends to the next.
+/// Message from one node to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Packet {
     /// Indices and samples of all nodes so far.
@@ -212,7 +212,7 @@ impl Packet {
     }
 }
 
-/// What both ends of a link agreed on.
+/// Format that both ends of a link agree on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contract {
     /// The encoding.

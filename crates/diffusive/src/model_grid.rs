@@ -7,8 +7,7 @@ use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
 use fewbits_core::Gaussian;
 use fewbits_models::SourceModel;
 use fewbits_models::diffusion::Air;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::probabilities;
+use fewbits_numerics::error::{entries, probabilities, refuse};
 use nalgebra::Vector2;
 
 /// Sensors in several models of the medium, with the models' prior probabilities.
@@ -33,7 +32,7 @@ pub struct ModelGrid<M = Air> {
     weights: Vec<f64>,
 }
 
-/// What samples say about one model.
+/// Posterior of one model of the medium.
 #[derive(Debug, Clone)]
 pub struct ModelPosterior {
     /// Posterior probability of the model.
@@ -52,13 +51,10 @@ impl<M: SourceModel> ModelGrid<M> {
     /// If there is none, the weights are no probabilities or not one for each, or the sensors sample at different instants.
     pub fn new(sensors: Vec<SourceSensor<M>>, weights: &[f64]) -> Result<Self, Error> {
         probabilities("weights", weights)?;
-        if sensors.len() != weights.len() {
-            let expected = format!("{}, one for each model", sensors.len());
-            return Err(ArgumentError::new("weights", weights.len(), expected).into());
-        }
+        entries("weights", weights.len(), sensors.len())?;
         if let Some(other) = sensors.iter().find(|s| s.instants() != sensors[0].instants()) {
             let expected = format!("{:?}, those of the first model", sensors[0].instants());
-            return Err(ArgumentError::new("instants", format!("{:?}", other.instants()), expected).into());
+            return refuse("instants", format!("{:?}", other.instants()), expected);
         }
         Ok(Self {
             sensors,
@@ -98,7 +94,7 @@ impl<M: SourceModel> ModelGrid<M> {
         self.sensors.iter().zip(self.weights.iter().copied())
     }
 
-    /// What samples of several nodes say about every model and the position under it.
+    /// Posterior of every model, and of the position under it, from the samples of several nodes.
     ///
     /// * `taken`: the place of each node and its samples, kg/m^3.
     ///

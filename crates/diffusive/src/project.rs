@@ -7,8 +7,7 @@ use crate::posterior::Posterior;
 use crate::{Error, RateModel};
 use fewbits_core::Gaussian;
 use fewbits_densities::{Component, Mixture};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, refuse};
 use serde::{Deserialize, Serialize};
 
 /// Clumps that a mixture is fitted to.
@@ -16,7 +15,7 @@ const CLUMPS: usize = 200;
 /// Widening of the Gaussians under polynomial Gaussians: their tails must reach beyond the posterior's.
 const LPG_WIDENING: f64 = 1.3;
 
-/// What travels from node to node.
+/// Form of the messages between nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Form {
@@ -47,14 +46,14 @@ impl Form {
             Self::Lpg { components, degree } => {
                 at_least_one("components", components)?;
                 if degree > crate::density::polynomials::HIGHEST_DEGREE {
-                    return Err(ArgumentError::new("degree", degree, "at most 20").into());
+                    return refuse("degree", degree, "at most 20");
                 }
             }
             Self::Raw | Self::Gaussian | Self::Laplace => {}
         }
         if matches!(rate, RateModel::Joint(_)) && matches!(self, Self::Particles(_) | Self::Laplace) {
             let expected = "Raw, Gaussian, Mixture or Lpg with a joint rate";
-            return Err(ArgumentError::new("form", format!("{self:?}"), expected).into());
+            return refuse("form", format!("{self:?}"), expected);
         }
         Ok(())
     }
@@ -82,7 +81,7 @@ pub(crate) fn lpg_scalars(degree: usize, with_rate: bool) -> usize {
     }
 }
 
-/// What travels on, apart from raw records.
+/// A belief in a message.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Travelling {
     /// A belief about the position.

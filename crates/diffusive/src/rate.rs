@@ -61,7 +61,7 @@ impl From<RateRange> for (f64, f64) {
     }
 }
 
-/// What is assumed of the release rate.
+/// Model of the release rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum RateModel {
     /// The rate is known, kg/s.
@@ -102,7 +102,7 @@ impl RateModel {
     }
 }
 
-/// What samples say about the rate at one position of the source: `sum a^2 / sigma^2`, `sum a y / sigma^2`, `sum y^2 / sigma^2`,
+/// Sufficient statistics of the samples for the rate, at one position of the source: `sum a^2 / sigma^2`, `sum a y / sigma^2`, `sum y^2 / sigma^2`,
 /// and the logarithm of the noise's normalisation. Sums of several nodes add.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RateSums {

@@ -1,11 +1,10 @@
-//! What one node sampled, tabulated for quick likelihoods.
+//! The samples of one node, with tabulated responses for quick likelihoods.
 
 use crate::rate::{Intervals, RateRange, RateSums, log_sample_marginal, log_sample_uncut};
 use crate::{Error, SourceSensor};
 use fewbits_models::diffusion::{Air, Profile};
 use fewbits_models::{Homogeneous, Receptor, SourceModel};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, positive};
+use fewbits_numerics::error::{all_finite, entries, positive};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::Vector2;
 
@@ -40,7 +39,7 @@ pub struct Record<M = Air> {
     along: Option<Along>,
 }
 
-/// What a record of a homogeneous model keeps.
+/// Tables of a record under a homogeneous model.
 #[derive(Debug, Clone, PartialEq)]
 struct Along {
     wind: Vector2<f64>,
@@ -58,7 +57,7 @@ struct Along {
 }
 
 impl<M: SourceModel> SourceSensor<M> {
-    /// What was sampled at a node, ready for likelihoods.
+    /// A record of the samples of a node, from which likelihoods are computed.
     ///
     /// # Errors
     /// If the number of samples is not that of the instants, one is not finite, or the model has no concentrations at `node`.
@@ -66,10 +65,7 @@ impl<M: SourceModel> SourceSensor<M> {
     where
         M: Clone,
     {
-        if samples.len() != self.instants().len() {
-            let expected = format!("{}, one for each instant", self.instants().len());
-            return Err(ArgumentError::new("samples", samples.len(), expected).into());
-        }
+        entries("samples", samples.len(), self.instants().len())?;
         all_finite("samples", samples)?;
         Record::new(self, node, samples.iter().map(|y| y - self.bias()).collect(), self.noise())
     }
@@ -140,20 +136,20 @@ impl<M: SourceModel> Record<M> {
         let table = |end: f64, width: f64| {
             Profile::new(end, width, |distance| {
                 // With a height between them sensor and source are never closest: a kink would spoil the first panel.
-                let apart = self.sensor.drop() > 0.0;
+                let apart = self.sensor.height_difference() > 0.0;
                 let rho = if apart {
                     distance
                 } else {
                     distance.max(homogeneous.closest)
                 };
                 let [a, b] = self.sums_by_model(&(-downwind * rho));
-                let r = rho.hypot(self.sensor.drop());
+                let r = rho.hypot(self.sensor.height_difference());
                 [r * r * a, r * b]
             })
         };
         // Source and image lie at these heights from the sensor: the responses bend over such distances.
         let heights = [
-            self.sensor.drop(),
+            self.sensor.height_difference(),
             self.sensor.source_height() + self.sensor.sensor_height(),
         ];
         let least = heights.into_iter().filter(|h| *h > 0.0).fold(f64::INFINITY, f64::min);
@@ -167,7 +163,7 @@ impl<M: SourceModel> Record<M> {
         Ok(tables)
     }
 
-    /// Where the node stands, m.
+    /// Position of the node, m.
     pub fn node(&self) -> &Vector2<f64> {
         &self.node
     }
@@ -213,8 +209,8 @@ impl<M: SourceModel> Record<M> {
         match along.tables.iter().find(|table| rho <= table.end()) {
             Some(table) => {
                 let [a, b] = table.at(rho);
-                let drop = self.sensor.drop();
-                let inverse = if drop > 0.0 { rho.hypot(drop) } else { rho }.recip();
+                let height = self.sensor.height_difference();
+                let inverse = if height > 0.0 { rho.hypot(height) } else { rho }.recip();
                 if !along.tilted {
                     return [a.max(0.0) * inverse * inverse, b * inverse];
                 }
@@ -263,8 +259,8 @@ impl<M: SourceModel> Record<M> {
             return (self.sums(position), (1.0 + change * change).recip());
         };
         let offset = self.node - position;
-        let drop = self.sensor.drop();
-        let rho = (offset.norm_squared() + drop * drop).sqrt();
+        let height = self.sensor.height_difference();
+        let rho = (offset.norm_squared() + height * height).sqrt();
         let near = (rho - 1.4 * half_width).max(0.6 * half_width).max(along.closest);
         let change = half_width * (along.steepness[0] * (near.recip() + along.drift) + along.steepness[1] * rho);
         let [response, correlation] = self.sums_along(along, &offset);

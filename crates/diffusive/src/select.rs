@@ -190,7 +190,7 @@ impl Selector {
     }
 }
 
-/// Where a clump is.
+/// Position of a clump in the plane.
 fn place(clump: &Clump<3>) -> Vector2<f64> {
     Vector2::new(clump.mean[0], clump.mean[1])
 }

@@ -1,4 +1,4 @@
-//! What a node samples: the concentration at its place at a few instants, with bias and noise.
+//! Sensors: samples of the concentration at a node at a few instants, with bias and noise.
 
 use crate::Error;
 use fewbits_models::diffusion::Air;
@@ -98,7 +98,7 @@ impl<M: SourceModel> SourceSensor<M> {
         Ok(Self { reach, ..self })
     }
 
-    /// How the substance spreads.
+    /// Model of the medium.
     pub fn model(&self) -> &M {
         &self.model
     }
@@ -143,7 +143,7 @@ impl<M: SourceModel> SourceSensor<M> {
     }
 
     /// Height difference of source and sensor, m.
-    pub(crate) fn drop(&self) -> f64 {
+    pub(crate) fn height_difference(&self) -> f64 {
         (self.source_height - self.sensor_height).abs()
     }
 

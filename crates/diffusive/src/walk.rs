@@ -5,6 +5,7 @@ use crate::{Form, Outcome, Search, SourceSensor, Status};
 use fewbits_core::rand::Rng;
 use fewbits_core::{BitString, Message, NumberFormat};
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::entries;
 use fewbits_protocol::{BoxError, Lead, Leader};
 use fewbits_topology::{Deployment, Graph};
 use std::cell::Cell;
@@ -32,9 +33,7 @@ impl SourceChain {
         graph: Graph,
         samples: Vec<Vec<f64>>,
     ) -> Result<Self, ArgumentError> {
-        if samples.len() != deployment.len() {
-            return Err(ArgumentError::new("samples", samples.len(), "a list for each node"));
-        }
+        entries("samples", samples.len(), deployment.len())?;
         if search.form != Form::Raw {
             return Err(ArgumentError::new("form", format!("{:?}", search.form), "raw records"));
         }

@@ -3,12 +3,13 @@
 use crate::Error;
 use crate::plant::scalar;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Message, Observation, Scheme};
+use fewbits_core::{
+    AlwaysReporting, BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Message, Observation,
+};
 use fewbits_numerics::error::{ArgumentError, finite, positive, within};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
 use nalgebra::Vector1;
-use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// The first message: which multiple of the resolution is nearest.
@@ -141,15 +142,10 @@ impl RoundedSample {
     }
 }
 
-impl fewbits_core::Deterministic<1> for RoundedSample {}
-
-impl Scheme<1> for RoundedSample {
-    type State = ();
+impl AlwaysReporting<1> for RoundedSample {
     type Feedback = ();
     type Report = Multiple;
     type Factor = Scalar;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) {}
 
@@ -157,18 +153,17 @@ impl Scheme<1> for RoundedSample {
         self.bits
     }
 
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        (): &(),
-    ) -> Result<Option<Multiple>, fewbits_core::Error> {
-        Ok(Some(self.round(measurement[0])?))
+    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Multiple, fewbits_core::Error> {
+        Ok(self.round(measurement[0])?)
     }
 
     /// Over a link that inverts bits, words of up to 12 bits.
-    fn factor(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
+    fn meaning_of(
+        &self,
+        (): &(),
+        observation: &Observation<Multiple>,
+        link: &Link,
+    ) -> Result<Scalar, fewbits_core::Error> {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };
@@ -231,7 +226,7 @@ impl Initialisation {
                 Ok(scalar(finite("message", scheme.value(*message))?, finite("resolution^2", variance)?))
             }
             Self::FineWithPrior { scheme, message, prior } => {
-                let factor = scheme.factor(&(), &Observation::Received(*message), &Link::PERFECT)?;
+                let factor = scheme.meaning_of(&(), &Observation::Received(*message), &Link::PERFECT)?;
                 let posterior = factor.tilted(prior)?;
                 Ok(scalar(posterior.mean[0], posterior.covariance[0]))
             }

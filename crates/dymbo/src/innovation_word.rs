@@ -3,14 +3,13 @@
 use crate::Error;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
-    Scheme,
+    AlwaysReporting, BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
+    Observation,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::stored;
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
 use nalgebra::{Matrix1, Vector1};
-use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// What the fusion centre broadcasts to sensors that report several bits.
@@ -157,15 +156,10 @@ impl MeasurementNoise<1> for InnovationWord {
     }
 }
 
-impl fewbits_core::Deterministic<1> for InnovationWord {}
-
-impl Scheme<1> for InnovationWord {
-    type State = ();
+impl AlwaysReporting<1> for InnovationWord {
     type Feedback = Prediction;
     type Report = CellIndex;
     type Factor = Scalar;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) -> NumberFormat {
         NumberFormat::Double
@@ -176,17 +170,11 @@ impl Scheme<1> for InnovationWord {
     }
 
     #[inline]
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        prediction: &Prediction,
-    ) -> Result<Option<CellIndex>, fewbits_core::Error> {
-        Ok(Some(self.word(measurement[0], prediction)?))
+    fn report_of(&self, measurement: &Vector1<f64>, prediction: &Prediction) -> Result<CellIndex, fewbits_core::Error> {
+        Ok(self.word(measurement[0], prediction)?)
     }
 
-    fn factor(
+    fn meaning_of(
         &self,
         prediction: &Prediction,
         observation: &Observation<CellIndex>,

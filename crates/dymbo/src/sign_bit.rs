@@ -2,12 +2,11 @@
 
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::{Constant, InCell, Scalar};
-use fewbits_core::{Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sign};
+use fewbits_core::{AlwaysReporting, Link, MeasurementNoise, NumberFormat, Observation, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
-use rand::Rng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 
@@ -65,15 +64,10 @@ impl MeasurementNoise<1> for SignBit {
     }
 }
 
-impl fewbits_core::Deterministic<1> for SignBit {}
-
-impl Scheme<1> for SignBit {
-    type State = ();
+impl AlwaysReporting<1> for SignBit {
     type Feedback = f64;
     type Report = Sign;
     type Factor = Scalar;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) -> NumberFormat {
         NumberFormat::Double
@@ -82,19 +76,13 @@ impl Scheme<1> for SignBit {
     fn report_format(&self) {}
 
     #[inline]
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        threshold: &f64,
-    ) -> Result<Option<Sign>, fewbits_core::Error> {
+    fn report_of(&self, measurement: &Vector1<f64>, threshold: &f64) -> Result<Sign, fewbits_core::Error> {
         let reached = fewbits_node::sign_bit(measurement[0], *threshold).map_err(ArgumentError::from)?;
-        Ok(Some(if reached { Sign::Above } else { Sign::Below }))
+        Ok(if reached { Sign::Above } else { Sign::Below })
     }
 
     #[inline]
-    fn factor(
+    fn meaning_of(
         &self,
         threshold: &f64,
         observation: &Observation<Sign>,

@@ -145,7 +145,7 @@ impl RaoBlackwellised {
         let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
             .factored()
             .map_err(|_| Error::SingularInnovation)?;
-        let (matrix, width) = (sensing.matrix(), belief.means().side_width());
+        let (matrix, width) = (sensing.matrix(), belief.means().auxiliary_width());
         let (mut columns, side) = belief.means_mut().parts_mut();
         for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
             let mean = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);

@@ -21,12 +21,4 @@ pub enum Error {
     Density(fewbits_densities::Error),
 }
 
-impl From<fewbits_densities::Error> for Error {
-    fn from(error: fewbits_densities::Error) -> Self {
-        match error {
-            fewbits_densities::Error::Argument(argument) => Self::Argument(argument),
-            fewbits_densities::Error::Core(error) => Self::Core(error),
-            other => Self::Density(other),
-        }
-    }
-}
+fewbits_numerics::lift!(fewbits_densities with Core => Density);

@@ -1,4 +1,4 @@
-//! What only reproduces a printed comparison. The recommended reduction is [`Reduction::default`](crate::Reduction::default).
+//! Reductions of the paper, for comparison. The recommended reduction is [`Reduction::default`](crate::Reduction::default).
 
 use crate::Error;
 use crate::divergence::plug_in::node_errors;
@@ -22,7 +22,7 @@ impl<const D: usize> PaperReductions<D> {
     /// Builds the KD-tree and its errors.
     ///
     /// # Errors
-    /// Never for a valid estimate.
+    /// If a node's covariance is not positive definite: not for a valid estimate.
     pub fn new(estimate: &KernelEstimate<D>) -> Result<Self, Error> {
         let tree = Tree::new(estimate, Split::KD)?;
         let plug_in = node_errors(estimate, &tree)?;

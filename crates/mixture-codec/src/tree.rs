@@ -2,8 +2,8 @@
 
 use crate::Error;
 use fewbits_densities::{Component, KernelEstimate};
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::eigen::symmetric_eigen;
+use fewbits_numerics::error::refuse;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -20,7 +20,7 @@ pub enum Axis {
     Alternating,
 }
 
-/// Where a node is split along its direction.
+/// Position along the direction at which a node is split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum At {
     /// The left child gets the first `ceil(n/2)` kernels.
@@ -70,7 +70,7 @@ impl<const D: usize> Node<D> {
     /// The node's Gaussian.
     ///
     /// # Errors
-    /// Never for a node of a tree.
+    /// If the node's covariance is not positive definite: not for a node of this tree.
     pub fn component(&self) -> Result<Component<D>, Error> {
         Ok(Component::new(self.weight, self.mean, self.covariance)?)
     }
@@ -265,7 +265,7 @@ impl<const D: usize> Tree<D> {
             match self.nodes.get(*index) {
                 Some(node) => ranges.push(node.range.clone()),
                 None => {
-                    return Err(ArgumentError::new("cut", index, format!("nodes below {}", self.nodes.len())).into());
+                    return refuse("cut", index, format!("nodes below {}", self.nodes.len()));
                 }
             }
         }
@@ -275,7 +275,7 @@ impl<const D: usize> Tree<D> {
             Ok(())
         } else {
             let expected = "exactly one ancestor-or-self of every leaf";
-            Err(ArgumentError::new("cut", format!("{cut:?}"), expected).into())
+            refuse("cut", format!("{cut:?}"), expected)
         }
     }
 }

@@ -14,6 +14,7 @@ use crate::Error;
 use fewbits_core::{Belief, Dynamics, Evolution, Gaussian, GaussianDynamics};
 use fewbits_numerics::error::{ArgumentError, all_finite, finite, non_negative, positive};
 use fewbits_numerics::linalg::{congruence, semidefinite_factor, symmetrised};
+use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -29,35 +30,14 @@ pub struct ContinuousLinear<const D: usize> {
     density: SMatrix<f64, D, D>,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "ContinuousLinear", deny_unknown_fields)]
-struct Parameters<const D: usize> {
+stored! { #[serde(rename = "ContinuousLinear")] [const D: usize] ContinuousLinear as Parameters |model| {
     #[serde(with = "fewbits_numerics::stored")]
-    drift: SMatrix<f64, D, D>,
+    drift: SMatrix<f64, D, D> = model.drift,
     #[serde(with = "fewbits_numerics::stored")]
-    offset: SVector<f64, D>,
+    offset: SVector<f64, D> = model.offset,
     #[serde(with = "fewbits_numerics::stored")]
-    density: SMatrix<f64, D, D>,
-}
-
-impl<const D: usize> From<ContinuousLinear<D>> for Parameters<D> {
-    fn from(model: ContinuousLinear<D>) -> Self {
-        Self {
-            drift: model.drift,
-            offset: model.offset,
-            density: model.density,
-        }
-    }
-}
-
-impl<const D: usize> TryFrom<Parameters<D>> for ContinuousLinear<D> {
-    type Error = Error;
-
-    fn try_from(stored: Parameters<D>) -> Result<Self, Error> {
-        Self::new(stored.drift, stored.offset, stored.density)
-    }
-}
+    density: SMatrix<f64, D, D> = model.density,
+} => ContinuousLinear::new(drift, offset, density), Error }
 
 impl<const D: usize> ContinuousLinear<D> {
     /// The model with drift `A` (per second), offset `b` (state per second) and noise density `Q_c` (state squared per second).

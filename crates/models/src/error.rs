@@ -1,4 +1,4 @@
-//! What a model refuses.
+//! Errors of this crate.
 
 fewbits_numerics::errors! {
     /// Errors of this crate.

@@ -1,4 +1,4 @@
-//! How the world moves and how it is sensed.
+//! Dynamics and sensors: models of how a state moves and of what is measured of it.
 //!
 //! A model here is a checked, immutable value: the matrices of a state equation or of a sensing equation, nothing else. It
 //! can predict, draw and describe its noise; what to do with a measurement is the business of the crates above.

@@ -3,9 +3,10 @@
 use crate::Error;
 use fewbits_core::columns::columns_agree;
 use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
-use fewbits_numerics::error::{ArgumentError, all_finite, non_negative};
+use fewbits_numerics::error::{all_finite, non_negative, refuse};
 use fewbits_numerics::kernels::{StandardNormals, vectorised};
 use fewbits_numerics::linalg::semidefinite_factor;
+use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -25,35 +26,14 @@ pub struct LinearGaussian<const D: usize, const U: usize> {
     noise_covariance: SMatrix<f64, D, D>,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "LinearGaussian", deny_unknown_fields)]
-struct Parameters<const D: usize, const U: usize> {
+stored! { #[serde(rename = "LinearGaussian")] [const D: usize, const U: usize] LinearGaussian as Parameters |model| {
     #[serde(with = "fewbits_numerics::stored")]
-    transition: SMatrix<f64, D, D>,
+    transition: SMatrix<f64, D, D> = model.transition,
     #[serde(with = "fewbits_numerics::stored")]
-    gain: SMatrix<f64, D, U>,
+    gain: SMatrix<f64, D, U> = model.gain,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variances: SVector<f64, U>,
-}
-
-impl<const D: usize, const U: usize> From<LinearGaussian<D, U>> for Parameters<D, U> {
-    fn from(model: LinearGaussian<D, U>) -> Self {
-        Self {
-            transition: model.transition,
-            gain: model.gain,
-            noise_variances: model.noise_variances,
-        }
-    }
-}
-
-impl<const D: usize, const U: usize> TryFrom<Parameters<D, U>> for LinearGaussian<D, U> {
-    type Error = Error;
-
-    fn try_from(stored: Parameters<D, U>) -> Result<Self, Error> {
-        Self::new(stored.transition, stored.gain, stored.noise_variances)
-    }
-}
+    noise_variances: SVector<f64, U> = model.noise_variances,
+} => LinearGaussian::new(transition, gain, noise_variances), Error }
 
 impl<const D: usize, const U: usize> LinearGaussian<D, U> {
     /// The model with transition `F` (D x D), noise gain `G` (D x U) and noise variances `q` (U).
@@ -154,7 +134,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
         let triangular = (0..D).all(|i| (0..i).all(|j| self.transition[(i, j)] == 0.0));
         if triangular && self.transition.diagonal().amax() < 1.0 {
             let expected = "a transition whose stationary covariance is a number";
-            return Err(ArgumentError::new("transition", format!("{:?}", self.transition), expected).into());
+            return refuse("transition", format!("{:?}", self.transition), expected);
         }
         Err(Error::NotStationary)
     }

@@ -5,6 +5,7 @@ use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, LinearSensing, Sensing};
 use fewbits_numerics::error::{all_finite, positive};
 use fewbits_numerics::linalg::definite_factor;
+use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -19,32 +20,12 @@ pub struct LinearSensor<const D: usize, const M: usize> {
     noise_factor: SMatrix<f64, M, M>,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "LinearSensor", deny_unknown_fields)]
-struct Parameters<const D: usize, const M: usize> {
+stored! { #[serde(rename = "LinearSensor")] [const D: usize, const M: usize] LinearSensor as Parameters |sensor| {
     #[serde(with = "fewbits_numerics::stored")]
-    matrix: SMatrix<f64, M, D>,
+    matrix: SMatrix<f64, M, D> = sensor.matrix,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_covariance: SMatrix<f64, M, M>,
-}
-
-impl<const D: usize, const M: usize> From<LinearSensor<D, M>> for Parameters<D, M> {
-    fn from(sensor: LinearSensor<D, M>) -> Self {
-        Self {
-            matrix: sensor.matrix,
-            noise_covariance: sensor.noise_covariance,
-        }
-    }
-}
-
-impl<const D: usize, const M: usize> TryFrom<Parameters<D, M>> for LinearSensor<D, M> {
-    type Error = Error;
-
-    fn try_from(stored: Parameters<D, M>) -> Result<Self, Error> {
-        Self::new(stored.matrix, stored.noise_covariance)
-    }
-}
+    noise_covariance: SMatrix<f64, M, M> = sensor.noise_covariance,
+} => LinearSensor::new(matrix, noise_covariance), Error }
 
 /// One sensor of one number: `z = h'x + w`, `w ~ N(0, r)`.
 pub type ScalarSensor<const D: usize> = LinearSensor<D, 1>;

@@ -3,8 +3,8 @@
 use crate::Error;
 use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, Sensing};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{finite, positive};
+use fewbits_numerics::error::{finite, positive, refuse};
+use fewbits_numerics::stored;
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// `D` is the dimension of the state and `axes` says which two coordinates are the position. `P0` is the power at distance
 /// zero (measurement units squared), `alpha` is in distance units to the power `-n`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Parameters", into = "Parameters")]
+#[serde(try_from = "Parameters<D>", into = "Parameters<D>")]
 pub struct ReceivedPower<const D: usize> {
     position: Vector2<f64>,
     axes: [usize; 2],
@@ -25,43 +25,19 @@ pub struct ReceivedPower<const D: usize> {
     noise_covariance: Matrix1<f64>,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "ReceivedPower", deny_unknown_fields)]
-struct Parameters {
+stored! { #[serde(rename = "ReceivedPower")] [const D: usize] ReceivedPower as Parameters |sensor| {
     #[serde(with = "fewbits_numerics::stored")]
-    position: Vector2<f64>,
-    axes: [usize; 2],
+    position: Vector2<f64> = sensor.position,
+    axes: [usize; 2] = sensor.axes,
     #[serde(with = "fewbits_numerics::stored")]
-    power: f64,
+    power: f64 = sensor.power,
     #[serde(with = "fewbits_numerics::stored")]
-    attenuation: f64,
+    attenuation: f64 = sensor.attenuation,
     #[serde(with = "fewbits_numerics::stored")]
-    exponent: f64,
+    exponent: f64 = sensor.exponent,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64,
-}
-
-impl<const D: usize> From<ReceivedPower<D>> for Parameters {
-    fn from(sensor: ReceivedPower<D>) -> Self {
-        Self {
-            position: sensor.position,
-            axes: sensor.axes,
-            power: sensor.power,
-            attenuation: sensor.attenuation,
-            exponent: sensor.exponent,
-            noise_variance: sensor.noise_variance(),
-        }
-    }
-}
-
-impl<const D: usize> TryFrom<Parameters> for ReceivedPower<D> {
-    type Error = Error;
-
-    fn try_from(s: Parameters) -> Result<Self, Error> {
-        Self::new(s.position, s.axes, s.power, s.attenuation, s.exponent, s.noise_variance)
-    }
-}
+    noise_variance: f64 = sensor.noise_variance(),
+} => ReceivedPower::new(position, axes, power, attenuation, exponent, noise_variance), Error }
 
 impl<const D: usize> ReceivedPower<D> {
     /// The sensor at `position` that senses the source at `(x[axes[0]], x[axes[1]])`.
@@ -80,11 +56,11 @@ impl<const D: usize> ReceivedPower<D> {
         finite("position", position[0])?;
         finite("position", position[1])?;
         if axes[0] == axes[1] || axes.iter().any(|a| *a >= D) {
-            return Err(ArgumentError::new("axes", format!("{axes:?}"), format!("two different axes below {D}")).into());
+            return refuse("axes", format!("{axes:?}"), format!("two different axes below {D}"));
         }
         positive("exponent", exponent)?;
         if exponent < 1.0 {
-            return Err(ArgumentError::new("exponent", exponent, "a number of at least 1").into());
+            return refuse("exponent", exponent, "a number of at least 1");
         }
         Ok(Self {
             position,
@@ -96,7 +72,7 @@ impl<const D: usize> ReceivedPower<D> {
         })
     }
 
-    /// Where the sensor stands.
+    /// Position of the sensor.
     pub fn position(&self) -> Vector2<f64> {
         self.position
     }

@@ -15,7 +15,7 @@ pub struct SourceGradient {
 /// A place at which a model gives concentrations. Made by [`SourceModel::receptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Receptor {
-    /// Where it is, m.
+    /// Position, m.
     pub place: Vector3<f64>,
     /// The model's own number of it, such as the index of its adjoint solution. 0 where the model needs none.
     pub index: usize,

@@ -2,7 +2,7 @@
 
 use crate::{AffineGaussian, ContinuousLinear, Error};
 use fewbits_core::Evolution;
-use fewbits_numerics::error::{ArgumentError, at_least_one, finite, non_negative};
+use fewbits_numerics::error::{at_least_one, finite, non_negative, refuse};
 use nalgebra::{DMatrix, SVector, Vector4};
 
 /// A world that moves by one of several models and switches between them at random instants: a Markov chain in continuous time.
@@ -36,7 +36,7 @@ impl<const D: usize> Switching<D> {
         if rates.len() != n || rates.iter().any(|row| row.len() != n) {
             let sizes: Vec<usize> = rates.iter().map(Vec::len).collect();
             let expected = format!("{n} rows of {n}");
-            return Err(ArgumentError::new("rates", format!("rows of {sizes:?}"), expected).into());
+            return refuse("rates", format!("rows of {sizes:?}"), expected);
         }
         let mut generator = DMatrix::zeros(n, n);
         for (i, row) in rates.iter().enumerate() {

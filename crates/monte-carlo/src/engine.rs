@@ -37,7 +37,7 @@ pub enum MonteCarloError {
         index: u64,
         /// Its random stream.
         stream: Stream,
-        /// What went wrong, as the trial's error says it.
+        /// Message of the trial's error.
         message: String,
     },
     /// A trial panicked; no other trial is affected.

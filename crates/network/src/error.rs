@@ -4,10 +4,10 @@ use crate::note::Note;
 use crate::units::{Seconds, SensorId};
 use fewbits_core::{ArgumentError, CodecError};
 
-/// What a crate below this one, or an estimator of the user's own, reported.
+/// An error of another crate or of a user's own estimator.
 pub type Cause = Box<dyn std::error::Error + Send + Sync>;
 
-/// What the simulated network refuses.
+/// Errors of the simulated network.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -75,7 +75,7 @@ pub enum Error {
         failed: u32,
         /// Slots of the run.
         slots: u32,
-        /// What it noted the last time.
+        /// Its last note.
         last: Note,
     },
     /// A message that does not fit its format.
@@ -86,7 +86,7 @@ pub enum Error {
     Estimator {
         /// Name of the estimator or of its crate.
         name: &'static str,
-        /// What it reported.
+        /// The estimator's error.
         source: Cause,
     },
     /// A log or snapshot that cannot be written.
@@ -108,14 +108,6 @@ pub enum Error {
         found: usize,
         /// Nodes of the network.
         expected: usize,
-    },
-    /// A replayed run that left its log.
-    #[error("the run left its log at transmission {transmission}: {difference}")]
-    LeftLog {
-        /// Number of the transmission, acknowledgements counted.
-        transmission: usize,
-        /// What differs.
-        difference: &'static str,
     },
 }
 

@@ -11,7 +11,7 @@
 //! | sensors around a fusion centre | [`BitStar`]: any `Receiver` of `fewbits-protocol`, any `SensorNode` of `fewbits-core` |
 //! | a belief that travels | [`Walk`]: any `Leader` of `fewbits-protocol` |
 //! | what the sensors measure | [`Measurements`]: a table, an iterator or a closure |
-//! | what happened | [`Summary`]; [`Log`]: written, read, replayed; [`Simulator::snapshot`] and [`restore`](Simulator::restore) |
+//! | what happened | [`Summary`]; [`Log`], written and read; [`Simulator::snapshot`] and [`restore`](Simulator::restore) |
 //! | a protocol of one's own | [`Protocol`], [`Simulator`] |
 //!
 //! The central choice: **nodes share nothing but bits.** A node is a small state machine that sees its own state and the frames that

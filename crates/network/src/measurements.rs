@@ -1,4 +1,4 @@
-//! What the sensors measure, slot by slot.
+//! Measurements of all sensors, slot by slot.
 
 use crate::error::Error;
 use fewbits_numerics::error::refuse;
@@ -40,7 +40,7 @@ impl<M> Measurements<M> {
         }
     }
 
-    /// What `used` makes of the measurement; `None` if there is none.
+    /// Applies `used` to the measurement; `None` if there is none.
     pub(crate) fn with<T>(&self, slot: u32, sensor: usize, used: impl FnOnce(&M) -> T) -> Option<T> {
         match &self.0 {
             Source::Table(table) => {

@@ -1,4 +1,4 @@
-//! What a node can notice, as it stands in the log.
+//! Notes of nodes in the log: damaged frames, disagreements, failed steps and the like.
 
 use crate::error::in_full;
 use crate::units::SensorId;
@@ -21,7 +21,7 @@ pub enum Note {
     Late,
     /// The sender's state is not the receiver's.
     Disagreement {
-        /// Whose frame showed it.
+        /// Sender of the frame that showed it.
         with: SensorId,
         /// The slot of the frame.
         slot: u32,

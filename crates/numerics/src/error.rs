@@ -72,9 +72,21 @@ macro_rules! errors {
     };
 }
 
-/// Takes the errors of crates below into variants of this crate's `Error`; an argument that they refused stays one.
+/// Takes the errors of crates below into variants of this crate's `Error`; an argument that they refused stays one. `with Core`: so do
+/// errors of the core.
 #[macro_export]
 macro_rules! lift {
+    ($below:ident with Core => $variant:ident) => {
+        impl From<$below::Error> for Error {
+            fn from(error: $below::Error) -> Self {
+                match error {
+                    $below::Error::Argument(argument) => Self::Argument(argument),
+                    $below::Error::Core(error) => Self::Core(error),
+                    other => Self::$variant(other),
+                }
+            }
+        }
+    };
     ($($below:ident => $variant:ident),+ $(,)?) => {
         $(impl From<$below::Error> for Error {
             fn from(error: $below::Error) -> Self {
@@ -158,6 +170,16 @@ pub fn at_least_one(name: &'static str, value: usize) -> Result<usize, ArgumentE
         Ok(value)
     } else {
         Err(ArgumentError::new(name, value, "at least 1"))
+    }
+}
+
+/// Accepts a list with as many entries as expected.
+#[inline]
+pub fn entries(name: &'static str, given: usize, expected: usize) -> Result<(), ArgumentError> {
+    if given == expected {
+        Ok(())
+    } else {
+        Err(ArgumentError::new(name, format!("{given} entries"), format!("{expected} entries")))
     }
 }
 

@@ -203,7 +203,8 @@ pub fn deserialize<'de, T: Floats, D: Deserializer<'de>>(deserializer: D) -> Res
 
 /// How a type with a checking constructor is written and read by serde: the fields of its stored form, each with its type and its
 /// value, and the constructor that reads them. The type itself says `#[serde(try_from = "Form", into = "Form")]`; without values
-/// (second form) it is written by its own derive, and `into` is left out; fields may then have serde's attributes.
+/// (second form) it is written by its own derive, and `into` is left out; the form and its fields may then have serde's attributes.
+/// A type with a dimension is written `[const D: usize] Type as Form`, and its form is `Form<D>`.
 ///
 /// ```
 /// use fewbits_numerics::{ArgumentError, error::positive, stored};
@@ -229,25 +230,25 @@ pub fn deserialize<'de, T: Floats, D: Deserializer<'de>>(deserializer: D) -> Res
 /// ```
 #[macro_export]
 macro_rules! stored {
-    ($type:ident as $form:ident |$value:ident| { $($(#[$attribute:meta])* $field:ident: $kind:ty = $get:expr),+ $(,)? } => $make:expr, $error:ty) => {
-        $crate::stored! { #[derive(::serde::Serialize)] $type as $form { $($(#[$attribute])* $field: $kind),+ } => $make, $error }
+    ($(#[$meta:meta])* $([$(const $n:ident: usize),+])? $type:ident as $form:ident |$value:ident| { $($(#[$attribute:meta])* $field:ident: $kind:ty = $get:expr),+ $(,)? } => $make:expr, $error:ty) => {
+        $crate::stored! { #[derive(::serde::Serialize)] $(#[$meta])* $([$(const $n: usize),+])? $type as $form { $($(#[$attribute])* $field: $kind),+ } => $make, $error }
 
-        impl From<$type> for $form {
-            fn from($value: $type) -> Self {
+        impl$(<$(const $n: usize),+>)? From<$type$(<$($n),+>)?> for $form$(<$($n),+>)? {
+            fn from($value: $type$(<$($n),+>)?) -> Self {
                 Self { $($field: $get),+ }
             }
         }
     };
-    ($(#[$meta:meta])* $type:ident as $form:ident { $($(#[$attribute:meta])* $field:ident: $kind:ty),+ $(,)? } => $make:expr, $error:ty) => {
-        $(#[$meta])*
+    ($(#[$meta:meta])* $([$(const $n:ident: usize),+])? $type:ident as $form:ident { $($(#[$attribute:meta])* $field:ident: $kind:ty),+ $(,)? } => $make:expr, $error:ty) => {
         #[derive(::serde::Deserialize)]
+        $(#[$meta])*
         #[serde(deny_unknown_fields)]
-        struct $form { $($(#[$attribute])* $field: $kind),+ }
+        struct $form$(<$(const $n: usize),+>)? { $($(#[$attribute])* $field: $kind),+ }
 
-        impl TryFrom<$form> for $type {
+        impl$(<$(const $n: usize),+>)? TryFrom<$form$(<$($n),+>)?> for $type$(<$($n),+>)? {
             type Error = $error;
 
-            fn try_from($form { $($field),+ }: $form) -> Result<Self, $error> {
+            fn try_from($form { $($field),+ }: $form$(<$($n),+>)?) -> Result<Self, $error> {
                 $make
             }
         }

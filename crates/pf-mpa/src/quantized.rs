@@ -5,13 +5,12 @@ use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::sensor::RangeNoise;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
-    Scheme,
+    AlwaysReporting, BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
+    Observation,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_quantizers::{Labelling, Symbol};
 use nalgebra::{Matrix1, Vector1};
-use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// Where the cells of a quantized range lie: `L` equal cells on `centre +- half_width`, the first and the last continued to
@@ -76,7 +75,7 @@ impl Message for RangeReference {
     }
 }
 
-/// A sensor that reports in which of `L` equal cells around a reference its range lies: a [`Scheme`], so that every filter of
+/// A sensor that reports in which of `L` equal cells around a reference its range lies: a [`Scheme`](fewbits_core::Scheme), so that every filter of
 /// the library tracks with it.
 ///
 /// The innovation `I = (z - centre) / half_width` takes the cell `clamp(floor((I + 1) L / 2), 0, L - 1)`; a range on an edge
@@ -213,15 +212,10 @@ impl MeasurementNoise<1> for QuantizedRange {
     }
 }
 
-impl fewbits_core::Deterministic<1> for QuantizedRange {}
-
-impl Scheme<1> for QuantizedRange {
-    type State = ();
+impl AlwaysReporting<1> for QuantizedRange {
     type Feedback = RangeReference;
     type Report = Symbol;
     type Factor = RangeFactor;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) -> NumberFormat {
         self.format
@@ -231,17 +225,11 @@ impl Scheme<1> for QuantizedRange {
         self.labelling.clone()
     }
 
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        reference: &RangeReference,
-    ) -> Result<Option<Symbol>, fewbits_core::Error> {
-        Ok(Some(self.level(measurement[0], reference)?))
+    fn report_of(&self, measurement: &Vector1<f64>, reference: &RangeReference) -> Result<Symbol, fewbits_core::Error> {
+        Ok(self.level(measurement[0], reference)?)
     }
 
-    fn factor(
+    fn meaning_of(
         &self,
         reference: &RangeReference,
         observation: &Observation<Symbol>,

@@ -7,7 +7,7 @@ use fewbits_core::bits::BitWriter;
 use fewbits_core::message::Message;
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::{
-    Criterion, Labelling, Newton, Noise, Prior, Quantizer, Scene, Symbol, System, design, lloyd_max,
+    Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, Symbol, System, design, lloyd_max,
 };
 
 fn main() {
@@ -19,15 +19,15 @@ fn lloyd(levels: usize) -> Quantizer {
 }
 
 fn pair(levels: usize, rho: f64) -> System {
-    let scene = Scene::new(
+    let model = ObservationModel::new(
         Prior::gaussian_with_deviation(1.0).unwrap(),
         Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
     );
-    System::ideal(scene.unwrap(), vec![lloyd(levels); 2]).unwrap()
+    System::ideal(model.unwrap(), vec![lloyd(levels); 2]).unwrap()
 }
 
-fn nine() -> Scene {
-    Scene::gaussian_with_deviations(1.0, &[1.0; 9]).unwrap()
+fn nine() -> ObservationModel {
+    ObservationModel::gaussian_with_deviations(1.0, &[1.0; 9]).unwrap()
 }
 
 /// The unit: one encoding by eight levels.

@@ -5,7 +5,7 @@
 
 use crate::compositions::Compositions;
 
-/// Where the axis of one group lies in a table of joint outcomes.
+/// Position of one group's axis in a table of joint outcomes: products of the sizes of the axes before and after it.
 #[derive(Clone, Copy)]
 pub(crate) struct Axis {
     pub(crate) outer: usize,

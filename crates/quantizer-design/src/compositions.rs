@@ -1,4 +1,4 @@
-//! Count vectors: what a group of identical sensors reports, up to who reported it.
+//! Count vectors: how many sensors of a group report each symbol.
 //!
 //! The likelihood of `N` identical sensors depends on how many reported each symbol, so `L^N` outcomes collapse to
 //! `C(N + L - 1, L - 1)` count vectors with multinomial coefficients: 220 instead of 262144 for nine sensors of four levels.
@@ -126,7 +126,7 @@ impl Compositions {
     }
 }
 
-/// How a multinomial probability follows from one with a report fewer.
+/// One step of the recursion from `m - 1` reports to `m`.
 #[derive(Debug, Clone, Copy, Default)]
 struct Step {
     from: usize,

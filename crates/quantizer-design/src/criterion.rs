@@ -1,7 +1,7 @@
-//! What a design is good for, as a sum over joint outcomes.
+//! Design criteria as sums over joint outcomes.
 
 use crate::error::{Error, refuse};
-use crate::scene::{Feature, Scene};
+use crate::observation_model::{Feature, ObservationModel};
 use serde::{Deserialize, Serialize};
 
 /// Below this a probability counts as zero inside a logarithm.
@@ -43,7 +43,7 @@ impl Criterion {
     }
 }
 
-/// A criterion in the scene where it is evaluated.
+/// A criterion in the model where it is evaluated.
 ///
 /// Every criterion is `constant + sense * sum_outcomes psi(m)` where `m` are a few moments of the outcome's likelihood:
 ///
@@ -71,15 +71,15 @@ enum Kind {
 }
 
 impl Scored {
-    pub(crate) fn new(criterion: Criterion, scene: &Scene) -> Result<Self, Error> {
+    pub(crate) fn new(criterion: Criterion, model: &ObservationModel) -> Result<Self, Error> {
         let (kind, features) = match criterion {
-            Criterion::MutualInformation if scene.is_discrete() && scene.values.len() <= FEW_VALUES => {
-                (Kind::Equivocation, scene.given.clone())
+            Criterion::MutualInformation if model.is_discrete() && model.values.len() <= FEW_VALUES => {
+                (Kind::Equivocation, model.given.clone())
             }
-            Criterion::MutualInformation if scene.is_independent() => (Kind::Entropy, vec![scene.mass.clone()]),
-            Criterion::MutualInformation => (Kind::Information, scene.given.clone()),
-            Criterion::MeanSquaredError => (Kind::Explained, vec![scene.mass.clone(), scene.moment.clone()]),
-            Criterion::BayesError if scene.is_discrete() => (Kind::Decision, scene.given.clone()),
+            Criterion::MutualInformation if model.is_independent() => (Kind::Entropy, vec![model.mass.clone()]),
+            Criterion::MutualInformation => (Kind::Information, model.given.clone()),
+            Criterion::MeanSquaredError => (Kind::Explained, vec![model.mass.clone(), model.moment.clone()]),
+            Criterion::BayesError if model.is_discrete() => (Kind::Decision, model.given.clone()),
             Criterion::BayesError => {
                 return refuse("prior", "a continuous prior", "a discrete prior for a Bayes error");
             }
@@ -87,7 +87,7 @@ impl Scored {
         Ok(Self {
             kind,
             features,
-            weights: scene.weights.clone(),
+            weights: model.weights.clone(),
         })
     }
 
@@ -237,16 +237,17 @@ impl Scored {
         (best, others + self.weights[best] * q[best], others)
     }
 
-    /// What the sums over outcomes start from, as far as designs see it; see also [`Scored::offset`].
-    pub(crate) fn constant(&self, scene: &Scene) -> f64 {
+    /// Constant that is added to the sum over outcomes within a design. [`Scored::offset`] is added to the returned value only.
+    pub(crate) fn constant(&self, model: &ObservationModel) -> f64 {
         if self.kind == Kind::Explained {
-            -scene.variance
+            -model.variance
         } else {
             0.0
         }
     }
 
-    /// What is added to a value for the outside only, since beside it small changes lose their digits: the prior's entropy.
+    /// The prior's entropy, if it is part of the criterion. It is added to returned values only: within a design small changes would
+    /// lose their digits beside it.
     pub(crate) fn offset(&self) -> f64 {
         if self.kind != Kind::Equivocation {
             return 0.0;
@@ -254,12 +255,12 @@ impl Scored {
         self.weights.iter().filter(|w| **w > 0.0).map(|w| -w * w.ln()).sum()
     }
 
-    /// The size against which changes of the signed value (without offset) are small or large, whatever the unit.
-    pub(crate) fn unit(&self, value: f64, scene: &Scene) -> f64 {
+    /// Scale of the signed value without offset: changes are judged relative to it, so that results do not depend on units.
+    pub(crate) fn unit(&self, value: f64, model: &ObservationModel) -> f64 {
         match self.kind {
             Kind::Equivocation | Kind::Decision => value.abs(),
             Kind::Entropy | Kind::Information => value.abs().max(1.0),
-            Kind::Explained => value.abs().max(scene.variance),
+            Kind::Explained => value.abs().max(model.variance),
         }
     }
 }

@@ -12,7 +12,7 @@ pub(crate) struct Deadline(Option<Instant>);
 impl Deadline {
     pub(crate) const NEVER: Self = Self(None);
 
-    /// So long after an instant; never without a limit, or if the limit is longer than the clock can count.
+    /// `limit` after `start`. Never, if there is no limit or the sum is beyond the clock's range.
     pub(crate) fn after(start: Instant, limit: Option<Duration>) -> Self {
         Self(limit.and_then(|limit| start.checked_add(limit)))
     }

@@ -3,7 +3,7 @@
 use fewbits_numerics::ArgumentError;
 
 fewbits_numerics::errors! {
-    /// Why a scene, system, design, decoder or bound was refused.
+    /// Why a model, system, design, decoder or bound was refused.
     pub enum Error wraps {
         /// A quantizer or channel was refused.
         Quantizer(fewbits_quantizers::Error),

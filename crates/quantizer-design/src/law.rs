@@ -3,7 +3,7 @@
 use crate::compositions::Compositions;
 use crate::error::Error;
 use crate::moments::{Table, moments};
-use crate::scene::Feature;
+use crate::observation_model::Feature;
 use crate::system::{SensorGroup, System};
 use fewbits_numerics::{kernels, normal};
 
@@ -15,7 +15,7 @@ pub(crate) struct Active<'a> {
     pub(crate) compositions: Compositions,
     /// Mean of a sensor's sample at each node, and its standard deviation there.
     pub(crate) means: Vec<f64>,
-    pub(crate) sd: f64,
+    pub(crate) deviation: f64,
     /// `c[i][t]`: change of the probability of symbol `t` when breakpoint `i` moves up, per density.
     pub(crate) exchange: Vec<Vec<f64>>,
 }
@@ -29,7 +29,7 @@ pub(crate) struct SensorLaw<'a> {
     pub(crate) exchange: &'a [Vec<f64>],
 }
 
-/// What the node sums of one group need at given breakpoints.
+/// Factors of the node sums of one group at given breakpoints.
 pub(crate) struct Slots {
     /// Report probabilities of all sensors of the group, of all but one, and of all but two.
     pub(crate) reports: [Table; 3],
@@ -43,7 +43,7 @@ impl<'a> Active<'a> {
     pub(crate) fn new(system: &'a System, index: usize) -> Result<Self, Error> {
         let group = system.group(index)?;
         let outputs = group.channel().outputs();
-        let (means, sd) = system.scene().sample_law(group.sensors()[0]);
+        let (means, deviation) = system.model().sample_law(group.sensors()[0]);
         let exchange = (0..group.quantizer().breakpoints().len())
             .map(|i| {
                 (0..outputs)
@@ -57,7 +57,7 @@ impl<'a> Active<'a> {
             group,
             compositions,
             means,
-            sd,
+            deviation,
             exchange,
         })
     }
@@ -72,7 +72,7 @@ impl<'a> Active<'a> {
             .map(|cell| {
                 let lower = if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
                 let upper = b.get(cell).copied().unwrap_or(f64::INFINITY);
-                let standardised = |edge: f64| self.means.iter().map(move |m| (edge - m) / self.sd).collect();
+                let standardised = |edge: f64| self.means.iter().map(move |m| (edge - m) / self.deviation).collect();
                 let (mut inside, upper): (Vec<f64>, Vec<f64>) = (standardised(lower), standardised(upper));
                 kernels::interval(&mut inside, &upper);
                 inside
@@ -103,7 +103,8 @@ impl<'a> Active<'a> {
             .map(|t| {
                 let law = |m: &f64| {
                     let cells = (0..=b.len()).map(|cell| {
-                        let inside = normal::log_interval((lower(cell) - m) / self.sd, (edge(cell) - m) / self.sd);
+                        let inside =
+                            normal::log_interval((lower(cell) - m) / self.deviation, (edge(cell) - m) / self.deviation);
                         inside + self.group.cell_transition(t, cell).ln()
                     });
                     kernels::log_sum_exp(&cells.collect::<Vec<_>>())
@@ -125,11 +126,11 @@ impl<'a> Active<'a> {
     pub(crate) fn densities(&self, b: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         b.iter()
             .map(|b| {
-                let standardised = self.means.iter().map(|m| (b - m) / self.sd);
+                let standardised = self.means.iter().map(|m| (b - m) / self.deviation);
                 standardised
                     .map(|u| {
-                        let density = normal::pdf(u) / self.sd;
-                        (density, -u * density / self.sd)
+                        let density = normal::pdf(u) / self.deviation;
+                        (density, -u * density / self.deviation)
                     })
                     .unzip()
             })
@@ -203,8 +204,8 @@ impl Reports {
 /// `ln P(outcome | x_k)` for every joint outcome, outcomes by values: digits where the probabilities themselves underflow.
 pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
     system.check_outcomes()?;
-    let scene = system.scene();
-    let nodes = scene.nodes();
+    let model = system.model();
+    let nodes = model.nodes();
     let mut joint = vec![vec![0.0; nodes]];
     for index in 0..system.groups().len() {
         let entry = Active::new(system, index)?;
@@ -227,9 +228,9 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
             .flat_map(|a| rows.iter().map(move |b| sums_of(a, b)))
             .collect();
     }
-    let mut out = Vec::with_capacity(joint.len() * scene.values.len());
+    let mut out = Vec::with_capacity(joint.len() * model.values.len());
     for row in &joint {
-        for feature in &scene.given {
+        for feature in &model.given {
             let logs = row[feature.start..].iter().zip(&feature.weights);
             let terms: Vec<f64> = logs.filter(|(_, w)| **w > 0.0).map(|(l, w)| l + w.ln()).collect();
             out.push(kernels::log_sum_exp(&terms));

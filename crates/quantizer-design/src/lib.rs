@@ -2,15 +2,15 @@
 //!
 //! Several sensors measure one unknown through noise, and each may report a few bits. Which cells should each sensor use so
 //! that together they say most, and which word stands for which cell? Start with [`Request`]: it takes the prior and the noise
-//! ([`Scene`]), the bits of each sensor ([`Bits`]) and the link, and returns [`Solutions`], best first. A [`Solution`] encodes
+//! ([`ObservationModel`]), the bits of each sensor ([`Bits`]) and the link, and returns [`Solutions`], best first. A [`Solution`] encodes
 //! and decodes, and leaves the library as a table, JSON, a C header or Rust constants ([`Export`]).
 //!
 //! ```
 //! use fewbits_core::Link;
-//! use fewbits_quantizer_design::{Bits, Noise, Prior, Request, Scene};
+//! use fewbits_quantizer_design::{Bits, Noise, Prior, Request, ObservationModel};
 //!
-//! let scene = Scene::new(Prior::normal(20.0, 4.0)?, Noise::independent_with_deviations(&[1.0, 1.5])?)?;
-//! let solutions = Request::estimation(scene, Bits::Each(2), Link::flipping(0.02)?).run()?;
+//! let model = ObservationModel::new(Prior::normal(20.0, 4.0)?, Noise::independent_with_deviations(&[1.0, 1.5])?)?;
+//! let solutions = Request::estimation(model, Bits::Each(2), Link::flipping(0.02)?).run()?;
 //! let best = solutions.best();
 //! let words = best.encode(&[21.3, 22.0])?;
 //! let estimate = best.decoder(16)?.decode_symbols(&words)?;
@@ -20,8 +20,8 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`solve`] | requests, solutions, exports, designs for a box of scenes |
-//! | [`scene`], [`system`] | prior and noise; the sensors with their quantizers and channels |
+//! | [`solve`] | requests, solutions, exports, designs for a box of models |
+//! | [`observation_model`], [`system`] | prior and noise; the sensors with their quantizers and channels |
 //! | [`design`] | local design of given levels by Newton's method: all sensors at once, or one after the other |
 //! | [`decoder`], [`table`] | the posterior of the unknown, decisions and tests |
 //! | [`bounds`] | limits that no design can pass |
@@ -32,17 +32,17 @@
 //! positive cell probabilities. That gives twelve digits, and with them gradients, Hessians, Newton's method, and the
 //! certainty that a stationary point is an optimum and not a saddle ([`Certificate`]). The price is the enumeration of outcomes,
 //! `L^N` of them for `N` different sensors of `L` levels; identical sensors are counted instead of told apart, which leaves
-//! `C(N + L - 1, L - 1)`, and every enumeration has a limit with a typed error beyond it. Nothing depends on the unit: a scene
+//! `C(N + L - 1, L - 1)`, and every enumeration has a limit with a typed error beyond it. Nothing depends on the unit: a model
 //! in other units has the design in other units.
 //!
 //! ```
 //! use fewbits_core::Observation;
 //! use fewbits_quantizer_design::decoder::MmseDecoder;
-//! use fewbits_quantizer_design::{Criterion, Newton, Scene, Symbol, System, design};
+//! use fewbits_quantizer_design::{Criterion, Newton, ObservationModel, Symbol, System, design};
 //!
 //! // Two sensors with unit noise about a standard normal unknown, two bits each, started from Lloyd-Max quantizers.
-//! let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0])?;
-//! let start = System::lloyd_max(scene, 4)?;
+//! let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 1.0])?;
+//! let start = System::lloyd_max(model, 4)?;
 //! let best = design::joint(&start, Criterion::MutualInformation, &Newton::default())?;
 //! assert!(!best.is_saddle());
 //! assert!((best.value - 0.474_687_859_5).abs() < 1e-9);
@@ -63,8 +63,8 @@
 pub mod bounds;
 pub mod decoder;
 pub mod design;
+pub mod observation_model;
 pub mod published;
-pub mod scene;
 pub mod solve;
 pub mod system;
 pub mod table;
@@ -86,7 +86,7 @@ pub use derivatives::Derivatives;
 pub use error::Error;
 pub use fewbits_quantizers::{Channel, Labelling, Quantizer, Symbol, canonical, lloyd_max, quantizer};
 pub use newton::{AtSaddle, Certificate, Newton};
-pub use scene::{Noise, Prior, Scene};
+pub use observation_model::{Noise, ObservationModel, Prior};
 pub use solve::{Adc, Bits, Export, Progress, Request, Solution, Solutions};
 pub use system::{SensorGroup, System};
 pub use table::JointTable;

@@ -1,7 +1,7 @@
 //! Sums over nodes of products of per-group tables: where all the time is spent.
 
 use crate::deadline::Deadline;
-use crate::scene::Feature;
+use crate::observation_model::Feature;
 
 /// Functions on the nodes, one a row.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -3,6 +3,7 @@
 use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
 use crate::error::Error;
+use fewbits_numerics::stored;
 use nalgebra::{DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
@@ -71,35 +72,15 @@ pub struct Newton {
     pub at_saddle: AtSaddle,
 }
 
-/// The stored form of the settings, whose values are checked when read.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredNewton {
+stored! { Newton as StoredNewton {
     max_iterations: usize,
     tolerance: f64,
     max_step: f64,
     at_saddle: AtSaddle,
-}
-
-impl TryFrom<StoredNewton> for Newton {
-    type Error = Error;
-
-    fn try_from(stored: StoredNewton) -> Result<Self, Error> {
-        let StoredNewton {
-            max_iterations,
-            tolerance,
-            max_step,
-            at_saddle,
-        } = stored;
-        let newton = Self {
-            max_iterations,
-            tolerance,
-            max_step,
-            at_saddle,
-        };
-        newton.check().map(|()| newton)
-    }
-}
+} => {
+    let newton = Newton { max_iterations, tolerance, max_step, at_saddle };
+    newton.check().map(|()| newton)
+}, Error }
 
 impl Default for Newton {
     fn default() -> Self {
@@ -130,7 +111,7 @@ impl Newton {
     }
 }
 
-/// What is maximised.
+/// An objective to be maximised.
 pub(crate) trait Objective {
     fn value(&self, b: &[f64]) -> f64;
     fn derivatives(&self, b: &[f64]) -> Derivatives;
@@ -140,7 +121,7 @@ pub(crate) trait Objective {
     fn unit(&self, value: f64) -> f64;
 }
 
-/// Where Newton's method ended.
+/// A stationary point that Newton's method found.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Stationary {
     pub(crate) point: Vec<f64>,

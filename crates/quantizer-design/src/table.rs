@@ -4,15 +4,16 @@ use crate::compositions::rank;
 use crate::criterion::most_probable;
 use crate::error::{Error, refuse};
 use crate::law::Reports;
-use crate::scene::Scene;
+use crate::observation_model::ObservationModel;
 use crate::system::System;
+use fewbits_numerics::error::entries;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Most entries of a table (outcomes times values of the unknown).
 const ENTRY_LIMIT: u64 = 1 << 25;
 
-/// Where a joint report stands in the tables of a system: counts within groups, groups in order.
+/// Index of a joint report in the tables of a system: the rank of each group's count vector, first group slowest.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout {
     groups: Vec<(Vec<usize>, usize, usize)>,
@@ -27,15 +28,13 @@ impl Layout {
             .map(|g| (g.sensors().to_vec(), g.channel().outputs(), g.outcomes() as usize));
         Self {
             groups: entries.collect(),
-            sensors: system.scene().sensors(),
+            sensors: system.model().sensors(),
         }
     }
 
     /// Number of the outcome in which sensor `n` was received as `symbols[n]`.
     pub(crate) fn index(&self, symbols: &[usize]) -> Result<usize, Error> {
-        if symbols.len() != self.sensors {
-            return refuse("symbols", format!("{} symbols", symbols.len()), format!("one a sensor, {}", self.sensors));
-        }
+        entries("symbols", symbols.len(), self.sensors)?;
         let mut index = 0;
         for (sensors, outputs, size) in &self.groups {
             let mut counts = [0; 64];
@@ -79,7 +78,7 @@ impl JointTable {
     /// # Errors
     /// [`Error::TooLarge`] beyond the system's outcome limit or 33 million entries.
     pub fn new(system: &System) -> Result<Self, Error> {
-        let needed = system.outcomes().saturating_mul(system.scene().values().len() as u64);
+        let needed = system.outcomes().saturating_mul(system.model().values().len() as u64);
         if needed > ENTRY_LIMIT {
             return Err(Error::TooLarge {
                 table: "joint outcome table",
@@ -91,7 +90,7 @@ impl JointTable {
         Ok(Self {
             layout: Layout::new(system),
             system: system.clone(),
-            likelihood: reports.moments(&system.scene().given),
+            likelihood: reports.moments(&system.model().given),
             log_multiplicity: reports.log_multiplicity,
         })
     }
@@ -101,8 +100,8 @@ impl JointTable {
         &self.system
     }
 
-    fn scene(&self) -> &Scene {
-        self.system.scene()
+    fn model(&self) -> &ObservationModel {
+        self.system.model()
     }
 
     /// Number of outcomes.
@@ -112,7 +111,7 @@ impl JointTable {
 
     /// Values of the unknown, the columns of the table.
     pub fn values(&self) -> &[f64] {
-        self.scene().values()
+        self.model().values()
     }
 
     /// Outcome in which sensor `n` was received as symbol `symbols[n]`.
@@ -126,7 +125,7 @@ impl JointTable {
     /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. Sensors of a group are not told apart: divide by the
     /// [`multiplicity`](Self::multiplicity) for one particular report.
     pub fn likelihood(&self, outcome: usize) -> &[f64] {
-        let values = self.scene().values().len();
+        let values = self.model().values().len();
         self.likelihood.chunks_exact(values).nth(outcome).unwrap_or_default()
     }
 
@@ -137,7 +136,7 @@ impl JointTable {
 
     /// Prior probability of an outcome.
     pub fn probability(&self, outcome: usize) -> f64 {
-        self.scene()
+        self.model()
             .weights()
             .iter()
             .zip(self.likelihood(outcome))
@@ -147,7 +146,7 @@ impl JointTable {
 
     /// Maximum a posteriori value of the unknown, as an index into [`values`](Self::values); the first on ties.
     pub fn decide(&self, outcome: usize) -> usize {
-        most_probable(self.scene().weights(), self.likelihood(outcome))
+        most_probable(self.model().weights(), self.likelihood(outcome))
     }
 
     /// Entropy of the unknown given the outcome, `H(X | T)` in nats, for a finite prior.
@@ -157,7 +156,7 @@ impl JointTable {
     /// # Errors
     /// If the prior is continuous.
     pub fn equivocation(&self) -> Result<f64, Error> {
-        if !self.scene().is_discrete() {
+        if !self.model().is_discrete() {
             return refuse("prior", "a continuous prior", "a discrete prior for a conditional entropy");
         }
         let mut total = 0.0;
@@ -168,7 +167,7 @@ impl JointTable {
                 continue;
             }
             let mut others = 0.0;
-            for (k, (w, q)) in self.scene().weights().iter().zip(self.likelihood(outcome)).enumerate() {
+            for (k, (w, q)) in self.model().weights().iter().zip(self.likelihood(outcome)).enumerate() {
                 let joint = w * q;
                 if k != best && joint > 0.0 {
                     others += joint;

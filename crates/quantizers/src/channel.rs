@@ -2,6 +2,7 @@
 
 use crate::error::{Error, refuse};
 use crate::labelling::Labelling;
+use fewbits_numerics::error::entries;
 use fewbits_numerics::normal;
 use serde::{Deserialize, Serialize};
 
@@ -208,9 +209,7 @@ impl Channel {
     /// Unless there is one probability per input, in `[0, 1]` and of sum 1.
     pub fn received(&self, levels: &[f64]) -> Result<Vec<f64>, Error> {
         fewbits_numerics::error::probabilities("levels", levels)?;
-        if levels.len() != self.inputs {
-            return refuse("levels", format!("{} probabilities", levels.len()), format!("{}", self.inputs));
-        }
+        entries("levels", levels.len(), self.inputs)?;
         let rows = self.transition.chunks_exact(self.inputs);
         Ok(rows
             .map(|row| row.iter().zip(levels).map(|(c, p)| c * p).sum())

@@ -3,6 +3,7 @@
 use crate::error::{Error, refuse};
 use fewbits_core::Message;
 use fewbits_core::bits::{BitReader, BitWriter, CodecError};
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Longest word.
@@ -23,31 +24,10 @@ pub struct Labelling {
     symbols: Vec<u32>,
 }
 
-/// The stored form: the word of each level.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    bits: u32,
-    words: Vec<u32>,
-}
-
-impl From<Labelling> for Stored {
-    fn from(mut labelling: Labelling) -> Self {
-        labelling.words.truncate(labelling.levels);
-        Self {
-            bits: labelling.bits,
-            words: labelling.words,
-        }
-    }
-}
-
-impl TryFrom<Stored> for Labelling {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::with_words(stored.bits, stored.words)
-    }
-}
+stored! { Labelling as Stored |labelling| {
+    bits: u32 = labelling.bits,
+    words: Vec<u32> = labelling.words[..labelling.levels].to_vec(),
+} => Labelling::with_words(bits, words), Error }
 
 impl Labelling {
     /// Level `z` is sent as the number `z` in `ceil(log2 levels)` bits.

@@ -5,7 +5,7 @@ use crate::density::edges;
 use crate::error::{Error, refuse};
 use fewbits_core::Cell;
 use fewbits_core::factor::{Constant, Partition, Scalar};
-use fewbits_numerics::error::{all_finite, finite, positive};
+use fewbits_numerics::error::{all_finite, entries, finite, positive};
 use fewbits_numerics::stored;
 use fewbits_numerics::{ArgumentError, normal};
 use serde::{Deserialize, Serialize};
@@ -84,9 +84,7 @@ impl Quantizer {
             return refuse("breakpoints", "empty", "at least one breakpoint (two levels)");
         }
         check_increasing(&breakpoints)?;
-        if labels.len() != breakpoints.len() + 1 {
-            return refuse("labels", format!("{} labels", labels.len()), format!("{} labels", breakpoints.len() + 1));
-        }
+        entries("labels", labels.len(), breakpoints.len() + 1)?;
         if let Some(label) = labels.iter().find(|label| **label >= labels.len()) {
             return refuse("labels", label, format!("numbers below {}, the number of cells", labels.len()));
         }

@@ -6,13 +6,12 @@ use crate::quantizer::Quantizer;
 use crate::refuse;
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::{SMatrix, SVector};
-use fewbits_core::rand::Rng;
-use fewbits_core::{Link, MeasurementNoise, Observation, Scheme};
+use fewbits_core::{AlwaysReporting, Link, MeasurementNoise, Observation};
 use fewbits_numerics::error::positive;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
-/// A sensor that reports the level of its scalar sample in every slot: a [`Scheme`], so that every filter takes it.
+/// A sensor that reports the level of its scalar sample in every slot: a [`Scheme`](fewbits_core::Scheme), so that every filter takes it.
 ///
 /// Over a [`Link`] of crossover `e` each bit of the word is inverted with probability `e`; a word that no level uses is a symbol,
 /// too, so no received word is undecodable. The sensor is never silent: a missing report says nothing about the sample.
@@ -83,15 +82,10 @@ impl MeasurementNoise<1> for QuantizingSensor {
     }
 }
 
-impl fewbits_core::Deterministic<1> for QuantizingSensor {}
-
-impl Scheme<1> for QuantizingSensor {
-    type State = ();
+impl AlwaysReporting<1> for QuantizingSensor {
     type Feedback = ();
     type Report = Symbol;
     type Factor = Scalar;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) {}
 
@@ -99,17 +93,16 @@ impl Scheme<1> for QuantizingSensor {
         self.labelling.clone()
     }
 
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &SVector<f64, 1>,
-        (): &(),
-    ) -> Result<Option<Symbol>, fewbits_core::Error> {
-        Ok(Some(Symbol(self.quantizer.encode(measurement[0])?)))
+    fn report_of(&self, measurement: &SVector<f64, 1>, (): &()) -> Result<Symbol, fewbits_core::Error> {
+        Ok(Symbol(self.quantizer.encode(measurement[0])?))
     }
 
-    fn factor(&self, (): &(), observation: &Observation<Symbol>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
+    fn meaning_of(
+        &self,
+        (): &(),
+        observation: &Observation<Symbol>,
+        link: &Link,
+    ) -> Result<Scalar, fewbits_core::Error> {
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
             missing => return Ok(Constant::of_delivery(missing, link).into()),

@@ -2,11 +2,10 @@
 
 use crate::Error;
 use fewbits_binary_patterns::{
-    Bank, BinaryQuantizer, Bit, Grid, IMPOSSIBLE, Nodes, PatternSensor, Source, gray_basis, linear_pattern,
+    Bank, BinaryQuantizer, Grid, IMPOSSIBLE, Nodes, PatternSensor, Source, Threshold, gray_basis, linear_pattern,
 };
 use fewbits_core::Observation;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::positive;
+use fewbits_numerics::error::{entries, positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
@@ -24,7 +23,7 @@ const PANEL: f64 = 2.0;
 pub struct CodedSensors {
     source: Source,
     half_width: f64,
-    noise_stds: Vec<f64>,
+    noise_deviations: Vec<f64>,
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`: the code is symmetric up to its first bit.
     nodes: Nodes,
@@ -36,7 +35,7 @@ pub struct CodedSensors {
 
 stored! { CodedSensors as StoredSensors |sensors| {
     half_width: f64 = sensors.half_width,
-    noise_deviations: Vec<f64> = sensors.noise_stds,
+    noise_deviations: Vec<f64> = sensors.noise_deviations,
 } => CodedSensors::with_deviations(half_width, &noise_deviations), Error }
 
 impl CodedSensors {
@@ -45,15 +44,11 @@ impl CodedSensors {
     /// # Errors
     /// If the half width or a variance is not positive and finite, or the number of sensors is not in `1..=16`.
     pub fn with_variances(half_width: f64, variances: &[f64]) -> Result<Self, Error> {
-        let sensors = variances.len();
-        if !(1..=MAX_SENSORS).contains(&sensors) {
-            return Err(ArgumentError::new("variances", format!("{sensors} entries"), "1 to 16 entries").into());
-        }
-        let noise_stds = variances
+        let noise_deviations = variances
             .iter()
             .map(|&v| positive("variance", v).map(f64::sqrt))
             .collect::<Result<Vec<_>, _>>()?;
-        Self::with_deviations(half_width, &noise_stds)
+        Self::with_deviations(half_width, &noise_deviations)
     }
 
     /// From the half width of the uniform source and each sensor's noise standard deviation.
@@ -63,28 +58,28 @@ impl CodedSensors {
     pub fn with_deviations(half_width: f64, deviations: &[f64]) -> Result<Self, Error> {
         let sensors = deviations.len();
         if !(1..=MAX_SENSORS).contains(&sensors) {
-            return Err(ArgumentError::new("deviations", format!("{sensors} entries"), "1 to 16 entries").into());
+            return refuse("deviations", format!("{sensors} entries"), "1 to 16 entries");
         }
         for deviation in deviations {
             positive("deviation", *deviation)?;
         }
-        let noise_stds = deviations.to_vec();
+        let noise_deviations = deviations.to_vec();
         let source = Source::uniform(half_width)?;
         let grid = Grid::uniform(half_width, sensors)?;
         let quantizers = gray_basis(sensors)?
             .into_iter()
             .map(|mask| linear_pattern(mask, sensors)?.on(&grid))
             .collect::<Result<Vec<_>, _>>()?;
-        let blurs: Vec<(f64, f64)> = noise_stds
+        let thresholds = noise_deviations
             .iter()
-            .flat_map(|&noise| grid.breakpoints().iter().map(move |&t| (t, noise)))
-            .collect();
-        let mut nodes = Nodes::adapted(&source, 0.0, half_width, &blurs, PANEL, gauss_legendre::<12>());
+            .flat_map(|&noise| Threshold::of(grid.breakpoints(), noise));
+        let thresholds: Vec<Threshold> = thresholds.collect();
+        let mut nodes = Nodes::adapted(&source, 0.0, half_width, &thresholds, PANEL, gauss_legendre::<12>());
         nodes.w.iter_mut().for_each(|w| *w *= 2.0);
         let probability: Vec<Vec<[Vec<f64>; 2]>> = quantizers
             .iter()
             .map(|quantizer| {
-                noise_stds
+                noise_deviations
                     .iter()
                     .map(|&noise| {
                         let p = quantizer.probabilities_at(&nodes.x, noise);
@@ -104,7 +99,7 @@ impl CodedSensors {
         Ok(Self {
             source,
             half_width,
-            noise_stds,
+            noise_deviations,
             quantizers,
             nodes,
             contrast,
@@ -114,7 +109,7 @@ impl CodedSensors {
 
     /// Number of sensors, and of bits.
     pub fn sensors(&self) -> usize {
-        self.noise_stds.len()
+        self.noise_deviations.len()
     }
 
     /// Half width `V` of the source.
@@ -123,8 +118,8 @@ impl CodedSensors {
     }
 
     /// Noise standard deviation of each sensor.
-    pub fn noise_stds(&self) -> &[f64] {
-        &self.noise_stds
+    pub fn noise_deviations(&self) -> &[f64] {
+        &self.noise_deviations
     }
 
     /// The quantizer of each Gray bit, the coarsest first.
@@ -158,7 +153,7 @@ impl CodedSensors {
         let sensors = assignment
             .iter()
             .zip(&self.quantizers)
-            .map(|(&n, quantizer)| PatternSensor::with_deviation(quantizer.clone(), self.noise_stds[n]))
+            .map(|(&n, quantizer)| PatternSensor::with_deviation(quantizer.clone(), self.noise_deviations[n]))
             .collect::<Result<_, _>>()?;
         Ok(Bank::new(self.source, sensors)?)
     }
@@ -232,15 +227,12 @@ impl CodedSensors {
     ///
     /// # Errors
     /// If the assignment is not a permutation, or there is not one observation per bit.
-    pub fn decode(&self, assignment: &[usize], observations: &[Observation<Bit>]) -> Result<f64, Error> {
+    pub fn decode(&self, assignment: &[usize], observations: &[Observation<bool>]) -> Result<f64, Error> {
         self.check(assignment)?;
-        if observations.len() != self.sensors() {
-            let given = format!("{} observations", observations.len());
-            return Err(ArgumentError::new("observations", given, format!("one per bit, {}", self.sensors())).into());
-        }
+        entries("observations", observations.len(), self.sensors())?;
         // From the finest bit on, as in `centre_mse`.
         let centre = observations.iter().rev().try_fold(0.0, |u, o| {
-            let sign = if o.received()?.0 { -1.0 } else { 1.0 };
+            let sign = if *o.received()? { -1.0 } else { 1.0 };
             Some(sign * (0.5 + 0.5 * u))
         });
         match centre {
@@ -330,10 +322,10 @@ mod tests {
         let order = [1, 0, 2];
         for cell in 0..8 {
             let centre = 2.0 * (2.0 * f64::from(cell) + 1.0 - 8.0) / 8.0;
-            let mut seen: Vec<Observation<Bit>> = sensors
+            let mut seen: Vec<Observation<bool>> = sensors
                 .quantizers()
                 .iter()
-                .map(|q| Observation::Received(q.report(centre).unwrap()))
+                .map(|q| Observation::Received(q.encode(centre).unwrap()))
                 .collect();
             assert!((sensors.decode(&order, &seen).unwrap() - centre).abs() < 1e-15);
             assert!(sensors.decode(&order, &seen[..2]).is_err());

@@ -5,10 +5,10 @@ use super::linear::CostMatrix;
 use crate::Error;
 use fewbits_binary_patterns::BinaryQuantizer;
 use fewbits_binary_patterns::Grid;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// Where the centre decoder lands if Gray bit `bit` of the cell of `x` is flipped and all others are right.
+/// Estimate of the centre decoder if Gray bit `bit` of the cell of `x` is inverted and all others are right.
 ///
 /// With the cell's centre `c` and the block of width `2 V / 2^(bit)` (bits from 0) that holds it, flipping mirrors `c` inside
 /// the block. An involution on the centres.
@@ -18,7 +18,7 @@ use fewbits_numerics::quadrature::gauss_legendre;
 pub fn flipped_estimate(x: f64, bit: usize, bits: usize, half_width: f64) -> Result<f64, Error> {
     let grid = Grid::uniform(half_width, bits)?;
     if bit >= bits {
-        return Err(ArgumentError::new("bit", bit, format!("a bit below {bits}")).into());
+        return refuse("bit", bit, format!("a bit below {bits}"));
     }
     Ok(flipped_centre(grid.locate(x)?, bit, grid.cells(), half_width))
 }
@@ -35,9 +35,9 @@ fn flipped_centre(cell: usize, bit: usize, cells: usize, half_width: f64) -> f64
 ///
 /// # Errors
 /// If `x` is NaN.
-pub fn bit_error(quantizer: &BinaryQuantizer, x: f64, noise_std: f64) -> Result<f64, Error> {
+pub fn bit_error(quantizer: &BinaryQuantizer, x: f64, noise_deviation: f64) -> Result<f64, Error> {
     let right = quantizer.encode(x)?;
-    Ok(quantizer.probabilities(x, noise_std)[usize::from(!right)])
+    Ok(quantizer.probabilities(x, noise_deviation)[usize::from(!right)])
 }
 
 /// Error of the cells' centres without noise, `V^2 / (3 4^N)`.
@@ -68,7 +68,7 @@ pub fn pair_costs(sensors: &CodedSensors) -> Result<CostMatrix, Error> {
 pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
     let (bits, v) = (sensors.sensors(), sensors.half_width());
     let quantizer = &sensors.quantizers()[bit];
-    let noise = sensors.noise_stds()[sensor];
+    let noise = sensors.noise_deviations()[sensor];
     let cells = 1usize << bits;
     let width = 2.0 * v / cells as f64;
     // Where a cell is narrow against the noise, a few nodes integrate its polynomial-like contents exactly.
@@ -131,7 +131,7 @@ mod tests {
         let costs = pair_costs(&sensors).unwrap();
         let points = 16_000;
         for bit in 0..3 {
-            for (sensor, &noise) in sensors.noise_stds().iter().enumerate() {
+            for (sensor, &noise) in sensors.noise_deviations().iter().enumerate() {
                 let sum: f64 = (0..points)
                     .map(|i| 1.3 * (2.0 * (f64::from(i) + 0.5) / f64::from(points) - 1.0))
                     .map(|x| {

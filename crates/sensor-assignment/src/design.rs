@@ -7,7 +7,7 @@
 use crate::linear::{JonkerVolgenant, LinearAssignment};
 use crate::{CodedSensors, Error, pair_costs};
 use fewbits_core::Link;
-use fewbits_quantizer_design::{AllowedCells, Bits, Request, Scene};
+use fewbits_quantizer_design::{AllowedCells, Bits, ObservationModel, Request};
 
 /// Breakpoints of a sensor, and the word of each cell.
 pub type BitCells = (Vec<f64>, Vec<usize>);
@@ -17,12 +17,12 @@ pub type BitCells = (Vec<f64>, Vec<usize>);
 ///
 /// # Errors
 /// If there are more than 16 sensors.
-pub fn bit_cells(scene: &Scene) -> Result<Vec<BitCells>, Error> {
-    let half_width = 3f64.sqrt() * scene.prior().deviation();
-    let deviations: Vec<f64> = (0..scene.sensors()).map(|n| scene.noise().deviation(n)).collect();
+pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
+    let half_width = 3f64.sqrt() * model.prior().deviation();
+    let deviations: Vec<f64> = (0..model.sensors()).map(|n| model.noise().deviation(n)).collect();
     let sensors = CodedSensors::with_deviations(half_width, &deviations)?;
     let assignment = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
-    let mean = scene.prior().mean();
+    let mean = model.prior().mean();
     let mut cells = vec![(Vec::new(), Vec::new()); deviations.len()];
     for (sensor, quantizer) in assignment.iter().zip(sensors.quantizers()) {
         let breakpoints: Vec<f64> = quantizer.breakpoints().iter().map(|b| mean + b).collect();
@@ -37,19 +37,19 @@ pub fn bit_cells(scene: &Scene) -> Result<Vec<BitCells>, Error> {
 ///
 /// ```
 /// use fewbits_core::Link;
-/// use fewbits_quantizer_design::{Noise, Prior, Scene};
+/// use fewbits_quantizer_design::{Noise, Prior, ObservationModel};
 /// let noise = Noise::independent_with_deviations(&[0.2, 0.1, 0.05])?;
-/// let scene = Scene::new(Prior::uniform(0.0, 2.0)?, noise)?;
-/// let solutions = fewbits_sensor_assignment::bit_per_sensor(scene, Link::flipping(0.01)?)?.with_starts(4).run()?;
+/// let model = ObservationModel::new(Prior::uniform(0.0, 2.0)?, noise)?;
+/// let solutions = fewbits_sensor_assignment::bit_per_sensor(model, Link::flipping(0.01)?)?.with_starts(4).run()?;
 /// assert!(solutions.best().value() < 0.08);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
 /// As [`bit_cells`].
-pub fn bit_per_sensor(scene: Scene, link: Link) -> Result<Request<'static>, Error> {
-    let cells = bit_cells(&scene)?;
-    Ok(Request::estimation(scene, Bits::Each(1), link)
+pub fn bit_per_sensor(model: ObservationModel, link: Link) -> Result<Request<'static>, Error> {
+    let cells = bit_cells(&model)?;
+    Ok(Request::estimation(model, Bits::Each(1), link)
         .with_cells(AllowedCells::Any)
         .with_start(cells)?)
 }
@@ -68,7 +68,7 @@ mod tests {
         for (scale, mean) in [(1.0, 0.0), (1e-4, 3.0)] {
             let noise = Noise::independent_with_deviations(&deviations.map(|d| scale * d)).unwrap();
             let prior = Prior::uniform(mean - scale, mean + scale).unwrap();
-            let request = bit_per_sensor(Scene::new(prior, noise).unwrap(), Link::PERFECT).unwrap();
+            let request = bit_per_sensor(ObservationModel::new(prior, noise).unwrap(), Link::PERFECT).unwrap();
             let found = request.with_starts(2).run().unwrap().best().value() / (scale * scale);
             let patterns = sensors.mmse(&assignment).unwrap();
             assert!(found <= patterns * (1.0 + 1e-6), "{found} {patterns}");

@@ -3,7 +3,7 @@
 use super::CodedSensors;
 use crate::Error;
 use fewbits_binary_patterns::IMPOSSIBLE;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use nalgebra::DMatrix;
 
 /// Most sensors for enumeration: 10! is 3.6 million.
@@ -11,7 +11,7 @@ const MAX_ENUMERATED: usize = 10;
 /// Relative improvement that counts as one.
 const IMPROVEMENT: f64 = 1e-12;
 
-/// What the fusion centre answers: which exact error is meant.
+/// Estimator of the fusion centre whose exact error is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
     /// Of the decoder that answers the cell's centre.
@@ -110,7 +110,7 @@ pub fn brute_force(sensors: &CodedSensors, estimator: Estimator) -> Result<(Vec<
 pub fn all_errors(sensors: &CodedSensors, estimator: Estimator) -> Result<AllErrors, Error> {
     let n = sensors.sensors();
     if n > MAX_ENUMERATED {
-        return Err(ArgumentError::new("sensors", n, "at most 10 sensors").into());
+        return refuse("sensors", n, "at most 10 sensors");
     }
     let mut tally = Tally::default();
     match estimator {

@@ -26,13 +26,13 @@ fewbits_numerics::errors! {
         },
         /// No vector of positive variances has this mean and standard deviation.
         #[error(
-            "variances of mean {mean} and standard deviation {std} over {count} sensors: expected std <= mean sqrt(count - 1)"
+            "variances of mean {mean} and standard deviation {deviation} over {count} sensors: expected deviation <= mean sqrt(count - 1)"
         )]
         InfeasibleVariances {
             /// Mean asked for.
             mean: f64,
             /// Population standard deviation asked for.
-            std: f64,
+            deviation: f64,
             /// Number of sensors.
             count: usize,
         },

@@ -1,8 +1,7 @@
 //! Test networks, and the two assignments that need no optimisation.
 
 use crate::Error;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, non_negative, positive};
+use fewbits_numerics::error::{all_finite, non_negative, positive, refuse};
 
 /// Variances with exactly this mean and population standard deviation, in the direction of `direction`.
 ///
@@ -10,26 +9,34 @@ use fewbits_numerics::error::{all_finite, non_negative, positive};
 /// on the sphere of that radius. `Ok(None)` if a variance falls below `least`: draw again.
 ///
 /// # Errors
-/// [`Error::InfeasibleVariances`] unless `std <= mean sqrt(N - 1)`, beyond which one variance is always negative;
+/// [`Error::InfeasibleVariances`] unless `deviation <= mean sqrt(N - 1)`, beyond which one variance is always negative;
 /// [`Error::Argument`] if the mean or `least` is not positive, the deviation negative, the direction constant or not finite, or a variance not finite.
-pub fn variances_with_moments(mean: f64, std: f64, least: f64, direction: &[f64]) -> Result<Option<Vec<f64>>, Error> {
+pub fn variances_with_moments(
+    mean: f64,
+    deviation: f64,
+    least: f64,
+    direction: &[f64],
+) -> Result<Option<Vec<f64>>, Error> {
     let mean = positive("mean", mean)?;
-    let std = non_negative("std", std)?;
+    let deviation = non_negative("deviation", deviation)?;
     let least = positive("least", least)?;
     all_finite("direction", direction)?;
     let count = direction.len();
-    if count == 0 || std > mean * (count as f64 - 1.0).sqrt() {
-        return Err(Error::InfeasibleVariances { mean, std, count });
+    if count == 0 || deviation > mean * (count as f64 - 1.0).sqrt() {
+        return Err(Error::InfeasibleVariances { mean, deviation, count });
     }
-    if std == 0.0 {
+    if deviation == 0.0 {
         return Ok((mean >= least).then(|| vec![mean; count]));
     }
     let centre = direction.iter().sum::<f64>() / count as f64;
     let spread = (direction.iter().map(|z| (z - centre) * (z - centre)).sum::<f64>() / count as f64).sqrt();
     if !(spread > 0.0 && spread.is_finite()) {
-        return Err(ArgumentError::new("direction", "constant", "numbers that differ").into());
+        return refuse("direction", "constant", "numbers that differ");
     }
-    let variances: Vec<f64> = direction.iter().map(|z| mean + std * (z - centre) / spread).collect();
+    let variances: Vec<f64> = direction
+        .iter()
+        .map(|z| mean + deviation * (z - centre) / spread)
+        .collect();
     all_finite("variances", &variances)?;
     Ok(variances.iter().all(|&v| v >= least).then_some(variances))
 }

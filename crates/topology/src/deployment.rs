@@ -1,4 +1,4 @@
-//! Where sensors stand.
+//! Positions of sensors.
 
 use crate::Error;
 use fewbits_numerics::ArgumentError;

@@ -1,7 +1,7 @@
 //! Errors of this crate.
 
 fewbits_numerics::errors! {
-    /// What a deployment or graph refuses.
+    /// Errors of deployments and graphs.
     pub enum Error {
         /// A node index beyond the last node.
         #[error("node {node} does not exist: the network has {nodes} nodes")]

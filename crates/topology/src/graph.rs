@@ -2,7 +2,7 @@
 
 use crate::Error;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, positive};
+use fewbits_numerics::error::{all_finite, positive, refuse};
 use nalgebra::Vector2;
 
 /// An undirected graph in compressed rows: neighbours of every node, sorted by index.
@@ -67,7 +67,7 @@ impl Graph {
         let mut lists = vec![Vec::new(); nodes];
         for (a, b) in edges {
             if a == b {
-                return Err(ArgumentError::new("edges", format!("{a} to {b}"), "two different nodes").into());
+                return refuse("edges", format!("{a} to {b}"), "two different nodes");
             }
             for (from, to) in [(a, b), (b, a)] {
                 let node = from as usize;

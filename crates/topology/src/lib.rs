@@ -1,4 +1,4 @@
-//! Where sensors stand, who can reach whom, and by which route.
+//! Positions of sensors, graphs of nodes in range of each other, and routes.
 //!
 //! | question | answer |
 //! |---|---|

@@ -4,8 +4,7 @@ use super::rate_distortion::ConditionalMean;
 use crate::Error;
 use crate::Source;
 use crate::observation::source::noise_in_range;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::newton;
 use fewbits_quantizers::density::{CellMoments, Density};
 use fewbits_quantizers::lloyd_max;
@@ -21,28 +20,28 @@ const TABLE: usize = 2000;
 /// `s^2/N`. A strict bound: a distributed scheme is a special case of a central one.
 ///
 /// # Errors
-/// If `noise_std` is not positive and finite, `sensors` not in `1..=12`, or the quantizer's iteration fails.
-pub fn centralised_bound(source: &Source, noise_std: f64, sensors: usize) -> Result<f64, Error> {
+/// If `noise_deviation` is not positive and finite, `sensors` not in `1..=12`, or the quantizer's iteration fails.
+pub fn centralised_bound(source: &Source, noise_deviation: f64, sensors: usize) -> Result<f64, Error> {
     if !(1..=MAX_SENSORS).contains(&sensors) {
-        return Err(ArgumentError::new("sensors", sensors, "a number of sensors in 1..=12").into());
+        return refuse("sensors", sensors, "a number of sensors in 1..=12");
     }
-    centralised_bound_of_levels(source, noise_std, sensors, 1 << sensors)
+    centralised_bound_of_levels(source, noise_deviation, sensors, 1 << sensors)
 }
 
 /// The same for `measurements` measurements described by one of `levels` symbols together: several levels of one measurement,
 /// or a few symbols for many.
 ///
 /// # Errors
-/// If `noise_std` is not positive and finite, `measurements` is 0, `levels` not in `2..=4096`, or the quantizer's iteration fails.
+/// If `noise_deviation` is not positive and finite, `measurements` is 0, `levels` not in `2..=4096`, or the quantizer's iteration fails.
 pub fn centralised_bound_of_levels(
     source: &Source,
-    noise_std: f64,
+    noise_deviation: f64,
     measurements: usize,
     levels: usize,
 ) -> Result<f64, Error> {
     at_least_one("measurements", measurements)?;
     let measurement =
-        ConditionalMean::with_deviation(*source, noise_in_range(noise_std)? / (measurements as f64).sqrt())?;
+        ConditionalMean::with_deviation(*source, noise_in_range(noise_deviation)? / (measurements as f64).sqrt())?;
     let estimate = EstimateDensity::new(measurement);
     let quantizer = lloyd_max::design(&estimate, levels)?;
     Ok(measurement.estimation_error() + quantizer.mean_squared_error())
@@ -76,7 +75,7 @@ impl EstimateDensity {
         }
         let y_at = |i: usize| reach * (2.0 * i as f64 / TABLE as f64 - 1.0);
         let (low, high) = (y_at(at - 1), y_at(at));
-        let noise = self.measurement.noise_std();
+        let noise = self.measurement.noise_deviation();
         let off = |y: f64| {
             let (mean, variance) = self.measurement.moments(y);
             (mean - v, variance / (noise * noise))
@@ -96,7 +95,7 @@ impl EstimateDensity {
 impl Density for EstimateDensity {
     fn pdf(&self, v: f64) -> f64 {
         let y = self.measurement_of(v);
-        let noise = self.measurement.noise_std();
+        let noise = self.measurement.noise_deviation();
         let variance = self.measurement.moments(y).1;
         if variance > 0.0 {
             self.measurement.measurement_density(y) * noise * noise / variance

@@ -1,4 +1,4 @@
-//! What no scheme of `N` bits can beat, and one printed formula that is not such a bound.
+//! Lower bounds on the error of schemes of `N` bits, and one printed formula that is not such a bound.
 //!
 //! | quantity | function | valid for |
 //! |---|---|---|
@@ -19,7 +19,7 @@ pub use van_trees::optimal_weight_van_trees;
 use crate::Bank;
 use crate::Error;
 use crate::observation::source::{Kind, Nodes};
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Panel width in noise standard deviations; the quotient is less smooth than the probabilities.
@@ -28,7 +28,7 @@ const INFORMATION_PANEL: f64 = 0.5;
 /// Mean Fisher information `E[J(X)]` of the bits about the source.
 pub fn mean_information(bank: &Bank) -> f64 {
     let reach = bank.source().reach();
-    Nodes::adapted(bank.source(), -reach, reach, &bank.blurs(), INFORMATION_PANEL, gauss_legendre::<12>())
+    Nodes::adapted(bank.source(), -reach, reach, &bank.thresholds(), INFORMATION_PANEL, gauss_legendre::<12>())
         .expectation(|x| bank.fisher_information(x))
 }
 
@@ -43,12 +43,12 @@ pub fn mean_information(bank: &Bank) -> f64 {
 pub fn printed_crlb(bank: &Bank) -> Result<f64, Error> {
     let prior = match bank.source().kind() {
         Kind::Uniform { .. } => 0.0,
-        Kind::Gaussian { std } => 1.0 / (std * std),
+        Kind::Gaussian { deviation } => 1.0 / (deviation * deviation),
     };
     let information = mean_information(bank) + prior;
     if information > 0.0 && (1.0 / information).is_finite() {
         Ok(1.0 / information)
     } else {
-        Err(ArgumentError::new("information", information, "information above 0").into())
+        refuse("information", information, "information above 0")
     }
 }

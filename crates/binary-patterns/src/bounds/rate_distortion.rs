@@ -18,32 +18,37 @@ const FAINT: f64 = 3e-6;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConditionalMean {
     source: Source,
-    noise_std: f64,
+    noise_deviation: f64,
 }
 
 impl ConditionalMean {
     /// From the source and the noise of the (only, or averaged) measurement.
     ///
     /// # Errors
-    /// If `noise_std` is not positive and finite.
-    pub fn with_deviation(source: Source, noise_std: f64) -> Result<Self, Error> {
-        let noise_std = noise_in_range(noise_std)?;
-        Ok(Self { source, noise_std })
+    /// If `noise_deviation` is not positive and finite.
+    pub fn with_deviation(source: Source, noise_deviation: f64) -> Result<Self, Error> {
+        let noise_deviation = noise_in_range(noise_deviation)?;
+        Ok(Self {
+            source,
+            noise_deviation,
+        })
     }
 
-    pub(super) fn noise_std(&self) -> f64 {
-        self.noise_std
+    pub(super) fn noise_deviation(&self) -> f64 {
+        self.noise_deviation
     }
 
     /// Density of the measurement.
     pub fn measurement_density(&self, y: f64) -> f64 {
         match self.source.kind() {
-            Kind::Uniform { half_width: v } if v < FAINT * self.noise_std => pdf(y / self.noise_std) / self.noise_std,
-            Kind::Uniform { half_width: v } => {
-                interval((-v - y) / self.noise_std, (v - y) / self.noise_std) / (2.0 * v)
+            Kind::Uniform { half_width: v } if v < FAINT * self.noise_deviation => {
+                pdf(y / self.noise_deviation) / self.noise_deviation
             }
-            Kind::Gaussian { std } => {
-                let total = std.hypot(self.noise_std);
+            Kind::Uniform { half_width: v } => {
+                interval((-v - y) / self.noise_deviation, (v - y) / self.noise_deviation) / (2.0 * v)
+            }
+            Kind::Gaussian { deviation } => {
+                let total = deviation.hypot(self.noise_deviation);
                 pdf(y / total) / total
             }
         }
@@ -51,7 +56,7 @@ impl ConditionalMean {
 
     /// `(E[X|y], Var[X|y])`: for a uniform source the moments of a normal truncated to `[-V, V]`.
     pub fn moments(&self, y: f64) -> (f64, f64) {
-        let s = self.noise_std;
+        let s = self.noise_deviation;
         match self.source.kind() {
             // To first order in `v/s`: the ends of the truncation would differ by rounding alone.
             Kind::Uniform { half_width: v } if v < FAINT * s => (v / s * (v / s) * y / 3.0, v * v / 3.0),
@@ -60,8 +65,8 @@ impl ConditionalMean {
                 // So far out that both ends round to one: the nearest point of the support is the limit.
                 Err(_) => (y.clamp(-v, v), 0.0),
             },
-            Kind::Gaussian { std } => {
-                let gain = std * std / (std * std + s * s);
+            Kind::Gaussian { deviation } => {
+                let gain = deviation * deviation / (deviation * deviation + s * s);
                 (gain * y, gain * s * s)
             }
         }
@@ -70,16 +75,16 @@ impl ConditionalMean {
     /// Half the width of the interval that carries the measurement.
     pub(super) fn measurement_reach(&self) -> f64 {
         match self.source.kind() {
-            Kind::Uniform { half_width } => half_width + REACH * self.noise_std,
-            Kind::Gaussian { std } => REACH * std.hypot(self.noise_std),
+            Kind::Uniform { half_width } => half_width + REACH * self.noise_deviation,
+            Kind::Gaussian { deviation } => REACH * deviation.hypot(self.noise_deviation),
         }
     }
 
     /// `int_{from}^{to} p_Y(y) f(y, E[X|y], Var[X|y]) dy`.
     pub(super) fn integrate(&self, from: f64, to: f64, mut f: impl FnMut(f64, f64, f64) -> f64) -> f64 {
         let (width, corner) = match self.source.kind() {
-            Kind::Uniform { half_width } => (self.noise_std, half_width - REACH * self.noise_std),
-            Kind::Gaussian { std } => (std.hypot(self.noise_std), 0.0),
+            Kind::Uniform { half_width } => (self.noise_deviation, half_width - REACH * self.noise_deviation),
+            Kind::Gaussian { deviation } => (deviation.hypot(self.noise_deviation), 0.0),
         };
         // Noise far below a uniform source rounds its two ends only; between them the density is constant.
         let corner = corner.max(0.0);
@@ -124,7 +129,7 @@ impl RemoteDistortion {
     }
 }
 
-/// The remote rate-distortion bound for one measurement with noise `noise_std`.
+/// The remote rate-distortion bound for one measurement with noise `noise_deviation`.
 ///
 /// The estimate splits the distortion exactly into `E Var[X|Y]` and the distortion of describing `E[X|Y]`: the cross term is
 /// zero by orthogonality, whatever the quantizer (erratum `binary-9`). The entropy needs no inverse function:
@@ -132,18 +137,18 @@ impl RemoteDistortion {
 /// `D(R) = sx^2 - sx^4/(sx^2 + s^2) (1 - 2^(-2R))`.
 ///
 /// # Errors
-/// If `noise_std` is not positive and finite.
-pub fn remote_distortion(source: &Source, noise_std: f64) -> Result<RemoteDistortion, Error> {
-    let measurement = ConditionalMean::with_deviation(*source, noise_std)?;
-    if let Kind::Gaussian { std } = source.kind() {
-        let gain = std * std / (std * std + noise_std * noise_std);
+/// If `noise_deviation` is not positive and finite.
+pub fn remote_distortion(source: &Source, noise_deviation: f64) -> Result<RemoteDistortion, Error> {
+    let measurement = ConditionalMean::with_deviation(*source, noise_deviation)?;
+    if let Kind::Gaussian { deviation } = source.kind() {
+        let gain = deviation * deviation / (deviation * deviation + noise_deviation * noise_deviation);
         return Ok(RemoteDistortion {
-            estimation_error: gain * noise_std * noise_std,
-            entropy_power: gain * std * std,
+            estimation_error: gain * noise_deviation * noise_deviation,
+            entropy_power: gain * deviation * deviation,
         });
     }
     let reach = measurement.measurement_reach();
-    let log2_variance_scale = 2.0 * noise_std.log2();
+    let log2_variance_scale = 2.0 * noise_deviation.log2();
     let entropy = measurement.integrate(-reach, reach, |y, _, variance| {
         variance.log2() - log2_variance_scale - measurement.measurement_density(y).log2()
     });
@@ -159,10 +164,10 @@ pub fn remote_distortion(source: &Source, noise_std: f64) -> Result<RemoteDistor
 /// Gaussian source at -5 dB reach 0.0649 where it forbids less than 0.0764; the value here is 0.0521.
 ///
 /// # Errors
-/// If `noise_std` is not positive and finite or there is no sensor.
-pub fn network_rate_distortion(source: &Source, noise_std: f64, sensors: usize) -> Result<f64, Error> {
+/// If `noise_deviation` is not positive and finite or there is no sensor.
+pub fn network_rate_distortion(source: &Source, noise_deviation: f64, sensors: usize) -> Result<f64, Error> {
     let sensors = at_least_one("sensors", sensors)? as f64;
-    remote_distortion(source, noise_in_range(noise_std)? / sensors.sqrt())?.at(sensors)
+    remote_distortion(source, noise_in_range(noise_deviation)? / sensors.sqrt())?.at(sensors)
 }
 
 #[cfg(test)]
@@ -173,7 +178,7 @@ mod tests {
     #[test]
     fn gaussian_is_equation_5_12() {
         let source = Source::gaussian_with_deviation(0.1f64.sqrt()).unwrap();
-        let s = source.noise_std(-5.0).unwrap();
+        let s = source.noise_deviation(-5.0).unwrap();
         assert_relative_eq!(remote_distortion(&source, s).unwrap().at(3.0).unwrap(), 0.076350, max_relative = 1e-5);
         assert_relative_eq!(network_rate_distortion(&source, s, 3).unwrap(), 0.052077, max_relative = 1e-5);
     }

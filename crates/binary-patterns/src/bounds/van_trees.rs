@@ -1,6 +1,6 @@
 //! The Bayesian Cramer-Rao bound with the best weight function.
 
-use crate::observation::source::{Blur, Kind};
+use crate::observation::source::{Kind, Threshold};
 use crate::{Bank, Error};
 use fewbits_numerics::newton;
 use std::f64::consts::PI;
@@ -42,9 +42,9 @@ pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
     let source = bank.source();
     let (prior, clamped) = match source.kind() {
         Kind::Uniform { .. } => (0.0, true),
-        Kind::Gaussian { std } => (1.0 / (std * std), false),
+        Kind::Gaussian { deviation } => (1.0 / (deviation * deviation), false),
     };
-    let mesh = Mesh::new(source.reach(), &bank.blurs());
+    let mesh = Mesh::new(source.reach(), &bank.thresholds());
     let mut intervals = COARSEST + PER_THRESHOLD * mesh.focus.len();
     let rate = |x: f64| bank.fisher_information(x) + prior;
     // Nodes and the middles between them alternate.
@@ -105,18 +105,15 @@ fn extrapolated(mut on_grid: impl FnMut(usize) -> Option<f64>) -> Result<f64, Er
 struct Mesh {
     reach: f64,
     /// Thresholds inside the support and the half widths of their regions.
-    focus: Vec<Blur>,
+    focus: Vec<(f64, f64)>,
     /// Total of the coordinate over the support.
     total: f64,
 }
 
 impl Mesh {
-    fn new(reach: f64, blurs: &[Blur]) -> Self {
-        let mut focus: Vec<Blur> = blurs
-            .iter()
-            .filter(|b| b.0.abs() < reach)
-            .map(|b| (b.0, FOCUS * b.1))
-            .collect();
+    fn new(reach: f64, thresholds: &[Threshold]) -> Self {
+        let inside = thresholds.iter().filter(|t| t.position.abs() < reach);
+        let mut focus: Vec<(f64, f64)> = inside.map(|t| (t.position, FOCUS * t.noise_deviation)).collect();
         focus.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         focus.dedup();
         let mut mesh = Self {
@@ -251,7 +248,10 @@ mod tests {
     #[test]
     fn constant_information_has_a_closed_form() {
         // -q'' + a^2 q = 1 with q(+-1) = 0 has mean (1 - tanh(a)/a) / a^2.
-        let mesh = Mesh::new(1.0, &[(0.3, 0.05), (-0.4, 0.002)]);
+        let thresholds: Vec<Threshold> = Threshold::of(&[0.3], 0.05)
+            .chain(Threshold::of(&[-0.4], 0.002))
+            .collect();
+        let mesh = Mesh::new(1.0, &thresholds);
         let value = weighted_mean(&mesh, &mesh.points(2 * 4096), &vec![9.0; 4097], true, |_| 0.5);
         let exact = (1.0 - 3f64.tanh() / 3.0) / 9.0;
         assert_relative_eq!(value, exact, max_relative = 1e-5);

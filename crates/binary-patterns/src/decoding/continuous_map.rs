@@ -30,7 +30,7 @@ pub(crate) fn estimates(bank: &Bank, outcomes: usize) -> Vec<f64> {
     let rows = bank.log_rows(&points);
     let prior = |x: f64| match bank.source().kind() {
         Kind::Uniform { .. } => 0.0,
-        Kind::Gaussian { std } => log_pdf(x / std),
+        Kind::Gaussian { deviation } => log_pdf(x / deviation),
     };
     let log_prior: Vec<f64> = points.iter().map(|&x| prior(x)).collect();
     let mut counts = Vec::new();

@@ -4,10 +4,9 @@ use crate::Error;
 use crate::decoding::continuous_map;
 use crate::observation::bank::{Bank, IMPOSSIBLE};
 use crate::observation::source::Nodes;
-use crate::{Bit, Grid, LookupTable};
+use crate::{Grid, LookupTable};
 use fewbits_core::Observation;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::finite;
+use fewbits_numerics::error::{entries, finite};
 
 /// Probabilities below this are taken as this when their logarithm is multiplied by a count that may be zero.
 const FLOOR: f64 = 1e-300;
@@ -37,7 +36,7 @@ impl Bank {
     ///
     /// # Errors
     /// If the number of observations is not the number of sensors.
-    pub fn posterior_mean(&self, observations: &[Observation<Bit>]) -> Result<f64, Error> {
+    pub fn posterior_mean(&self, observations: &[Observation<bool>]) -> Result<f64, Error> {
         let (score, nodes) = self.posterior_score(observations)?;
         Ok(mean_under(&score, &nodes))
     }
@@ -47,7 +46,7 @@ impl Bank {
     ///
     /// # Errors
     /// If the number of observations is not the number of sensors, or `estimate` is not finite.
-    pub fn posterior_squared_error(&self, observations: &[Observation<Bit>], estimate: f64) -> Result<f64, Error> {
+    pub fn posterior_squared_error(&self, observations: &[Observation<bool>], estimate: f64) -> Result<f64, Error> {
         finite("estimate", estimate)?;
         let (score, nodes) = self.posterior_score(observations)?;
         let w = weights_under(&score, &nodes);
@@ -60,15 +59,12 @@ impl Bank {
     }
 
     /// Log likelihood of the observations at the nodes of the source, and the nodes.
-    fn posterior_score(&self, observations: &[Observation<Bit>]) -> Result<(Vec<f64>, Nodes), Error> {
-        if observations.len() != self.sensors() {
-            let given = format!("{} observations", observations.len());
-            return Err(ArgumentError::new("observations", given, format!("{}", self.sensors())).into());
-        }
+    fn posterior_score(&self, observations: &[Observation<bool>]) -> Result<(Vec<f64>, Nodes), Error> {
+        entries("observations", observations.len(), self.sensors())?;
         let nodes = self.fine_nodes();
         let mut score = vec![0.0; nodes.len()];
         for (n, observation) in observations.iter().enumerate() {
-            let Some(Bit(bit)) = observation.received() else {
+            let Some(bit) = observation.received() else {
                 continue;
             };
             let sensor = self.sensor(n);
@@ -262,7 +258,7 @@ impl Bank {
     }
 }
 
-/// What equation 5.10 multiplies.
+/// Probabilities that equation 5.10 multiplies.
 #[derive(Clone, Copy, PartialEq)]
 enum Scaling {
     /// Probabilities given the cell.

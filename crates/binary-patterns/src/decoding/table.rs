@@ -1,9 +1,10 @@
 //! Estimates for all that a bank may report.
 
 use crate::observation::source::Nodes;
-use crate::{Bank, Bit, Error};
+use crate::{Bank, Error};
 use fewbits_core::Observation;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, entries};
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Most sensors for a table over bit strings.
@@ -17,39 +18,14 @@ pub struct LookupTable {
     pub(crate) estimates: Vec<f64>,
 }
 
-/// The stored form of a table.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredTable {
-    bank: Bank,
-    estimates: Vec<f64>,
-}
-
-impl From<LookupTable> for StoredTable {
-    fn from(table: LookupTable) -> Self {
-        Self {
-            bank: table.bank,
-            estimates: table.estimates,
-        }
-    }
-}
-
-impl TryFrom<StoredTable> for LookupTable {
-    type Error = Error;
-
-    fn try_from(stored: StoredTable) -> Result<Self, Error> {
-        fewbits_numerics::error::all_finite("estimates", &stored.estimates)?;
-        let outcomes = stored.bank.checked_outcomes()?;
-        if stored.estimates.len() != outcomes {
-            let given = format!("{} estimates", stored.estimates.len());
-            return Err(ArgumentError::new("estimates", given, format!("{outcomes}, one per outcome")).into());
-        }
-        Ok(Self {
-            bank: stored.bank,
-            estimates: stored.estimates,
-        })
-    }
-}
+stored! { LookupTable as StoredTable |table| {
+    bank: Bank = table.bank,
+    estimates: Vec<f64> = table.estimates,
+} => {
+    all_finite("estimates", &estimates)?;
+    entries("estimates", estimates.len(), bank.checked_outcomes()?)?;
+    Ok(LookupTable { bank, estimates })
+}, Error }
 
 impl LookupTable {
     /// The estimate from one observation per sensor. Where a bit is missing (these sensors always report, so that nothing
@@ -57,11 +33,8 @@ impl LookupTable {
     ///
     /// # Errors
     /// If the number of observations is not the number of sensors.
-    pub fn decode(&self, observations: &[Observation<Bit>]) -> Result<f64, Error> {
-        let bits: Vec<bool> = observations
-            .iter()
-            .filter_map(|o| o.received().map(|bit| bit.0))
-            .collect();
+    pub fn decode(&self, observations: &[Observation<bool>]) -> Result<f64, Error> {
+        let bits: Vec<bool> = observations.iter().filter_map(|o| o.received().copied()).collect();
         if bits.len() == observations.len() {
             return self.estimate(&bits);
         }
@@ -72,7 +45,7 @@ impl LookupTable {
     ///
     /// # Errors
     /// If the number of observations is not the number of sensors.
-    pub fn decode_with_error(&self, observations: &[Observation<Bit>]) -> Result<(f64, f64), Error> {
+    pub fn decode_with_error(&self, observations: &[Observation<bool>]) -> Result<(f64, f64), Error> {
         let estimate = self.decode(observations)?;
         Ok((estimate, self.bank.posterior_squared_error(observations, estimate)?))
     }
@@ -145,11 +118,11 @@ mod tests {
         let table = bank(all.clone()).table(Decoder::Mmse).unwrap();
         let others = bank(all[..2].to_vec()).table(Decoder::Mmse).unwrap();
         for bits in [[false, true], [true, true], [true, false]] {
-            let mut seen = bits.map(|b| Observation::Received(Bit(b))).to_vec();
+            let mut seen = bits.map(Observation::Received).to_vec();
             seen.push(Observation::Lost);
             assert!((table.decode(&seen).unwrap() - others.estimate(&bits).unwrap()).abs() < 1e-12);
             assert!(table.decode(&seen[..2]).is_err());
-            seen[2] = Observation::Received(Bit(true));
+            seen[2] = Observation::Received(true);
             let full = [bits[0], bits[1], true];
             assert_eq!(table.decode(&seen).unwrap(), table.estimate(&full).unwrap());
         }
@@ -178,7 +151,7 @@ mod tests {
                         end * given(0) * given(1) * given(2) / f64::from(steps)
                     })
                     .sum();
-                let seen = bits.map(|b| Observation::Received(Bit(b)));
+                let seen = bits.map(Observation::Received);
                 let (estimate, error) = table.decode_with_error(&seen).unwrap();
                 assert_eq!(estimate, table.estimate(&bits).unwrap());
                 average += probability * error;

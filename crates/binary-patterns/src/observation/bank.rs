@@ -1,10 +1,9 @@
 //! A source observed through a bank of one-bit sensors, and the exact enumeration of what they may report.
 
-use crate::observation::source::{Blur, Nodes};
+use crate::observation::source::{Nodes, Threshold};
 use crate::{BinaryQuantizer, Error, PatternSensor, Source};
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::binomial;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, entries};
 use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
@@ -73,15 +72,15 @@ impl Bank {
     /// Sensors of equal noise, one a quantizer.
     ///
     /// # Errors
-    /// If there is no quantizer or `noise_std` is not positive and finite.
+    /// If there is no quantizer or `noise_deviation` is not positive and finite.
     pub fn homogeneous_with_deviation(
         source: Source,
         quantizers: Vec<BinaryQuantizer>,
-        noise_std: f64,
+        noise_deviation: f64,
     ) -> Result<Self, Error> {
         let sensors = quantizers
             .into_iter()
-            .map(|quantizer| PatternSensor::with_deviation(quantizer, noise_std))
+            .map(|quantizer| PatternSensor::with_deviation(quantizer, noise_deviation))
             .collect::<Result<_, _>>()?;
         Self::new(source, sensors)
     }
@@ -127,7 +126,7 @@ impl Bank {
     pub(crate) fn finest_noise(&self) -> f64 {
         self.groups
             .iter()
-            .map(|g| g.sensor.noise_std())
+            .map(|g| g.sensor.noise_deviation())
             .fold(f64::INFINITY, f64::min)
     }
 
@@ -147,20 +146,14 @@ impl Bank {
 
     /// The same for a part of the support.
     pub(crate) fn nodes_between(&self, from: f64, to: f64) -> Nodes {
-        Nodes::adapted(&self.source, from, to, &self.blurs(), PANEL, gauss_legendre::<12>())
+        Nodes::adapted(&self.source, from, to, &self.thresholds(), PANEL, gauss_legendre::<12>())
     }
 
     /// All thresholds with their noise.
-    pub(crate) fn blurs(&self) -> Vec<Blur> {
-        self.groups
-            .iter()
-            .flat_map(|g| {
-                g.sensor
-                    .quantizer()
-                    .breakpoints()
-                    .iter()
-                    .map(|&t| (t, g.sensor.noise_std()))
-            })
+    pub(crate) fn thresholds(&self) -> Vec<Threshold> {
+        let sensors = self.groups.iter().map(|g| &g.sensor);
+        sensors
+            .flat_map(|s| Threshold::of(s.quantizer().breakpoints(), s.noise_deviation()))
             .collect()
     }
 
@@ -182,11 +175,7 @@ impl Bank {
 
     /// Refuses bit strings of another length, and turns the others into the index of their counts.
     pub(crate) fn index_of(&self, bits: &[bool]) -> Result<usize, Error> {
-        if bits.len() != self.sensors() {
-            return Err(
-                ArgumentError::new("bits", format!("{} bits", bits.len()), format!("{} bits", self.sensors())).into()
-            );
-        }
+        entries("bits", bits.len(), self.sensors())?;
         let mut counts = vec![0usize; self.groups.len()];
         for (&bit, &group) in bits.iter().zip(&self.membership) {
             counts[group] += usize::from(bit);
@@ -233,7 +222,7 @@ const LOG_COUNT: usize = 60;
 
 impl CountTable {
     pub fn new(sensor: &PatternSensor, count: usize, nodes: &Nodes) -> Self {
-        let p = sensor.quantizer().probabilities_at(&nodes.x, sensor.noise_std());
+        let p = sensor.quantizer().probabilities_at(&nodes.x, sensor.noise_deviation());
         Self::from_probabilities(&p, count)
     }
 

@@ -1,6 +1,5 @@
 //! What is observed: the source, the sensors with their noise, and what they may report.
 
 pub(crate) mod bank;
-pub(crate) mod report;
 pub(crate) mod sensor;
 pub(crate) mod source;

@@ -1,31 +1,38 @@
-//! One sensor with a one-bit quantizer.
+//! One sensor with a one-bit quantizer, and the scheme by which it reports.
 
 use crate::observation::source::noise_in_range;
 use crate::{BinaryQuantizer, Error};
+use fewbits_core::factor::{Constant, Scalar};
+use fewbits_core::nalgebra::SVector;
+use fewbits_core::{AlwaysReporting, Link, Observation};
 use fewbits_numerics::stored;
+use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
-/// One sensor: what it measures is `Y = X + N(0, noise_std^2)`, what it reports is the bit of its quantizer.
+/// One sensor: what it measures is `Y = X + N(0, noise_deviation^2)`, what it reports is the bit of its quantizer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredSensor", into = "StoredSensor")]
 pub struct PatternSensor {
     quantizer: BinaryQuantizer,
-    noise_std: f64,
+    noise_deviation: f64,
 }
 
 stored! { PatternSensor as StoredSensor |sensor| {
     quantizer: BinaryQuantizer = sensor.quantizer,
-    noise_std: f64 = sensor.noise_std,
-} => PatternSensor::with_deviation(quantizer, noise_std), Error }
+    noise_deviation: f64 = sensor.noise_deviation,
+} => PatternSensor::with_deviation(quantizer, noise_deviation), Error }
 
 impl PatternSensor {
     /// A sensor from its quantizer and the standard deviation (not the variance) of its noise.
     ///
     /// # Errors
-    /// If `noise_std` is not positive and finite.
-    pub fn with_deviation(quantizer: BinaryQuantizer, noise_std: f64) -> Result<Self, Error> {
-        let noise_std = noise_in_range(noise_std)?;
-        Ok(Self { quantizer, noise_std })
+    /// If `noise_deviation` is not positive and finite.
+    pub fn with_deviation(quantizer: BinaryQuantizer, noise_deviation: f64) -> Result<Self, Error> {
+        let noise_deviation = noise_in_range(noise_deviation)?;
+        Ok(Self {
+            quantizer,
+            noise_deviation,
+        })
     }
 
     /// Its quantizer.
@@ -34,22 +41,97 @@ impl PatternSensor {
     }
 
     /// Standard deviation of its noise.
-    pub fn noise_std(&self) -> f64 {
-        self.noise_std
+    pub fn noise_deviation(&self) -> f64 {
+        self.noise_deviation
     }
 
     /// `[P(0|x), P(1|x)]`.
     pub fn probabilities(&self, x: f64) -> [f64; 2] {
-        self.quantizer.probabilities(x, self.noise_std)
+        self.quantizer.probabilities(x, self.noise_deviation)
     }
 
     /// `[ln P(0|x), ln P(1|x)]`.
     pub fn log_probabilities(&self, x: f64) -> [f64; 2] {
-        self.quantizer.log_probabilities(x, self.noise_std)
+        self.quantizer.log_probabilities(x, self.noise_deviation)
     }
 
     /// Fisher information about `x` in its bit.
     pub fn fisher_information(&self, x: f64) -> f64 {
-        self.quantizer.fisher_information(x, self.noise_std)
+        self.quantizer.fisher_information(x, self.noise_deviation)
+    }
+}
+
+/// The report is the bit of the cell that holds the measurement. A missing report says nothing about the measurement.
+impl AlwaysReporting<1> for PatternSensor {
+    type Feedback = ();
+    type Report = bool;
+    type Factor = Scalar;
+
+    fn feedback_format(&self) {}
+
+    fn report_format(&self) {}
+
+    fn report_of(&self, measurement: &SVector<f64, 1>, (): &()) -> Result<bool, fewbits_core::Error> {
+        Ok(self.quantizer().encode(measurement[0])?)
+    }
+
+    fn meaning_of(&self, (): &(), observation: &Observation<bool>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
+        let bit = match observation {
+            Observation::Received(bit) => *bit,
+            missing => return Ok(Constant::of_delivery(missing, link).into()),
+        };
+        let arrival = link.of_received()?;
+        let cells = Quantizer::try_from(self.quantizer())?;
+        let variance = self.noise_deviation() * self.noise_deviation();
+        let given = |level: usize| arrival * link.word_probability(level as u64, u64::from(bit), 1);
+        Ok(cells.factor_of(variance, given)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fewbits_core::laws::{factor, message, scheme};
+    use fewbits_core::{Gaussian, Message, Scheme};
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn a_bit_takes_one_bit() {
+        for bit in [false, true] {
+            assert_eq!(message::round_trip(&bit, &()).unwrap(), 1);
+            assert!(message::decoding_is_total::<bool>(&bit.to_bits(&()).unwrap(), &()));
+        }
+    }
+
+    #[test]
+    fn a_bit_of_a_pattern_is_a_lawful_factor() {
+        for scale in [1e-4, 1.0, 1e4] {
+            let quantizer = BinaryQuantizer::new([-0.5, 0.4, 1.1].map(|b| scale * b).to_vec()).unwrap();
+            let sensor = PatternSensor::with_deviation(quantizer, 0.3 * scale).unwrap();
+            let points = [-1e9, -3.0, -0.4, 0.0, 0.7, 30.0].map(|m| SVector::from([scale * m]));
+            let prior = Gaussian::scalar(0.2 * scale, scale * scale).unwrap();
+            for link in [Link::PERFECT, Link::new(0.3, 0.1).unwrap().with_erasure(0.2).unwrap()] {
+                let bits = [false, true];
+                scheme::total_probability(&sensor, &(), &link, bits, &points).unwrap();
+                let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+                let noise = |rng: &mut rand_pcg::Pcg64Mcg| {
+                    SVector::from([0.3 * scale * rng.sample::<f64, _>(rand_distr::StandardNormal)])
+                };
+                let m = SVector::from([0.25 * scale]);
+                scheme::frequencies(&sensor, &(), &link, &mut rng, 20_000, &m, noise, bits).unwrap();
+                for bit in bits {
+                    let received = sensor.factor(&(), &Observation::Received(bit), &link).unwrap();
+                    factor::is_a_number(&received, &points).unwrap();
+                    factor::sweep_is_scalar(&received, &points).unwrap();
+                    factor::tilted_is_quadrature(&received, &prior, 12.0 * scale, 20_001, 1e-9).unwrap();
+                    use fewbits_core::Factor;
+                    if link == Link::PERFECT {
+                        let log = sensor.log_probabilities(0.4 * scale)[usize::from(bit)];
+                        assert!((received.log_likelihood(&SVector::from([0.4 * scale])) - log).abs() < 1e-12);
+                    }
+                }
+            }
+            assert!(sensor.quantizer().encode(f64::NAN).is_err());
+        }
     }
 }

@@ -1,8 +1,7 @@
 //! The scalar under observation.
 
 use crate::Error;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{finite, positive};
+use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::Rule;
 use serde::{Deserialize, Serialize};
@@ -29,7 +28,7 @@ impl TryFrom<Kind> for Source {
     fn try_from(kind: Kind) -> Result<Self, Error> {
         match kind {
             Kind::Uniform { half_width } => Self::uniform(half_width),
-            Kind::Gaussian { std } => Self::gaussian_with_deviation(std),
+            Kind::Gaussian { deviation } => Self::gaussian_with_deviation(deviation),
         }
     }
 }
@@ -38,7 +37,7 @@ impl TryFrom<Kind> for Source {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(crate) enum Kind {
     Uniform { half_width: f64 },
-    Gaussian { std: f64 },
+    Gaussian { deviation: f64 },
 }
 
 /// A number above zero whose square is a number above zero, with room for sums.
@@ -59,14 +58,14 @@ impl Source {
         })
     }
 
-    /// `N(0, std^2)`.
+    /// `N(0, deviation^2)`.
     ///
     /// # Errors
-    /// If `std` is not a finite number above zero, or its square leaves the range of numbers.
-    pub fn gaussian_with_deviation(std: f64) -> Result<Self, Error> {
-        let std = squared("std", std)?;
+    /// If `deviation` is not a finite number above zero, or its square leaves the range of numbers.
+    pub fn gaussian_with_deviation(deviation: f64) -> Result<Self, Error> {
+        let deviation = squared("deviation", deviation)?;
         Ok(Self {
-            kind: Kind::Gaussian { std },
+            kind: Kind::Gaussian { deviation },
         })
     }
 
@@ -78,7 +77,7 @@ impl Source {
     pub fn scale(&self) -> f64 {
         match self.kind {
             Kind::Uniform { half_width } => half_width,
-            Kind::Gaussian { std } => std,
+            Kind::Gaussian { deviation } => deviation,
         }
     }
 
@@ -98,7 +97,7 @@ impl Source {
     pub fn variance(&self) -> f64 {
         match self.kind {
             Kind::Uniform { half_width } => half_width * half_width / 3.0,
-            Kind::Gaussian { std } => std * std,
+            Kind::Gaussian { deviation } => deviation * deviation,
         }
     }
 
@@ -107,7 +106,7 @@ impl Source {
         match self.kind {
             Kind::Uniform { half_width } if x.abs() <= half_width => 0.5 / half_width,
             Kind::Uniform { .. } => 0.0,
-            Kind::Gaussian { std } => pdf(x / std) / std,
+            Kind::Gaussian { deviation } => pdf(x / deviation) / deviation,
         }
     }
 
@@ -115,7 +114,7 @@ impl Source {
     pub fn reach(&self) -> f64 {
         match self.kind {
             Kind::Uniform { half_width } => half_width,
-            Kind::Gaussian { std } => GAUSSIAN_REACH * std,
+            Kind::Gaussian { deviation } => GAUSSIAN_REACH * deviation,
         }
     }
 
@@ -123,16 +122,16 @@ impl Source {
     ///
     /// # Errors
     /// If `snr_db` is not finite or so extreme that the result is not a positive finite number.
-    pub fn noise_std(&self, snr_db: f64) -> Result<f64, Error> {
+    pub fn noise_deviation(&self, snr_db: f64) -> Result<f64, Error> {
         let snr_db = finite("snr_db", snr_db)?;
-        Ok(positive("noise_std", (self.variance() / 10f64.powf(snr_db / 10.0)).sqrt())?)
+        Ok(positive("noise_deviation", (self.variance() / 10f64.powf(snr_db / 10.0)).sqrt())?)
     }
 
     /// Panels no wider than `width`, half of `V`, or one and a half standard deviations of the source.
     fn panels(&self, from: f64, to: f64, width: f64) -> usize {
         let widest = match self.kind {
             Kind::Uniform { half_width } => 0.5 * half_width,
-            Kind::Gaussian { std } => 1.5 * std,
+            Kind::Gaussian { deviation } => 1.5 * deviation,
         };
         // A noise far below the resolution of any grid must not ask for unbounded memory.
         (((to - from) / width.min(widest)).ceil() as usize).clamp(1, MAX_PANELS)
@@ -145,19 +144,19 @@ impl Source {
         nodes
     }
 
-    /// The same over the whole support, for noise that blurs all of it.
+    /// The same over the whole support, for noise so large that no part of it is certain.
     pub(crate) fn nodes(&self, width: f64, rule: &Rule) -> Nodes {
         self.nodes_between(-self.reach(), self.reach(), width, rule)
     }
 
     /// Refuses noise too small for an even grid of nodes to resolve.
-    pub(crate) fn resolvable(&self, noise_std: f64) -> Result<f64, Error> {
-        let noise_std = noise_in_range(noise_std)?;
+    pub(crate) fn resolvable(&self, noise_deviation: f64) -> Result<f64, Error> {
+        let noise_deviation = noise_in_range(noise_deviation)?;
         let least = FINEST * self.reach();
-        if noise_std >= least {
-            return Ok(noise_std);
+        if noise_deviation >= least {
+            return Ok(noise_deviation);
         }
-        Err(ArgumentError::new("noise_std", noise_std, format!("at least {least}, 1e-4 of the source's reach")).into())
+        refuse("noise_deviation", noise_deviation, format!("at least {least}, 1e-4 of the source's reach"))
     }
 }
 
@@ -168,8 +167,24 @@ const FINEST: f64 = 1e-4;
 /// Beyond this many noise standard deviations from a threshold its bit is certain to `1e-50`.
 const ZONE: f64 = 15.0;
 
-/// A threshold and the noise that blurs it: the integrands vary there, and nowhere else.
-pub type Blur = (f64, f64);
+/// A threshold in noise. Integrands vary within some deviations of a threshold, and nowhere else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Threshold {
+    /// Where it is on the measurement axis.
+    pub position: f64,
+    /// Standard deviation of the noise of the sensor that has it.
+    pub noise_deviation: f64,
+}
+
+impl Threshold {
+    /// The breakpoints of a quantizer whose measurement has this noise.
+    pub fn of(breakpoints: &[f64], noise_deviation: f64) -> impl Iterator<Item = Self> + '_ {
+        breakpoints.iter().map(move |&position| Self {
+            position,
+            noise_deviation,
+        })
+    }
+}
 
 /// Quadrature nodes `x` and weights `w` with the source density inside: `E[f(X)] = sum w f(x)`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -199,20 +214,24 @@ impl Nodes {
         self.x.is_empty()
     }
 
-    /// Nodes on `[from, to]` that are dense where a threshold is blurred and sparse where all bits are certain.
+    /// Nodes on `[from, to]` that are dense near thresholds and sparse where all bits are certain.
     ///
     /// Panels within reach of a threshold are `share` of its noise wide. The number of nodes so depends on the number of
     /// thresholds and not on how small the noise is.
-    pub fn adapted(source: &Source, from: f64, to: f64, blurs: &[Blur], share: f64, rule: &Rule) -> Self {
+    pub fn adapted(source: &Source, from: f64, to: f64, thresholds: &[Threshold], share: f64, rule: &Rule) -> Self {
         let mut nodes = Self::default();
         let widest = match source.kind() {
             Kind::Uniform { half_width } => 0.5 * half_width,
-            Kind::Gaussian { std } => 1.5 * std,
+            Kind::Gaussian { deviation } => 1.5 * deviation,
         };
         let mut x = from;
         while x < to {
             let mut step = widest.min(to - x);
-            for &(threshold, noise) in blurs {
+            for &Threshold {
+                position: threshold,
+                noise_deviation: noise,
+            } in thresholds
+            {
                 let ahead = threshold - ZONE * noise - x;
                 if ahead > 0.0 {
                     // A panel fine enough for the zone need not stop at its edge.
@@ -241,9 +260,9 @@ impl Nodes {
 }
 
 /// Noise standard deviations are checked once, here.
-pub(crate) fn noise_in_range(noise_std: f64) -> Result<f64, Error> {
-    finite("noise_std", noise_std)?;
-    Ok(positive("noise_std", noise_std)?)
+pub(crate) fn noise_in_range(noise_deviation: f64) -> Result<f64, Error> {
+    finite("noise_deviation", noise_deviation)?;
+    Ok(positive("noise_deviation", noise_deviation)?)
 }
 
 #[cfg(test)]
@@ -270,8 +289,8 @@ mod tests {
         let source = Source::uniform(1.0).unwrap();
         let mut last = 0;
         for noise in [0.3, 1e-3, 1e-6, 1e-9] {
-            let nodes =
-                Nodes::adapted(&source, -1.0, 1.0, &[(-0.5, noise), (0.25, noise)], 2.0, gauss_legendre::<12>());
+            let thresholds: Vec<Threshold> = Threshold::of(&[-0.5, 0.25], noise).collect();
+            let nodes = Nodes::adapted(&source, -1.0, 1.0, &thresholds, 2.0, gauss_legendre::<12>());
             assert_relative_eq!(nodes.expectation(|x| x * x), source.variance(), max_relative = 1e-13);
             let p = nodes.expectation(|x| cdf((x - 0.25) / noise));
             let integral = |u: f64| u * cdf(u) + pdf(u);
@@ -289,7 +308,7 @@ mod tests {
             assert!(Source::gaussian_with_deviation(bad).is_err());
         }
         let source = Source::uniform(1.0).unwrap();
-        assert!(source.noise_std(f64::NAN).is_err());
-        assert!(source.noise_std(1e6).is_err());
+        assert!(source.noise_deviation(f64::NAN).is_err());
+        assert!(source.noise_deviation(1e6).is_err());
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::observation::source::{Kind, Source};
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use serde::{Deserialize, Serialize};
 
@@ -57,29 +57,29 @@ impl Grid {
     /// If the edges are empty, not finite or not strictly increasing.
     pub fn from_breakpoints(breakpoints: Vec<f64>) -> Result<Self, Error> {
         if breakpoints.is_empty() {
-            return Err(ArgumentError::new("breakpoints", "empty", "at least one breakpoint").into());
+            return refuse("breakpoints", "empty", "at least one breakpoint");
         }
         check_increasing(&breakpoints)?;
         Ok(Self { breakpoints })
     }
 
-    /// `2^bits` cells of the Lloyd-Max quantizer of `N(0, std^2)`.
+    /// `2^bits` cells of the Lloyd-Max quantizer of `N(0, deviation^2)`.
     ///
     /// # Errors
-    /// If `std` is not positive and finite or `bits` not in `1..=8`.
-    pub fn lloyd_max(std: f64, bits: usize) -> Result<Self, Error> {
-        let std = fewbits_numerics::error::positive("std", std)?;
+    /// If `deviation` is not positive and finite or `bits` not in `1..=8`.
+    pub fn lloyd_max(deviation: f64, bits: usize) -> Result<Self, Error> {
+        let deviation = fewbits_numerics::error::positive("deviation", deviation)?;
         let table = fewbits_quantizers::lloyd_max::gaussian_table(bits_in_range(bits)?)?;
-        Self::from_breakpoints(table.breakpoints().iter().map(|t| t * std).collect())
+        Self::from_breakpoints(table.breakpoints().iter().map(|t| t * deviation).collect())
     }
 
     /// The eight-cell Gaussian grid with the printed four digits ([`MAX_EIGHT_LEVEL_EDGES`]), for reproductions.
     ///
     /// # Errors
-    /// If `std` is not positive and finite.
-    pub fn printed_gaussian(std: f64) -> Result<Self, Error> {
-        let std = fewbits_numerics::error::positive("std", std)?;
-        Self::from_breakpoints(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * std).collect())
+    /// If `deviation` is not positive and finite.
+    pub fn printed_gaussian(deviation: f64) -> Result<Self, Error> {
+        let deviation = fewbits_numerics::error::positive("deviation", deviation)?;
+        Self::from_breakpoints(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * deviation).collect())
     }
 
     /// The interior edges.
@@ -135,7 +135,7 @@ impl Grid {
             .map(|(low, high)| {
                 let width = match source.kind() {
                     Kind::Uniform { .. } => high - low,
-                    Kind::Gaussian { std } => std,
+                    Kind::Gaussian { deviation } => deviation,
                 };
                 let nodes = source.nodes_between(low, high, width, rule);
                 let mass = nodes.expectation(|_| 1.0);
@@ -154,7 +154,7 @@ pub(crate) fn bits_in_range(bits: usize) -> Result<usize, Error> {
     if (1..=MAX_BITS).contains(&bits) {
         Ok(bits)
     } else {
-        Err(ArgumentError::new("bits", bits, "a number of bits in 1..=16").into())
+        refuse("bits", bits, "a number of bits in 1..=16")
     }
 }
 

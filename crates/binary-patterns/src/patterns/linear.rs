@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::patterns::grid::bits_in_range;
 use crate::{Grid, Pattern};
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 
 /// Selects which natural patterns are XORed: the most significant of the `bits` binary digits selects pattern 1.
 ///
@@ -19,7 +19,7 @@ pub fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
     if mask != 0 && mask < 1 << bits {
         Ok(mask)
     } else {
-        Err(ArgumentError::new("mask", mask, format!("a mask in 1..{}", 1u32 << bits)).into())
+        refuse("mask", mask, format!("a mask in 1..{}", 1u32 << bits))
     }
 }
 
@@ -129,7 +129,7 @@ pub(crate) fn flips_under_reflection(mask: Mask) -> bool {
 pub(crate) fn grid_bits(grid: &Grid) -> Result<usize, Error> {
     match grid.bits() {
         Some(bits) => bits_in_range(bits),
-        None => Err(ArgumentError::new("grid", format!("{} cells", grid.cells()), "a power of two of cells").into()),
+        None => refuse("grid", format!("{} cells", grid.cells()), "a power of two of cells"),
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::{BinaryQuantizer, Grid};
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -76,7 +77,7 @@ impl Pattern {
     /// If `cells` is not in `2..=20`; there are too many beyond.
     pub fn all(cells: usize) -> Result<Vec<Self>, Error> {
         if !(2..=20).contains(&cells) {
-            return Err(ArgumentError::new("cells", cells, "a number of cells in 2..=20").into());
+            return refuse("cells", cells, "a number of cells in 2..=20");
         }
         Ok((1u32..1 << (cells - 1))
             .map(|word| Self {

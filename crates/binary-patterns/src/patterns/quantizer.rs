@@ -2,6 +2,7 @@
 
 use crate::Error;
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use fewbits_numerics::normal::{interval, log_interval, pdf};
 use fewbits_quantizers::Quantizer;
@@ -29,7 +30,7 @@ impl BinaryQuantizer {
     /// If there is no breakpoint, one is not finite, or they do not increase strictly.
     pub fn new(breakpoints: Vec<f64>) -> Result<Self, Error> {
         if breakpoints.is_empty() {
-            return Err(ArgumentError::new("breakpoints", "empty", "at least one breakpoint").into());
+            return refuse("breakpoints", "empty", "at least one breakpoint");
         }
         check_increasing(&breakpoints)?;
         Ok(Self { breakpoints })
@@ -50,12 +51,12 @@ impl BinaryQuantizer {
         Ok(fewbits_node::pattern_bit(&self.breakpoints, measurement).map_err(ArgumentError::from)?)
     }
 
-    /// `[P(0|x), P(1|x)]` for the measurement `Y = x + N(0, noise_std^2)`.
+    /// `[P(0|x), P(1|x)]` for the measurement `Y = x + N(0, noise_deviation^2)`.
     ///
     /// Each is a sum of interval probabilities of its own cells, so that neither loses digits when it is small.
-    pub fn probabilities(&self, x: f64, noise_std: f64) -> [f64; 2] {
+    pub fn probabilities(&self, x: f64, noise_deviation: f64) -> [f64; 2] {
         let mut mass = [0.0; 2];
-        self.for_cells(x, noise_std, |bit, low, high| {
+        self.for_cells(x, noise_deviation, |bit, low, high| {
             if high > -VANISHED && low < VANISHED {
                 mass[bit] += interval(low, high);
             }
@@ -64,7 +65,7 @@ impl BinaryQuantizer {
     }
 
     /// [`probabilities`](Self::probabilities) at many points, in vector registers.
-    pub fn probabilities_at(&self, points: &[f64], noise_std: f64) -> Vec<[f64; 2]> {
+    pub fn probabilities_at(&self, points: &[f64], noise_deviation: f64) -> Vec<[f64; 2]> {
         let mut mass = vec![[0.0; 2]; points.len()];
         let (mut edges, mut inside) = (vec![f64::NEG_INFINITY; points.len()], vec![0.0; points.len()]);
         for (cell, t) in self.breakpoints.iter().copied().chain([f64::INFINITY]).enumerate() {
@@ -72,7 +73,7 @@ impl BinaryQuantizer {
             edges
                 .iter_mut()
                 .zip(points)
-                .for_each(|(edge, x)| *edge = (t - x) / noise_std);
+                .for_each(|(edge, x)| *edge = (t - x) / noise_deviation);
             kernels::interval(&mut inside, &edges);
             mass.iter_mut().zip(&inside).for_each(|(mass, p)| mass[cell % 2] += p);
         }
@@ -80,13 +81,13 @@ impl BinaryQuantizer {
     }
 
     /// `[ln P(0|x), ln P(1|x)]`, finite however far `x` lies from the cells.
-    pub fn log_probabilities(&self, x: f64, noise_std: f64) -> [f64; 2] {
+    pub fn log_probabilities(&self, x: f64, noise_deviation: f64) -> [f64; 2] {
         let mut largest = [f64::NEG_INFINITY; 2];
-        self.for_cells(x, noise_std, |bit, low, high| {
+        self.for_cells(x, noise_deviation, |bit, low, high| {
             largest[bit] = largest[bit].max(log_interval(low, high));
         });
         let mut sum = [0.0; 2];
-        self.for_cells(x, noise_std, |bit, low, high| {
+        self.for_cells(x, noise_deviation, |bit, low, high| {
             if largest[bit] > f64::NEG_INFINITY {
                 sum[bit] += (log_interval(low, high) - largest[bit]).exp();
             }
@@ -95,30 +96,30 @@ impl BinaryQuantizer {
     }
 
     /// `dP(1|x)/dx`, the sum of `+-phi((t - x)/s)/s` over the breakpoints.
-    pub fn slope(&self, x: f64, noise_std: f64) -> f64 {
+    pub fn slope(&self, x: f64, noise_deviation: f64) -> f64 {
         let mut sign = 1.0;
         let mut slope = 0.0;
         for &t in &self.breakpoints {
-            slope += sign * pdf((t - x) / noise_std);
+            slope += sign * pdf((t - x) / noise_deviation);
             sign = -sign;
         }
-        slope / noise_std
+        slope / noise_deviation
     }
 
     /// Fisher information about `x` in the bit: `P1'^2 / (P0 P1)`, 0 where that is below the smallest double.
-    pub fn fisher_information(&self, x: f64, noise_std: f64) -> f64 {
-        let [p0, p1] = self.probabilities(x, noise_std);
-        let slope = self.slope(x, noise_std);
+    pub fn fisher_information(&self, x: f64, noise_deviation: f64) -> f64 {
+        let [p0, p1] = self.probabilities(x, noise_deviation);
+        let slope = self.slope(x, noise_deviation);
         // Both factors of the product may be tiny; dividing by the smaller one last keeps the quotient in range.
         let information = (slope / p0.max(p1)) * (slope / p0.min(p1));
         if information.is_finite() { information } else { 0.0 }
     }
 
-    fn for_cells(&self, x: f64, noise_std: f64, mut visit: impl FnMut(usize, f64, f64)) {
+    fn for_cells(&self, x: f64, noise_deviation: f64, mut visit: impl FnMut(usize, f64, f64)) {
         let mut low = f64::NEG_INFINITY;
         let mut bit = 0;
         for &t in &self.breakpoints {
-            let high = (t - x) / noise_std;
+            let high = (t - x) / noise_deviation;
             visit(bit, low, high);
             bit ^= 1;
             low = high;

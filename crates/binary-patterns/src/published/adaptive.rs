@@ -6,8 +6,7 @@ use crate::decoding::decoder::{moments, squared_error};
 use crate::observation::bank::{IMPOSSIBLE, MAX_OUTCOMES};
 use crate::observation::source::Nodes;
 use crate::observation::source::noise_in_range;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, at_least_one, positive};
+use fewbits_numerics::error::{all_finite, at_least_one, positive, refuse};
 use fewbits_numerics::golden::maximum;
 use fewbits_numerics::newton;
 use fewbits_numerics::normal::{cdf, inverse_mills, log_cdf, log_pdf};
@@ -59,8 +58,13 @@ pub struct AdaptiveErrors {
 ///
 /// # Errors
 /// If the noise is below `1e-4` of the source's reach, a parameter of the rule is out of range, or `sensors` is not in `1..=20`.
-pub fn adaptive(source: &Source, noise_std: f64, sensors: usize, rule: AdaptiveRule) -> Result<AdaptiveErrors, Error> {
-    let noise_std = source.resolvable(noise_std)?;
+pub fn adaptive(
+    source: &Source,
+    noise_deviation: f64,
+    sensors: usize,
+    rule: AdaptiveRule,
+) -> Result<AdaptiveErrors, Error> {
+    let noise_deviation = source.resolvable(noise_deviation)?;
     at_least_one("sensors", sensors)?;
     if sensors > MAX_SENSORS {
         return Err(Error::TooManyOutcomes {
@@ -72,13 +76,13 @@ pub fn adaptive(source: &Source, noise_std: f64, sensors: usize, rule: AdaptiveR
     if let AdaptiveRule::VariableStep { step: first, factor } = rule {
         step = positive("step", first)?;
         if !(factor.is_finite() && factor >= 1.0) {
-            return Err(ArgumentError::new("factor", factor, "a finite number, 1 or above").into());
+            return refuse("factor", factor, "a finite number, 1 or above");
         }
     }
-    let nodes = source.nodes(2.0 * noise_std, gauss_legendre::<12>());
+    let nodes = source.nodes(2.0 * noise_deviation, gauss_legendre::<12>());
     let mut tree = Tree {
         source,
-        noise_std,
+        noise_deviation,
         rule,
         levels: vec![nodes.w.clone(); sensors + 1],
         nodes,
@@ -91,7 +95,7 @@ pub fn adaptive(source: &Source, noise_std: f64, sensors: usize, rule: AdaptiveR
 
 struct Tree<'a> {
     source: &'a Source,
-    noise_std: f64,
+    noise_deviation: f64,
     rule: AdaptiveRule,
     nodes: Nodes,
     /// `w p(x) P(bits|x)` at each depth of the current branch.
@@ -108,7 +112,7 @@ impl Tree<'_> {
             let (mass, first) = moments(w, &self.nodes.x);
             if mass > IMPOSSIBLE {
                 self.errors.mmse += squared_error(w, &self.nodes.x, first / mass);
-                let mle = maximum_likelihood(&self.history, self.noise_std, self.source.reach());
+                let mle = maximum_likelihood(&self.history, self.noise_deviation, self.source.reach());
                 self.errors.mle += squared_error(w, &self.nodes.x, mle);
             }
             return;
@@ -117,7 +121,7 @@ impl Tree<'_> {
             let sign = if bit { 1.0 } else { -1.0 };
             let (above, below) = self.levels.split_at_mut(depth + 1);
             for ((child, w), x) in below[0].iter_mut().zip(&above[depth]).zip(&self.nodes.x) {
-                *child = w * cdf(sign * (x - threshold) / self.noise_std);
+                *child = w * cdf(sign * (x - threshold) / self.noise_deviation);
             }
             let repeated = self.history.last().is_some_and(|last| last.1 == bit);
             self.history.push((threshold, bit));
@@ -143,7 +147,7 @@ impl Tree<'_> {
                 };
                 ((threshold + sign * step).clamp(-reach, reach), step)
             }
-            AdaptiveRule::MaximumLikelihood => (maximum_likelihood(&self.history, self.noise_std, reach), step),
+            AdaptiveRule::MaximumLikelihood => (maximum_likelihood(&self.history, self.noise_deviation, reach), step),
             AdaptiveRule::PosteriorMean => (self.posterior(w).map_or(threshold, |(mean, _)| mean), step),
             AdaptiveRule::LeastVariance => {
                 let next = self.posterior(w).map_or(threshold, |(mean, variance)| {
@@ -164,7 +168,7 @@ impl Tree<'_> {
     fn explained(&self, w: &[f64], t: f64) -> f64 {
         let mut sums = [(0.0, 0.0); 2];
         for (w, x) in w.iter().zip(&self.nodes.x) {
-            let u = (x - t) / self.noise_std;
+            let u = (x - t) / self.noise_deviation;
             for (sum, p) in sums.iter_mut().zip([cdf(-u), cdf(u)]) {
                 sum.0 += w * p;
                 sum.1 += w * p * x;
@@ -183,22 +187,22 @@ impl Tree<'_> {
 ///
 /// # Errors
 /// If there is no bit, a threshold is not finite, or the noise or the bound is not positive and finite.
-pub fn bounded_mle(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> Result<f64, Error> {
+pub fn bounded_mle(bits: &[(f64, bool)], noise_deviation: f64, bound: f64) -> Result<f64, Error> {
     at_least_one("bits", bits.len())?;
     let thresholds: Vec<f64> = bits.iter().map(|b| b.0).collect();
     all_finite("thresholds", &thresholds)?;
-    Ok(maximum_likelihood(bits, noise_in_range(noise_std)?, positive("bound", bound)?))
+    Ok(maximum_likelihood(bits, noise_in_range(noise_deviation)?, positive("bound", bound)?))
 }
 
-fn maximum_likelihood(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> f64 {
-    if balance(bits, noise_std, -bound).0 <= 0.0 {
+fn maximum_likelihood(bits: &[(f64, bool)], noise_deviation: f64, bound: f64) -> f64 {
+    if balance(bits, noise_deviation, -bound).0 <= 0.0 {
         return -bound;
     }
-    if balance(bits, noise_std, bound).0 >= 0.0 {
+    if balance(bits, noise_deviation, bound).0 >= 0.0 {
         return bound;
     }
     let falling = |x: f64| {
-        let (value, slope) = balance(bits, noise_std, x);
+        let (value, slope) = balance(bits, noise_deviation, x);
         (-value, -slope)
     };
     newton::increasing(falling, -bound, bound, 0.0, MLE_STOP * bound)
@@ -208,16 +212,16 @@ fn maximum_likelihood(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> f64 {
 ///
 /// The score is a difference of sums of inverse Mills ratios. Between thresholds many deviations apart all of them are below
 /// the smallest double, and only the logarithms still say which side is stronger.
-fn balance(bits: &[(f64, bool)], noise_std: f64, x: f64) -> (f64, f64) {
+fn balance(bits: &[(f64, bool)], noise_deviation: f64, x: f64) -> (f64, f64) {
     // For each side the largest log ratio, the sum relative to it, and the sum weighted with the derivative of the logarithm.
     let mut sides = [(f64::NEG_INFINITY, 0.0, 0.0); 2];
     for &(t, bit) in bits {
         let sign = if bit { 1.0 } else { -1.0 };
-        let u = sign * (x - t) / noise_std;
+        let u = sign * (x - t) / noise_deviation;
         let log_cdf = log_cdf(u);
         let log_ratio = log_pdf(u) - log_cdf;
         // d/dx ln(phi/Phi)(u) = -(u + phi/Phi) du/dx.
-        let derivative = -sign * (u + inverse_mills(u)) / noise_std;
+        let derivative = -sign * (u + inverse_mills(u)) / noise_deviation;
         let side = &mut sides[usize::from(bit)];
         if log_ratio > side.0 {
             let shrink = (side.0 - log_ratio).exp();
@@ -258,7 +262,7 @@ mod tests {
     #[test]
     fn one_bit_is_the_sign_and_feedback_helps() {
         let source = Source::uniform(1.0).unwrap();
-        let noise = source.noise_std(10.0).unwrap();
+        let noise = source.noise_deviation(10.0).unwrap();
         let alone = super::super::fixed_threshold(source, noise, 1).unwrap().mmse().unwrap();
         for rule in [
             AdaptiveRule::VariableStep { step: 0.5, factor: 1.5 },

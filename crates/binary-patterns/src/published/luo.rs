@@ -3,10 +3,10 @@
 use crate::Error;
 use crate::observation::bank::CountTable;
 use crate::observation::source::noise_in_range;
-use crate::observation::source::{Blur, Kind, Nodes};
+use crate::observation::source::{Kind, Nodes, Threshold};
 use crate::patterns::grid::bits_in_range;
 use crate::{Bank, BinaryQuantizer, Decoder, Grid, PatternSensor, Source, linear_pattern, natural_basis};
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::quadrature::gauss_legendre;
 
 /// The allocation of sensors to natural bits, for a uniform source.
@@ -14,7 +14,7 @@ use fewbits_numerics::quadrature::gauss_legendre;
 pub struct Luo {
     source: Source,
     half_width: f64,
-    noise_std: f64,
+    noise_deviation: f64,
     quantizers: Vec<BinaryQuantizer>,
     allocation: Vec<usize>,
 }
@@ -36,18 +36,16 @@ impl Luo {
     ///
     /// # Errors
     /// If the source is not uniform, `bits` is out of range, an allocation would be empty, or the noise is not positive.
-    pub fn new(source: Source, noise_std: f64, bits: usize, sensors: usize) -> Result<Self, Error> {
+    pub fn new(source: Source, noise_deviation: f64, bits: usize, sensors: usize) -> Result<Self, Error> {
         let Kind::Uniform { half_width } = source.kind() else {
-            return Err(ArgumentError::new("source", "Gaussian", "a uniform source").into());
+            return refuse("source", "Gaussian", "a uniform source");
         };
         let bits = bits_in_range(bits)?;
-        let noise_std = noise_in_range(noise_std)?;
+        let noise_deviation = noise_in_range(noise_deviation)?;
         let mut allocation: Vec<usize> = (1..bits).map(|b| sensors.checked_shr(b as u32).unwrap_or(0)).collect();
         allocation.push(sensors - allocation.iter().sum::<usize>());
         if allocation.contains(&0) {
-            return Err(
-                ArgumentError::new("sensors", sensors, format!("at least {} sensors", 1usize << (bits - 1))).into()
-            );
+            return refuse("sensors", sensors, format!("at least {} sensors", 1usize << (bits - 1)));
         }
         let grid = Grid::uniform(half_width, bits)?;
         let quantizers = natural_basis(bits)?
@@ -57,7 +55,7 @@ impl Luo {
         Ok(Self {
             source,
             half_width,
-            noise_std,
+            noise_deviation,
             quantizers,
             allocation,
         })
@@ -76,7 +74,7 @@ impl Luo {
         let mut sensors = Vec::new();
         for (quantizer, &count) in self.quantizers.iter().zip(&self.allocation) {
             for _ in 0..count {
-                sensors.push(PatternSensor::with_deviation(quantizer.clone(), self.noise_std)?);
+                sensors.push(PatternSensor::with_deviation(quantizer.clone(), self.noise_deviation)?);
             }
         }
         Bank::new(self.source, sensors)
@@ -87,13 +85,13 @@ impl Luo {
     /// # Errors
     /// If the bank has too many outcomes.
     pub fn errors(&self) -> Result<LuoErrors, Error> {
-        let blurs: Vec<Blur> = self
+        let thresholds = self
             .quantizers
             .iter()
-            .flat_map(|q| q.breakpoints().iter().map(|&t| (t, self.noise_std)))
-            .collect();
+            .flat_map(|q| Threshold::of(q.breakpoints(), self.noise_deviation));
+        let thresholds: Vec<Threshold> = thresholds.collect();
         let v = self.half_width;
-        let nodes = Nodes::adapted(&self.source, -v, v, &blurs, 1.0, gauss_legendre::<12>());
+        let nodes = Nodes::adapted(&self.source, -v, v, &thresholds, 1.0, gauss_legendre::<12>());
         let (mut soft, mut majority) = (0.0, 0.0);
         for (&x, &w) in nodes.x.iter().zip(&nodes.w) {
             // (mean, variance) of both estimates given x.
@@ -101,7 +99,7 @@ impl Luo {
             let mut weight = self.half_width;
             for (quantizer, &count) in self.quantizers.iter().zip(&self.allocation) {
                 weight *= 0.5;
-                let p = quantizer.probabilities(x, self.noise_std);
+                let p = quantizer.probabilities(x, self.noise_deviation);
                 by_mean.0 += weight * (p[1] - p[0]);
                 by_mean.1 += 4.0 * weight * weight * p[0] * p[1] / count as f64;
                 let vote = votes(p, count);

@@ -1,4 +1,4 @@
-//! What only reproduces printed comparisons: other schemes that send one bit per sensor, and the thesis's shortcuts around a search. The
+//! Published schemes for comparison: other ways to send one bit per sensor, and the thesis's shortcuts around a search. The
 //! recommended designs are in [`search`](crate::search). All errors are exact.
 
 mod adaptive;
@@ -18,9 +18,9 @@ use fewbits_numerics::error::at_least_one;
 /// `sensors` sensors that all send the sign of their measurement.
 ///
 /// # Errors
-/// If there is no sensor or `noise_std` is not positive and finite.
-pub fn fixed_threshold(source: Source, noise_std: f64, sensors: usize) -> Result<Bank, Error> {
+/// If there is no sensor or `noise_deviation` is not positive and finite.
+pub fn fixed_threshold(source: Source, noise_deviation: f64, sensors: usize) -> Result<Bank, Error> {
     at_least_one("sensors", sensors)?;
     let sign = BinaryQuantizer::new(vec![0.0])?;
-    Bank::homogeneous_with_deviation(source, vec![sign; sensors], noise_std)
+    Bank::homogeneous_with_deviation(source, vec![sign; sensors], noise_deviation)
 }

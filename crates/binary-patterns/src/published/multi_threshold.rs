@@ -33,8 +33,8 @@ pub struct MultiThreshold {
 }
 
 /// `ln I(x; t)` of the sign of `Y - t`: `phi(u)^2 / (s^2 Phi(u) Phi(-u))` at `u = (x - t)/s`.
-fn log_information(u: f64, noise_std: f64) -> f64 {
-    -u * u - log_cdf(u) - log_cdf(-u) - (TAU * noise_std * noise_std).ln()
+fn log_information(u: f64, noise_deviation: f64) -> f64 {
+    -u * u - log_cdf(u) - log_cdf(-u) - (TAU * noise_deviation * noise_deviation).ln()
 }
 
 /// Minimum over `rho >= 0`, `sum rho = N`, of `E[1 / sum_k rho_k I(X; t_k)]` on 401 thresholds over `+-(V + 2 s)`.
@@ -52,23 +52,28 @@ fn log_information(u: f64, noise_std: f64) -> f64 {
 /// ```
 ///
 /// # Errors
-/// If there is no sensor or `noise_std` is not finite or below `1e-4` of the source's reach; [`Error::NotConverged`] if the gap is
+/// If there is no sensor or `noise_deviation` is not finite or below `1e-4` of the source's reach; [`Error::NotConverged`] if the gap is
 /// not closed in 200000 updates.
-pub fn multi_threshold_bound(source: &Source, noise_std: f64, sensors: usize) -> Result<MultiThreshold, Error> {
-    optimum(source, noise_std, sensors, MAX_UPDATES)
+pub fn multi_threshold_bound(source: &Source, noise_deviation: f64, sensors: usize) -> Result<MultiThreshold, Error> {
+    optimum(source, noise_deviation, sensors, MAX_UPDATES)
 }
 
-fn optimum(source: &Source, noise_std: f64, sensors: usize, most_updates: usize) -> Result<MultiThreshold, Error> {
+fn optimum(
+    source: &Source,
+    noise_deviation: f64,
+    sensors: usize,
+    most_updates: usize,
+) -> Result<MultiThreshold, Error> {
     let total = at_least_one("sensors", sensors)? as f64;
-    let noise_std = source.resolvable(noise_std)?;
-    let nodes = source.nodes(noise_std, gauss_legendre::<8>());
-    let limit = source.reach() + MARGIN * noise_std;
+    let noise_deviation = source.resolvable(noise_deviation)?;
+    let nodes = source.nodes(noise_deviation, gauss_legendre::<8>());
+    let limit = source.reach() + MARGIN * noise_deviation;
     let thresholds: Vec<f64> = (0..THRESHOLDS)
         .map(|k| limit * (2.0 * k as f64 / (THRESHOLDS - 1) as f64 - 1.0))
         .collect();
     // A threshold informs about nearby points only; the rest of its row is dropped.
     let spacing = thresholds[1] - thresholds[0];
-    let band = (BAND * noise_std).max(4.0 * spacing);
+    let band = (BAND * noise_deviation).max(4.0 * spacing);
     let rows: Vec<(usize, Vec<f64>)> = thresholds
         .iter()
         .map(|&t| {
@@ -76,7 +81,7 @@ fn optimum(source: &Source, noise_std: f64, sensors: usize, most_updates: usize)
             let last = nodes.x.partition_point(|&x| x <= t + band);
             let row = nodes.x[first..last]
                 .iter()
-                .map(|&x| log_information((x - t) / noise_std, noise_std).exp())
+                .map(|&x| log_information((x - t) / noise_deviation, noise_deviation).exp())
                 .collect();
             (first, row)
         })

@@ -5,7 +5,7 @@ use crate::bounds::mean_information;
 use crate::patterns::linear::grid_bits;
 use crate::{Bank, Grid, PatternSensor, linear_pattern};
 use crate::{Mask, Source};
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 
 /// Strategy 2: repeats the masks of a smaller optimum until there are `sensors` of them, in increasing order.
 ///
@@ -16,9 +16,7 @@ use fewbits_numerics::ArgumentError;
 /// If `masks` is empty or longer than `sensors`.
 pub fn tile(masks: &[Mask], sensors: usize) -> Result<Vec<Mask>, Error> {
     if masks.is_empty() || masks.len() > sensors {
-        return Err(
-            ArgumentError::new("masks", format!("{} masks", masks.len()), format!("1 to {sensors} masks")).into()
-        );
+        return refuse("masks", format!("{} masks", masks.len()), format!("1 to {sensors} masks"));
     }
     let mut tiled: Vec<Mask> = masks.iter().copied().cycle().take(sensors).collect();
     tiled.sort_unstable();
@@ -36,14 +34,14 @@ pub fn tile(masks: &[Mask], sensors: usize) -> Result<Vec<Mask>, Error> {
 pub fn by_information(
     source: &Source,
     grid: &Grid,
-    noise_std: f64,
+    noise_deviation: f64,
     sensors: usize,
     forced: &[Mask],
 ) -> Result<Vec<Mask>, Error> {
     let bits = grid_bits(grid)?;
     let mut best = (0, f64::NEG_INFINITY);
     for mask in 1..1 << bits {
-        let sensor = PatternSensor::with_deviation(linear_pattern(mask, bits)?.on(grid)?, noise_std)?;
+        let sensor = PatternSensor::with_deviation(linear_pattern(mask, bits)?.on(grid)?, noise_deviation)?;
         let information = mean_information(&Bank::new(*source, vec![sensor])?);
         // Mirror images and rounding make ties; the lowest mask keeps them.
         if information > best.1 * (1.0 + 1e-12) || best.0 == 0 {
@@ -51,9 +49,7 @@ pub fn by_information(
         }
     }
     if forced.len() > sensors {
-        return Err(
-            ArgumentError::new("forced", format!("{} masks", forced.len()), format!("at most {sensors}")).into()
-        );
+        return refuse("forced", format!("{} masks", forced.len()), format!("at most {sensors}"));
     }
     let mut masks = forced.to_vec();
     masks.resize(sensors, best.0);
@@ -76,7 +72,7 @@ mod tests {
     fn information_repeats_one_mask() {
         let source = Source::uniform(1.0).unwrap();
         let grid = Grid::uniform(1.0, 3).unwrap();
-        let masks = by_information(&source, &grid, source.noise_std(20.0).unwrap(), 5, &[4, 6, 3]).unwrap();
+        let masks = by_information(&source, &grid, source.noise_deviation(20.0).unwrap(), 5, &[4, 6, 3]).unwrap();
         assert_eq!(masks, [1, 1, 3, 4, 6]);
         assert!(by_information(&source, &grid, 0.1, 2, &[4, 6, 3]).is_err());
     }

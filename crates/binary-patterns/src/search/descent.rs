@@ -4,11 +4,11 @@ use super::outcomes::{Outcomes, SEARCH_PANEL};
 use crate::Error;
 use crate::observation::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::observation::source::noise_in_range;
-use crate::observation::source::{Blur, Nodes};
+use crate::observation::source::{Nodes, Threshold};
 use crate::{Bank, BinaryQuantizer, Grid, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::DMatrix;
 use rand::RngExt;
@@ -66,17 +66,17 @@ impl Descent {
     /// If either list is empty or a noise is not positive and finite.
     pub fn with_deviations(
         source: Source,
-        noise_stds: Vec<f64>,
+        noise_deviations: Vec<f64>,
         candidates: Vec<BinaryQuantizer>,
     ) -> Result<Self, Error> {
-        at_least_one("noise_stds", noise_stds.len())?;
+        at_least_one("noise_deviations", noise_deviations.len())?;
         at_least_one("candidates", candidates.len())?;
-        for &noise in &noise_stds {
+        for &noise in &noise_deviations {
             noise_in_range(noise)?;
         }
         Ok(Self {
             source,
-            noise: noise_stds,
+            noise: noise_deviations,
             candidates,
         })
     }
@@ -108,7 +108,7 @@ impl Descent {
             return Ok(());
         }
         let expected = format!("{} indices below {}", self.noise.len(), self.candidates.len());
-        Err(ArgumentError::new("choice", format!("{choice:?}"), expected).into())
+        refuse("choice", format!("{choice:?}"), expected)
     }
 
     /// The best of the descents from the given starts and `extra` scattered ones.
@@ -191,12 +191,12 @@ impl<'a> Kernel<'a> {
             .collect();
         thresholds.sort_by(f64::total_cmp);
         thresholds.dedup();
-        let blurs: Vec<Blur> = noises
+        let thresholds: Vec<Threshold> = noises
             .iter()
-            .flat_map(|&noise| thresholds.iter().map(move |&t| (t, noise)))
+            .flat_map(|&noise| Threshold::of(&thresholds, noise))
             .collect();
         let from = if folded { 0.0 } else { -reach };
-        let nodes = Nodes::adapted(&descent.source, from, reach, &blurs, SEARCH_PANEL, gauss_legendre::<8>());
+        let nodes = Nodes::adapted(&descent.source, from, reach, &thresholds, SEARCH_PANEL, gauss_legendre::<8>());
         let p: Vec<Vec<Vec<[f64; 2]>>> = noises
             .iter()
             .map(|&noise| {
@@ -257,7 +257,7 @@ impl<'a> Kernel<'a> {
         Ok(choice)
     }
 
-    /// What each candidate for sensor `n` would explain of the variance.
+    /// Variance explained by the bits, for each candidate quantizer of sensor `n`.
     fn respond(&self, choice: &[usize], n: usize) -> Result<Vec<f64>, Error> {
         // Exchangeable others: (noise class, candidate, count).
         let mut groups: Vec<(usize, usize, usize)> = Vec::new();
@@ -331,7 +331,7 @@ mod tests {
         let source = Source::uniform(1.0).unwrap();
         let grid = Grid::uniform(1.0, 3).unwrap();
         for snr in [5.0, 18.2] {
-            let noise = source.noise_std(snr).unwrap();
+            let noise = source.noise_deviation(snr).unwrap();
             let exact = LinearSearch::with_deviation(source, grid.clone(), noise, 6)
                 .unwrap()
                 .best()

@@ -9,8 +9,7 @@ use crate::observation::source::Nodes;
 use crate::patterns::linear::grid_bits;
 use crate::{Bank, BinaryQuantizer, Grid, Mask, PatternSensor, Source, linear_pattern};
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, non_negative};
+use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::gauss_legendre;
 use rand::RngExt;
@@ -56,11 +55,11 @@ pub fn free_breakpoints(
     at_least_one("starts", starts)?;
     non_negative("jitter", jitter)?;
     if sensors.len() > MAX_SENSORS {
-        return Err(ArgumentError::new("sensors", sensors.len(), "at most 16 sensors").into());
+        return refuse("sensors", sensors.len(), "at most 16 sensors");
     }
     for sensor in sensors {
         // The thresholds move, so the nodes must be dense everywhere.
-        source.resolvable(sensor.noise_std())?;
+        source.resolvable(sensor.noise_deviation())?;
     }
     // In the source's own unit, so that no step or tolerance knows another.
     let unit = source.scale();
@@ -87,14 +86,14 @@ pub fn free_breakpoints_of_masks(
     source: &Source,
     grid: &Grid,
     masks: &[Mask],
-    noise_std: f64,
+    noise_deviation: f64,
     jitter: f64,
     starts: usize,
 ) -> Result<FreeDesign, Error> {
     let bits = grid_bits(grid)?;
     let sensors = masks
         .iter()
-        .map(|mask| PatternSensor::with_deviation(linear_pattern(*mask, bits)?.on(grid)?, noise_std))
+        .map(|mask| PatternSensor::with_deviation(linear_pattern(*mask, bits)?.on(grid)?, noise_deviation))
         .collect::<Result<Vec<_>, _>>()?;
     free_breakpoints(source, &sensors, jitter, starts)
 }
@@ -102,7 +101,7 @@ pub fn free_breakpoints_of_masks(
 /// The sensor in units in which every number is `factor` times as large.
 fn rescaled(sensor: &PatternSensor, factor: f64) -> Result<PatternSensor, Error> {
     let breakpoints = sensor.quantizer().breakpoints().iter().map(|b| factor * b).collect();
-    PatternSensor::with_deviation(BinaryQuantizer::new(breakpoints)?, factor * sensor.noise_std())
+    PatternSensor::with_deviation(BinaryQuantizer::new(breakpoints)?, factor * sensor.noise_deviation())
 }
 
 fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: usize) -> Result<FreeDesign, Error> {
@@ -141,7 +140,7 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
             .into_iter()
             .zip(sensors)
             .map(|(thresholds, sensor)| {
-                PatternSensor::with_deviation(BinaryQuantizer::new(thresholds)?, sensor.noise_std())
+                PatternSensor::with_deviation(BinaryQuantizer::new(thresholds)?, sensor.noise_deviation())
             })
             .collect::<Result<Vec<_>, _>>();
         // A run that drives two thresholds into one has left the domain; the others stand.
@@ -201,7 +200,7 @@ impl OutcomeTree {
     fn new(source: &Source, sensors: &[PatternSensor]) -> Self {
         let finest = sensors
             .iter()
-            .map(PatternSensor::noise_std)
+            .map(PatternSensor::noise_deviation)
             .fold(f64::INFINITY, f64::min);
         let nodes = source.nodes(SEARCH_PANEL * finest, gauss_legendre::<8>());
         let row = || vec![0.0; nodes.len()];
@@ -210,7 +209,7 @@ impl OutcomeTree {
         let mut weight: Vec<Vec<f64>> = rows();
         weight[0].copy_from_slice(&nodes.w);
         Self {
-            noise: sensors.iter().map(PatternSensor::noise_std).collect(),
+            noise: sensors.iter().map(PatternSensor::noise_deviation).collect(),
             lengths: sensors.iter().map(|s| s.quantizer().breakpoints().len()).collect(),
             variance: source.variance(),
             p: pairs(),
@@ -351,7 +350,7 @@ mod tests {
         let run = |v: f64| {
             let source = Source::uniform(v).unwrap();
             let grid = Grid::uniform(v, 3).unwrap();
-            let noise = source.noise_std(5.0).unwrap();
+            let noise = source.noise_deviation(5.0).unwrap();
             let found = free_breakpoints_of_masks(&source, &grid, &[4, 4, 6], noise, 0.05, 2).unwrap();
             let start = PatternSensor::with_deviation(linear_pattern(4, 3).unwrap().on(&grid).unwrap(), noise).unwrap();
             assert!(found.sensors.iter().any(|s| *s != start));

@@ -47,7 +47,7 @@ proptest! {
     ) {
         let sensors: Vec<PatternSensor> = sensors
             .iter()
-            .map(|(t, snr)| PatternSensor::with_deviation(quantizer(t, &source), source.noise_std(*snr).unwrap()).unwrap())
+            .map(|(t, snr)| PatternSensor::with_deviation(quantizer(t, &source), source.noise_deviation(*snr).unwrap()).unwrap())
             .collect();
         let bank = Bank::new(source, sensors).unwrap();
         let mmse = bank.mmse().unwrap();
@@ -75,7 +75,7 @@ proptest! {
         patterns in prop::collection::vec(thresholds(), 1..5),
         snr in -10.0f64..30.0,
     ) {
-        let noise = source.noise_std(snr).unwrap();
+        let noise = source.noise_deviation(snr).unwrap();
         let quantizers: Vec<_> = patterns.iter().map(|t| quantizer(t, &source)).collect();
         let count = quantizers.len();
         let mmse = Bank::homogeneous_with_deviation(source, quantizers, noise).unwrap().mmse().unwrap();
@@ -86,7 +86,7 @@ proptest! {
 
     #[test]
     fn more_sensors_never_hurt_and_scale_does_not_matter(source in source(), t in thresholds(), snr in 0.0f64..30.0, scale in 0.1f64..10.0) {
-        let noise = source.noise_std(snr).unwrap();
+        let noise = source.noise_deviation(snr).unwrap();
         let one = quantizer(&t, &source);
         let mut last = source.variance();
         for n in 1..4 {
@@ -95,7 +95,7 @@ proptest! {
             last = mmse;
         }
         let (unit, other) = (Source::uniform(1.0).unwrap(), Source::uniform(scale).unwrap());
-        let error = |s: Source| Bank::homogeneous_with_deviation(s, vec![quantizer(&t, &s)], s.noise_std(snr).unwrap()).unwrap().mmse().unwrap();
+        let error = |s: Source| Bank::homogeneous_with_deviation(s, vec![quantizer(&t, &s)], s.noise_deviation(snr).unwrap()).unwrap().mmse().unwrap();
         prop_assert!((error(other) - scale * scale * error(unit)).abs() <= 1e-9 * error(other));
     }
 }
@@ -110,10 +110,11 @@ fn the_printed_bound_is_valid_for_gaussian_sources_only() {
     let quantizers: Vec<_> = patterns.iter().map(|p| p.on(&grid).unwrap()).collect();
     for snr in [-10.0, 0.0, 10.0, 20.0] {
         let bank =
-            Bank::homogeneous_with_deviation(gaussian, quantizers.clone(), gaussian.noise_std(snr).unwrap()).unwrap();
+            Bank::homogeneous_with_deviation(gaussian, quantizers.clone(), gaussian.noise_deviation(snr).unwrap())
+                .unwrap();
         assert!(printed_crlb(&bank).unwrap() <= optimal_weight_van_trees(&bank).unwrap() * (1.0 + 1e-9));
     }
-    let bank = Bank::homogeneous_with_deviation(uniform, quantizers, uniform.noise_std(-20.0).unwrap()).unwrap();
+    let bank = Bank::homogeneous_with_deviation(uniform, quantizers, uniform.noise_deviation(-20.0).unwrap()).unwrap();
     let mmse = bank.mmse().unwrap();
     assert!(printed_crlb(&bank).unwrap() > 100.0 * mmse);
     assert!((optimal_weight_van_trees(&bank).unwrap() / mmse - 0.999).abs() < 5e-4);
@@ -131,7 +132,7 @@ fn repeated_sensors_are_counted() {
     ] {
         quantizers.extend(std::iter::repeat_n(BinaryQuantizer::new(thresholds).unwrap(), count));
     }
-    let bank = Bank::homogeneous_with_deviation(source, quantizers, source.noise_std(10.0).unwrap()).unwrap();
+    let bank = Bank::homogeneous_with_deviation(source, quantizers, source.noise_deviation(10.0).unwrap()).unwrap();
     assert_eq!(bank.outcomes(), 5508);
     let mmse = bank.mmse().unwrap();
     assert!(optimal_weight_van_trees(&bank).unwrap() < mmse && mmse < 0.003);
@@ -169,7 +170,7 @@ fn vanishing_likelihoods_do_not_become_nan() {
     let source = Source::uniform(1.0).unwrap();
     let grid = Grid::uniform(1.0, 3).unwrap();
     for snr in [29.0, 45.0, 60.0] {
-        let noise = source.noise_std(snr).unwrap();
+        let noise = source.noise_deviation(snr).unwrap();
         let quantizers: Vec<_> = ["00001111", "00111100", "00111100", "01100110"]
             .iter()
             .map(|p| {
@@ -204,7 +205,7 @@ fn vanishing_likelihoods_do_not_become_nan() {
 #[test]
 fn free_breakpoints_beat_the_grid() {
     let source = Source::uniform(1.0).unwrap();
-    let noise = source.noise_std(10.0).unwrap();
+    let noise = source.noise_deviation(10.0).unwrap();
     let grid = Grid::uniform(1.0, 3).unwrap();
     let start: Vec<PatternSensor> = ["00001111", "00111100", "00111100"]
         .iter()
@@ -266,5 +267,5 @@ fn vanishing_noise_is_resolved() {
 fn gray(source: Source, grid: &Grid, snr: f64) -> Bank {
     let on = |p: &str| p.parse::<fewbits_binary_patterns::Pattern>().unwrap().on(grid).unwrap();
     let quantizers = ["00001111", "00111100", "01100110"].map(on).to_vec();
-    Bank::homogeneous_with_deviation(source, quantizers, source.noise_std(snr).unwrap()).unwrap()
+    Bank::homogeneous_with_deviation(source, quantizers, source.noise_deviation(snr).unwrap()).unwrap()
 }

@@ -36,7 +36,7 @@ fn grid(bits: usize) -> Grid {
 }
 
 fn bank(source: Source, grid: &Grid, masks: &[Mask], snr: f64) -> Bank {
-    let noise = source.noise_std(snr).unwrap();
+    let noise = source.noise_deviation(snr).unwrap();
     let bits = grid.bits().unwrap();
     let quantizers = masks
         .iter()
@@ -138,7 +138,7 @@ const PRINTED_51: [Mask; 8] = [1, 2, 3, 3, 3, 4, 5, 6];
 
 #[test]
 fn table_5_1() {
-    let noise = uniform().noise_std(18.2).unwrap();
+    let noise = uniform().noise_deviation(18.2).unwrap();
     let search = LinearSearch::with_deviation(uniform(), grid(3), noise, 8).unwrap();
     for e in entries().iter().filter(|e| e.id.starts_with("t51.")) {
         let printed = bank(uniform(), &grid(3), &PRINTED_51, 18.2);
@@ -194,7 +194,7 @@ fn table_5_1() {
 
 #[test]
 fn table_5_2() {
-    let noise = gauss().noise_std(5.2).unwrap();
+    let noise = gauss().noise_deviation(5.2).unwrap();
     let search = LinearSearch::with_deviation(gauss(), gauss_grid(), noise, 3).unwrap();
     family("t52.", |e| match e.id.as_str() {
         "t52.sigma" => noise,
@@ -275,7 +275,7 @@ fn figure_5_6() {
 fn optimum(e: &Entry, any_rank: bool) -> f64 {
     let snr = snr_of(&e.id);
     let sensors = e.inputs["N"].as_u64().unwrap_or(10) as usize;
-    let noise = uniform().noise_std(snr).unwrap();
+    let noise = uniform().noise_deviation(snr).unwrap();
     let search = LinearSearch::with_deviation(uniform(), grid(3), noise, sensors).unwrap();
     let best = if any_rank {
         search.any_rank().best()
@@ -296,7 +296,7 @@ fn figure_5_7_optima() {
 #[test]
 fn figure_5_7_others() {
     family("f57.luo.", |e| {
-        let luo = Luo::new(uniform(), uniform().noise_std(snr_of(&e.id)).unwrap(), 3, 8).unwrap();
+        let luo = Luo::new(uniform(), uniform().noise_deviation(snr_of(&e.id)).unwrap(), 3, 8).unwrap();
         assert_eq!(luo.allocation(), [4, 2, 2]);
         let errors = luo.errors().unwrap();
         match e.id.split('.').nth(2).unwrap() {
@@ -309,7 +309,7 @@ fn figure_5_7_others() {
     family("f57.strat13.", |e| {
         let snr = snr_of(&e.id);
         let gray = gray_basis(3).unwrap();
-        let masks = by_information(&uniform(), &grid(3), uniform().noise_std(snr).unwrap(), 8, &gray).unwrap();
+        let masks = by_information(&uniform(), &grid(3), uniform().noise_deviation(snr).unwrap(), 8, &gray).unwrap();
         let extra = e.inputs["extra_mask"].as_u64().unwrap() as Mask;
         assert!(masks.iter().filter(|m| **m == extra).count() >= 5, "{}: {masks:?}", e.id);
         mmse(uniform(), &grid(3), &masks, snr)
@@ -328,7 +328,7 @@ fn figure_5_8(e: &Entry) -> f64 {
     } else {
         (gauss(), gauss_grid())
     };
-    let noise = source.noise_std(snr).unwrap();
+    let noise = source.noise_deviation(snr).unwrap();
     let bank = bank(source, &grid, &gray_basis(3).unwrap(), snr);
     let parts: Vec<&str> = e.id.split('.').collect();
     match (parts[2], parts[3]) {
@@ -372,7 +372,7 @@ fn figure_5_8_gaussian() {
 #[test]
 fn figure_5_9() {
     family("f59.", |e| {
-        let noise = gauss().noise_std(snr_of(&e.id)).unwrap();
+        let noise = gauss().noise_deviation(snr_of(&e.id)).unwrap();
         match e.id.split('.').nth(1).unwrap() {
             "best" => {
                 let best = LinearSearch::with_deviation(gauss(), gauss_grid(), noise, 3)
@@ -390,18 +390,18 @@ fn figure_5_9() {
 }
 
 fn heard(e: &Entry, rule: AdaptiveRule) -> AdaptiveErrors {
-    adaptive(&uniform(), uniform().noise_std(snr_of(&e.id)).unwrap(), 10, rule).unwrap()
+    adaptive(&uniform(), uniform().noise_deviation(snr_of(&e.id)).unwrap(), 10, rule).unwrap()
 }
 
 #[test]
 fn figure_5_10_without_feedback() {
     family("f510.lbqp.", |e| optimum(e, false));
     family("f510.fixed.", |e| {
-        let noise = uniform().noise_std(snr_of(&e.id)).unwrap();
+        let noise = uniform().noise_deviation(snr_of(&e.id)).unwrap();
         fixed_threshold(uniform(), noise, 10).unwrap().mmse().unwrap()
     });
     family("f510.luo.", |e| {
-        let luo = Luo::new(uniform(), uniform().noise_std(snr_of(&e.id)).unwrap(), 3, 10).unwrap();
+        let luo = Luo::new(uniform(), uniform().noise_deviation(snr_of(&e.id)).unwrap(), 3, 10).unwrap();
         assert_eq!(serde_json::json!(luo.allocation()), e.inputs["alloc"]);
         luo.errors().unwrap().soft
     });
@@ -410,7 +410,7 @@ fn figure_5_10_without_feedback() {
 #[test]
 fn figure_5_10_thresholds() {
     family("f510.ribeiro.", |e| {
-        let noise = uniform().noise_std(snr_of(&e.id)).unwrap();
+        let noise = uniform().noise_deviation(snr_of(&e.id)).unwrap();
         let found = multi_threshold_bound(&uniform(), noise, 10).unwrap();
         assert!(found.gap < 3e-4);
         found.bound
@@ -431,7 +431,7 @@ fn figure_5_10_with_feedback() {
 fn free_breakpoints_reach_the_best_known() {
     for e in entries().iter().filter(|e| e.id.starts_with("bp.")) {
         assert_eq!(e.id, "bp.joint.gauss.N3.5p2");
-        let noise = gauss().noise_std(5.2).unwrap();
+        let noise = gauss().noise_deviation(5.2).unwrap();
         let start: Vec<PatternSensor> = [4, 4, 6]
             .iter()
             .map(|&m| {

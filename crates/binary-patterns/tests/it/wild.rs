@@ -2,7 +2,7 @@
 
 use fewbits_binary_patterns::bounds::{centralised_bound, remote_distortion};
 use fewbits_binary_patterns::published::bounded_mle;
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, Bit, Decoder, Grid, PatternSensor, Source};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, Grid, PatternSensor, Source};
 use fewbits_core::{Link, Observation, Scheme, factor::Factor, laws::wild};
 use proptest::prelude::*;
 
@@ -21,7 +21,7 @@ proptest! {
     fn quantizers_and_grids_answer_numbers(x in prop::array::uniform8(wild()), bits in 0..6_usize, count in 0..5_usize) {
         for source in sources(x[0]) {
             prop_assert!(source.variance() >= 0.0 && !source.density(x[1]).is_nan() || x[1].is_nan(), "{:?} {}", source, x[1]);
-            for number in [source.noise_std(x[1]), source.rescaled(x[1]).map(|s| s.scale())].into_iter().flatten() {
+            for number in [source.noise_deviation(x[1]), source.rescaled(x[1]).map(|s| s.scale())].into_iter().flatten() {
                 prop_assert!(!number.is_nan() && number >= 0.0, "{:?} {}: {}", source, x[1], number);
             }
         }
@@ -38,7 +38,7 @@ proptest! {
             prop_assert!(!x[7].is_finite() || (p[0] + p[1] - 1.0).abs() < 1e-9, "{:?} {}: {:?}", sensor, x[7], p);
             prop_assert!(!x[7].is_finite() || !sensor.fisher_information(x[7]).is_nan(), "{:?} {}", sensor, x[7]);
             let link = Link::new(x[0], x[1]).unwrap_or(Link::PERFECT);
-            if let Ok(factor) = sensor.factor(&(), &Observation::Received(Bit(bits % 2 == 0)), &link) {
+            if let Ok(factor) = sensor.factor(&(), &Observation::Received(bits % 2 == 0), &link) {
                 prop_assert!(!x[7].is_finite() || !factor.log_likelihood(&[x[7]].into()).is_nan(), "{:?}", factor);
             }
         }
@@ -72,7 +72,7 @@ proptest! {
             breakpoints.sort_by(f64::total_cmp);
             let Ok(quantizer) = BinaryQuantizer::new(breakpoints) else { continue };
             let Ok(bank) = Bank::homogeneous_with_deviation(source, vec![quantizer; count], x[1]) else { continue };
-            let seen: Vec<_> = (0..count).map(|i| if i == 0 { Observation::Received(Bit(true)) } else { Observation::Nothing }).collect();
+            let seen: Vec<_> = (0..count).map(|i| if i == 0 { Observation::Received(true) } else { Observation::Nothing }).collect();
             for number in [bank.mmse(), bank.mse(Decoder::Mmse), bank.posterior_mean(&seen), bank.posterior_squared_error(&seen, x[5])].into_iter().flatten() {
                 prop_assert!(!number.is_nan(), "{:?} {:?}", x, number);
             }

@@ -34,7 +34,7 @@ impl<const D: usize> ImputedBelief<D> {
     pub fn new(start: &Gaussian<D>, sensors: usize, particles: usize) -> Result<Self, Error> {
         let mut cloud = GaussianCloud::agreed(start, particles)?;
         let side = (0..particles * sensors * D).map(|c| start.mean()[c % D]).collect();
-        *cloud.means_mut() = cloud.means().clone().with_side(side)?;
+        *cloud.means_mut() = cloud.means().clone().with_auxiliary(side)?;
         Ok(Self {
             own: vec![OwnRecursion::new(start); sensors],
             cloud,

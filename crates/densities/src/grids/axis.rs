@@ -1,7 +1,8 @@
 //! Uniform nodes on a line.
 
 use crate::Error;
-use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_numerics::error::{finite, positive, refuse};
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Uniform nodes of a trapezoid rule.
@@ -15,27 +16,18 @@ pub struct Grid {
     points: usize,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Deserialize)]
-#[serde(rename = "Grid", deny_unknown_fields)]
-struct Stored {
+stored! { #[serde(rename = "Grid")] Grid as Stored {
     #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
     #[serde(with = "fewbits_numerics::stored")]
     spacing: f64,
     points: usize,
-}
-
-impl TryFrom<Stored> for Grid {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        if !(2..=MOST).contains(&stored.points) {
-            return Err(ArgumentError::new("points", stored.points, format!("2 to {MOST} nodes")).into());
-        }
-        Self::of_nodes(finite("lower", stored.lower)?, stored.spacing, stored.points)
+} => {
+    if !(2..=MOST).contains(&points) {
+        return refuse("points", points, format!("2 to {MOST} nodes"));
     }
-}
+    Grid::of_nodes(finite("lower", lower)?, spacing, points)
+}, Error }
 
 /// Most nodes of a grid.
 const MOST: usize = 1_000_000;
@@ -54,7 +46,7 @@ impl Grid {
         let farthest = lower.abs().max(grid.node(points).abs());
         if !(spacing * points as f64 <= WIDEST && spacing >= f64::MIN_POSITIVE && farthest / spacing <= 1e300) {
             let expected = "a spacing that keeps the grid below 1e153 and above the rounding of its reciprocal";
-            return Err(ArgumentError::new("spacing", format!("{spacing} from {lower}"), expected).into());
+            return refuse("spacing", format!("{spacing} from {lower}"), expected);
         }
         Ok(grid)
     }
@@ -71,7 +63,7 @@ impl Grid {
         let intervals = ((upper - lower) / spacing).ceil();
         if !(1.0..MOST as f64).contains(&intervals) {
             let expected = "an interval that holds 1 to a million spacings";
-            return Err(ArgumentError::new("grid", format!("[{lower}, {upper}] by {spacing}"), expected).into());
+            return refuse("grid", format!("[{lower}, {upper}] by {spacing}"), expected);
         }
         Self::of_nodes(lower, spacing, intervals as usize + 1)
     }

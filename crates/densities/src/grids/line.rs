@@ -4,8 +4,9 @@ use super::axis::Grid;
 use crate::Error;
 use crate::particles::weights::Categorical;
 use fewbits_core::{Belief, ColumnsMut, Density, Likelihood};
-use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_numerics::error::{entries, finite, positive, refuse};
 use fewbits_numerics::normal::log_pdf_with;
+use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -20,23 +21,11 @@ pub struct PointMass {
     density: Vec<f64>,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Deserialize)]
-#[serde(rename = "PointMass", deny_unknown_fields)]
-struct Stored {
+stored! { #[serde(rename = "PointMass")] PointMass as Stored {
     grid: Grid,
     #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
-}
-
-impl TryFrom<Stored> for PointMass {
-    type Error = Error;
-
-    fn try_from(Stored { grid, density }: Stored) -> Result<Self, Error> {
-        check_density(&density, grid.points(), grid.spacing())?;
-        Ok(Self { grid, density })
-    }
-}
+} => check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density }), Error }
 
 /// Densities at `nodes` nodes of the given volume each: finite, non-negative, integrating to one.
 pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Result<(), Error> {
@@ -44,7 +33,7 @@ pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Resul
     let total = density.iter().sum::<f64>() * volume;
     if bad.is_some() || density.len() != nodes || (total - 1.0).abs() > 1e-9 {
         let text = format!("{} numbers with integral {total}", density.len());
-        return Err(ArgumentError::new("density", text, format!("{nodes} densities that integrate to 1")).into());
+        return refuse("density", text, format!("{nodes} densities that integrate to 1"));
     }
     Ok(())
 }
@@ -154,10 +143,7 @@ impl PointMass {
     /// # Errors
     /// A table of wrong length; [`fewbits_core::Error::Impossible`], which leaves the belief as it was.
     pub fn reweight(&mut self, likelihood: &[f64]) -> Result<f64, Error> {
-        if likelihood.len() != self.density.len() {
-            let expected = "one value per node";
-            return Err(ArgumentError::new("likelihood", format!("{} values", likelihood.len()), expected).into());
-        }
+        entries("likelihood", likelihood.len(), self.density.len())?;
         let sum: f64 = self.density.iter().zip(likelihood).map(|(p, l)| p * l).sum();
         let evidence = sum * self.grid.spacing();
         if !evidence.is_finite() {

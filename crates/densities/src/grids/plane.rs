@@ -6,7 +6,8 @@ use crate::Error;
 use crate::particles::weights::Categorical;
 use fewbits_core::columns::{count, set_state};
 use fewbits_core::{Belief, ColumnsMut, Density, Gaussian, Likelihood};
-use fewbits_numerics::error::{ArgumentError, all_finite};
+use fewbits_numerics::error::{ArgumentError, all_finite, refuse};
+use fewbits_numerics::stored;
 use nalgebra::{Cholesky, Matrix2, Vector2};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -31,40 +32,30 @@ pub struct PlaneMass {
     density: Vec<f64>,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Deserialize)]
-#[serde(rename = "PlaneMass", deny_unknown_fields)]
-struct Stored {
+stored! { #[serde(rename = "PlaneMass")] PlaneMass as Stored {
     #[serde(with = "fewbits_numerics::stored")]
     basis: Matrix2<f64>,
     first: [i64; 2],
     size: [usize; 2],
     #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
-}
-
-impl TryFrom<Stored> for PlaneMass {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        let mut mass = Self::empty(&stored.basis, stored.first, stored.size)?;
-        check_density(&stored.density, mass.density.len(), mass.area())?;
-        mass.density = stored.density;
-        Ok(mass)
-    }
-}
+} => {
+    let mass = PlaneMass::empty(&basis, first, size)?;
+    check_density(&density, mass.density.len(), mass.area())?;
+    Ok(PlaneMass { density, ..mass })
+}, Error }
 
 impl PlaneMass {
     fn empty(basis: &Matrix2<f64>, first: [i64; 2], size: [usize; 2]) -> Result<Self, Error> {
         all_finite("basis", basis.as_slice())?;
         // Densities are at most one over the area of a node.
         if !basis.determinant().is_normal() {
-            return Err(ArgumentError::new("basis", format!("{basis:?}"), "a regular matrix").into());
+            return refuse("basis", format!("{basis:?}"), "a regular matrix");
         }
         let nodes = size[0].saturating_mul(size[1]);
         if nodes == 0 || nodes > MOST_NODES || first.iter().any(|n| n.unsigned_abs() > 1 << 50) {
             let text = format!("{} x {} nodes", size[0], size[1]);
-            return Err(ArgumentError::new("belief", text, "a belief that a million nodes can hold").into());
+            return refuse("belief", text, "a belief that a million nodes can hold");
         }
         Ok(Self {
             basis: *basis,

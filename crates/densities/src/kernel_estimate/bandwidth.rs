@@ -2,8 +2,7 @@
 
 use crate::Error;
 use crate::particles::Particles;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{non_negative, positive};
+use fewbits_numerics::error::{non_negative, positive, refuse};
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -129,7 +128,7 @@ impl Bandwidth {
         let floor = (self.floor * self.floor).max(RELATIVE_FLOOR * largest);
         if floor == 0.0 {
             let expected = "particles that do not all coincide, or a bandwidth with a floor";
-            return Err(ArgumentError::new("particles", "a sample without spread", expected).into());
+            return refuse("particles", "a sample without spread", expected);
         }
         for k in 0..D {
             // Raising a diagonal keeps a matrix positive semidefinite.
@@ -149,7 +148,7 @@ impl Bandwidth {
     /// Per axis `x <- m + sqrt(1 - H_kk / C_kk) (x - m)`; an axis narrower than its kernel collapses to the mean.
     ///
     /// # Errors
-    /// Never for particles and a kernel of this rule.
+    /// If a shrunk coordinate is not finite: not for a kernel of this rule.
     pub fn shrunk<const D: usize>(
         &self,
         particles: &Particles<D>,

@@ -11,10 +11,11 @@ use crate::mixture::{Component, Mixture};
 use crate::particles::Particles;
 use crate::particles::weights::systematic;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::normal::LN_SQRT_2PI;
+use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -187,7 +188,7 @@ impl<const D: usize> KernelEstimate<D> {
     /// The same density as a mixture, one component per particle of positive weight.
     ///
     /// # Errors
-    /// Never for a valid estimate.
+    /// If the kernel is not positive definite: not for an estimate that was formed.
     pub fn to_mixture(&self) -> Result<Mixture<D>, Error> {
         let components = (0..self.len()).filter(|i| self.particles.weights()[*i] > 0.0).map(|i| {
             let centre = SVector::from_fn(|d, _| self.particles.columns()[d][i]);
@@ -232,13 +233,7 @@ fn whitened<const D: usize>(
 }
 
 impl<const D: usize> Belief<D> for KernelEstimate<D> {
-    fn mean(&self) -> SVector<f64, D> {
-        self.mean()
-    }
-
-    fn covariance(&self) -> SMatrix<f64, D, D> {
-        self.covariance()
-    }
+    crate::own_moments!();
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
         if !fewbits_core::columns::columns_agree(&mut states) {
@@ -256,50 +251,16 @@ impl<const D: usize> Belief<D> for KernelEstimate<D> {
 }
 
 impl<const D: usize> Density<D> for KernelEstimate<D> {
-    fn log_density(&self, state: &SVector<f64, D>) -> f64 {
-        self.log_pdf(state)
-    }
-
-    fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
-        let mut own = vec![0.0; logs.len()];
-        self.log_pdf_columns(*states, &mut own);
-        logs.iter_mut().zip(own).for_each(|(log, x)| *log += x);
-    }
+    crate::own_log_pdf!();
 }
 
-/// The plain form in which an estimate is stored.
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-struct Stored<const D: usize> {
-    particles: Particles<D>,
+stored! { [const D: usize] KernelEstimate as Stored |estimate| {
     #[serde(with = "fewbits_numerics::stored")]
-    kernel: Vec<Vec<f64>>,
-}
-
-impl<const D: usize> From<KernelEstimate<D>> for Stored<D> {
-    fn from(estimate: KernelEstimate<D>) -> Self {
-        Self {
-            kernel: (0..D)
-                .map(|i| estimate.kernel.row(i).iter().copied().collect())
-                .collect(),
-            particles: estimate.particles,
-        }
+    kernel: Vec<Vec<f64>> = (0..D).map(|i| estimate.kernel.row(i).iter().copied().collect()).collect(),
+    particles: Particles<D> = estimate.particles,
+} => {
+    if kernel.len() != D || kernel.iter().any(|row| row.len() != D) {
+        return refuse("kernel", "of another shape", format!("{D} by {D} numbers"));
     }
-}
-
-impl<const D: usize> TryFrom<Stored<D>> for KernelEstimate<D> {
-    type Error = Error;
-
-    fn try_from(stored: Stored<D>) -> Result<Self, Error> {
-        if stored.kernel.len() != D || stored.kernel.iter().any(|row| row.len() != D) {
-            return Err(fewbits_numerics::ArgumentError::new(
-                "kernel",
-                "of another shape",
-                format!("{D} by {D} numbers"),
-            )
-            .into());
-        }
-        let kernel = SMatrix::from_fn(|i, j| stored.kernel[i][j]);
-        Self::new(stored.particles, kernel)
-    }
-}
+    KernelEstimate::new(particles, SMatrix::from_fn(|i, j| kernel[i][j]))
+}, Error }

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use fewbits_core::Gaussian;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::factored::Factored;
 use nalgebra::SVector;
 
@@ -11,7 +11,7 @@ fn level(value: f64) -> Result<f64, Error> {
     if value > 0.0 && value < 1.0 {
         Ok(value)
     } else {
-        Err(ArgumentError::new("level", value, "a number above 0 and below 1").into())
+        refuse("level", value, "a number above 0 and below 1")
     }
 }
 

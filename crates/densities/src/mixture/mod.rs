@@ -10,10 +10,10 @@ use crate::Error;
 use crate::particles::Particles;
 use crate::particles::weights::systematic;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density, Gaussian};
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::LogSum;
+use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::kernels::{scalar, vectorised};
 use fewbits_numerics::normal;
-use fewbits_numerics::{ArgumentError, LogSum};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ impl<const D: usize> Mixture<D> {
         at_least_one("components", components.len())?;
         let total: f64 = components.iter().map(|c| c.weight).sum();
         if !(total > 0.0 && total.is_finite()) {
-            return Err(ArgumentError::new("weights", format!("a sum of {total}"), "a finite sum above 0").into());
+            return refuse("weights", format!("a sum of {total}"), "a finite sum above 0");
         }
         let mut components = components;
         for c in &mut components {
@@ -157,7 +157,7 @@ impl<const D: usize> Mixture<D> {
     pub fn marginal<const K: usize>(&self, axes: [usize; K]) -> Result<Mixture<K>, Error> {
         for (i, axis) in axes.iter().enumerate() {
             if *axis >= D || axes[..i].contains(axis) {
-                return Err(ArgumentError::new("axes", format!("{axes:?}"), format!("different axes below {D}")).into());
+                return refuse("axes", format!("{axes:?}"), format!("different axes below {D}"));
             }
         }
         let components = self.components.iter().map(|c| {
@@ -211,13 +211,7 @@ fn log_sum_rows(terms: &[f64], out: &mut [f64]) {
 }
 
 impl<const D: usize> Belief<D> for Mixture<D> {
-    fn mean(&self) -> SVector<f64, D> {
-        self.mean()
-    }
-
-    fn covariance(&self) -> SMatrix<f64, D, D> {
-        self.covariance()
-    }
+    crate::own_moments!();
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
         if !fewbits_core::columns::columns_agree(&mut states) {
@@ -232,15 +226,7 @@ impl<const D: usize> Belief<D> for Mixture<D> {
 }
 
 impl<const D: usize> Density<D> for Mixture<D> {
-    fn log_density(&self, state: &SVector<f64, D>) -> f64 {
-        self.log_pdf(state)
-    }
-
-    fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
-        let mut own = vec![0.0; logs.len()];
-        self.log_pdf_columns(*states, &mut own);
-        logs.iter_mut().zip(own).for_each(|(log, x)| *log += x);
-    }
+    crate::own_log_pdf!();
 }
 
 impl Mixture<1> {
@@ -295,7 +281,7 @@ impl<const D: usize> TryFrom<Stored> for Mixture<D> {
             || !stored.covariances.iter().all(square)
         {
             let expected = format!("{n} means of {D} and {n} covariances of {D} by {D} numbers");
-            return Err(ArgumentError::new("means", "of another shape", expected).into());
+            return refuse("means", "of another shape", expected);
         }
         let components = (0..n).map(|k| {
             let mean = SVector::from_fn(|i, _| stored.means[k][i]);

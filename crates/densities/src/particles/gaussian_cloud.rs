@@ -5,6 +5,7 @@ use super::weights::Categorical;
 use crate::Error;
 use fewbits_core::columns::{count, set_state, state_at};
 use fewbits_core::{Belief, ColumnsMut, Gaussian};
+use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -19,22 +20,11 @@ pub struct GaussianCloud<const D: usize> {
     covariance: SMatrix<f64, D, D>,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Deserialize)]
-#[serde(rename = "GaussianCloud", deny_unknown_fields)]
-struct Stored<const D: usize> {
+stored! { #[serde(rename = "GaussianCloud")] [const D: usize] GaussianCloud as Stored {
     means: Particles<D>,
     #[serde(with = "fewbits_numerics::stored")]
     covariance: SMatrix<f64, D, D>,
-}
-
-impl<const D: usize> TryFrom<Stored<D>> for GaussianCloud<D> {
-    type Error = Error;
-
-    fn try_from(stored: Stored<D>) -> Result<Self, Error> {
-        Self::new(stored.means, stored.covariance)
-    }
-}
+} => GaussianCloud::new(means, covariance), Error }
 
 impl<const D: usize> GaussianCloud<D> {
     /// Gaussians of one covariance around the given means.

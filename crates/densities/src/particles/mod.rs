@@ -10,7 +10,7 @@ pub use weights::Categorical;
 use crate::Error;
 use fewbits_core::{Belief, Columns, ColumnsMut};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, at_least_one};
+use fewbits_numerics::error::{all_finite, at_least_one, entries, refuse};
 use fewbits_numerics::kernels::{dot, weighted_covariance};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
@@ -24,7 +24,7 @@ use weights::{gather_rows, normalise};
 /// inner loops run over plain slices, no weight underflows on the way, and one exponential a particle is paid where the
 /// weights change. They change only through [`reweigh`](Self::reweigh), which either succeeds or leaves the belief as it was.
 ///
-/// Beside its state a particle may carry a row of numbers of its own ([`with_side`](Self::with_side)), which is selected with
+/// Beside its state a particle may carry a row of numbers of its own ([`with_auxiliary`](Self::with_auxiliary)), which is selected with
 /// it: what a sensor estimates under the particle's history, a label, a statistic.
 ///
 /// ```
@@ -41,8 +41,8 @@ pub struct Particles<const D: usize> {
     log_weights: Vec<f64>,
     weights: Vec<f64>,
     effective_sample_size: f64,
-    /// One row of `side.len() / len` numbers per particle.
-    side: Vec<f64>,
+    /// One row of `auxiliary.len() / len` numbers per particle.
+    auxiliary: Vec<f64>,
     /// Room for a column or for weights under construction, so that no step allocates.
     scratch: Vec<f64>,
 }
@@ -55,16 +55,12 @@ impl<const D: usize> Particles<D> {
     /// zero.
     pub fn new(columns: [Vec<f64>; D], log_weights: &[f64]) -> Result<Self, Error> {
         if let Some(bad) = log_weights.iter().find(|w| w.is_nan() || **w == f64::INFINITY) {
-            return Err(ArgumentError::new("log_weights", bad, "log weights below infinity").into());
+            return refuse("log_weights", bad, "log weights below infinity");
         }
         let mut belief = Self::uniform(columns)?;
         if belief.len() != log_weights.len() {
-            return Err(ArgumentError::new(
-                "log_weights",
-                format!("{} numbers", log_weights.len()),
-                format!("{}, one per particle", belief.len()),
-            )
-            .into());
+            let given = format!("{} numbers", log_weights.len());
+            return refuse("log_weights", given, format!("{}, one per particle", belief.len()));
         }
         belief.reweigh(|_, own| own.copy_from_slice(log_weights))?;
         Ok(belief)
@@ -78,14 +74,7 @@ impl<const D: usize> Particles<D> {
         let count = columns.first().map_or(0, Vec::len);
         at_least_one("particles", count)?;
         for column in &columns {
-            if column.len() != count {
-                return Err(ArgumentError::new(
-                    "columns",
-                    format!("a column of length {}", column.len()),
-                    format!("length {count}, as the first column"),
-                )
-                .into());
-            }
+            entries("columns", column.len(), count)?;
             all_finite("columns", column)?;
         }
         let mut belief = Self {
@@ -93,7 +82,7 @@ impl<const D: usize> Particles<D> {
             log_weights: Vec::with_capacity(count),
             weights: Vec::with_capacity(count),
             effective_sample_size: 0.0,
-            side: Vec::new(),
+            auxiliary: Vec::new(),
             scratch: Vec::with_capacity(count),
         };
         belief.equalise(count);
@@ -125,33 +114,33 @@ impl<const D: usize> Particles<D> {
         Self::uniform(columns)
     }
 
-    /// The same particles, each with a row of numbers of its own; `side` holds the rows one after the other.
+    /// The same particles, each with a row of numbers of its own; `auxiliary` holds the rows one after the other.
     ///
     /// # Errors
-    /// If the length of `side` is no multiple of the number of particles, or an entry is not finite.
-    pub fn with_side(mut self, side: Vec<f64>) -> Result<Self, Error> {
-        all_finite("side", &side)?;
-        if !side.len().is_multiple_of(self.len()) {
+    /// If the length of `auxiliary` is no multiple of the number of particles, or an entry is not finite.
+    pub fn with_auxiliary(mut self, auxiliary: Vec<f64>) -> Result<Self, Error> {
+        all_finite("auxiliary", &auxiliary)?;
+        if !auxiliary.len().is_multiple_of(self.len()) {
             let expected = format!("rows of equal length for {} particles", self.len());
-            return Err(ArgumentError::new("side", format!("{} numbers", side.len()), expected).into());
+            return refuse("auxiliary", format!("{} numbers", auxiliary.len()), expected);
         }
-        self.side = side;
+        self.auxiliary = auxiliary;
         Ok(self)
     }
 
     /// Numbers beside each particle's state.
-    pub fn side_width(&self) -> usize {
-        self.side.len() / self.len()
+    pub fn auxiliary_width(&self) -> usize {
+        self.auxiliary.len() / self.len()
     }
 
     /// The numbers beside all states, one row after the other.
-    pub fn side(&self) -> &[f64] {
-        &self.side
+    pub fn auxiliary(&self) -> &[f64] {
+        &self.auxiliary
     }
 
-    /// Coordinates and side rows for work in place. Finite numbers must stay finite.
+    /// Coordinates and auxiliary rows for work in place. Finite numbers must stay finite.
     pub fn parts_mut(&mut self) -> (ColumnsMut<'_, D>, &mut [f64]) {
-        (self.columns.each_mut().map(Vec::as_mut_slice), &mut self.side)
+        (self.columns.each_mut().map(Vec::as_mut_slice), &mut self.auxiliary)
     }
 
     /// Number of particles, at least one.
@@ -217,7 +206,7 @@ impl<const D: usize> Particles<D> {
     /// If there is no index, or one is not below [`len`](Self::len); the belief is then as it was.
     pub fn select(&mut self, ancestors: &[u32]) -> Result<(), Error> {
         self.check(ancestors)?;
-        let width = self.side_width();
+        let width = self.auxiliary_width();
         for column in &mut self.columns {
             self.scratch.clear();
             self.scratch.extend(ancestors.iter().map(|a| column[*a as usize]));
@@ -225,8 +214,8 @@ impl<const D: usize> Particles<D> {
         }
         if width > 0 {
             self.scratch.clear();
-            gather_rows(&self.side, width, ancestors, &mut self.scratch);
-            std::mem::swap(&mut self.side, &mut self.scratch);
+            gather_rows(&self.auxiliary, width, ancestors, &mut self.scratch);
+            std::mem::swap(&mut self.auxiliary, &mut self.scratch);
         }
         self.equalise(ancestors.len());
         Ok(())
@@ -242,8 +231,8 @@ impl<const D: usize> Particles<D> {
             column.clear();
             column.extend(ancestors.iter().map(|a| from[*a as usize]));
         }
-        self.side.clear();
-        gather_rows(&source.side, source.side_width(), ancestors, &mut self.side);
+        self.auxiliary.clear();
+        gather_rows(&source.auxiliary, source.auxiliary_width(), ancestors, &mut self.auxiliary);
         self.equalise(ancestors.len());
         Ok(())
     }
@@ -254,7 +243,7 @@ impl<const D: usize> Particles<D> {
         // A maximum runs in vector registers, a search does not.
         let largest = ancestors.iter().fold(0, |largest: u32, a| largest.max(*a));
         if largest as usize >= count {
-            return Err(ArgumentError::new("ancestors", largest, format!("indices below {count}")).into());
+            return refuse("ancestors", largest, format!("indices below {count}"));
         }
         Ok(())
     }
@@ -301,7 +290,7 @@ impl<const D: usize> Clone for Particles<D> {
             log_weights: self.log_weights.clone(),
             weights: self.weights.clone(),
             effective_sample_size: self.effective_sample_size,
-            side: self.side.clone(),
+            auxiliary: self.auxiliary.clone(),
             scratch: Vec::with_capacity(self.len()),
         }
     }
@@ -311,25 +300,19 @@ impl<const D: usize> Clone for Particles<D> {
         self.log_weights.clone_from(&other.log_weights);
         self.weights.clone_from(&other.weights);
         self.effective_sample_size = other.effective_sample_size;
-        self.side.clone_from(&other.side);
+        self.auxiliary.clone_from(&other.auxiliary);
     }
 }
 
-/// Equality of the belief: columns, weights and side rows.
+/// Equality of the belief: columns, weights and auxiliary rows.
 impl<const D: usize> PartialEq for Particles<D> {
     fn eq(&self, other: &Self) -> bool {
-        self.columns == other.columns && self.log_weights == other.log_weights && self.side == other.side
+        self.columns == other.columns && self.log_weights == other.log_weights && self.auxiliary == other.auxiliary
     }
 }
 
 impl<const D: usize> Belief<D> for Particles<D> {
-    fn mean(&self) -> SVector<f64, D> {
-        self.mean()
-    }
-
-    fn covariance(&self) -> SMatrix<f64, D, D> {
-        self.covariance()
-    }
+    crate::own_moments!();
 
     /// Each draw is a particle, chosen by its weight.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
@@ -354,7 +337,7 @@ impl<const D: usize> From<Particles<D>> for StoredParticles {
             belief.weights,
             &belief.log_weights,
             belief.effective_sample_size,
-            belief.side,
+            belief.auxiliary,
         )
     }
 }
@@ -363,11 +346,11 @@ impl<const D: usize> TryFrom<StoredParticles> for Particles<D> {
     type Error = Error;
 
     fn try_from(stored: StoredParticles) -> Result<Self, Error> {
-        let (columns, weights, log_weights, effective, side) = stored.parts()?;
+        let (columns, weights, log_weights, effective, auxiliary) = stored.parts()?;
         let columns = columns.try_into().map_err(|columns: Vec<Vec<f64>>| {
             ArgumentError::new("columns", format!("{} columns", columns.len()), format!("{D} columns"))
         })?;
-        let mut belief = Self::new(columns, &log_weights)?.with_side(side)?;
+        let mut belief = Self::new(columns, &log_weights)?.with_auxiliary(auxiliary)?;
         // As it was stored, to the last bit.
         if weights.windows(2).all(|pair| pair[0] == pair[1]) {
             belief.equalise(weights.len());

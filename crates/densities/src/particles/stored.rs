@@ -1,10 +1,10 @@
 //! Particles as they are stored.
 
 use crate::Error;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use serde::{Deserialize, Serialize};
 
-/// Columns, weights with their logarithms (of which a weight of zero has none: JSON has no infinity) and side rows.
+/// Columns, weights with their logarithms (of which a weight of zero has none: JSON has no infinity) and auxiliary rows.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename = "Particles", deny_unknown_fields)]
 pub(crate) struct StoredParticles {
@@ -21,10 +21,10 @@ pub(crate) struct StoredParticles {
     effective_sample_size: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[serde(with = "fewbits_numerics::stored")]
-    side: Vec<f64>,
+    auxiliary: Vec<f64>,
 }
 
-/// Columns, weights, log weights, effective sample size, side rows.
+/// Columns, weights, log weights, effective sample size, auxiliary rows.
 type Parts = (Vec<Vec<f64>>, Vec<f64>, Vec<f64>, Option<f64>, Vec<f64>);
 
 impl StoredParticles {
@@ -34,7 +34,7 @@ impl StoredParticles {
         weights: Vec<f64>,
         log_weights: &[f64],
         effective_sample_size: f64,
-        side: Vec<f64>,
+        auxiliary: Vec<f64>,
     ) -> Self {
         let equal = log_weights.windows(2).all(|pair| pair[0] == pair[1]);
         let stored = |w: &f64| w.is_finite().then_some(*w);
@@ -47,7 +47,7 @@ impl StoredParticles {
                 log_weights.iter().map(stored).collect()
             },
             effective_sample_size: (!equal).then_some(effective_sample_size),
-            side,
+            auxiliary,
         }
     }
 
@@ -65,15 +65,15 @@ impl StoredParticles {
         let agree = |(log, w): (&f64, &f64)| (log.exp() - w).abs() <= 1e-9;
         if log_weights.len() != self.weights.len() || !log_weights.iter().zip(&self.weights).all(agree) {
             let text = format!("{} numbers", log_weights.len());
-            return Err(ArgumentError::new("log_weights", text, "the logarithms of the weights").into());
+            return refuse("log_weights", text, "the logarithms of the weights");
         }
         let effective = 1.0 / self.weights.iter().map(|w| w * w).sum::<f64>();
         if let Some(bad) = self
             .effective_sample_size
             .filter(|n| (n / effective - 1.0).abs() > 1e-9 || n.is_nan())
         {
-            return Err(ArgumentError::new("effective_sample_size", bad, format!("{effective}")).into());
+            return refuse("effective_sample_size", bad, format!("{effective}"));
         }
-        Ok((self.columns, self.weights, log_weights, self.effective_sample_size, self.side))
+        Ok((self.columns, self.weights, log_weights, self.effective_sample_size, self.auxiliary))
     }
 }

@@ -21,7 +21,7 @@ fn weighted(scale: f64) -> Particles<2> {
     logs[7] = f64::NEG_INFINITY;
     Particles::new([x, y], &logs)
         .unwrap()
-        .with_side((0..120).map(f64::from).collect())
+        .with_auxiliary((0..120).map(f64::from).collect())
         .unwrap()
 }
 
@@ -120,7 +120,10 @@ fn what_is_no_belief_is_refused() {
     assert!(serde_json::from_str::<Particles<1>>(means).is_ok());
     refused(&format!(r#"{{"means":{means},"covariance":[-1.0]}}"#), "covariance");
     refused(r#"{"means":{"columns":[[1.0,2.0]],"weights":[0.7,0.5]},"covariance":[1.0]}"#, "weights");
-    refused(r#"{"means":{"columns":[[1.0,2.0]],"weights":[0.5,0.5],"side":[1.0]},"covariance":[1.0]}"#, "side");
+    refused(
+        r#"{"means":{"columns":[[1.0,2.0]],"weights":[0.5,0.5],"auxiliary":[1.0]},"covariance":[1.0]}"#,
+        "auxiliary",
+    );
     let wrong = r#"{"columns":[[1.0,2.0]],"weights":[0.5,0.5],"log_weights":[0.0,-1.0]}"#;
     refused(&format!(r#"{{"means":{wrong},"covariance":[1.0]}}"#), "log_weights");
     assert!(serde_json::from_str::<Grid>(r#"{"lower":0.0,"spacing":0.0,"points":3}"#).is_err());
@@ -154,10 +157,10 @@ fn selections_carry_side_rows() {
     assert_eq!(belief, before);
     belief.select(&[3, 3, 9]).unwrap();
     assert_eq!(belief.columns()[0], [3.0, 3.0, 9.0]);
-    assert_eq!(belief.side(), [9.0, 10.0, 11.0, 9.0, 10.0, 11.0, 27.0, 28.0, 29.0]);
+    assert_eq!(belief.auxiliary(), [9.0, 10.0, 11.0, 9.0, 10.0, 11.0, 27.0, 28.0, 29.0]);
     assert_eq!((belief.weights(), belief.effective_sample_size()), (&[1.0 / 3.0; 3][..], 3.0));
     let mut copy = Particles::uniform([vec![0.0], vec![0.0]]).unwrap();
     copy.select_from(&before, &[3, 3, 9]).unwrap();
-    assert_eq!((copy.columns(), copy.side()), (belief.columns(), belief.side()));
-    assert!(weighted(1.0).with_side(vec![0.0; 41]).is_err());
+    assert_eq!((copy.columns(), copy.auxiliary()), (belief.columns(), belief.auxiliary()));
+    assert!(weighted(1.0).with_auxiliary(vec![0.0; 41]).is_err());
 }

@@ -104,8 +104,8 @@ fn particles_and_clouds_give_back_what_they_were_made_of() {
     use nalgebra::{Matrix2, Vector2};
     let (x, y, logs) = (vec![1.0, 4.0, -2.0], vec![0.5, -1.5, 3.0], [0.2, -0.7, 1.1]);
     let belief = Particles::new([x.clone(), y.clone()], &logs).unwrap();
-    let mut belief = belief.with_side(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
-    assert_eq!((belief.len(), belief.is_empty(), belief.side_width()), (3, false, 2));
+    let mut belief = belief.with_auxiliary(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
+    assert_eq!((belief.len(), belief.is_empty(), belief.auxiliary_width()), (3, false, 2));
     assert_eq!(
         (belief.columns(), belief.point(2), belief.point(3)),
         ([&x[..], &y[..]], Some(Vector2::new(-2.0, 3.0)), None)
@@ -119,7 +119,7 @@ fn particles_and_clouds_give_back_what_they_were_made_of() {
         (y[1], side[3]) = (-2.5, 7.0);
     }
     belief.columns_mut()[0][0] = 1.5;
-    assert_eq!((belief.columns()[0][0], belief.columns()[1][1], belief.side()[3]), (1.5, -2.5, 7.0));
+    assert_eq!((belief.columns()[0][0], belief.columns()[1][1], belief.auxiliary()[3]), (1.5, -2.5, 7.0));
     assert_ne!(same, belief);
     // About another point the covariance gains the outer product of the gap.
     let gap = Vector2::new(0.3, -1.1);

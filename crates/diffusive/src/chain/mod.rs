@@ -20,8 +20,7 @@ use alternatives::{Alternative, log_evidence, mixed, mixed_fit, most_probable};
 use fewbits_core::{Gaussian, Message};
 use fewbits_densities::Mixture;
 use fewbits_models::SourceModel;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, positive, within};
+use fewbits_numerics::error::{at_least_one, positive, refuse, within};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::Vector2;
 use outcome::failure;
@@ -40,13 +39,13 @@ use outcome::failure;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Search {
-    /// What is known of the position beforehand.
+    /// Prior of the position.
     pub prior: Gaussian<2>,
-    /// Where the source can be at all.
+    /// Box that contains the source.
     pub search: SearchBox,
-    /// What is assumed of the release rate.
+    /// Model of the release rate.
     pub rate: RateModel,
-    /// What travels.
+    /// Form of the messages.
     pub form: Form,
     /// How the next node is chosen.
     pub rule: Rule,
@@ -57,9 +56,9 @@ pub struct Search {
     /// After so many nodes without the determinant falling to a half, the next node is chosen by mutual information whatever the
     /// rule.
     pub stall: Option<usize>,
-    /// How what travels is encoded.
+    /// Encoding of the messages.
     pub wire: Wire,
-    /// How exact posteriors are covered.
+    /// Options of the cells that hold exact posteriors.
     pub cells: CellOptions,
     /// The probability with which a right model may be refused ([`Status::Misfit`]), 1e-3 unless told. `None`: it is never refused.
     pub refusal: Option<f64>,
@@ -104,7 +103,7 @@ impl Search {
 
     /// Runs the search from node `start`; `samples` says what a node measures when it is asked.
     ///
-    /// What can go wrong on the way ends the search with a [`Status`]; errors are for arguments that make no sense.
+    /// A search that fails on the way ends with a [`Status`]. Errors are for invalid arguments.
     ///
     /// # Errors
     /// If `start` does not exist, graph and deployment differ in size, the model has no concentrations at a node, a sample is not
@@ -269,10 +268,10 @@ impl Search {
         }
         if graph.len() != deployment.len() || start >= deployment.len() {
             let expected = format!("a node of a graph of the {} deployed", deployment.len());
-            return Err(ArgumentError::new("start", format!("{start} in a graph of {}", graph.len()), expected).into());
+            return refuse("start", format!("{start} in a graph of {}", graph.len()), expected);
         }
         if models.len() > 1 && self.form != Form::Raw {
-            return Err(ArgumentError::new("form", format!("{:?}", self.form), "Raw with several models").into());
+            return refuse("form", format!("{:?}", self.form), "Raw with several models");
         }
         for (sensor, _) in models.iter() {
             for position in deployment.positions() {

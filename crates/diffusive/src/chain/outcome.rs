@@ -1,4 +1,4 @@
-//! How a search went, and why it ended.
+//! The outcome of a search: its steps, and the reason for its end.
 
 use crate::fit::Fit;
 use crate::posterior::Posterior;
@@ -21,7 +21,7 @@ pub enum Status {
     /// The samples are not what the model says ([`Fit`]): no source at the place and with a rate that are possible causes them in this
     /// medium. Whatever the belief says, do not trust it.
     Misfit,
-    /// What was to travel is no belief any more once it is encoded: the wire's numbers are too coarse.
+    /// The encoded belief does not decode to a belief: the numbers of the wire format are too coarse.
     Undecodable,
     /// The posterior leans on the border of the search box: the source is probably outside.
     OutsideField,
@@ -51,7 +51,7 @@ pub struct Step {
     pub fit: Fit,
 }
 
-/// How a search went.
+/// Outcome of a search.
 #[derive(Debug, Clone)]
 pub struct Outcome<M = Air> {
     /// Why it ended.

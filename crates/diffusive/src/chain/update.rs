@@ -59,7 +59,7 @@ impl Search {
         Ok(None)
     }
 
-    /// What an update of one model multiplies: the prior, the likelihood, and the box that holds the product.
+    /// Prior and likelihood of one model's update, and a box that holds the posterior.
     fn terms<M: SourceModel + Clone>(
         &self,
         alternative: &Alternative<M>,

@@ -3,9 +3,8 @@
 use super::Error;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Categorical;
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::eigen::symmetric_eigen;
-use fewbits_numerics::error::{all_finite, at_least_one, positive};
+use fewbits_numerics::error::{all_finite, at_least_one, positive, refuse};
 use fewbits_numerics::kernels::exp_minus;
 use fewbits_numerics::kernels::{largest, sum};
 use nalgebra::{SMatrix, SVector};
@@ -211,7 +210,7 @@ impl<const D: usize> Cells<D> {
         self.log_evidence
     }
 
-    /// How many densities the cover has cost.
+    /// Number of evaluated densities.
     pub fn evaluations(&self) -> usize {
         self.evaluations
     }
@@ -292,7 +291,7 @@ fn lattice<const D: usize>(
         .iter()
         .try_fold(1_usize, |product, count| product.checked_mul(*count));
     let Some(total) = total.filter(|total| *total <= most) else {
-        return Err(ArgumentError::new("per_axis", format!("{counts:?} cells"), format!("at most {most} cells")).into());
+        return refuse("per_axis", format!("{counts:?} cells"), format!("at most {most} cells"));
     };
     let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(total));
     for i in 0..total {

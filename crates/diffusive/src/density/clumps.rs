@@ -2,8 +2,7 @@
 
 use super::Error;
 use fewbits_core::Columns;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, non_negative};
+use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use nalgebra::{SMatrix, SVector};
 
 /// Weight, mean and covariance of one part of a belief.
@@ -25,12 +24,18 @@ pub struct Clumps<const D: usize> {
 }
 
 impl<const D: usize> Clumps<D> {
-    /// Splits weighted points into at most `count` clumps: again and again the clump whose points spread most (weight times
-    /// largest variance) is cut at its mean across that coordinate. `spread` is what each point adds to the variances, one
-    /// column a coordinate or an empty one: a point may stand for a coordinate that was integrated out.
+    /// Groups weighted points into at most `count` clumps and stores weight, mean and covariance of each.
+    ///
+    /// Starts with one clump. Repeatedly splits the clump with the largest weight times variance (largest over the coordinates,
+    /// each relative to its variance over all points) at its mean along that coordinate.
+    ///
+    /// * `columns`: `D` columns of `n` coordinates.
+    /// * `spread`: per coordinate `n` variances that are added to the clump's, or an empty slice for none. Use it if a point stands
+    ///   for a distribution over that coordinate.
+    /// * `weights`: `n` numbers, zero or positive, of any sum.
     ///
     /// # Errors
-    /// If `count` is zero, lengths differ, or no weight is above zero.
+    /// If `count` is zero, lengths differ, a weight is negative or not finite, or no weight is above zero.
     pub fn new(
         columns: &Columns<'_, D>,
         spread: &Columns<'_, D>,
@@ -41,7 +46,7 @@ impl<const D: usize> Clumps<D> {
         if columns.iter().any(|c| c.len() != weights.len())
             || spread.iter().any(|c| !c.is_empty() && c.len() != weights.len())
         {
-            return Err(ArgumentError::new("columns", "of different lengths", "one number a weight").into());
+            return refuse("columns", "of different lengths", "one number a weight");
         }
         let mut order: Vec<u32> = Vec::with_capacity(weights.len());
         let mut total = 0.0;
@@ -109,7 +114,7 @@ impl<const D: usize> Clumps<D> {
             .sum()
     }
 
-    /// The same, with least variances of fitted components: what the points resolve. Zero sets none.
+    /// Sets the least variance of fitted components along each coordinate: what the points resolve. Zero sets none.
     ///
     /// # Errors
     /// If a variance is negative or not finite.
@@ -126,7 +131,7 @@ struct Cloud<'a, const D: usize> {
     spread: &'a Columns<'a, D>,
     weights: &'a [f64],
     total: f64,
-    /// What makes variances of different coordinates comparable.
+    /// Reciprocal variances of all points, which make variances of different coordinates comparable.
     scale: SVector<f64, D>,
 }
 

@@ -24,17 +24,9 @@ pub enum Error {
     /// The density has no peak of the shape that an approximation needs.
     #[error("no Gaussian peak: {reason}")]
     NoPeak {
-        /// What is wrong with the place where the search ended.
+        /// Reason.
         reason: &'static str,
     },
 }
 
-impl From<fewbits_densities::Error> for Error {
-    fn from(error: fewbits_densities::Error) -> Self {
-        match error {
-            fewbits_densities::Error::Argument(argument) => Self::Argument(argument),
-            fewbits_densities::Error::Core(error) => Self::Core(error),
-            other => Self::Density(other),
-        }
-    }
-}
+fewbits_numerics::lift!(fewbits_densities with Core => Density);

@@ -16,7 +16,7 @@ const SETTLED: f64 = 1e-13;
 /// The peak of a log density and the curvature there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak<const D: usize> {
-    /// Where it is.
+    /// Position of the peak.
     pub mode: SVector<f64, D>,
     /// Log density there.
     pub height: f64,

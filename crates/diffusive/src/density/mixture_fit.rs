@@ -46,6 +46,9 @@ impl MixtureFit {
     }
 }
 
+/// Shares this many nats below the largest are below rounding (4e-18).
+const NEGLIGIBLE_NATS: f64 = 40.0;
+
 impl<const D: usize> Clumps<D> {
     /// A Gaussian mixture of the same mean and covariance, by expectation-maximisation over the clumps.
     ///
@@ -103,6 +106,8 @@ impl<const D: usize> Clumps<D> {
             let prepared: Vec<_> = components.iter().map(Prepared::new).collect();
             let mut sums: Vec<Sums<D>> = components.iter().map(|_| Sums::default()).collect();
             let mut mean_log = 0.0;
+            // E step: divide each clump among the components in proportion to weight times exp(expected log density).
+            // The largest logarithm is subtracted first, so that `exp` cannot overflow.
             for clump in &self.clumps {
                 let mut best = f64::NEG_INFINITY;
                 for (log, p) in logs.iter_mut().zip(&prepared) {
@@ -111,7 +116,11 @@ impl<const D: usize> Clumps<D> {
                 }
                 let mut total = 0.0;
                 for log in &mut logs {
-                    *log = if *log > best - 40.0 { (*log - best).exp() } else { 0.0 };
+                    *log = if *log > best - NEGLIGIBLE_NATS {
+                        (*log - best).exp()
+                    } else {
+                        0.0
+                    };
                     total += *log;
                 }
                 mean_log += clump.weight * (best + total.ln());
@@ -121,8 +130,10 @@ impl<const D: usize> Clumps<D> {
                     }
                 }
             }
+            // M step: each component takes the moments of its shares. A component without weight is dropped.
             components = sums.iter().filter_map(|s| s.clump(&floor)).collect();
             logs.truncate(components.len());
+            // Stop: the mean log density rose by at most `tolerance` nats.
             let gained = mean_log - before;
             if gained <= options.tolerance || gained.is_nan() {
                 break;

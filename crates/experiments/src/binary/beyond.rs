@@ -176,7 +176,7 @@ fn free(id: &'static str, name: &'static str, scene: Scene, sensors: usize, jitt
         let sensors: Vec<_> = found
             .sensors
             .iter()
-            .map(|s| (s.quantizer().clone(), s.noise_std()))
+            .map(|s| (s.quantizer().clone(), s.noise_deviation()))
             .collect();
         let outcome = change(format!("free-{id}"), "free thresholds", name.to_owned(), linear.mse, found.mse);
         Ok(designed(outcome, start, None, &sensors))
@@ -192,7 +192,7 @@ fn rules(
 ) -> Job {
     Box::new(move || {
         let source = Source::uniform(1.0)?;
-        let noise = source.noise_std(snr)?;
+        let noise = source.noise_deviation(snr)?;
         let run = |(rule, posterior_mean): (AdaptiveRule, bool)| {
             let errors = adaptive(&source, noise, 10, rule)?;
             Ok::<_, Error>(if posterior_mean { errors.mmse } else { errors.mle })
@@ -249,7 +249,7 @@ fn joint_of_table_6_1() -> Result<Outcome, Error> {
         noise: 0.0,
     };
     let candidates = quantizers(&scene, 1..16, 4)?;
-    let descent = Descent::with_deviations(scene.source, sensors.noise_stds().to_vec(), candidates.clone())?;
+    let descent = Descent::with_deviations(scene.source, sensors.noise_deviations().to_vec(), candidates.clone())?;
     let gray = gray_basis(4)?;
     // The most precise sensors come last, and serve the finest bits well.
     let start: Vec<usize> = gray.iter().cycle().take(8).map(|&m| m as usize - 1).collect();
@@ -258,7 +258,7 @@ fn joint_of_table_6_1() -> Result<Outcome, Error> {
     let found = descent.run(&starts, 40, |_| true)?;
     let masks: Vec<Mask> = found.choice.iter().map(|&c| c as Mask + 1).collect();
     let own = found.choice.iter().map(|&c| candidates[c].clone());
-    let own: Vec<_> = own.zip(sensors.noise_stds().iter().copied()).collect();
+    let own: Vec<_> = own.zip(sensors.noise_deviations().iter().copied()).collect();
     let case = format!("{UNEQUAL}, B=4");
     let outcome = change("joint".into(), "joint pattern and sensor design", case, before, found.mse);
     Ok(designed(outcome, "repeated Gray basis, 40 scattered", Some(&masks), &own))

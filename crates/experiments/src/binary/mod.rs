@@ -65,7 +65,7 @@ impl Scene {
     }
 
     fn new(source: Source, grid: Grid, snr_db: f64) -> Result<Self, Error> {
-        let noise = source.noise_std(snr_db)?;
+        let noise = source.noise_deviation(snr_db)?;
         Ok(Self { source, grid, noise })
     }
 

@@ -3,7 +3,7 @@
 use crate::prelude::*;
 use fewbits_quantizer_design::design::{self, Design};
 use fewbits_quantizer_design::{
-    Channel, Criterion, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, lloyd_max,
+    Channel, Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System, lloyd_max,
 };
 
 pub(super) const MI: Criterion = Criterion::MutualInformation;
@@ -19,8 +19,11 @@ pub(super) fn name(criterion: Criterion) -> &'static str {
 }
 
 /// A standard normal unknown in noise of these standard deviations and this common correlation.
-pub(super) fn scene(sds: &[f64], rho: f64) -> Result<Scene, Error> {
-    Ok(Scene::new(Prior::gaussian_with_deviation(1.0)?, Noise::equicorrelated_with_deviations(sds, rho)?)?)
+pub(super) fn scene(sds: &[f64], rho: f64) -> Result<ObservationModel, Error> {
+    Ok(ObservationModel::new(
+        Prior::gaussian_with_deviation(1.0)?,
+        Noise::equicorrelated_with_deviations(sds, rho)?,
+    )?)
 }
 
 /// The Lloyd-Max quantizer of a normal variable of standard deviation `sd`.
@@ -29,7 +32,11 @@ pub(super) fn lloyd(levels: usize, sd: f64) -> Result<Quantizer, Error> {
 }
 
 /// A Lloyd-Max quantizer at every sensor, scaled as `sd` says.
-pub(super) fn lloyd_system(scene: &Scene, levels: usize, sd: impl Fn(usize) -> f64) -> Result<System, Error> {
+pub(super) fn lloyd_system(
+    scene: &ObservationModel,
+    levels: usize,
+    sd: impl Fn(usize) -> f64,
+) -> Result<System, Error> {
     let quantizers = (0..scene.sensors())
         .map(|n| lloyd(levels, sd(n)))
         .collect::<Result<_, _>>()?;

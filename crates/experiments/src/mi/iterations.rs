@@ -46,7 +46,7 @@ rows! {
 
 fn first_alone(both: &System) -> Result<System, Error> {
     let group = both.groups()[0].clone();
-    Ok(System::new(both.scene().subset(&[0])?, vec![group])?)
+    Ok(System::new(both.model().subset(&[0])?, vec![group])?)
 }
 
 fn step(crossover: f64, [iteration, stage, iter_in_stage]: [usize; 3], both: &System) -> Result<Step, Error> {

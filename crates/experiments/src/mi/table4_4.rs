@@ -7,7 +7,7 @@ use fewbits_numerics::normal;
 use fewbits_quantizer_design::decoder::NeymanPearson;
 use fewbits_quantizer_design::published::{self, Separation};
 use fewbits_quantizer_design::{
-    Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Scene, System, design,
+    Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior, Quantizer, System, design,
 };
 
 const PE: Criterion = Criterion::BayesError;
@@ -57,8 +57,11 @@ rows! {
     }
 }
 
-fn scene(signal: f64, sensors: usize) -> Result<Scene, Error> {
-    Ok(Scene::new(Prior::binary(signal, 0.5)?, Noise::independent_with_deviations(&vec![1.0; sensors])?)?)
+fn scene(signal: f64, sensors: usize) -> Result<ObservationModel, Error> {
+    Ok(ObservationModel::new(
+        Prior::binary(signal, 0.5)?,
+        Noise::independent_with_deviations(&vec![1.0; sensors])?,
+    )?)
 }
 
 fn about(signal: f64, t: f64) -> Result<Quantizer, Error> {

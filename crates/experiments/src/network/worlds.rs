@@ -25,7 +25,7 @@ use fewbits_models::{Ar1, LinearGaussian, LinearSensor, PLANE_POSITION, constant
 use fewbits_network::{BitStar, Clock, Field, Radio, Seconds, SensorId, Setup, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
 use fewbits_protocol::{BoxError, Feedback, Receiver, ReportLength};
-use fewbits_quantizer_design::{Criterion, Newton, Scene, System, design};
+use fewbits_quantizer_design::{Criterion, Newton, ObservationModel, System, design};
 use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
 use nalgebra::{Matrix4, SVector, Vector1, Vector4};
 
@@ -316,7 +316,7 @@ impl World<1, Ar1> {
         }
         let plant = ScalarPlant::new(COEFFICIENT, PROCESS, 1.0)?;
         let (start, deviation) = (self.start, self.start.standard_deviations()[0]);
-        let scene = || Scene::gaussian_with_deviations(deviation, &[1.0; SENSORS]).map_err(Error::failed);
+        let scene = || ObservationModel::gaussian_with_deviations(deviation, &[1.0; SENSORS]).map_err(Error::failed);
         let table = |system: &System, levels: usize| {
             let look_up = LookUp::new(system, 10_000)?;
             let schemes = look_up.schemes().to_vec();

@@ -38,7 +38,7 @@ fn cloud() -> Particles<1> {
     let logs: Vec<f64> = (0..50).map(|i| -0.1 * f64::from(i)).collect();
     Particles::new([(0..50).map(f64::from).collect()], &logs)
         .unwrap()
-        .with_side((0..100).map(f64::from).collect())
+        .with_auxiliary((0..100).map(f64::from).collect())
         .unwrap()
 }
 

@@ -1,4 +1,4 @@
-//! How far two densities are apart: four measures, and what each says about the others.
+//! Four divergences between densities, and the inequalities between them.
 //!
 //! With `f = ln p - ln q`:
 //!
@@ -21,9 +21,8 @@ pub mod quadrature;
 
 use crate::Error;
 use fewbits_core::Gaussian;
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::eigen::symmetric_eigen;
-use fewbits_numerics::error::probabilities;
+use fewbits_numerics::error::{entries, probabilities};
 use fewbits_numerics::factored::Factored;
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
@@ -48,10 +47,7 @@ pub struct Divergence {
 pub fn discrete(p: &[f64], q: &[f64]) -> Result<Divergence, Error> {
     probabilities("p", p)?;
     probabilities("q", q)?;
-    if p.len() != q.len() {
-        let expected = format!("{} probabilities, as `p`", p.len());
-        return Err(ArgumentError::new("q", format!("{} probabilities", q.len()), expected).into());
-    }
+    entries("q", q.len(), p.len())?;
     let (mut kl, mut l1) = (0.0, 0.0);
     let (mut top, mut bottom) = (f64::NEG_INFINITY, f64::INFINITY);
     // Where neither has mass the ratio is NaN, which maximum and minimum pass over.

@@ -3,8 +3,7 @@
 use crate::Error;
 use fewbits_core::Columns;
 use fewbits_densities::Mixture;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::positive;
+use fewbits_numerics::error::{positive, refuse};
 use serde::{Deserialize, Serialize};
 
 /// KL and L1 by quadrature, and the mass that the grid saw of each density: how far it is from one tells how good the grid was.
@@ -46,7 +45,7 @@ impl<const D: usize> QuadratureGrid<D> {
             let intervals = (width / positive("step", step[d])?).ceil().max(1.0);
             nodes *= intervals + 1.0;
             if nodes > MOST_NODES {
-                return Err(ArgumentError::new("step", step[d], format!("steps for at most {MOST_NODES} nodes")).into());
+                return refuse("step", step[d], format!("steps for at most {MOST_NODES} nodes"));
             }
             counts[d] = intervals as usize + 1;
             steps[d] = width / intervals;
@@ -125,7 +124,7 @@ impl<const D: usize> QuadratureGrid<D> {
 /// If `D` is 0 or the grid would need over 5e7 nodes.
 pub fn integrated<const D: usize>(p: &Mixture<D>, q: &Mixture<D>) -> Result<Integrated, Error> {
     if D == 0 {
-        return Err(ArgumentError::new("D", 0, "at least 1").into());
+        return refuse("D", 0, "at least 1");
     }
     let fineness = match D {
         1 => 0.05,

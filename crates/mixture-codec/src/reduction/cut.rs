@@ -4,8 +4,7 @@ use crate::divergence::plug_in::{PlugIn, node_errors};
 use crate::tree::ROOT;
 use crate::{Error, Tree};
 use fewbits_densities::{KernelEstimate, Mixture};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, entries, refuse};
 use fewbits_numerics::factored::half_log_det;
 use serde::{Deserialize, Serialize};
 
@@ -81,17 +80,14 @@ impl NodeErrors {
         plug_in: &[PlugIn],
         criterion: Criterion,
     ) -> Result<Self, Error> {
-        if plug_in.len() != tree.nodes().len() {
-            let expected = format!("{}, one per node", tree.nodes().len());
-            return Err(ArgumentError::new("plug_in", plug_in.len(), expected).into());
-        }
+        entries("plug_in", plug_in.len(), tree.nodes().len())?;
         let nodes = tree.nodes().iter().zip(plug_in);
         let (values, combine) = match criterion {
             Criterion::Ml => (nodes.map(|(_, e)| e.ml_plugin).collect(), Combine::Max),
             Criterion::Kl => (nodes.map(|(n, e)| n.weight * e.kl_plugin.max(0.0)).collect(), Combine::Sum),
             Criterion::L1 => (nodes.map(|(n, e)| n.weight * e.l1_plugin).collect(), Combine::Sum),
             Criterion::LogDeterminant => {
-                return Err(ArgumentError::new("criterion", "LogDeterminant", "ML, KL or L1").into());
+                return refuse("criterion", "LogDeterminant", "ML, KL or L1");
             }
         };
         Ok(Self { values, combine })
@@ -158,7 +154,7 @@ pub fn greedy_within<const D: usize>(
     check(tree, errors)?;
     let mut total = price(ROOT);
     if !matches!(total.partial_cmp(&limit), Some(std::cmp::Ordering::Less | std::cmp::Ordering::Equal)) {
-        return Err(ArgumentError::new("limit", limit, format!("at least {total}, the price of the root")).into());
+        return refuse("limit", limit, format!("at least {total}, the price of the root"));
     }
     // Plug-in errors of inner nodes may be 0 or below by chance: a stop at the worst node would come too early.
     let leaves = leaves(tree);
@@ -271,5 +267,5 @@ fn check<const D: usize>(tree: &Tree<D>, errors: &NodeErrors) -> Result<(), Erro
         return Ok(());
     }
     let expected = format!("errors of {} nodes", tree.nodes().len());
-    Err(ArgumentError::new("errors", format!("errors of {} nodes", errors.values.len()), expected).into())
+    refuse("errors", format!("errors of {} nodes", errors.values.len()), expected)
 }

@@ -2,14 +2,13 @@
 
 use crate::Error;
 use fewbits_densities::{Component, Mixture};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::factored::{Factored, half_log_det};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// What a merge is charged.
+/// Cost of merging a pair of components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum MergeCost {
@@ -89,7 +88,7 @@ pub fn merge<const D: usize>(mixture: &Mixture<D>, components: usize, cost: Merg
     if parts.len() > components {
         // No pair that is left has a finite price.
         let given = format!("{} components that cannot be joined", parts.len());
-        return Err(ArgumentError::new("mixture", given, "components whose joint covariances are finite").into());
+        return refuse("mixture", given, "components whose joint covariances are finite");
     }
     let merged = parts.iter().map(|p| Component::new(p.weight, p.mean, p.covariance));
     Ok(Merged {

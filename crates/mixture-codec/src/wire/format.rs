@@ -1,14 +1,14 @@
-//! What both ends of a link agree on beforehand.
+//! The format that both ends of a link agree on beforehand.
 
 use crate::Error;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, positive};
+use fewbits_numerics::error::{all_finite, entries, positive, refuse};
+use fewbits_numerics::stored;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-/// What both ends of a link know beforehand: where beliefs may lie, in which unit, and how finely they are told.
+/// The format that both ends of a link agree on: range of the means, unit, and resolutions of the quantiser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredFormat", into = "StoredFormat")]
+#[serde(try_from = "StoredFormat<D>", into = "StoredFormat<D>")]
 pub struct WireFormat<const D: usize> {
     pub(super) centre: SVector<f64, D>,
     pub(super) half_width: f64,
@@ -28,7 +28,7 @@ impl<const D: usize> WireFormat<D> {
         positive("half_width", half_width)?;
         positive("unit", unit)?;
         if resolutions.is_empty() || resolutions.len() > 16 {
-            return Err(ArgumentError::new("resolutions", format!("{} numbers", resolutions.len()), "1 to 16").into());
+            return refuse("resolutions", format!("{} numbers", resolutions.len()), "1 to 16");
         }
         for r in resolutions {
             fewbits_numerics::error::within("resolutions", *r, 1e-4, 4.0)?;
@@ -55,38 +55,16 @@ impl<const D: usize> WireFormat<D> {
     }
 }
 
-/// The plain form in which a format is stored.
-#[derive(Serialize, Deserialize)]
-struct StoredFormat {
+stored! { [const D: usize] WireFormat as StoredFormat |format| {
     #[serde(with = "fewbits_numerics::stored")]
-    centre: Vec<f64>,
+    centre: Vec<f64> = format.centre.as_slice().to_vec(),
     #[serde(with = "fewbits_numerics::stored")]
-    half_width: f64,
+    half_width: f64 = format.half_width,
     #[serde(with = "fewbits_numerics::stored")]
-    unit: f64,
+    unit: f64 = format.unit,
     #[serde(with = "fewbits_numerics::stored")]
-    resolutions: Vec<f64>,
-}
-
-impl<const D: usize> From<WireFormat<D>> for StoredFormat {
-    fn from(format: WireFormat<D>) -> Self {
-        Self {
-            centre: format.centre.as_slice().to_vec(),
-            half_width: format.half_width,
-            unit: format.unit,
-            resolutions: format.resolutions,
-        }
-    }
-}
-
-impl<const D: usize> TryFrom<StoredFormat> for WireFormat<D> {
-    type Error = Error;
-
-    fn try_from(stored: StoredFormat) -> Result<Self, Error> {
-        if stored.centre.len() != D {
-            return Err(ArgumentError::new("centre", format!("{:?}", stored.centre), format!("{D} numbers")).into());
-        }
-        let centre = SVector::from_fn(|i, _| stored.centre[i]);
-        Self::new(centre, stored.half_width, stored.unit, &stored.resolutions)
-    }
-}
+    resolutions: Vec<f64> = format.resolutions,
+} => {
+    entries("centre", centre.len(), D)?;
+    WireFormat::new(SVector::from_fn(|i, _| centre[i]), half_width, unit, &resolutions)
+}, Error }

@@ -36,7 +36,7 @@ pub use rate::{RateControl, Rated};
 use crate::Error;
 use fewbits_core::{BitReader, BitWriter, CodecError, Message};
 use fewbits_densities::Mixture;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use range::{Reader, Writer};
 use walk::{Quantiser, Replay, walk};
 
@@ -77,11 +77,11 @@ impl<const D: usize> CodedMixture<D> {
     pub fn new(mixture: &Mixture<D>, format: &WireFormat<D>, resolution: usize) -> Result<Self, Error> {
         let kept = mixture.components().iter().filter(|c| c.weight() > 0.0).count();
         if kept > MOST_COMPONENTS {
-            return Err(ArgumentError::new("mixture", format!("{kept} components"), "at most 63").into());
+            return refuse("mixture", format!("{kept} components"), "at most 63");
         }
         if resolution >= format.resolutions().len() {
             let expected = format!("below {}", format.resolutions().len());
-            return Err(ArgumentError::new("resolution", resolution, expected).into());
+            return refuse("resolution", resolution, expected);
         }
         let mut symbols = Quantiser::default();
         let coded = walk(&mut symbols, format, Some((mixture, resolution)))?;

@@ -13,7 +13,7 @@ const LARGEST_SCALE: f64 = 64.0;
 /// Integers are coded up to this size.
 pub(super) const LARGEST: f64 = 2_147_483_648.0;
 
-/// What the law of one integer is, in steps of its quantiser.
+/// Distribution of one integer, in steps of its quantiser.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Law {
     /// `0..count`.

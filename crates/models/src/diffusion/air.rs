@@ -5,8 +5,7 @@ use super::half_space::{Flux, Wall};
 use super::space::{ImpulseResponse, Space, step_response};
 use crate::Error;
 use crate::source_model::{Homogeneous, Receptor, SourceGradient, SourceModel};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{positive, within};
+use fewbits_numerics::error::{positive, refuse, within};
 use fewbits_numerics::kernels::scalar::exp;
 use fewbits_numerics::normal::erfcx;
 use nalgebra::Vector3;
@@ -20,7 +19,7 @@ const SQRT_PI: f64 = 1.772_453_850_905_516;
 const LARGEST: f64 = 1e60;
 pub(super) const SMALLEST: f64 = 1e-60;
 
-/// What bounds the air below.
+/// Lower boundary of the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ground {
     /// Nothing: the medium is unbounded.
@@ -63,7 +62,7 @@ impl Air {
         let open = |v| Axis::open(diffusivity)?.with_wind(v, Flux::Total);
         let vertical = match ground {
             Ground::None => open(wind.z)?,
-            _ if wind.z != 0.0 => return Err(ArgumentError::new("wind.z", wind.z, "0 above ground").into()),
+            _ if wind.z != 0.0 => return refuse("wind.z", wind.z, "0 above ground"),
             Ground::Impermeable => Axis::half_space(diffusivity, Wall::IMPERMEABLE)?,
             Ground::Wall(wall) => Axis::half_space(diffusivity, wall)?,
         };
@@ -106,7 +105,7 @@ impl Air {
         Self::new(diffusivity, self.wind, self.ground)?.with_closest(self.closest)
     }
 
-    /// What bounds the air below.
+    /// Lower boundary of the air.
     pub fn ground(&self) -> Ground {
         self.ground
     }
@@ -281,7 +280,7 @@ impl Air {
     }
 }
 
-/// What concentration and gradient share.
+/// Quantities used by both the concentration and its gradient.
 struct Terms {
     distance: f64,
     /// `1 / sqrt(4 k t)`.

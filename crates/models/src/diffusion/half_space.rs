@@ -10,7 +10,7 @@ const SQRT_PI: f64 = 1.772_453_850_905_516;
 /// Above this argument `1 - sqrt(pi) x erfcx(x)` comes from its asymptotic series.
 const SERIES_FROM: f64 = 12.0;
 
-/// What a wall does to the substance.
+/// Boundary condition of a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct Wall {
@@ -44,7 +44,7 @@ impl Wall {
     }
 }
 
-/// What the wall law is about where wind blows across the wall.
+/// Quantity in the boundary condition of a wall across which wind blows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Flux {
     /// Diffusion and wind together carry `loss * c` into the wall: no mass appears from nowhere.

@@ -1,8 +1,7 @@
 //! Smooth functions of one distance, tabulated as piecewise polynomials.
 
 use crate::Error;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, positive};
+use fewbits_numerics::error::{at_least_one, positive, refuse};
 use std::f64::consts::PI;
 
 /// Coefficients of each polynomial: degree 9.
@@ -39,7 +38,7 @@ impl<const K: usize> Profile<K> {
                 let r = width * (panel as f64 + 0.5 * (1.0 + node(i)));
                 for (component, value) in values.iter_mut().zip(f(r)) {
                     if !value.is_finite() {
-                        return Err(ArgumentError::new("f", format!("{value} at {r}"), "a finite number").into());
+                        return refuse("f", format!("{value} at {r}"), "a finite number");
                     }
                     component[i] = value;
                 }

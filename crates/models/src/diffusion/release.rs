@@ -2,8 +2,7 @@
 
 use super::integrate::integrate;
 use crate::Error;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, positive};
+use fewbits_numerics::error::{all_finite, positive, refuse};
 
 /// A rate of release that is constant between given instants, and zero before the first and after the last.
 ///
@@ -49,15 +48,15 @@ impl Release {
     pub fn piecewise(edges: Vec<f64>, rates: Vec<f64>) -> Result<Self, Error> {
         if rates.is_empty() || edges.len() != rates.len() + 1 {
             let expected = format!("{} numbers, one more than rates (at least 2)", rates.len() + 1);
-            return Err(ArgumentError::new("edges", format!("{} numbers", edges.len()), expected).into());
+            return refuse("edges", format!("{} numbers", edges.len()), expected);
         }
         let increasing = edges.windows(2).all(|pair| pair[0] < pair[1]) && edges[0].is_finite();
         if !increasing {
-            return Err(ArgumentError::new("edges", format!("{edges:?}"), "increasing instants").into());
+            return refuse("edges", format!("{edges:?}"), "increasing instants");
         }
         all_finite("rates", &rates)?;
         if let Some(rate) = rates.iter().find(|rate| **rate < 0.0) {
-            return Err(ArgumentError::new("rates", rate, "rates of 0 or above").into());
+            return refuse("rates", rate, "rates of 0 or above");
         }
         Ok(Self { edges, rates })
     }

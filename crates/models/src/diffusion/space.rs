@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::integrate::integrate;
 use crate::Error;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use nalgebra::Vector3;
 
 /// The concentration that a unit mass, released at one point at once, causes elsewhere later.
@@ -33,9 +33,7 @@ impl Space {
         let expected = axes[0].diffusivity();
         match axes.iter().find(|axis| axis.diffusivity() != expected) {
             None => Ok(Self { axes }),
-            Some(other) => {
-                Err(ArgumentError::new("diffusivity", other.diffusivity(), format!("{expected} on every axis")).into())
-            }
+            Some(other) => refuse("diffusivity", other.diffusivity(), format!("{expected} on every axis")),
         }
     }
 

@@ -1,4 +1,4 @@
-//! What happens to a frame on the way, and what the receiver may know of it beforehand: loss, inverted bits, delay.
+//! The channel: loss, inverted bits and delay of frames, and the link model that a receiver assumes.
 
 use super::loss::Loss;
 use crate::units::Seconds;
@@ -8,7 +8,7 @@ use fewbits_protocol::Check;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// What the air does to frames. Every frame and receiver is independent of the others, but for the state of [`Loss::Burst`]. Inverted bits are those of
+/// Loss, inverted bits, delay, duplication and reordering of frames. Every frame and receiver is independent of the others, but for the state of [`Loss::Burst`]. Inverted bits are those of
 /// [`Frame`](crate::Frame)s; preambles and link headers are taken to be received.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,4 +1,4 @@
-//! What a transmission costs and what happens to it: positions, radio, channel, bits on air.
+//! The medium: positions of nodes, radios, channels and frames on air.
 
 pub(crate) mod air;
 pub(crate) mod channel;

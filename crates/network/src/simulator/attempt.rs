@@ -3,7 +3,6 @@
 use super::core::{BufferPool, SimulatorCore};
 use super::log::{Detail, Entry, Reception, Transmission};
 use super::queue::Arrival;
-use crate::error::Error;
 use crate::medium::air::{from_air, payload_bits};
 use crate::medium::{Loss, ReceivedCopy, Stored, Transceiver};
 use crate::units::{Bits, Joules, SensorId};
@@ -63,13 +62,9 @@ impl SimulatorCore {
     }
 
     /// Sends once. True if a receiver listened.
-    pub(super) fn attempt(&mut self, attempt: &Attempt<'_>) -> Result<bool, Error> {
+    pub(super) fn attempt(&mut self, attempt: &Attempt<'_>) -> bool {
         let mut pool = std::mem::take(&mut self.pool);
-        let mut receptions = match &mut self.recorded {
-            None => self.draw(attempt, &mut pool),
-            Some(recorded) => replayed(recorded.pop_front(), attempt, self.state.transmissions)?,
-        };
-        self.state.transmissions += 1;
+        let mut receptions = self.draw(attempt, &mut pool);
         let listened = !receptions.is_empty();
         let (sending, receiving) = self.charge(attempt, &receptions);
         self.launch(attempt, &receptions);
@@ -94,7 +89,7 @@ impl SimulatorCore {
         }
         pool.receptions = receptions;
         self.pool = pool;
-        Ok(listened)
+        listened
     }
 
     /// Draws what arrives, at every node that could hear the attempt.
@@ -275,24 +270,4 @@ fn frames_of<'a>(frames: &'a [Stored], copy: &'a ReceivedCopy) -> impl Iterator<
             .filter(|bit| *bit < frame.bits())
             .fold(frame.clone(), BitString::with_flipped)
     })
-}
-
-/// What arrived of the attempt in the run that is replayed.
-fn replayed(recorded: Option<Entry>, attempt: &Attempt<'_>, transmission: usize) -> Result<Vec<Reception>, Error> {
-    let left = |difference| Error::LeftLog {
-        transmission,
-        difference,
-    };
-    let recorded = match recorded {
-        Some(Entry::Sent(recorded)) => recorded,
-        Some(_) => return Err(left("an acknowledgement")),
-        None => return Err(left("the log has ended")),
-    };
-    if (recorded.from, recorded.to, recorded.attempt) != (attempt.from, attempt.to, attempt.before) {
-        return Err(left("sender, receiver or attempt"));
-    }
-    if recorded.frames != attempt.frames {
-        return Err(left("the bits"));
-    }
-    Ok(recorded.receptions)
 }

@@ -1,4 +1,4 @@
-//! What nodes do, and what they may do while they handle an event.
+//! The interface of protocols: event handlers of nodes, and the actions that they may take.
 
 use super::core::{SimulatorCore, Ticket};
 use super::queue::EventKind;
@@ -14,19 +14,19 @@ use serde::{Serialize, de::DeserializeOwned};
 /// Handlers see their own node and the [`Context`], never another node: whatever passes between nodes is bits. An error of a
 /// handler ends the run; what may happen in a faulty network is no error but a [`Note`].
 pub trait Protocol {
-    /// What one node remembers.
+    /// State of one node.
     type Node;
 
     /// A timer has fired that the node set, or that started it.
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn on_timer(&self, node: &mut Self::Node, context: &mut Context<'_>, token: u32) -> Result<(), Error>;
 
     /// A frame has arrived and passed its check.
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn on_frame(
         &self,
         node: &mut Self::Node,
@@ -38,7 +38,7 @@ pub trait Protocol {
     /// A frame has arrived and failed its check. Slots tell who sent it.
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn on_damaged(&self, _: &mut Self::Node, _: &mut Context<'_>, _: SensorId) -> Result<(), Error> {
         Ok(())
     }
@@ -46,7 +46,7 @@ pub trait Protocol {
     /// The acknowledgement of a frame has arrived. Only if the setup has acknowledgements ([`Setup::retries`](crate::Setup::retries)), and never for broadcasts.
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn on_ack(&self, _: &mut Self::Node, _: &mut Context<'_>, _: Ticket) -> Result<(), Error> {
         Ok(())
     }
@@ -55,7 +55,7 @@ pub trait Protocol {
     /// [`on_ack`](Self::on_ack) is called for each acknowledged frame, unless its sender restarts or dies before.
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn on_give_up(&self, _: &mut Self::Node, _: &mut Context<'_>, _: Ticket) -> Result<(), Error> {
         Ok(())
     }
@@ -63,7 +63,7 @@ pub trait Protocol {
     /// The node has lost its memory and begins anew. Timers that it set still fire.
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn on_restart(&self, node: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error>;
 }
 
@@ -92,7 +92,11 @@ pub struct Context<'a> {
     pub(super) node: SensorId,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    pub(super) fn new(core: &'a mut SimulatorCore, node: SensorId) -> Self {
+        Self { core, node }
+    }
+
     /// The node that handles the event.
     pub fn id(&self) -> SensorId {
         self.node
@@ -126,7 +130,7 @@ impl Context<'_> {
     /// [`Error::UnknownNode`], [`Error::SelfLink`], [`Error::OutOfRange`]; if the frame does not fit its format.
     pub fn send(&mut self, to: SensorId, frame: &Frame<'_>) -> Result<Ticket, Error> {
         self.core.field.check_link(self.node, to)?;
-        self.core.submit(self.node, Some(to), frame)
+        Ok(self.core.submit(self.node, Some(to), frame))
     }
 
     /// Sends to a neighbour as soon as the air is free, alone.
@@ -135,7 +139,7 @@ impl Context<'_> {
     /// As [`Context::send`].
     pub fn send_now(&mut self, to: SensorId, frame: &Frame<'_>) -> Result<Ticket, Error> {
         self.core.field.check_link(self.node, to)?;
-        self.core.send(self.node, Some(to), frame)
+        Ok(self.core.send(self.node, Some(to), frame))
     }
 
     /// Sends to all neighbours, perhaps later in a batch. Nobody acknowledges it.
@@ -143,7 +147,8 @@ impl Context<'_> {
     /// # Errors
     /// If the frame does not fit its format.
     pub fn broadcast(&mut self, frame: &Frame<'_>) -> Result<(), Error> {
-        self.core.submit(self.node, None, frame).map(|_| ())
+        self.core.submit(self.node, None, frame);
+        Ok(())
     }
 
     /// Whether frames to one receiver are acknowledged.

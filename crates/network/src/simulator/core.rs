@@ -16,7 +16,7 @@ use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_protocol::{Check, Kind};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 /// Names a frame that a node sent, for [`Protocol::on_ack`](super::Protocol::on_ack) and
 /// [`Protocol::on_give_up`](super::Protocol::on_give_up). No two frames of a run have the same.
@@ -60,11 +60,11 @@ pub(super) struct OnAir {
     pub(super) from: SensorId,
     pub(super) start: Instant,
     pub(super) end: Instant,
-    /// What is on its way: receiver, and place in the queue.
+    /// Arrivals to come: receiver, and place in the queue.
     pub(super) arrivals: Vec<(SensorId, u32)>,
 }
 
-/// What a snapshot holds besides the nodes.
+/// State of the simulator that a snapshot holds besides the nodes.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct State {
@@ -85,8 +85,6 @@ pub(super) struct State {
     #[serde(default)]
     pub(super) on_air: Vec<OnAir>,
     pub(super) bursts: BTreeMap<(SensorId, SensorId), BurstState>,
-    /// Transmissions and acknowledgements so far.
-    pub(super) transmissions: usize,
     pub(super) ledger: Ledger,
     pub(super) log: Log,
 }
@@ -104,8 +102,6 @@ pub(super) struct SimulatorCore {
     pub(super) setup: Setup,
     pub(super) air: Stream,
     pub(super) state: State,
-    /// What happened on air in the run that is replayed.
-    pub(super) recorded: Option<VecDeque<Entry>>,
     pub(super) pool: BufferPool,
 }
 
@@ -127,13 +123,11 @@ impl SimulatorCore {
                 next_ticket: 0,
                 on_air: Vec::new(),
                 bursts: BTreeMap::new(),
-                transmissions: 0,
                 ledger: Ledger::new(nodes),
                 log: Log::default(),
             },
             field,
             setup,
-            recorded: None,
             pool: BufferPool::default(),
         };
         for index in 0..core.setup.faults.len() {

@@ -4,7 +4,7 @@ use crate::medium::Radio;
 use crate::units::{Bits, Instant, Joules, Seconds};
 use serde::{Deserialize, Serialize};
 
-/// What one node spent, without the idle energy.
+/// Bits, energy and time spent by one node, without its idle energy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Account {
@@ -39,7 +39,7 @@ impl Account {
     }
 }
 
-/// What all messages cost together, counted message by message.
+/// Cost of all messages, summed message by message.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Totals {
@@ -55,7 +55,7 @@ pub struct Totals {
     pub receiving: Joules,
 }
 
-/// What went wrong, counted.
+/// Numbers of faults by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Faults {
@@ -103,12 +103,12 @@ impl Ledger {
         &self.accounts
     }
 
-    /// What all messages cost.
+    /// Cost of all messages.
     pub fn messages(&self) -> &Totals {
         &self.messages
     }
 
-    /// What went wrong.
+    /// Numbers of faults by kind.
     pub fn faults(&self) -> &Faults {
         &self.faults
     }

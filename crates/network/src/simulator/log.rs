@@ -1,4 +1,4 @@
-//! The message log: what was sent, what arrived of it, and what the nodes noticed. It can be written, read and replayed.
+//! The message log: what was sent, what arrived of it, and what the nodes noticed. It can be written and read.
 
 use crate::error::Error;
 use crate::medium::{ReceivedCopy, Stored};
@@ -13,14 +13,14 @@ use std::io::{Read, Write};
 pub enum Detail {
     /// Nothing: counters only.
     Nothing,
-    /// What the nodes noticed.
+    /// Notes of the nodes.
     #[default]
     Notes,
-    /// Every transmission too, so that the run can be replayed.
+    /// Every transmission too.
     Everything,
 }
 
-/// What arrived of a transmission at one receiver.
+/// The copies of a transmission that arrived at one receiver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reception {
@@ -48,7 +48,7 @@ pub struct Transmission {
     pub payload: u64,
     /// Bits on air, with preambles and headers.
     pub air: u64,
-    /// What arrived where.
+    /// Arrivals at each receiver.
     pub receptions: Vec<Reception>,
     /// Energy of sending. Listening for an acknowledgement is part of `receiving`.
     pub sending: Joules,
@@ -64,7 +64,7 @@ pub struct Acknowledgement {
     pub at: Instant,
     /// Who acknowledges.
     pub from: SensorId,
-    /// Whose frame.
+    /// Sender of the acknowledged frame.
     pub to: SensorId,
     /// Its bits on air.
     pub air: u64,

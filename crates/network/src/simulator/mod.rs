@@ -27,7 +27,7 @@ use crate::medium::air::from_air;
 use crate::note::Note;
 use crate::units::{Instant, Joules, Seconds, SensorId};
 use fewbits_core::BitString;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::entries;
 use fewbits_protocol::Frame;
 use log::{unreadable, unwritable};
 use queue::{Arrival, Event, EventKind};
@@ -52,10 +52,7 @@ impl<P: Protocol> Simulator<P> {
     /// If numbers of the setup are out of range, a fault befalls a node that does not exist, or there is not one state for each
     /// node.
     pub fn new(protocol: P, nodes: Vec<P::Node>, field: Field, setup: Setup) -> Result<Self, Error> {
-        if nodes.len() != field.len() {
-            let expected = format!("{}, one per node of the field", field.len());
-            return Err(ArgumentError::new("nodes", nodes.len(), expected).into());
-        }
+        entries("nodes", nodes.len(), field.len())?;
         Ok(Self {
             core: SimulatorCore::new(field, setup)?,
             protocol,
@@ -84,14 +81,6 @@ impl<P: Protocol> Simulator<P> {
         let answer = None;
         self.core.deliver(at, to, Arrival { from, answer, bits });
         Ok(())
-    }
-
-    /// Takes what happens to each transmission from a log instead of the channel.
-    #[must_use]
-    pub fn replaying(mut self, log: &Log) -> Self {
-        let on_air = |entry: &&Entry| !matches!(entry, Entry::Noted { .. });
-        self.core.recorded = Some(log.entries.iter().filter(on_air).cloned().collect());
-        self
     }
 
     /// Handles all events up to and including `end`, in the order of their times; of one time, in the order in which they were
@@ -131,10 +120,7 @@ impl<P: Protocol> Simulator<P> {
                 if !self.core.is_alive(id) {
                     return Ok(());
                 }
-                let mut context = Context {
-                    core: &mut self.core,
-                    node: id,
-                };
+                let mut context = Context::new(&mut self.core, id);
                 self.protocol.on_timer(&mut self.nodes[id.index()], &mut context, token)
             }
             EventKind::Arrival(place) => match self.core.state.queue.take(place) {
@@ -143,22 +129,25 @@ impl<P: Protocol> Simulator<P> {
             },
             EventKind::Fault(index) => {
                 if self.core.fault(index as usize) {
-                    let mut context = Context {
-                        core: &mut self.core,
-                        node: id,
-                    };
+                    let mut context = Context::new(&mut self.core, id);
                     self.protocol.on_restart(&mut self.nodes[id.index()], &mut context)?;
                 }
                 Ok(())
             }
-            EventKind::Flush(batch) => self.core.flush(id, batch),
-            EventKind::Transmit(frame) => self.core.transmit(frame),
+            EventKind::Flush(batch) => {
+                self.core.flush(id, batch);
+                Ok(())
+            }
+            EventKind::Transmit(frame) => {
+                self.core.transmit(frame);
+                Ok(())
+            }
             EventKind::Acknowledged(frame) => {
                 let tickets = self.core.acknowledged(id, frame);
                 self.tell(id, &tickets, P::on_ack)
             }
             EventKind::AckTimeout(frame) => {
-                let tickets = self.core.ack_timeout(frame)?;
+                let tickets = self.core.ack_timeout(frame);
                 self.tell(id, &tickets, P::on_give_up)
             }
         }
@@ -173,14 +162,11 @@ impl<P: Protocol> Simulator<P> {
             return Ok(());
         }
         if let Some(frame) = answer {
-            self.core.answer(frame, id, from)?;
+            self.core.answer(frame, id, from);
         }
         let bytes = from_air(&bits);
         let frame = Frame::decode(&bytes, self.core.check_of(Frame::kind_of(&bytes)));
-        let mut context = Context {
-            core: &mut self.core,
-            node: id,
-        };
+        let mut context = Context::new(&mut self.core, id);
         let node = &mut self.nodes[id.index()];
         if let Ok(frame) = frame {
             self.protocol.on_frame(node, &mut context, from, &frame)
@@ -199,10 +185,7 @@ impl<P: Protocol> Simulator<P> {
     ) -> Result<(), Error> {
         for ticket in tickets {
             if self.core.is_alive(id) {
-                let mut context = Context {
-                    core: &mut self.core,
-                    node: id,
-                };
+                let mut context = Context::new(&mut self.core, id);
                 handler(&self.protocol, &mut self.nodes[id.index()], &mut context, *ticket)?;
             }
         }

@@ -5,8 +5,7 @@ use crate::error::Error;
 use crate::medium::{Channel, Field, Loss, Radio};
 use crate::units::{Seconds, SensorId};
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, within};
+use fewbits_numerics::error::{at_least_one, refuse, within};
 use fewbits_protocol::Check;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -50,8 +49,7 @@ pub enum Access {
 /// the frame is lost
 /// ```
 /// A transmission that began less than `blind` ago is not heard. What two nodes send at once is lost at every node in range of both, and at a node that sends
-/// itself. Acknowledgements are sent without listening; they are heard and destroy other frames, and are not destroyed themselves. A replay
-/// needs the seed of the run.
+/// itself. Acknowledgements are sent without listening; they are heard and destroy other frames, and are not destroyed themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CarrierSense {
@@ -110,7 +108,7 @@ pub struct Setup {
     pub radio: Radio,
     /// Radios of single nodes. Bit rate and framing must be those of `radio`.
     pub radios: BTreeMap<SensorId, Radio>,
-    /// What the air does.
+    /// Loss, inverted bits and delay of every link.
     pub channel: Channel,
     /// Loss of single links, from the first node to the second, in place of the channel's. Loss of acknowledgements too.
     pub link_loss: BTreeMap<(SensorId, SensorId), Loss>,
@@ -185,7 +183,7 @@ impl Setup {
             radio.checked()?;
             if !radio.understands(&self.radio) {
                 let expected = "bit rate, preamble, header, acknowledgement and mtu of the others";
-                return Err(ArgumentError::new("radios", format!("another radio at {node}"), expected).into());
+                return refuse("radios", format!("another radio at {node}"), expected);
             }
         }
         for ((from, to), loss) in &self.link_loss {

@@ -1,4 +1,4 @@
-//! What a run came to, in numbers that a user asks for.
+//! Summary of a run: cost, lifetime, faults and estimation error.
 
 use super::ledger::{Faults, Ledger};
 use crate::units::{Bits, Joules, Seconds, SensorId};
@@ -21,7 +21,7 @@ pub struct Summary {
     pub energy: Joules,
     /// The node whose batteries end first, and when: when it died, or at the mean power of the run. `None` if no node has batteries.
     pub lifetime: Option<(Seconds, SensorId)>,
-    /// What went wrong.
+    /// Numbers of faults by kind.
     pub faults: Faults,
     /// Error of the estimates, if truths were given.
     pub error: Option<EstimateError>,

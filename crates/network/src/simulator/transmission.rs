@@ -14,14 +14,13 @@ use super::attempt::{Attempt, LENGTH_BITS};
 use super::core::{Batch, Outgoing, SimulatorCore, Ticket};
 use super::log::{Acknowledgement, Detail, Entry};
 use super::queue::EventKind;
-use crate::error::Error;
 use crate::medium::{Radio, Stored, on_air};
 use crate::units::{Bits, Instant, Seconds, SensorId};
 use fewbits_protocol::Frame;
 
 impl SimulatorCore {
     /// Sends a frame, perhaps later in a batch.
-    pub(super) fn submit(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Result<Ticket, Error> {
+    pub(super) fn submit(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Ticket {
         let batching = self.setup.batching;
         if batching.max_frames <= 1 {
             return self.send(from, to, frame);
@@ -36,7 +35,7 @@ impl SimulatorCore {
                 .map(|f| f.0.bits() as u64 + LENGTH_BITS)
                 .sum();
             if radio.link_frames(Bits(together)) > 1 {
-                self.send_batch(from, to)?;
+                self.send_batch(from, to);
             }
         }
         let ticket = self.next_ticket();
@@ -54,52 +53,44 @@ impl SimulatorCore {
         batch.frames.push(bits);
         batch.tickets.push(ticket);
         if batch.frames.len() >= batching.max_frames {
-            self.send_batch(from, to)?;
+            self.send_batch(from, to);
         }
-        Ok(ticket)
+        ticket
     }
 
     /// Sends a frame as soon as the air is free, alone.
-    pub(super) fn send(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Result<Ticket, Error> {
+    pub(super) fn send(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Ticket {
         let bits = Stored(on_air(frame, self.check_of(Some(frame.kind))));
         let ticket = self.next_ticket();
-        self.dispatch(from, to, std::slice::from_ref(&bits), &[ticket])?;
-        Ok(ticket)
+        self.dispatch(from, to, std::slice::from_ref(&bits), &[ticket]);
+        ticket
     }
 
     /// The hold time of a batch is over. A batch that was sent before has another number than the one that waits now.
-    pub(super) fn flush(&mut self, from: SensorId, number: u32) -> Result<(), Error> {
+    pub(super) fn flush(&mut self, from: SensorId, number: u32) {
         let mut own = self
             .state
             .batches
             .range((from, None)..)
             .take_while(|((node, _), _)| *node == from);
-        match own.find(|(_, batch)| batch.number == number).map(|((_, to), _)| *to) {
-            Some(to) => self.send_batch(from, to),
-            None => Ok(()),
+        if let Some(to) = own.find(|(_, batch)| batch.number == number).map(|((_, to), _)| *to) {
+            self.send_batch(from, to);
         }
     }
 
-    fn send_batch(&mut self, from: SensorId, to: Option<SensorId>) -> Result<(), Error> {
-        match self.state.batches.remove(&(from, to)) {
-            Some(batch) => self.dispatch(from, to, &batch.frames, &batch.tickets),
-            None => Ok(()),
+    fn send_batch(&mut self, from: SensorId, to: Option<SensorId>) {
+        if let Some(batch) = self.state.batches.remove(&(from, to)) {
+            self.dispatch(from, to, &batch.frames, &batch.tickets);
         }
     }
 
     /// Books the air for frames and sends them when it is free.
-    fn dispatch(
-        &mut self,
-        from: SensorId,
-        to: Option<SensorId>,
-        frames: &[Stored],
-        tickets: &[Ticket],
-    ) -> Result<(), Error> {
+    fn dispatch(&mut self, from: SensorId, to: Option<SensorId>, frames: &[Stored], tickets: &[Ticket]) {
         self.drain(from);
         let acknowledged = self.is_acknowledged(to);
         if !self.is_alive(from) || (!acknowledged && !self.listens(from)) {
             self.state.ledger.faults.lost += 1;
-            return Ok(());
+            return;
         }
         let size = self.size(from, frames);
         let contends = self.contends();
@@ -117,8 +108,8 @@ impl SimulatorCore {
                 sender_awake: false,
                 receiver_awake: false,
                 answer: None,
-            })?;
-            return Ok(());
+            });
+            return;
         }
         let number = self.next_number();
         let outgoing = Outgoing {
@@ -133,24 +124,23 @@ impl SimulatorCore {
         };
         if contends {
             self.contend(number, outgoing);
-            return Ok(());
+            return;
         }
         self.state.outgoing.insert(number, outgoing);
-        self.transmit_at(start, from, number)
+        self.transmit_at(start, from, number);
     }
 
-    fn transmit_at(&mut self, start: Instant, from: SensorId, number: u32) -> Result<(), Error> {
+    fn transmit_at(&mut self, start: Instant, from: SensorId, number: u32) {
         if start <= self.state.now {
             return self.transmit(number);
         }
         self.schedule(start, from, EventKind::Transmit(number));
-        Ok(())
     }
 
     /// The air is free for an outgoing frame.
-    pub(super) fn transmit(&mut self, number: u32) -> Result<(), Error> {
+    pub(super) fn transmit(&mut self, number: u32) {
         let Some(mut outgoing) = self.state.outgoing.remove(&number) else {
-            return Ok(());
+            return;
         };
         let (from, to) = (outgoing.from, outgoing.to);
         self.drain(from);
@@ -162,7 +152,7 @@ impl SimulatorCore {
             outgoing.heard += 1;
             if outgoing.heard < self.tries() {
                 self.contend(number, outgoing);
-                return Ok(());
+                return;
             }
             sends = false;
         }
@@ -177,7 +167,7 @@ impl SimulatorCore {
                 sender_awake: outgoing.sender_awake,
                 receiver_awake: outgoing.receiver_awake,
                 answer: acknowledged.then_some(number),
-            })?;
+            });
         } else {
             self.state.ledger.faults.lost += 1;
         }
@@ -189,7 +179,6 @@ impl SimulatorCore {
             (outgoing.sender_awake, outgoing.receiver_awake) = (sends, listened);
             self.state.outgoing.insert(number, outgoing);
         }
-        Ok(())
     }
 
     /// The acknowledgement of an outgoing frame is back. Returns the frames that it acknowledges: none if the sender does not hear it, or if an
@@ -207,24 +196,24 @@ impl SimulatorCore {
     }
 
     /// No acknowledgement came in time: repeats the frame, or returns the frames that are given up.
-    pub(super) fn ack_timeout(&mut self, number: u32) -> Result<Vec<Ticket>, Error> {
+    pub(super) fn ack_timeout(&mut self, number: u32) -> Vec<Ticket> {
         let Some(outgoing) = self.state.outgoing.get(&number) else {
-            return Ok(Vec::new());
+            return Vec::new();
         };
         let (from, attempts) = (outgoing.from, outgoing.attempts);
         if self.setup.retries.is_none_or(|retries| attempts > retries) {
             self.state.ledger.faults.given_up += 1;
-            return Ok(self
+            return self
                 .state
                 .outgoing
                 .remove(&number)
-                .map_or_else(Vec::new, |frame| frame.tickets));
+                .map_or_else(Vec::new, |frame| frame.tickets);
         }
         if self.contends() {
             if let Some(outgoing) = self.state.outgoing.remove(&number) {
                 self.contend(number, outgoing);
             }
-            return Ok(Vec::new());
+            return Vec::new();
         }
         let air = self.size(from, &outgoing.frames).air;
         let start = self.book(from, air, true);
@@ -234,34 +223,18 @@ impl SimulatorCore {
         {
             (outgoing.sender_awake, outgoing.receiver_awake) = (false, false);
         }
-        self.transmit_at(start, from, number)?;
-        Ok(Vec::new())
+        self.transmit_at(start, from, number);
+        Vec::new()
     }
 
     /// The radio of `by` acknowledges what arrived intact from `to`.
-    pub(super) fn answer(&mut self, number: u32, by: SensorId, to: SensorId) -> Result<(), Error> {
+    pub(super) fn answer(&mut self, number: u32, by: SensorId, to: SensorId) {
         let radio = *self.setup.radio_of(by);
         let mut copies = Vec::new();
-        match &mut self.recorded {
-            None => {
-                let sent = u64::from(self.state.ledger.accounts[by.index()].acknowledgements);
-                let bits = usize::try_from(radio.acknowledgement.0).unwrap_or(usize::MAX);
-                // The last index tells these streams from those of frames.
-                self.receive(by, to, sent, 1, bits, 1, &mut copies);
-            }
-            Some(recorded) => {
-                let left = |difference| Error::LeftLog {
-                    transmission: self.state.transmissions,
-                    difference,
-                };
-                match recorded.pop_front() {
-                    Some(Entry::Answered(answer)) if (answer.from, answer.to) == (by, to) => copies = answer.copies,
-                    Some(_) => return Err(left("no acknowledgement, or between other nodes")),
-                    None => return Err(left("the log has ended")),
-                }
-            }
-        }
-        self.state.transmissions += 1;
+        let sent = u64::from(self.state.ledger.accounts[by.index()].acknowledgements);
+        let bits = usize::try_from(radio.acknowledgement.0).unwrap_or(usize::MAX);
+        // The last index tells these streams from those of frames.
+        self.receive(by, to, sent, 1, bits, 1, &mut copies);
         let begins = self.state.now.after(radio.turnaround);
         self.occupy(by, begins, radio.acknowledgement, Vec::new());
         let sending = radio.turn() + radio.transmit(radio.acknowledgement, self.field.distance(by.0, to.0));
@@ -299,7 +272,6 @@ impl SimulatorCore {
             }));
         }
         self.drain(by);
-        Ok(())
     }
 
     fn is_acknowledged(&self, to: Option<SensorId>) -> bool {

@@ -112,7 +112,7 @@ fn parts<const WIDE: bool, const ALONE: bool>(a: f64, b: f64) -> Parts {
     }
 }
 
-/// Cells at least this wide are never narrow, whatever rounding does to their edges.
+/// Least width of a cell for the functions `*_wide`, with a margin for rounded edges.
 pub const WIDE: f64 = 1.0 + 1e-9;
 
 /// `ln(Phi(b) - Phi(a))`: within eight units in the last place for cells given exactly; `-inf` for `a >= b`.
@@ -121,7 +121,7 @@ pub fn log_interval(a: f64, b: f64) -> f64 {
     log_interval_of::<false, false>(a, b)
 }
 
-/// The same bits, cheaper, for `b - a` of at least [`WIDE`] before rounding.
+/// The same result to the bit. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
 #[inline(always)]
 pub fn log_interval_wide(a: f64, b: f64) -> f64 {
     log_interval_of::<true, false>(a, b)
@@ -141,7 +141,7 @@ pub fn interval(a: f64, b: f64) -> f64 {
     interval_of::<false, false>(a, b)
 }
 
-/// The same bits, cheaper, for `b - a` of at least [`WIDE`] before rounding.
+/// The same result to the bit. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
 #[inline(always)]
 pub fn interval_wide(a: f64, b: f64) -> f64 {
     interval_of::<true, false>(a, b)

@@ -132,10 +132,10 @@ macro_rules! over_cells {
 over_cells! {
     /// `Phi(upper_i) - Phi(lower_i)` over the shorter of the two, written over the lower edges.
     interval
-    /// The same bits, cheaper, for cells of which none is narrower than [`scalar::WIDE`].
+    /// The same results to the bit. Precondition: no cell is narrower than [`scalar::WIDE`]; skips the series for narrow cells.
     interval_wide
     /// `ln(Phi(upper_i) - Phi(lower_i))` over the shorter of the two, written over the lower edges.
     log_interval
-    /// The same bits, cheaper, for cells of which none is narrower than [`scalar::WIDE`].
+    /// The same results to the bit. Precondition: no cell is narrower than [`scalar::WIDE`]; skips the series for narrow cells.
     log_interval_wide
 }

@@ -61,7 +61,7 @@ pub fn pdf(x: f64) -> f64 {
     INV_SQRT_2PI * exp_minus_half_square(x)
 }
 
-/// What the functions of one cut share.
+/// Quantities that all functions of one truncation need.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cut {
     /// `T(|x|)`.

@@ -1,4 +1,4 @@
-//! What small covariance matrices need beyond nalgebra.
+//! Functions of small covariance matrices that nalgebra does not have.
 
 use crate::error::{self, ArgumentError};
 use nalgebra::{ArrayStorage, Cholesky, Const, SMatrix, SVector};

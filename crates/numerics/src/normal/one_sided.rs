@@ -82,7 +82,7 @@ fn variance_with_mean(x: f64, mean: f64) -> f64 {
     if mean == 0.0 { 1.0 } else { 1.0 - mean * (mean + x) }
 }
 
-/// What is known of a standard normal variable that exceeds `-x`.
+/// Probability and moments of a standard normal variable that exceeds `-x`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OneSided {
     /// `ln Phi(x)`, as [`log_cdf`](super::log_cdf) gives it, to rounding.

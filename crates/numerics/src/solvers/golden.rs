@@ -3,7 +3,7 @@
 /// `(sqrt(5) - 1) / 2`.
 const RATIO: f64 = 0.618_033_988_749_894_9;
 
-/// Where `f` is largest on `[low, high]`, by golden-section search until the bracket is `tolerance` of its first width, and the value
+/// The argument at which `f` is largest on `[low, high]`, by golden-section search until the bracket is `tolerance` of its first width, and the value
 /// there. `f` must rise to one peak and fall after it. A maximum at an end of the interval is found too.
 ///
 /// One evaluation per step, each of which leaves 0.618 of the bracket. Below the root of the machine's precision (1e-8) differences of

@@ -32,7 +32,7 @@ pub enum RootError {
     /// The function is NaN inside the bracket.
     #[error("f({at}) is NaN: expected a number")]
     NotANumber {
-        /// Where.
+        /// Argument at which it was met.
         at: f64,
     },
     /// The bracket did not become small enough.

@@ -2,7 +2,7 @@
 
 use super::{independent_variances, prior_variance};
 use crate::error::{Error, refuse};
-use crate::scene::{Noise, Prior};
+use crate::observation_model::{Noise, Prior};
 use nalgebra::{DMatrix, DVector};
 
 /// Most sensors of a CEO bound: every subset is a constraint.

@@ -2,22 +2,22 @@
 
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
+use crate::observation_model::Prior;
 use crate::problem::Problem;
-use crate::scene::Prior;
 use crate::system::System;
 
-/// Fisher information about `x` in the received symbols at each value of the scene, for independent noise.
+/// Fisher information about `x` in the received symbols at each value of the model, for independent noise.
 ///
 /// `J(x) = sum_sensors sum_t (dP_t(x)/dx)^2 / P_t(x)`; symbols of vanishing probability contribute nothing.
 ///
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated.
 pub fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
-    let scene = system.scene();
-    if !scene.is_independent() {
+    let model = system.model();
+    if !model.is_independent() {
         return refuse("noise", "correlated noise", "independent noise for a Fisher information");
     }
-    let nodes = scene.values().len();
+    let nodes = model.values().len();
     let mut information = vec![0.0; nodes];
     let active: Vec<usize> = (0..system.groups().len()).collect();
     let problem = Problem::new(system, Criterion::MeanSquaredError, &active)?;
@@ -44,7 +44,7 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
     let information = fisher_information(system)?;
     Ok(information
         .iter()
-        .zip(system.scene().weights())
+        .zip(system.model().weights())
         .map(|(j, w)| w * j)
         .sum())
 }
@@ -54,7 +54,7 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated or the prior is not Gaussian.
 pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
-    match system.scene().prior() {
+    match system.model().prior() {
         Prior::Gaussian { deviation, .. } => {
             Ok(1.0 / (mean_fisher_information(system)? + 1.0 / (deviation * deviation)))
         }
@@ -65,13 +65,13 @@ pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Quantizer, Scene};
+    use crate::{ObservationModel, Quantizer};
 
     #[test]
     fn fine_quantizers_attain_the_information_of_the_sample() {
-        let scene = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();
+        let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0]).unwrap();
         let fine: Vec<f64> = (-600..=600).map(|i| f64::from(i) * 0.02).collect();
-        let system = System::ideal(scene, vec![Quantizer::new(fine).unwrap()]).unwrap();
+        let system = System::ideal(model, vec![Quantizer::new(fine).unwrap()]).unwrap();
         let j = mean_fisher_information(&system).unwrap();
         assert!(j < 1.0 && j > 0.9999, "{j}");
     }

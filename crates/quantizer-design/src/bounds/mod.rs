@@ -20,7 +20,7 @@ pub use fisher::{bayesian_cramer_rao, fisher_information, mean_fisher_informatio
 pub use unquantised::unquantised;
 
 use crate::error::{Error, refuse};
-use crate::scene::{Noise, Prior};
+use crate::observation_model::{Noise, Prior};
 
 /// `D(R) = s_x^2 - s_x^4 / (s_x^2 + s^2) (1 - 2^{-2R})`: least squared error in `X` from `R` bits about the samples of sensors that are
 /// encoded together, (2.15); independent noises combine to `1 / s^2 = sum_n 1 / s_n^2`.

@@ -1,8 +1,8 @@
-//! What could be had from the samples themselves.
+//! The criterion's value if the fusion centre had the samples themselves.
 
 use crate::criterion::Criterion;
 use crate::error::Error;
-use crate::scene::Scene;
+use crate::observation_model::ObservationModel;
 
 /// Step of the sum over the sufficient statistic, in standard deviations of its noise.
 const STEP: f64 = 0.25;
@@ -17,10 +17,10 @@ const MAX_TERMS: f64 = 2e7;
 /// that noise is so small against the prior that the sum would be too long.
 ///
 /// # Errors
-/// As [`Scene::new`].
-pub fn unquantised(scene: &Scene, criterion: Criterion) -> Result<Option<f64>, Error> {
-    let deviation = 1.0 / scene.noise().precision_of_mean().sqrt();
-    let values = scene.values();
+/// As [`ObservationModel::new`].
+pub fn unquantised(model: &ObservationModel, criterion: Criterion) -> Result<Option<f64>, Error> {
+    let deviation = 1.0 / model.noise().precision_of_mean().sqrt();
+    let values = model.values();
     let (low, high) = values
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
@@ -28,12 +28,12 @@ pub fn unquantised(scene: &Scene, criterion: Criterion) -> Result<Option<f64>, E
     if !(deviation > 0.0 && count * values.len() as f64 <= MAX_TERMS) {
         return Ok(None);
     }
-    let (step, mean) = (STEP * deviation, scene.sample_mean());
+    let (step, mean) = (STEP * deviation, model.sample_mean());
     let (mut explained, mut information, mut correct) = (0.0, 0.0, 0.0);
     for i in 0..=count as usize {
         let s = low - REACH * deviation + i as f64 * step;
         let (mut mass, mut moment, mut largest, mut logs) = (0.0, 0.0, 0.0_f64, 0.0);
-        for (x, w) in values.iter().zip(scene.weights()) {
+        for (x, w) in values.iter().zip(model.weights()) {
             let u = (s - x) / deviation;
             let density = (-0.5 * u * u).exp() * STEP / std::f64::consts::TAU.sqrt();
             let joint = w * density;
@@ -51,7 +51,7 @@ pub fn unquantised(scene: &Scene, criterion: Criterion) -> Result<Option<f64>, E
         }
     }
     Ok(Some(match criterion {
-        Criterion::MeanSquaredError => (scene.variance - explained).max(0.0),
+        Criterion::MeanSquaredError => (model.variance - explained).max(0.0),
         Criterion::MutualInformation => information,
         Criterion::BayesError => 1.0 - correct,
     }))

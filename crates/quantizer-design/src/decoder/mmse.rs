@@ -3,10 +3,11 @@
 use crate::error::{Error, refuse};
 use crate::law::{Active, Reports};
 use crate::moments::{Table, dot};
-use crate::scene::{Feature, Scene};
+use crate::observation_model::{Feature, ObservationModel};
 use crate::system::System;
 use crate::table::{JointTable, Layout};
 use fewbits_core::Observation;
+use fewbits_numerics::error::entries;
 use fewbits_numerics::stored;
 use fewbits_quantizers::Symbol;
 use serde::{Deserialize, Serialize};
@@ -28,8 +29,8 @@ pub struct Estimate {
 ///
 /// ```
 /// use fewbits_core::Observation;
-/// use fewbits_quantizer_design::{Quantizer, Scene, Symbol, System, decoder::MmseDecoder};
-/// let system = System::identical(Scene::gaussian_with_deviations(1.0, &[1.0; 9])?, Quantizer::symmetric(1.38)?)?;
+/// use fewbits_quantizer_design::{Quantizer, ObservationModel, Symbol, System, decoder::MmseDecoder};
+/// let system = System::identical(ObservationModel::gaussian_with_deviations(1.0, &[1.0; 9])?, Quantizer::symmetric(1.38)?)?;
 /// let decoder = MmseDecoder::new(&system, 220)?;
 /// let mut observations = [3, 2, 2, 3, 1, 2, 3, 2, 2].map(|t| Observation::Received(Symbol(t)));
 /// let estimate = decoder.decode(&observations)?;
@@ -68,21 +69,21 @@ impl MmseDecoder {
                 limit: limit as u64,
             });
         }
-        let scene = system.scene();
+        let model = system.model();
         let allowed = system
             .clone()
             .with_outcome_limit(system.outcome_limit().max(limit as u64));
         let entries = match JointTable::new(&allowed) {
             Ok(table) => (0..table.outcomes())
-                .map(|outcome| posterior(scene, table.likelihood(outcome)))
+                .map(|outcome| posterior(model, table.likelihood(outcome)))
                 .collect(),
-            Err(Error::TooLarge { .. }) => Self::entries_by_moments(scene, &Reports::of(&allowed)?),
+            Err(Error::TooLarge { .. }) => Self::entries_by_moments(model, &Reports::of(&allowed)?),
             Err(error) => return Err(error),
         };
         let symbols = (0..system.groups().len())
             .map(|g| {
                 let entry = Active::new(system, g)?;
-                Ok(Table::new(entry.symbols(entry.group.quantizer().breakpoints()), scene.nodes()))
+                Ok(Table::new(entry.symbols(entry.group.quantizer().breakpoints()), model.nodes()))
             })
             .collect::<Result<_, Error>>()?;
         Ok(Self {
@@ -95,24 +96,24 @@ impl MmseDecoder {
     }
 
     /// Variances as differences of moments about the prior mean, for tables too large to hold all likelihoods.
-    fn entries_by_moments(scene: &Scene, reports: &Reports) -> Vec<[f64; 3]> {
-        let mut square = vec![0.0; scene.nodes()];
-        for ((given, w), x) in scene.given.iter().zip(&scene.weights).zip(&scene.values) {
+    fn entries_by_moments(model: &ObservationModel, reports: &Reports) -> Vec<[f64; 3]> {
+        let mut square = vec![0.0; model.nodes()];
+        for ((given, w), x) in model.given.iter().zip(&model.weights).zip(&model.values) {
             for (i, p) in given.weights.iter().enumerate() {
-                square[given.start + i] += w * (x - scene.mean) * (x - scene.mean) * p;
+                square[given.start + i] += w * (x - model.mean) * (x - model.mean) * p;
             }
         }
         let square = Feature {
             start: 0,
             weights: square,
         };
-        let features = [scene.mass.clone(), scene.moment.clone(), square];
+        let features = [model.mass.clone(), model.moment.clone(), square];
         let entry = |m: &[f64]| {
             if m[0] > 0.0 {
                 let off = m[1] / m[0];
-                [m[0], scene.mean + off, (m[2] / m[0] - off * off).max(0.0)]
+                [m[0], model.mean + off, (m[2] / m[0] - off * off).max(0.0)]
             } else {
-                [0.0, scene.mean, scene.variance]
+                [0.0, model.mean, model.variance]
             }
         };
         reports.moments(&features).chunks_exact(3).map(entry).collect()
@@ -150,12 +151,9 @@ impl MmseDecoder {
         if received.len() == observations.len() {
             return self.decode_symbols(&received);
         }
-        let scene = self.system.scene();
-        if observations.len() != scene.sensors() {
-            let given = format!("{} observations", observations.len());
-            return refuse("observations", given, format!("one per sensor, {}", scene.sensors()));
-        }
-        let mut product = vec![1.0; scene.nodes()];
+        let model = self.system.model();
+        entries("observations", observations.len(), model.sensors())?;
+        let mut product = vec![1.0; model.nodes()];
         for (group, symbols) in self.system.groups().iter().zip(&self.symbols) {
             for symbol in group.sensors().iter().filter_map(|n| observations[*n].received()) {
                 if symbol.0 >= symbols.rows() {
@@ -168,12 +166,12 @@ impl MmseDecoder {
                 }
             }
         }
-        let q: Vec<f64> = scene
+        let q: Vec<f64> = model
             .given
             .iter()
             .map(|f| dot(&f.weights, &product[f.start..f.start + f.weights.len()]))
             .collect();
-        Self::estimate(posterior(scene, &q))
+        Self::estimate(posterior(model, &q))
     }
 
     /// The estimate when symbol `symbols[n]` was received from sensor `n`.
@@ -194,15 +192,15 @@ impl MmseDecoder {
 }
 
 /// Probability, posterior mean and variance from the likelihoods of the values, all sums of positive terms.
-fn posterior(scene: &Scene, likelihood: &[f64]) -> [f64; 3] {
-    let terms = || scene.weights.iter().zip(likelihood).zip(&scene.values);
+fn posterior(model: &ObservationModel, likelihood: &[f64]) -> [f64; 3] {
+    let terms = || model.weights.iter().zip(likelihood).zip(&model.values);
     let mass: f64 = terms().map(|((w, q), _)| w * q).sum();
     if mass <= 0.0 {
-        return [0.0, scene.mean, scene.variance];
+        return [0.0, model.mean, model.variance];
     }
-    let off = terms().map(|((w, q), x)| w * q * (x - scene.mean)).sum::<f64>() / mass;
-    let mean = scene.mean + off;
-    let spread = |x: f64| (x - scene.mean - off) * (x - scene.mean - off);
+    let off = terms().map(|((w, q), x)| w * q * (x - model.mean)).sum::<f64>() / mass;
+    let mean = model.mean + off;
+    let spread = |x: f64| (x - model.mean - off) * (x - model.mean - off);
     [
         mass,
         mean,
@@ -213,13 +211,13 @@ fn posterior(scene: &Scene, likelihood: &[f64]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Criterion, Noise, Prior, Quantizer, Scene};
+    use crate::{Criterion, Noise, ObservationModel, Prior, Quantizer};
 
     #[test]
     fn the_table_attains_the_mean_squared_error() {
-        let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 0.7]).unwrap();
+        let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 0.7]).unwrap();
         let q = Quantizer::symmetric(1.2).unwrap();
-        let system = System::ideal(scene, vec![q.clone(), q]).unwrap();
+        let system = System::ideal(model, vec![q.clone(), q]).unwrap();
         let decoder = MmseDecoder::new(&system, 16).unwrap();
         let mean_variance: f64 = decoder.entries.iter().map(|e| e[0] * e[2]).sum();
         assert!((mean_variance - system.value(Criterion::MeanSquaredError).unwrap()).abs() < 1e-13);
@@ -239,11 +237,11 @@ mod tests {
     fn an_erased_symbol_leaves_the_posterior_of_the_others() {
         for rho in [0.0, 0.5] {
             let noise = Noise::equicorrelated_with_deviations(&[1.0; 3], rho).unwrap();
-            let scene = Scene::new(Prior::gaussian_with_deviation(1.0).unwrap(), noise).unwrap();
+            let model = ObservationModel::new(Prior::gaussian_with_deviation(1.0).unwrap(), noise).unwrap();
             let q = Quantizer::symmetric(1.2).unwrap();
-            let system = System::identical(scene.clone(), q.clone()).unwrap();
+            let system = System::identical(model.clone(), q.clone()).unwrap();
             let decoder = MmseDecoder::new(&system, 20).unwrap();
-            let others = System::identical(scene.subset(&[0, 1]).unwrap(), q).unwrap();
+            let others = System::identical(model.subset(&[0, 1]).unwrap(), q).unwrap();
             let exact = MmseDecoder::new(&others, 10).unwrap().decode_symbols(&[3, 1]).unwrap();
             for missing in [Observation::Lost, Observation::Nothing] {
                 let seen = [
@@ -265,11 +263,11 @@ mod tests {
     /// Moments about the prior mean: an offset of the unknown costs no digit.
     #[test]
     fn an_offset_prior_has_the_error_of_one_at_zero() {
-        let scene = |m: f64| {
+        let model = |m: f64| {
             let prior = Prior::discrete(vec![m, m + 1.0], vec![0.5, 0.5]).unwrap();
-            Scene::new(prior, Noise::independent_with_deviations(&[1.0]).unwrap()).unwrap()
+            ObservationModel::new(prior, Noise::independent_with_deviations(&[1.0]).unwrap()).unwrap()
         };
-        let system = |m: f64| System::ideal(scene(m), vec![Quantizer::new(vec![m + 0.5]).unwrap()]).unwrap();
+        let system = |m: f64| System::ideal(model(m), vec![Quantizer::new(vec![m + 0.5]).unwrap()]).unwrap();
         let exact = system(0.0).value(Criterion::MeanSquaredError).unwrap();
         assert!((exact - 0.213_342).abs() < 1e-6);
         for m in [1e3, 1e7, -1e9] {

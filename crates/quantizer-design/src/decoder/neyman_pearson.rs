@@ -5,6 +5,7 @@ use crate::law::log_likelihoods;
 use crate::system::System;
 use crate::table::JointTable;
 use fewbits_core::Observation;
+use fewbits_numerics::error::entries;
 use fewbits_numerics::stored;
 use fewbits_quantizers::Symbol;
 use serde::{Deserialize, Serialize};
@@ -37,7 +38,7 @@ impl NeymanPearson {
         if !(false_alarm > 0.0 && false_alarm < 1.0) {
             return refuse("false_alarm", false_alarm, "a probability inside (0, 1)");
         }
-        if !system.scene().is_discrete() || system.scene().values().len() != 2 {
+        if !system.model().is_discrete() || system.model().values().len() != 2 {
             return refuse("prior", "not two hypotheses", "a discrete prior on two values");
         }
         let table = JointTable::new(system)?;
@@ -79,10 +80,7 @@ impl NeymanPearson {
     /// If there is not one observation per sensor, or a symbol is out of range.
     pub fn acceptance(&self, observations: &[Observation<Symbol>]) -> Result<f64, Error> {
         let system = self.table.system();
-        if observations.len() != system.scene().sensors() {
-            let given = format!("{} observations", observations.len());
-            return refuse("observations", given, format!("one per sensor, {}", system.scene().sensors()));
-        }
+        entries("observations", observations.len(), system.model().sensors())?;
         let symbols: Vec<usize> = observations.iter().filter_map(|o| o.received().map(|s| s.0)).collect();
         if symbols.is_empty() {
             return Ok(self.false_alarm);
@@ -101,14 +99,14 @@ impl NeymanPearson {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Criterion, Noise, Prior, Quantizer, Scene};
+    use crate::{Criterion, Noise, ObservationModel, Prior, Quantizer};
 
     #[test]
     fn likelihood_ratios_are_ordered_by_their_logarithms() {
         let five = |signal: f64, sensors: usize, b: Vec<f64>| {
             let noise = Noise::independent_with_deviations(&vec![1.0; sensors]).unwrap();
-            let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
-            System::identical(scene, Quantizer::new(b).unwrap()).unwrap()
+            let model = ObservationModel::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
+            System::identical(model, Quantizer::new(b).unwrap()).unwrap()
         };
         // Products of probabilities are no total order here.
         let b: Vec<f64> = (1..8).map(|i| 4.0 * f64::from(i) / 8.0).collect();
@@ -125,10 +123,12 @@ mod tests {
 
     #[test]
     fn the_test_spends_its_budget_exactly() {
-        let scene =
-            Scene::new(Prior::binary(2.0, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 3]).unwrap())
-                .unwrap();
-        let system = System::identical(scene, Quantizer::new(vec![0.0, 1.0, 2.0]).unwrap()).unwrap();
+        let model = ObservationModel::new(
+            Prior::binary(2.0, 0.5).unwrap(),
+            Noise::independent_with_deviations(&[1.0; 3]).unwrap(),
+        )
+        .unwrap();
+        let system = System::identical(model, Quantizer::new(vec![0.0, 1.0, 2.0]).unwrap()).unwrap();
         let mut last: f64 = 0.0;
         for alpha in [1e-6, 0.01, 0.3, 0.9] {
             let test = NeymanPearson::new(&system, alpha).unwrap();
@@ -170,8 +170,8 @@ mod tests {
         for tenth in 700..800 {
             let signal = f64::from(tenth) * 0.1;
             let noise = Noise::independent_with_deviations(&[1.0]).unwrap();
-            let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
-            let system = System::identical(scene, Quantizer::new(vec![0.5 * signal]).unwrap()).unwrap();
+            let model = ObservationModel::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
+            let system = System::identical(model, Quantizer::new(vec![0.5 * signal]).unwrap()).unwrap();
             let equivocation = JointTable::new(&system).unwrap().equivocation().unwrap();
             assert!((0.0..1e-200).contains(&equivocation), "{equivocation} at {signal}");
         }
@@ -179,10 +179,12 @@ mod tests {
 
     #[test]
     fn equivocation_and_information_make_up_the_prior_entropy() {
-        let scene =
-            Scene::new(Prior::binary(1.0, 0.3).unwrap(), Noise::independent_with_deviations(&[1.0; 3]).unwrap())
-                .unwrap();
-        let system = System::identical(scene, Quantizer::new(vec![0.5]).unwrap()).unwrap();
+        let model = ObservationModel::new(
+            Prior::binary(1.0, 0.3).unwrap(),
+            Noise::independent_with_deviations(&[1.0; 3]).unwrap(),
+        )
+        .unwrap();
+        let system = System::identical(model, Quantizer::new(vec![0.5]).unwrap()).unwrap();
         let table = JointTable::new(&system).unwrap();
         let entropy = -(0.3 * f64::ln(0.3) + 0.7 * f64::ln(0.7));
         let sum = table.equivocation().unwrap() + system.value(Criterion::MutualInformation).unwrap();

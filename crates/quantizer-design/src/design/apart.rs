@@ -74,5 +74,5 @@ fn regrouped(system: &System, group: usize, parts: impl Iterator<Item = Vec<usiz
     let mut groups = system.groups().to_vec();
     let parts = parts.map(|sensors| SensorGroup::new(entry.quantizer().clone(), entry.channel().clone(), sensors));
     groups.splice(group..=group, parts.collect::<Result<Vec<_>, _>>()?);
-    Ok(System::new(system.scene().clone(), groups)?.with_outcome_limit(system.outcome_limit()))
+    Ok(System::new(system.model().clone(), groups)?.with_outcome_limit(system.outcome_limit()))
 }

@@ -204,7 +204,7 @@ fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
     groups
         .iter()
         .filter_map(|g| system.groups().get(*g))
-        .map(|g| system.scene().sample_deviation(g.sensors()[0]))
+        .map(|g| system.model().sample_deviation(g.sensors()[0]))
         .fold(f64::INFINITY, f64::min)
 }
 
@@ -234,8 +234,8 @@ pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &N
             quantizers.push(designed.unwrap_or(group).quantizer().clone());
             channels.push(group.channel().clone());
         }
-        let scene = system.scene().subset(&sensors)?;
-        let partial = System::distinct(scene, quantizers, channels)?.with_outcome_limit(system.outcome_limit());
+        let model = system.model().subset(&sensors)?;
+        let partial = System::distinct(model, quantizers, channels)?.with_outcome_limit(system.outcome_limit());
         stages.push(optimise_groups(&partial, &[n], criterion, newton)?);
     }
     Ok(stages)
@@ -285,12 +285,12 @@ pub fn random_starts(system: &System, starts: usize, seed: u64) -> Vec<System> {
 /// The system with random ordered breakpoints.
 fn random_system(system: &System, stream: Stream) -> Result<System, Error> {
     let mut rng = stream.rng();
-    let mean = system.scene().sample_mean();
+    let mean = system.model().sample_mean();
     let quantizers = system
         .groups()
         .iter()
         .map(|group| {
-            let spread = 1.3 * system.scene().sample_deviation(group.sensors()[0]);
+            let spread = 1.3 * system.model().sample_deviation(group.sensors()[0]);
             let mut b: Vec<f64> = group
                 .quantizer()
                 .breakpoints()

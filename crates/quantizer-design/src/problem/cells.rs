@@ -1,4 +1,4 @@
-//! What each cell of one sensor contributes, for the dynamic programme.
+//! Contribution of each cell of one sensor to the criterion, for the dynamic programme.
 
 use super::Problem;
 use crate::law::negative_entropy;
@@ -14,7 +14,7 @@ impl Problem<'_> {
             return values;
         };
         let nodes = active.means.len();
-        let mass = &self.system.scene().mass.weights;
+        let mass = &self.system.model().mass.weights;
         let slivers = Table::new(active.cells(candidates).concat(), nodes);
         let width = self.scored.features().len();
         let tables: Vec<&Table> = self.fixed.iter().chain([&slivers]).collect();

@@ -52,7 +52,7 @@ impl Objective for Problem<'_> {
     }
 
     fn unit(&self, value: f64) -> f64 {
-        self.scored.unit(value, self.system.scene())
+        self.scored.unit(value, self.system.model())
     }
 }
 
@@ -60,11 +60,11 @@ impl<'a> Problem<'a> {
     /// The criterion over the breakpoints of the groups `active` (increasing, may be empty).
     pub(crate) fn new(system: &'a System, criterion: Criterion, active: &[usize]) -> Result<Self, Error> {
         system.check_outcomes()?;
-        let scene = system.scene();
-        let scored = Scored::new(criterion, scene)?;
+        let model = system.model();
+        let scored = Scored::new(criterion, model)?;
         let mut fixed = Vec::new();
         let mut log_multiplicity = vec![0.0];
-        let mut constant = scored.constant(scene);
+        let mut constant = scored.constant(model);
         let mut chosen = Vec::new();
         for index in 0..system.groups().len() {
             let entry = Active::new(system, index)?;
@@ -74,7 +74,7 @@ impl<'a> Problem<'a> {
             }
             let (reports, symbols) = entry.reports(entry.group.quantizer().breakpoints());
             if scored.has_separable_entropy() {
-                constant += entry.group.sensors().len() as f64 * negative_entropy(&symbols, &scene.mass.weights);
+                constant += entry.group.sensors().len() as f64 * negative_entropy(&symbols, &model.mass.weights);
             }
             fixed.push(reports);
             log_multiplicity = sums(&log_multiplicity, entry.compositions.log_multiplicity());
@@ -117,7 +117,7 @@ impl<'a> Problem<'a> {
 
     /// Least probability of a cell of an active group: `(group, cell, probability)`.
     pub(crate) fn rarest_cell(&self, b: &[f64]) -> Option<(usize, usize, f64)> {
-        let mass = &self.system.scene().mass.weights;
+        let mass = &self.system.model().mass.weights;
         let cells = self.active.iter().zip(self.split(b)).flat_map(|(a, b)| {
             let cells = a.cells(b).into_iter().enumerate();
             cells.map(move |(cell, p)| (a.index, cell, inner_product(&p, mass)))
@@ -156,7 +156,7 @@ impl<'a> Problem<'a> {
 
     /// Joint report probabilities of the fixed groups and, for the single active group, its symbol probabilities.
     pub(crate) fn surroundings(&self) -> (Table, Table) {
-        let nodes = self.system.scene().nodes();
+        let nodes = self.system.model().nodes();
         let symbols = self
             .active
             .first()
@@ -186,19 +186,19 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// What does not depend on the active groups.
+    /// Part of the criterion that does not depend on the active groups.
     pub(crate) fn constant(&self) -> f64 {
         self.constant + self.offset()
     }
 
-    /// What is added to a value for the outside.
+    /// [`Scored::offset`].
     pub(crate) fn offset(&self) -> f64 {
         self.scored.offset()
     }
 
     fn entropy_share(&self, a: &Active<'_>, symbols: &[f64]) -> f64 {
         if self.scored.has_separable_entropy() {
-            a.group.sensors().len() as f64 * negative_entropy(symbols, &self.system.scene().mass.weights)
+            a.group.sensors().len() as f64 * negative_entropy(symbols, &self.system.model().mass.weights)
         } else {
             0.0
         }

@@ -144,7 +144,7 @@ impl Problem<'_> {
         densities: &[Vec<f64>],
         slopes: &[Vec<f64>],
     ) -> Derivatives {
-        let mass = &self.system.scene().mass.weights;
+        let mass = &self.system.model().mass.weights;
         let (n, nodes) = (a.parameters(), mass.len());
         let sensors = a.group.sensors().len() as f64;
         let mut gradient = DVector::zeros(n);

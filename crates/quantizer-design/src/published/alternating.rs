@@ -79,7 +79,7 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
     let mut value = current.value(criterion)?;
     let mut change = f64::INFINITY;
     let spread = system
-        .scene()
+        .model()
         .sample_deviation(single_sensor(system, group)?.sensors()[0]);
     for iteration in 1..=rule.max_iterations {
         let old = current.group(group)?.quantizer().clone();
@@ -121,35 +121,35 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
 pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> Result<Quantizer, Error> {
     let entry = single_sensor(system, group)?;
     let problem = Problem::new(system, criterion, &[group])?;
-    let scene = system.scene();
+    let model = system.model();
     let (others, symbols) = problem.surroundings();
     let channel = entry.channel();
-    let gains = if scene.is_discrete() {
+    let gains = if model.is_discrete() {
         // Hypotheses may be so far apart that the probability of a wrong symbol underflows: its logarithm counts.
-        let values = scene.values.len();
+        let values = model.values.len();
         let logs = log_likelihoods(system)?;
         let inner: usize = system.groups()[group + 1..]
             .iter()
             .map(|g| g.outcomes() as usize)
             .product();
         let outputs = channel.outputs();
-        gains_of(scene, criterion, &others, channel, |at| {
+        gains_of(model, criterion, &others, channel, |at| {
             let (other, symbol) = (at / outputs, at % outputs);
             let outcome = (other / inner * outputs + symbol) * inner + other % inner;
             &logs[outcome * values..(outcome + 1) * values]
         })
     } else {
-        level_gains(scene, criterion, &others, &symbols, channel)
+        level_gains(model, criterion, &others, &symbols, channel)
     };
-    let (means, sd) = scene.sample_law(entry.sensors()[0]);
+    let (means, deviation) = model.sample_law(entry.sensors()[0]);
     let worth = Worth {
         gains: &gains,
         means: &means,
-        sd,
+        deviation,
     };
 
-    let spread = scene.sample_deviation(entry.sensors()[0]);
-    let start = scene.sample_mean() - REACH * spread;
+    let spread = model.sample_deviation(entry.sensors()[0]);
+    let start = model.sample_mean() - REACH * spread;
     let step = 2.0 * REACH * spread / SCAN as f64;
     let (mut labels, mut breakpoints) = (vec![worth.best(start)], Vec::new());
     for i in 1..=SCAN {
@@ -176,13 +176,13 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
 struct Worth<'a> {
     gains: &'a Table,
     means: &'a [f64],
-    sd: f64,
+    deviation: f64,
 }
 
 impl Worth<'_> {
     /// Logarithm of the sample's density at `y` given a node's mean, up to a constant.
     fn log_density(&self, y: f64, mean: f64) -> f64 {
-        let u = (y - mean) / self.sd;
+        let u = (y - mean) / self.deviation;
         -0.5 * u * u
     }
 
@@ -219,7 +219,7 @@ impl Worth<'_> {
             let ((a, slope_a), (b, slope_b)) = (self.log_sum(&gained, y), self.log_sum(&lost, y));
             (a - b, slope_a - slope_b)
         };
-        let size = low.abs().max(high.abs()).max(self.sd);
+        let size = low.abs().max(high.abs()).max(self.deviation);
         newton::increasing(lead, low, high, 0.5 * (low + high), 1e-15 * size)
     }
 
@@ -234,7 +234,7 @@ impl Worth<'_> {
         for term in terms {
             let share = (log(term) - largest).exp();
             sum += share;
-            slope -= share * (y - term.0) / (self.sd * self.sd);
+            slope -= share * (y - term.0) / (self.deviation * self.deviation);
         }
         (largest + sum.ln(), slope / sum)
     }
@@ -243,14 +243,14 @@ impl Worth<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
+    use crate::observation_model::ObservationModel;
     use fewbits_quantizers::lloyd_max;
 
     /// Erratum `mi-2`.
     #[test]
     fn converges_to_the_stationary_point_of_newton() {
-        let scene = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();
-        let start = System::ideal(scene, vec![Quantizer::from(&lloyd_max::gaussian(4).unwrap())]).unwrap();
+        let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0]).unwrap();
+        let start = System::ideal(model, vec![Quantizer::from(&lloyd_max::gaussian(4).unwrap())]).unwrap();
         let criterion = Criterion::MutualInformation;
         let rule = Alternating {
             breakpoint_tolerance: 1e-12,
@@ -272,12 +272,12 @@ mod tests {
     /// 76 on the probabilities of wrong symbols.
     #[test]
     fn distant_hypotheses_are_parted_midway() {
-        use crate::scene::{Noise, Prior};
+        use crate::observation_model::{Noise, Prior};
         for signal in [4.0, 14.0, 40.0, 100.0, 1000.0] {
             let noise = Noise::independent_with_deviations(&[1.0]).unwrap();
-            let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
+            let model = ObservationModel::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
             let start = Quantizer::new(vec![0.5 * signal + 0.1]).unwrap();
-            let system = System::ideal(scene, vec![start]).unwrap();
+            let system = System::ideal(model, vec![start]).unwrap();
             for criterion in [Criterion::MutualInformation, Criterion::BayesError] {
                 let step = alternating_step(&system, 0, criterion).unwrap();
                 assert_eq!(step.labels(), [0, 1], "{signal} {criterion:?}");
@@ -297,12 +297,12 @@ mod tests {
     #[test]
     fn one_step_for_squared_error_is_a_lloyd_sweep_on_the_sample() {
         // E[X|Y] is linear, so the best one-sensor cells are Lloyd-Max cells of the sample.
-        let scene = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();
+        let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0]).unwrap();
         let b = lloyd_max::gaussian(4)
             .unwrap()
             .affine(0.0, std::f64::consts::SQRT_2)
             .unwrap();
-        let system = System::ideal(scene, vec![Quantizer::from(&b)]).unwrap();
+        let system = System::ideal(model, vec![Quantizer::from(&b)]).unwrap();
         let again = alternating_step(&system, 0, Criterion::MeanSquaredError).unwrap();
         for (a, b) in again.breakpoints().iter().zip(b.breakpoints()) {
             assert!((a - b).abs() < 1e-11, "{a} {b}");

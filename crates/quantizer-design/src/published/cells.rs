@@ -1,4 +1,4 @@
-//! What it is worth to report a sample as one level or another, the other sensors and the decoder being as they are.
+//! The gain of reporting a sample as one level or another, for fixed other sensors and a fixed decoder.
 //!
 //! With the decoder's scores held fixed every criterion is linear in the sensor's decisions, so the best level at a sample `y`
 //! is the largest of a few functions `D_z(y)`, on which the alternating algorithm rests.
@@ -6,7 +6,7 @@
 use crate::criterion::{Criterion, LOG_FLOOR};
 use crate::error::{Error, refuse};
 use crate::moments::{Table, moments};
-use crate::scene::Scene;
+use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_quantizers::Channel;
 
@@ -27,38 +27,38 @@ pub(super) fn single_sensor(system: &System, group: usize) -> Result<&SensorGrou
 /// `others` holds the joint report probabilities of the other sensors and `symbols` this sensor's, both a row per report. The
 /// score is `ln p(t', t | x) / p(t', t)`, minus the squared error of the posterior mean, or minus one for a wrong decision.
 pub(super) fn level_gains(
-    scene: &Scene,
+    model: &ObservationModel,
     criterion: Criterion,
     others: &Table,
     symbols: &Table,
     channel: &Channel,
 ) -> Table {
-    let values = scene.values.len();
-    let mut log_likelihood = moments(&[others, symbols], &scene.given);
+    let values = model.values.len();
+    let mut log_likelihood = moments(&[others, symbols], &model.given);
     for q in &mut log_likelihood {
         *q = q.max(LOG_FLOOR).ln();
     }
-    gains_of(scene, criterion, others, channel, |at| &log_likelihood[at * values..(at + 1) * values])
+    gains_of(model, criterion, others, channel, |at| &log_likelihood[at * values..(at + 1) * values])
 }
 
 /// As [`level_gains`], from the logarithms of the likelihoods: `log_likelihood(i)` is one number per value of the unknown, of
 /// the outcome `i = other * outputs + symbol`. Probabilities may underflow, their logarithms may not.
 pub(super) fn gains_of<'a>(
-    scene: &Scene,
+    model: &ObservationModel,
     criterion: Criterion,
     others: &Table,
     channel: &Channel,
     log_likelihood: impl Fn(usize) -> &'a [f64],
 ) -> Table {
-    let (nodes, values) = (scene.nodes(), scene.values.len());
+    let (nodes, values) = (model.nodes(), model.values.len());
     let mut per_symbol = vec![0.0; channel.outputs() * nodes];
     let mut score = vec![0.0; values];
     for at in 0..others.rows() * channel.outputs() {
         let (other, symbol) = (at / channel.outputs(), at % channel.outputs());
-        scores(scene, criterion, log_likelihood(at), &mut score);
+        scores(model, criterion, log_likelihood(at), &mut score);
         let reports = others.row(other);
         let out = &mut per_symbol[symbol * nodes..(symbol + 1) * nodes];
-        for ((feature, w), s) in scene.given.iter().zip(&scene.weights).zip(&score) {
+        for ((feature, w), s) in model.given.iter().zip(&model.weights).zip(&score) {
             let factor = w * s;
             for (i, p) in feature.weights.iter().enumerate() {
                 out[feature.start + i] += factor * p * reports[feature.start + i];
@@ -77,8 +77,8 @@ pub(super) fn gains_of<'a>(
     Table::new(gains, nodes)
 }
 
-/// What the decoder's answer to one outcome is worth at each value of the unknown.
-fn scores(scene: &Scene, criterion: Criterion, log_likelihood: &[f64], out: &mut [f64]) {
+/// Score of the decoder's answer to one outcome, for each value of the unknown.
+fn scores(model: &ObservationModel, criterion: Criterion, log_likelihood: &[f64], out: &mut [f64]) {
     // Relative to the most likely value, so that the largest number is 1.
     let largest = log_likelihood.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if largest == f64::NEG_INFINITY {
@@ -87,7 +87,7 @@ fn scores(scene: &Scene, criterion: Criterion, log_likelihood: &[f64], out: &mut
         return;
     }
     let relative = |l: &f64| (l - largest).exp();
-    let total: f64 = scene
+    let total: f64 = model
         .weights
         .iter()
         .zip(log_likelihood)
@@ -101,15 +101,15 @@ fn scores(scene: &Scene, criterion: Criterion, log_likelihood: &[f64], out: &mut
             }
         }
         Criterion::MeanSquaredError => {
-            let terms = scene.weights.iter().zip(&scene.values).zip(log_likelihood);
-            let moment: f64 = terms.map(|((w, x), l)| w * (x - scene.mean) * relative(l)).sum();
-            let mean = scene.mean + if total > 0.0 { moment / total } else { 0.0 };
-            for (o, x) in out.iter_mut().zip(&scene.values) {
+            let terms = model.weights.iter().zip(&model.values).zip(log_likelihood);
+            let moment: f64 = terms.map(|((w, x), l)| w * (x - model.mean) * relative(l)).sum();
+            let mean = model.mean + if total > 0.0 { moment / total } else { 0.0 };
+            for (o, x) in out.iter_mut().zip(&model.values) {
                 *o = -(x - mean) * (x - mean);
             }
         }
         Criterion::BayesError => {
-            let joint = |k: usize| scene.weights[k].ln() + log_likelihood[k];
+            let joint = |k: usize| model.weights[k].ln() + log_likelihood[k];
             let best = (1..out.len()).fold(0, |best, k| if joint(k) > joint(best) { k } else { best });
             for (k, o) in out.iter_mut().enumerate() {
                 *o = if k == best { 0.0 } else { -1.0 };

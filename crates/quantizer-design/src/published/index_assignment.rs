@@ -9,7 +9,7 @@ use crate::criterion::Criterion;
 use crate::design::{Design, joint};
 use crate::error::{Error, refuse};
 use crate::newton::Newton;
-use crate::scene::Scene;
+use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Labelling;
@@ -33,7 +33,7 @@ pub struct WordsDesign {
     pub design: Design,
 }
 
-/// Whose words may differ.
+/// Whether sensors may use different words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Words {
     /// All sensors use the same words.
@@ -97,7 +97,7 @@ fn representative(bits: u32, words: &[u32]) -> Vec<u32> {
     images.min().unwrap_or_else(|| words.to_vec())
 }
 
-/// Designs the sensors of `scene` for every class of assignments, best first.
+/// Designs the sensors of `model` for every class of assignments, best first.
 ///
 /// Every sensor sends words of `bits` bits over its own binary symmetric channel of the given crossover. `cells` bounds the
 /// number of cells. Each design is the
@@ -108,7 +108,7 @@ fn representative(bits: u32, words: &[u32]) -> Vec<u32> {
 /// [`Error::Argument`] if `bits` is not in `1..=3`, `cells` not in `2..=2^bits`, or the crossover no probability up to 1/2; [`Error::TooLarge`] for more than
 /// 20000 combinations of mixed assignments.
 pub fn assign_words(
-    scene: &Scene,
+    model: &ObservationModel,
     bits: u32,
     crossover: f64,
     cells: RangeInclusive<usize>,
@@ -119,7 +119,7 @@ pub fn assign_words(
     for count in cells {
         classes.extend(word_classes(bits, count)?);
     }
-    let sensors = scene.sensors();
+    let sensors = model.sensors();
     let combinations: Vec<Vec<usize>> = if words == Words::PerSensor {
         let needed = (classes.len() as u64).saturating_pow(sensors as u32);
         if needed > MAX_COMBINATIONS as u64 {
@@ -132,7 +132,7 @@ pub fn assign_words(
         (0..sensors).fold(vec![Vec::new()], |lists: Vec<Vec<usize>>, n| {
             let longer = |list: &Vec<usize>| {
                 // Sensors of one law may be exchanged: keep their classes in order.
-                let first = if n > 0 && scene.interchangeable(n - 1, n) {
+                let first = if n > 0 && model.interchangeable(n - 1, n) {
                     list[n - 1]
                 } else {
                     0
@@ -153,11 +153,11 @@ pub fn assign_words(
             let words = &classes[*class];
             let labelling = Labelling::with_words(bits, words.clone())?;
             let channel = Channel::binary_symmetric_with_gaps(&labelling, crossover)?;
-            let sample = lloyd_max::gaussian(words.len())?.affine(scene.sample_mean(), scene.sample_deviation(n))?;
+            let sample = lloyd_max::gaussian(words.len())?.affine(model.sample_mean(), model.sample_deviation(n))?;
             groups.push(SensorGroup::new(Quantizer::from(&sample), channel, vec![n])?);
         }
         let words = combination.iter().map(|c| classes[*c].clone()).collect();
-        if let Ok(design) = joint(&System::new(scene.clone(), groups)?, criterion, &Newton::default()) {
+        if let Ok(design) = joint(&System::new(model.clone(), groups)?, criterion, &Newton::default()) {
             found.push(WordsDesign { words, design });
         }
     }

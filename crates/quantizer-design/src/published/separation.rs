@@ -5,8 +5,8 @@ use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
 use crate::error::{Error, refuse};
 use crate::newton::{Newton, Objective, climb};
+use crate::observation_model::{Noise, ObservationModel, Prior};
 use crate::problem::Problem;
-use crate::scene::{Noise, Prior, Scene};
 use crate::system::System;
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
@@ -62,16 +62,16 @@ impl Separation {
 
 /// The quantizer of one sensor that separates the hypotheses 0 and `signal` best, and the distance reached.
 ///
-/// `start` gives the number of levels, the labels and the first breakpoints; `sd` is the noise's standard deviation. Under
+/// `start` gives the number of levels, the labels and the first breakpoints; `deviation` is the noise's standard deviation. Under
 /// equal noise the optimum is symmetric about `signal / 2`.
 ///
 /// # Errors
-/// [`Error::NotConverged`]; [`Error::Argument`] if `signal` is 0 or not finite, `sd` is not positive, or the channel does not
+/// [`Error::NotConverged`]; [`Error::Argument`] if `signal` is 0 or not finite, `deviation` is not positive, or the channel does not
 /// fit the quantizer.
 pub fn separate(
     distance: Separation,
     signal: f64,
-    sd: f64,
+    deviation: f64,
     start: &Quantizer,
     channel: &Channel,
     newton: &Newton,
@@ -79,14 +79,14 @@ pub fn separate(
     if signal == 0.0 {
         return refuse("signal", signal, "a signal other than 0");
     }
-    let scene = Scene::new(Prior::binary(signal, 0.5)?, Noise::independent_with_deviations(&[sd])?)?;
-    let system = System::distinct(scene, vec![start.clone()], vec![channel.clone()])?;
+    let model = ObservationModel::new(Prior::binary(signal, 0.5)?, Noise::independent_with_deviations(&[deviation])?)?;
+    let system = System::distinct(model, vec![start.clone()], vec![channel.clone()])?;
     let problem = Problem::new(&system, Criterion::BayesError, &[0])?;
     let objective = Separated {
         distance,
         problem: &problem,
     };
-    let found = climb(&objective, start.breakpoints(), sd, newton, Deadline::NEVER)?;
+    let found = climb(&objective, start.breakpoints(), deviation, newton, Deadline::NEVER)?;
     let (p0, p1) = objective.distributions(&found.point);
     Ok((start.with_breakpoints(found.point)?, distance.of(&p0, &p1)))
 }

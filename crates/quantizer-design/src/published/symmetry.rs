@@ -1,4 +1,4 @@
-//! Where identical quantizers stop being a local optimum.
+//! The noise or correlation at which identical quantizers stop being a local optimum.
 
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};

@@ -3,7 +3,7 @@
 use super::participant::WordedCells;
 use super::solution::Solution;
 use crate::error::{Error, refuse};
-use fewbits_numerics::error::finite;
+use fewbits_numerics::error::{entries, finite};
 use std::ops::RangeInclusive;
 
 /// Most bits of a converter.
@@ -91,10 +91,7 @@ impl Solution {
     /// # Errors
     /// If there is not one converter per sensor.
     pub fn rounded(&self, adcs: &[Adc]) -> Result<Rounded, Error> {
-        if adcs.len() != self.sensors().len() {
-            let expected = format!("one per sensor, {}", self.sensors().len());
-            return refuse("adcs", format!("{} converters", adcs.len()), expected);
-        }
+        entries("adcs", adcs.len(), self.sensors().len())?;
         let (mut thresholds, mut cells) = (Vec::new(), Vec::new());
         for (sensor, adc) in self.sensors().iter().zip(adcs) {
             let (mut codes, mut words): (Vec<u32>, Vec<usize>) = (Vec::new(), vec![sensor.words[0]]);

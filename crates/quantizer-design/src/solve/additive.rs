@@ -4,6 +4,7 @@ use super::solution::Solution;
 use crate::error::{Error, refuse};
 use crate::law::Active;
 use crate::moments::{Table, dot, moments};
+use fewbits_numerics::error::entries;
 use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this share of the largest count as zero: the symbols' indicators sum to one for every sensor.
@@ -26,13 +27,7 @@ impl AdditiveDecoder {
     /// # Errors
     /// If there is not one symbol per sensor, or a symbol is out of range.
     pub fn decode(&self, symbols: &[usize]) -> Result<f64, Error> {
-        if symbols.len() != self.weights.len() {
-            return refuse(
-                "symbols",
-                format!("{} symbols", symbols.len()),
-                format!("one per sensor, {}", self.weights.len()),
-            );
-        }
+        entries("symbols", symbols.len(), self.weights.len())?;
         symbols
             .iter()
             .zip(&self.weights)
@@ -49,11 +44,11 @@ impl Solution {
     /// # Errors
     /// If a symbol table cannot be formed; cannot happen for a design that has a value.
     pub fn additive_decoder(&self) -> Result<AdditiveDecoder, Error> {
-        let (system, scene) = (self.system(), self.system().scene());
-        let mut tables: Vec<Table> = vec![Table::default(); scene.sensors()];
+        let (system, model) = (self.system(), self.system().model());
+        let mut tables: Vec<Table> = vec![Table::default(); model.sensors()];
         for g in 0..system.groups().len() {
             let entry = Active::new(system, g)?;
-            let symbols = Table::new(entry.symbols(entry.group.quantizer().breakpoints()), scene.nodes());
+            let symbols = Table::new(entry.symbols(entry.group.quantizer().breakpoints()), model.nodes());
             entry.group.sensors().iter().for_each(|n| tables[*n] = symbols.clone());
         }
         let firsts: Vec<usize> = tables
@@ -68,19 +63,19 @@ impl Solution {
         let (mut gram, mut moment) = (DMatrix::zeros(size, size), DVector::zeros(size));
         for (m, first) in tables.iter().zip(&firsts) {
             for t in 0..m.rows() {
-                moment[first + t] = dot(&scene.moment.weights, m.row(t));
+                moment[first + t] = dot(&model.moment.weights, m.row(t));
             }
         }
         for m in 0..tables.len() {
             for n in m..tables.len() {
-                let joint = moments(&[&tables[m], &tables[n]], std::slice::from_ref(&scene.mass));
+                let joint = moments(&[&tables[m], &tables[n]], std::slice::from_ref(&model.mass));
                 for (at, p) in joint.iter().enumerate() {
                     let (i, j) = (at / tables[n].rows(), at % tables[n].rows());
                     let (row, column) = (firsts[m] + i, firsts[n] + j);
                     if m == n {
                         // A sensor sends one symbol.
                         if i == j {
-                            gram[(row, row)] = dot(&scene.mass.weights, tables[m].row(i));
+                            gram[(row, row)] = dot(&model.mass.weights, tables[m].row(i));
                         }
                     } else {
                         gram[(row, column)] = *p;
@@ -98,8 +93,8 @@ impl Solution {
         };
         let weights = svd.solve(&moment, cut).map_err(|_| stalled)?;
         Ok(AdditiveDecoder {
-            offset: scene.mean,
-            mean_squared_error: (scene.variance - weights.dot(&moment)).max(0.0),
+            offset: model.mean,
+            mean_squared_error: (model.variance - weights.dot(&moment)).max(0.0),
             weights: tables
                 .iter()
                 .zip(&firsts)

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 /// How far a design has come, for a display.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// What is being done.
+    /// The present stage.
     pub stage: Stage,
     /// Parts of the stage that are done.
     pub done: usize,
@@ -76,7 +76,7 @@ impl<'a> Control<'a> {
         }
     }
 
-    /// What follows shares this portion of the limit.
+    /// The stages from here on end at this portion of the time limit.
     pub(super) fn end_with(&mut self, portion: f64) {
         self.portion = portion;
         self.enter(Share::All);

@@ -4,6 +4,7 @@ use super::adc::Rounded;
 use super::additive::AdditiveDecoder;
 use super::solution::{SensorDesign, Solution};
 use crate::error::{Error, refuse};
+use fewbits_numerics::error::entries;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -70,7 +71,7 @@ impl Solution {
 
     fn joint_decoder(&self, shape: &[usize], outcomes: usize) -> Result<Decoder, Error> {
         let decoder = self.decoder(outcomes)?;
-        let scene = self.system().scene();
+        let model = self.system().model();
         let (mut means, mut deviations) = (Vec::with_capacity(outcomes), Vec::with_capacity(outcomes));
         let mut symbols = vec![0; shape.len()];
         for outcome in 0..outcomes {
@@ -82,7 +83,7 @@ impl Solution {
             let (mean, variance) = match decoder.decode_symbols(&symbols) {
                 Ok(estimate) => (estimate.mean, estimate.variance),
                 // What cannot be received leaves the prior.
-                Err(Error::ImpossibleOutcome) => (scene.mean, scene.variance),
+                Err(Error::ImpossibleOutcome) => (model.mean, model.variance),
                 Err(error) => return Err(error),
             };
             means.push(mean);
@@ -126,10 +127,7 @@ impl Export {
             Decoder::Additive(decoder) => decoder.decode(symbols),
             Decoder::Joint { means, .. } => {
                 let sensors = self.solution.sensors();
-                if symbols.len() != sensors.len() {
-                    let expected = format!("one per sensor, {}", sensors.len());
-                    return refuse("symbols", format!("{} symbols", symbols.len()), expected);
-                }
+                entries("symbols", symbols.len(), sensors.len())?;
                 let mut index = 0;
                 for (sensor, symbol) in sensors.iter().zip(symbols) {
                     if *symbol >= sensor.symbols() {

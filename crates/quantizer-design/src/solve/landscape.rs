@@ -9,7 +9,7 @@ use crate::deadline::Deadline;
 use crate::error::Error;
 use crate::law::negative_entropy;
 use crate::moments::{Table, dot, moments_until};
-use crate::scene::{Feature, Resolution, Scene};
+use crate::observation_model::{Feature, ObservationModel, Resolution};
 use fewbits_numerics::kernels;
 
 /// Reach of the table of a sample, in its standard deviations.
@@ -21,7 +21,7 @@ const SWEEPS: f64 = 5.0;
 /// Below this a probability is taken as zero in a logarithm.
 const LOG_FLOOR: f64 = 1e-300;
 
-/// What arrives of a word: outputs by words.
+/// Transition probabilities from sent words to received symbols, a row per symbol.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct WordLaw {
     pub(super) words: usize,
@@ -39,7 +39,7 @@ impl WordLaw {
 #[derive(Debug, Clone)]
 struct Scenario {
     weight: f64,
-    scene: Scene,
+    model: ObservationModel,
     features: Vec<Feature>,
 }
 
@@ -53,7 +53,7 @@ pub(super) struct Grid {
 /// Which word each grid cell is sent as.
 pub(super) type Words = Vec<usize>;
 
-/// The criterion of a scene, or of a mixture of scenes, and the words' laws.
+/// The criterion of a model, or of a mixture of models, and the words' laws.
 #[derive(Debug, Clone)]
 pub(super) struct Landscape {
     scenarios: Vec<Scenario>,
@@ -72,16 +72,16 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    fn of(scene: &Scene, sensor: usize) -> Self {
-        let (mean, deviation) = (scene.sample_mean(), scene.sample_deviation(sensor));
+    fn of(model: &ObservationModel, sensor: usize) -> Self {
+        let (mean, deviation) = (model.sample_mean(), model.sample_deviation(sensor));
         let place = |i: usize| mean + REACH * deviation * (2.0 * i as f64 / PLACES as f64 - 1.0);
         let places: Vec<f64> = (0..=PLACES).map(place).collect();
-        let noise = scene.noise().deviation(sensor);
+        let noise = model.noise().deviation(sensor);
         let at = |y: &f64| {
-            let mut below = vec![f64::NEG_INFINITY; scene.values.len()];
-            let upper: Vec<f64> = scene.values.iter().map(|x| (y - x) / noise).collect();
+            let mut below = vec![f64::NEG_INFINITY; model.values.len()];
+            let upper: Vec<f64> = model.values.iter().map(|x| (y - x) / noise).collect();
             kernels::interval(&mut below, &upper);
-            dot(&below, &scene.weights)
+            dot(&below, &model.weights)
         };
         Self {
             mean,
@@ -118,14 +118,14 @@ pub(super) struct Block {
 }
 
 impl Landscape {
-    /// `scenes` are weighted; more than one only for squared error. Each is put on fewer nodes here.
+    /// `models` are weighted; more than one only for squared error. Each is put on fewer nodes here.
     pub(super) fn new(
-        scenes: &[(f64, &Scene)],
+        models: &[(f64, &ObservationModel)],
         criterion: Criterion,
         laws: Vec<WordLaw>,
         resolution: Resolution,
     ) -> Result<Self, Error> {
-        let coarse = scenes
+        let coarse = models
             .iter()
             .map(|(_, s)| s.at(resolution))
             .collect::<Result<Vec<_>, _>>()?;
@@ -133,13 +133,13 @@ impl Landscape {
         let reference = coarse[0].mean;
         let scenarios = coarse
             .into_iter()
-            .zip(scenes)
-            .map(|(scene, (weight, _))| {
+            .zip(models)
+            .map(|(model, (weight, _))| {
                 let features = if criterion == Criterion::MeanSquaredError {
                     // Moments of all scenarios are about one point.
-                    let offset = scene.mean - reference;
-                    let mass = scene.mass.weights.clone();
-                    let moment = scene
+                    let offset = model.mean - reference;
+                    let mass = model.mass.weights.clone();
+                    let moment = model
                         .moment
                         .weights
                         .iter()
@@ -152,20 +152,20 @@ impl Landscape {
                 };
                 Scenario {
                     weight: *weight,
-                    scene,
+                    model,
                     features,
                 }
             })
             .collect();
         Ok(Self {
-            samples: (0..laws.len()).map(|n| Sample::of(scenes[0].1, n)).collect(),
+            samples: (0..laws.len()).map(|n| Sample::of(models[0].1, n)).collect(),
             scenarios,
             scored,
             laws,
         })
     }
 
-    /// Changes the weights of the scenes.
+    /// Changes the weights of the models.
     pub(super) fn set_weights(&mut self, weights: &[f64]) {
         self.scenarios.iter_mut().zip(weights).for_each(|(s, w)| s.weight = *w);
     }
@@ -191,13 +191,13 @@ impl Landscape {
     /// Tabulates a grid for one sensor.
     pub(super) fn grid(&self, sensor: usize, edges: Vec<f64>) -> Grid {
         let cells = self.scenarios.iter().map(|scenario| {
-            let (means, sd) = scenario.scene.sample_law(sensor);
+            let (means, deviation) = scenario.model.sample_law(sensor);
             let mut cells = Vec::with_capacity((edges.len() + 1) * means.len());
             for c in 0..=edges.len() {
                 let lower = if c == 0 { f64::NEG_INFINITY } else { edges[c - 1] };
                 let upper = edges.get(c).copied().unwrap_or(f64::INFINITY);
-                let mut inside: Vec<f64> = means.iter().map(|m| (lower - m) / sd).collect();
-                let above: Vec<f64> = means.iter().map(|m| (upper - m) / sd).collect();
+                let mut inside: Vec<f64> = means.iter().map(|m| (lower - m) / deviation).collect();
+                let above: Vec<f64> = means.iter().map(|m| (upper - m) / deviation).collect();
                 kernels::interval(&mut inside, &above);
                 cells.extend(inside);
             }
@@ -317,9 +317,9 @@ impl Landscape {
         value
     }
 
-    /// What a sensor's symbols add to the conditional entropy.
+    /// Contribution of a sensor's symbols to the conditional entropy.
     fn own_entropy(&self, symbols: &Table) -> f64 {
-        negative_entropy(&symbols.values, &self.scenarios[0].scene.mass.weights)
+        negative_entropy(&symbols.values, &self.scenarios[0].model.mass.weights)
     }
 
     /// The value of a whole design; `None` if the time is over first.
@@ -341,10 +341,10 @@ impl Landscape {
 
     /// Size against which a change of a value counts.
     pub(super) fn unit(&self, value: f64) -> f64 {
-        self.scored.unit(value, &self.scenarios[0].scene)
+        self.scored.unit(value, &self.scenarios[0].model)
     }
 
-    /// What it is worth to send each grid cell as each word while the decoder stays: `[cell][word]`.
+    /// Gain of sending each grid cell as each word for a fixed decoder: `[cell][word]`.
     pub(super) fn worth(&self, block: &Block, grid: &Grid, words: &[usize]) -> Vec<f64> {
         let law = &self.laws[block.sensor];
         let (width, count, outputs) = (self.width(), law.words, law.outputs);
@@ -369,7 +369,7 @@ impl Landscape {
         }
         if self.scored.has_separable_entropy() {
             let symbols = self.symbols_in(0, block.sensor, grid, words);
-            let mass = &self.scenarios[0].scene.mass.weights;
+            let mass = &self.scenarios[0].model.mass.weights;
             for t in 0..outputs {
                 let logs = symbols.row(t).iter().zip(mass).map(|(p, w)| w * p.max(LOG_FLOOR).ln());
                 let logs: Vec<f64> = logs.collect();

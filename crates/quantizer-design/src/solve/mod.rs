@@ -13,7 +13,7 @@
 //! | `search`, `starts` | cells and words searched together; from which starts |
 //! | `polish`, `share` | Newton's method; shares of a total |
 //! | `adc`, `export`, `additive` | what leaves the library |
-//! | `robust` | other scenes than the one of the design |
+//! | `robust` | other models than the one of the design |
 //!
 //! Cells and words are searched together because over a link that inverts bits neither can be chosen first: which cells are
 //! worth having depends on which words are confused, and behind a poor link some words are better not used. Newton's method

@@ -2,7 +2,7 @@
 
 use super::landscape::{WordLaw, Words};
 use crate::error::Error;
-use crate::scene::Scene;
+use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_core::Link;
 use fewbits_quantizers::{Channel, Quantizer};
@@ -10,7 +10,7 @@ use fewbits_quantizers::{Channel, Quantizer};
 /// A sensor that takes part.
 #[derive(Debug, Clone)]
 pub(super) struct Participant {
-    /// Number in the request's scene.
+    /// Number in the request's model.
     pub(super) sensor: usize,
     pub(super) bits: u32,
     pub(super) link: Link,
@@ -27,7 +27,7 @@ impl Participant {
         (0..bits.len()).filter(|n| bits[*n] > 0).map(of).collect()
     }
 
-    /// What arrives of a word: the words, and that nothing arrived if that can be.
+    /// Transition probabilities from words to received symbols: the words, and one more symbol "missing" if the link loses words.
     pub(super) fn law(&self) -> WordLaw {
         let words = 1usize << self.bits;
         let missing = missing(&self.link);
@@ -92,7 +92,7 @@ impl WordedCells {
 
 /// The system of these cells and words; symbols are the received words, and one more if a word may be missing.
 pub(super) fn system_of(
-    scene: &Scene,
+    model: &ObservationModel,
     participants: &[Participant],
     cells: &[WordedCells],
     apart: bool,
@@ -103,7 +103,7 @@ pub(super) fn system_of(
             !apart
                 && cells[*first] == cells[n]
                 && participants[*first].law() == participants[n].law()
-                && scene.interchangeable(*first, n)
+                && model.interchangeable(*first, n)
         });
         match alike {
             Some((_, sensors)) => sensors.push(n),
@@ -111,15 +111,15 @@ pub(super) fn system_of(
         }
     }
     let groups = groups.into_iter().map(|(first, sensors)| {
-        let (quantizer, channel) = parts_of(scene, first, &participants[first], &cells[first])?;
+        let (quantizer, channel) = parts_of(model, first, &participants[first], &cells[first])?;
         SensorGroup::new(quantizer, channel, sensors)
     });
-    System::new(scene.clone(), groups.collect::<Result<_, _>>()?)
+    System::new(model.clone(), groups.collect::<Result<_, _>>()?)
 }
 
 /// Quantizer and channel of one sensor. A sensor with a single cell gets a second one that is sent as the same word.
 fn parts_of(
-    scene: &Scene,
+    model: &ObservationModel,
     sensor: usize,
     participant: &Participant,
     cells: &WordedCells,
@@ -136,8 +136,8 @@ fn parts_of(
     let mut breakpoints = cells.breakpoints.clone();
     if used.len() == 1 {
         used.push(used[0]);
-        (labels, breakpoints) = (vec![0, 1], vec![scene.sample_mean()]);
-        debug_assert!(sensor < scene.sensors());
+        (labels, breakpoints) = (vec![0, 1], vec![model.sample_mean()]);
+        debug_assert!(sensor < model.sensors());
     }
     let law = participant.law();
     let rows: Vec<Vec<f64>> = law

@@ -9,6 +9,7 @@ use super::solution::{Solution, Solutions};
 use super::starts::{Search, gray, plain};
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
+use fewbits_numerics::error::entries;
 
 impl Request<'_> {
     /// Makes the design: several, best first.
@@ -27,7 +28,7 @@ impl Request<'_> {
 
     /// Bits of every sensor.
     fn checked_bits(&self, control: &mut Control<'_>) -> Result<Vec<u32>, Error> {
-        let sensors = self.scene.sensors();
+        let sensors = self.model.sensors();
         let bits = match &self.bits {
             Bits::Each(bits) => vec![*bits; sensors],
             Bits::PerSensor(bits) => bits.clone(),
@@ -39,9 +40,7 @@ impl Request<'_> {
                 share::shared_out(self, *total, control)?
             }
         };
-        if bits.len() != sensors {
-            return refuse("bits", format!("{} numbers", bits.len()), format!("one per sensor, {sensors}"));
-        }
+        entries("bits", bits.len(), sensors)?;
         if let Some(bits) = bits.iter().find(|b| **b > MAX_BITS) {
             return refuse("bits", bits, format!("at most {MAX_BITS} bits per sensor"));
         }
@@ -59,13 +58,13 @@ impl Request<'_> {
     fn solve(&self, bits: &[u32], control: &mut Control<'_>) -> Result<Vec<Solution>, Error> {
         let participants = Participant::all(bits, &self.links);
         let sensors: Vec<usize> = participants.iter().map(|p| p.sensor).collect();
-        let scene = self.scene.subset(&sensors)?;
+        let model = self.model.subset(&sensors)?;
         let given = self
             .start
             .as_ref()
             .map(|all| sensors.iter().map(|n| all[*n].clone()).collect::<Vec<WordedCells>>());
         let search = Search {
-            scene: &scene,
+            model: &model,
             criterion: self.criterion,
             participants: &participants,
             shape: self.cells,
@@ -76,9 +75,9 @@ impl Request<'_> {
         control.enter(Share::All);
         if self.criterion == Criterion::BayesError {
             // The error probability has kinks and many flat places: the design of most information is a good start.
-            let cells = plain(&scene, &participants, gray)?;
+            let cells = plain(&model, &participants, gray)?;
             let deadline = control.deadline();
-            let informed = polish(&scene, Criterion::MutualInformation, &participants, cells, false, deadline)?;
+            let informed = polish(&model, Criterion::MutualInformation, &participants, cells, false, deadline)?;
             searched.designs.push(informed.cells);
         }
         let parts = searched.designs.len();
@@ -90,7 +89,7 @@ impl Request<'_> {
                 cells,
                 certificate,
                 scope,
-            } = polish(&scene, self.criterion, &participants, cells, searched.apart, control.deadline())?;
+            } = polish(&model, self.criterion, &participants, cells, searched.apart, control.deadline())?;
             found.push(Solution::new(self.criterion, &participants, system, cells, certificate, scope)?);
         }
         control.report(Stage::Certificate, parts, parts);

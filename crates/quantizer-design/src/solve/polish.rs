@@ -6,7 +6,7 @@ use crate::deadline::Deadline;
 use crate::design::{Scope, joint_until};
 use crate::error::Error;
 use crate::newton::{Certificate, Newton};
-use crate::scene::{Resolution, Scene};
+use crate::observation_model::{ObservationModel, Resolution};
 use crate::system::System;
 
 /// Newton's method is left out where the second derivatives take more multiplications than this.
@@ -28,21 +28,21 @@ pub(super) struct Polished {
 }
 
 /// Whether Newton's method on the full nodes is worth its time.
-pub(super) fn is_affordable(scene: &Scene, criterion: Criterion, outcomes: f64) -> bool {
+pub(super) fn is_affordable(model: &ObservationModel, criterion: Criterion, outcomes: f64) -> bool {
     // A table as large as that of the outcomes for each sensor, twice, and for each pair.
-    let sensors = scene.sensors() as f64;
+    let sensors = model.sensors() as f64;
     let tables = 1.0 + 2.0 * sensors + 0.5 * sensors * (sensors - 1.0);
-    tables * evaluation_work(scene, criterion, outcomes) <= MAX_HESSIAN_WORK
+    tables * evaluation_work(model, criterion, outcomes) <= MAX_HESSIAN_WORK
 }
 
 /// Whether designs can be compared after the time is over.
-pub(super) fn is_quick(scene: &Scene, criterion: Criterion, outcomes: f64) -> Result<bool, Error> {
-    Ok(evaluation_work(&scene.at(Resolution::Coarse)?, criterion, outcomes) <= LATE_COARSE_WORK)
+pub(super) fn is_quick(model: &ObservationModel, criterion: Criterion, outcomes: f64) -> Result<bool, Error> {
+    Ok(evaluation_work(&model.at(Resolution::Coarse)?, criterion, outcomes) <= LATE_COARSE_WORK)
 }
 
 /// Multiplications that one evaluation takes.
-pub(super) fn evaluation_work(scene: &Scene, criterion: Criterion, outcomes: f64) -> f64 {
-    let per_outcome = Scored::new(criterion, scene)
+pub(super) fn evaluation_work(model: &ObservationModel, criterion: Criterion, outcomes: f64) -> f64 {
+    let per_outcome = Scored::new(criterion, model)
         .map_or(f64::INFINITY, |s| s.features().iter().map(|f| f.weights.len() as f64).sum::<f64>());
     outcomes * per_outcome
 }
@@ -50,7 +50,7 @@ pub(super) fn evaluation_work(scene: &Scene, criterion: Criterion, outcomes: f64
 /// Climbs to the stationary point next to a design. Where Newton's method does not converge, or would take too long, the design
 /// stays as it is and its certificate says so.
 pub(super) fn polish(
-    scene: &Scene,
+    model: &ObservationModel,
     criterion: Criterion,
     participants: &[Participant],
     mut cells: Vec<WordedCells>,
@@ -63,15 +63,15 @@ pub(super) fn polish(
         Scope::SharedBreakpoints
     };
     // Most of the way goes on coarse nodes, which are a tenth as many.
-    let coarse = scene.at(Resolution::Coarse)?;
+    let coarse = model.at(Resolution::Coarse)?;
     let unproved = |cells: Vec<WordedCells>| {
-        let mut system = system_of(scene, participants, &cells, apart)?;
+        let mut system = system_of(model, participants, &cells, apart)?;
         let outcomes = system.outcomes() as f64;
-        let work = evaluation_work(scene, criterion, outcomes);
+        let work = evaluation_work(model, criterion, outcomes);
         let is_late = deadline.is_short_for(work);
         let coarse_work = evaluation_work(&coarse, criterion, outcomes);
         if coarse_work > LATE_COARSE_WORK && deadline.is_short_for(coarse_work) {
-            system = system_of(&scene.at(Resolution::Rough)?, participants, &cells, apart)?;
+            system = system_of(&model.at(Resolution::Rough)?, participants, &cells, apart)?;
         } else if work > if is_late { LATE_VALUE_WORK } else { MAX_VALUE_WORK } {
             system = system_of(&coarse, participants, &cells, apart)?;
         }
@@ -84,8 +84,8 @@ pub(super) fn polish(
     };
     let mut is_coarse = true;
     loop {
-        let system = system_of(if is_coarse { &coarse } else { scene }, participants, &cells, apart)?;
-        if deadline.is_over() || !is_affordable(system.scene(), criterion, system.outcomes() as f64) {
+        let system = system_of(if is_coarse { &coarse } else { model }, participants, &cells, apart)?;
+        if deadline.is_over() || !is_affordable(system.model(), criterion, system.outcomes() as f64) {
             return unproved(cells);
         }
         let newton = Newton {
@@ -149,7 +149,7 @@ fn merge(cells: &mut WordedCells, cell: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{Noise, Prior, Resolution, Scene};
+    use crate::observation_model::{Noise, ObservationModel, Prior, Resolution};
     use crate::{Criterion, System};
 
     #[test]
@@ -163,9 +163,9 @@ mod tests {
         for prior in priors {
             for (deviations, rho) in [([0.3, 0.3], 0.0), ([0.3, 0.3], 0.6), ([0.3, 0.8], 0.85)] {
                 let noise = Noise::equicorrelated_with_deviations(&deviations, rho).unwrap();
-                let scene = Scene::new(prior.clone(), noise).unwrap();
-                let full = System::lloyd_max(scene.clone(), 4).unwrap();
-                let coarse = System::ideal(scene.at(Resolution::Coarse).unwrap(), full.quantizers()).unwrap();
+                let model = ObservationModel::new(prior.clone(), noise).unwrap();
+                let full = System::lloyd_max(model.clone(), 4).unwrap();
+                let coarse = System::ideal(model.at(Resolution::Coarse).unwrap(), full.quantizers()).unwrap();
                 for criterion in [Criterion::MeanSquaredError, Criterion::MutualInformation] {
                     let [a, b] = [&full, &coarse].map(|s| s.value(criterion).unwrap());
                     assert!((a / b - 1.0).abs() < 1e-5, "{prior:?} {rho} {criterion:?}: {a} {b}");

@@ -1,11 +1,12 @@
-//! What is asked of a design.
+//! A request: the problem and the options of a design.
 
 use super::control::Progress;
 use super::participant::WordedCells;
 use crate::criterion::{AllowedCells, Criterion};
 use crate::error::{Error, refuse};
-use crate::scene::{Prior, Scene};
+use crate::observation_model::{ObservationModel, Prior};
 use fewbits_core::Link;
+use fewbits_numerics::error::entries;
 use fewbits_quantizers::quantizer::check_increasing;
 use std::time::Duration;
 
@@ -30,11 +31,11 @@ pub enum Bits {
 /// ```
 /// use fewbits_core::Link;
 /// use fewbits_quantizer_design::solve::{Bits, Request};
-/// use fewbits_quantizer_design::{Noise, Prior, Scene};
+/// use fewbits_quantizer_design::{Noise, Prior, ObservationModel};
 ///
 /// let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.5], 0.5)?;
-/// let scene = Scene::new(Prior::normal(20.0, 4.0)?, noise)?;
-/// let solutions = Request::estimation(scene, Bits::Each(2), Link::flipping(0.02)?).run()?;
+/// let model = ObservationModel::new(Prior::normal(20.0, 4.0)?, noise)?;
+/// let solutions = Request::estimation(model, Bits::Each(2), Link::flipping(0.02)?).run()?;
 /// let best = solutions.best();
 /// println!("{}", best.table());
 /// let estimate = best.decoder(100)?.decode_symbols(&best.encode(&[21.3, 22.0])?)?;
@@ -42,7 +43,7 @@ pub enum Bits {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Request<'a> {
-    pub(super) scene: Scene,
+    pub(super) model: ObservationModel,
     pub(super) bits: Bits,
     pub(super) links: Vec<Link>,
     pub(super) criterion: Criterion,
@@ -57,10 +58,10 @@ pub struct Request<'a> {
 impl<'a> Request<'a> {
     /// Quantizers, words and decoder for the estimate of least mean squared error. The prior may be any, discrete ones included:
     /// their values are taken as numbers to be estimated, not as hypotheses.
-    pub fn estimation(scene: Scene, bits: Bits, link: Link) -> Self {
+    pub fn estimation(model: ObservationModel, bits: Bits, link: Link) -> Self {
         Self {
-            links: vec![link; scene.sensors()],
-            scene,
+            links: vec![link; model.sensors()],
+            model,
             bits,
             criterion: Criterion::MeanSquaredError,
             cells: AllowedCells::Intervals,
@@ -75,13 +76,13 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// If the prior is not discrete.
-    pub fn detection(scene: Scene, bits: Bits, link: Link) -> Result<Self, Error> {
-        if !matches!(scene.prior(), Prior::Discrete { .. }) {
+    pub fn detection(model: ObservationModel, bits: Bits, link: Link) -> Result<Self, Error> {
+        if !matches!(model.prior(), Prior::Discrete { .. }) {
             return refuse("prior", "a continuous prior", "a discrete prior: the hypotheses");
         }
         Ok(Self {
             criterion: Criterion::BayesError,
-            ..Self::estimation(scene, bits, link)
+            ..Self::estimation(model, bits, link)
         })
     }
 
@@ -97,13 +98,7 @@ impl<'a> Request<'a> {
     /// # Errors
     /// If their number is not that of the sensors.
     pub fn with_links(mut self, links: Vec<Link>) -> Result<Self, Error> {
-        if links.len() != self.scene.sensors() {
-            return refuse(
-                "links",
-                format!("{} links", links.len()),
-                format!("one per sensor, {}", self.scene.sensors()),
-            );
-        }
+        entries("links", links.len(), self.model.sensors())?;
         self.links = links;
         Ok(self)
     }
@@ -124,24 +119,15 @@ impl<'a> Request<'a> {
         self
     }
 
-    /// Tries a design of the caller's as a start, too: breakpoints and the word of each cell, for every sensor of the scene.
+    /// Tries a design of the caller's as a start, too: breakpoints and the word of each cell, for every sensor of the model.
     ///
     /// # Errors
     /// If there is not one entry per sensor, breakpoints do not increase, or there is not one word per cell.
     pub fn with_start(mut self, cells: Vec<(Vec<f64>, Vec<usize>)>) -> Result<Self, Error> {
-        if cells.len() != self.scene.sensors() {
-            return refuse(
-                "cells",
-                format!("{} entries", cells.len()),
-                format!("one per sensor, {}", self.scene.sensors()),
-            );
-        }
+        entries("cells", cells.len(), self.model.sensors())?;
         for (breakpoints, words) in &cells {
             check_increasing(breakpoints)?;
-            if words.len() != breakpoints.len() + 1 {
-                let given = format!("{} words for {} breakpoints", words.len(), breakpoints.len());
-                return refuse("cells", given, "one word per cell");
-            }
+            entries("cells", words.len(), breakpoints.len() + 1)?;
         }
         let cells = cells
             .into_iter()

@@ -9,71 +9,71 @@ use super::solution::{SensorDesign, Solution};
 use crate::criterion::{AllowedCells, Criterion};
 use crate::error::{Error, refuse};
 use crate::law::Reports;
-use crate::scene::{Resolution, Scene};
+use crate::observation_model::{ObservationModel, Resolution};
 use crate::system::System;
 use fewbits_numerics::error::{non_negative, within};
 
-/// Rounds in which the weights of the scenes move.
+/// Rounds in which the weights of the models move.
 const ROUNDS: usize = 40;
-/// How strongly a scene of more than average error gains weight in the first round.
+/// How strongly a model of more than average error gains weight in the first round.
 const LEARNING: f64 = 4.0;
 /// Grid cells of a sensor.
 const GRID: usize = 96;
 
-/// A design used in another scene than its own.
+/// A design used under another observation model than its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mismatch {
-    /// Mean squared error with the decoder of the design, which does not know of the change.
+    /// Mean squared error with the decoder of the design, which was made for the first model.
     pub mean_squared_error: f64,
-    /// Mean squared error of the same cells and words with a decoder that knows the other scene.
+    /// Mean squared error of the same cells and words with the decoder for the other model.
     pub with_best_decoder: f64,
 }
 
-/// What one change of the scene does to a design.
+/// The error of a design after one change of the observation model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivity {
-    /// What is changed.
+    /// Name of the changed quantity.
     pub what: &'static str,
     /// The relative change; of the mean, in standard deviations of the prior.
     pub change: f64,
-    /// What follows.
+    /// Errors after the change.
     pub mismatch: Mismatch,
 }
 
 impl Solution {
-    /// The mean squared error of this design in another scene of the same sensors.
+    /// The mean squared error of this design in another model of the same sensors.
     ///
     /// # Errors
-    /// If the scene has another number of sensors; [`Error::TooLarge`] for too many joint symbols.
-    pub fn in_scene(&self, scene: &Scene) -> Result<Mismatch, Error> {
-        let own = self.system_in(self.system().scene())?;
-        let other = self.system_in(scene)?;
+    /// If the model has another number of sensors; [`Error::TooLarge`] for too many joint symbols.
+    pub fn in_model(&self, model: &ObservationModel) -> Result<Mismatch, Error> {
+        let own = self.system_in(self.system().model())?;
+        let other = self.system_in(model)?;
         Ok(Mismatch {
             mean_squared_error: error_of(&other, &estimates(&own)?)?,
             with_best_decoder: other.value(Criterion::MeanSquaredError)?,
         })
     }
 
-    /// The mean squared error if one number of the scene is a share `change` larger or smaller than the design supposes: the
+    /// The mean squared error if one number of the model is a share `change` larger or smaller than the design supposes: the
     /// prior's standard deviation, its mean (by `change` standard deviations), the noise.
     ///
     /// # Errors
-    /// If `change` is not in `[0, 0.9]`; as [`Solution::in_scene`].
+    /// If `change` is not in `[0, 0.9]`; as [`Solution::in_model`].
     pub fn sensitivity(&self, change: f64) -> Result<Vec<Sensitivity>, Error> {
         within("change", change, 0.0, 0.9)?;
-        let scene = self.system().scene();
+        let model = self.system().model();
         let mut found = Vec::new();
         for change in [-change, change] {
             let varied = [
-                ("prior deviation", varied(scene, 0.0, 1.0 + change, 1.0)?),
-                ("prior mean", varied(scene, change * scene.prior().deviation(), 1.0, 1.0)?),
-                ("noise deviations", varied(scene, 0.0, 1.0, 1.0 + change)?),
+                ("prior deviation", varied(model, 0.0, 1.0 + change, 1.0)?),
+                ("prior mean", varied(model, change * model.prior().deviation(), 1.0, 1.0)?),
+                ("noise deviations", varied(model, 0.0, 1.0, 1.0 + change)?),
             ];
             for (what, other) in varied {
                 found.push(Sensitivity {
                     what,
                     change,
-                    mismatch: self.in_scene(&other)?,
+                    mismatch: self.in_model(&other)?,
                 });
             }
         }
@@ -81,22 +81,22 @@ impl Solution {
     }
 }
 
-/// The scene with its prior moved and stretched about its mean, and its noise stretched.
-fn varied(scene: &Scene, offset: f64, prior: f64, noise: f64) -> Result<Scene, Error> {
-    let mean = scene.prior().mean();
-    let moved = scene.prior().rescaled(prior)?.shifted(offset + mean - prior * mean)?;
-    Scene::new(moved, scene.noise().rescaled(noise)?)
+/// The model with its prior moved and stretched about its mean, and its noise stretched.
+fn varied(model: &ObservationModel, offset: f64, prior: f64, noise: f64) -> Result<ObservationModel, Error> {
+    let mean = model.prior().mean();
+    let moved = model.prior().rescaled(prior)?.shifted(offset + mean - prior * mean)?;
+    ObservationModel::new(moved, model.noise().rescaled(noise)?)
 }
 
 /// Probability, and moment about the prior mean, of every joint symbol, first sensor slowest.
 fn outcome_moments(system: &System) -> Result<Vec<f64>, Error> {
-    let scene = system.scene();
-    Ok(Reports::of(system)?.moments(&[scene.mass.clone(), scene.moment.clone()]))
+    let model = system.model();
+    Ok(Reports::of(system)?.moments(&[model.mass.clone(), model.moment.clone()]))
 }
 
 /// The posterior mean for every joint symbol; the prior mean for what cannot happen.
 fn estimates(system: &System) -> Result<Vec<f64>, Error> {
-    let mean = system.scene().mean;
+    let mean = system.model().mean;
     Ok(outcome_moments(system)?
         .chunks_exact(2)
         .map(|m| if m[0] > 0.0 { mean + m[1] / m[0] } else { mean })
@@ -105,20 +105,20 @@ fn estimates(system: &System) -> Result<Vec<f64>, Error> {
 
 /// Mean squared error of a table of estimates: `E (X - m)^2 + sum_t (P_t d_t^2 + 2 d_t M_t)` with `d_t = m - estimate_t`.
 fn error_of(system: &System, estimates: &[f64]) -> Result<f64, Error> {
-    let scene = system.scene();
+    let model = system.model();
     let terms = outcome_moments(system)?;
     let change: f64 = terms
         .chunks_exact(2)
         .zip(estimates)
         .map(|(m, estimate)| {
-            let off = scene.mean - estimate;
+            let off = model.mean - estimate;
             off * (m[0] * off + 2.0 * m[1])
         })
         .sum();
-    Ok((scene.variance + change).max(0.0))
+    Ok((model.variance + change).max(0.0))
 }
 
-/// A box of scenes: how far the true scene may be from the one of the request.
+/// A box of models: how far the true model may be from the one of the request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Corner {
     mean: f64,
@@ -126,7 +126,7 @@ struct Corner {
     noise: f64,
 }
 
-/// A design for the worst scene of a box.
+/// A design for the worst model of a box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimax {
     /// Cells and words of the sensors that take part.
@@ -135,24 +135,24 @@ pub struct Minimax {
     pub estimates: Vec<f64>,
     /// Largest mean squared error over the corners and the centre of the box.
     pub worst_case: f64,
-    /// The same for the design that trusts the request's scene.
+    /// The same for the design that trusts the request's model.
     pub nominal_worst_case: f64,
-    /// The error of the best design found against the mixture of scenes that is worst for it. If that search missed nothing,
+    /// The error of the best design found against the mixture of models that is worst for it. If that search missed nothing,
     /// no design has a smaller worst case.
     pub bound: f64,
-    /// The share of each scene in that mixture: the centre first, then the corners.
+    /// The share of each model in that mixture: the centre first, then the corners.
     pub weights: Vec<f64>,
 }
 
-/// The design of least worst-case mean squared error over a box of scenes: the prior's mean may be off by
+/// The design of least worst-case mean squared error over a box of models: the prior's mean may be off by
 /// `mean_offset` (in the unit of the unknown), its deviation and all noise deviations by the given shares. Cells, words and
-/// decoder are one for all scenes.
+/// decoder are one for all models.
 ///
 /// ```text
 /// weights <- equal, over the corners of the box and its centre
 /// repeat
-///     design  <- best against the mixture of scenes, from the last design
-///     errors  <- of that design in each scene
+///     design  <- best against the mixture of models, from the last design
+///     errors  <- of that design in each model
 ///     weights <- weights * exp(rate * (error / mean error - 1)), normalised
 /// answer  <- the design with the least largest error
 /// ```
@@ -171,35 +171,35 @@ pub fn minimax(
     non_negative("mean_offset", mean_offset)?;
     within("deviation_share", deviation_share, 0.0, 0.9)?;
     within("noise_share", noise_share, 0.0, 0.9)?;
-    let centre = request.scene.clone();
+    let centre = request.model.clone();
     let solutions = request.run()?;
     let nominal = solutions.best();
     let own: Vec<usize> = nominal.sensors().iter().map(|s| s.sensor).collect();
     let centre = centre.subset(&own)?;
-    let scenes = corners(mean_offset, deviation_share, noise_share)
+    let models = corners(mean_offset, deviation_share, noise_share)
         .into_iter()
         .map(|c| varied(&centre, c.mean, 1.0 + c.deviation, 1.0 + c.noise))
         .collect::<Result<Vec<_>, _>>()?;
     let participants = nominal.participants();
     let laws: Vec<WordLaw> = participants.iter().map(Participant::law).collect();
-    let mut weights = vec![1.0 / scenes.len() as f64; scenes.len()];
-    let weighted: Vec<(f64, &Scene)> = weights.iter().copied().zip(&scenes).collect();
+    let mut weights = vec![1.0 / models.len() as f64; models.len()];
+    let weighted: Vec<(f64, &ObservationModel)> = weights.iter().copied().zip(&models).collect();
     let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws, Resolution::Coarse)?;
     let mut cells = nominal.cells();
     let nominal_estimates = estimates(&nominal.system_in(&centre)?)?;
-    let nominal_worst_case = worst(&scenes, nominal, &nominal_estimates)?.0;
+    let nominal_worst_case = worst(&models, nominal, &nominal_estimates)?.0;
     let mut best: Option<Minimax> = None;
     let mut bound = 0.0_f64;
     for round in 0..ROUNDS {
         landscape.set_weights(&weights);
         cells = best_cells(&landscape, &cells);
         let design = nominal.with_cells(cells.clone())?;
-        let systems = scenes
+        let systems = models
             .iter()
             .map(|s| design.system_in(s))
             .collect::<Result<Vec<_>, _>>()?;
         let mixed = mixed_estimates(&systems, &weights)?;
-        let (worst_case, errors) = worst(&scenes, &design, &mixed)?;
+        let (worst_case, errors) = worst(&models, &design, &mixed)?;
         let average: f64 = errors.iter().zip(&weights).map(|(e, w)| e * w).sum();
         bound = bound.max(average);
         if best.as_ref().is_none_or(|b| worst_case < b.worst_case) {
@@ -268,21 +268,21 @@ fn best_cells(landscape: &Landscape, cells: &[WordedCells]) -> Vec<WordedCells> 
     cells_of(&point)
 }
 
-/// The largest error over the scenes, and all of them.
-fn worst(scenes: &[Scene], design: &Solution, estimates: &[f64]) -> Result<(f64, Vec<f64>), Error> {
-    let errors = scenes
+/// The largest error over the models, and all of them.
+fn worst(models: &[ObservationModel], design: &Solution, estimates: &[f64]) -> Result<(f64, Vec<f64>), Error> {
+    let errors = models
         .iter()
-        .map(|scene| error_of(&design.system_in(scene)?, estimates))
+        .map(|model| error_of(&design.system_in(model)?, estimates))
         .collect::<Result<Vec<_>, _>>()?;
     Ok((errors.iter().copied().fold(0.0, f64::max), errors))
 }
 
-/// The posterior mean under a mixture of scenes.
+/// The posterior mean under a mixture of models.
 fn mixed_estimates(systems: &[System], weights: &[f64]) -> Result<Vec<f64>, Error> {
-    let reference = systems[0].scene().mean;
+    let reference = systems[0].model().mean;
     let mut sums: Vec<[f64; 2]> = Vec::new();
     for (system, weight) in systems.iter().zip(weights) {
-        let offset = system.scene().mean - reference;
+        let offset = system.model().mean - reference;
         let own = outcome_moments(system)?;
         sums.resize(own.len() / 2, [0.0; 2]);
         for (sum, m) in sums.iter_mut().zip(own.chunks_exact(2)) {

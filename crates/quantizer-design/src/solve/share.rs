@@ -27,7 +27,7 @@ const MAX_MOVES: usize = 20;
 /// Bits of every sensor.
 pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Control<'_>) -> Result<Vec<u32>, Error> {
     control.end_with(SHARE);
-    let sensors = request.scene.sensors();
+    let sensors = request.model.sensors();
     let mut tried = Tried {
         request,
         values: BTreeMap::new(),
@@ -70,9 +70,9 @@ fn moved(bits: &[u32], from: Option<usize>, to: usize) -> Vec<u32> {
 
 /// The sensor of the largest signal-to-noise ratio, halved once for each bit that it has.
 fn next_sensor(request: &Request<'_>, bits: &[u32]) -> usize {
-    let scene = &request.scene;
+    let model = &request.model;
     let left = |n: usize| {
-        let ratio = scene.prior().deviation() / scene.noise().deviation(n);
+        let ratio = model.prior().deviation() / model.noise().deviation(n);
         ratio.ln() - f64::from(bits[n]) * std::f64::consts::LN_2
     };
     let open = (0..bits.len()).filter(|n| bits[*n] < MAX_BITS);
@@ -112,7 +112,7 @@ impl Tried<'_, '_> {
         let participants = Participant::all(bits, &self.request.links);
         let sensors: Vec<usize> = participants.iter().map(|p| p.sensor).collect();
         let search = Search {
-            scene: &self.request.scene.subset(&sensors)?,
+            model: &self.request.model.subset(&sensors)?,
             criterion: self.request.criterion,
             participants: &participants,
             shape: AllowedCells::Intervals,

@@ -1,4 +1,4 @@
-//! What a design is: cells and words of every sensor, what they are worth, and how sure that is.
+//! A finished design: cells and words of every sensor, the criterion's value, a bound and a certificate.
 
 use super::participant::{Participant, WordedCells, missing, system_of};
 use crate::bounds;
@@ -7,9 +7,10 @@ use crate::decoder::MmseDecoder;
 use crate::design::Scope;
 use crate::error::{Error, refuse};
 use crate::newton::Certificate;
-use crate::scene::{Prior, Scene};
+use crate::observation_model::{ObservationModel, Prior};
 use crate::system::System;
 use fewbits_core::Link;
+use fewbits_numerics::error::entries;
 use fewbits_quantizers::quantizer::cell_of;
 use std::fmt::Write;
 
@@ -83,12 +84,12 @@ impl SensorDesign {
     }
 }
 
-/// What no design of as many bits can pass.
+/// A bound on the criterion over all designs with these bits and links.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
     /// In the unit of the criterion: a lower bound on an error, an upper bound on information.
     pub value: f64,
-    /// How it is known.
+    /// How the bound was obtained.
     pub kind: BoundKind,
 }
 
@@ -184,7 +185,7 @@ impl Solution {
         self.system.value(Criterion::MeanSquaredError)
     }
 
-    /// What no design can pass, if a bound is known.
+    /// A bound on the criterion over all designs with these bits and links, if one is known.
     pub fn bound(&self) -> Option<Bound> {
         self.bound
     }
@@ -210,10 +211,7 @@ impl Solution {
     /// # Errors
     /// If there is not one sample per sensor, or one is NaN.
     pub fn encode(&self, samples: &[f64]) -> Result<Vec<usize>, Error> {
-        if samples.len() != self.sensors.len() {
-            let expected = format!("one per sensor, {}", self.sensors.len());
-            return refuse("samples", format!("{} samples", samples.len()), expected);
-        }
+        entries("samples", samples.len(), self.sensors.len())?;
         self.sensors
             .iter()
             .zip(samples)
@@ -234,10 +232,7 @@ impl Solution {
     /// # Errors
     /// If there is not one list per sensor, or a list has another length or is not increasing.
     pub fn with_breakpoints(&self, breakpoints: Vec<Vec<f64>>) -> Result<Self, Error> {
-        if breakpoints.len() != self.sensors.len() {
-            let expected = format!("one per sensor, {}", self.sensors.len());
-            return refuse("breakpoints", format!("{} lists", breakpoints.len()), expected);
-        }
+        entries("breakpoints", breakpoints.len(), self.sensors.len())?;
         let mut cells = self.cells();
         cells
             .iter_mut()
@@ -247,16 +242,13 @@ impl Solution {
     }
 
     pub(super) fn with_cells(&self, cells: Vec<WordedCells>) -> Result<Self, Error> {
-        for (sensor, cells) in self.sensors.iter().zip(&cells) {
+        for cells in &cells {
             fewbits_quantizers::quantizer::check_increasing(&cells.breakpoints)?;
-            if cells.words.len() != cells.breakpoints.len() + 1 {
-                let expected = format!("{} for sensor {}", cells.words.len() - 1, sensor.sensor);
-                return refuse("breakpoints", format!("{} breakpoints", cells.breakpoints.len()), expected);
-            }
+            entries("breakpoints", cells.breakpoints.len(), cells.words.len() - 1)?;
         }
         let participants = self.participants();
         let apart = self.system.groups().len() == self.sensors.len();
-        let system = system_of(self.system.scene(), &participants, &cells, apart)?;
+        let system = system_of(self.system.model(), &participants, &cells, apart)?;
         let sensors = self.sensors.iter().zip(cells).map(|(s, c)| SensorDesign {
             breakpoints: c.breakpoints,
             words: c.words,
@@ -274,13 +266,13 @@ impl Solution {
         parts.collect()
     }
 
-    /// The system of these cells and words in another scene of as many sensors.
-    pub(super) fn system_in(&self, scene: &Scene) -> Result<System, Error> {
-        if scene.sensors() != self.sensors.len() {
+    /// The system of these cells and words in another model of as many sensors.
+    pub(super) fn system_in(&self, model: &ObservationModel) -> Result<System, Error> {
+        if model.sensors() != self.sensors.len() {
             let expected = format!("{}, those that take part", self.sensors.len());
-            return refuse("scene", format!("{} sensors", scene.sensors()), expected);
+            return refuse("model", format!("{} sensors", model.sensors()), expected);
         }
-        system_of(scene, &self.participants(), &self.cells(), true)
+        system_of(model, &self.participants(), &self.cells(), true)
     }
 
     /// Cells and words of every sensor.
@@ -328,11 +320,11 @@ impl Solution {
 
 /// The tightest of the bounds that hold for a system.
 fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterion) -> Result<Option<Bound>, Error> {
-    let scene = system.scene();
+    let model = system.model();
     let capacities: Vec<f64> = sensors.iter().map(|s| capacity(&s.link, s.bits)).collect();
     let total: f64 = capacities.iter().sum();
     let mut found = Vec::new();
-    if let Some(value) = bounds::unquantised(scene, criterion)? {
+    if let Some(value) = bounds::unquantised(model, criterion)? {
         found.push(Bound {
             value,
             kind: BoundKind::Unquantised,
@@ -345,17 +337,17 @@ fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterio
                 kind: BoundKind::Capacity,
             });
         }
-        Criterion::MeanSquaredError if matches!(scene.prior(), Prior::Gaussian { .. }) => {
-            let prior = scene.prior_variance();
-            let left = 1.0 / (1.0 / prior + scene.noise().precision_of_mean());
+        Criterion::MeanSquaredError if matches!(model.prior(), Prior::Gaussian { .. }) => {
+            let prior = model.prior_variance();
+            let left = 1.0 / (1.0 / prior + model.noise().precision_of_mean());
             let value = left + (prior - left) * (-2.0 * total).exp2();
             found.push(Bound {
                 value,
                 kind: BoundKind::Together,
             });
-            if scene.is_independent() && sensors.len() <= bounds::CEO_MAX_SENSORS {
+            if model.is_independent() && sensors.len() <= bounds::CEO_MAX_SENSORS {
                 // A bound that does not converge is no bound.
-                if let Ok(ceo) = bounds::ceo(scene.prior(), scene.noise(), &capacities) {
+                if let Ok(ceo) = bounds::ceo(model.prior(), model.noise(), &capacities) {
                     found.push(Bound {
                         value: ceo.lower(),
                         kind: BoundKind::Ceo,

@@ -7,7 +7,7 @@ use super::polish;
 use super::search::{Point, best_of, cells_of, climb, gray_walk, grid_with, random_start, refine, spacing, start};
 use crate::criterion::{AllowedCells, Criterion};
 use crate::error::Error;
-use crate::scene::{Resolution, Scene};
+use crate::observation_model::{ObservationModel, Resolution};
 use crate::system::OUTCOME_LIMIT;
 use fewbits_monte_carlo::Stream;
 use fewbits_quantizers::lloyd_max;
@@ -45,10 +45,10 @@ pub(super) struct Searched {
     pub(super) apart: bool,
 }
 
-/// What is searched for.
+/// A search problem.
 #[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
-    pub(super) scene: &'a Scene,
+    pub(super) model: &'a ObservationModel,
     pub(super) criterion: Criterion,
     pub(super) participants: &'a [Participant],
     pub(super) shape: AllowedCells,
@@ -61,7 +61,7 @@ pub(super) struct Search<'a> {
 impl Search<'_> {
     pub(super) fn run(&self, control: &mut Control<'_>) -> Result<Searched, Error> {
         let Self {
-            scene,
+            model,
             criterion,
             participants,
             ..
@@ -77,7 +77,7 @@ impl Search<'_> {
                 apart: false,
             });
         }
-        let mut landscape = Landscape::new(&[(1.0, scene)], criterion, laws.clone(), Resolution::Coarse)?;
+        let mut landscape = Landscape::new(&[(1.0, model)], criterion, laws.clone(), Resolution::Coarse)?;
         let mut cells: Vec<usize> = participants.iter().map(|p| grid_cells(p.bits)).collect();
         let largest = cells.iter().copied().max().unwrap_or(0);
         let mut work = landscape.work(largest);
@@ -95,8 +95,8 @@ impl Search<'_> {
                 .collect();
         }
         if work_is_large {
-            let rough = scene.at(Resolution::Rough)?;
-            landscape = Landscape::new(&[(1.0, scene)], criterion, laws, Resolution::Rough)?;
+            let rough = model.at(Resolution::Rough)?;
+            landscape = Landscape::new(&[(1.0, model)], criterion, laws, Resolution::Rough)?;
             work = landscape.work(cells.iter().copied().max().unwrap_or(0));
             // Where few climbs are possible the first one starts from the best design at hand.
             first = self.best_at_hand(&rough, first, control)?;
@@ -119,9 +119,9 @@ impl Search<'_> {
             if designs.is_empty() {
                 designs.push(first.clone());
             }
-            if polish::is_quick(scene, criterion, outcomes)? {
-                designs.push(plain(scene, participants, gray)?);
-                designs.push(plain(scene, participants, |level| level)?);
+            if polish::is_quick(model, criterion, outcomes)? {
+                designs.push(plain(model, participants, gray)?);
+                designs.push(plain(model, participants, |level| level)?);
             }
         }
         Ok(Searched {
@@ -134,12 +134,12 @@ impl Search<'_> {
     /// The best on rough nodes of a design and the plain ones, as far as there is time to evaluate them.
     fn best_at_hand(
         &self,
-        rough: &Scene,
+        rough: &ObservationModel,
         design: Vec<WordedCells>,
         control: &mut Control<'_>,
     ) -> Result<Vec<WordedCells>, Error> {
-        let gray = plain(self.scene, self.participants, gray)?;
-        let natural = plain(self.scene, self.participants, |level| level)?;
+        let gray = plain(self.model, self.participants, gray)?;
+        let natural = plain(self.model, self.participants, |level| level)?;
         let outcomes = self.participants.iter().map(|p| p.law().outputs as f64).product();
         let work = polish::evaluation_work(rough, self.criterion, outcomes);
         let mut best = (f64::NEG_INFINITY, design.clone());
@@ -207,7 +207,7 @@ impl Search<'_> {
     ) -> Vec<Point> {
         control.enter(Share::Refinement);
         // Newton's method needs a close start; where it is not affordable the grids alone do it.
-        let refinements = if polish::is_affordable(self.scene, self.criterion, outcomes) {
+        let refinements = if polish::is_affordable(self.model, self.criterion, outcomes) {
             REFINEMENTS
         } else {
             MORE_REFINEMENTS
@@ -230,7 +230,7 @@ impl Search<'_> {
 
     /// The best designs of every sensor by itself, best first.
     fn single_sensors(&self, laws: &[WordLaw], control: &mut Control<'_>) -> Result<Vec<Vec<WordedCells>>, Error> {
-        let (scene, participants) = (self.scene, self.participants);
+        let (model, participants) = (self.model, self.participants);
         // A single sensor's decisions need few levels: what it tells is what counts beside other sensors.
         let criterion = match self.criterion {
             Criterion::BayesError if participants.len() > 1 => Criterion::MutualInformation,
@@ -238,13 +238,13 @@ impl Search<'_> {
         };
         let mut found: Vec<Vec<WordedCells>> = Vec::new();
         for n in 0..participants.len() {
-            let alike = (0..n).find(|m| scene.interchangeable(*m, n) && laws[*m] == laws[n]);
+            let alike = (0..n).find(|m| model.interchangeable(*m, n) && laws[*m] == laws[n]);
             if let Some(m) = alike {
                 found.push(found[m].clone());
                 continue;
             }
             control.enter_part(Share::SingleSensors, participants.len() - n);
-            let own = scene.subset(&[n])?;
+            let own = model.subset(&[n])?;
             let landscape = Landscape::new(&[(1.0, &own)], criterion, vec![laws[n].clone()], Resolution::Coarse)?;
             let bits = participants[n].bits;
             let cells = grid_cells(bits);
@@ -316,13 +316,13 @@ fn size_of(landscape: &Landscape, points: &[Point]) -> f64 {
 
 /// Lloyd-Max cells of a normal sample with the word of each level.
 pub(super) fn plain(
-    scene: &Scene,
+    model: &ObservationModel,
     participants: &[Participant],
     word: fn(usize) -> usize,
 ) -> Result<Vec<WordedCells>, Error> {
     let of = |(n, participant): (usize, &Participant)| {
         let levels = 1usize << participant.bits;
-        let lloyd = lloyd_max::gaussian(levels)?.affine(scene.sample_mean(), scene.sample_deviation(n))?;
+        let lloyd = lloyd_max::gaussian(levels)?.affine(model.sample_mean(), model.sample_deviation(n))?;
         Ok(WordedCells {
             breakpoints: lloyd.breakpoints().to_vec(),
             words: (0..levels).map(word).collect(),

@@ -51,7 +51,7 @@ impl SensorGroup {
         &self.channel
     }
 
-    /// Numbers of the sensors in the scene.
+    /// Numbers of the sensors in the model.
     pub fn sensors(&self) -> &[usize] {
         &self.sensors
     }

@@ -6,7 +6,8 @@ pub use group::SensorGroup;
 
 use crate::compositions::count;
 use crate::error::{Error, refuse};
-use crate::scene::Scene;
+use crate::observation_model::ObservationModel;
+use fewbits_numerics::error::entries;
 use fewbits_numerics::stored;
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
@@ -16,44 +17,44 @@ use serde::{Deserialize, Serialize};
 /// Most joint outcomes a computation may enumerate unless told otherwise.
 pub const OUTCOME_LIMIT: u64 = 1 << 20;
 
-/// A scene and, for each of its sensors, a quantizer and a channel.
+/// A model and, for each of its sensors, a quantizer and a channel.
 ///
 /// ```
-/// use fewbits_quantizer_design::{Criterion, Quantizer, Scene, System};
-/// let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0])?;
-/// let system = System::identical(scene, Quantizer::symmetric(1.37)?)?;
+/// use fewbits_quantizer_design::{Criterion, Quantizer, ObservationModel, System};
+/// let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 1.0])?;
+/// let system = System::identical(model, Quantizer::symmetric(1.37)?)?;
 /// assert!((system.value(Criterion::MeanSquaredError)? - 0.388_458_855_09).abs() < 1e-9);
 /// # Ok::<(), fewbits_quantizer_design::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredSystem", into = "StoredSystem")]
 pub struct System {
-    scene: Scene,
+    model: ObservationModel,
     groups: Vec<SensorGroup>,
     outcome_limit: u64,
 }
 
 stored! { System as StoredSystem |system| {
-    scene: Scene = system.scene,
+    model: ObservationModel = system.model,
     groups: Vec<SensorGroup> = system.groups,
     outcome_limit: u64 = system.outcome_limit,
-} => Ok(System::new(scene, groups)?.with_outcome_limit(outcome_limit)), Error }
+} => Ok(System::new(model, groups)?.with_outcome_limit(outcome_limit)), Error }
 
 impl System {
     /// A system of groups.
     ///
     /// # Errors
-    /// Unless every sensor of the scene is in exactly one group and the sensors of a group have the same noise.
-    pub fn new(scene: Scene, groups: Vec<SensorGroup>) -> Result<Self, Error> {
-        let mut seen = vec![false; scene.sensors()];
+    /// Unless every sensor of the model is in exactly one group and the sensors of a group have the same noise.
+    pub fn new(model: ObservationModel, groups: Vec<SensorGroup>) -> Result<Self, Error> {
+        let mut seen = vec![false; model.sensors()];
         for group in &groups {
             for n in &group.sensors {
                 match seen.get_mut(*n) {
-                    None => return refuse("sensor", n, format!("a number below {}", scene.sensors())),
+                    None => return refuse("sensor", n, format!("a number below {}", model.sensors())),
                     Some(true) => return refuse("sensor", format!("{n} twice"), "each sensor in one group"),
                     Some(slot) => *slot = true,
                 }
-                if !scene.interchangeable(group.sensors[0], *n) {
+                if !model.interchangeable(group.sensors[0], *n) {
                     return refuse("group", format!("sensors {} and {n}", group.sensors[0]), "sensors of equal noise");
                 }
             }
@@ -62,7 +63,7 @@ impl System {
             return refuse("groups", format!("without sensor {n}"), "each sensor in one group");
         }
         Ok(Self {
-            scene,
+            model,
             groups,
             outcome_limit: OUTCOME_LIMIT,
         })
@@ -72,50 +73,54 @@ impl System {
     ///
     /// # Errors
     /// If the numbers of sensors, quantizers and channels differ, or a channel does not fit its quantizer.
-    pub fn distinct(scene: Scene, quantizers: Vec<Quantizer>, channels: Vec<Channel>) -> Result<Self, Error> {
-        if quantizers.len() != channels.len() || quantizers.len() != scene.sensors() {
+    pub fn distinct(
+        model: ObservationModel,
+        quantizers: Vec<Quantizer>,
+        channels: Vec<Channel>,
+    ) -> Result<Self, Error> {
+        if quantizers.len() != channels.len() || quantizers.len() != model.sensors() {
             let given = format!("{} quantizers, {} channels", quantizers.len(), channels.len());
-            return refuse("quantizers", given, format!("{} of each", scene.sensors()));
+            return refuse("quantizers", given, format!("{} of each", model.sensors()));
         }
         let pairs = quantizers.into_iter().zip(channels).enumerate();
         let groups = pairs
             .map(|(n, (q, c))| SensorGroup::new(q, c, vec![n]))
             .collect::<Result<_, _>>()?;
-        Self::new(scene, groups)
+        Self::new(model, groups)
     }
 
     /// A quantizer for each sensor, received as sent.
     ///
     /// # Errors
     /// As [`System::distinct`].
-    pub fn ideal(scene: Scene, quantizers: Vec<Quantizer>) -> Result<Self, Error> {
+    pub fn ideal(model: ObservationModel, quantizers: Vec<Quantizer>) -> Result<Self, Error> {
         let channels = quantizers
             .iter()
             .map(|q| Channel::ideal(q.levels()))
             .collect::<Result<_, _>>()?;
-        Self::distinct(scene, quantizers, channels)
+        Self::distinct(model, quantizers, channels)
     }
 
     /// One quantizer for all sensors, which must have the same noise, received as sent: outcomes are counts.
     ///
     /// # Errors
     /// If the sensors differ.
-    pub fn identical(scene: Scene, quantizer: Quantizer) -> Result<Self, Error> {
-        let sensors = (0..scene.sensors()).collect();
+    pub fn identical(model: ObservationModel, quantizer: Quantizer) -> Result<Self, Error> {
+        let sensors = (0..model.sensors()).collect();
         let channel = Channel::ideal(quantizer.levels())?;
-        Self::new(scene, vec![SensorGroup::new(quantizer, channel, sensors)?])
+        Self::new(model, vec![SensorGroup::new(quantizer, channel, sensors)?])
     }
 
     /// The Lloyd-Max quantizer of its own sample for each sensor, received as sent: independent designs, and the usual start.
     ///
     /// # Errors
     /// Unless `levels` is in `2..=4096`.
-    pub fn lloyd_max(scene: Scene, levels: usize) -> Result<Self, Error> {
+    pub fn lloyd_max(model: ObservationModel, levels: usize) -> Result<Self, Error> {
         let standard = lloyd_max::gaussian(levels)?;
-        let quantizers = (0..scene.sensors())
-            .map(|n| Ok(Quantizer::from(&standard.affine(scene.sample_mean(), scene.sample_deviation(n))?)))
+        let quantizers = (0..model.sensors())
+            .map(|n| Ok(Quantizer::from(&standard.affine(model.sample_mean(), model.sample_deviation(n))?)))
             .collect::<Result<Vec<_>, Error>>()?;
-        Self::ideal(scene, quantizers)
+        Self::ideal(model, quantizers)
     }
 
     /// The system of some of the sensors only, in the given order.
@@ -132,7 +137,7 @@ impl System {
         if let Some(n) = (1..sensors.len()).find(|n| sensors[..*n].contains(&sensors[*n])) {
             return refuse("sensor", format!("{} twice", sensors[n]), "each sensor once");
         }
-        let system = Self::new(self.scene.subset(sensors)?, groups.collect::<Result<_, _>>()?)?;
+        let system = Self::new(self.model.subset(sensors)?, groups.collect::<Result<_, _>>()?)?;
         Ok(system.with_outcome_limit(self.outcome_limit))
     }
 
@@ -143,20 +148,20 @@ impl System {
     pub fn symbol_distribution(&self, sensor: usize) -> Result<Vec<f64>, Error> {
         let per_value = self.symbol_distributions_given_values(sensor)?;
         let outputs = per_value.first().map_or(0, Vec::len);
-        let mixed = |t: usize| per_value.iter().zip(&self.scene.weights).map(|(p, w)| w * p[t]).sum();
+        let mixed = |t: usize| per_value.iter().zip(&self.model.weights).map(|(p, w)| w * p[t]).sum();
         Ok((0..outputs).map(mixed).collect())
     }
 
-    /// Distribution of the symbol received from one sensor for each value of the unknown ([`Scene::values`]).
+    /// Distribution of the symbol received from one sensor for each value of the unknown ([`ObservationModel::values`]).
     ///
     /// # Errors
     /// If there is no such sensor.
     pub fn symbol_distributions_given_values(&self, sensor: usize) -> Result<Vec<Vec<f64>>, Error> {
         let Some(group) = self.groups.iter().find(|g| g.sensors.contains(&sensor)) else {
-            return refuse("sensor", sensor, format!("a number below {}", self.scene.sensors()));
+            return refuse("sensor", sensor, format!("a number below {}", self.model.sensors()));
         };
-        let deviation = self.scene.noise().deviation(sensor);
-        self.scene
+        let deviation = self.model.noise().deviation(sensor);
+        self.model
             .values
             .iter()
             .map(|x| {
@@ -174,8 +179,8 @@ impl System {
     }
 
     /// Prior and noise.
-    pub fn scene(&self) -> &Scene {
-        &self.scene
+    pub fn model(&self) -> &ObservationModel {
+        &self.model
     }
 
     /// The groups.
@@ -238,9 +243,7 @@ impl System {
     /// # Errors
     /// As [`System::with_quantizer`], or if the number of quantizers is not the number of groups.
     pub fn with_quantizers(&self, quantizers: Vec<Quantizer>) -> Result<Self, Error> {
-        if quantizers.len() != self.groups.len() {
-            return refuse("quantizers", quantizers.len(), format!("{} quantizers", self.groups.len()));
-        }
+        entries("quantizers", quantizers.len(), self.groups.len())?;
         quantizers
             .into_iter()
             .enumerate()
@@ -252,12 +255,10 @@ impl System {
     /// # Errors
     /// If a channel does not fit its quantizer or their number differs from the groups'.
     pub fn with_channels(&self, channels: Vec<Channel>) -> Result<Self, Error> {
-        if channels.len() != self.groups.len() {
-            return refuse("channels", channels.len(), format!("{} channels", self.groups.len()));
-        }
+        entries("channels", channels.len(), self.groups.len())?;
         let groups = self.groups.iter().zip(channels);
         let groups = groups.map(|(g, c)| SensorGroup::new(g.quantizer.clone(), c, g.sensors.clone()));
-        let rebuilt = Self::new(self.scene.clone(), groups.collect::<Result<_, _>>()?)?;
+        let rebuilt = Self::new(self.model.clone(), groups.collect::<Result<_, _>>()?)?;
         Ok(rebuilt.with_outcome_limit(self.outcome_limit))
     }
 
@@ -276,18 +277,18 @@ mod tests {
 
     #[test]
     fn systems_that_do_not_fit_are_refused() {
-        let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 0.5]).unwrap();
+        let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 0.5]).unwrap();
         let q = Quantizer::symmetric(1.0).unwrap();
         assert!(
-            System::identical(scene.clone(), q.clone())
+            System::identical(model.clone(), q.clone())
                 .unwrap_err()
                 .to_string()
                 .contains("equal noise")
         );
-        assert!(System::ideal(scene.clone(), vec![q.clone()]).is_err());
+        assert!(System::ideal(model.clone(), vec![q.clone()]).is_err());
         let two = Channel::ideal(2).unwrap();
-        assert!(System::distinct(scene.clone(), vec![q.clone(); 2], vec![two.clone(), two]).is_err());
-        let system = System::ideal(scene, vec![q.clone(); 2]).unwrap();
+        assert!(System::distinct(model.clone(), vec![q.clone(); 2], vec![two.clone(), two]).is_err());
+        let system = System::ideal(model, vec![q.clone(); 2]).unwrap();
         assert!(
             system
                 .value(Criterion::BayesError)

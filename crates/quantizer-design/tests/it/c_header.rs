@@ -3,7 +3,7 @@
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
 use fewbits_quantizer_design::solve::{Adc, Bits, Export, Request};
-use fewbits_quantizer_design::{Noise, Prior, Scene};
+use fewbits_quantizer_design::{Noise, ObservationModel, Prior};
 use rand::RngExt;
 use std::io::Write;
 use std::path::PathBuf;
@@ -77,9 +77,9 @@ fn answers(export: &Export, name: &str, input: String) -> Option<String> {
 /// Sensor 0 sends one word only: nothing gets through.
 fn useless_link() -> Export {
     let noise = Noise::independent_with_deviations(&[1.0, 1.0]).unwrap();
-    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let links = vec![Link::flipping(0.5).unwrap(), Link::PERFECT];
-    let request = Request::estimation(scene, Bits::Each(1), Link::PERFECT).with_links(links);
+    let request = Request::estimation(model, Bits::Each(1), Link::PERFECT).with_links(links);
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let rounded = request
         .unwrap()
@@ -107,8 +107,8 @@ fn a_sensor_with_one_word_makes_a_valid_header() {
 #[test]
 fn the_rust_constants_are_the_design() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
-    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
-    let request = Request::estimation(scene, Bits::PerSensor(vec![2, 1]), Link::new(0.05, 0.02).unwrap());
+    let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let request = Request::estimation(model, Bits::PerSensor(vec![2, 1]), Link::new(0.05, 0.02).unwrap());
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let rounded = request
         .with_starts(2)
@@ -173,9 +173,9 @@ fn the_rust_constants_are_the_design() {
 #[test]
 fn the_c_header_decodes_as_the_library() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
-    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let link = Link::new(0.05, 0.02).unwrap();
-    let request = Request::estimation(scene, Bits::PerSensor(vec![3, 2]), link).with_starts(3);
+    let request = Request::estimation(model, Bits::PerSensor(vec![3, 2]), link).with_starts(3);
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let rounded = request.run().unwrap().best().rounded(&[adc, adc]).unwrap();
     let mut rng = Stream::new(9).named("words").rng();

@@ -5,7 +5,8 @@ use fewbits_quantizer_design::design;
 use fewbits_quantizer_design::published::{self, Separation};
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::{
-    Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, bounds, lloyd_max,
+    Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System,
+    bounds, lloyd_max,
 };
 use proptest::prelude::*;
 
@@ -32,7 +33,7 @@ fn pair() -> impl Strategy<Value = System> {
         |(a, b, s1, s2, rho, eps, equal)| {
             let sds = if equal { [s1, s1] } else { [s1, s2] };
             let rho = if rho.abs() < 0.2 { 0.0 } else { rho };
-            let scene = Scene::new(
+            let model = ObservationModel::new(
                 Prior::gaussian_with_deviation(1.0).unwrap(),
                 Noise::equicorrelated_with_deviations(&sds, rho).unwrap(),
             )
@@ -42,7 +43,7 @@ fn pair() -> impl Strategy<Value = System> {
                 Quantizer::new(a).unwrap(),
                 Quantizer::with_labels(b, vec![0, 1, 2, 3, 0]).unwrap(),
             ];
-            System::distinct(scene, quantizers, vec![channel.clone(), channel]).unwrap()
+            System::distinct(model, quantizers, vec![channel.clone(), channel]).unwrap()
         },
     )
 }
@@ -60,11 +61,11 @@ fn grouped() -> impl Strategy<Value = System> {
         } else {
             Noise::independent_with_deviations(&[sd, sd, sd, 0.8])
         };
-        let scene = Scene::new(prior, noise.unwrap()).unwrap();
+        let model = ObservationModel::new(prior, noise.unwrap()).unwrap();
         let three =
             SensorGroup::new(Quantizer::new(a).unwrap(), Channel::symbol_erasure(3, loss).unwrap(), vec![0, 1, 2]);
         let one = SensorGroup::new(Quantizer::new(b).unwrap(), Channel::ideal(2).unwrap(), vec![3]);
-        System::new(scene, vec![three.unwrap(), one.unwrap()]).unwrap()
+        System::new(model, vec![three.unwrap(), one.unwrap()]).unwrap()
     })
 }
 
@@ -131,11 +132,11 @@ proptest! {
     fn information_and_error_obey_their_bounds(system in pair()) {
         let mi = system.value(MI).unwrap();
         let mse = system.value(MSE).unwrap();
-        prop_assert!(mse >= system.scene().prior_variance() * (-2.0 * mi).exp());
+        prop_assert!(mse >= system.model().prior_variance() * (-2.0 * mi).exp());
         let clear = system.with_channels(vec![Channel::ideal(4).unwrap(), Channel::ideal(4).unwrap()]).unwrap();
         prop_assert!(mi <= clear.value(MI).unwrap() + 1e-13);
         prop_assert!(mse >= clear.value(MSE).unwrap() - 1e-13);
-        prop_assert!(mi >= -1e-15 && mse <= system.scene().prior_variance() + 1e-12);
+        prop_assert!(mi >= -1e-15 && mse <= system.model().prior_variance() + 1e-12);
     }
 
     #[test]
@@ -147,7 +148,7 @@ proptest! {
         prop_assert!((mirrored_words.word(0), mirrored_words.word(3)) == (Some(3), Some(0)));
         let mirrored = system.with_quantizers(mirror).unwrap();
         let swapped = System::distinct(
-            system.scene().subset(&[1, 0]).unwrap(),
+            system.model().subset(&[1, 0]).unwrap(),
             system.quantizers().into_iter().rev().collect(),
             vec![b, a],
         ).unwrap();
@@ -161,7 +162,7 @@ proptest! {
     #[test]
     fn counting_agrees_with_telling_apart(system in grouped()) {
         let apart = System::new(
-            system.scene().clone(),
+            system.model().clone(),
             system
                 .groups()
                 .iter()
@@ -180,9 +181,9 @@ proptest! {
     #[test]
     fn erasures_scale_the_information_of_one_sensor(b in breakpoints(3), loss in 0.0..1.0f64, sd in 0.3..2.0f64) {
         let one = |channel: Channel| {
-            let scene = Scene::gaussian_with_deviations(1.0, &[sd]).unwrap();
+            let model = ObservationModel::gaussian_with_deviations(1.0, &[sd]).unwrap();
             let q = Quantizer::new(b.clone()).unwrap();
-            System::distinct(scene, vec![q], vec![channel]).unwrap().value(MI).unwrap()
+            System::distinct(model, vec![q], vec![channel]).unwrap().value(MI).unwrap()
         };
         let clear = one(Channel::ideal(4).unwrap());
         prop_assert!((one(Channel::symbol_erasure(4, loss).unwrap()) - (1.0 - loss) * clear).abs() < 1e-13);
@@ -191,9 +192,9 @@ proptest! {
     #[test]
     fn quantized_sensors_respect_van_trees_and_the_ceo(b in breakpoints(3), sd in 0.3..2.0f64, other in 0.3..2.0f64) {
         let q = Quantizer::new(b).unwrap();
-        let scene = Scene::gaussian_with_deviations(1.0, &[sd, other]).unwrap();
-        let ceo = bounds::ceo(scene.prior(), scene.noise(), &[2.0, 2.0]).unwrap();
-        let system = System::ideal(scene, vec![q.clone(), q]).unwrap();
+        let model = ObservationModel::gaussian_with_deviations(1.0, &[sd, other]).unwrap();
+        let ceo = bounds::ceo(model.prior(), model.noise(), &[2.0, 2.0]).unwrap();
+        let system = System::ideal(model, vec![q.clone(), q]).unwrap();
         let mse = system.value(MSE).unwrap();
         prop_assert!(mse > bounds::bayesian_cramer_rao(&system).unwrap());
         prop_assert!(mse > ceo.distortion);
@@ -202,11 +203,11 @@ proptest! {
     #[test]
     fn derivatives_of_bayes_errors_agree_with_differences(b in breakpoints(3), theta in 0.5..3.0f64, prior in 0.2..0.8f64) {
         let noise = Noise::independent_with_deviations(&[1.0, 1.0, 0.7]).unwrap();
-        let scene = Scene::new(Prior::binary(theta, prior).unwrap(), noise).unwrap();
+        let model = ObservationModel::new(Prior::binary(theta, prior).unwrap(), noise).unwrap();
         let q = Quantizer::new(b).unwrap();
         let ideal = Channel::ideal(4).unwrap();
         let pair = SensorGroup::new(q.clone(), ideal.clone(), vec![0, 1]).unwrap();
-        let system = System::new(scene, vec![pair, SensorGroup::new(q, ideal, vec![2]).unwrap()]).unwrap();
+        let system = System::new(model, vec![pair, SensorGroup::new(q, ideal, vec![2]).unwrap()]).unwrap();
         let decisions = |s: &System| {
             let table = JointTable::new(s).unwrap();
             (0..table.outcomes()).map(|t| table.decide(t)).collect::<Vec<_>>()
@@ -221,9 +222,9 @@ proptest! {
     #[test]
     fn the_dynamic_programme_equals_brute_force(sd in 0.3..1.5f64, rho in -0.8..0.8f64, kind in 0..3usize) {
         let prior = if kind == 2 { Prior::binary(1.5, 0.4) } else { Prior::gaussian_with_deviation(1.0) }.unwrap();
-        let scene = Scene::new(prior, Noise::equicorrelated_with_deviations(&[sd, sd], rho).unwrap()).unwrap();
+        let model = ObservationModel::new(prior, Noise::equicorrelated_with_deviations(&[sd, sd], rho).unwrap()).unwrap();
         let q = |b: [f64; 2]| Quantizer::new(b.to_vec()).unwrap();
-        let system = System::ideal(scene, vec![q([-0.7, 0.9]), q([-0.5, 0.4])]).unwrap();
+        let system = System::ideal(model, vec![q([-0.7, 0.9]), q([-0.5, 0.4])]).unwrap();
         let criterion = [MI, MSE, Criterion::BayesError][kind];
         let grid: Vec<f64> = (-4..=5).map(|i| f64::from(i) * 0.55).collect();
         let (best, value) = published::best_contiguous(&system, 1, criterion, &grid).unwrap();
@@ -244,8 +245,8 @@ proptest! {
 fn a_useless_channel_says_nothing_and_a_clean_one_changes_no_bit() {
     let words = Labelling::natural(4).unwrap();
     let q = Quantizer::symmetric(1.2).unwrap();
-    let scene = Scene::gaussian_with_deviations(2.0, &[1.0, 1.0]).unwrap();
-    let ideal = System::ideal(scene, vec![q.clone(), q]).unwrap();
+    let model = ObservationModel::gaussian_with_deviations(2.0, &[1.0, 1.0]).unwrap();
+    let ideal = System::ideal(model, vec![q.clone(), q]).unwrap();
     let over = |eps| {
         ideal
             .with_channels(vec![Channel::binary_symmetric(&words, eps).unwrap(); 2])
@@ -266,12 +267,12 @@ fn empty_far_and_useless_cells_are_finite() {
     let far = Quantizer::new(vec![-30.0, 0.0, 30.0, 60.0, 61.0]).unwrap();
     let near = Quantizer::new(vec![-1e-9, 1e-9]).unwrap();
     for rho in [0.0, 0.6] {
-        let scene = Scene::new(
+        let model = ObservationModel::new(
             Prior::gaussian_with_deviation(1.0).unwrap(),
             Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
         )
         .unwrap();
-        let system = System::ideal(scene.clone(), vec![far.clone(), near.clone()]).unwrap();
+        let system = System::ideal(model.clone(), vec![far.clone(), near.clone()]).unwrap();
         for criterion in [MI, MSE] {
             let found = system.derivatives(criterion).unwrap();
             assert!(
@@ -279,7 +280,7 @@ fn empty_far_and_useless_cells_are_finite() {
             );
         }
         // Cells that are never met change nothing.
-        let plain = System::ideal(scene, vec![Quantizer::new(vec![0.0]).unwrap(), near.clone()]).unwrap();
+        let plain = System::ideal(model, vec![Quantizer::new(vec![0.0]).unwrap(), near.clone()]).unwrap();
         assert!((plain.value(MI).unwrap() - system.value(MI).unwrap()).abs() < 1e-12);
         let decoder = MmseDecoder::new(&system, 18).unwrap();
         assert!(matches!(decoder.decode_symbols(&[4, 0]), Err(Error::ImpossibleOutcome)));
@@ -289,18 +290,20 @@ fn empty_far_and_useless_cells_are_finite() {
 
 #[test]
 fn a_signal_of_zero_cannot_be_detected() {
-    let scene =
-        Scene::new(Prior::binary(0.0, 0.3).unwrap(), Noise::independent_with_deviations(&[1.0; 4]).unwrap()).unwrap();
-    let system = System::identical(scene, Quantizer::symmetric(1.0).unwrap()).unwrap();
+    let model =
+        ObservationModel::new(Prior::binary(0.0, 0.3).unwrap(), Noise::independent_with_deviations(&[1.0; 4]).unwrap())
+            .unwrap();
+    let system = System::identical(model, Quantizer::symmetric(1.0).unwrap()).unwrap();
     assert!((system.value(Criterion::BayesError).unwrap() - 0.3).abs() < 1e-15);
     assert!(system.value(MI).unwrap().abs() < 1e-14);
 }
 
 #[test]
 fn small_equivocations_keep_their_digits() {
-    let scene =
-        Scene::new(Prior::binary(4.0, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 5]).unwrap()).unwrap();
-    let system = System::identical(scene, Quantizer::new(vec![0.960_430_8, 2.0, 3.039_569_2]).unwrap()).unwrap();
+    let model =
+        ObservationModel::new(Prior::binary(4.0, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 5]).unwrap())
+            .unwrap();
+    let system = System::identical(model, Quantizer::new(vec![0.960_430_8, 2.0, 3.039_569_2]).unwrap()).unwrap();
     let left = JointTable::new(&system).unwrap().equivocation().unwrap();
     // ln 2 - 0.693108122 leaves four digits; the table keeps all of them.
     assert!((left - (std::f64::consts::LN_2 - system.value(MI).unwrap())).abs() < 1e-14);
@@ -309,13 +312,13 @@ fn small_equivocations_keep_their_digits() {
 
 #[test]
 fn a_step_off_leaves_the_saddle_of_two_signs() {
-    let scene = Scene::new(
+    let model = ObservationModel::new(
         Prior::gaussian_with_deviation(1.0).unwrap(),
         Noise::equicorrelated_with_deviations(&[1.0; 2], 0.85).unwrap(),
     )
     .unwrap();
     let q = Quantizer::new(vec![0.0]).unwrap();
-    let start = System::ideal(scene, vec![q.clone(), q]).unwrap();
+    let start = System::ideal(model, vec![q.clone(), q]).unwrap();
     let saddle = design::joint(&start, MSE, &Newton::to_nearest_stationary_point()).unwrap();
     let escaped = design::joint(&start, MSE, &Newton::default()).unwrap();
     assert!(saddle.is_saddle() && !escaped.is_saddle());
@@ -324,9 +327,9 @@ fn a_step_off_leaves_the_saddle_of_two_signs() {
 
 #[test]
 fn joint_newton_is_cheap() {
-    let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
+    let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
     let eight = Quantizer::from(&lloyd_max::gaussian(8).unwrap());
-    let start = System::ideal(scene, vec![eight.clone(), eight]).unwrap();
+    let start = System::ideal(model, vec![eight.clone(), eight]).unwrap();
     for criterion in [MI, MSE] {
         let design = design::joint(&start, criterion, &Newton::default()).unwrap();
         assert!(design.evaluations <= 200 && design.iterations <= 12, "{} {}", design.evaluations, design.iterations);
@@ -335,9 +338,9 @@ fn joint_newton_is_cheap() {
 
 #[test]
 fn impossible_requests_are_named() {
-    let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
+    let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
     let q = Quantizer::symmetric(1.0).unwrap();
-    let ideal = System::ideal(scene.clone(), vec![q.clone(), q.clone()]).unwrap();
+    let ideal = System::ideal(model.clone(), vec![q.clone(), q.clone()]).unwrap();
     let noisy = ideal
         .with_channels(vec![Channel::symbol_erasure(4, 0.1).unwrap(); 2])
         .unwrap();
@@ -350,7 +353,7 @@ fn impossible_requests_are_named() {
     );
     assert!(published::best_contiguous(&ideal, 0, MI, &grid[..2]).is_err());
     assert!(published::best_contiguous(&ideal, 2, MI, &grid).is_err());
-    let counted = System::identical(scene.clone(), q.clone()).unwrap();
+    let counted = System::identical(model.clone(), q.clone()).unwrap();
     assert!(
         published::best_contiguous(&counted, 0, MI, &grid)
             .unwrap_err()
@@ -360,9 +363,11 @@ fn impossible_requests_are_named() {
     assert!(design::greedy(&counted, &[0], MI, &Newton::default()).is_err());
     assert!(design::optimise_groups(&ideal, &[], MI, &Newton::default()).is_err());
     assert!(published::alternating_step(&counted, 0, MI).is_err());
-    let many = System::ideal(Scene::gaussian_with_deviations(1.0, &[1.0; 11]).unwrap(), vec![q.clone(); 11]).unwrap();
+    let many = System::ideal(ObservationModel::gaussian_with_deviations(1.0, &[1.0; 11]).unwrap(), vec![q.clone(); 11])
+        .unwrap();
     assert!(matches!(many.value(MI), Err(Error::TooLarge { .. })));
-    let crowd = System::identical(Scene::gaussian_with_deviations(1.0, &vec![1.0; 400]).unwrap(), q.clone()).unwrap();
+    let crowd = System::identical(ObservationModel::gaussian_with_deviations(1.0, &vec![1.0; 400]).unwrap(), q.clone())
+        .unwrap();
     assert!(matches!(crowd.value(MI), Err(Error::TooLarge { .. })));
     let separate = |signal, sd| {
         published::separate(Separation::Matusita, signal, sd, &q, &Channel::ideal(4).unwrap(), &Newton::default())

@@ -4,8 +4,8 @@
 mod c_header;
 mod laws;
 mod mi_fixtures;
+mod models;
 mod nelder_mead;
 mod request;
 mod scale;
-mod scenes;
 mod wild;

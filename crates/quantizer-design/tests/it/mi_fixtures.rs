@@ -5,7 +5,7 @@ use fewbits_quantizer_design::published::{self, Separation};
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::table::JointTable;
 use fewbits_quantizer_design::{
-    Channel, Criterion, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, bounds, canonical,
+    Channel, Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System, bounds, canonical,
     decoder::NeymanPearson, lloyd_max,
 };
 use serde_json::Value;
@@ -189,9 +189,9 @@ fn ceo(entry: &Entry) {
 
 fn van_trees(entry: &Entry) {
     let n = number(&entry.inputs["N"]) as usize;
-    let scene = Scene::gaussian_with_deviations(1.0, &vec![number(&entry.inputs["sigma"]); n]).unwrap();
+    let model = ObservationModel::gaussian_with_deviations(1.0, &vec![number(&entry.inputs["sigma"]); n]).unwrap();
     let q = Quantizer::new(numbers(&entry.inputs["breakpoints"])).unwrap();
-    let system = System::identical(scene, q).unwrap();
+    let system = System::identical(model, q).unwrap();
     close(entry, "fisher", bounds::mean_fisher_information(&system).unwrap(), number(&entry.value["fisher"]));
     let bound = bounds::bayesian_cramer_rao(&system).unwrap();
     close(entry, "bound", bound, number(&entry.value["bound"]));
@@ -201,9 +201,10 @@ fn van_trees(entry: &Entry) {
 fn rectangles(entry: &Entry) {
     let noise =
         Noise::equicorrelated_with_deviations(&numbers(&entry.inputs["sigma"]), number(&entry.inputs["rho"])).unwrap();
-    let scene = Scene::new(Prior::discrete(vec![number(&entry.inputs["x"])], vec![1.0]).unwrap(), noise).unwrap();
+    let model =
+        ObservationModel::new(Prior::discrete(vec![number(&entry.inputs["x"])], vec![1.0]).unwrap(), noise).unwrap();
     let q = |k| Quantizer::new(numbers(&entry.inputs[k])).unwrap();
-    let table = JointTable::new(&System::ideal(scene, vec![q("b1"), q("b2")]).unwrap()).unwrap();
+    let table = JointTable::new(&System::ideal(model, vec![q("b1"), q("b2")]).unwrap()).unwrap();
     for (i, row) in rows(&entry.value).iter().enumerate() {
         for (j, expected) in row.iter().enumerate() {
             let found = table.likelihood(table.outcome(&[i, j]).unwrap())[0];
@@ -213,8 +214,8 @@ fn rectangles(entry: &Entry) {
     }
 }
 
-/// The scene of a two-sensor entry.
-fn scene(entry: &Entry) -> Scene {
+/// The model of a two-sensor entry.
+fn model(entry: &Entry) -> ObservationModel {
     let i = &entry.inputs;
     let sds = match (i.get("sigma"), i.get("sigma2")) {
         (Some(s), _) => numbers(s),
@@ -222,7 +223,7 @@ fn scene(entry: &Entry) -> Scene {
         _ => vec![1.0, 1.0],
     };
     let rho = i.get("rho").map_or(0.0, number);
-    Scene::new(
+    ObservationModel::new(
         Prior::gaussian_with_deviation(1.0).unwrap(),
         Noise::equicorrelated_with_deviations(&sds, rho).unwrap(),
     )
@@ -250,7 +251,7 @@ fn check(entry: &Entry, expected: &Value, system: &System) {
         .zip(&found)
         .map(|(b, q)| q.with_breakpoints(b).unwrap())
         .collect();
-    let sds: Vec<f64> = (0..2).map(|n| system.scene().noise().deviation(n)).collect();
+    let sds: Vec<f64> = (0..2).map(|n| system.model().noise().deviation(n)).collect();
     let classes = [0, usize::from(sds[0] != sds[1])];
     let (found, wanted) = (canonical(&found, &classes), canonical(&wanted, &classes));
     for (f, w) in found.iter().zip(&wanted) {
@@ -271,7 +272,7 @@ fn criterion(id: &str) -> Criterion {
 
 fn pair(entry: &Entry) {
     let id = entry.id.as_str();
-    let scene = scene(entry);
+    let model = model(entry);
     let plain = Newton::default();
     if id.ends_with("unquantized_mse") {
         // Equal sensors: their mean has noise variance (1 + rho) / 2.
@@ -281,17 +282,17 @@ fn pair(entry: &Entry) {
     }
     if let Some(b) = entry.inputs.get("b") {
         let quantizers = rows(b).into_iter().map(|b| Quantizer::new(b).unwrap()).collect();
-        return check(entry, &entry.value, &System::ideal(scene, quantizers).unwrap());
+        return check(entry, &entry.value, &System::ideal(model, quantizers).unwrap());
     }
     if let Some(b) = entry.inputs.get("breakpoints") {
         let q = Quantizer::new(numbers(b)).unwrap();
-        return check(entry, &entry.value, &System::identical(scene, q).unwrap());
+        return check(entry, &entry.value, &System::identical(model, q).unwrap());
     }
     let levels = number(&entry.inputs["L"]) as usize;
     let lloyd_of = |sd: &dyn Fn(usize) -> f64| {
-        System::ideal(scene.clone(), (0..2).map(|n| lloyd(levels, sd(n))).collect()).unwrap()
+        System::ideal(model.clone(), (0..2).map(|n| lloyd(levels, sd(n))).collect()).unwrap()
     };
-    let sample = lloyd_of(&|n| scene.sample_deviation(n));
+    let sample = lloyd_of(&|n| model.sample_deviation(n));
     let criterion = criterion(id);
     let last = |order: &[usize]| {
         design::greedy(&sample, order, criterion, &plain)
@@ -304,12 +305,12 @@ fn pair(entry: &Entry) {
     } else if id.ends_with("lmY") || id.ends_with("lloydY") {
         check(entry, &entry.value, &sample);
     } else if id.ends_with("lloydW") {
-        check(entry, &entry.value, &lloyd_of(&|n| scene.noise().deviation(n)));
+        check(entry, &entry.value, &lloyd_of(&|n| model.noise().deviation(n)));
     } else if id.contains("greedyrev") {
         let design = last(&[1, 0]);
         let mut quantizers = design.quantizers();
         quantizers.reverse();
-        check(entry, &entry.value, &System::ideal(scene.clone(), quantizers).unwrap());
+        check(entry, &entry.value, &System::ideal(model.clone(), quantizers).unwrap());
     } else if id.contains("greedy") {
         check_design(entry, &last(&[0, 1]));
     } else if id.contains("joint") {
@@ -329,7 +330,7 @@ fn pair(entry: &Entry) {
         } else {
             Quantizer::with_labels(vec![-2.5, -1.5, -0.5, 0.5, 1.5, 2.5], vec![0, 1, 2, 3, 0, 1, 2]).unwrap()
         };
-        let start = System::ideal(scene.clone(), vec![lloyd(levels, 1.2), folded]).unwrap();
+        let start = System::ideal(model.clone(), vec![lloyd(levels, 1.2), folded]).unwrap();
         check_design(entry, &design::joint(&start, criterion, &plain).unwrap());
     } else {
         panic!("{id}: not handled");
@@ -338,10 +339,10 @@ fn pair(entry: &Entry) {
 
 fn nine_sensors(entry: &Entry) {
     let (n, sd) = (number(&entry.inputs["N"]) as usize, number(&entry.inputs["sigma"]));
-    let scene = Scene::gaussian_with_deviations(1.0, &vec![sd; n]).unwrap();
+    let model = ObservationModel::gaussian_with_deviations(1.0, &vec![sd; n]).unwrap();
     let criterion = criterion(&entry.id);
     if entry.id.contains("greedy") {
-        let start = System::ideal(scene, vec![lloyd(4, 1.4); n]).unwrap();
+        let start = System::ideal(model, vec![lloyd(4, 1.4); n]).unwrap();
         let order: Vec<usize> = (0..n - 1).collect();
         let stages = design::greedy(&start, &order, criterion, &Newton::default()).unwrap();
         let rows = rows(&entry.value);
@@ -368,9 +369,9 @@ fn nine_sensors(entry: &Entry) {
         return;
     }
     let system = match entry.inputs.get("t") {
-        Some(t) => System::identical(scene, Quantizer::symmetric(number(t)).unwrap()).unwrap(),
+        Some(t) => System::identical(model, Quantizer::symmetric(number(t)).unwrap()).unwrap(),
         None => {
-            let start = System::identical(scene, lloyd(4, 1.4)).unwrap();
+            let start = System::identical(model, lloyd(4, 1.4)).unwrap();
             design::joint(&start, criterion, &Newton::default()).unwrap().system
         }
     };
@@ -383,9 +384,12 @@ fn nine_sensors(entry: &Entry) {
 fn detection(entry: &Entry) {
     let theta = number(&entry.inputs["theta"]);
     let newton = Newton::default();
-    let scene = |n: usize| {
-        Scene::new(Prior::binary(theta, 0.5).unwrap(), Noise::independent_with_deviations(&vec![1.0; n]).unwrap())
-            .unwrap()
+    let model = |n: usize| {
+        ObservationModel::new(
+            Prior::binary(theta, 0.5).unwrap(),
+            Noise::independent_with_deviations(&vec![1.0; n]).unwrap(),
+        )
+        .unwrap()
     };
     let about = |t: f64| Quantizer::new(vec![theta / 2.0 - t, theta / 2.0, theta / 2.0 + t]).unwrap();
     let ideal = Channel::ideal(4).unwrap();
@@ -394,7 +398,7 @@ fn detection(entry: &Entry) {
             .unwrap()
             .0
     };
-    let five = |q: Quantizer| System::identical(scene(5), q).unwrap();
+    let five = |q: Quantizer| System::identical(model(5), q).unwrap();
     let rest = entry.id.splitn(3, '_').nth(2).unwrap();
     let (kind, error_only) = match rest.strip_suffix("_pe") {
         Some(kind) => (kind, true),
@@ -409,7 +413,7 @@ fn detection(entry: &Entry) {
         return close(entry, "P_d", test.detection_probability(), number(&entry.value));
     }
     if kind == "MIgreedy" {
-        let start = System::ideal(scene(5), vec![about(1.0); 5]).unwrap();
+        let start = System::ideal(model(5), vec![about(1.0); 5]).unwrap();
         let design = design::greedy(&start, &[0, 1, 2, 3, 4], MI, &newton)
             .unwrap()
             .pop()
@@ -431,7 +435,7 @@ fn detection(entry: &Entry) {
             .quantizers()
             .remove(0),
         "MIsingle" => {
-            let one = System::identical(scene(1), about(1.0)).unwrap();
+            let one = System::identical(model(1), about(1.0)).unwrap();
             design::joint(&one, MI, &newton).unwrap().quantizers().remove(0)
         }
         "matusita" => separated(Separation::Matusita),
@@ -446,7 +450,7 @@ fn detection(entry: &Entry) {
     if error_only {
         return close(entry, "Pe", system.value(Criterion::BayesError).unwrap(), number(&entry.value));
     }
-    let one = JointTable::new(&System::identical(scene(1), quantizer.clone()).unwrap()).unwrap();
+    let one = JointTable::new(&System::identical(model(1), quantizer.clone()).unwrap()).unwrap();
     let (p0, p1): (Vec<f64>, Vec<f64>) = (0..4).map(|t| (one.likelihood(t)[0], one.likelihood(t)[1])).unzip();
     close(entry, "t", quantizer.breakpoints()[2] - theta / 2.0, number(&entry.value["t"]));
     close(entry, "mi", system.value(MI).unwrap(), number(&entry.value["mi_nats"]));
@@ -461,8 +465,8 @@ fn bsc(labels: &Value, eps: f64) -> Channel {
 }
 
 fn over(channel: &Channel, quantizer: &Quantizer) -> System {
-    let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
-    System::distinct(scene, vec![quantizer.clone(); 2], vec![channel.clone(); 2]).unwrap()
+    let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
+    System::distinct(model, vec![quantizer.clone(); 2], vec![channel.clone(); 2]).unwrap()
 }
 
 fn pair_over_bsc(entry: &Entry) {
@@ -509,9 +513,9 @@ fn bsc_matrix(entry: &Entry) {
 }
 
 fn collapsed(entry: &Entry) {
-    let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
+    let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
     let eps = number(&entry.inputs["eps"]);
-    let best = published::assign_words(&scene, 2, eps, 2..=4, criterion(&entry.id), published::Words::Shared)
+    let best = published::assign_words(&model, 2, eps, 2..=4, criterion(&entry.id), published::Words::Shared)
         .unwrap()
         .remove(0);
     assert_eq!(best.words, vec![words(&entry.inputs["words"]); 2], "{}", entry.id);
@@ -544,7 +548,7 @@ fn alternating_series(entry: &Entry) {
         if row[2] > 0.0 {
             let quantizer = if stage == 1 {
                 let first = both.groups()[0].clone();
-                let alone = both.scene().subset(&[0]).unwrap();
+                let alone = both.model().subset(&[0]).unwrap();
                 let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
                 published::alternating_step(&System::new(alone, vec![group]).unwrap(), 0, MI).unwrap()
             } else {
@@ -554,7 +558,7 @@ fn alternating_series(entry: &Entry) {
         }
         let first = &both.groups()[0];
         let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
-        let alone = System::new(both.scene().subset(&[0]).unwrap(), vec![group]).unwrap();
+        let alone = System::new(both.model().subset(&[0]).unwrap(), vec![group]).unwrap();
         let outer = |g: usize| both.groups()[g].quantizer().breakpoints()[2];
         let values = [
             alone.value(MI).unwrap(),
@@ -568,9 +572,9 @@ fn alternating_series(entry: &Entry) {
 }
 
 fn alternating_step(entry: &Entry) {
-    let scene = Scene::gaussian_with_deviations(1.0, &[number(&entry.inputs["sigma"])]).unwrap();
+    let model = ObservationModel::gaussian_with_deviations(1.0, &[number(&entry.inputs["sigma"])]).unwrap();
     let start = Quantizer::new(numbers(&entry.inputs["start"])).unwrap();
-    let system = System::ideal(scene, vec![start]).unwrap();
+    let system = System::ideal(model, vec![start]).unwrap();
     let step = published::alternating_step(&system, 0, MI).unwrap();
     all_close(entry, "breakpoints", step.breakpoints(), &numbers(&entry.value));
     // The spec quotes 137 steps until the breakpoints are within 1e-8 of the limit, where Newton takes 7.
@@ -596,8 +600,8 @@ fn alternating_step(entry: &Entry) {
 fn bifurcation(entry: &Entry) {
     let signs = |sd: f64, rho: f64| {
         let noise = Noise::equicorrelated_with_deviations(&[sd, sd], rho)?;
-        let scene = Scene::new(Prior::gaussian_with_deviation(1.0)?, noise)?;
-        System::ideal(scene, vec![Quantizer::new(vec![0.0])?; 2])
+        let model = ObservationModel::new(Prior::gaussian_with_deviation(1.0)?, noise)?;
+        System::ideal(model, vec![Quantizer::new(vec![0.0])?; 2])
     };
     let criterion = criterion(&entry.id);
     let found = if entry.id.contains("rho") {
@@ -608,19 +612,19 @@ fn bifurcation(entry: &Entry) {
     close(entry, "parameter", found.unwrap(), number(&entry.value));
 }
 
-fn low_noise(entry: &Entry) -> Scene {
-    Scene::gaussian_with_deviations(1.0, &[number(&entry.inputs["sigma"]); 2]).unwrap()
+fn low_noise(entry: &Entry) -> ObservationModel {
+    ObservationModel::gaussian_with_deviations(1.0, &[number(&entry.inputs["sigma"]); 2]).unwrap()
 }
 
 fn folded(entry: &Entry) {
-    let scene = low_noise(entry);
+    let model = low_noise(entry);
     let one = |b: f64| Quantizer::new(vec![b]).unwrap();
     let folded = Quantizer::with_labels(vec![-1.1, 1.1], vec![1, 0, 1]).unwrap();
     for (key, start) in [
         ("contiguous", vec![one(0.5), one(-0.5)]),
         ("noncontiguous", vec![one(0.0), folded]),
     ] {
-        let start = System::ideal(scene.clone(), start).unwrap();
+        let start = System::ideal(model.clone(), start).unwrap();
         let design = design::joint(&start, criterion(&entry.id), &Newton::default()).unwrap();
         check(entry, &entry.value[key], &design.system);
     }
@@ -634,8 +638,8 @@ fn contiguous(entry: &Entry) {
 fn modulo_or_monte_carlo(entry: &Entry) {
     if entry.id.starts_with("mc_") {
         // The simulated value must agree with quadrature within its own interval.
-        let scene = |rho| {
-            Scene::new(
+        let model = |rho| {
+            ObservationModel::new(
                 Prior::gaussian_with_deviation(1.0).unwrap(),
                 Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
             )
@@ -643,8 +647,8 @@ fn modulo_or_monte_carlo(entry: &Entry) {
         };
         let q = |t| Quantizer::symmetric(t).unwrap();
         let exact = match entry.id.as_str() {
-            "mc_rho0" => System::ideal(scene(0.0), vec![q(1.37); 2]).unwrap(),
-            "mc_rho85" => System::ideal(scene(0.85), vec![q(1.15), q(2.1)]).unwrap(),
+            "mc_rho0" => System::ideal(model(0.0), vec![q(1.37); 2]).unwrap(),
+            "mc_rho85" => System::ideal(model(0.85), vec![q(1.15), q(2.1)]).unwrap(),
             "mc_bsc05" => over(&Channel::binary_symmetric(&Labelling::natural(4).unwrap(), 0.05).unwrap(), &q(1.37)),
             other => panic!("{other}: not handled"),
         };

@@ -1,28 +1,28 @@
 //! The front door: requests and solutions.
 
+use super::models;
 use super::nelder_mead::Stopwatch;
-use super::scenes;
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
 use fewbits_quantizer_design::AllowedCells;
 use fewbits_quantizer_design::design::Scope;
 use fewbits_quantizer_design::solve::{Adc, Bits, Request, Solution, minimax};
-use fewbits_quantizer_design::{Certificate, Noise, Prior, Scene};
+use fewbits_quantizer_design::{Certificate, Noise, ObservationModel, Prior};
 use rand::RngExt;
 use std::time::Duration;
 
-fn pair(scale: f64) -> Scene {
+fn pair(scale: f64) -> ObservationModel {
     let noise = Noise::equicorrelated_with_deviations(&[scale; 2], 0.5).unwrap();
-    Scene::new(Prior::normal(20.0 * scale, 4.0 * scale).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::normal(20.0 * scale, 4.0 * scale).unwrap(), noise).unwrap()
 }
 
-fn unit_pair(rho: f64) -> Scene {
+fn unit_pair(rho: f64) -> ObservationModel {
     let noise = Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap();
-    Scene::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap()
 }
 
-fn best(scene: Scene, bits: Bits, link: Link) -> Solution {
-    Request::estimation(scene, bits, link)
+fn best(model: ObservationModel, bits: Bits, link: Link) -> Solution {
+    Request::estimation(model, bits, link)
         .with_starts(8)
         .run()
         .unwrap()
@@ -34,7 +34,7 @@ fn best(scene: Scene, bits: Bits, link: Link) -> Solution {
 fn simulated(solution: &Solution, deviations: &[f64], rho: f64, draws: u64) -> (f64, f64) {
     let mut rng = Stream::new(5).named("simulated").rng();
     let decoder = solution.decoder(10_000).unwrap();
-    let (prior, mean) = (solution.system().scene().prior().deviation(), solution.system().scene().prior().mean());
+    let (prior, mean) = (solution.system().model().prior().deviation(), solution.system().model().prior().mean());
     let (mut sum, mut squares) = (0.0, 0.0);
     for _ in 0..draws {
         let mut normal = || fewbits_numerics::normal::quantile(rng.random_range(1e-12..1.0));
@@ -66,9 +66,9 @@ fn simulated(solution: &Solution, deviations: &[f64], rho: f64, draws: u64) -> (
 #[test]
 fn two_correlated_sensors_over_a_flipping_link() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
-    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let link = Link::flipping(0.02).unwrap();
-    let solutions = Request::estimation(scene, Bits::Each(3), link).run().unwrap();
+    let solutions = Request::estimation(model, Bits::Each(3), link).run().unwrap();
     let solution = solutions.best();
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let header = solution
@@ -96,8 +96,8 @@ fn two_correlated_sensors_over_a_flipping_link() {
 #[test]
 fn two_correlated_sensors_with_folded_cells() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
-    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
-    let request = Request::estimation(scene, Bits::Each(3), Link::flipping(0.02).unwrap());
+    let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let request = Request::estimation(model, Bits::Each(3), Link::flipping(0.02).unwrap());
     let solutions = request.with_cells(AllowedCells::Any).run().unwrap();
     assert!(solutions.best().value() < 1.354_45, "{}", solutions.best().value());
     assert_eq!(solutions.best().certificate(), Certificate::LocalOptimum);
@@ -109,8 +109,8 @@ fn two_correlated_sensors_with_folded_cells() {
 fn folded_cells_of_one_bit_are_found() {
     let folded = |scale: f64| {
         let noise = Noise::equicorrelated_with_deviations(&[scale; 2], 0.85).unwrap();
-        let scene = Scene::new(Prior::normal(0.0, scale).unwrap(), noise).unwrap();
-        let request = Request::estimation(scene, Bits::Each(1), Link::PERFECT).with_cells(AllowedCells::Any);
+        let model = ObservationModel::new(Prior::normal(0.0, scale).unwrap(), noise).unwrap();
+        let request = Request::estimation(model, Bits::Each(1), Link::PERFECT).with_cells(AllowedCells::Any);
         request.with_starts(1).run().unwrap().best().clone()
     };
     let one = folded(1.0);
@@ -136,8 +136,8 @@ fn folded_cells_beat_intervals_where_noise_is_small() {
 #[test]
 fn one_sensor_over_a_clear_link_is_lloyd_max() {
     for (bits, distortion) in [(2, 0.117_481_847_829), (3, 0.034_547_760_778)] {
-        let scene = Scene::gaussian_with_deviations(2.0, &[1.0]).unwrap();
-        let found = best(scene, Bits::Each(bits), Link::PERFECT).value();
+        let model = ObservationModel::gaussian_with_deviations(2.0, &[1.0]).unwrap();
+        let found = best(model, Bits::Each(bits), Link::PERFECT).value();
         let exact = 4.0 - 16.0 / 5.0 * (1.0 - distortion);
         assert!((found - exact).abs() < 1e-7, "{found} {exact}");
     }
@@ -159,8 +159,8 @@ fn printed_optima_are_found() {
 #[test]
 fn detection_reaches_the_printed_error_probability() {
     let noise = Noise::independent_with_deviations(&[1.0; 5]).unwrap();
-    let scene = Scene::new(Prior::binary(2.0, 0.5).unwrap(), noise).unwrap();
-    let found = Request::detection(scene, Bits::Each(2), Link::PERFECT)
+    let model = ObservationModel::new(Prior::binary(2.0, 0.5).unwrap(), noise).unwrap();
+    let found = Request::detection(model, Bits::Each(2), Link::PERFECT)
         .unwrap()
         .with_starts(2)
         .run()
@@ -195,15 +195,15 @@ fn designs_scale_with_the_unit() {
 /// A symbol that is lost and known to be leaves the prior.
 #[test]
 fn losses_of_one_sensor_mix_prior_and_posterior() {
-    let scene = || Scene::gaussian_with_deviations(1.0, &[0.5]).unwrap();
-    let clear = best(scene(), Bits::Each(2), Link::PERFECT).value();
+    let model = || ObservationModel::gaussian_with_deviations(1.0, &[0.5]).unwrap();
+    let clear = best(model(), Bits::Each(2), Link::PERFECT).value();
     // Whether the loss is noticed makes no difference.
     for link in [
         Link::lossy(0.3).unwrap(),
         Link::PERFECT.with_erasure(0.3).unwrap(),
         Link::lossy(0.1).unwrap().with_erasure(0.2).unwrap(),
     ] {
-        let lossy = best(scene(), Bits::Each(2), link);
+        let lossy = best(model(), Bits::Each(2), link);
         assert!((lossy.value() - (0.3 + 0.7 * clear)).abs() < 1e-9, "{link:?}");
         assert_eq!(lossy.sensors()[0].symbols(), 5);
         assert!((lossy.decoder(5).unwrap().decode_symbols(&[4]).unwrap().variance - 1.0).abs() < 1e-9);
@@ -218,26 +218,26 @@ fn a_useless_link_leaves_the_prior() {
 
 #[test]
 fn shared_out_bits_are_the_best_of_all_shares() {
-    let scene = || Scene::gaussian_with_deviations(1.0, &[0.2, 1.5]).unwrap();
+    let model = || ObservationModel::gaussian_with_deviations(1.0, &[0.2, 1.5]).unwrap();
     let link = Link::flipping(0.01).unwrap();
-    let shared = best(scene(), Bits::Total(3), link);
-    let all = (0..=3).map(|first| best(scene(), Bits::PerSensor(vec![first, 3 - first]), link).value());
+    let shared = best(model(), Bits::Total(3), link);
+    let all = (0..=3).map(|first| best(model(), Bits::PerSensor(vec![first, 3 - first]), link).value());
     let least = all.fold(f64::INFINITY, f64::min);
     assert!((shared.value() / least - 1.0).abs() < 1e-6, "{} {least}", shared.value());
-    assert!(Request::estimation(scene(), Bits::Total(0), link).run().is_err());
-    assert!(Request::estimation(scene(), Bits::Each(7), link).run().is_err());
+    assert!(Request::estimation(model(), Bits::Total(0), link).run().is_err());
+    assert!(Request::estimation(model(), Bits::Each(7), link).run().is_err());
     assert!(
-        Request::estimation(scene(), Bits::PerSensor(vec![1]), link)
+        Request::estimation(model(), Bits::PerSensor(vec![1]), link)
             .run()
             .is_err()
     );
 }
 
-/// With as much time on the processor as the design took; one scene of each prior, and the units in turn.
+/// With as much time on the processor as the design took; one model of each prior, and the units in turn.
 #[test]
-fn random_scenes_are_no_worse_than_nelder_mead() {
+fn random_models_are_no_worse_than_nelder_mead() {
     for i in 0..5 {
-        let task = scenes::task(i, [1e-4, 1.0, 1e4][i as usize % 3], 3, 2).unwrap();
+        let task = models::task(i, [1e-4, 1.0, 1e4][i as usize % 3], 3, 2).unwrap();
         let found = task.solve(None).unwrap();
         let error = task.exact(found.solutions.best()).unwrap();
         let reference = task.nelder_mead(found.time).unwrap();
@@ -262,11 +262,11 @@ fn a_time_limit_still_gives_a_design() {
 fn large_designs_end_soon_after_their_time_limit() {
     let deviations = [0.5, 0.6, 0.7, 0.8, 0.9];
     let noise = Noise::equicorrelated_with_deviations(&deviations, 0.5).unwrap();
-    let scene = Scene::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap();
-    let alone = best(scene.subset(&[0]).unwrap(), Bits::Each(4), Link::flipping(0.05).unwrap()).value();
+    let model = ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap();
+    let alone = best(model.subset(&[0]).unwrap(), Bits::Each(4), Link::flipping(0.05).unwrap()).value();
     for bits in [Bits::Each(4), Bits::Total(18)] {
         let watch = Stopwatch::start();
-        let request = Request::estimation(scene.clone(), bits.clone(), Link::flipping(0.05).unwrap());
+        let request = Request::estimation(model.clone(), bits.clone(), Link::flipping(0.05).unwrap());
         let found = request.with_time_limit(Duration::from_millis(500)).run().unwrap();
         assert!(watch.elapsed() < Duration::from_secs(3), "{bits:?}: {:?}", watch.elapsed());
         assert!(found.is_cut_short());

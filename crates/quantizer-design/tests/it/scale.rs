@@ -1,26 +1,26 @@
-//! Nothing depends on the unit: the design of a scaled scene is the scaled design.
+//! Nothing depends on the unit: the design of a scaled model is the scaled design.
 
 use fewbits_core::Link;
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::design::{self, Design, Scope};
 use fewbits_quantizer_design::published::{self, Alternating, Separation, Words};
 use fewbits_quantizer_design::{
-    AllowedCells, Bits, Certificate, Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Request, Scene,
-    System, lloyd_max,
+    AllowedCells, Bits, Certificate, Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior, Quantizer,
+    Request, System, lloyd_max,
 };
 
 const MI: Criterion = Criterion::MutualInformation;
 const MSE: Criterion = Criterion::MeanSquaredError;
 const SCALES: [f64; 2] = [1e-4, 1e4];
 
-fn pair(rho: f64, scale: f64) -> Scene {
+fn pair(rho: f64, scale: f64) -> ObservationModel {
     let noise = Noise::equicorrelated_with_deviations(&[scale, 0.8 * scale], rho).unwrap();
-    Scene::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
 }
 
-fn equal_pair(rho: f64, scale: f64) -> Scene {
+fn equal_pair(rho: f64, scale: f64) -> ObservationModel {
     let noise = Noise::equicorrelated_with_deviations(&[scale; 2], rho).unwrap();
-    Scene::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
+    ObservationModel::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
 }
 
 fn size(criterion: Criterion, scale: f64) -> f64 {
@@ -140,13 +140,17 @@ fn alternating_steps_and_programmes_know_no_unit() {
 
 #[test]
 fn detection_knows_no_unit() {
-    let scene = |s: f64| {
-        Scene::new(Prior::binary(2.0 * s, 0.4).unwrap(), Noise::independent_with_deviations(&[s; 3]).unwrap()).unwrap()
+    let model = |s: f64| {
+        ObservationModel::new(
+            Prior::binary(2.0 * s, 0.4).unwrap(),
+            Noise::independent_with_deviations(&[s; 3]).unwrap(),
+        )
+        .unwrap()
     };
     let about = |s: f64| Quantizer::new([0.2, 1.0, 1.8].map(|b| s * b).to_vec()).unwrap();
     for criterion in [MI, Criterion::BayesError] {
         law(criterion, 1e-6, |s| {
-            let start = System::identical(scene(s), about(s)).unwrap();
+            let start = System::identical(model(s), about(s)).unwrap();
             design::joint(&start, criterion, &Newton::default()).unwrap()
         });
     }
@@ -170,10 +174,12 @@ fn strong_signals_have_designs_too() {
     for signal in [10.0, 14.0] {
         let middle = 0.5 * signal;
         let about = Quantizer::new(vec![middle - 1.0, middle, middle + 1.0]).unwrap();
-        let scene =
-            Scene::new(Prior::binary(signal, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 9]).unwrap())
-                .unwrap();
-        let start = System::identical(scene, about.clone()).unwrap();
+        let model = ObservationModel::new(
+            Prior::binary(signal, 0.5).unwrap(),
+            Noise::independent_with_deviations(&[1.0; 9]).unwrap(),
+        )
+        .unwrap();
+        let start = System::identical(model, about.clone()).unwrap();
         let informed = design::joint(&start, MI, &Newton::default()).unwrap();
         let decided = design::joint(&start, Criterion::BayesError, &Newton::default()).unwrap();
         let ideal = Channel::ideal(4).unwrap();
@@ -197,12 +203,12 @@ fn a_design_is_stored_and_restored() {
 
 #[test]
 fn what_a_user_reaches_for_agrees_with_what_he_built_by_hand() {
-    let scene = pair(0.4, 1.0);
-    let lloyd = System::lloyd_max(scene.clone(), 4).unwrap();
+    let model = pair(0.4, 1.0);
+    let lloyd = System::lloyd_max(model.clone(), 4).unwrap();
     for (n, q) in lloyd.quantizers().iter().enumerate() {
         let by_hand = lloyd_max::gaussian(4)
             .unwrap()
-            .affine(0.0, scene.sample_deviation(n))
+            .affine(0.0, model.sample_deviation(n))
             .unwrap();
         assert_eq!(q, &Quantizer::from(&by_hand));
         // The samples are normal, so the symbols have the table's probabilities.
@@ -256,10 +262,10 @@ fn an_unchecked_certificate_names_its_scope() {
 fn nodes_of_a_density_are_estimated_not_guessed() {
     let values: Vec<f64> = (0..64).map(|k| (f64::from(k) + 0.5) / 64.0).collect();
     let noise = || Noise::independent_with_deviations(&[0.3, 0.3]).unwrap();
-    let nodes = Scene::new(Prior::discrete(values, vec![1.0 / 64.0; 64]).unwrap(), noise()).unwrap();
-    let density = Scene::new(Prior::uniform(0.0, 1.0).unwrap(), noise()).unwrap();
-    let [estimated, exact] = [&nodes, &density].map(|scene| {
-        let found = Request::estimation(scene.clone(), Bits::Each(1), Link::PERFECT)
+    let nodes = ObservationModel::new(Prior::discrete(values, vec![1.0 / 64.0; 64]).unwrap(), noise()).unwrap();
+    let density = ObservationModel::new(Prior::uniform(0.0, 1.0).unwrap(), noise()).unwrap();
+    let [estimated, exact] = [&nodes, &density].map(|model| {
+        let found = Request::estimation(model.clone(), Bits::Each(1), Link::PERFECT)
             .run()
             .unwrap();
         found.best().clone()
@@ -271,6 +277,6 @@ fn nodes_of_a_density_are_estimated_not_guessed() {
     let guessed = request.run().unwrap().best().clone();
     assert!(estimated.value() < guessed.mean_squared_error().unwrap());
     assert!(guessed.value() < estimated.system().value(Criterion::BayesError).unwrap());
-    let gaussian = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();
+    let gaussian = ObservationModel::gaussian_with_deviations(1.0, &[1.0]).unwrap();
     assert!(Request::detection(gaussian, Bits::Each(1), Link::PERFECT).is_err());
 }

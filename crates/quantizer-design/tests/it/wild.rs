@@ -1,10 +1,11 @@
-//! Wild arguments: scenes, systems and designs answer numbers or errors.
+//! Wild arguments: models, systems and designs answer numbers or errors.
 
 use fewbits_core::Observation;
 use fewbits_numerics::wild;
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::{
-    Channel, Criterion, JointTable, Labelling, Newton, Noise, Prior, Quantizer, Scene, Symbol, System, bounds, design,
+    Channel, Criterion, JointTable, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, Symbol, System,
+    bounds, design,
 };
 use proptest::prelude::*;
 
@@ -37,35 +38,35 @@ fn noises(x: &[f64; 8]) -> impl Iterator<Item = Noise> {
     .flatten()
 }
 
-fn scenes(x: &[f64; 8]) -> Vec<Scene> {
+fn models(x: &[f64; 8]) -> Vec<ObservationModel> {
     let noises: Vec<Noise> = noises(x).collect();
     priors(x)
         .flat_map(|prior| {
             noises
                 .iter()
-                .flat_map(move |noise| Scene::new(prior.clone(), noise.clone()).ok())
+                .flat_map(move |noise| ObservationModel::new(prior.clone(), noise.clone()).ok())
                 .collect::<Vec<_>>()
         })
         .collect()
 }
 
 proptest! {
-    // Each case builds up to 28 scenes: one case in 16.
+    // Each case builds up to 28 models: one case in 16.
     #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(16), ..ProptestConfig::default() })]
     #[test]
-    fn scenes_and_systems_answer_numbers(x in prop::array::uniform8(wild()), levels in 1..4_usize) {
+    fn models_and_systems_answer_numbers(x in prop::array::uniform8(wild()), levels in 1..4_usize) {
         for prior in priors(&x) {
             prop_assert!(prior.mean().is_finite() && !prior.deviation().is_nan(), "{:?}", prior);
         }
-        for scene in scenes(&x) {
-            prop_assert!(scene.prior_variance() >= 0.0 && scene.sample_mean().is_finite() && scene.sample_deviation(0) >= 0.0, "{:?}", scene);
-            let _ = scene.subset(&[levels]);
+        for model in models(&x) {
+            prop_assert!(model.prior_variance() >= 0.0 && model.sample_mean().is_finite() && model.sample_deviation(0) >= 0.0, "{:?}", model);
+            let _ = model.subset(&[levels]);
             for criterion in [Criterion::MutualInformation, Criterion::MeanSquaredError] {
-                if let Ok(Some(bound)) = bounds::unquantised(&scene, criterion) {
-                    prop_assert!(!bound.is_nan(), "{:?}", scene);
+                if let Ok(Some(bound)) = bounds::unquantised(&model, criterion) {
+                    prop_assert!(!bound.is_nan(), "{:?}", model);
                 }
             }
-            let Ok(system) = System::lloyd_max(scene, levels) else { continue };
+            let Ok(system) = System::lloyd_max(model, levels) else { continue };
             if let Ok(p) = system.symbol_distribution(0) {
                 prop_assert!((p.iter().sum::<f64>() - 1.0).abs() < 1e-6, "{:?}: {:?}", system, p);
             }
@@ -78,10 +79,10 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(64), ..ProptestConfig::default() })]
     #[test]
     fn decoders_and_designs_answer_numbers(x in prop::array::uniform8(wild()), symbols in prop::array::uniform2(0..4_usize)) {
-        for scene in scenes(&x).into_iter().take(3) {
+        for model in models(&x).into_iter().take(3) {
             let channel = Channel::binary_symmetric(&Labelling::natural(2).unwrap(), x[7]).unwrap_or_else(|_| Channel::ideal(2).unwrap());
             let quantizers = vec![Quantizer::new(vec![x[6]]).unwrap_or_else(|_| Quantizer::new(vec![0.0]).unwrap()); 2];
-            let Ok(system) = System::distinct(scene, quantizers, vec![channel; 2]) else { continue };
+            let Ok(system) = System::distinct(model, quantizers, vec![channel; 2]) else { continue };
             if let Ok(decoder) = MmseDecoder::new(&system, 64)
                 && let Ok(estimate) = decoder.decode(&[Observation::Received(Symbol(symbols[0])), Observation::Lost])
             {

@@ -3,6 +3,7 @@
 use crate::error::{Error, refuse};
 use crate::quantizer::{Quantizer, cell_of, check_increasing};
 use fewbits_numerics::error::{all_finite, finite, non_negative, positive, probabilities};
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// A least-squares scalar quantizer: cells `[b_{i-1}, b_i)` and the centroid of each.
@@ -15,44 +16,24 @@ pub struct LloydMax {
     pub(super) mean_squared_error: f64,
 }
 
-/// The stored form.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Table {
-    breakpoints: Vec<f64>,
-    centroids: Vec<f64>,
-    probabilities: Vec<f64>,
-    mean_squared_error: f64,
-}
+stored! { LloydMax as Table |quantizer| {
+    breakpoints: Vec<f64> = quantizer.breakpoints,
+    centroids: Vec<f64> = quantizer.centroids,
+    probabilities: Vec<f64> = quantizer.probabilities,
+    mean_squared_error: f64 = quantizer.mean_squared_error,
+} => LloydMax { breakpoints, centroids, probabilities, mean_squared_error }.checked(), Error }
 
-impl From<LloydMax> for Table {
-    fn from(quantizer: LloydMax) -> Self {
-        Self {
-            breakpoints: quantizer.breakpoints,
-            centroids: quantizer.centroids,
-            probabilities: quantizer.probabilities,
-            mean_squared_error: quantizer.mean_squared_error,
-        }
-    }
-}
-
-impl TryFrom<Table> for LloydMax {
-    type Error = Error;
-
-    fn try_from(table: Table) -> Result<Self, Error> {
-        let Table {
-            breakpoints,
-            centroids,
-            probabilities: masses,
-            mean_squared_error,
-        } = table;
-        check_increasing(&breakpoints)?;
-        all_finite("centroids", &centroids)?;
-        probabilities("probabilities", &masses)?;
-        non_negative("mean_squared_error", mean_squared_error)?;
+impl LloydMax {
+    /// A stored quantizer, if its parts fit together.
+    fn checked(self) -> Result<Self, Error> {
+        let (breakpoints, centroids) = (&self.breakpoints, &self.centroids);
+        check_increasing(breakpoints)?;
+        all_finite("centroids", centroids)?;
+        probabilities("probabilities", &self.probabilities)?;
+        non_negative("mean_squared_error", self.mean_squared_error)?;
         let levels = breakpoints.len() + 1;
-        if breakpoints.is_empty() || centroids.len() != levels || masses.len() != levels {
-            let given = format!("{} centroids, {} probabilities", centroids.len(), masses.len());
+        if breakpoints.is_empty() || centroids.len() != levels || self.probabilities.len() != levels {
+            let given = format!("{} centroids, {} probabilities", centroids.len(), self.probabilities.len());
             return refuse("centroids", given, format!("one per cell, {levels} of each, and at least two cells"));
         }
         let inside = |i: usize| {
@@ -61,16 +42,9 @@ impl TryFrom<Table> for LloydMax {
         if let Some(at) = (0..levels).find(|i| !inside(*i)) {
             return refuse("centroids", format!("{} at index {at}", centroids[at]), "a point of its own cell");
         }
-        Ok(Self {
-            breakpoints,
-            centroids,
-            probabilities: masses,
-            mean_squared_error,
-        })
+        Ok(self)
     }
-}
 
-impl LloydMax {
     /// Finite breakpoints, increasing, one fewer than levels.
     pub fn breakpoints(&self) -> &[f64] {
         &self.breakpoints

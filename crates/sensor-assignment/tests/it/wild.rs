@@ -27,7 +27,7 @@ proptest! {
         }
         let sensors = [CodedSensors::with_variances(x[0], &x[1..1 + count]), CodedSensors::with_deviations(x[0], &x[1..1 + count])];
         // Noise that is narrow against the cells asks for many nodes: with others the costs are soon found.
-        let quick = |sensors: &CodedSensors| sensors.noise_stds().iter().all(|noise| sensors.half_width() < 100.0 * noise);
+        let quick = |sensors: &CodedSensors| sensors.noise_deviations().iter().all(|noise| sensors.half_width() < 100.0 * noise);
         for sensors in sensors.into_iter().flatten().filter(quick) {
             if let Ok(costs) = pair_costs(&sensors) {
                 let all = (0..costs.size()).flat_map(|i| (0..costs.size()).map(move |j| (i, j)));

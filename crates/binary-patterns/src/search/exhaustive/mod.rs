@@ -91,7 +91,7 @@ mod tests {
 
     fn search(bits: usize, sensors: usize, snr: f64) -> LinearSearch {
         let source = Source::uniform(1.0).unwrap();
-        let noise = source.noise_std(snr).unwrap();
+        let noise = source.noise_deviation(snr).unwrap();
         LinearSearch::with_deviation(source, Grid::uniform(1.0, bits).unwrap(), noise, sensors).unwrap()
     }
 

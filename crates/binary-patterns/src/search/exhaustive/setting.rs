@@ -1,4 +1,4 @@
-//! What an exhaustive search looks through.
+//! The search space of an exhaustive search.
 
 use crate::observation::source::noise_in_range;
 use crate::patterns::count::{full_rank_multisets, multisets};
@@ -37,7 +37,7 @@ pub struct LinearSearch {
     pub(super) source: Source,
     pub(super) grid: Grid,
     pub(super) bits: usize,
-    pub(super) noise_std: f64,
+    pub(super) noise_deviation: f64,
     pub(super) sensors: usize,
     pub(super) full_rank: bool,
     pub(super) forced: Vec<usize>,
@@ -48,13 +48,13 @@ impl LinearSearch {
     ///
     /// # Errors
     /// If the grid has not `2^B` cells, the noise is not positive and finite, or there is no sensor.
-    pub fn with_deviation(source: Source, grid: Grid, noise_std: f64, sensors: usize) -> Result<Self, Error> {
+    pub fn with_deviation(source: Source, grid: Grid, noise_deviation: f64, sensors: usize) -> Result<Self, Error> {
         let bits = grid_bits(&grid)?;
         at_least_one("sensors", sensors)?;
         Ok(Self {
             source,
             bits,
-            noise_std: noise_in_range(noise_std)?,
+            noise_deviation: noise_in_range(noise_deviation)?,
             sensors,
             full_rank: true,
             forced: vec![0; (1 << bits) - 1],
@@ -102,7 +102,7 @@ impl LinearSearch {
         let sensors = masks
             .iter()
             .map(|&mask| {
-                PatternSensor::with_deviation(linear_pattern(mask, self.bits)?.on(&self.grid)?, self.noise_std)
+                PatternSensor::with_deviation(linear_pattern(mask, self.bits)?.on(&self.grid)?, self.noise_deviation)
             })
             .collect::<Result<_, _>>()?;
         Bank::new(self.source, sensors)

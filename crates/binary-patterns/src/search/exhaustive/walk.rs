@@ -2,7 +2,7 @@
 
 use super::setting::{LinearSearch, MaskSet};
 use crate::observation::bank::{CountTable, IMPOSSIBLE};
-use crate::observation::source::{Blur, Nodes};
+use crate::observation::source::{Nodes, Threshold};
 use crate::patterns::linear::{Span, flips_under_reflection};
 use crate::search::outcomes::{Outcomes, SEARCH_PANEL};
 use crate::{Error, Mask, linear_pattern};
@@ -80,19 +80,14 @@ impl<'a> Walk<'a> {
     pub(super) fn new(search: &'a LinearSearch, keep: usize) -> Result<Self, Error> {
         let folded = search.grid.is_symmetric();
         let reach = search.source.reach();
-        let blurs: Vec<Blur> = search
-            .grid
-            .breakpoints()
-            .iter()
-            .map(|&t| (t, search.noise_std))
-            .collect();
+        let thresholds: Vec<Threshold> = Threshold::of(search.grid.breakpoints(), search.noise_deviation).collect();
         let from = if folded { 0.0 } else { -reach };
-        let nodes = Nodes::adapted(&search.source, from, reach, &blurs, SEARCH_PANEL, gauss_legendre::<8>());
+        let nodes = Nodes::adapted(&search.source, from, reach, &thresholds, SEARCH_PANEL, gauss_legendre::<8>());
         let kinds = search.forced.len();
         let mut tables = Vec::with_capacity(kinds);
         for mask in 1..=kinds {
             let quantizer = linear_pattern(mask as Mask, search.bits)?.on(&search.grid)?;
-            let p = quantizer.probabilities_at(&nodes.x, search.noise_std);
+            let p = quantizer.probabilities_at(&nodes.x, search.noise_deviation);
             tables.push(
                 (1..=search.sensors)
                     .map(|count| CountTable::from_probabilities(&p, count))

@@ -5,7 +5,7 @@ use super::basis::hermite_products;
 use crate::density::{Cells, Error};
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Pivots of the Gram matrix below this mean that its Gaussians are too much alike.
@@ -57,7 +57,7 @@ impl<const D: usize> Lpg<D> {
         // The basis of each Gaussian is orthonormal: the diagonal is one, and a tiny pivot is rounding.
         let independent = |factor: &Cholesky<f64, Dyn>| factor.l_dirty().diagonal().min() > DEPENDENT;
         let Some(factor) = gram.clone().cholesky().filter(independent) else {
-            return Err(ArgumentError::new("gaussians", "a dependent set", "Gaussians that differ").into());
+            return refuse("gaussians", "a dependent set", "Gaussians that differ");
         };
         let c = factor.solve(b);
         for (term, own) in self.terms.iter_mut().zip(c.as_slice().chunks(self.indices.len())) {

@@ -13,9 +13,9 @@ use basis::{gauss_hermite, hermite_products};
 use fewbits_core::columns::state_at;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Component;
-use fewbits_numerics::error::{all_finite, at_least_one};
+use fewbits_numerics::LogSum;
+use fewbits_numerics::error::{all_finite, at_least_one, refuse};
 use fewbits_numerics::normal::LN_SQRT_2PI;
-use fewbits_numerics::{ArgumentError, LogSum};
 use nalgebra::{SMatrix, SVector};
 use polynomials::{check_degree, multi_indices};
 use rand::{Rng, RngExt};
@@ -60,7 +60,7 @@ impl<const D: usize> Lpg<D> {
         let size = belief.indices.len();
         if coefficients.len() != gaussians.len() || coefficients.iter().any(|c| c.len() != size) {
             let expected = format!("{} lists of {size} numbers", gaussians.len());
-            return Err(ArgumentError::new("coefficients", "of other lengths", expected).into());
+            return refuse("coefficients", "of other lengths", expected);
         }
         for (term, list) in belief.terms.iter_mut().zip(coefficients) {
             all_finite("coefficients", list)?;
@@ -171,13 +171,13 @@ impl<const D: usize> Lpg<D> {
                 let (wa, wb) = (&a.gaussian.factor().whitener, &b.gaussian.factor().whitener);
                 let precision = (wa.tr_mul(wa) + wb.tr_mul(wb)) * 0.5;
                 let Some(factor) = precision.cholesky() else {
-                    return Err(ArgumentError::new("covariance", "singular", "a positive definite matrix").into());
+                    return refuse("covariance", "singular", "a positive definite matrix");
                 };
                 let pull = wa.tr_mul(wa) * a.gaussian.mean() + wb.tr_mul(wb) * b.gaussian.mean();
                 let mean = factor.solve(&(pull * 0.5));
                 let covariance = factor.inverse();
                 let Some(root) = covariance.cholesky() else {
-                    return Err(ArgumentError::new("covariance", "singular", "a positive definite matrix").into());
+                    return refuse("covariance", "singular", "a positive definite matrix");
                 };
                 let (ua, ub) = (a.whitened(&mean), b.whitened(&mean));
                 let half_log_det: f64 = root.l_dirty().diagonal().iter().map(|d| d.ln()).sum();

@@ -2,6 +2,7 @@
 
 use crate::density::Error;
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use nalgebra::SMatrix;
 use nalgebra::SVector;
 use std::collections::HashMap;
@@ -161,7 +162,7 @@ pub fn gaussian_moment<const D: usize>(
     }
     let order: usize = nu.iter().sum();
     if order > 2 * HIGHEST_DEGREE {
-        return Err(ArgumentError::new("nu", order, format!("a sum of at most {}", 2 * HIGHEST_DEGREE)).into());
+        return refuse("nu", order, format!("a sum of at most {}", 2 * HIGHEST_DEGREE));
     }
     Ok(step(nu, mean, covariance, &mut HashMap::new()))
 }
@@ -188,7 +189,7 @@ pub fn series_moments<const D: usize>(
     terms: &[([usize; D], f64)],
 ) -> Result<SeriesMoments<D>, Error> {
     let Some(factor) = covariance.cholesky() else {
-        return Err(ArgumentError::new("covariance", format!("{covariance:?}"), "a positive definite matrix").into());
+        return refuse("covariance", format!("{covariance:?}"), "a positive definite matrix");
     };
     let w = factor.inverse();
     // As a polynomial in z, whose covariance is W and which x - mean is S times.

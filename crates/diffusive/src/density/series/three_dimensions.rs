@@ -7,7 +7,7 @@ use super::{Lpg, Term};
 use crate::density::{Cells, Error};
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{DVector, Vector2, Vector3};
 
@@ -66,7 +66,7 @@ impl Lpg<3> {
     ) -> Result<LpgFit<3>, Error> {
         let belief = Self::skeleton(gaussians, degree)?;
         if means.len() != cells.len() || variances.len() != cells.len() {
-            return Err(ArgumentError::new("means", means.len(), format!("{}, one for each cell", cells.len())).into());
+            return refuse("means", means.len(), format!("{}, one for each cell", cells.len()));
         }
         let gram = belief.gram()?;
         let size = belief.indices.len();
@@ -243,7 +243,7 @@ impl Slice {
     }
 }
 
-/// Where one term's product with a likelihood has its mass.
+/// Interval outside which the product of one term with the likelihood is negligible.
 #[derive(Debug, Clone, Copy)]
 struct Stretch {
     from: f64,
@@ -256,7 +256,9 @@ impl Stretch {
     fn around(centre: f64, precision: f64, height: f64, [low, high]: [f64; 2]) -> Self {
         let deviation = precision.sqrt().recip();
         let reach = ENDS * deviation;
-        // Beyond an end only a tail is inside, and what counts of it is short: as far as the exponent falls by `ENDS^2 / 2`.
+        // The exponent is `-(t - centre)^2 / (2 deviation^2)`. Keep the part of [low, high] where it is within `ENDS^2 / 2` of its
+        // largest value there. If the centre is outside at a distance d, that value is at the nearer end, and the part ends at
+        // hypot(d, ENDS deviation) from the centre.
         let (below, above) = ((low - centre).max(0.0), (centre - high).max(0.0));
         Self {
             from: low.max(centre - above.hypot(reach)),

@@ -5,8 +5,8 @@ use crate::prelude::*;
 use fewbits_core::Link;
 use fewbits_quantizer_design::design::Design;
 use fewbits_quantizer_design::{
-    AllowedCells, Bits, Channel, Criterion, Newton, Quantizer, Request, Scene, SensorGroup, System, bounds, design,
-    published,
+    AllowedCells, Bits, Channel, Criterion, Newton, ObservationModel, Quantizer, Request, SensorGroup, System, bounds,
+    design, published,
 };
 
 parameters! {
@@ -106,12 +106,12 @@ const SEARCHES: [(&str, usize, f64, f64, &[Criterion]); 7] = [
 
 fn signs(noise_sd: f64, rho: f64) -> Result<System, fewbits_quantizer_design::Error> {
     let noise = fewbits_quantizer_design::Noise::equicorrelated_with_deviations(&[noise_sd; 2], rho)?;
-    let scene = Scene::new(fewbits_quantizer_design::Prior::gaussian_with_deviation(1.0)?, noise)?;
+    let scene = ObservationModel::new(fewbits_quantizer_design::Prior::gaussian_with_deviation(1.0)?, noise)?;
     System::ideal(scene, vec![Quantizer::new(vec![0.0])?; 2])
 }
 
 /// The best quantizers found when levels need not be intervals.
-fn folded(scene: &Scene, levels: usize, criterion: Criterion, starts: usize) -> Result<Design, Error> {
+fn folded(scene: &ObservationModel, levels: usize, criterion: Criterion, starts: usize) -> Result<Design, Error> {
     let request = Request::estimation(scene.clone(), Bits::Each(levels.ilog2()), Link::PERFECT)
         .with_cells(AllowedCells::Any)
         .with_starts(starts);
@@ -267,7 +267,7 @@ pub(super) fn limits() -> Result<Vec<Limit>, Error> {
             sensors,
             levels,
             crossover,
-            ceo_bound: bounds::ceo(best.system.scene().prior(), best.system.scene().noise(), &vec![bits; sensors])?
+            ceo_bound: bounds::ceo(best.system.model().prior(), best.system.model().noise(), &vec![bits; sensors])?
                 .distortion,
             van_trees: (crossover == 0.0)
                 .then(|| bounds::bayesian_cramer_rao(&best.system))

@@ -1,7 +1,7 @@
 //! Static quantizers and a table at the fusion centre: no feedback, no memory. Every slot stands alone.
 
 use crate::prelude::Error;
-use fewbits_binary_patterns::{Bit, LookupTable};
+use fewbits_binary_patterns::LookupTable;
 use fewbits_core::{Gaussian, NumberFormat, Observation};
 use fewbits_numerics::ArgumentError;
 use fewbits_protocol::{BoxError, Estimator, moments};
@@ -62,7 +62,7 @@ impl LookUp {
     /// The decoder of a system of sensors with unit noise, with at most `limit` outcomes; neighbouring levels differ in one bit on the wire
     /// where their number is a power of two.
     pub(crate) fn new(system: &System, limit: usize) -> Result<Self, Error> {
-        let scene = system.scene();
+        let scene = system.model();
         let mut sensors = vec![None; system.groups().iter().map(|group| group.sensors().len()).sum()];
         for group in system.groups() {
             let (quantizer, levels) = (group.quantizer(), group.quantizer().levels());
@@ -137,13 +137,18 @@ impl Patterns {
 
 impl Estimator for Patterns {
     stands_alone!();
-    type Report = Bit;
+    type Report = bool;
 
     fn sensors(&self) -> usize {
         self.sensors
     }
 
-    fn update(&self, _: u64, _: &Gaussian<1>, observed: &[(usize, Observation<Bit>)]) -> Result<Gaussian<1>, BoxError> {
+    fn update(
+        &self,
+        _: u64,
+        _: &Gaussian<1>,
+        observed: &[(usize, Observation<bool>)],
+    ) -> Result<Gaussian<1>, BoxError> {
         let (mean, squared_error) = self.table.decode_with_error(&all(self.sensors, observed))?;
         Ok(Gaussian::scalar(mean, squared_error)?)
     }

@@ -2,7 +2,7 @@
 
 use super::{Followers, LookUp, Patterns};
 use fewbits_adaptive::{Config, Receiver as Following, Sensor};
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, Bit, Decoder, PatternSensor, Source};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
 use fewbits_core::factor::InCell;
 use fewbits_core::{Cell, Dynamics, Gaussian, Observation, SchemeNode, Sensing, SensorNode};
 use fewbits_filters::{assumed_density, kalman};
@@ -11,7 +11,7 @@ use fewbits_monte_carlo::Stream;
 use fewbits_network::{BitStar, Channel, Clock, Fault, FaultKind, Field, Radio, Seconds, SensorId, Setup, Simulator};
 use fewbits_protocol::{Estimator, Feedback, OverBits, ReportLength};
 use fewbits_quantizer_design::decoder::MmseDecoder;
-use fewbits_quantizer_design::{Scene, System};
+use fewbits_quantizer_design::{ObservationModel, System};
 use fewbits_quantizers::Symbol;
 use nalgebra::Vector1;
 
@@ -74,7 +74,8 @@ fn means<E: Estimator + Clone + Send + Sync + 'static>(star: BitStar<OverBits<E>
 #[test]
 fn tables_give_what_they_give_alone() {
     let deviation = start().covariance()[0].sqrt();
-    let system = System::lloyd_max(Scene::gaussian_with_deviations(deviation, &[1.0; 3]).unwrap(), 4).unwrap();
+    let system =
+        System::lloyd_max(ObservationModel::gaussian_with_deviations(deviation, &[1.0; 3]).unwrap(), 4).unwrap();
     let (decoder, quantizer) = (MmseDecoder::new(&system, 1000).unwrap(), &system.quantizers()[0]);
     let alone = measured().into_iter().map(|z| {
         let symbol = |z: &Vector1<f64>| Observation::Received(Symbol(quantizer.encode(z[0]).unwrap()));
@@ -98,7 +99,7 @@ fn patterns_have_the_variance_given_the_bits() {
     let predicted = patterns.predict(1, &patterns.start()).unwrap();
     assert!((predicted.covariance()[0] - variance).abs() < 1e-12);
     let after = patterns
-        .update(1, &predicted, &[(0, Observation::Received(Bit(true)))])
+        .update(1, &predicted, &[(0, Observation::Received(true))])
         .unwrap();
     let share = 2.0 / std::f64::consts::PI * variance * variance / (variance + 1.0);
     assert!((after.mean()[0].abs() - share.sqrt()).abs() < 1e-9, "{after:?}");

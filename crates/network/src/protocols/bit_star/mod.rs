@@ -138,7 +138,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         Self::new(receiver, Feedback::Told, ReportLength::Varying, node, measurements, clock, stream)
     }
 
-    /// The same where one sensor (the first is 0) learns what it must know, or reports, in another way.
+    /// Gives one sensor (the first is 0) another kind of feedback or another length of reports.
     ///
     /// # Errors
     /// If there is no such sensor.
@@ -149,14 +149,14 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         Ok(self)
     }
 
-    /// The same with losses that were recorded: a report reaches the centre only if `arrives(slot, sensor)`. The channel's losses come on top.
+    /// Adds recorded losses: a report reaches the centre only if `arrives(slot, sensor)`. The channel's losses come on top.
     #[must_use]
     pub fn with_recorded_losses(mut self, arrives: impl Fn(u32, usize) -> bool + Send + Sync + 'static) -> Self {
         self.arrives = Some(Arc::new(arrives));
         self
     }
 
-    /// The same where sensors out of range of the centre send through others, along shortest routes. What the centre sends to all is passed on by
+    /// Lets sensors out of range of the centre send through others, along shortest routes. What the centre sends to all is passed on by
     /// every sensor on whose way others are; a frame that is passed on has the sensor's number and a header of its own besides.
     #[must_use]
     pub fn relaying(mut self) -> Self {
@@ -164,7 +164,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         self
     }
 
-    /// The same where the centre sends a heartbeat every so many slots in which it sends nothing else to all, by which sensors set their clocks.
+    /// Lets the centre send a heartbeat every `every` slots in which it sends nothing else to all, by which sensors set their clocks.
     #[must_use]
     pub fn announcing(self, every: u32) -> Self {
         Self {
@@ -173,7 +173,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         }
     }
 
-    /// The same where the first sensor that reports by the clock does so `first` after the slot's beginning, and each other `spacing` after the one
+    /// Sets when sensors that report by the clock do so: the first one `first` after the slot's beginning, and each other `spacing` after the one
     /// before it. A clock may be ahead by `first`.
     #[must_use]
     pub fn reporting_at(self, first: Seconds, spacing: Seconds) -> Self {

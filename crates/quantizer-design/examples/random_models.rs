@@ -1,12 +1,12 @@
-//! A hundred random scenes: the design on request against multi-start Nelder-Mead of the same time, with time limits.
+//! A hundred random models: the design on request against multi-start Nelder-Mead of the same time, with time limits.
 //!
-//! `cargo run --release -p fewbits-quantizer-design --example random_scenes -- scenes.log 100 500 3000`: log file, number of
-//! scenes, limits in milliseconds. A scene with a line in the log is not run again. At the end the whole log is summed up.
+//! `cargo run --release -p fewbits-quantizer-design --example random_models -- models.log 100 500 3000`: log file, number of
+//! models, limits in milliseconds. A model with a line in the log is not run again. At the end the whole log is summed up.
 
+#[path = "../tests/it/models.rs"]
+mod models;
 #[path = "../tests/it/nelder_mead.rs"]
 mod nelder_mead;
-#[path = "../tests/it/scenes.rs"]
-mod scenes;
 
 use std::io::Write;
 use std::time::Duration;
@@ -18,7 +18,7 @@ const SAME: f64 = 1e-6;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let path = arguments.next().unwrap_or("scenes.log".into());
+    let path = arguments.next().unwrap_or("models.log".into());
     let count: u64 = arguments.next().map_or(Ok(100), |a| a.parse())?;
     let mut limits = arguments.map(|a| a.parse::<u64>()).collect::<Result<Vec<_>, _>>()?;
     if limits.is_empty() {
@@ -51,14 +51,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Ratio of the squared errors, seconds, relative change in another unit (a dash where a limit was met), and what it was.
 fn compare(i: u64, limit: Duration) -> Result<String, Box<dyn std::error::Error>> {
     let scale = |at: u64| [1.0, 1e-4, 1e4][at as usize % 3];
-    let task = scenes::task(i, scale(i), 5, 4)?;
+    let task = models::task(i, scale(i), 5, 4)?;
     let found = task.solve(Some(limit))?;
     let error = task.exact(found.solutions.best())?;
     let reference = task.nelder_mead(found.time)?;
     let unit = if found.solutions.is_cut_short() {
         "-".into()
     } else {
-        let (other, ratio) = (scenes::task(i, scale(i + 1), 5, 4)?, scale(i) / scale(i + 1));
+        let (other, ratio) = (models::task(i, scale(i + 1), 5, 4)?, scale(i) / scale(i + 1));
         let again = other.exact(other.solve(Some(10 * limit))?.solutions.best())?;
         format!("{:.1e}", again * ratio * ratio / error - 1.0)
     };

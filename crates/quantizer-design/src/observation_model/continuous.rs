@@ -1,7 +1,7 @@
 //! Priors with a density that is not one normal bell.
 
 use crate::error::{Error, refuse};
-use fewbits_numerics::error::{all_finite, at_least_one, finite, positive, probabilities};
+use fewbits_numerics::error::{all_finite, at_least_one, entries, finite, positive, probabilities};
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 
@@ -52,7 +52,7 @@ pub(super) enum Shape {
     },
 }
 
-/// How well the smooth density of a sample stands for the sample, and the sample for its source.
+/// Errors of a prior that was estimated from a sample: by smoothing, and because the sample is finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleFit {
     /// Standard deviation of the bell at each value, in the unit of the sample.
@@ -180,10 +180,7 @@ impl Continuous {
             return refuse("density", negative, "numbers that are not negative");
         }
         let rule = gauss_legendre::<TABLE_NODES>();
-        if densities.len() != TABLE_PANELS * TABLE_NODES {
-            let expected = format!("{} numbers", TABLE_PANELS * TABLE_NODES);
-            return refuse("density", format!("{} numbers", densities.len()), expected);
-        }
+        entries("density", densities.len(), TABLE_PANELS * TABLE_NODES)?;
         let nodes: Vec<(f64, f64)> = rule.panels(low, high, TABLE_PANELS).collect();
         let total: f64 = nodes.iter().zip(&densities).map(|((_, w), p)| w * p).sum();
         positive("integral of the density", total)?;

@@ -1,4 +1,4 @@
-//! What the sensors look at: a scalar prior and the noise of each sensor, discretised once for all computations.
+//! The model of the observations: the prior of a scalar unknown and the noise of each sensor, on quadrature nodes.
 //!
 //! `Y_n = X + a_n U + d_n V_n` with `U` and all `V_n` standard normal: given `X` and the shared factor `U` the sensors are
 //! independent. Every joint probability is then a sum of products of one-dimensional cell probabilities with positive
@@ -44,10 +44,10 @@ pub(crate) struct Feature {
     pub(crate) weights: Vec<f64>,
 }
 
-/// Prior and noise on their quadrature nodes.
+/// The prior of the unknown and the noise of all sensors, on quadrature nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredScene", into = "StoredScene")]
-pub struct Scene {
+#[serde(try_from = "StoredModel", into = "StoredModel")]
+pub struct ObservationModel {
     prior: Prior,
     noise: Noise,
     /// Values of `X` and their probabilities.
@@ -66,12 +66,12 @@ pub struct Scene {
     pub(crate) variance: f64,
 }
 
-stored! { Scene as StoredScene |scene| {
-    prior: Prior = scene.prior,
-    noise: Noise = scene.noise,
-} => Scene::new(prior, noise), Error }
+stored! { ObservationModel as StoredModel |model| {
+    prior: Prior = model.prior,
+    noise: Noise = model.noise,
+} => ObservationModel::new(prior, noise), Error }
 
-impl Scene {
+impl ObservationModel {
     /// Discretises a prior and the noise of all sensors.
     ///
     /// # Errors
@@ -81,7 +81,7 @@ impl Scene {
         Self::resolved(prior, noise, Resolution::Full)
     }
 
-    /// The scene on fewer nodes.
+    /// The model on fewer nodes.
     pub(crate) fn at(&self, resolution: Resolution) -> Result<Self, Error> {
         Self::resolved(self.prior.clone(), self.noise.clone(), resolution)
     }
@@ -106,7 +106,7 @@ impl Scene {
             Prior::Discrete { values, probabilities } => (values.clone(), normalised(probabilities.clone())),
         };
         let mean = prior.mean();
-        let mut scene = Self {
+        let mut model = Self {
             variance: values
                 .iter()
                 .zip(&weights)
@@ -135,30 +135,30 @@ impl Scene {
             weights,
         };
         let in_range = |x: &f64| ((x - mean) * (x - mean)).is_finite();
-        if !scene.variance.is_finite() || !scene.values.iter().all(in_range) {
-            let shown = format!("mean {mean}, variance {}", scene.variance);
+        if !model.variance.is_finite() || !model.values.iter().all(in_range) {
+            let shown = format!("mean {mean}, variance {}", model.variance);
             return refuse("prior", shown, "a prior with values whose squares are in the range of numbers");
         }
-        if !scene.noise.is_independent() {
-            scene.resolve_shared_factor(crowd, resolution)?;
+        if !model.noise.is_independent() {
+            model.resolve_shared_factor(crowd, resolution)?;
         }
-        let mut mass = vec![0.0; scene.base.len()];
+        let mut mass = vec![0.0; model.base.len()];
         let mut moment = mass.clone();
-        for ((feature, w), x) in scene.given.iter().zip(&scene.weights).zip(&scene.values) {
+        for ((feature, w), x) in model.given.iter().zip(&model.weights).zip(&model.values) {
             for (i, p) in feature.weights.iter().enumerate() {
                 mass[feature.start + i] += w * p;
                 moment[feature.start + i] += w * (x - mean) * p;
             }
         }
-        scene.mass.weights = mass;
-        scene.moment.weights = moment;
-        Ok(scene)
+        model.mass.weights = mass;
+        model.moment.weights = moment;
+        Ok(model)
     }
 
     /// A Gaussian prior seen by sensors with independent noise, all given by their standard deviations.
     ///
     /// # Errors
-    /// As [`Prior::gaussian_with_deviation`], [`Noise::independent_with_deviations`] and [`Scene::new`].
+    /// As [`Prior::gaussian_with_deviation`], [`Noise::independent_with_deviations`] and [`ObservationModel::new`].
     pub fn gaussian_with_deviations(prior: f64, noise: &[f64]) -> Result<Self, Error> {
         Self::new(Prior::gaussian_with_deviation(prior)?, Noise::independent_with_deviations(noise)?)
     }
@@ -345,23 +345,24 @@ mod tests {
     #[test]
     fn a_faint_correlation_takes_few_nodes() {
         let prior = || Prior::gaussian_with_deviation(1.0).unwrap();
-        let none = Scene::new(prior(), Noise::independent_with_deviations(&[1.0; 2]).unwrap()).unwrap();
+        let none = ObservationModel::new(prior(), Noise::independent_with_deviations(&[1.0; 2]).unwrap()).unwrap();
         for rho in [1e-16, 1e-10, 1e-6, 1e-3] {
-            let scene = Scene::new(prior(), Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap()).unwrap();
-            assert!(scene.nodes() < 40 * none.nodes());
-            assert!((scene.mass.weights.iter().sum::<f64>() - 1.0).abs() < 1e-13);
+            let model =
+                ObservationModel::new(prior(), Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap()).unwrap();
+            assert!(model.nodes() < 40 * none.nodes());
+            assert!((model.mass.weights.iter().sum::<f64>() - 1.0).abs() < 1e-13);
         }
     }
 
     #[test]
-    fn stored_scenes_are_checked_when_restored() {
-        let scene = Scene::new(
+    fn stored_models_are_checked_when_restored() {
+        let model = ObservationModel::new(
             Prior::binary(1.0, 0.3).unwrap(),
             Noise::equicorrelated_with_deviations(&[1.0; 2], 0.4).unwrap(),
         )
         .unwrap();
-        let json = serde_json::to_string(&scene).unwrap();
-        assert_eq!(serde_json::from_str::<Scene>(&json).unwrap(), scene);
+        let json = serde_json::to_string(&model).unwrap();
+        assert_eq!(serde_json::from_str::<ObservationModel>(&json).unwrap(), model);
         assert!(serde_json::from_str::<Prior>(r#"{"gaussian":{"deviation":-1}}"#).is_err());
         assert!(serde_json::from_str::<Noise>(r#"{"loadings":[0],"residual_deviations":[0]}"#).is_err());
     }
@@ -373,10 +374,10 @@ mod tests {
             Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.85).unwrap(),
             Noise::equicorrelated_with_deviations(&[1.0, 0.5], -0.4).unwrap(),
         ] {
-            let scene = Scene::new(Prior::gaussian_with_deviation(2.0).unwrap(), noise).unwrap();
-            assert!((scene.mass.weights.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-            assert!((scene.variance - 4.0).abs() < 1e-12);
-            assert!(scene.moment.weights.iter().sum::<f64>().abs() < 1e-12);
+            let model = ObservationModel::new(Prior::gaussian_with_deviation(2.0).unwrap(), noise).unwrap();
+            assert!((model.mass.weights.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+            assert!((model.variance - 4.0).abs() < 1e-12);
+            assert!(model.moment.weights.iter().sum::<f64>().abs() < 1e-12);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The noise of all sensors.
 
 use crate::error::{Error, refuse};
+use fewbits_numerics::error::entries;
 use fewbits_numerics::stored;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -76,9 +77,7 @@ impl Noise {
         for s in residuals {
             fewbits_numerics::error::positive("noise standard deviation", *s)?;
         }
-        if loadings.len() != residuals.len() {
-            return refuse("loadings", format!("{} loadings", loadings.len()), format!("{}", residuals.len()));
-        }
+        entries("loadings", loadings.len(), residuals.len())?;
         Ok(Self {
             loadings: loadings.to_vec(),
             residuals: residuals.to_vec(),
@@ -209,7 +208,7 @@ fn shared_factor(matrix: &DMatrix<f64>, tolerance: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Prior, Scene};
+    use crate::observation_model::{ObservationModel, Prior};
 
     #[test]
     fn covariances_of_one_factor_are_found() {
@@ -249,6 +248,6 @@ mod tests {
         assert!(Prior::discrete(vec![0.0, 1.0], vec![0.4, 0.4]).is_err());
         assert!(Prior::discrete(vec![0.0], vec![0.4, 0.6]).is_err());
         assert!(Prior::binary(1.0, 1.5).is_err());
-        assert!(matches!(Scene::gaussian_with_deviations(1.0, &[1e-9]), Err(Error::TooLarge { .. })));
+        assert!(matches!(ObservationModel::gaussian_with_deviations(1.0, &[1e-9]), Err(Error::TooLarge { .. })));
     }
 }

@@ -1,18 +1,18 @@
-//! Random scenes, and multi-start Nelder-Mead on them.
+//! Random models, and multi-start Nelder-Mead on them.
 
 use super::nelder_mead::{Stopwatch, minimise};
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
 use fewbits_quantizer_design::solve::{Bits, Request, Solution, Solutions};
 use fewbits_quantizer_design::{
-    Channel, Criterion, Error, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max,
+    Channel, Criterion, Error, Labelling, Noise, ObservationModel, Prior, Quantizer, System, lloyd_max,
 };
 use rand::RngExt;
 use std::time::Duration;
 
-/// A scene with its task.
+/// A model with its task.
 pub struct Task {
-    pub scene: Scene,
+    pub model: ObservationModel,
     pub bits: Vec<u32>,
     pub crossover: f64,
     pub what: String,
@@ -39,7 +39,7 @@ pub fn prior(kind: usize, scale: f64) -> Result<Prior, Error> {
 
 /// Task number `i` at a scale: 2 to `max_sensors` sensors, 1 to `max_bits` bits, correlation 0 to .9, flips 0 to .2.
 pub fn task(i: u64, scale: f64, max_sensors: usize, max_bits: u32) -> Result<Task, Error> {
-    let mut rng = Stream::new(31).named("random-scenes").indexed(i).rng();
+    let mut rng = Stream::new(31).named("random-models").indexed(i).rng();
     let sensors = rng.random_range(2..=max_sensors);
     let bits: Vec<u32> = (0..sensors).map(|_| rng.random_range(1..=max_bits)).collect();
     let rho = rng.random_range(0.0..0.9);
@@ -50,11 +50,11 @@ pub fn task(i: u64, scale: f64, max_sensors: usize, max_bits: u32) -> Result<Tas
         .map(|_| scale * if equal { first } else { rng.random_range(0.2..1.0) })
         .collect();
     let kind = i as usize % PRIORS.len();
-    let scene = Scene::new(prior(kind, scale)?, Noise::equicorrelated_with_deviations(&deviations, rho)?)?;
+    let model = ObservationModel::new(prior(kind, scale)?, Noise::equicorrelated_with_deviations(&deviations, rho)?)?;
     let what =
         format!("{i}: {} {bits:?} bits, noise {deviations:.2?}, rho {rho:.2}, flips {crossover:.3}", PRIORS[kind]);
     Ok(Task {
-        scene,
+        model,
         bits,
         crossover,
         what,
@@ -70,13 +70,13 @@ pub struct Found {
 impl Task {
     /// Squared error of a design on the full nodes.
     pub fn exact(&self, solution: &Solution) -> Result<f64, Error> {
-        System::new(self.scene.clone(), solution.system().groups().to_vec())?.value(Criterion::MeanSquaredError)
+        System::new(self.model.clone(), solution.system().groups().to_vec())?.value(Criterion::MeanSquaredError)
     }
 
     pub fn solve(&self, limit: Option<Duration>) -> Result<Found, Box<dyn std::error::Error>> {
         let watch = Stopwatch::start();
         let mut request = Request::estimation(
-            self.scene.clone(),
+            self.model.clone(),
             Bits::PerSensor(self.bits.clone()),
             Link::flipping(self.crossover)?,
         );
@@ -106,7 +106,7 @@ impl Task {
                     Labelling::natural(levels)?
                 };
                 channels.push(Channel::binary_symmetric(&words, self.crossover)?);
-                let (mean, deviation) = (self.scene.sample_mean(), self.scene.sample_deviation(n));
+                let (mean, deviation) = (self.model.sample_mean(), self.model.sample_deviation(n));
                 let lloyd = lloyd_max::gaussian(levels)?.affine(mean, deviation)?;
                 let mut b = lloyd.breakpoints().to_vec();
                 if start > 1 {
@@ -117,7 +117,7 @@ impl Task {
                 quantizers.push(Quantizer::new(b.clone())?);
                 at.extend(b);
             }
-            let system = System::distinct(self.scene.clone(), quantizers, channels)?;
+            let system = System::distinct(self.model.clone(), quantizers, channels)?;
             let mut error = |b: &[f64]| {
                 let mut rest = b;
                 let own = self.bits.iter().map(|bits| {
@@ -133,7 +133,7 @@ impl Task {
                     .and_then(|s| s.value(Criterion::MeanSquaredError));
                 moved.unwrap_or(f64::INFINITY)
             };
-            let step = 0.15 * self.scene.sample_deviation(0);
+            let step = 0.15 * self.model.sample_deviation(0);
             best = best.min(minimise(&mut error, &at, step, &is_over));
             if is_over() {
                 break;

@@ -1,7 +1,8 @@
 //! The unknown before anything is received.
 
 use super::continuous::{Continuous, Shape, components};
-use crate::error::{Error, refuse};
+use crate::error::Error;
+use fewbits_numerics::error::entries;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
@@ -196,9 +197,7 @@ impl Prior {
     pub fn discrete(values: Vec<f64>, probabilities: Vec<f64>) -> Result<Self, Error> {
         fewbits_numerics::error::all_finite("values", &values)?;
         fewbits_numerics::error::probabilities("probabilities", &probabilities)?;
-        if values.len() != probabilities.len() {
-            return refuse("values", format!("{} values", values.len()), format!("{} values", probabilities.len()));
-        }
+        entries("values", values.len(), probabilities.len())?;
         Ok(Self::Discrete { values, probabilities })
     }
 

@@ -1,6 +1,6 @@
-//! How finely a scene is discretised.
+//! How finely a model is discretised.
 
-/// How finely a scene is discretised.
+/// How finely a model is discretised.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Resolution {
     /// Exact to 1e-12.
