@@ -44,6 +44,7 @@ pub struct FrameWriter {
     ends: Vec<Option<(f64, f64)>>,
     /// Rows at which it is tried next whether they fill a frame.
     next_trial: usize,
+    has_sent: bool,
 }
 
 impl FrameWriter {
@@ -65,6 +66,7 @@ impl FrameWriter {
             columns: vec![Vec::new(); schema.columns.len()],
             ends: vec![None; schema.columns.len()],
             next_trial: 1,
+            has_sent: false,
             schema,
         })
     }
@@ -76,12 +78,18 @@ impl FrameWriter {
 
     /// The header as a recording begins with it, for links that lose nothing; `None` before the first frame.
     pub fn header(&self) -> Option<Vec<u8>> {
-        self.header.as_ref().map(Header::to_bytes)
+        self.sent_header().map(Header::to_bytes)
+    }
+
+    fn sent_header(&self) -> Option<&Header> {
+        self.header.as_ref().filter(|_| self.has_sent)
     }
 
     /// The header's pieces; none before the first frame.
     pub fn header_frames(&self) -> Vec<Vec<u8>> {
-        let Some(header) = &self.header else { return Vec::new() };
+        let Some(header) = self.sent_header() else {
+            return Vec::new();
+        };
         let bytes = header.to_bytes();
         let room = self.max_bytes - PIECE_OVERHEAD;
         let pieces = bytes.chunks(room);
@@ -181,6 +189,7 @@ impl FrameWriter {
     }
 
     fn forget(&mut self, rows: usize) {
+        self.has_sent = true;
         self.ticks.drain(..rows);
         self.columns.iter_mut().for_each(|cells| drop(cells.drain(..rows)));
         self.next_trial = rows.max(1);
@@ -199,9 +208,10 @@ impl FrameWriter {
 
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
         let columns = 0..self.columns.len();
-        if self.header.is_none() {
+        // Until the first frame is out, all rows that wait say what frames begin with.
+        if !self.has_sent {
             let bounds = columns.clone().map(|i| self.share_bound(i).unwrap_or(0.0)).collect();
-            let header = Header::new(self.schema.clone(), &self.ticks[..rows], bounds);
+            let header = Header::new(self.schema.clone(), &self.ticks, bounds);
             self.header = Some(header.with_starts(&self.columns));
         }
         let Some(header) = &self.header else {

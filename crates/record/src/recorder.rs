@@ -214,12 +214,19 @@ impl<W: Write> Recorder<W> {
             self.write_block(Starts::None)?;
         }
         self.write_header(Starts::None)?;
-        self.write_segment()?;
-        let footer = self
-            .header
-            .as_ref()
-            .map(|header| index::push_footer(header, &self.segments));
-        self.write(&footer.unwrap_or_default())?;
+        // The only segment is its own footer.
+        let is_only = self.segments.is_empty() && !self.entries.is_empty();
+        self.write_segment(if is_only { index::ONLY } else { index::SEGMENT })?;
+        let footer = match &self.header {
+            Some(header) if !is_only => index::push_footer(header, &self.segments),
+            _ => Vec::new(),
+        };
+        let length = if is_only {
+            self.segments[0].length
+        } else {
+            footer.len() as u64
+        };
+        self.write(&[footer, index::trailer(length)].concat())?;
         self.writer.flush().map_err(Error::io("write"))?;
         Ok(self.writer)
     }
@@ -282,12 +289,12 @@ impl<W: Write> Recorder<W> {
         self.ticks.clear();
         self.columns.iter_mut().for_each(Vec::clear);
         if self.entries.len() == BLOCKS_PER_SEGMENT {
-            self.write_segment()?;
+            self.write_segment(index::SEGMENT)?;
         }
         Ok(())
     }
 
-    fn write_segment(&mut self) -> Result<(), Error> {
+    fn write_segment(&mut self, kind: u8) -> Result<(), Error> {
         if self.entries.is_empty() {
             return Ok(());
         }
@@ -295,7 +302,7 @@ impl<W: Write> Recorder<W> {
             return Err(Error::Broken);
         };
         let content = index::push_segment(header, &self.entries);
-        let bytes = index::special(header.check, index::SEGMENT, &content);
+        let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;
         let segment = Segment::new(self.segment_start, bytes.len() as u64, &self.entries);
         self.segment_start = segment.end();
