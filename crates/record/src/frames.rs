@@ -11,9 +11,9 @@
 //! ```
 
 use crate::block::{self, Block, Cells};
-use crate::bound::Bound;
 use crate::error::{Damage, Error};
 use crate::header::{Header, MAX_START};
+use crate::ranges::Ranges;
 use crate::schema::Schema;
 use crate::wire::{Bytes, CHECK_BYTES, checksum};
 use fewbits_adaptive::Effort;
@@ -41,7 +41,7 @@ pub struct FrameWriter {
     max_bytes: usize,
     ticks: Vec<i64>,
     columns: Vec<Cells>,
-    ends: Vec<Option<(f64, f64)>>,
+    ranges: Ranges,
     /// Rows at which it is tried next whether they fill a frame.
     next_trial: usize,
     has_sent: bool,
@@ -64,7 +64,7 @@ impl FrameWriter {
             max_bytes,
             ticks: Vec::new(),
             columns: vec![Vec::new(); schema.columns.len()],
-            ends: vec![None; schema.columns.len()],
+            ranges: Ranges::new(schema.columns.len()),
             next_trial: 1,
             has_sent: false,
             schema,
@@ -113,13 +113,11 @@ impl FrameWriter {
             return Err(ArgumentError::new("row", format!("{} cells", row.len()), expected).into());
         }
         self.ticks.push(tick);
-        for ((cells, cell), ends) in self.columns.iter_mut().zip(row).zip(&mut self.ends) {
-            cells.push(*cell);
-            if let Some(value) = cell.filter(|value| value.is_finite()) {
-                let (low, high) = ends.unwrap_or((value, value));
-                *ends = Some((low.min(value), high.max(value)));
-            }
-        }
+        self.ranges.add(row);
+        self.columns
+            .iter_mut()
+            .zip(row)
+            .for_each(|(cells, cell)| cells.push(*cell));
         let mut frames = Vec::new();
         while self.ticks.len() >= self.next_trial.min(self.schema.rows_per_block) && !self.ticks.is_empty() {
             let rows = self.ticks.len().min(self.schema.rows_per_block);
@@ -195,31 +193,17 @@ impl FrameWriter {
         self.next_trial = rows.max(1);
     }
 
-    fn share_bound(&self, column: usize) -> Option<f64> {
-        let spec = &self.schema.columns[column];
-        let Bound::ShareOfRange(share) = spec.bound else {
-            return None;
-        };
-        let range = spec
-            .known_range()
-            .or_else(|| self.ends[column].map(|(low, high)| high - low));
-        Some(crate::recorder::share_of(share, range.unwrap_or(0.0)))
-    }
-
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
-        let columns = 0..self.columns.len();
         // Until the first frame is out, all rows that wait say what frames begin with.
         if !self.has_sent {
-            let bounds = columns.clone().map(|i| self.share_bound(i).unwrap_or(0.0)).collect();
+            let bounds = self.ranges.bounds(&self.schema);
             let header = Header::new(self.schema.clone(), &self.ticks, bounds);
             self.header = Some(header.with_starts(&self.columns));
         }
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let own: Vec<Option<f64>> = columns
-            .map(|i| crate::recorder::own_bound(self.share_bound(i)?, header.share_bounds[i]))
-            .collect();
+        let own = self.ranges.own_bounds(header);
         let cells: Vec<Cells> = self.columns.iter().map(|cells| cells[..rows].to_vec()).collect();
         Ok(block::encode(header, &self.ticks[..rows], &cells, &own, Effort::Thorough).0)
     }

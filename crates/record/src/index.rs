@@ -7,6 +7,7 @@
 use crate::block::Cells;
 use crate::error::Damage;
 use crate::header::Header;
+use crate::ranges::{self, Ends};
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint, zigzag};
 
 /// Blocks of one segment.
@@ -31,7 +32,7 @@ pub(crate) struct Entry {
     pub(crate) rows: u64,
     pub(crate) ticks: (i64, i64),
     /// Least and largest finite value of each column, or something beyond them; `None` without any.
-    pub(crate) ends: Vec<Option<(f64, f64)>>,
+    pub(crate) ends: Vec<Ends>,
 }
 
 impl Entry {
@@ -45,13 +46,9 @@ impl Entry {
     }
 
     pub(crate) fn of(length: u64, ticks: &[i64], columns: &[Cells]) -> Self {
-        let ends = columns.iter().map(|cells| {
-            let finite = cells.iter().flatten().filter(|value| value.is_finite());
-            finite.fold(None, |ends, value| {
-                let (low, high) = ends.unwrap_or((*value, *value));
-                Some((value.min(low), value.max(high)))
-            })
-        });
+        let ends = columns
+            .iter()
+            .map(|cells| cells.iter().fold(None, |ends, cell| ranges::with(ends, *cell)));
         let ticks = ticks
             .iter()
             .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));

@@ -100,20 +100,30 @@ pub(crate) fn encode(
     own_bounds: &[Option<f64>],
     effort: Effort,
 ) -> (Vec<u8>, Vec<Cells>) {
-    if columns.len() <= SHARED_COLUMNS {
-        let (bytes, restored) = encode_as(header, ticks, columns, own_bounds, effort, true);
-        let read = decode(header, &bytes, |_| true);
-        let same = |read: &[Cells]| {
-            let cells = read.iter().flatten().zip(restored.iter().flatten());
-            cells.fold(true, |same, (a, b)| same && a.map(f64::to_bits) == b.map(f64::to_bits))
+    let may_share = columns.len() <= SHARED_COLUMNS;
+    let (bytes, restored, shares) = encode_as(header, ticks, columns, own_bounds, effort, may_share);
+    // Columns with bytes of their own were decoded one by one.
+    let is_read = || {
+        let read = decode(header, &bytes, |_| true)
+            .map(|block| block.columns)
+            .unwrap_or_default();
+        let bits = |columns: &[Cells]| {
+            columns
+                .iter()
+                .flatten()
+                .map(|cell| cell.map(f64::to_bits))
+                .collect::<Vec<_>>()
         };
-        if read.is_ok_and(|read| same(&read.columns)) {
-            return (bytes, restored);
-        }
+        bits(&read) == bits(&restored)
+    };
+    if !shares || is_read() {
+        return (bytes, restored);
     }
-    encode_as(header, ticks, columns, own_bounds, effort, false)
+    let (bytes, restored, _) = encode_as(header, ticks, columns, own_bounds, effort, false);
+    (bytes, restored)
 }
 
+/// As [`encode`], without the check of the shared code, which there may be none of; whether there is one.
 fn encode_as(
     header: &Header,
     ticks: &[i64],
@@ -121,7 +131,7 @@ fn encode_as(
     own_bounds: &[Option<f64>],
     effort: Effort,
     may_share: bool,
-) -> (Vec<u8>, Vec<Cells>) {
+) -> (Vec<u8>, Vec<Cells>, bool) {
     let (mut coded, mut restored) = (Vec::with_capacity(columns.len()), Vec::with_capacity(columns.len()));
     for (cells, own) in columns.iter().zip(own_bounds) {
         let mut column = encode_column(header, cells, *own, &restored, effort, may_share);
@@ -186,7 +196,7 @@ fn encode_as(
         let indices: Vec<Option<Vec<i64>>> = coded.into_iter().map(|column| column.indices).collect();
         body.extend(shared::encode(header, columns, &specials, &indices, &restored, effort));
     }
-    (framed(header, body), restored)
+    (framed(header, body), restored, shares)
 }
 
 /// Length, body, checksum.

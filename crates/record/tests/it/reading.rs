@@ -182,7 +182,7 @@ fn flushed_rows_can_be_read_at_once() {
 
 #[test]
 fn related_columns_are_predicted_from_each_other() {
-    let mut numbers = crate::common::Numbers(9);
+    let mut numbers = Numbers(9);
     let (mut level, names) = (0.0, ["a", "b", "c", "d"]);
     let rows: Vec<Vec<Option<f64>>> = (0..1500)
         .map(|i| {
