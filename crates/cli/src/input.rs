@@ -301,6 +301,8 @@ impl Table {
         let Ok(value) = text.parse::<f64>() else {
             let mend = if self.all_names.len() == 1 && text.contains([';', '\t', '|']) {
                 "name what separates cells with --delimiter"
+            } else if clock::format_of(text).is_some() {
+                "if this is the time of the row, add --time exact"
             } else {
                 "mend the cell, leave it empty for a gap, or choose columns with --columns"
             };

@@ -243,7 +243,7 @@ fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, 
     })
 }
 
-/// Writes the rows of frames as they come, until there is none.
+/// Writes the rows of frames as they come, until there is none. Failed if the header never came whole.
 fn receive_frames(
     options: &ReceiveOptions,
     address: &str,
@@ -267,7 +267,8 @@ fn receive_frames(
             write_blocks(blocks.into_iter().map(Ok), writer, (i64::MIN, i64::MAX), columns, address)?;
         }
     }
-    writer
-        .map_or(Ok(()), |(writer, _)| writer.finish())
-        .map(|()| Ending::Good)
+    match writer {
+        Some((writer, _)) => writer.finish().map(|()| Ending::Good),
+        None => Ok(Ending::no_frame(address)),
+    }
 }

@@ -44,6 +44,14 @@ pub(crate) enum Ending {
     Failed,
 }
 
+impl Ending {
+    /// Of a link on which nothing whole came.
+    pub(crate) fn no_frame(name: &str) -> Self {
+        eprintln!("error: {name}: no whole frame came: use the sender's link, options and baud rate, and wait longer");
+        Self::Failed
+    }
+}
+
 fn main() -> ExitCode {
     let done = match Cli::parse().task {
         Task::Plan(options) => plan::run(&options),

@@ -31,6 +31,7 @@ pub(crate) fn config(bound: &str, sequence_bits: u32) -> Result<Config, Error> {
 }
 
 /// Writes a row per slot, `slot,value`, until there is no frame. From a loss that is noticed to the next refresh there are gaps.
+/// Failed if none was a frame of such a sensor.
 pub(crate) fn receive(
     options: &ReceiveOptions,
     config: Config,
@@ -40,9 +41,11 @@ pub(crate) fn receive(
     let names = ["slot", "value"].map(str::to_owned).to_vec();
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::Csv, names)?;
     let mut sensor = Slots::new(config);
+    let mut understood = false;
     while let Some(bytes) = frames.next().map_err(Error::file(name, "read"))? {
         match sensor.frame(&bytes) {
             Ok(rows) => {
+                understood = true;
                 for (slot, value) in rows {
                     sheet.write([Cell::Text(slot.to_string()), Cell::Number(value)])?;
                 }
@@ -52,7 +55,11 @@ pub(crate) fn receive(
             Err(reason) => eprintln!("warning: {name}: a frame was refused: {reason}"),
         }
     }
-    Ok(Ending::Good)
+    Ok(if understood {
+        Ending::Good
+    } else {
+        Ending::no_frame(name)
+    })
 }
 
 /// Count and value of a slot.

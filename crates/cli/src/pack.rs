@@ -98,10 +98,11 @@ pub(crate) fn run(options: &PackOptions) -> Result<Ending, Error> {
         serde_json::to_writer(stderr(), &done)?;
         eprintln!();
     } else {
-        eprintln!(
-            "{} rows of {columns} columns in {} bytes, {:.3} bits per sample",
-            done.rows, done.bytes, done.bits_per_sample
-        );
+        eprint!("{rows} rows of {columns} columns in {bytes} bytes");
+        match rows {
+            0 => eprintln!(),
+            _ => eprintln!(", {:.3} bits per sample", done.bits_per_sample),
+        }
     }
     Ok(Ending::Good)
 }

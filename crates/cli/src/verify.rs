@@ -87,10 +87,11 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
                 if !column.keeps(*sample, restored, block.share_bounds[i]) {
                     result.failed += 1;
                     if result.first_failures.len() < SHOWN {
-                        let at = clock::shown(*tick, time);
-                        result
-                            .first_failures
-                            .push(format!("row {} (tick {at}): {sample:?} was restored as {restored:?}", verdict.rows));
+                        let (row, at) = (verdict.rows, clock::shown(*tick, time));
+                        let told = |cell: Option<f64>| cell.map_or("a gap".to_owned(), |value| value.to_string());
+                        let (sample, restored) = (told(*sample), told(restored));
+                        let failure = format!("row {row} (tick {at}): {sample} was restored as {restored}");
+                        result.first_failures.push(failure);
                     }
                 }
             }

@@ -2,9 +2,10 @@
 //!
 //! `cargo run --release -p fewbits-record --example measure -- FOLDER [KEY]` reads `manifest.csv` (key, ..., period, range),
 //! `baselines.csv` (key, bound in percent of the range, codec, bits per sample) and for each key `KEY.f64`, little-endian doubles. It
-//! prints one line for each series, bound and size of blocks, then the summary. Every restored sample is checked.
+//! prints one line for each series, bound and size of blocks, then the summary. Every restored sample is checked. With `day` in place of
+//! a key it records the day of telemetry of `docs/record.md`.
 
-use fewbits_record::{Bound, Column, Playback, Recorder, Schema, TimeBase};
+use fewbits_record::{Bound, Column, Playback, Recorder, Schema, TimeBase, TimeFormat};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
@@ -47,11 +48,78 @@ fn measure(samples: &[f64], column: &Column, rows: usize) -> Result<Cost, Failur
     })
 }
 
+/// A series of the folder.
+fn series(folder: &Path, key: &str) -> Result<Vec<f64>, Failure> {
+    let bytes = std::fs::read(folder.join(format!("{key}.f64")))?;
+    let numbers = bytes.as_chunks::<8>().0.iter();
+    Ok(numbers.map(|chunk| f64::from_le_bytes(*chunk)).collect())
+}
+
+/// Columns of a day of telemetry, their ranges, and the period of one.
+const DAY: [(&str, f64, Option<f64>); 5] = [
+    ("temp1_degc", 0.667, None),
+    ("hum2_pct", 3.529, None),
+    ("c_111_ppm", 7.376, None),
+    ("wind_speed_mps", 1.32, None),
+    ("wind_dir_deg", 360.0, Some(360.0)),
+];
+
+/// Five columns with 1 % NaN and a gap of 60 rows: mean bytes over twenty draws of the NaN.
+fn day(folder: &Path, rows_per_block: usize) -> Result<(), Failure> {
+    let (mut columns, mut samples) = (Vec::new(), Vec::new());
+    for (name, range, period) in DAY {
+        let column = Column::new(name, Bound::Absolute(0.01 * range))?;
+        columns.push(match period {
+            Some(period) => column.with_period(period)?,
+            None => column,
+        });
+        samples.push(series(folder, &format!("orebro1.{name}"))?);
+    }
+    let (mut state, mut blocks, mut whole) = (1_u64, 0, 0);
+    for _ in 0..20 {
+        let time = TimeBase::Clock {
+            decimals: 0,
+            tolerance: 0,
+            format: TimeFormat::Utc,
+        };
+        let schema = Schema::new(columns.clone(), time)?.with_rows_per_block(rows_per_block)?;
+        let mut recorder = Recorder::new(Vec::new(), schema);
+        for row in 0..samples[0].len() {
+            let cells = samples.iter().map(|column| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                let value = if (state >> 33) % 100 == 0 {
+                    f64::NAN
+                } else {
+                    column[row]
+                };
+                (!(1700..1760).contains(&row)).then_some(value)
+            });
+            recorder.push(1_700_000_000 + 2 * row as i64, &cells.collect::<Vec<_>>())?;
+        }
+        let bytes = recorder.finish()?;
+        let index = Playback::new(Cursor::new(&bytes))?.index()?;
+        blocks += index.iter().map(|block| block.bytes).sum::<u64>();
+        whole += bytes.len();
+    }
+    let mean = |sum: f64| sum / 20.0;
+    println!(
+        "day in blocks of {rows_per_block} rows: {:.0} bytes, of which blocks {:.0}",
+        mean(whole as f64),
+        mean(blocks as f64)
+    );
+    Ok(())
+}
+
 fn main() -> Result<(), Failure> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().ok_or("which folder?")?;
     let chosen = arguments.next();
     let folder = Path::new(&folder);
+    if chosen.as_deref() == Some("day") {
+        return [512, 1 << 14].into_iter().try_for_each(|rows| day(folder, rows));
+    }
     let mut references: BTreeMap<(String, String), BTreeMap<String, f64>> = BTreeMap::new();
     for record in csv::Reader::from_path(folder.join("baselines.csv"))?.records() {
         let record = record?;
@@ -69,13 +137,7 @@ fn main() -> Result<(), Failure> {
         if chosen.as_ref().is_some_and(|chosen| chosen != key) {
             continue;
         }
-        let bytes = std::fs::read(folder.join(format!("{key}.f64")))?;
-        let samples: Vec<f64> = bytes
-            .as_chunks::<8>()
-            .0
-            .iter()
-            .map(|chunk| f64::from_le_bytes(*chunk))
-            .collect();
+        let samples = series(folder, key)?;
         for percent in PERCENTS {
             let delta = 0.01 * percent.parse::<f64>()? * range;
             let bound = if delta > 0.0 {

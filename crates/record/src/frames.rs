@@ -11,9 +11,9 @@
 //! ```
 
 use crate::block::{self, Block, Cells};
-use crate::bound::Bound;
 use crate::error::{Damage, Error};
 use crate::header::{Header, MAX_START};
+use crate::ranges::Ranges;
 use crate::schema::Schema;
 use crate::wire::{Bytes, CHECK_BYTES, checksum};
 use fewbits_adaptive::Effort;
@@ -41,9 +41,10 @@ pub struct FrameWriter {
     max_bytes: usize,
     ticks: Vec<i64>,
     columns: Vec<Cells>,
-    ends: Vec<Option<(f64, f64)>>,
+    ranges: Ranges,
     /// Rows at which it is tried next whether they fill a frame.
     next_trial: usize,
+    has_sent: bool,
 }
 
 impl FrameWriter {
@@ -63,8 +64,9 @@ impl FrameWriter {
             max_bytes,
             ticks: Vec::new(),
             columns: vec![Vec::new(); schema.columns.len()],
-            ends: vec![None; schema.columns.len()],
+            ranges: Ranges::new(schema.columns.len()),
             next_trial: 1,
+            has_sent: false,
             schema,
         })
     }
@@ -76,12 +78,18 @@ impl FrameWriter {
 
     /// The header as a recording begins with it, for links that lose nothing; `None` before the first frame.
     pub fn header(&self) -> Option<Vec<u8>> {
-        self.header.as_ref().map(Header::to_bytes)
+        self.sent_header().map(Header::to_bytes)
+    }
+
+    fn sent_header(&self) -> Option<&Header> {
+        self.header.as_ref().filter(|_| self.has_sent)
     }
 
     /// The header's pieces; none before the first frame.
     pub fn header_frames(&self) -> Vec<Vec<u8>> {
-        let Some(header) = &self.header else { return Vec::new() };
+        let Some(header) = self.sent_header() else {
+            return Vec::new();
+        };
         let bytes = header.to_bytes();
         let room = self.max_bytes - PIECE_OVERHEAD;
         let pieces = bytes.chunks(room);
@@ -105,13 +113,11 @@ impl FrameWriter {
             return Err(ArgumentError::new("row", format!("{} cells", row.len()), expected).into());
         }
         self.ticks.push(tick);
-        for ((cells, cell), ends) in self.columns.iter_mut().zip(row).zip(&mut self.ends) {
-            cells.push(*cell);
-            if let Some(value) = cell.filter(|value| value.is_finite()) {
-                let (low, high) = ends.unwrap_or((value, value));
-                *ends = Some((low.min(value), high.max(value)));
-            }
-        }
+        self.ranges.add(row);
+        self.columns
+            .iter_mut()
+            .zip(row)
+            .for_each(|(cells, cell)| cells.push(*cell));
         let mut frames = Vec::new();
         while self.ticks.len() >= self.next_trial.min(self.schema.rows_per_block) && !self.ticks.is_empty() {
             let rows = self.ticks.len().min(self.schema.rows_per_block);
@@ -181,35 +187,23 @@ impl FrameWriter {
     }
 
     fn forget(&mut self, rows: usize) {
+        self.has_sent = true;
         self.ticks.drain(..rows);
         self.columns.iter_mut().for_each(|cells| drop(cells.drain(..rows)));
         self.next_trial = rows.max(1);
     }
 
-    fn share_bound(&self, column: usize) -> Option<f64> {
-        let spec = &self.schema.columns[column];
-        let Bound::ShareOfRange(share) = spec.bound else {
-            return None;
-        };
-        let range = spec
-            .known_range()
-            .or_else(|| self.ends[column].map(|(low, high)| high - low));
-        Some(crate::recorder::share_of(share, range.unwrap_or(0.0)))
-    }
-
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
-        let columns = 0..self.columns.len();
-        if self.header.is_none() {
-            let bounds = columns.clone().map(|i| self.share_bound(i).unwrap_or(0.0)).collect();
-            let header = Header::new(self.schema.clone(), &self.ticks[..rows], bounds);
+        // Until the first frame is out, all rows that wait say what frames begin with.
+        if !self.has_sent {
+            let bounds = self.ranges.bounds(&self.schema);
+            let header = Header::new(self.schema.clone(), &self.ticks, bounds);
             self.header = Some(header.with_starts(&self.columns));
         }
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let own: Vec<Option<f64>> = columns
-            .map(|i| crate::recorder::own_bound(self.share_bound(i)?, header.share_bounds[i]))
-            .collect();
+        let own = self.ranges.own_bounds(header);
         let cells: Vec<Cells> = self.columns.iter().map(|cells| cells[..rows].to_vec()).collect();
         Ok(block::encode(header, &self.ticks[..rows], &cells, &own, Effort::Thorough).0)
     }

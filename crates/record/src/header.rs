@@ -11,7 +11,7 @@ use fewbits_adaptive::Start;
 /// The first bytes. Like PNG's they contain a byte above 127 and a line end, so that text transfers are noticed.
 const MAGIC: [u8; 7] = *b"\x8bfewb\r\n";
 /// The version of the format.
-pub(crate) const VERSION: u8 = 2;
+pub(crate) const VERSION: u8 = 3;
 /// No header is longer: 4096 columns with names and units.
 pub(crate) const MAX_HEADER: usize = 1 << 24;
 
@@ -75,6 +75,10 @@ impl Header {
     /// What a block of a column begins with; blocks with a bound of their own have other indices.
     pub(crate) fn start(&self, column: usize, own: Option<f64>) -> Option<Start> {
         self.starts[column].filter(|_| own.is_none())
+    }
+
+    pub(crate) fn has_starts(&self) -> bool {
+        self.starts.iter().any(Option::is_some)
     }
 
     pub(crate) fn grid(&self) -> Grid {
@@ -205,9 +209,10 @@ pub(crate) fn rounded_down(bound: f64) -> f64 {
     f64::from_bits(bound.to_bits() & !0xff_ffff_ffff)
 }
 
-/// Flags beside the kind of a bound: a period follows, a start follows.
+/// Flags beside the kind of a bound: a period follows, a start follows, a unit follows.
 const HAS_PERIOD: u8 = 0x10;
 const HAS_START: u8 = 0x20;
+const HAS_UNIT: u8 = 0x40;
 /// In place of decimals: the double itself follows.
 const DOUBLE: u8 = 0xff;
 
@@ -243,9 +248,10 @@ fn read_number(body: &mut Bytes<'_>) -> Result<f64, Damage> {
 
 fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64, start: Option<&Start>) {
     push_text(body, &column.name);
-    push_text(body, &column.unit);
     let flag = |given: bool, flag: u8| if given { flag } else { 0 };
-    let flags = flag(column.period.is_some(), HAS_PERIOD) | flag(start.is_some(), HAS_START);
+    let flags = flag(column.period.is_some(), HAS_PERIOD)
+        | flag(start.is_some(), HAS_START)
+        | flag(!column.unit.is_empty(), HAS_UNIT);
     match column.bound {
         Bound::Lossless => body.push(flags),
         Bound::Absolute(delta) => {
@@ -262,6 +268,9 @@ fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64, start: Opt
             body.push(places);
         }
     }
+    if !column.unit.is_empty() {
+        push_text(body, &column.unit);
+    }
     if let Some(period) = column.period {
         push_number(body, period);
     }
@@ -273,10 +282,9 @@ fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64, start: Opt
 fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<Start>), Error> {
     let damaged = Error::Header;
     let name = body.text().map_err(damaged)?;
-    let unit = body.text().map_err(damaged)?;
     let kind = body.byte().map_err(damaged)?;
     let mut share_bound = 0.0;
-    let bound = match kind & !(HAS_PERIOD | HAS_START) {
+    let bound = match kind & !(HAS_PERIOD | HAS_START | HAS_UNIT) {
         0 => Bound::Lossless,
         1 => Bound::Absolute(read_number(body).map_err(damaged)?),
         2 => {
@@ -291,7 +299,10 @@ fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<Start>), Err
         3 => Bound::Decimals(body.byte().map_err(damaged)?),
         _ => return Err(damaged(Damage::Content("bound"))),
     };
-    let mut column = Column::new(name, bound)?.with_unit(unit)?;
+    let mut column = Column::new(name, bound)?;
+    if kind & HAS_UNIT != 0 {
+        column = column.with_unit(body.text().map_err(damaged)?)?;
+    }
     if kind & HAS_PERIOD != 0 {
         column = column.with_period(read_number(body).map_err(damaged)?)?;
     }

@@ -1,26 +1,21 @@
 //! The index: where blocks are, when, and between which values. A recording is read without it too, only not as fast.
 //!
-//! ```text
-//! special  := 0, kind byte, length varint, content, CRC-32 of header's checksum and all of it
-//! segment  := kind `I`: number of blocks, per column two f32 (low and high end of all its blocks), per block: twice the length in bytes,
-//!             plus 1 if rows, distance and span are those of the block before, which then do not follow; rows, distance of the first
-//!             tick from the last block's last, span; per column two bytes (low and high in 255ths between the ends, outwards)
-//! footer   := kind `F`: number of segments, per segment: bytes of its blocks, its own bytes, rows, least and largest tick
-//!             then behind the checksum: length of the footer (4 bytes, little-endian), "fEnd"
-//! ```
-//!
-//! A segment follows its blocks, every 1024 blocks and at the end; so a recorder holds no more than that many entries. An entry without
-//! rows stands for damaged bytes that `resume` left in place.
+//! `docs/record.md` says each byte. A segment follows its blocks, every 1024 blocks and at the end; so a recorder holds no more than that many
+//! entries. A footer lists the segments; where there is one only, its index stands in the footer's place. An entry without rows stands for
+//! damaged bytes that `resume` left in place.
 
 use crate::block::Cells;
 use crate::error::Damage;
 use crate::header::Header;
+use crate::ranges::{self, Ends};
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint, zigzag};
 
 /// Blocks of one segment.
 pub(crate) const BLOCKS_PER_SEGMENT: usize = 1024;
 pub(crate) const SEGMENT: u8 = b'I';
 pub(crate) const FOOTER: u8 = b'F';
+/// The only segment of a finished recording.
+pub(crate) const ONLY: u8 = b'O';
 /// The last bytes of a finished recording.
 pub(crate) const END: [u8; 4] = *b"fEnd";
 /// Bytes behind the footer's checksum.
@@ -37,7 +32,7 @@ pub(crate) struct Entry {
     pub(crate) rows: u64,
     pub(crate) ticks: (i64, i64),
     /// Least and largest finite value of each column, or something beyond them; `None` without any.
-    pub(crate) ends: Vec<Option<(f64, f64)>>,
+    pub(crate) ends: Vec<Ends>,
 }
 
 impl Entry {
@@ -51,13 +46,9 @@ impl Entry {
     }
 
     pub(crate) fn of(length: u64, ticks: &[i64], columns: &[Cells]) -> Self {
-        let ends = columns.iter().map(|cells| {
-            let finite = cells.iter().flatten().filter(|value| value.is_finite());
-            finite.fold(None, |ends, value| {
-                let (low, high) = ends.unwrap_or((*value, *value));
-                Some((value.min(low), value.max(high)))
-            })
-        });
+        let ends = columns
+            .iter()
+            .map(|cells| cells.iter().fold(None, |ends, cell| ranges::with(ends, *cell)));
         let ticks = ticks
             .iter()
             .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));
@@ -88,9 +79,11 @@ impl Segment {
         let filled = || entries.iter().filter(|entry| entry.rows > 0);
         Self {
             start,
-            blocks: entries.iter().map(|entry| entry.length).sum(),
+            blocks: entries
+                .iter()
+                .fold(0, |sum: u64, entry| sum.saturating_add(entry.length)),
             length,
-            rows: entries.iter().map(|entry| entry.rows).sum(),
+            rows: entries.iter().fold(0, |sum: u64, entry| sum.saturating_add(entry.rows)),
             ticks: (
                 filled().map(|entry| entry.ticks.0).min().unwrap_or(0),
                 filled().map(|entry| entry.ticks.1).max().unwrap_or(0),
@@ -117,7 +110,7 @@ pub(crate) fn special(check: u32, kind: u8, content: &[u8]) -> Vec<u8> {
 /// The longest content of a special record of a recording.
 fn max_content(kind: u8, columns: usize) -> usize {
     match kind {
-        SEGMENT => 16 + 8 * columns + BLOCKS_PER_SEGMENT * (40 + 2 * columns),
+        SEGMENT | ONLY => 16 + 8 * columns + BLOCKS_PER_SEGMENT * (40 + columns),
         FOOTER => MAX_FOOTER,
         _ => 0,
     }
@@ -181,9 +174,12 @@ fn read_short(reader: &mut Bytes<'_>) -> Result<f64, Damage> {
 }
 
 /// Levels between a column's ends.
-const LEVELS: f64 = 255.0;
+const MOST: u8 = 15;
+const LEVELS: f64 = MOST as f64;
+/// Levels of a column without values: the low one is above.
+const NO_VALUES: [u8; 2] = [1, 0];
 
-/// A value between two ends, in 255ths, rounded down; `ends` may be infinite.
+/// A value between two ends, in 15ths, rounded down; `ends` may be infinite.
 fn level_below(value: f64, ends: (f64, f64)) -> u8 {
     let share = (value - ends.0) / (ends.1 - ends.0);
     let level = (LEVELS * share).floor().clamp(0.0, LEVELS) as u8;
@@ -198,7 +194,7 @@ fn level_below(value: f64, ends: (f64, f64)) -> u8 {
 fn level_above(value: f64, ends: (f64, f64)) -> u8 {
     let level = level_below(value, ends);
     if level_value(level, ends) < value {
-        level.saturating_add(1)
+        (level + 1).min(MOST)
     } else {
         level
     }
@@ -207,7 +203,7 @@ fn level_above(value: f64, ends: (f64, f64)) -> u8 {
 fn level_value(level: u8, ends: (f64, f64)) -> f64 {
     match level {
         0 => ends.0,
-        u8::MAX => ends.1,
+        MOST.. => ends.1,
         // Ends beyond the numbers of 32 bits are infinite: nothing lies between them.
         _ if !(ends.1 - ends.0).is_finite() => ends.1,
         level => ends.0 + (ends.1 - ends.0) * (f64::from(level) / LEVELS),
@@ -247,8 +243,9 @@ pub(crate) fn push_segment(header: &Header, entries: &[Entry]) -> Vec<u8> {
         }
         (last, before) = (entry.ticks.1, Some(shape));
         for (ends, scale) in entry.ends.iter().zip(&scales) {
-            let levels = ends.map_or([1, 0], |(low, high)| [level_below(low, *scale), level_above(high, *scale)]);
-            content.extend(levels);
+            let levels = ends.map(|(low, high)| [level_below(low, *scale), level_above(high, *scale)]);
+            let [low, high] = levels.unwrap_or(NO_VALUES);
+            content.push(low << 4 | high);
         }
     }
     content
@@ -281,7 +278,8 @@ pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>
             entry.ticks = (first, first.wrapping_add(shape.2));
             (last, before) = (entry.ticks.1, Some(shape));
             for (ends, scale) in entry.ends.iter_mut().zip(&scales) {
-                let [low, high] = reader.array()?;
+                let byte = reader.byte()?;
+                let (low, high) = (byte >> 4, byte & 15);
                 *ends = (low <= high).then(|| (level_value(low, *scale), level_value(high, *scale)));
             }
         }
@@ -291,7 +289,7 @@ pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>
     Ok(entries)
 }
 
-/// The footer with its trailer.
+/// The footer.
 pub(crate) fn push_footer(header: &Header, segments: &[Segment]) -> Vec<u8> {
     let mut content = Vec::new();
     push_varint(&mut content, segments.len() as u64);
@@ -302,11 +300,12 @@ pub(crate) fn push_footer(header: &Header, segments: &[Segment]) -> Vec<u8> {
         push_varint(&mut content, zigzag(segment.ticks.0.wrapping_sub(header.origin)));
         push_varint(&mut content, segment.ticks.1.wrapping_sub(segment.ticks.0) as u64);
     }
-    let mut bytes = special(header.check, FOOTER, &content);
-    let length = bytes.len() as u32;
-    bytes.extend(length.to_le_bytes());
-    bytes.extend(END);
-    bytes
+    special(header.check, FOOTER, &content)
+}
+
+/// What ends a recording behind its footer.
+pub(crate) fn trailer(footer: u64) -> Vec<u8> {
+    [&(footer as u32).to_le_bytes()[..], &END].concat()
 }
 
 /// Reads what [`push_footer`] wrote; the first block begins at `start`.

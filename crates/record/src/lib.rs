@@ -58,6 +58,7 @@ mod frames;
 mod header;
 mod index;
 mod playback;
+mod ranges;
 mod recorder;
 mod related;
 mod resume;

@@ -33,7 +33,7 @@ pub struct BlockInfo {
     pub rows: u64,
     /// Least and largest tick.
     pub ticks: (i64, i64),
-    /// Least and largest value of each column or a little beyond them (a 255th of the column's range in 1024 blocks); `None` without any.
+    /// Least and largest value of each column or a little beyond them (a 15th of the column's range in 1024 blocks); `None` without any.
     pub ends: Vec<Option<(f64, f64)>>,
 }
 
@@ -201,13 +201,18 @@ pub(crate) fn segments(reader: &mut (impl Read + Seek), header: &Header) -> Resu
         return Ok(None);
     };
     let first = header.to_bytes().len() as u64;
-    let found = match index::read_special(header, &bytes) {
+    let (found, expected) = match index::read_special(header, &bytes) {
         Ok((index::FOOTER, content, whole)) if whole as u64 == length => {
-            index::read_footer(header, content, first).ok()
+            (index::read_footer(header, content, first), start)
         }
-        _ => None,
+        Ok((index::ONLY, content, whole)) if whole as u64 == length => {
+            let entries = index::read_segment(header, content);
+            (entries.map(|entries| vec![Segment::new(first, length, &entries)]), trailer)
+        }
+        _ => return Ok(None),
     };
-    Ok(found.filter(|segments| segments.last().map_or(first, Segment::end) == start))
+    let ends = |segments: &Vec<Segment>| segments.last().map_or(first, Segment::end) == expected;
+    Ok(found.ok().filter(ends))
 }
 
 /// The entries of a segment; `None` if it is damaged.
@@ -221,7 +226,7 @@ pub(crate) fn entries(
         return Ok(None);
     };
     let found = match index::read_special(header, &bytes) {
-        Ok((index::SEGMENT, content, _)) => index::read_segment(header, content).ok(),
+        Ok((index::SEGMENT | index::ONLY, content, _)) => index::read_segment(header, content).ok(),
         _ => None,
     };
     let total = |entries: &Vec<Entry>| {

@@ -1,10 +1,10 @@
 //! Writing recordings.
 
 use crate::block::{self, Cells};
-use crate::bound::Bound;
 use crate::error::Error;
-use crate::header::{Header, rounded_down};
+use crate::header::Header;
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
+use crate::ranges::Ranges;
 use crate::resume;
 use crate::schema::{Schema, TimeBase};
 use fewbits_adaptive::Effort;
@@ -12,22 +12,6 @@ use fewbits_numerics::ArgumentError;
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
-
-/// A share's bound in a block is written when it is larger than the header's by this factor.
-const WIDER: f64 = 1.25;
-
-/// A bound not above `share * range`; 0 where the range is none or overflows.
-pub(crate) fn share_of(share: f64, range: f64) -> f64 {
-    // The product may be rounded up; a bound must not be.
-    let bound = (share * range).next_down().max(0.0);
-    if (2.0 * bound).is_finite() { bound } else { 0.0 }
-}
-
-/// The bound that a block states itself, if the header's is much smaller.
-pub(crate) fn own_bound(bound: f64, of_header: f64) -> Option<f64> {
-    let bound = rounded_down(bound);
-    (bound > WIDER * of_header).then_some(bound)
-}
 
 /// Whether a new header says what the blocks begin with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,8 +32,7 @@ pub struct Recorder<W> {
     header: Option<Header>,
     ticks: Vec<i64>,
     columns: Vec<Cells>,
-    /// Ends of each column's finite values so far.
-    ends: Vec<Option<(f64, f64)>>,
+    ranges: Ranges,
     next_tick: i64,
     /// Bytes written.
     offset: u64,
@@ -124,7 +107,7 @@ impl<W: Write> Recorder<W> {
             header: None,
             ticks: Vec::new(),
             columns: vec![Vec::new(); columns],
-            ends: vec![None; columns],
+            ranges: Ranges::new(columns),
             next_tick: 0,
             offset: 0,
             segment_start: 0,
@@ -169,6 +152,7 @@ impl<W: Write> Recorder<W> {
             return Err(ArgumentError::new("row", format!("{} cells", row.len()), expected).into());
         }
         self.ticks.push(tick);
+        self.ranges.add(row);
         for (cells, cell) in self.columns.iter_mut().zip(row) {
             cells.push(*cell);
         }
@@ -214,12 +198,19 @@ impl<W: Write> Recorder<W> {
             self.write_block(Starts::None)?;
         }
         self.write_header(Starts::None)?;
-        self.write_segment()?;
-        let footer = self
-            .header
-            .as_ref()
-            .map(|header| index::push_footer(header, &self.segments));
-        self.write(&footer.unwrap_or_default())?;
+        // The only segment is its own footer.
+        let is_only = self.segments.is_empty() && !self.entries.is_empty();
+        self.write_segment(if is_only { index::ONLY } else { index::SEGMENT })?;
+        let footer = match &self.header {
+            Some(header) if !is_only => index::push_footer(header, &self.segments),
+            _ => Vec::new(),
+        };
+        let length = if is_only {
+            self.segments[0].length
+        } else {
+            footer.len() as u64
+        };
+        self.write(&[footer, index::trailer(length)].concat())?;
         self.writer.flush().map_err(Error::io("write"))?;
         Ok(self.writer)
     }
@@ -237,9 +228,7 @@ impl<W: Write> Recorder<W> {
         if self.header.is_some() {
             return Ok(());
         }
-        let bounds = (0..self.columns.len())
-            .map(|i| self.share_bound(i).unwrap_or(0.0))
-            .collect();
+        let bounds = self.ranges.bounds(&self.schema);
         let mut header = Header::new(self.schema.clone(), &self.ticks, bounds);
         if starts == Starts::Learned {
             header = header.with_starts(&self.columns);
@@ -250,44 +239,24 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    /// The bound that a share means by now; `None` for columns without a share.
-    fn share_bound(&self, column: usize) -> Option<f64> {
-        let spec = &self.schema.columns[column];
-        let Bound::ShareOfRange(share) = spec.bound else {
-            return None;
-        };
-        let range = spec
-            .known_range()
-            .or_else(|| self.ends[column].map(|(low, high)| high - low));
-        Some(share_of(share, range.unwrap_or(0.0)))
-    }
-
     fn write_block(&mut self, starts: Starts) -> Result<(), Error> {
-        for (ends, cells) in self.ends.iter_mut().zip(&self.columns) {
-            for value in cells.iter().flatten().filter(|value| value.is_finite()) {
-                let (low, high) = ends.unwrap_or((*value, *value));
-                *ends = Some((low.min(*value), high.max(*value)));
-            }
-        }
         self.write_header(starts)?;
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let own: Vec<Option<f64>> = (0..self.columns.len())
-            .map(|i| own_bound(self.share_bound(i)?, header.share_bounds[i]))
-            .collect();
+        let own = self.ranges.own_bounds(header);
         let (bytes, restored) = block::encode(header, &self.ticks, &self.columns, &own, self.effort);
         self.write(&bytes)?;
         self.entries.push(Entry::of(bytes.len() as u64, &self.ticks, &restored));
         self.ticks.clear();
         self.columns.iter_mut().for_each(Vec::clear);
         if self.entries.len() == BLOCKS_PER_SEGMENT {
-            self.write_segment()?;
+            self.write_segment(index::SEGMENT)?;
         }
         Ok(())
     }
 
-    fn write_segment(&mut self) -> Result<(), Error> {
+    fn write_segment(&mut self, kind: u8) -> Result<(), Error> {
         if self.entries.is_empty() {
             return Ok(());
         }
@@ -295,7 +264,7 @@ impl<W: Write> Recorder<W> {
             return Err(Error::Broken);
         };
         let content = index::push_segment(header, &self.entries);
-        let bytes = index::special(header.check, index::SEGMENT, &content);
+        let bytes = index::special(header.check, kind, &content);
         self.write(&bytes)?;
         let segment = Segment::new(self.segment_start, bytes.len() as u64, &self.entries);
         self.segment_start = segment.end();

@@ -111,8 +111,8 @@ impl<R: Read> Scanner<R> {
                 let (kind, _, length) = index::read_special(header, bytes)?;
                 match kind {
                     index::SEGMENT => Ok((Kind::Segment, length)),
-                    index::FOOTER if bytes.len() < length + TRAILER_BYTES => Err(Damage::CutOff),
-                    index::FOOTER => Ok((Kind::Footer, length + TRAILER_BYTES)),
+                    index::FOOTER | index::ONLY if bytes.len() < length + TRAILER_BYTES => Err(Damage::CutOff),
+                    index::FOOTER | index::ONLY => Ok((Kind::Footer, length + TRAILER_BYTES)),
                     _ => Err(Damage::NoBlock),
                 }
             }

@@ -110,7 +110,7 @@ impl Count {
 const LEFT: usize = 3;
 
 /// Codes the special cells of all columns: `wanted` at the writer, `None` at the reader.
-fn code<C: Coder>(
+pub(crate) fn code<C: Coder>(
     coder: &mut C,
     wanted: Option<&[Specials]>,
     columns: usize,
@@ -179,6 +179,16 @@ pub(crate) fn decode(bytes: &[u8], columns: usize, rows: usize) -> Result<Vec<Sp
     let specials = code(&mut reader, None, columns, rows)?;
     reader.finish().map_err(|_| Damage::Content("special cells"))?;
     Ok(specials)
+}
+
+/// Which rows the codec has a value for; an empty list stands for no special cells.
+pub(crate) fn has_value(specials: &[Option<Special>], rows: usize) -> Vec<bool> {
+    let mut has_value: Vec<bool> = specials
+        .iter()
+        .map(|special| special.is_none_or(Special::has_value))
+        .collect();
+    has_value.resize(rows, true);
+    has_value
 }
 
 /// Values with the special cells between them; an empty list stands for none.

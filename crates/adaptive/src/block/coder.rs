@@ -79,7 +79,7 @@ impl Interval {
 }
 
 /// Writes decisions as bytes.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Writer {
     interval: Interval,
     bytes: Vec<u8>,
@@ -92,6 +92,12 @@ impl Writer {
             interval: Interval::WHOLE,
             bytes,
         }
+    }
+
+    /// Bits so far, to a fraction: what is left of the interval counts.
+    pub fn bits(&self) -> f64 {
+        let width = self.interval.high.wrapping_sub(self.interval.low) as f64;
+        8.0 * self.bytes.len() as f64 + 64.0 - width.log2()
     }
 
     /// The bytes with the shortest end.

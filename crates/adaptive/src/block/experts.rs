@@ -2,7 +2,7 @@
 //!
 //! Positions are relative to the last index. All laws are logistic, as those of [`Filters`](super::filters::Filters).
 
-use fewbits_node::elementary::exp2;
+use fewbits_node::elementary::power;
 
 /// Probability below and above an edge, each accurate relative to itself.
 #[derive(Debug, Clone, Copy, Default)]
@@ -56,7 +56,7 @@ impl Track {
     /// A logistic law about the prediction with the mean absolute error of the past.
     #[inline(always)]
     pub(super) fn tails(&self, edge: f32) -> Tails {
-        let e = exp2(((self.at - edge) * self.sharpness).clamp(-FLAT, FLAT));
+        let e = power(((self.at - edge) * self.sharpness).clamp(-FLAT, FLAT));
         let below = 1.0 / (1.0 + e);
         Tails {
             below,

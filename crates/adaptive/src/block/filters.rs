@@ -3,7 +3,7 @@
 use super::experts::{FLAT, Tails};
 use super::priors::FILTER_WEIGHTS;
 use fewbits_node::adaptive::{DECAYS, MODELS, SCALES, steady_gains};
-use fewbits_node::elementary::exp2;
+use fewbits_node::elementary::{exp2, greater, power};
 use std::sync::LazyLock;
 
 /// Share of the weights that is spread evenly before each slot.
@@ -97,7 +97,7 @@ impl Filters {
         let sharpness = &GAINS.sharpness;
         let (mut below, mut above) = ([0.0; MODELS], [0.0; MODELS]);
         for m in 0..MODELS {
-            let e = exp2(((self.position[m] - edge) * sharpness[m]).clamp(-FLAT, FLAT));
+            let e = power(((self.position[m] - edge) * sharpness[m]).clamp(-FLAT, FLAT));
             let share = self.weight[m] / (1.0 + e);
             below[m] = share;
             above[m] = e * share;
@@ -115,7 +115,7 @@ impl Filters {
         let ratios = &gains.ratios[(k as usize).min(WIDEST - 1)];
         let mut parts = [[0.0; MODELS]; 4];
         for m in 0..MODELS {
-            let low = exp2(((self.position[m] - edge) * gains.sharpness[m]).clamp(-FLAT, FLAT));
+            let low = power(((self.position[m] - edge) * gains.sharpness[m]).clamp(-FLAT, FLAT));
             let high = low * ratios[m];
             let share = self.weight[m] / ((1.0 + low) * (1.0 + high));
             let (below_low, below_high) = (share * (1.0 + high), share * (1.0 + low));
@@ -148,13 +148,13 @@ impl Filters {
         }
         for m in 0..MODELS {
             let residual = step - self.position[m];
-            self.evidence[m] = self.evidence[m].max(LEAST_EVIDENCE * self.weight[m]);
+            self.evidence[m] = greater(self.evidence[m], LEAST_EVIDENCE * self.weight[m]);
             self.position[m] += gains.position[m] * residual - step;
             self.velocity[m] += gains.velocity[m] * residual;
         }
         let inverse = 1.0 / sum(&self.evidence);
         for m in 0..MODELS {
-            self.weight[m] = (self.evidence[m] * inverse).max(LEAST_WEIGHT);
+            self.weight[m] = greater(self.evidence[m] * inverse, LEAST_WEIGHT);
         }
     }
 

@@ -6,7 +6,7 @@
 //! ```
 
 use super::priors::MIXER_WEIGHTS;
-use fewbits_node::elementary::{log2, squash};
+use fewbits_node::elementary::{greater, log2, squash};
 use std::sync::LazyLock;
 
 /// Contexts whose outcomes are counted.
@@ -70,12 +70,15 @@ static LOG_ODDS: LazyLock<Box<[f32; 4096]>> = LazyLock::new(|| {
 #[inline(always)]
 pub(super) fn log_odds(yes: [f32; EXPERTS], no: [f32; EXPERTS]) -> [f32; EXPERTS] {
     const LEAST: f32 = 1e-9;
+    let mut logs = [[0.0; EXPERTS]; 2];
+    for (logs, shares) in logs.iter_mut().zip([yes, no]) {
+        for e in 0..EXPERTS {
+            logs[e] = log2(greater(shares[e], LEAST));
+        }
+    }
     let mut odds = [0.0; EXPERTS];
     for e in 0..EXPERTS {
-        odds[e] = yes[e].max(LEAST) / no[e].max(LEAST);
-    }
-    for odds in &mut odds {
-        *odds = log2(*odds).clamp(-12.0, 12.0);
+        odds[e] = (logs[0][e] - logs[1][e]).clamp(-12.0, 12.0);
     }
     odds
 }
@@ -165,10 +168,8 @@ impl Mixer {
     pub(super) fn predict(&mut self) -> u32 {
         let table = self.log_odds;
         let start = self.class * STRIDE;
-        let mut sum = CONSTANT * self.weights[start + STRIDE - 1];
-        for e in 0..EXPERTS {
-            sum += self.weights[start + CONTEXTS * CONFIDENCES + e] * self.experts[e];
-        }
+        let experts = &self.weights[start + CONTEXTS * CONFIDENCES..start + STRIDE];
+        let mut terms = [0.0; CONTEXTS];
         for c in 0..CONTEXTS {
             let slot = self.held[c];
             self.rows[c] = start + c * CONFIDENCES + usize::from(CONFIDENCE[usize::from(slot.seen)]);
@@ -177,8 +178,13 @@ impl Mixer {
             } else {
                 table[usize::from(slot.one >> 4)]
             };
-            sum += self.weights[self.rows[c]] * self.inputs[c];
+            terms[c] = self.weights[self.rows[c]] * self.inputs[c];
         }
+        // In pairs, so that few additions wait for each other.
+        let [a, b, c, d, e, f] = terms;
+        let by_experts = (experts[0] * self.experts[0] + experts[1] * self.experts[1])
+            + (experts[2] * self.experts[2] + experts[3] * self.experts[3]);
+        let sum = ((a + b) + (c + d)) + ((e + f) + (by_experts + CONSTANT * experts[EXPERTS]));
         self.p = squash(sum.clamp(-FARTHEST, FARTHEST));
         ((self.p * 65536.0) as u32).clamp(1, 65535)
     }
@@ -203,7 +209,7 @@ impl Mixer {
         for c in 0..CONTEXTS {
             let slot = &mut self.held[c];
             let one = if slot.seen == 0 { mixed } else { i32::from(slot.one) };
-            let moved = one + (target - one) * SHARES[usize::from(slot.seen)] / (1 << 15);
+            let moved = one + (((target - one) * SHARES[usize::from(slot.seen)]) >> 15);
             slot.one = moved.clamp(16, 65520) as u16;
             slot.seen = (slot.seen + 1).min(MOST_SEEN);
             self.slots[self.chosen[c]] = *slot;

@@ -12,7 +12,7 @@ use super::experts::{Frequencies, LeastSquares, Tails, Track};
 use super::filters::Filters;
 use super::mixer::{EXPERTS, Mixer, log_odds};
 use fewbits_core::CodecError;
-use fewbits_node::elementary::{log2, round};
+use fewbits_node::elementary::round;
 
 /// Largest index, either sign: sums of a few stay whole in an `i64` with room.
 pub(super) const LARGEST: i64 = 1 << 46;
@@ -156,8 +156,8 @@ impl Model {
         }
         // Predictions are within 2^22, where rounding is exact.
         let offset = round(best.1.clamp(-4e6, 4e6)) as i64;
-        let doublings = log2(best.0.max(0.01));
-        let k = if doublings > 1.5 { (doublings - 0.5) as u32 } else { 0 };
+        // Doublings of the error over the square root of two, rounded down, if any.
+        let k = ((best.0 * std::f32::consts::FRAC_1_SQRT_2).to_bits() >> 23).saturating_sub(127);
 
         let step = |d: i64| ((d >> k).clamp(-20, 20) + 32) as u32;
         let size = |d: i64| (d.unsigned_abs() >> k).min(3) as u32;

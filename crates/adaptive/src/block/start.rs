@@ -26,6 +26,10 @@ const WITH_START: u32 = 65_280;
 const BY_MODELS: u32 = 61_440;
 /// The first byte of a block of its own: no code that begins with a decision of `WITH_START` begins with it.
 const ALONE: u8 = 255;
+/// Blocks of differences of more bits in the mean may be shorter otherwise; of few rows they rarely are.
+const COARSE_BITS: usize = 1;
+const COARSE_BITS_OF_FEW: usize = 2;
+const FEW_ROWS: usize = 1024;
 /// Flag beside the grid: steps follow.
 const STEPPED: u8 = 16;
 /// Indices are smaller than `2^47` in zigzag form.
@@ -62,6 +66,11 @@ impl Start {
         push_varint(&mut bytes, zigzag(self.usual));
         bytes.push(self.k);
         bytes
+    }
+
+    /// The samples at these points of the grid.
+    pub fn values(&self, indices: &[i64]) -> Vec<f64> {
+        indices.iter().map(|index| self.grid.value(*index)).collect()
     }
 
     fn first_index<C: Coder>(&self, coder: &mut C, wanted: Option<i64>) -> Result<i64, CodecError> {
@@ -154,20 +163,66 @@ impl BlockCodec {
         shortest.ok_or_else(|| invalid("block", "none", "a coding that holds the samples").into())
     }
 
+    /// The samples as points of the start's grid, for [`code_shared`](Self::code_shared); `None` where a block of its own may be shorter: some
+    /// sample is off the grid, another grid is better, or neighbours differ by many points.
+    pub fn indices_on(&self, start: &Start, samples: &[f64]) -> Option<Vec<i64>> {
+        let (indices, exceptions) = self.indices(&start.grid, samples);
+        let bits = |pair: &[i64]| u64::from(u64::BITS - pair[0].abs_diff(pair[1]).leading_zeros());
+        let sizes: u64 = indices.windows(2).map(bits).sum();
+        let few = samples.len() <= FEW_ROWS;
+        let most = if few { COARSE_BITS_OF_FEW } else { COARSE_BITS };
+        let is_fine = sizes > (most * samples.len()) as u64;
+        if !exceptions.is_empty() || is_fine {
+            return None;
+        }
+        let is_like = samples.is_empty() || self.grid(samples).is_some_and(|grid| grid.is_like(&start.grid));
+        let begins_with_start = || Some(self.encode_from(start, samples, &[]).ok()?.bytes.first()? != &ALONE);
+        (is_like || begins_with_start()?).then_some(indices)
+    }
+
+    /// Codes one column as a part of a code that goes on behind it: `wanted` at the writer, `None` at the reader. Returns the indices of
+    /// `rows` rows, predicted from `others` if there are any; [`Start::values`] has their samples.
+    ///
+    /// # Errors
+    /// If a column has another number of rows, or a reader finds what no writer codes.
+    pub fn code_shared<C: Coder>(
+        &self,
+        coder: &mut C,
+        start: &Start,
+        wanted: Option<&[i64]>,
+        rows: usize,
+        others: &[&[f64]],
+    ) -> Result<Vec<i64>, Error> {
+        check_rows(rows, others)?;
+        if rows == 0 {
+            return Ok(Vec::new());
+        }
+        let others = (!others.is_empty()).then(|| Others::new(others));
+        Ok(self.code(coder, start, wanted, rows, others.as_ref())?)
+    }
+
+    fn code<C: Coder>(
+        &self,
+        coder: &mut C,
+        start: &Start,
+        wanted: Option<&[i64]>,
+        rows: usize,
+        others: Option<&Others<'_>>,
+    ) -> Result<Vec<i64>, CodecError> {
+        let by_models = coder.bit(BY_MODELS, self.effort == Effort::Thorough);
+        let first = start.first_index(coder, wanted.and_then(|wanted| wanted.first().copied()))?;
+        if by_models {
+            let mut model = Model::new(rows, first, start.grid.cells(), others.is_some());
+            return code_models(coder, &mut model, wanted, rows, others);
+        }
+        let second = coder.raw(u64::from(wanted.is_some_and(Counts::prefers_second)), 1) == 1;
+        code_counts(coder, &mut Counts::new(first, second), wanted, rows)
+    }
+
     fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, CodecError> {
         let mut writer = Writer::new(Vec::with_capacity(64 + indices.len() / 2));
-        let models = self.effort == Effort::Thorough;
         writer.bit(WITH_START, true);
-        writer.bit(BY_MODELS, models);
-        let first = start.first_index(&mut writer, indices.first().copied())?;
-        if models {
-            let mut model = Model::new(indices.len(), first, start.grid.cells(), others.is_some());
-            code_models(&mut writer, &mut model, Some(indices), indices.len(), others)?;
-        } else {
-            let second = Counts::prefers_second(indices);
-            writer.raw(u64::from(second), 1);
-            code_counts(&mut writer, &mut Counts::new(first, second), Some(indices), indices.len())?;
-        }
+        self.code(&mut writer, start, Some(indices), indices.len(), others)?;
         Ok(StartedBlock {
             bytes: writer.finish(),
             joint: others.is_some(),
@@ -186,16 +241,8 @@ impl BlockCodec {
         let others = (!others.is_empty()).then(|| Others::new(others));
         let mut reader = Reader::new(bytes);
         reader.bit(WITH_START, true);
-        let models = reader.bit(BY_MODELS, true);
-        let first = start.first_index(&mut reader, None)?;
-        let indices = if models {
-            let mut model = Model::new(rows, first, start.grid.cells(), others.is_some());
-            code_models(&mut reader, &mut model, None, rows, others.as_ref())?
-        } else {
-            let second = reader.raw(0, 1) == 1;
-            code_counts(&mut reader, &mut Counts::new(first, second), None, rows)?
-        };
+        let indices = self.code(&mut reader, start, None, rows, others.as_ref())?;
         reader.finish()?;
-        Ok(indices.into_iter().map(|index| start.grid.value(index)).collect())
+        Ok(start.values(&indices))
     }
 }

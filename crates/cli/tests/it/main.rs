@@ -114,6 +114,8 @@ fn altered_table_fails_verification() {
     assert_eq!(output.status.code(), Some(1));
     let verdict: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&verdict["holds"], &verdict["columns"][0]["failed"]), (&false.into(), &1.into()));
+    let failure = verdict["columns"][0]["first_failures"][0].as_str().unwrap();
+    assert!(failure.contains(": 20.5 was restored as 19.99"), "{failure}");
 }
 
 #[test]
@@ -233,6 +235,8 @@ fn refusals_name_file_row_column_and_mend() {
     assert!(message.contains("row 2, column `x`") && message.contains("is not a time"), "{message}");
     let message = refused(&folder, &["pack", "-", "-o", "x"], b"n\n18014398509481985\n");
     assert!(message.contains("more than 53 bits"), "{message}");
+    let message = refused(&folder, &["pack", "-", "-o", "x"], b"time,x\n2026-01-31T12:00:00Z,1\n");
+    assert!(message.contains("row 1, column `time`") && message.contains("add --time exact"), "{message}");
 }
 
 #[cfg(not(feature = "parquet"))]

@@ -87,3 +87,16 @@ fn bound_of_a_share_is_refused_for_a_sensor() {
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("--sensor"));
 }
+
+#[test]
+fn stream_without_a_whole_frame_is_an_error() {
+    let (_kept, folder) = folder();
+    let whole = &frames(10)[0].1;
+    let mut damaged = whole.clone();
+    damaged[3] ^= 1;
+    for stream in [&b""[..], b"slot,value\n", &whole[..whole.len() - 3], &damaged] {
+        let refused = super::fewbits(&folder, &["receive", "--sensor", "±0.05"], stream);
+        assert_eq!(refused.status.code(), Some(1));
+        assert!(text(&refused.stderr).contains("standard input: no whole frame"), "{}", text(&refused.stderr));
+    }
+}

@@ -7,7 +7,7 @@ use fewbits_adaptive::{BlockCodec, Config, Effort, Start};
 use std::borrow::Cow;
 
 /// The codec of a promise. Decimals are rounded before, and then return exactly.
-fn codec(target: &Target) -> Option<BlockCodec> {
+pub(crate) fn codec(target: &Target) -> Option<BlockCodec> {
     let delta = match target.promise {
         Promise::Exact | Promise::Decimals(_) => return Some(BlockCodec::lossless()),
         Promise::Within(delta) => delta,
@@ -33,7 +33,7 @@ fn rounded(sample: f64, places: u8) -> f64 {
 }
 
 /// The samples as the codec gets them.
-fn prepared<'a>(samples: &'a [f64], target: &Target) -> Cow<'a, [f64]> {
+pub(crate) fn prepared<'a>(samples: &'a [f64], target: &Target) -> Cow<'a, [f64]> {
     match target.promise {
         Promise::Decimals(places) => samples.iter().map(|sample| rounded(*sample, places)).collect(),
         _ => Cow::Borrowed(samples),

@@ -8,6 +8,7 @@
 //! | 0 | doubles, little-endian | what nothing makes smaller |
 //! | 1 | the first bytes of one double, highest first | all samples alike within the promise |
 //! | 2 | a block of `fewbits-adaptive` | everything else |
+//! | 3 | none: the column is a part of the block's shared code | what lies on the grid of the column's start |
 
 pub(crate) mod adaptive;
 mod plain;
@@ -24,6 +25,7 @@ pub(crate) enum CodecId {
     Raw = 0,
     Constant = 1,
     Adaptive = 2,
+    Shared = 3,
 }
 
 impl CodecId {
@@ -32,6 +34,7 @@ impl CodecId {
             0 => Self::Raw,
             1 => Self::Constant,
             2 => Self::Adaptive,
+            3 => Self::Shared,
             _ => return Err(Damage::Content("codec")),
         })
     }
@@ -140,6 +143,7 @@ pub(crate) fn decode(
         CodecId::Raw => plain::decode_raw(bytes, count),
         CodecId::Constant => plain::decode_constant(bytes, count),
         CodecId::Adaptive => adaptive::decode(bytes, count, target, start, others),
+        CodecId::Shared => Err(Damage::Content("codec")),
     }?;
     if values.iter().all(|value| value.is_finite()) {
         Ok(values)

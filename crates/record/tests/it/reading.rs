@@ -1,6 +1,6 @@
 //! Ranges, chosen columns, the index, pipes.
 
-use crate::common::{read, record, row_holds, rows, schema};
+use crate::common::{Numbers, read, record, row_holds, rows, schema};
 use fewbits_record::{BlockReader, Bound, Column, Effort, Error, Playback, Recorder, Schema, TimeBase};
 use std::io::Cursor;
 
@@ -35,6 +35,76 @@ fn columns_come_in_the_order_asked() {
     }
     let refused = playback.columns(&["weight"]).map(|_| ()).unwrap_err();
     assert_eq!(refused.to_string(), "no column `weight`: the recording has wave, price, count");
+}
+
+/// Columns of one code, a column of its own bytes between them, and special cells: each column alone is what it is among all.
+#[test]
+fn columns_of_one_code_are_read_alone() {
+    let names = ["wave", "noise", "like wave", "still", "around"];
+    let bounds = [
+        Bound::Absolute(0.05),
+        Bound::Lossless,
+        Bound::Absolute(0.05),
+        Bound::Absolute(0.05),
+        Bound::Absolute(2.0),
+    ];
+    let columns = names.iter().zip(bounds).map(|(name, bound)| {
+        let column = Column::new(*name, bound).unwrap();
+        if *name == "around" {
+            column.with_period(360.0).unwrap()
+        } else {
+            column
+        }
+    });
+    let schema = Schema::new(columns.collect(), TimeBase::Numbered)
+        .unwrap()
+        .with_rows_per_block(128)
+        .unwrap();
+    let mut numbers = Numbers(3);
+    let mut wave = 0.0;
+    let mut row = |i: usize| -> Vec<Option<f64>> {
+        wave += 0.3 * (numbers.next() - 0.5);
+        let values = [
+            wave,
+            numbers.next(),
+            2.0 - 0.5 * wave,
+            7.0,
+            (40.0 * wave).rem_euclid(360.0),
+        ];
+        let cell = |value: f64| match (numbers.next() * 100.0) as u32 {
+            0 => Some(f64::NAN),
+            1 => None,
+            _ => Some(value),
+        };
+        if (300..340).contains(&i) {
+            vec![None; 5]
+        } else {
+            values.into_iter().map(cell).collect()
+        }
+    };
+    let truth: Vec<_> = (0..1000).map(&mut row).collect();
+    for effort in [Effort::Thorough, Effort::Fast] {
+        let mut recorder = Recorder::new(Vec::new(), schema.clone()).with_effort(effort);
+        truth.iter().for_each(|row| recorder.push_next(row).unwrap());
+        let bytes = recorder.finish().unwrap();
+        let all = read(&bytes);
+        let bits = |cell: &Option<f64>| cell.map(f64::to_bits);
+        for (row, sample) in all.iter().zip(&truth) {
+            let mut cells = row.values.iter().zip(sample).zip(schema.columns());
+            assert!(cells.all(|((value, sample), column)| column.keeps(*sample, *value, None)));
+        }
+        let mut playback = Playback::new(Cursor::new(&bytes)).unwrap();
+        for chosen in [&["still"][..], &["around", "wave"], &["noise"], &[]] {
+            let rows: Vec<_> = playback.columns(chosen).unwrap().rows().map(Result::unwrap).collect();
+            assert_eq!(rows.len(), truth.len());
+            for (row, whole) in rows.iter().zip(&all) {
+                let expected = chosen
+                    .iter()
+                    .map(|name| bits(&whole.values[schema.position(name).unwrap()]));
+                assert!(row.values.iter().map(bits).eq(expected));
+            }
+        }
+    }
 }
 
 #[test]
@@ -112,7 +182,7 @@ fn flushed_rows_can_be_read_at_once() {
 
 #[test]
 fn related_columns_are_predicted_from_each_other() {
-    let mut numbers = crate::common::Numbers(9);
+    let mut numbers = Numbers(9);
     let (mut level, names) = (0.0, ["a", "b", "c", "d"]);
     let rows: Vec<Vec<Option<f64>>> = (0..1500)
         .map(|i| {

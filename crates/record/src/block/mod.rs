@@ -1,0 +1,92 @@
+//! Blocks: rows that are decoded alone, with nothing but the header.
+//!
+//! `docs/record.md` says each byte. A block has sections of bytes for columns that are coded alone, then one arithmetic code for special
+//! cells and all columns behind their starts: a code has one end, and needs no length.
+
+mod read;
+mod shared;
+mod write;
+
+use crate::codec::CodecId;
+use crate::error::Damage;
+use crate::header::Header;
+use crate::wire::{Bytes, CHECK_BYTES, checksum};
+pub(crate) use read::decode;
+pub(crate) use write::encode;
+
+/// The cells of one column; `None` is a gap.
+pub type Cells = Vec<Option<f64>>;
+
+/// Rows as they were restored, or are to be stored.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
+pub struct Block {
+    /// The tick of each row.
+    pub ticks: Vec<i64>,
+    /// One list of cells per column; `None` is a gap. A column that was not asked for is empty.
+    pub columns: Vec<Cells>,
+    /// For columns with a share of the range: the bound in this block in units of the column; 0 means lossless. `None` for others.
+    pub share_bounds: Vec<Option<f64>>,
+}
+
+impl Block {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.ticks.len()
+    }
+}
+
+const ROWS_FOLLOW: u64 = 4;
+const DESCRIPTORS_FOLLOW: u64 = 8;
+const SPECIALS_FOLLOW: u64 = 16;
+const BOUND_FOLLOWS: u8 = 0x20;
+const OTHERS_FOLLOW: u8 = 0x40;
+const DESCRIPTOR_BITS: u8 = 15 | BOUND_FOLLOWS | OTHERS_FOLLOW;
+/// Columns with starts have bytes of their own.
+const APART: u64 = 32;
+/// A reader of one column decodes all columns of a shared code before it, so wide tables have none.
+const SHARED_COLUMNS: usize = 16;
+
+/// The descriptor of a column that has none.
+fn plain(header: &Header, apart: bool, column: usize) -> u8 {
+    match header.start(column, None) {
+        Some(_) if !apart => CodecId::Shared as u8,
+        _ => CodecId::Adaptive as u8,
+    }
+}
+
+/// The cells of another column in the rows in which a column has values; NaN for gaps.
+pub(crate) fn aligned(cells: &[Option<f64>], has_value: &[bool]) -> Vec<f64> {
+    let kept = cells.iter().zip(has_value).filter(|(_, kept)| **kept);
+    kept.map(|(cell, _)| cell.unwrap_or(f64::NAN)).collect()
+}
+
+/// The most bytes that a block of a recording may have: twice what raw samples take. A longer one is not a block.
+pub(crate) fn max_bytes(header: &Header) -> usize {
+    let cells = (header.schema.columns.len() + 1) * header.schema.rows_per_block;
+    64 + 32 * header.schema.columns.len() + 24 * cells
+}
+
+/// The length in bytes of the block that begins here.
+///
+/// # Errors
+/// [`Damage::CutOff`] if the slice ends before the block does, others if no block begins here.
+pub(crate) fn length(header: &Header, bytes: &[u8]) -> Result<usize, Damage> {
+    let mut reader = Bytes(bytes);
+    let length = reader.varint().map_err(|damage| match damage {
+        Damage::CutOff => damage,
+        _ => Damage::NoBlock,
+    })?;
+    let limit = max_bytes(header) as u64;
+    if length == 0 || length > limit {
+        return Err(Damage::NoBlock);
+    }
+    let body = reader.take(length as usize)?;
+    let end = bytes.len() - reader.0.len();
+    debug_assert_eq!(body.len() as u64, length);
+    let check = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
+    if check != checksum(&[&header.check.to_le_bytes(), &bytes[..end]]) {
+        return Err(Damage::Checksum);
+    }
+    Ok(end + CHECK_BYTES)
+}

@@ -1,0 +1,200 @@
+//! Reading a block.
+
+use super::{
+    APART, BOUND_FOLLOWS, Block, Cells, DESCRIPTOR_BITS, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW,
+    SPECIALS_FOLLOW, aligned, plain, shared,
+};
+use crate::bound::Bound;
+use crate::codec::{self, CodecId, JOINT_COLUMNS};
+use crate::error::Damage;
+use crate::header::Header;
+use crate::specials::{self, Specials};
+use crate::time::{self, TimeKind};
+use crate::wire::{Bytes, push_varint};
+use fewbits_adaptive::arithmetic::Reader;
+
+/// Decodes one block whose checksum was found right; columns that are not `wanted` stay empty.
+pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Damage> {
+    let mut reader = Bytes(bytes);
+    let length = reader.count(bytes.len(), "length")?;
+    let mut body = Bytes(reader.take(length)?);
+    let (grid, columns) = (header.grid(), header.schema.columns.len());
+    let mut rows = header.schema.rows_per_block;
+    let mut descriptors: Vec<u8> = (0..columns).map(|i| plain(header, false, i)).collect();
+    let mut specials = Vec::new();
+    let head = body.varint()?;
+    let flags = if head & 1 == 1 {
+        head >> 1
+    } else {
+        (head >> 1 & 1) * APART
+    };
+    if flags > 63 {
+        return Err(Damage::Content("flags"));
+    }
+    if flags & APART != 0 {
+        descriptors.fill(CodecId::Adaptive as u8);
+    }
+    let ticks = if head & 1 == 0 {
+        let mut block = Vec::new();
+        push_varint(&mut block, head >> 2);
+        time::decode(TimeKind::Grid, &mut Bytes(&block), rows, &grid)?
+    } else {
+        if flags & ROWS_FOLLOW != 0 {
+            rows = body.count(rows, "number of rows")?;
+        }
+        if rows == 0 {
+            return Err(Damage::Content("number of rows"));
+        }
+        let ticks = time::decode(TimeKind::from_bits(flags), &mut body, rows, &grid)?;
+        if flags & DESCRIPTORS_FOLLOW != 0 {
+            let has_own = body.take(columns.div_ceil(8))?;
+            for (i, descriptor) in descriptors.iter_mut().enumerate() {
+                if has_own[i / 8] >> (i % 8) & 1 == 1 {
+                    *descriptor = body.byte()?;
+                }
+            }
+        }
+        if flags & SPECIALS_FOLLOW != 0 {
+            let length = body.count(body.0.len(), "length of special cells")?;
+            specials = specials::decode(body.take(length)?, columns, rows)?;
+        }
+        ticks
+    };
+    let is_shared = |descriptor: &u8| *descriptor == CodecId::Shared as u8;
+    let shares = descriptors.iter().any(is_shared);
+    let mut sections = Vec::with_capacity(columns);
+    for (i, descriptor) in descriptors.iter().enumerate() {
+        let has_length = shares || i + 1 < columns;
+        sections.push(read_section(header, &mut body, i, *descriptor, has_length)?);
+    }
+    let mut shared = Reader::new(body.0);
+    if shares {
+        specials = shared::specials(&mut shared, None, columns, rows)?;
+    } else {
+        body.finish()?;
+    }
+    specials.resize(columns, Specials::new());
+    // Columns that a wanted one was predicted from are decoded too; they stand before it. Of a shared code all before it are.
+    let mut needed: Vec<bool> = (0..columns).map(&wanted).collect();
+    for i in (0..columns).rev() {
+        if needed[i] {
+            sections[i].others.iter().for_each(|other| needed[*other] = true);
+            let before = if shares { i } else { 0 };
+            needed[..before].fill(true);
+        }
+    }
+    let mut decoded: Vec<Cells> = Vec::with_capacity(columns);
+    for (i, (section, specials)) in sections.iter().zip(&specials).enumerate() {
+        let cells = if !needed[i] {
+            Cells::new()
+        } else if section.id == CodecId::Shared {
+            shared::decode(header, &mut shared, &decoded, specials, rows)?
+        } else {
+            section.cells(header, &decoded, specials, rows)?
+        };
+        decoded.push(cells);
+    }
+    if shares && !needed.contains(&false) {
+        shared.finish().map_err(|_| Damage::Content("shared code"))?;
+    }
+    for (_, cells) in decoded.iter_mut().enumerate().filter(|(i, _)| !wanted(*i)) {
+        *cells = Cells::new();
+    }
+    Ok(Block {
+        ticks,
+        columns: decoded,
+        share_bounds: sections
+            .iter()
+            .enumerate()
+            .map(|(i, section)| section.share_bound(header, i))
+            .collect(),
+    })
+}
+
+/// The bytes of one column, taken apart.
+struct Section<'a> {
+    id: CodecId,
+    own: Option<f64>,
+    others: Vec<usize>,
+    bytes: &'a [u8],
+}
+
+fn read_section<'a>(
+    header: &Header,
+    body: &mut Bytes<'a>,
+    column: usize,
+    descriptor: u8,
+    has_length: bool,
+) -> Result<Section<'a>, Damage> {
+    if descriptor & !DESCRIPTOR_BITS != 0 {
+        return Err(Damage::Content("descriptor"));
+    }
+    let id = CodecId::from_byte(descriptor & 15)?;
+    if id == CodecId::Shared {
+        if descriptor & !15 != 0 || header.start(column, None).is_none() {
+            return Err(Damage::Content("descriptor"));
+        }
+        let (own, others, bytes) = (None, Vec::new(), &body.0[..0]);
+        return Ok(Section { id, own, others, bytes });
+    }
+    let own = if descriptor & BOUND_FOLLOWS != 0 {
+        Some(read_bound(body)?)
+    } else {
+        None
+    };
+    let mut others = Vec::new();
+    if descriptor & OTHERS_FOLLOW != 0 {
+        let count = usize::from(body.byte()?) + 1;
+        if count > JOINT_COLUMNS {
+            return Err(Damage::Content("number of other columns"));
+        }
+        for _ in 0..count {
+            let back = body.count(column, "another column")?;
+            others.push(
+                column
+                    .checked_sub(back)
+                    .filter(|_| back > 0)
+                    .ok_or(Damage::Content("another column"))?,
+            );
+        }
+    }
+    let length = if has_length {
+        body.count(body.0.len(), "length of a column")?
+    } else {
+        body.0.len()
+    };
+    Ok(Section {
+        id,
+        own,
+        others,
+        bytes: body.take(length)?,
+    })
+}
+
+impl Section<'_> {
+    fn cells(&self, header: &Header, before: &[Cells], specials: &Specials, rows: usize) -> Result<Cells, Damage> {
+        let has_value = specials::has_value(specials, rows);
+        let count = has_value.iter().filter(|has| **has).count();
+        let others: Vec<Vec<f64>> = self.others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
+        let others: Vec<&[f64]> = others.iter().map(Vec::as_slice).collect();
+        let target = header.target(before.len(), self.own);
+        let start = header.start(before.len(), self.own);
+        let values = codec::decode(self.id, self.bytes, count, &target, start.as_ref(), &others)?;
+        Ok(specials::merged(specials, &values))
+    }
+
+    fn share_bound(&self, header: &Header, column: usize) -> Option<f64> {
+        let shared = matches!(header.schema.columns[column].bound, Bound::ShareOfRange(_));
+        shared.then(|| self.own.unwrap_or(header.share_bounds[column]))
+    }
+}
+
+fn read_bound(body: &mut Bytes<'_>) -> Result<f64, Damage> {
+    let [a, b, c] = body.array()?;
+    let bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
+    if bound > 0.0 && (2.0 * bound).is_finite() {
+        Ok(bound)
+    } else {
+        Err(Damage::Content("bound"))
+    }
+}

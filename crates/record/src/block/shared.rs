@@ -1,0 +1,137 @@
+//! One arithmetic code for special cells and columns of a block.
+//!
+//! ```text
+//! any special cells? (even odds)   if so: module `specials`   then column by column:
+//! predicted from other columns? (1 in 8; never the first)   if so: their number - 1 (2 bits), how far before this one each stands, less 1 (4 bits)
+//! indices behind the column's start (module `block::start` of fewbits-adaptive)
+//! ```
+
+use super::{Cells, aligned};
+use crate::codec::{JOINT_COLUMNS, adaptive};
+use crate::error::Damage;
+use crate::header::Header;
+use crate::related;
+use crate::specials::{self, Specials};
+use fewbits_adaptive::Effort;
+use fewbits_adaptive::arithmetic::{Coder, Reader, Writer};
+
+/// Probabilities in units of `2^-16`: special cells, others.
+const SPECIALS: u32 = 1 << 15;
+const OTHERS: u32 = 1 << 13;
+/// Bits of the number of other columns, and of how far before a column another one stands.
+const NUMBER_BITS: u32 = 2;
+const DISTANCE_BITS: u32 = 4;
+
+/// A column's points of its start's grid, and their samples; `None` where it needs bytes of its own.
+pub(super) fn indices(
+    header: &Header,
+    column: usize,
+    cells: &[Option<f64>],
+    own: Option<f64>,
+) -> Option<(Vec<i64>, Vec<f64>)> {
+    let (start, target) = (header.start(column, own)?, header.target(column, own));
+    let samples: Vec<f64> = cells.iter().flatten().copied().filter(|x| x.is_finite()).collect();
+    let indices = adaptive::codec(&target)?.indices_on(&start, &adaptive::prepared(&samples, &target))?;
+    let values = start.values(&indices);
+    let mut pairs = samples.iter().zip(&values);
+    let holds = pairs.all(|(sample, value)| target.holds(*sample, *value));
+    holds.then_some((indices, values))
+}
+
+/// Special cells of all columns: `wanted` at the writer, `None` at the reader.
+pub(super) fn specials<C: Coder>(
+    coder: &mut C,
+    wanted: Option<&[Specials]>,
+    columns: usize,
+    rows: usize,
+) -> Result<Vec<Specials>, Damage> {
+    let any = wanted.is_some_and(|wanted| wanted.iter().flatten().any(Option::is_some));
+    if coder.bit(SPECIALS, any) {
+        specials::code(coder, wanted, columns, rows)
+    } else {
+        Ok(Vec::new())
+    }
+}
+
+/// The columns that one is predicted from.
+fn others<C: Coder>(coder: &mut C, column: usize, wanted: &[usize]) -> Result<Vec<usize>, Damage> {
+    if column == 0 || !coder.bit(OTHERS, !wanted.is_empty()) {
+        return Ok(Vec::new());
+    }
+    let count = coder.raw((wanted.len() as u64).saturating_sub(1), NUMBER_BITS) as usize + 1;
+    if count > JOINT_COLUMNS {
+        return Err(Damage::Content("number of other columns"));
+    }
+    let other = |i: usize| {
+        let distance = wanted.get(i).map_or(0, |other| (column - other - 1) as u64);
+        let distance = coder.raw(distance, DISTANCE_BITS) as usize + 1;
+        column.checked_sub(distance).ok_or(Damage::Content("another column"))
+    };
+    (0..count).map(other).collect()
+}
+
+/// The code of all columns that have indices.
+pub(super) fn encode(
+    header: &Header,
+    cells: &[Cells],
+    specials: &[Specials],
+    indices: &[Option<Vec<i64>>],
+    restored: &[Cells],
+    effort: Effort,
+) -> Vec<u8> {
+    let mut writer = Writer::new(Vec::new());
+    // Only a reader finds what no writer codes.
+    let _ = self::specials(&mut writer, Some(specials), cells.len(), cells[0].len());
+    for (column, wanted) in indices.iter().enumerate() {
+        let (Some(wanted), Some(start)) = (wanted, header.start(column, None)) else {
+            continue;
+        };
+        let Some(codec) = adaptive::codec(&header.target(column, None)) else {
+            continue;
+        };
+        let codec = codec.with_effort(effort);
+        let has_value: Vec<bool> = specials[column].iter().map(Option::is_none).collect();
+        let written = |related: &[usize]| {
+            let mut writer = writer.clone();
+            let _ = others(&mut writer, column, related);
+            let values: Vec<Vec<f64>> = related.iter().map(|i| aligned(&restored[*i], &has_value)).collect();
+            let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+            let _ = codec.code_shared(&mut writer, &start, Some(wanted), wanted.len(), &values);
+            writer
+        };
+        let alone = written(&[]);
+        let related = match effort {
+            Effort::Thorough => related::columns(&cells[column], &restored[..column]),
+            _ => Vec::new(),
+        };
+        let joint = (!related.is_empty()).then(|| written(&related));
+        writer = joint.filter(|joint| joint.bits() < alone.bits()).unwrap_or(alone);
+    }
+    writer.finish()
+}
+
+/// The next column of a shared code, which the cells of all columns before it stand for.
+pub(super) fn decode(
+    header: &Header,
+    reader: &mut Reader<'_>,
+    before: &[Cells],
+    specials: &Specials,
+    rows: usize,
+) -> Result<Cells, Damage> {
+    let column = before.len();
+    let damaged = Damage::Content("shared code");
+    let (start, codec) = (header.start(column, None), adaptive::codec(&header.target(column, None)));
+    let (start, codec) = start.zip(codec).ok_or(damaged)?;
+    let has_value = specials::has_value(specials, rows);
+    let count = has_value.iter().filter(|has| **has).count();
+    let others = others(reader, column, &[])?;
+    let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
+    let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let indices = codec
+        .code_shared(reader, &start, None, count, &values)
+        .map_err(|_| damaged)?;
+    if reader.overran() {
+        return Err(damaged);
+    }
+    Ok(specials::merged(specials, &start.values(&indices)))
+}

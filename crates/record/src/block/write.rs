@@ -1,0 +1,210 @@
+//! Writing a block.
+
+use super::read::decode;
+use super::{
+    APART, BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW,
+    aligned, plain, shared,
+};
+use crate::codec::{self, CodecId};
+use crate::header::Header;
+use crate::related;
+use crate::specials::{self, Special, Specials};
+use crate::time::{self, TimeKind};
+use crate::wire::{Bytes, checksum, push_varint};
+use fewbits_adaptive::Effort;
+
+struct CodedColumn {
+    descriptor: u8,
+    /// Bound and others.
+    head: Vec<u8>,
+    bytes: Vec<u8>,
+    /// Points of the start's grid, for the code that columns share.
+    indices: Option<Vec<i64>>,
+    specials: Specials,
+    restored: Cells,
+}
+
+/// One column of a block. `before` are the columns before it as a reader will restore them.
+fn encode_column(
+    header: &Header,
+    cells: &[Option<f64>],
+    own: Option<f64>,
+    before: &[Cells],
+    effort: Effort,
+    may_share: bool,
+) -> CodedColumn {
+    let column = before.len();
+    let target = header.target(column, own);
+    let start = header.start(column, own);
+    let mut specials: Specials = cells.iter().map(|cell| Special::of(*cell)).collect();
+    let shared = may_share.then(|| shared::indices(header, column, cells, own)).flatten();
+    if let Some((indices, values)) = shared {
+        return CodedColumn {
+            descriptor: CodecId::Shared as u8,
+            head: Vec::new(),
+            bytes: Vec::new(),
+            indices: Some(indices),
+            restored: specials::merged(&specials, &values),
+            specials,
+        };
+    }
+    let has_value: Vec<bool> = specials.iter().map(Option::is_none).collect();
+    let samples = aligned(cells, &has_value);
+    let mut others = match effort {
+        Effort::Thorough => related::columns(cells, before),
+        _ => Vec::new(),
+    };
+    let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
+    let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let coded = codec::encode(&samples, &target, start.as_ref(), &values, effort);
+    if !coded.uses_others {
+        others.clear();
+    }
+    // Samples whose restored value breaks the promise are stored whole.
+    let mut values = samples.iter().zip(&coded.restored);
+    for special in specials.iter_mut().filter(|special| special.is_none()) {
+        if let Some((sample, value)) = values.next()
+            && !target.holds(*sample, *value)
+        {
+            *special = Some(Special::Whole(sample.to_bits()));
+        }
+    }
+    let mut descriptor = coded.id as u8;
+    let mut head = Vec::new();
+    if let Some(bound) = own {
+        descriptor |= BOUND_FOLLOWS;
+        head.extend_from_slice(&bound.to_be_bytes()[..3]);
+    }
+    if !others.is_empty() {
+        descriptor |= OTHERS_FOLLOW;
+        head.push((others.len() - 1) as u8);
+        others
+            .iter()
+            .for_each(|other| push_varint(&mut head, (column - other) as u64));
+    }
+    CodedColumn {
+        descriptor,
+        head,
+        bytes: coded.bytes,
+        indices: None,
+        restored: specials::merged(&specials, &coded.restored),
+        specials,
+    }
+}
+
+/// A block's bytes, and the cells as a reader will restore them.
+pub(crate) fn encode(
+    header: &Header,
+    ticks: &[i64],
+    columns: &[Cells],
+    own_bounds: &[Option<f64>],
+    effort: Effort,
+) -> (Vec<u8>, Vec<Cells>) {
+    let may_share = columns.len() <= SHARED_COLUMNS;
+    let (bytes, restored, shares) = encode_as(header, ticks, columns, own_bounds, effort, may_share);
+    // Columns with bytes of their own were decoded one by one.
+    let is_read = || {
+        let read = decode(header, &bytes, |_| true)
+            .map(|block| block.columns)
+            .unwrap_or_default();
+        let bits = |columns: &[Cells]| {
+            columns
+                .iter()
+                .flatten()
+                .map(|cell| cell.map(f64::to_bits))
+                .collect::<Vec<_>>()
+        };
+        bits(&read) == bits(&restored)
+    };
+    if !shares || is_read() {
+        return (bytes, restored);
+    }
+    let (bytes, restored, _) = encode_as(header, ticks, columns, own_bounds, effort, false);
+    (bytes, restored)
+}
+
+/// As [`encode`], without the check of the shared code, which there may be none of; whether there is one.
+fn encode_as(
+    header: &Header,
+    ticks: &[i64],
+    columns: &[Cells],
+    own_bounds: &[Option<f64>],
+    effort: Effort,
+    may_share: bool,
+) -> (Vec<u8>, Vec<Cells>, bool) {
+    let (mut coded, mut restored) = (Vec::with_capacity(columns.len()), Vec::with_capacity(columns.len()));
+    for (cells, own) in columns.iter().zip(own_bounds) {
+        let mut column = encode_column(header, cells, *own, &restored, effort, may_share);
+        restored.push(std::mem::take(&mut column.restored));
+        coded.push(column);
+    }
+    let shares = coded.iter().any(|column| column.indices.is_some());
+    let apart = !shares && header.has_starts();
+    let (kind, time) = time::encode(ticks, &header.grid());
+    let mut body = Vec::new();
+    let has_own: Vec<bool> = (0..)
+        .zip(&coded)
+        .map(|(i, column)| column.descriptor != plain(header, apart, i))
+        .collect();
+    let all_plain = !has_own.contains(&true);
+    let whole = ticks.len() == header.schema.rows_per_block;
+    let specials: Vec<Specials> = coded
+        .iter_mut()
+        .map(|column| std::mem::take(&mut column.specials))
+        .collect();
+    let told = !shares && specials.iter().flatten().any(Option::is_some);
+    match (kind, Bytes(&time).varint()) {
+        (TimeKind::Grid, Ok(block)) if all_plain && whole && !told => {
+            push_varint(&mut body, 4 * block + 2 * u64::from(apart))
+        }
+        _ => {
+            let flag = |given: bool, flag: u64| if given { flag } else { 0 };
+            let flags = flag(!whole, ROWS_FOLLOW)
+                | flag(!all_plain, DESCRIPTORS_FOLLOW)
+                | flag(told, SPECIALS_FOLLOW)
+                | flag(apart, APART);
+            push_varint(&mut body, 2 * (kind as u64 | flags) + 1);
+            if !whole {
+                push_varint(&mut body, ticks.len() as u64);
+            }
+            body.extend_from_slice(&time);
+            if !all_plain {
+                body.extend(has_own.chunks(8).map(|eight| {
+                    let bits = eight.iter().enumerate();
+                    bits.fold(0, |byte, (i, own)| byte | u8::from(*own) << i)
+                }));
+                let columns = coded.iter().zip(&has_own);
+                body.extend(columns.filter(|(_, own)| **own).map(|(column, _)| column.descriptor));
+            }
+            if told {
+                let bytes = specials::encode(&specials, ticks.len());
+                push_varint(&mut body, bytes.len() as u64);
+                body.extend(bytes);
+            }
+        }
+    }
+    let last = coded.len() - 1;
+    let alone = coded.iter().enumerate().filter(|(_, column)| column.indices.is_none());
+    for (i, column) in alone {
+        body.extend_from_slice(&column.head);
+        if shares || i < last {
+            push_varint(&mut body, column.bytes.len() as u64);
+        }
+        body.extend_from_slice(&column.bytes);
+    }
+    if shares {
+        let indices: Vec<Option<Vec<i64>>> = coded.into_iter().map(|column| column.indices).collect();
+        body.extend(shared::encode(header, columns, &specials, &indices, &restored, effort));
+    }
+    (framed(header, body), restored, shares)
+}
+
+/// Length, body, checksum.
+fn framed(header: &Header, body: Vec<u8>) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(body.len() + 9);
+    push_varint(&mut bytes, body.len() as u64);
+    bytes.extend(body);
+    let check = checksum(&[&header.check.to_le_bytes(), &bytes]);
+    bytes.extend(check.to_le_bytes());
+    bytes
+}

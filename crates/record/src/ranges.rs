@@ -1,0 +1,67 @@
+//! Ranges of columns so far, and the bounds that shares of them mean.
+
+use crate::bound::Bound;
+use crate::header::{Header, rounded_down};
+use crate::schema::Schema;
+
+/// A share's bound in a block is written when it is larger than the header's by this factor.
+const WIDER: f64 = 1.25;
+
+/// Least and greatest of some values.
+pub(crate) type Ends = Option<(f64, f64)>;
+
+/// The ends with one more cell, which counts if it is finite.
+pub(crate) fn with(ends: Ends, cell: Option<f64>) -> Ends {
+    match (ends, cell.filter(|value| value.is_finite())) {
+        (None, value) => value.map(|value| (value, value)),
+        (ends, None) => ends,
+        (Some((low, high)), Some(value)) => Some((value.min(low), value.max(high))),
+    }
+}
+
+/// The ends of each column's finite cells so far.
+#[derive(Debug)]
+pub(crate) struct Ranges(Vec<Ends>);
+
+impl Ranges {
+    pub(crate) fn new(columns: usize) -> Self {
+        Self(vec![None; columns])
+    }
+
+    /// Takes one row.
+    pub(crate) fn add(&mut self, row: &[Option<f64>]) {
+        for (ends, cell) in self.0.iter_mut().zip(row) {
+            *ends = with(*ends, *cell);
+        }
+    }
+
+    /// A bound not above what the column's share means by now, 0 where the range is none or overflows; `None` for columns without a share.
+    fn share_bound(&self, schema: &Schema, column: usize) -> Option<f64> {
+        let spec = &schema.columns[column];
+        let Bound::ShareOfRange(share) = spec.bound else {
+            return None;
+        };
+        let range = spec
+            .known_range()
+            .or_else(|| self.0[column].map(|(low, high)| high - low));
+        // The product may be rounded up; a bound must not be.
+        let bound = (share * range.unwrap_or(0.0)).next_down().max(0.0);
+        Some(if (2.0 * bound).is_finite() { bound } else { 0.0 })
+    }
+
+    /// The bounds of shares for a header; 0 for other columns.
+    pub(crate) fn bounds(&self, schema: &Schema) -> Vec<f64> {
+        (0..self.0.len())
+            .map(|i| self.share_bound(schema, i).unwrap_or(0.0))
+            .collect()
+    }
+
+    /// The bounds that a block states itself, where the header's are much smaller.
+    pub(crate) fn own_bounds(&self, header: &Header) -> Vec<Option<f64>> {
+        let own = |i: usize| {
+            let bound = rounded_down(self.share_bound(&header.schema, i)?);
+            (bound > WIDER * header.share_bounds[i]).then_some(bound)
+        };
+        (0..self.0.len()).map(own).collect()
+    }
+}
