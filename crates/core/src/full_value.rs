@@ -6,7 +6,7 @@ use crate::gaussian::Gaussian;
 use crate::measurement_noise::MeasurementNoise;
 use crate::number::NumberFormat;
 use crate::observation::{Link, Observation};
-use crate::scheme::Scheme;
+use crate::scheme::{Deterministic, Scheme};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive, within};
 use nalgebra::{Matrix1, SVector, Vector1};
@@ -66,7 +66,7 @@ impl Factor<1> for SentValue {
     }
 }
 
-impl crate::Deterministic<1> for FullValue {}
+impl Deterministic<1> for FullValue {}
 
 impl Scheme<1> for FullValue {
     type State = ();

@@ -3,7 +3,9 @@
 use crate::Error;
 use crate::plant::scalar;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Message, Observation, Scheme};
+use fewbits_core::{
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Factor, Gaussian, Link, Message, Observation, Scheme,
+};
 use fewbits_numerics::error::{ArgumentError, finite, positive, within};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
@@ -141,7 +143,7 @@ impl RoundedSample {
     }
 }
 
-impl fewbits_core::Deterministic<1> for RoundedSample {}
+impl Deterministic<1> for RoundedSample {}
 
 impl Scheme<1> for RoundedSample {
     type State = ();

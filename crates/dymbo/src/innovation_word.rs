@@ -3,8 +3,8 @@
 use crate::Error;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
-    Scheme,
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
+    Observation, Scheme,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::stored;
@@ -157,7 +157,7 @@ impl MeasurementNoise<1> for InnovationWord {
     }
 }
 
-impl fewbits_core::Deterministic<1> for InnovationWord {}
+impl Deterministic<1> for InnovationWord {}
 
 impl Scheme<1> for InnovationWord {
     type State = ();

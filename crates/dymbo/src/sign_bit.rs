@@ -2,7 +2,7 @@
 
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::{Constant, InCell, Scalar};
-use fewbits_core::{Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sign};
+use fewbits_core::{Deterministic, Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
@@ -65,7 +65,7 @@ impl MeasurementNoise<1> for SignBit {
     }
 }
 
-impl fewbits_core::Deterministic<1> for SignBit {}
+impl Deterministic<1> for SignBit {}
 
 impl Scheme<1> for SignBit {
     type State = ();

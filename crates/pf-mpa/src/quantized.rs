@@ -5,8 +5,8 @@ use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::sensor::RangeNoise;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
-    Scheme,
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
+    Observation, Scheme,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_quantizers::{Labelling, Symbol};
@@ -213,7 +213,7 @@ impl MeasurementNoise<1> for QuantizedRange {
     }
 }
 
-impl fewbits_core::Deterministic<1> for QuantizedRange {}
+impl Deterministic<1> for QuantizedRange {}
 
 impl Scheme<1> for QuantizedRange {
     type State = ();

@@ -7,7 +7,7 @@ use crate::refuse;
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::{SMatrix, SVector};
 use fewbits_core::rand::Rng;
-use fewbits_core::{Link, MeasurementNoise, Observation, Scheme};
+use fewbits_core::{Deterministic, Link, MeasurementNoise, Observation, Scheme};
 use fewbits_numerics::error::positive;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
@@ -83,7 +83,7 @@ impl MeasurementNoise<1> for QuantizingSensor {
     }
 }
 
-impl fewbits_core::Deterministic<1> for QuantizingSensor {}
+impl Deterministic<1> for QuantizingSensor {}
 
 impl Scheme<1> for QuantizingSensor {
     type State = ();

@@ -7,7 +7,7 @@ use fewbits_core::bits::{BitReader, BitWriter, CodecError};
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::SVector;
 use fewbits_core::rand::Rng;
-use fewbits_core::{Link, Message, Observation, Scheme};
+use fewbits_core::{Deterministic, Link, Message, Observation, Scheme};
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
@@ -39,7 +39,7 @@ impl BinaryQuantizer {
 }
 
 /// A sensor that reports in every slot: a missing report says nothing about the measurement.
-impl fewbits_core::Deterministic<1> for PatternSensor {}
+impl Deterministic<1> for PatternSensor {}
 
 impl Scheme<1> for PatternSensor {
     type State = ();
@@ -98,6 +98,7 @@ mod tests {
             let sensor = PatternSensor::with_deviation(quantizer, 0.3 * scale).unwrap();
             let points = [-1e9, -3.0, -0.4, 0.0, 0.7, 30.0].map(|m| SVector::from([scale * m]));
             let prior = Gaussian::scalar(0.2 * scale, scale * scale).unwrap();
+            scheme::deterministic(&sensor, &(), &[1, 2].map(rand_pcg::Pcg64Mcg::seed_from_u64), &points).unwrap();
             for link in [Link::PERFECT, Link::new(0.3, 0.1).unwrap().with_erasure(0.2).unwrap()] {
                 let bits = [Bit(false), Bit(true)];
                 scheme::total_probability(&sensor, &(), &link, bits, &points).unwrap();
