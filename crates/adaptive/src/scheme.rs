@@ -4,7 +4,7 @@ use crate::packet::Packet;
 use crate::report;
 use crate::{Error, Sensor};
 use fewbits_core::factor::{Factor, InCell, Scalar, Tilted, Value};
-use fewbits_core::{Cell, Columns, Gaussian, Link, Observation, Scheme};
+use fewbits_core::{Cell, Columns, Deterministic, Gaussian, Link, Observation, Scheme};
 use fewbits_node::adaptive::{Content, Lattice, REACH, Replica, Slot, push};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
@@ -118,7 +118,7 @@ impl Factor<1> for SlotFactor {
     }
 }
 
-impl fewbits_core::Deterministic<1> for SlotScheme {}
+impl Deterministic<1> for SlotScheme {}
 
 impl Scheme<1> for SlotScheme {
     type State = ();

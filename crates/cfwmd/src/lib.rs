@@ -8,12 +8,13 @@
 //! |---|---|
 //! | budget to threshold | [`Budget`](threshold::Budget) |
 //! | the rule, and whose covariance weighs the innovation | [`CensoringRule`](rule::CensoringRule), [`Weighing`](rule::Weighing), [`OwnRecursion`](rule::OwnRecursion) |
-//! | the schemes: state feedback or a schedule, state and covariance feedback, none, a random trigger | [`Censoring`](scheme::Censoring), [`CovarianceFeedback`](scheme::CovarianceFeedback), [`LocalCensoring`](no_feedback::LocalCensoring), [`Triggered`](trigger::Triggered) |
+//! | the schemes: state feedback or a schedule, state and covariance feedback, none | [`Censoring`](scheme::Censoring), [`CovarianceFeedback`](scheme::CovarianceFeedback), [`LocalCensoring`](no_feedback::LocalCensoring) |
 //! | `ln p(value or silence given the noise-free measurement)` | [`Censored`](censored::Censored), [`Ellipsoid`](ellipsoid::Ellipsoid) |
 //! | fusion with feedback: Gaussian (the default), or a likelihood for any particle or grid filter | [`Network::fuse`](network::Network::fuse), [`Network::likelihood`](network::Network::likelihood) |
 //! | fusion without feedback | [`no_feedback`] |
 //! | thresholds before deployment | [`expected_covariances`](schedule::expected_covariances) |
 //! | what a message is worth | [`information`] |
+//! | what the publications compare with | [`published`] |
 //!
 //! The central choice: **silence is a factor in closed form or by quadrature, never by sampling**, and with linear sensors
 //! the belief is the Gaussian with the exact mean and covariance after each observation
@@ -61,11 +62,11 @@ mod error;
 pub mod information;
 pub mod network;
 pub mod no_feedback;
+pub mod published;
 pub mod rule;
 pub mod schedule;
 pub mod scheme;
 pub mod threshold;
-pub mod trigger;
 
 pub use error::Error;
 pub use {nalgebra, rand};

@@ -129,7 +129,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         Ok((observations.collect::<Result<_, Error>>()?, sent))
     }
 
-    fn count(&self, rules: usize, observations: usize) -> Result<(), Error> {
+    pub(crate) fn count(&self, rules: usize, observations: usize) -> Result<(), Error> {
         let sensors = self.sensors.len();
         if rules != sensors {
             return Err(ArgumentError::new("rules", rules, format!("{sensors} rules, one per sensor")).into());
@@ -273,28 +273,5 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
                 received,
             },
         ))
-    }
-
-    /// The baseline (the paper's CFoMD, and all-send and random censoring): a Kalman filter on what was received, to which
-    /// silence says nothing.
-    ///
-    /// # Errors
-    /// [`Error::ObservationCount`]; if a value is not finite.
-    pub fn fuse_received(
-        &self,
-        predicted: &Gaussian<D>,
-        observations: &[Observation<SVector<f64, M>>],
-    ) -> Result<(Gaussian<D>, FusionInfo), Error> {
-        self.count(self.sensors.len(), observations.len())?;
-        let (mut belief, mut info) = (*predicted, FusionInfo::default());
-        for (sensor, observation) in self.sensors.iter().zip(observations) {
-            if let Observation::Received(value) = observation {
-                let (next, update) = kalman::update(sensor, &belief, value)?;
-                belief = next;
-                info.log_likelihood += update.log_likelihood;
-                info.received += 1;
-            }
-        }
-        Ok((belief, info))
     }
 }

@@ -4,8 +4,8 @@ use crate::Error;
 use crate::censored::{Censored, MissingReports, as_core};
 use crate::rule::CensoringRule;
 use fewbits_core::{
-    BitReader, BitWriter, CodecError, Gaussian, LinearSensing, Link, MeasurementNoise, Message, NumberFormat,
-    Observation, Scheme, Sensing,
+    BitReader, BitWriter, CodecError, Deterministic, Gaussian, LinearSensing, Link, MeasurementNoise, Message,
+    NumberFormat, Observation, Scheme, Sensing,
 };
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};
@@ -112,7 +112,7 @@ fn finite_over<const M: usize>(
     Ok(all_finite("prediction", prediction.as_slice())?)
 }
 
-impl<const D: usize, const M: usize, S: Sensing<D, M>> fewbits_core::Deterministic<M> for Censoring<S, D, M> {}
+impl<const D: usize, const M: usize, S: Sensing<D, M>> Deterministic<M> for Censoring<S, D, M> {}
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S, D, M> {
     type State = ();
@@ -252,10 +252,7 @@ impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M>
     }
 }
 
-impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> fewbits_core::Deterministic<M>
-    for CovarianceFeedback<S, D, M>
-{
-}
+impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Deterministic<M> for CovarianceFeedback<S, D, M> {}
 
 impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Scheme<M> for CovarianceFeedback<S, D, M> {
     type State = ();

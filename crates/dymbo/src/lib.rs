@@ -18,7 +18,7 @@
 //! | more bits, more sensors, vectors | [`MultibitFilter`], [`ParallelFilter`], [`SignFilter`] |
 //! | a closed loop in one call | [`ScalarFilter::exchange`] |
 //! | what to expect | [`steady`] (closed forms, loss, contours), [`chain`] and [`tree`] (exact errors), [`gap`] (beside the exact posterior) |
-//! | how normal the posterior is | [`skew_normal`]; successive bits of one sample: [`iterated`] |
+//! | comparisons of the publications: how normal the posterior is, successive bits of one sample | [`published`] |
 //!
 //! What a report says is a [`Factor`](fewbits_core::Factor), whatever the threshold and the [`Link`](fewbits_core::Link):
 //! `fewbits_filters::assumed_density::update` turns it into the moments of any Gaussian belief, and the filters here are its
@@ -52,12 +52,11 @@ mod filter;
 mod first_message;
 pub mod gap;
 mod innovation_word;
-pub mod iterated;
 mod multibit;
 mod parallel;
 mod plant;
+pub mod published;
 pub mod sign_bit;
-pub mod skew_normal;
 pub mod steady;
 pub mod tree;
 mod vector;

@@ -5,9 +5,10 @@
 use divan::{AllocProfiler, Bencher};
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
+use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{
-    Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange, RangeNoise, Ranged,
-    Reports, Target, Tracker,
+    Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeNoise, Ranged, Reports, Target,
+    Tracker,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
 use rand::RngExt;

@@ -19,11 +19,10 @@
 //! | ranges of a recording: bias, outliers, missing anchors, unknown speed, acquisition | [`RangeTracker`] |
 //! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
 //! | particles and draws | [`ParticleFilter`](fewbits_filters::ParticleFilter) on [`WithManoeuvre`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
-//! | Algorithm 6 | [`MessagePassing`], its [`ProductSampler`] |
+//! | Algorithm 6, its messages, the factor graphs behind it | [`published`] |
 //! | bounds | [`CramerRao`], [`level_information`] |
 //! | two targets, measurements in unknown order | [`association`] |
 //! | who leads, what is handed over, in bits | [`leader`] |
-//! | factor graphs, sum-product over finite alphabets | [`graph`] |
 //!
 //! ```
 //! use fewbits_core::Gaussian;
@@ -52,20 +51,15 @@ mod chain;
 mod encoder;
 mod error;
 mod factor;
-pub mod graph;
 mod grid;
 mod guided;
-mod labels;
 pub mod leader;
 mod linearised;
-mod message;
-mod message_passing;
 pub mod product;
-mod product_sampler;
+pub mod published;
 mod quantized;
 mod rao_blackwell;
 mod recording;
-mod ring;
 mod sensor;
 mod target;
 mod tracker;
@@ -77,15 +71,10 @@ pub use error::Error;
 pub use factor::RangeFactor;
 pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
 pub use guided::{GuidedGaussian, GuidedWorkspace};
-pub use labels::{LabelChain, ratio_second_moments};
 pub use linearised::{Linearised, QuantizationNoise, Velocity};
-pub use message::{DynamicsWeight, KernelRule, Ring, RingWeight, kernel_error};
-pub use message_passing::{MessagePassing, MessageWorkspace};
-pub use product_sampler::ProductSampler;
 pub use quantized::{IntervalRule, QuantizedRange, RangeReference};
 pub use rao_blackwell::{RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
 pub use recording::{RangeEstimate, RangeSettings, RangeTracker, Travel};
-pub use ring::RingBias;
 pub use sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
 pub use target::{Manoeuvres, Target, WithManoeuvre};
 pub use tracker::{Network, POSITION, Ranged, Reports, StepInfo, Tracker};

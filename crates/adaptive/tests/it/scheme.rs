@@ -29,6 +29,8 @@ fn slots_obey_the_laws_of_schemes() {
             let mut rng = Stream::new(seed).rng();
             laws::scheme::frequencies(&scheme, &(), &link, &mut rng, 20_000, &measurements[3], noise, few).unwrap();
         }
+        let sources = [Stream::new(1).rng(), Stream::new(2).rng()];
+        laws::scheme::deterministic(&scheme, &(), &sources, &measurements).unwrap();
         assert!(
             scheme
                 .factor(&(), &Observation::Nothing, &Link::flipping(0.1).unwrap())

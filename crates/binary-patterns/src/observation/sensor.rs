@@ -110,6 +110,7 @@ mod tests {
             let sensor = PatternSensor::with_deviation(quantizer, 0.3 * scale).unwrap();
             let points = [-1e9, -3.0, -0.4, 0.0, 0.7, 30.0].map(|m| SVector::from([scale * m]));
             let prior = Gaussian::scalar(0.2 * scale, scale * scale).unwrap();
+            scheme::deterministic(&sensor, &(), &[1, 2].map(rand_pcg::Pcg64Mcg::seed_from_u64), &points).unwrap();
             for link in [Link::PERFECT, Link::new(0.3, 0.1).unwrap().with_erasure(0.2).unwrap()] {
                 let bits = [false, true];
                 scheme::total_probability(&sensor, &(), &link, bits, &points).unwrap();

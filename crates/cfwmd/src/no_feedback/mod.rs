@@ -9,13 +9,11 @@
 //! | estimator | item |
 //! |---|---|
 //! | joint Gaussian belief with exact moments after each observation: the default, as accurate as the next in every case measured | [`joint`] |
-//! | exact as the number of particles grows: withheld measurements imputed, the rest Gaussian | [`imputing`] |
-//! | silence ignored (the paper's CFoMD) | [`Network::fuse_received`] |
+//! | exact as the number of particles grows: withheld measurements imputed, the rest Gaussian | [`imputing`](crate::published::imputing) |
+//! | silence ignored (the paper's CFoMD) | [`fuse_received`](crate::published::fuse_received) |
 
-pub mod imputing;
 pub mod joint;
 
-pub use imputing::ImputedBelief;
 pub use joint::JointBelief;
 
 use crate::Error;
@@ -23,7 +21,9 @@ use crate::censored::Censored;
 use crate::network::Network;
 use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
 use crate::scheme::{Censoring, send_if};
-use fewbits_core::{Gaussian, LinearDynamics, LinearSensing, Link, NumberFormat, Observation, Scheme, Sensing};
+use fewbits_core::{
+    Deterministic, Gaussian, LinearDynamics, LinearSensing, Link, NumberFormat, Observation, Scheme, Sensing,
+};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};
 use nalgebra::{SMatrix, SVector};
@@ -34,7 +34,7 @@ use rand::Rng;
 ///
 /// What only the sensor knows, its estimate, is its `State`. The factor is that of a receiver that supposes
 /// [`start`](Scheme::start) for it: one that does not know the estimate carries it in its belief, as [`joint`] and
-/// [`imputing`] do.
+/// [`imputing`](crate::published::imputing) do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalCensoring<S, const D: usize, const M: usize> {
     scheme: Censoring<S, D, M>,
@@ -44,10 +44,7 @@ pub struct LocalCensoring<S, const D: usize, const M: usize> {
     supposed: SVector<f64, D>,
 }
 
-impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> fewbits_core::Deterministic<M>
-    for LocalCensoring<S, D, M>
-{
-}
+impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> Deterministic<M> for LocalCensoring<S, D, M> {}
 
 impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> Scheme<M> for LocalCensoring<S, D, M> {
     /// The sensor's estimate after the last slot.
@@ -164,7 +161,7 @@ impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> LocalSensor
 }
 
 /// Rules and gains of all sensors' own filters in one step.
-fn advance<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
+pub(crate) fn advance<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
     recursions: &mut [OwnRecursion<D>],
     network: &Network<S, D, M>,
     dynamics: &impl LinearDynamics<D>,
@@ -178,7 +175,7 @@ fn advance<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
 }
 
 /// Refuses observations of the wrong number or with values that are not finite.
-fn check<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
+pub(crate) fn check<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
     network: &Network<S, D, M>,
     observations: &[Observation<SVector<f64, M>>],
 ) -> Result<(), Error> {

@@ -3,9 +3,9 @@
 use crate::Silence;
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
 use fewbits_cfwmd::information::{Direction, divergence};
+use fewbits_cfwmd::published::trigger::StochasticTrigger;
 use fewbits_cfwmd::rule::{OwnRecursion, OwnStep, cross_covariance_step};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_cfwmd::trigger::StochasticTrigger;
 use fewbits_core::{Factor, Gaussian};
 use fewbits_filters::kalman;
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d};

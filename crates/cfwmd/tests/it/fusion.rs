@@ -2,6 +2,7 @@
 
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;
+use fewbits_cfwmd::published::fuse_received;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
@@ -268,9 +269,7 @@ fn the_evidence_of_values_is_their_joint_density() {
         assert!((info.log_likelihood - expected - arrival - cells).abs() < 1e-3, "{info:?}");
     }
     // The baseline takes densities and does not ask how often values arrive.
-    let (_, info) = network(0.3, NumberFormat::Double)
-        .fuse_received(&belief, &observations)
-        .unwrap();
+    let (_, info) = fuse_received(&network(0.3, NumberFormat::Double), &belief, &observations).unwrap();
     assert!((info.log_likelihood - expected).abs() < 1e-12 && info.received == 2);
 }
 

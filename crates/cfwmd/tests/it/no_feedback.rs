@@ -2,7 +2,8 @@
 
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::no_feedback::{ImputedBelief, JointBelief, LocalSensor, imputing, joint};
+use fewbits_cfwmd::no_feedback::{JointBelief, LocalSensor, joint};
+use fewbits_cfwmd::published::{ImputedBelief, fuse_received, imputing};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Sensing};
 use fewbits_filters::kalman;
@@ -88,9 +89,8 @@ fn track<const M: usize>(
         .map(|(_, observations)| {
             let info = match method {
                 Method::Ignore => {
-                    let (next, info) = network
-                        .fuse_received(&kalman::predict(&dynamics, &belief), observations)
-                        .unwrap();
+                    let predicted = kalman::predict(&dynamics, &belief);
+                    let (next, info) = fuse_received(network, &predicted, observations).unwrap();
                     belief = next;
                     info
                 }

@@ -2,15 +2,15 @@
 
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::LocalSensor;
+use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::scheme::{Censoring, CovarianceFeedback, Prediction};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_core::laws::factor::tilted_is_quadrature;
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
-use fewbits_core::laws::scheme::{honesty, total_probability, total_probability_with};
+use fewbits_core::laws::scheme::{deterministic, honesty, total_probability, total_probability_with};
 use fewbits_core::number::Levels;
-use fewbits_core::{BitString, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
+use fewbits_core::{BitString, Deterministic, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_models::{LinearSensor, ReceivedPower, ScalarSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::quadrature::gauss_legendre;
@@ -69,6 +69,16 @@ fn scalar_laws<S: Scheme<1, State = ()>>(
     }
 }
 
+/// The law of deterministic schemes, at measurements about `near`.
+fn draws_nothing<const M: usize, S: Deterministic<M>>(scheme: &S, feedback: &S::Feedback, near: SVector<f64, M>)
+where
+    S::Report: PartialEq,
+{
+    let sources = [Stream::new(1).rng(), Stream::new(2).rng()];
+    let measurements = [-9.0, -0.4, 0.0, 0.2, 1.7, 40.0].map(|z| near.add_scalar(z));
+    deterministic(scheme, feedback, &sources, &measurements).unwrap();
+}
+
 fn draw<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     rng.sample(rand_distr::StandardNormal)
 }
@@ -78,6 +88,7 @@ fn censoring_with_state_feedback_is_lawful() {
     let rule = CensoringRule::scalar(2.4, 0.45).unwrap();
     let scheme = Censoring::new(position(), rule, NumberFormat::Double).unwrap();
     scalar_laws(&scheme, &Vector2::new(0.5, 2.0), 1.3, Vector1::new);
+    draws_nothing(&scheme, &Vector2::new(0.5, 2.0), Vector1::new(0.5));
     // A nonlinear sensor.
     let rule = CensoringRule::scalar(2.0, 0.7).unwrap();
     let scheme = Censoring::new(field(), rule, NumberFormat::Double).unwrap();
@@ -89,6 +100,7 @@ fn covariance_feedback_and_the_random_trigger_are_lawful() {
     let scheme = CovarianceFeedback::new(position(), 0.45, NumberFormat::Double).unwrap();
     let told = Gaussian::new(Vector2::new(0.5, 2.0), Matrix2::new(2.0, 0.4, 0.4, 1.0)).unwrap();
     scalar_laws(&scheme, &Prediction(told), 1.3, Vector1::new);
+    draws_nothing(&scheme, &Prediction(told), Vector1::new(0.5));
     assert_eq!(round_trip(&Prediction(told), &NumberFormat::Double).unwrap(), 5 * 64);
     assert!(CovarianceFeedback::new(position(), -1.0, NumberFormat::Double).is_err());
 
@@ -148,6 +160,7 @@ fn vectors_are_lawful() {
     let rule = CensoringRule::new(&Matrix2::new(5.0, 1.0, 1.0, 6.0), 1.386).unwrap();
     let scheme = Censoring::new(sensor, rule, NumberFormat::Double).unwrap();
     let broadcast = Vector2::new(0.5, 2.0);
+    draws_nothing(&scheme, &broadcast, broadcast);
     for link in links() {
         let nothing = scheme.factor(&broadcast, &Observation::Nothing, &link).unwrap();
         let lost = scheme.factor(&broadcast, &Observation::Lost, &link).unwrap();
@@ -217,6 +230,7 @@ fn a_sensor_with_its_own_filter_is_lawful_given_its_memory() {
             assert!((share - p).abs() < 4.0 * (p * (1.0 - p) / 20_000.0).sqrt(), "{share} {p}");
         }
     }
+    draws_nothing(&slot, &(), Vector1::new(20.0));
     assert_eq!(slot.start(), *sensor.estimate());
 }
 

@@ -3,9 +3,9 @@
 use crate::Silence;
 use fewbits_cfwmd::censored::{Censored, MissingReports};
 use fewbits_cfwmd::network::Network;
+use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::threshold::threshold;
-use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_core::laws::factor::{is_a_number, sweep_is_scalar};
 use fewbits_core::{Dynamics, Factor, Gaussian, Link, Observation, Scheme, Sensing};
 use fewbits_filters::kalman;

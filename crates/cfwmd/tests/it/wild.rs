@@ -3,9 +3,10 @@
 use fewbits_cfwmd::censored::{Censored, MissingReports};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{JointBelief, joint};
+use fewbits_cfwmd::published::fuse_received;
+use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme};
 use fewbits_models::{LinearSensor, constant_velocity_1d};
 use nalgebra::{Matrix2, Vector1, Vector2};
@@ -53,7 +54,7 @@ proptest! {
         if let Ok((after, info)) = network.fuse(&belief, &rules, &Vector2::new(x[13], x[14]), &seen) {
             prop_assert!(after.is_finite() && info.log_likelihood.is_finite(), "{:?} {:?}: {:?}", network, belief, after);
         }
-        if let Ok((after, info)) = network.fuse_received(&belief, &seen) {
+        if let Ok((after, info)) = fuse_received(&network, &belief, &seen) {
             prop_assert!(after.is_finite() && info.log_likelihood.is_finite());
         }
         let dynamics = constant_velocity_1d(1.0, 1.0).unwrap();

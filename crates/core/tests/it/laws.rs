@@ -3,9 +3,9 @@
 use fewbits_core::columns::{columns_agree, lengths_agree};
 use fewbits_core::factor::{Constant, Factor, Tilted, Value};
 use fewbits_core::{
-    Belief, BitReader, BitWriter, CodecError, Columns, ColumnsMut, Density, Dynamics, Error, Gaussian,
-    GaussianDynamics, Likelihood, LinearDynamics, Link, Message, NumberFormat, Observation, Scheme, Sensing, Sign,
-    laws,
+    Belief, BitReader, BitWriter, CodecError, Columns, ColumnsMut, Density, Deterministic, Dynamics, Error, FullValue,
+    Gaussian, GaussianDynamics, Likelihood, LinearDynamics, Link, Message, NumberFormat, Observation, Scheme, Sensing,
+    Sign, laws,
 };
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SVector, Vector1, Vector2};
@@ -426,6 +426,23 @@ fn laws_of_schemes_refuse_what_is_wrong() {
         assert!(total(&biased).is_ok() && honest(&biased).is_err());
         assert!(honest(&coin(0.3, 0.25, lost)).is_err());
     }
+}
+
+/// False: a coin draws.
+impl Deterministic<1> for Coin {}
+
+#[test]
+fn values_draw_nothing_and_coins_do() {
+    let sources = [Stream::new(1).rng(), Stream::new(2).rng()];
+    let measurements = [-3.0, 0.0, 1e9].map(Vector1::new);
+    let value = FullValue::new(0.4).unwrap();
+    laws::scheme::deterministic(&value, &(), &sources, &measurements).unwrap();
+    let coin = Coin {
+        heads: 0.3,
+        nothing: 0.2,
+        lost: 1.0,
+    };
+    assert!(laws::scheme::deterministic(&coin, &0.0, &sources, &measurements).is_err());
 }
 
 /// Whether each probability of a link is the share of reports that it is stated for, in words of the laws and by counting.

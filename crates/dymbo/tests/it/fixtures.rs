@@ -6,10 +6,10 @@
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::chain::{self, TransientStep};
+use fewbits_dymbo::published::{iterated, skew_normal};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, Initialisation, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter,
-    ScalarPlant, SignFilter, filtered_variance, first_message_mse, first_message_value, iterated, sign_bit,
-    skew_normal, steady, tree,
+    ScalarPlant, SignFilter, filtered_variance, first_message_mse, first_message_value, sign_bit, steady, tree,
 };
 use fewbits_filters::{
     Grid, PointMass, PointMassFilter, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,

@@ -2,7 +2,8 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain, iterated};
+use fewbits_dymbo::published::iterated;
+use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain};
 use fewbits_monte_carlo::parallel;
 
 parameters! {

@@ -4,9 +4,8 @@ use super::scores::{Row, agree, ladder, mse};
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, compare};
 use crate::prelude::*;
-use fewbits_pf_mpa::{
-    DynamicsWeight, IntervalRule, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight, Velocity,
-};
+use fewbits_pf_mpa::published::{DynamicsWeight, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight};
+use fewbits_pf_mpa::{IntervalRule, Velocity};
 
 parameters! {
     pub struct Parameters {

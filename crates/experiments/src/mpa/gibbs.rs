@@ -2,8 +2,8 @@
 
 use crate::prelude::*;
 use fewbits_densities::{Component, Mixture};
-use fewbits_pf_mpa::LabelChain;
 use fewbits_pf_mpa::product;
+use fewbits_pf_mpa::published::LabelChain;
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
 
 pub struct Gibbs;

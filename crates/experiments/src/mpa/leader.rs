@@ -5,7 +5,8 @@ use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
 use fewbits_core::{Gaussian, NumberFormat};
 use fewbits_pf_mpa::leader::{Handover, elect, nearest};
-use fewbits_pf_mpa::{MessagePassing, Reports, Target, Tracker};
+use fewbits_pf_mpa::published::MessagePassing;
+use fewbits_pf_mpa::{Reports, Target, Tracker};
 use nalgebra::Vector2;
 
 parameters! {

@@ -1,7 +1,7 @@
 //! `mpa-ring`: the errata in closed form.
 
 use crate::prelude::*;
-use fewbits_pf_mpa::{RingBias, kernel_error, ratio_second_moments};
+use fewbits_pf_mpa::published::{RingBias, kernel_error, ratio_second_moments};
 
 pub struct Rings;
 

@@ -3,10 +3,10 @@
 use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian, Observed, OnAxes};
 use fewbits_filters::ParticleFilter;
+use fewbits_pf_mpa::published::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_pf_mpa::{
-    DynamicsWeight, Encoder, GridFilter, GuidedGaussian, IntervalRule, KernelRule, Linearised, MessagePassing, Network,
-    POSITION, QuantizedRange, RangeFactor, RangeNoise, RangeSensor, Ranged, RaoBlackwellGuided, Reports, Ring,
-    RingWeight, Target, Tracker, Velocity, WithManoeuvre,
+    Encoder, GridFilter, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, QuantizedRange, RangeFactor,
+    RangeNoise, RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
 use rand::RngExt;

@@ -192,8 +192,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// # Errors
     /// As there.
     pub fn join_boxed(&mut self, number: u32, sensor: Box<dyn RemoteSensor<D>>) -> Result<(), Error> {
-        let feedback = sensor.feedback(&self.estimate())?;
-        let nothing = sensor.likelihood(&feedback, &Observation::Nothing, 1.0);
+        let silent = Slot::new(number, sensor.feedback(&self.estimate())?, Observation::Nothing);
+        let nothing = sensor.likelihood(&silent, 1.0);
         let member = Member {
             number,
             arrival: sensor.arrival(),

@@ -31,7 +31,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             next_seat = seat + 1;
             let member = &self.members[seat];
             let (working, is_used) = (member.state.presence.working, !member.state.excluded);
-            let likelihood = || member.sensor.likelihood(&slot.feedback, &slot.observation, working);
+            let likelihood = || member.sensor.likelihood(slot, working);
             let Observation::Received(bits) = &slot.observation else {
                 let missing = likelihood()?;
                 watched.push((seat, member.silence(slot, &*missing, &predicted)?));
@@ -45,9 +45,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let report = if posterior.is_none() { Some(likelihood()?) } else { None };
             let condition = |belief: &mut Gaussian<D>| match &report {
                 Some(report) => report.condition(belief),
-                None => member
-                    .sensor
-                    .condition(&slot.feedback, &slot.observation, working, belief),
+                None => member.sensor.condition(slot, working, belief),
             };
             let is_bit = bits.bits() == 1 && member.always_speaks;
             let before = (!is_bit).then_some(given);
@@ -60,7 +58,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 Ok(evidence) => Some(evidence),
                 Err(error) if posterior.is_some() && is_used => return Err(error),
                 // What cannot be conditioned on may have evidence all the same.
-                Err(_) => member.evidence(slot, &slot.observation, working, &given)?,
+                Err(_) => member.evidence(slot, working, &given)?,
             };
             let report_says = match (evidence, before) {
                 (None, _) => Watched::Report(None),
@@ -122,14 +120,8 @@ impl<const D: usize> Posterior<D> {
 
 impl<const D: usize> Member<D> {
     /// What an observation in this slot says about the model; `None` if it is impossible.
-    fn evidence(
-        &self,
-        slot: &Slot,
-        observation: &Observation<BitString>,
-        working: f64,
-        belief: &Gaussian<D>,
-    ) -> Result<Option<Evidence>, Error> {
-        match self.sensor.evidence(&slot.feedback, observation, working, belief) {
+    fn evidence(&self, slot: &Slot, working: f64, belief: &Gaussian<D>) -> Result<Option<Evidence>, Error> {
+        match self.sensor.evidence(slot, working, belief) {
             Ok(found) => Ok(Some(found)),
             Err(Error::Core(fewbits_core::Error::Impossible)) => Ok(None),
             Err(error) => Err(error),
@@ -149,7 +141,7 @@ impl<const D: usize> Member<D> {
         let found = match likelihood.as_constant() {
             Some(log) if self.state.presence.working == 1.0 => log.exp(),
             _ => self
-                .evidence(slot, &slot.observation, 1.0, predicted)?
+                .evidence(slot, 1.0, predicted)?
                 .map_or(0.0, |one| one.log_likelihood.exp()),
         };
         Ok(Watched::Silence(found.min(1.0)))
@@ -173,7 +165,7 @@ impl<const D: usize> Member<D> {
             return Ok(None);
         }
         let mut words = Vec::with_capacity(1 << bits.bits());
-        let mut at = 0;
+        let (mut at, mut alternative) = (0, slot.clone());
         for word in 0..1_u8 << bits.bits() {
             let other = BitString::from_bytes(vec![word << (8 - bits.bits())], bits.bits())?;
             if other == *bits {
@@ -182,8 +174,13 @@ impl<const D: usize> Member<D> {
                 continue;
             }
             // A word that the scheme never sends is no alternative.
-            let found = self.evidence(slot, &Observation::Received(other), working, predicted);
-            words.extend(found.ok().flatten().map(place));
+            alternative.observation = Observation::Received(other);
+            words.extend(
+                self.evidence(&alternative, working, predicted)
+                    .ok()
+                    .flatten()
+                    .map(place),
+            );
         }
         Ok(Residual::of_word(&words, at))
     }

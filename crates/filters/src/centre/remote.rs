@@ -1,5 +1,6 @@
 //! A sensor as its receiver sees it: bits in, likelihoods out.
 
+use super::Slot;
 use crate::Error;
 use crate::contract::{Evidence, StateLikelihood};
 use fewbits_core::{BitString, Gaussian, Link, MeasurementNoise, Message, Observation, Observed, Scheme, Sensing};
@@ -17,44 +18,27 @@ pub trait RemoteSensor<const D: usize> {
     /// If the belief gives no feedback that fits its format, or sensing and scheme suppose different noise.
     fn feedback(&self, predicted: &Gaussian<D>) -> Result<BitString, Error>;
 
-    /// What an observation of it says, given the feedback as it travelled. `working` is the probability that the sensor works at all: a
+    /// What a slot of it says. `working` is the probability that the sensor works at all: a
     /// dead sensor is silent, too.
     ///
     /// # Errors
     /// If the feedback does not decode, `working` is outside `[0, 1]`, or the scheme refuses the report.
-    fn likelihood(
-        &self,
-        feedback: &BitString,
-        observation: &Observation<BitString>,
-        working: f64,
-    ) -> Result<Box<dyn StateLikelihood<D>>, Error>;
+    fn likelihood(&self, slot: &Slot, working: f64) -> Result<Box<dyn StateLikelihood<D>>, Error>;
 
     /// Conditions a Gaussian on [`likelihood`](Self::likelihood).
     ///
     /// # Errors
     /// As there, and as [`StateLikelihood::condition`].
-    fn condition(
-        &self,
-        feedback: &BitString,
-        observation: &Observation<BitString>,
-        working: f64,
-        belief: &mut Gaussian<D>,
-    ) -> Result<Evidence, Error> {
-        self.likelihood(feedback, observation, working)?.condition(belief)
+    fn condition(&self, slot: &Slot, working: f64, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
+        self.likelihood(slot, working)?.condition(belief)
     }
 
     /// The evidence of [`likelihood`](Self::likelihood) under a Gaussian.
     ///
     /// # Errors
     /// As there, and as [`StateLikelihood::evidence`].
-    fn evidence(
-        &self,
-        feedback: &BitString,
-        observation: &Observation<BitString>,
-        working: f64,
-        belief: &Gaussian<D>,
-    ) -> Result<Evidence, Error> {
-        self.likelihood(feedback, observation, working)?.evidence(belief)
+    fn evidence(&self, slot: &Slot, working: f64, belief: &Gaussian<D>) -> Result<Evidence, Error> {
+        self.likelihood(slot, working)?.evidence(belief)
     }
 
     /// Variance of a scalar measurement under the prediction, noise included, if the sensor sends every measurement as a value.
@@ -142,18 +126,13 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
     }
 
     #[inline(always)]
-    fn observed(
-        &self,
-        feedback: &BitString,
-        observation: &Observation<BitString>,
-        working: f64,
-    ) -> Result<Observed<S, C::Factor, M>, Error>
+    fn observed(&self, slot: &Slot, working: f64) -> Result<Observed<S, C::Factor, M>, Error>
     where
         S: Clone,
         C: Scheme<M>,
     {
-        let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), feedback)?;
-        let observation = match observation {
+        let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), &slot.feedback)?;
+        let observation = match &slot.observation {
             // Bits that are no report of the scheme: sent, and not understood.
             Observation::Received(bits) => C::Report::from_bits(&self.scheme.report_format(), bits)
                 .map_or(Observation::Lost, Observation::Received),
@@ -178,33 +157,16 @@ where
         Ok((self.ask)(predicted, &measurement).to_bits(&self.scheme.feedback_format())?)
     }
 
-    fn likelihood(
-        &self,
-        feedback: &BitString,
-        observation: &Observation<BitString>,
-        working: f64,
-    ) -> Result<Box<dyn StateLikelihood<D>>, Error> {
-        Ok(Box::new(self.observed(feedback, observation, working)?))
+    fn likelihood(&self, slot: &Slot, working: f64) -> Result<Box<dyn StateLikelihood<D>>, Error> {
+        Ok(Box::new(self.observed(slot, working)?))
     }
 
-    fn condition(
-        &self,
-        feedback: &BitString,
-        observation: &Observation<BitString>,
-        working: f64,
-        belief: &mut Gaussian<D>,
-    ) -> Result<Evidence, Error> {
-        self.observed(feedback, observation, working)?.condition(belief)
+    fn condition(&self, slot: &Slot, working: f64, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
+        self.observed(slot, working)?.condition(belief)
     }
 
-    fn evidence(
-        &self,
-        feedback: &BitString,
-        observation: &Observation<BitString>,
-        working: f64,
-        belief: &Gaussian<D>,
-    ) -> Result<Evidence, Error> {
-        self.observed(feedback, observation, working)?.evidence(belief)
+    fn evidence(&self, slot: &Slot, working: f64, belief: &Gaussian<D>) -> Result<Evidence, Error> {
+        self.observed(slot, working)?.evidence(belief)
     }
 
     fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64> {

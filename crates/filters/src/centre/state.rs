@@ -73,14 +73,14 @@ impl StoredSlot {
         }
     }
 
-    pub fn bits(&self) -> Result<(BitString, Observation<BitString>), Error> {
+    pub fn read(&self) -> Result<Slot, Error> {
         let bits = |(bytes, count): &(Vec<u8>, usize)| BitString::from_bytes(bytes.clone(), *count);
         let observation = match &self.observation {
             Observation::Received(report) => Observation::Received(bits(report)?),
             Observation::Nothing => Observation::Nothing,
             Observation::Lost => Observation::Lost,
         };
-        Ok((bits(&self.feedback)?, observation))
+        Ok(Slot::new(self.sensor, bits(&self.feedback)?, observation))
     }
 }
 

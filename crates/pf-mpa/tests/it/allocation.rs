@@ -3,9 +3,10 @@
 use allocation_counter::measure;
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
+use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{
-    Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange, RangeNoise,
-    RaoBlackwellGuided, Reports, Target, Tracker,
+    Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports,
+    Target, Tracker,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
 use std::hint::black_box;

@@ -4,10 +4,10 @@ use fewbits_core::{Gaussian, Observed};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_monte_carlo::Stream;
+use fewbits_pf_mpa::published::{MessagePassing, ProductSampler};
 use fewbits_pf_mpa::{
-    AccelerationChain, Encoder, GridFilter, GridWorkspace, GuidedGaussian, Linearised, MessagePassing, Network,
-    POSITION, ProductSampler, QuantizedRange, RangeNoise, RangeReference, RaoBlackwellGuided, Reports, Target, Tracker,
-    WithManoeuvre,
+    AccelerationChain, Encoder, GridFilter, GridWorkspace, GuidedGaussian, Linearised, Network, POSITION,
+    QuantizedRange, RangeNoise, RangeReference, RaoBlackwellGuided, Reports, Target, Tracker, WithManoeuvre,
 };
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, Vector2, Vector4};

@@ -6,10 +6,11 @@ use fewbits_densities::{Bandwidth, Component, Mixture, Rule};
 use fewbits_pf_mpa::association::{self, Rule as Association, tanh_rule};
 use fewbits_pf_mpa::leader::StepBits;
 use fewbits_pf_mpa::product;
+use fewbits_pf_mpa::published::{LabelChain, RingBias, kernel_error, ratio_second_moments};
 use fewbits_pf_mpa::{
-    AccelerationChain, CramerRao, Encoder, GridFilter, GridWorkspace, LabelChain, Linearised, Manoeuvres, Network,
-    Normalisation, QuantizedRange, RangeNoise, RangeReference, Reports, RingBias, Target, Tracker, kernel_error,
-    level_information, position_information, range_information, ratio_second_moments,
+    AccelerationChain, CramerRao, Encoder, GridFilter, GridWorkspace, Linearised, Manoeuvres, Network, Normalisation,
+    QuantizedRange, RangeNoise, RangeReference, Reports, Target, Tracker, level_information, position_information,
+    range_information,
 };
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, SMatrix, SVector, Vector1, Vector2, Vector4};

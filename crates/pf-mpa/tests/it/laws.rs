@@ -33,6 +33,9 @@ fn schemes_obey_their_laws() {
                 let range = QuantizedRange::new(levels, noise)
                     .unwrap()
                     .with_labelling(Labelling::gray(levels).unwrap());
+                let at = [-2.0, 0.0, 1e-3, 3.0, 5.2, 7.0, 90.0].map(|m| Vector1::new(m * scale));
+                let sources = [Stream::new(1).rng(), Stream::new(2).rng()];
+                scheme::deterministic(&range, &reference(scale), &sources, &at).unwrap();
                 for link in [Link::PERFECT, Link::new(0.2, 0.1).unwrap().with_erasure(0.3).unwrap()] {
                     let symbols = || {
                         (0..if link.crossover() > 0.0 {
@@ -42,7 +45,6 @@ fn schemes_obey_their_laws() {
                         })
                             .map(Symbol)
                     };
-                    let at = [-2.0, 0.0, 1e-3, 3.0, 5.2, 7.0, 90.0].map(|m| Vector1::new(m * scale));
                     scheme::total_probability(&range, &reference(scale), &link, symbols(), &at).unwrap();
                     if levels == 4 {
                         let m = Vector1::new(6.0 * scale);

@@ -5,10 +5,11 @@ use fewbits_monte_carlo::Stream;
 use fewbits_numerics::wild;
 use fewbits_pf_mpa::association::{Rule, separation, update};
 use fewbits_pf_mpa::leader::{Handover, elect};
+use fewbits_pf_mpa::published::{MessagePassing, RingBias, kernel_error};
 use fewbits_pf_mpa::{
-    AccelerationChain, Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange,
-    RangeFactor, RangeNoise, RangeReference, RangeSensor, RaoBlackwellGuided, Reports, RingBias, Target, Tracker,
-    kernel_error, level_information, range_information,
+    AccelerationChain, Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeFactor,
+    RangeNoise, RangeReference, RangeSensor, RaoBlackwellGuided, Reports, Target, Tracker, level_information,
+    range_information,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
 use proptest::prelude::*;

@@ -56,6 +56,8 @@ fn every_quantizing_sensor_obeys_the_laws_of_schemes() {
             let m = Scalar::from([0.7 * s]);
             scheme::frequencies(&sensor, &(), &link, &mut rng, 20_000, &m, noise, symbols(&sensor)).unwrap();
         }
+        let sources = [Stream::new(1).rng(), Stream::new(2).rng()];
+        scheme::deterministic(&sensor, &(), &sources, &points(&sensor)).unwrap();
     }
 }
 

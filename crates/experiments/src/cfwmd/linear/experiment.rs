@@ -5,7 +5,8 @@ use crate::cfwmd::rows::Record;
 use crate::cfwmd::setting::Linear;
 use crate::{Context, Error};
 use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::no_feedback::{ImputedBelief, JointBelief, LocalSensor, imputing, joint};
+use fewbits_cfwmd::no_feedback::{JointBelief, LocalSensor, joint};
+use fewbits_cfwmd::published::{ImputedBelief, fuse_received, imputing};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
@@ -220,9 +221,7 @@ where
             let received = observations.iter().filter(|o| o.received().is_some()).count();
             match method {
                 Method::Ignored => {
-                    belief = network
-                        .fuse_received(&kalman::predict(&self.dynamics, &belief), observations)?
-                        .0;
+                    belief = fuse_received(network, &kalman::predict(&self.dynamics, &belief), observations)?.0;
                 }
                 Method::Joint => {
                     gaussian = joint::step(network, &self.dynamics, &gaussian, observations)?.0;

@@ -3,8 +3,8 @@
 use super::experiment::{Experiment, Track};
 use crate::Error;
 use fewbits_cfwmd::censored::Censored;
+use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::rule::Weighing;
-use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_core::factor::{InCell, Scalar, Value};
 use fewbits_core::{Cell, Dynamics, Link, Observation, Observed, Scheme};
 use fewbits_densities::GaussianCloud;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// A bipartite graph of variables and functions.
 ///
 /// ```
-/// use fewbits_pf_mpa::graph::FactorGraph;
+/// use fewbits_pf_mpa::published::graph::FactorGraph;
 /// let mut graph = FactorGraph::new();
 /// let (a, b) = (graph.variable("a", 2)?, graph.variable("b", 3)?);
 /// graph.function("f", &[a], &[0.2, 0.8])?;

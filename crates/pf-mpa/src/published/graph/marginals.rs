@@ -106,7 +106,7 @@ fn normalised(mut message: Vec<f64>) -> Result<Vec<f64>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::Function;
+    use crate::published::graph::Function;
     use proptest::prelude::*;
 
     fn random(states: [usize; 5], values: &[f64]) -> FactorGraph {
@@ -166,6 +166,6 @@ mod tests {
         assert_eq!(enumerated(&graph), Err(Error::IMPOSSIBLE));
         graph.function("again", &[a, b], &[1.0; 4]).unwrap();
         assert!(graph.marginals().is_err());
-        assert!(crate::graph::example().unwrap().marginals().is_err());
+        assert!(crate::published::graph::example().unwrap().marginals().is_err());
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::error::refuse;
-use crate::message::KernelMessage;
 use crate::product;
+use crate::published::message::KernelMessage;
 use fewbits_densities::Mixture;
 use fewbits_numerics::kernels::{self, scalar, vectorised};
 use nalgebra::{Cholesky, Matrix2, Vector2};
@@ -306,7 +306,7 @@ fn exact<R: Rng + ?Sized>(rng: &mut R, messages: &[KernelMessage], out: &mut Dra
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::message::kernel_of;
+    use crate::published::message::kernel_of;
     use fewbits_densities::Component;
     use fewbits_monte_carlo::{Moments, Stream};
 

@@ -1,8 +1,8 @@
 //! The exact fusion centre without feedback: withheld measurements are imputed, the rest is Gaussian.
 
-use super::{advance, check};
 use crate::Error;
 use crate::network::{FusionInfo, Network};
+use crate::no_feedback::{advance, check};
 use crate::rule::{CensoringRule, OwnRecursion};
 use fewbits_core::{FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observation};
 use fewbits_densities::GaussianCloud;

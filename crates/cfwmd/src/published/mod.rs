@@ -1,0 +1,35 @@
+//! What the publications compare with: silence ignored, a random trigger, and withheld measurements imputed.
+
+pub mod imputing;
+pub mod trigger;
+
+pub use imputing::ImputedBelief;
+
+use crate::Error;
+use crate::network::{FusionInfo, Network};
+use fewbits_core::{Gaussian, LinearSensing, Observation};
+use fewbits_filters::kalman;
+use nalgebra::SVector;
+
+/// The baseline (the paper's CFoMD, and all-send and random censoring): a Kalman filter on what was received, to which silence says
+/// nothing.
+///
+/// # Errors
+/// [`Error::ObservationCount`]; if a value is not finite.
+pub fn fuse_received<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
+    network: &Network<S, D, M>,
+    predicted: &Gaussian<D>,
+    observations: &[Observation<SVector<f64, M>>],
+) -> Result<(Gaussian<D>, FusionInfo), Error> {
+    network.count(network.sensors().len(), observations.len())?;
+    let (mut belief, mut info) = (*predicted, FusionInfo::default());
+    for (sensor, observation) in network.sensors().iter().zip(observations) {
+        if let Observation::Received(value) = observation {
+            let (next, update) = kalman::update(sensor, &belief, value)?;
+            belief = next;
+            info.log_likelihood += update.log_likelihood;
+            info.received += 1;
+        }
+    }
+    Ok((belief, info))
+}

@@ -1,0 +1,22 @@
+//! Particle message passing as published and with its errata mended, to reproduce its tables. [`GridFilter`](crate::GridFilter) is better at a
+//! tenth of the cost.
+//!
+//! | part | item |
+//! |---|---|
+//! | Algorithm 6 | [`MessagePassing`] |
+//! | its messages, their kernels and weights | [`Ring`], [`RingWeight`], [`DynamicsWeight`], [`KernelRule`], [`RingBias`] |
+//! | draws from products of messages | [`ProductSampler`]; how far Gibbs chains of labels are from mixing, [`LabelChain`] |
+//! | factor graphs, sum-product over finite alphabets | [`graph`] |
+
+pub mod graph;
+mod labels;
+mod message;
+mod message_passing;
+mod product_sampler;
+mod ring;
+
+pub use labels::{LabelChain, ratio_second_moments};
+pub use message::{DynamicsWeight, KernelRule, Ring, RingWeight, kernel_error};
+pub use message_passing::{MessagePassing, MessageWorkspace};
+pub use product_sampler::ProductSampler;
+pub use ring::RingBias;
