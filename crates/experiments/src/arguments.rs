@@ -49,6 +49,20 @@ pub trait Argument {
     }
 }
 
+/// Parameters that `--quick` lowers, and that may depend on each other.
+pub trait Quick {
+    /// Reduces effort: the whole figure should then take about a second. The default changes nothing.
+    fn quicken(&mut self) {}
+
+    /// Refuses what is beyond the limits of the fields themselves. The default refuses nothing.
+    ///
+    /// # Errors
+    /// If a field does not fit the others.
+    fn check(&self) -> Result<(), Refusal> {
+        Ok(())
+    }
+}
+
 macro_rules! arguments {
     ($($type:ty)*) => {$(impl Argument for $type {})*};
 }

@@ -9,7 +9,7 @@
 
 use crate::measured::Measured;
 use crate::reference;
-use crate::table::Value;
+use crate::schema::Value;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::fmt;

@@ -1,6 +1,6 @@
 //! What a figure is, and how it is run.
 
-use crate::arguments::{self, Argument, Parameter, Refusal};
+use crate::arguments::{self, Argument, Parameter, Quick};
 use crate::claim::{Claim, Claims};
 use crate::error::Error;
 use crate::kept::Kept;
@@ -134,20 +134,6 @@ impl Cost {
         seconds: 86_400.0,
         bytes: 2e9,
     };
-}
-
-/// Parameters that `--quick` lowers, and that may depend on each other.
-pub trait Quick {
-    /// Reduces effort: the whole figure should then take about a second. The default changes nothing.
-    fn quicken(&mut self) {}
-
-    /// Refuses what is beyond the limits of the fields themselves. The default refuses nothing.
-    ///
-    /// # Errors
-    /// If a field does not fit the others.
-    fn check(&self) -> Result<(), Refusal> {
-        Ok(())
-    }
 }
 
 /// A figure or table of a publication, or one of our own: parameters in, rows out, and the claims they must meet.

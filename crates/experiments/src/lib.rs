@@ -41,15 +41,15 @@ mod words;
 
 #[doc(hidden)]
 pub use arguments::Limits;
-pub use arguments::{Argument, Parameter, Refusal, plain};
+pub use arguments::{Argument, Parameter, Quick, Refusal, plain};
 pub use claim::{Claim, Claims, Expected, Verdict};
 pub use error::Error;
-pub use figure::{About, AnyFigure, Context, Cost, Figure, Outcome, Quick};
+pub use figure::{About, AnyFigure, Context, Cost, Figure, Outcome};
 pub use kept::Kept;
 pub use measured::Measured;
-pub use schema::{Column, Fields};
+pub use schema::{Column, Fields, Value};
 pub use sweep::{Comparison, Tally};
-pub use table::{Table, Tables, Value};
+pub use table::{Table, Tables};
 
 /// Every figure and table, in the order of the publications.
 pub fn all() -> Vec<&'static dyn AnyFigure> {

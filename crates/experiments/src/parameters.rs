@@ -1,7 +1,6 @@
 //! From `--set name=value` to checked parameters.
 
-use crate::Quick;
-use crate::arguments::{self, Argument, Parameter, Refusal, plain};
+use crate::arguments::{self, Argument, Parameter, Quick, Refusal, plain};
 use crate::error::Error;
 use serde::Serialize;
 use serde::de::DeserializeOwned;

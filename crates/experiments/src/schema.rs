@@ -1,9 +1,9 @@
 //! What the fields of a row say about themselves: names, units and meanings of columns, and their cells.
 
 use crate::measured::Measured;
-use crate::table::Value;
 use serde::Serialize;
 use std::borrow::Cow;
+use std::fmt;
 
 /// A column: its name in the CSV header, its unit and what it holds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -30,6 +30,34 @@ impl Column {
 /// A documentation comment on one line.
 pub(crate) fn on_one_line(documentation: &str) -> String {
     documentation.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// One entry of a table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A number.
+    Number(f64),
+    /// A count or an index.
+    Integer(i64),
+    /// A label.
+    Text(String),
+    /// No value: an empty field.
+    Missing,
+}
+
+/// Numbers are written with the shortest digits that read back to the same bits.
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(x) if *x != 0.0 && !(1e-4..1e15).contains(&x.abs()) && x.is_finite() => write!(f, "{x:e}"),
+            // A negative zero is written as zero.
+            Self::Number(x) => write!(f, "{}", x + 0.0),
+            Self::Integer(i) => write!(f, "{i}"),
+            Self::Text(text) => f.write_str(text),
+            Self::Missing => Ok(()),
+        }
+    }
 }
 
 /// A table as its rows describe it.

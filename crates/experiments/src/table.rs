@@ -6,38 +6,9 @@
 //! must say so.
 
 use crate::error::Error;
-use crate::schema::{self, Cells, Column, Field, Fields};
+use crate::schema::{self, Cells, Column, Field, Fields, Value};
 use serde::Serialize;
 use std::borrow::Cow;
-use std::fmt;
-
-/// One entry of a table.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum Value {
-    /// A number.
-    Number(f64),
-    /// A count or an index.
-    Integer(i64),
-    /// A label.
-    Text(String),
-    /// No value: an empty field.
-    Missing,
-}
-
-/// Numbers are written with the shortest digits that read back to the same bits.
-impl fmt::Display for Value {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number(x) if *x != 0.0 && !(1e-4..1e15).contains(&x.abs()) && x.is_finite() => write!(f, "{x:e}"),
-            // A negative zero is written as zero.
-            Self::Number(x) => write!(f, "{}", x + 0.0),
-            Self::Integer(i) => write!(f, "{i}"),
-            Self::Text(text) => f.write_str(text),
-            Self::Missing => Ok(()),
-        }
-    }
-}
 
 /// Rows under named columns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
