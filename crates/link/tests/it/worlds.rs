@@ -122,7 +122,7 @@ fn over_udp(reports: Reports, steps: usize) {
     let asked = Asked::default();
     let threads = sensors(reports, relay, &stop, &asked);
     let (loss, count) = (1.0 - 0.94_f64.powi(2), reports.sensors());
-    let settings = settings(reports, 20_000_000, count as usize);
+    let settings = settings(reports, 30_000_000, count as usize);
     let mut station = Station::new(settings, receiver(reports, loss), peers(count), None).unwrap();
     // All sensors have said where they are before the first slot.
     let mut known = HashSet::new();
