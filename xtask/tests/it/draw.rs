@@ -103,7 +103,7 @@ fn what_has_no_place_on_an_axis_is_left_out() {
 
 #[test]
 fn text_is_at_least_seven_points_in_print_and_inside_the_picture() {
-    for (id, panels) in [("dymbo-fig4", 1), ("handoff-fig2", 2), ("assign-table6-1", 2)] {
+    for (id, panels) in [("dymbo-fig4", 1), ("handoff-fig2", 2), ("binary-fig5-6", 2)] {
         let figure = all().into_iter().find(|figure| figure.about().id == id).unwrap();
         let parameters = figure.configure(&[], true).unwrap();
         let plot = figure.produce(&parameters, &Context::new(1)).unwrap().plot;

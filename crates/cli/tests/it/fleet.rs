@@ -135,7 +135,7 @@ fn fleet_meets_over_zenoh() {
 fn sensor_with_another_key_is_not_heard() {
     let folder = tempfile::tempdir().unwrap();
     written(folder.path(), &free_place(), &key('c'));
-    let rows = rows(&run(folder.path(), "75"));
+    let rows = rows(&run(folder.path(), "50"));
     assert!(rows.iter().any(|(_, reports, _)| *reports == 1) && rows.iter().all(|(_, reports, _)| *reports < 2));
 }
 

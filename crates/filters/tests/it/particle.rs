@@ -149,7 +149,7 @@ fn the_likelihood_estimate_is_unbiased_for_every_law() {
         for resampling in Resampling::ALL {
             for schedule in [Schedule::Always, Schedule::Below(0.5)] {
                 let filter = ParticleFilter::new(resampling, schedule);
-                let ratio: Moments = (0..1500)
+                let ratio: Moments = (0..1000)
                     .map(|repeat| {
                         let stream = Stream::new(8).named("unbiased").indexed(repeat);
                         (run(&scene, kind, filter, 60, stream).1 - log_likelihood).exp()

@@ -221,7 +221,7 @@ fn one_step(entry: &Value) {
         found.extend(belief.covariance().iter());
         found
     };
-    check(entry, &found(601, 7.0));
+    check(entry, &found(201, 7.0));
     let expected = numbers(&entry["value"]);
     for (a, b) in found(31, 4.0)[1..5].iter().zip(&expected[1..5]) {
         assert!((a - b).abs() < 1e-4, "{}: grid of 31 {a}, exact {b}", entry["id"]);
@@ -343,7 +343,7 @@ fn one(entry: &Value) {
         }
         ["run", _, "ADF"] => {
             // The other program's grid ends at 4 deviations of the prediction, too: part of the definition of its numbers.
-            for nodes in [401, 501] {
+            for nodes in [121, 161] {
                 check(entry, &run(&GridFilter::new(nodes).unwrap(), input, Reports::Levels));
             }
         }

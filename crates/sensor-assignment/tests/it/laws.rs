@@ -12,8 +12,8 @@ fn variances() -> impl Strategy<Value = Vec<f64>> {
 }
 
 proptest! {
-    // One case in 6 of `PROPTEST_CASES`: they are dear.
-    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(6), ..ProptestConfig::default() })]
+    // One case in 16 of `PROPTEST_CASES`: they are dear.
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(16), ..ProptestConfig::default() })]
 
     #[test]
     fn enumeration_bounds_every_assignment(variances in variances(), half_width in 0.5f64..2.0) {
