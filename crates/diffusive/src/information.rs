@@ -4,6 +4,7 @@ use crate::{Error, SourceSensor};
 use fewbits_models::{Receptor, SourceModel};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, probabilities};
+use fewbits_numerics::kernels;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
@@ -61,16 +62,25 @@ impl Predictions {
     /// `-sum_i w_i ln sum_j w_j exp(-D_ij / 8)` and the same with `D_ij / 2`, `D_ij` the squared distance of predictions in noise
     /// standard deviations (Kolchinsky and Tracey 2017): bounds of the mutual information, nats.
     pub fn pairwise_bounds(&self) -> Bounds {
-        let points = self.means.transpose();
-        let count = self.weights.len();
-        let mut inner = [self.weights.clone(), self.weights.clone()];
-        for i in 0..count {
-            for j in 0..i {
-                let squared = (points.column(i) - points.column(j)).norm_squared();
-                for (sums, divisor) in inner.iter_mut().zip([8.0, 2.0]) {
-                    let overlap = (-squared / divisor).exp();
-                    sums[i] += self.weights[j] * overlap;
-                    sums[j] += self.weights[i] * overlap;
+        let weights = &self.weights;
+        let mut inner = [weights.clone(), weights.clone()];
+        let (mut exponents, mut overlaps) = (vec![0.0; weights.len()], vec![0.0; weights.len()]);
+        for i in 1..weights.len() {
+            let (exponents, overlaps) = (&mut exponents[..i], &mut overlaps[..i]);
+            exponents.fill(0.0);
+            for column in self.means.column_iter() {
+                let own = column[i];
+                for (exponent, other) in exponents.iter_mut().zip(column.iter()) {
+                    *exponent -= 0.125 * (own - other) * (own - other);
+                }
+            }
+            kernels::exp_minus(exponents, 0.0, overlaps);
+            for (j, eighth) in overlaps.iter().enumerate() {
+                // exp(-D / 2) is the fourth power of exp(-D / 8).
+                let half = (eighth * eighth) * (eighth * eighth);
+                for (sums, overlap) in inner.iter_mut().zip([*eighth, half]) {
+                    sums[i] += weights[j] * overlap;
+                    sums[j] += weights[i] * overlap;
                 }
             }
         }

@@ -5,6 +5,7 @@ use super::summary::{Summary, summaries};
 use crate::prelude::*;
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{Posterior, Rule, Selector, SourceSensor};
+use fewbits_numerics::kernels::exp_minus;
 use nalgebra::Vector2;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -227,7 +228,7 @@ fn rank(p: &Parameters, settings: &Settings, trial: Trial) -> Result<Option<Vec<
             .collect();
         let predictions = Predictions::new(&means, &weights, sensor.noise())?;
         let bounds = predictions.pairwise_bounds();
-        exact.push(reference.information(&sensor, place)?);
+        exact.push(reference.information(&sensor, place));
         scores[0].push(predictions.gaussian_bound());
         scores[1].push(bounds.lower);
         scores[2].push(bounds.upper);
@@ -311,30 +312,36 @@ impl<'a> Reference<'a> {
 
     /// Mutual information of (position, rate) and the samples of a node, nats: the mean of `ln p(y | position, rate) - ln p(y)`, with
     /// `p(y)` the sum over all cells, the rate in each integrated out as a normal of its mean and variance.
-    fn information(&self, sensor: &SourceSensor, place: &Vector2<f64>) -> Result<f64, Error> {
+    fn information(&self, sensor: &SourceSensor, place: &Vector2<f64>) -> f64 {
         let [x, y] = self.posterior.cells.columns();
         let weights = self.posterior.cells.weights();
+        let in_noise = |at: Vector2<f64>| -> Vec<f64> {
+            let responses = sensor.responses(place, &at);
+            responses.iter().map(|a| a / sensor.noise()).collect()
+        };
+        // What all draws share: responses at every cell, and the moments of its rate.
+        let predicted: Vec<Vec<f64>> = x.iter().zip(y).map(|(x, y)| in_noise(Vector2::new(*x, *y))).collect();
+        let rate = |i: usize| self.posterior.rates.as_ref().map_or((1.0, 0.0), |(m, v)| (m[i], v[i]));
+        let (mut logs, mut terms) = (vec![0.0; weights.len()], vec![0.0; weights.len()]);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        // `ln p(y | position, rate)` but for what does not depend on them.
+        let log = |rate: f64, response: f64, correlation: f64| rate * (correlation - 0.5 * rate * response);
         let mut total = 0.0;
         for draw in &self.draws {
-            let clean = sensor.responses(place, &draw.position);
-            let samples: Vec<f64> = clean
-                .iter()
-                .zip(&draw.noise)
-                .map(|(a, e)| draw.rate * a + sensor.noise() * e + sensor.bias())
-                .collect();
-            let record = sensor.record(place, &samples)?;
-            let own = record.sums(&draw.position).log_given_rate(draw.rate);
-            let mut ratio = 0.0;
-            for (i, weight) in weights.iter().enumerate() {
-                let sums = record.sums(&Vector2::new(x[i], y[i]));
-                let (mean, variance) = self.posterior.rates.as_ref().map_or((1.0, 0.0), |(m, v)| (m[i], v[i]));
-                let spread = 1.0 + variance * sums.response;
-                let residual = sums.correlation - mean * sums.response;
-                let gain = 0.5 * residual * residual * variance / spread - 0.5 * spread.ln();
-                ratio += weight * (sums.log_given_rate(mean) + gain - own).exp();
+            let clean = in_noise(draw.position);
+            let samples: Vec<f64> = clean.iter().zip(&draw.noise).map(|(a, e)| draw.rate * a + e).collect();
+            let own = log(draw.rate, dot(&clean, &clean), dot(&clean, &samples));
+            for (i, (sum, predicted)) in logs.iter_mut().zip(&predicted).enumerate() {
+                let (response, correlation) = (dot(predicted, predicted), dot(predicted, &samples));
+                let (mean, variance) = rate(i);
+                let spread = 1.0 + variance * response;
+                let residual = correlation - mean * response;
+                *sum = log(mean, response, correlation) + 0.5 * residual * residual * variance / spread
+                    - 0.5 * spread.ln();
             }
-            total -= ratio.ln();
+            exp_minus(&logs, own, &mut terms);
+            total -= dot(weights, &terms).ln();
         }
-        Ok(total / self.draws.len() as f64)
+        total / self.draws.len() as f64
     }
 }

@@ -3,6 +3,7 @@
 use crate::Error;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 /// Coefficients of each polynomial: degree 9.
 const ORDER: usize = 10;
@@ -30,12 +31,15 @@ impl<const K: usize> Profile<K> {
         positive("width", width)?;
         let panels = at_least_one("panels", (end / width).ceil() as usize)?;
         let width = end / panels as f64;
-        let to_monomials = to_monomials();
+        // Both by cosines: once for all tables.
+        static NODES: LazyLock<[f64; ORDER]> = LazyLock::new(|| std::array::from_fn(node));
+        static TO_MONOMIALS: LazyLock<[[f64; ORDER]; ORDER]> = LazyLock::new(to_monomials);
+        let (nodes, to_monomials) = (&*NODES, &*TO_MONOMIALS);
         let mut coefficients = Vec::with_capacity(panels);
         for panel in 0..panels {
             let mut values = [[0.0; ORDER]; K];
-            for i in 0..ORDER {
-                let r = width * (panel as f64 + 0.5 * (1.0 + node(i)));
+            for (i, node) in nodes.iter().enumerate() {
+                let r = width * (panel as f64 + 0.5 * (1.0 + node));
                 for (component, value) in values.iter_mut().zip(f(r)) {
                     if !value.is_finite() {
                         return refuse("f", format!("{value} at {r}"), "a finite number");
@@ -43,9 +47,13 @@ impl<const K: usize> Profile<K> {
                     component[i] = value;
                 }
             }
-            coefficients.push(values.map(|component| {
-                std::array::from_fn(|power| (0..ORDER).map(|i| to_monomials[power][i] * component[i]).sum())
-            }));
+            let mut polynomials = [[0.0; ORDER]; K];
+            for (polynomial, component) in polynomials.iter_mut().zip(&values) {
+                for (coefficient, row) in polynomial.iter_mut().zip(to_monomials) {
+                    *coefficient = row.iter().zip(component).map(|(share, value)| share * value).sum();
+                }
+            }
+            coefficients.push(polynomials);
         }
         Ok(Self {
             coefficients,
@@ -65,7 +73,15 @@ impl<const K: usize> Profile<K> {
         let position = (r * self.scale).max(0.0);
         let panel = (position as usize).min(self.coefficients.len() - 1);
         let x = (2.0 * (position - panel as f64) - 1.0).min(1.0);
-        self.coefficients[panel].map(|c| c.iter().rev().fold(0.0, |sum, c| sum * x + c))
+        // By reference: a `map` would copy the coefficients.
+        let polynomials = &self.coefficients[panel];
+        let mut sums = [0.0; K];
+        for power in (0..ORDER).rev() {
+            for (sum, polynomial) in sums.iter_mut().zip(polynomials) {
+                *sum = *sum * x + polynomial[power];
+            }
+        }
+        sums
     }
 }
 

@@ -56,7 +56,39 @@ pub fn multi_indices<const D: usize>(degree: usize) -> Result<Vec<[usize; D]>, E
 /// If the sum of `nu` exceeds 20.
 pub fn hermite<const D: usize>(nu: [usize; D], z: &SVector<f64, D>, w: &SMatrix<f64, D, D>) -> Result<f64, Error> {
     check_degree(nu.iter().sum())?;
-    Ok(polynomial_of(nu, w).at(z))
+    // Every index up to `nu`, the last entry running fastest: those below an index stand before it.
+    let mut strides = [1; D];
+    for d in (1..D).rev() {
+        strides[d - 1] = strides[d] * (nu[d] + 1);
+    }
+    let count = (0..D).map(|d| nu[d] + 1).product();
+    let mut values = Vec::with_capacity(count);
+    let mut index = [0; D];
+    for n in 0..count {
+        let value = match index.iter().position(|k| *k > 0) {
+            None => 1.0,
+            Some(i) => {
+                let below = n - strides[i];
+                let mut sum = z[i] * values[below];
+                for j in 0..D {
+                    let times = index[j] - usize::from(i == j);
+                    if times > 0 {
+                        sum -= w[(i, j)] * times as f64 * values[below - strides[j]];
+                    }
+                }
+                sum
+            }
+        };
+        values.push(value);
+        for d in (0..D).rev() {
+            index[d] += 1;
+            if index[d] <= nu[d] {
+                break;
+            }
+            index[d] = 0;
+        }
+    }
+    Ok(values[count - 1])
 }
 
 /// `He_nu(z; W)` as a polynomial in `z`: exponents and coefficients, by descending degree. The symbolic form of Table I.
@@ -65,27 +97,13 @@ pub fn hermite<const D: usize>(nu: [usize; D], z: &SVector<f64, D>, w: &SMatrix<
 /// If the sum of `nu` exceeds 20.
 pub fn hermite_terms<const D: usize>(nu: [usize; D], w: &SMatrix<f64, D, D>) -> Result<Vec<([usize; D], f64)>, Error> {
     check_degree(nu.iter().sum())?;
-    let mut terms: Vec<_> = polynomial_of(nu, w).terms.into_iter().filter(|t| t.1 != 0.0).collect();
+    let mut terms: Vec<_> = polynomial_of(nu, w).into_iter().filter(|t| t.1 != 0.0).collect();
     terms.sort_by_key(|(powers, _)| std::cmp::Reverse((powers.iter().sum::<usize>(), *powers)));
     Ok(terms)
 }
 
-#[derive(Clone)]
-struct Polynomial<const D: usize> {
-    terms: HashMap<[usize; D], f64>,
-}
-
-impl<const D: usize> Polynomial<D> {
-    fn at(&self, z: &SVector<f64, D>) -> f64 {
-        let mut terms: Vec<_> = self.terms.iter().collect();
-        // The order of a hash map is not the same in every run.
-        terms.sort_by(|a, b| a.0.cmp(b.0));
-        terms
-            .iter()
-            .map(|(index, c)| **c * (0..D).map(|d| z[d].powi(index[d] as i32)).product::<f64>())
-            .sum()
-    }
-}
+/// Coefficients by exponents.
+type Polynomial<const D: usize> = HashMap<[usize; D], f64>;
 
 fn polynomial_of<const D: usize>(nu: [usize; D], w: &SMatrix<f64, D, D>) -> Polynomial<D> {
     fn step<const D: usize>(
@@ -97,25 +115,23 @@ fn polynomial_of<const D: usize>(nu: [usize; D], w: &SMatrix<f64, D, D>) -> Poly
             return polynomial.clone();
         }
         let Some(i) = nu.iter().position(|n| *n > 0) else {
-            return Polynomial {
-                terms: [([0; D], 1.0)].into(),
-            };
+            return [([0; D], 1.0)].into();
         };
         let mut below = nu;
         below[i] -= 1;
-        let mut sum = Polynomial { terms: HashMap::new() };
-        for (index, c) in step(below, w, known).terms {
+        let mut sum = Polynomial::new();
+        for (index, c) in step(below, w, known) {
             let mut raised = index;
             raised[i] += 1;
-            *sum.terms.entry(raised).or_insert(0.0) += c;
+            *sum.entry(raised).or_insert(0.0) += c;
         }
         for j in 0..D {
             if below[j] > 0 {
                 let mut lower = below;
                 lower[j] -= 1;
                 let factor = w[(i, j)] * below[j] as f64;
-                for (index, c) in step(lower, w, known).terms {
-                    *sum.terms.entry(index).or_insert(0.0) -= factor * c;
+                for (index, c) in step(lower, w, known) {
+                    *sum.entry(index).or_insert(0.0) -= factor * c;
                 }
             }
         }

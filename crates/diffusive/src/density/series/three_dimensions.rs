@@ -1,6 +1,6 @@
 //! Polynomial Gaussians over a plane and one more coordinate, beside beliefs that are cells over the plane.
 
-use super::basis::{gauss_hermite, row_of_polynomials};
+use super::basis::{LANES, gauss_hermite, row_of_polynomials, sums_of_polynomials};
 use super::fit::LpgFit;
 use super::polynomials::HIGHEST_DEGREE;
 use super::{Lpg, Term};
@@ -188,7 +188,6 @@ impl Slice {
         stretches.sort_by(|a, b| a.from.total_cmp(&b.from));
         let origin = none.mean;
         let (mut mass, mut first, mut second) = (0.0, 0.0, 0.0);
-        let mut row = [0.0; HIGHEST_DEGREE + 1];
         let mut rest = stretches.as_slice();
         while let Some((head, tail)) = rest.split_first() {
             // Stretches that overlap are integrated as one.
@@ -201,13 +200,24 @@ impl Slice {
             }
             rest = others;
             let panels = (((whole.to - whole.from) / whole.step).ceil() as usize).clamp(LEAST_PANELS, MOST_PANELS);
-            for (t, weight) in gauss_legendre::<8>().panels(whole.from, whole.to, panels) {
-                let root = self.root(t, 0.5 * (likelihood(t) - peak), &mut row[..=self.degree]);
-                let share = weight * root * root;
-                let d = t - origin;
-                mass += share;
-                first += share * d;
-                second += share * d * d;
+            let mut nodes = gauss_legendre::<LANES>().panels(whole.from, whole.to, panels);
+            while let Some(node) = nodes.next() {
+                // One panel.
+                let panel: [_; LANES] = std::array::from_fn(|i| {
+                    if i == 0 {
+                        node
+                    } else {
+                        nodes.next().unwrap_or((node.0, 0.0))
+                    }
+                });
+                let roots = self.roots(&panel.map(|(t, _)| t), |t| 0.5 * (likelihood(t) - peak));
+                for ((t, weight), root) in panel.into_iter().zip(roots) {
+                    let share = weight * root * root;
+                    let d = t - origin;
+                    mass += share;
+                    first += share * d;
+                    second += share * d * d;
+                }
             }
         }
         if !(mass > 0.0 && mass.is_finite()) {
@@ -221,25 +231,25 @@ impl Slice {
         }
     }
 
-    /// `s(t) exp(log)`.
-    fn root(&self, t: f64, log: f64, row: &mut [f64]) -> f64 {
-        let mut sum = 0.0;
+    /// `s(t) exp(log(t))`.
+    fn roots(&self, t: &[f64; LANES], log: impl Fn(f64) -> f64) -> [f64; LANES] {
+        let mut sums = [0.0; LANES];
+        let logs = t.map(log);
         for term in &self.terms {
-            let u = (t - term.centre) / term.deviation;
-            let exponent = term.height - 0.25 * u * u + log;
-            if exponent < -FAINT {
+            let u = t.map(|t| (t - term.centre) / term.deviation);
+            let exponents: [f64; LANES] =
+                std::array::from_fn(|lane| term.height - 0.25 * u[lane] * u[lane] + logs[lane]);
+            if exponents.iter().all(|exponent| *exponent < -FAINT) {
                 continue;
             }
-            row_of_polynomials(u, row);
-            let parts = row.iter().zip(&term.coefficients);
-            let polynomial: f64 = if self.absolute {
-                parts.map(|(h, c)| (h * c).abs()).sum()
-            } else {
-                parts.map(|(h, c)| h * c).sum()
-            };
-            sum += polynomial * exponent.exp();
+            let polynomials = sums_of_polynomials(&u, &term.coefficients[..=self.degree], self.absolute);
+            for lane in 0..LANES {
+                if exponents[lane] >= -FAINT {
+                    sums[lane] += polynomials[lane] * exponents[lane].exp();
+                }
+            }
         }
-        sum
+        sums
     }
 }
 
