@@ -228,3 +228,29 @@ pub fn plain(value: &Json) -> String {
         other => other.to_string(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_numbers() {
+        fn check(id: &str, parameter: &Parameter) -> usize {
+            let limits = &parameter.limits;
+            let (least, most) = limits.length.unwrap_or_default();
+            let written = [limits.low, limits.high, least, most].into_iter().flatten();
+            let own = written.map(|limit| {
+                assert!(number(Some(limit)).is_some_and(|x| !x.is_nan()), "{id} {}: {limit}", parameter.name);
+            });
+            own.count() + parameter.points.iter().map(|point| check(id, point)).sum::<usize>()
+        }
+        let read = |figure: &dyn crate::figure::AnyFigure| {
+            figure
+                .parameters()
+                .iter()
+                .map(|p| check(figure.about().id, p))
+                .sum::<usize>()
+        };
+        assert!(crate::all().into_iter().map(read).sum::<usize>() > 400);
+    }
+}

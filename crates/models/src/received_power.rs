@@ -4,6 +4,7 @@ use crate::Error;
 use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, Sensing};
 use fewbits_numerics::error::{finite, positive, refuse};
+use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::stored;
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
 use rand::Rng;
@@ -137,9 +138,14 @@ impl<const D: usize> ReceivedPower<D> {
         };
         // The inverse square law needs no power function and vectorises.
         if self.exponent == 2.0 {
-            for (i, amplitude) in amplitudes.iter_mut().enumerate() {
-                *amplitude = (self.power / (1.0 + self.attenuation * squared(i))).sqrt();
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (i, amplitude) in amplitudes.iter_mut().enumerate() {
+                        *amplitude = (self.power / (1.0 + self.attenuation * squared(i))).sqrt();
+                    }
+                },
+            );
         } else {
             for (i, amplitude) in amplitudes.iter_mut().enumerate() {
                 *amplitude = self.amplitude(squared(i));

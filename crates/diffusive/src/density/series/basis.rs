@@ -63,7 +63,7 @@ pub(super) fn row_of_polynomials(x: f64, row: &mut [f64]) {
 pub(super) const LANES: usize = 8;
 
 /// `sum_n c_n he_n(x) / sqrt(n!)` at each point, or of the absolute values of these terms.
-#[inline]
+#[inline(always)]
 pub(super) fn sums_of_polynomials(x: &[f64; LANES], coefficients: &[f64], absolute: bool) -> [f64; LANES] {
     let (mut before, mut now, mut sums) = ([0.0; LANES], [1.0; LANES], [0.0; LANES]);
     for (n, c) in coefficients.iter().enumerate() {

@@ -8,6 +8,7 @@ use crate::density::{Cells, Error};
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
 use fewbits_numerics::error::refuse;
+use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{DVector, Vector2, Vector3};
 
@@ -210,7 +211,11 @@ impl Slice {
                         nodes.next().unwrap_or((node.0, 0.0))
                     }
                 });
-                let roots = self.roots(&panel.map(|(t, _)| t), |t| 0.5 * (likelihood(t) - peak));
+                let (at, logs) = (panel.map(|(t, _)| t), panel.map(|(t, _)| 0.5 * (likelihood(t) - peak)));
+                let roots = vectorised(
+                    #[inline(always)]
+                    || self.roots(&at, &logs),
+                );
                 for ((t, weight), root) in panel.into_iter().zip(roots) {
                     let share = weight * root * root;
                     let d = t - origin;
@@ -231,10 +236,10 @@ impl Slice {
         }
     }
 
-    /// `s(t) exp(log(t))`.
-    fn roots(&self, t: &[f64; LANES], log: impl Fn(f64) -> f64) -> [f64; LANES] {
+    /// `s(t) exp(log)`.
+    #[inline(always)]
+    fn roots(&self, t: &[f64; LANES], logs: &[f64; LANES]) -> [f64; LANES] {
         let mut sums = [0.0; LANES];
-        let logs = t.map(log);
         for term in &self.terms {
             let u = t.map(|t| (t - term.centre) / term.deviation);
             let exponents: [f64; LANES] =
