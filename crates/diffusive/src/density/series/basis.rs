@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, SVector};
 const ROOTS: [f64; HIGHEST_DEGREE + 2] = [
     0.0,
     1.0,
-    1.414_213_562_373_095_1,
+    std::f64::consts::SQRT_2,
     1.732_050_807_568_877_2,
     2.0,
     2.236_067_977_499_79,
