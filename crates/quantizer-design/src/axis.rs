@@ -25,7 +25,7 @@ pub(crate) fn slice(values: &[f64], axis: Axis, blocks: usize, rows: usize, bloc
 
 /// `out(m) = (N - missing) sum_t c_t worth(m + e_t)` along the group's axis.
 pub(crate) fn reduce(worth: &[f64], axis: Axis, compositions: &Compositions, missing: usize, c: &[f64]) -> Vec<f64> {
-    let sensors = (compositions.total() - missing) as f64;
+    let sensors = (compositions.total - missing) as f64;
     let (above, below) = (compositions.len_below(missing), compositions.len_below(missing + 1));
     let mut out = vec![0.0; axis.outer * below * axis.inner];
     for (o, block) in out.chunks_exact_mut(below * axis.inner).enumerate() {
@@ -49,7 +49,7 @@ pub(crate) fn reduce(worth: &[f64], axis: Axis, compositions: &Compositions, mis
 
 /// The transpose of [`reduce`]: `out(m + e_t) += N c_t moved(m)`.
 pub(crate) fn scatter(moved: &[f64], axis: Axis, compositions: &Compositions, c: &[f64]) -> Vec<f64> {
-    let sensors = compositions.total() as f64;
+    let sensors = compositions.total as f64;
     let (above, below) = (compositions.len(), compositions.len_below(1));
     let mut out = vec![0.0; axis.outer * above * axis.inner];
     for o in 0..axis.outer {

@@ -14,46 +14,38 @@ pub(crate) fn count(total: usize, parts: usize) -> u64 {
     }
 }
 
-/// All count vectors of `0..=total` reports, level by level, in decreasing lexicographic order.
+/// The count vectors of `total` reports, in decreasing lexicographic order, and those of fewer reports from which they come.
 #[derive(Debug, Clone)]
 pub(crate) struct Compositions {
-    total: usize,
-    parts: usize,
-    /// `up[m][r * parts + t]`: rank at level `m + 1` of vector `r` of level `m` with one more report of `t`.
+    pub(crate) total: usize,
+    pub(crate) parts: usize,
+    pub(crate) vectors: Vec<Vec<usize>>,
+    /// Log multinomial coefficients.
+    pub(crate) log_multiplicity: Vec<f64>,
+    /// `up[m][r * parts + t]`: rank among vectors of `m + 1` reports of vector `r` of `m` reports with one more report of `t`.
     up: Vec<Vec<usize>>,
+    /// How the probabilities of `m + 1` reports follow from those of `m`.
     steps: Vec<Vec<Step>>,
-    /// Log multinomial coefficients of the top level.
-    log_multiplicity: Vec<f64>,
-    /// The top level's vectors.
-    vectors: Vec<Vec<usize>>,
 }
 
 impl Compositions {
     pub(crate) fn new(total: usize, parts: usize) -> Self {
-        let mut up = Vec::with_capacity(total);
-        let mut steps = Vec::with_capacity(total);
+        let (mut up, mut steps) = (Vec::with_capacity(total), Vec::with_capacity(total));
         let mut vectors = vec![vec![0; parts]];
         for m in 0..total {
-            let mut ranks = Vec::with_capacity(vectors.len() * parts);
-            let mut next = vec![Vec::new(); count(m + 1, parts) as usize];
-            let mut step = vec![Step::default(); next.len()];
-            for (from, vector) in vectors.iter().enumerate() {
-                for t in 0..parts {
-                    let mut raised = vector.clone();
-                    raised[t] += 1;
-                    let at = rank(&raised);
-                    ranks.push(at);
-                    step[at] = Step {
-                        from,
-                        symbol: t,
-                        factor: (m + 1) as f64 / raised[t] as f64,
-                    };
-                    next[at] = raised;
-                }
-            }
-            up.push(ranks);
-            steps.push(step);
-            vectors = next;
+            let raised = |v: &Vec<usize>, t: usize| {
+                let mut raised = v.clone();
+                raised[t] += 1;
+                rank(&raised)
+            };
+            up.push(
+                vectors
+                    .iter()
+                    .flat_map(|v| (0..parts).map(move |t| raised(v, t)))
+                    .collect(),
+            );
+            vectors = vectors_of(m + 1, parts);
+            steps.push(vectors.iter().map(|v| Step::to(v, m + 1)).collect());
         }
         let ln_factorial = |n: usize| (2..=n).map(|i| (i as f64).ln()).sum::<f64>();
         let log_multiplicity = vectors
@@ -63,22 +55,14 @@ impl Compositions {
         Self {
             total,
             parts,
+            vectors,
+            log_multiplicity,
             up,
             steps,
-            log_multiplicity,
-            vectors,
         }
     }
 
-    pub(crate) fn total(&self) -> usize {
-        self.total
-    }
-
-    pub(crate) fn parts(&self) -> usize {
-        self.parts
-    }
-
-    /// Number of vectors of the top level.
+    /// Number of vectors.
     pub(crate) fn len(&self) -> usize {
         self.vectors.len()
     }
@@ -93,18 +77,9 @@ impl Compositions {
         &self.up[self.total - missing]
     }
 
-    pub(crate) fn log_multiplicity(&self) -> &[f64] {
-        &self.log_multiplicity
-    }
-
-    /// The top level's vectors, in order of rank.
-    pub(crate) fn vectors(&self) -> &[Vec<usize>] {
-        &self.vectors
-    }
-
     /// Multinomial probabilities at every node; `symbol[t * nodes + i]` is the probability of symbol `t` at node `i`.
     ///
-    /// From `R_m(n) = (m / n_t) P_t R_{m-1}(n - e_t)`, any `t` that occurs. Returns the tables of `total`, `total - 1` and
+    /// From `R_m(n) = (m / n_t) P_t R_{m-1}(n - e_t)`, the first `t` that occurs. Returns the tables of `total`, `total - 1` and
     /// `total - 2` reports, the last two as far as they exist.
     pub(crate) fn probabilities(&self, symbol: &[f64], nodes: usize) -> Vec<Vec<f64>> {
         let mut levels = vec![vec![1.0; nodes]];
@@ -127,11 +102,39 @@ impl Compositions {
 }
 
 /// One step of the recursion from `m - 1` reports to `m`.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Step {
     from: usize,
     symbol: usize,
     factor: f64,
+}
+
+impl Step {
+    fn to(vector: &[usize], reports: usize) -> Self {
+        let symbol = vector.iter().position(|n| *n > 0).unwrap_or(0);
+        let mut before = vector.to_vec();
+        before[symbol] -= 1;
+        Self {
+            from: rank(&before),
+            symbol,
+            factor: reports as f64 / vector[symbol] as f64,
+        }
+    }
+}
+
+/// All count vectors of so many reports.
+fn vectors_of(total: usize, parts: usize) -> Vec<Vec<usize>> {
+    let mut vector = vec![0; parts];
+    vector[0] = total;
+    let mut all = vec![vector.clone()];
+    // The next one has one report less at the last place before the end that has any; it and those of the end follow behind.
+    while let Some(i) = (0..parts - 1).rev().find(|i| vector[*i] > 0) {
+        let end = std::mem::take(&mut vector[parts - 1]);
+        vector[i] -= 1;
+        vector[i + 1] = end + 1;
+        all.push(vector.clone());
+    }
+    all
 }
 
 /// Position of a count vector among those of its sum and length, in decreasing lexicographic order.
@@ -156,12 +159,12 @@ mod tests {
     fn ranks_number_the_vectors_in_order() {
         let all = Compositions::new(4, 3);
         assert_eq!(all.len(), 15);
-        for (i, v) in all.vectors().iter().enumerate() {
+        for (i, v) in all.vectors.iter().enumerate() {
             assert_eq!(rank(v), i);
             assert_eq!(v.iter().sum::<usize>(), 4);
         }
-        assert!(all.vectors().windows(2).all(|w| w[0] > w[1]));
-        let sum: f64 = all.log_multiplicity().iter().map(|l| l.exp()).sum();
+        assert!(all.vectors.windows(2).all(|w| w[0] > w[1]));
+        let sum: f64 = all.log_multiplicity.iter().map(|l| l.exp()).sum();
         assert!((sum - 81.0).abs() < 1e-9);
     }
 
@@ -171,7 +174,7 @@ mod tests {
         let p = [0.2, 0.3, 0.5];
         let levels = all.probabilities(&p, 1);
         assert_eq!(levels.iter().map(Vec::len).collect::<Vec<_>>(), [21, 15, 10]);
-        for ((v, q), l) in all.vectors().iter().zip(&levels[0]).zip(all.log_multiplicity()) {
+        for ((v, q), l) in all.vectors.iter().zip(&levels[0]).zip(&all.log_multiplicity) {
             let direct: f64 = v.iter().zip(&p).map(|(n, p)| p.powi(*n as i32)).product();
             assert!((q - l.exp() * direct).abs() < 1e-15);
         }

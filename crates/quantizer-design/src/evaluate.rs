@@ -3,6 +3,7 @@
 use crate::criterion::Criterion;
 use crate::derivatives::Derivatives;
 use crate::error::Error;
+use crate::newton::Objective;
 use crate::problem::Problem;
 use crate::system::System;
 

@@ -20,15 +20,6 @@ pub(crate) struct Active<'a> {
     pub(crate) exchange: Vec<Vec<f64>>,
 }
 
-/// One sensor's symbol probabilities (a row a symbol), and how breakpoints move them.
-#[derive(Debug, Default)]
-pub(crate) struct SensorLaw<'a> {
-    pub(crate) symbols: Vec<f64>,
-    pub(crate) densities: Vec<Vec<f64>>,
-    pub(crate) slopes: Vec<Vec<f64>>,
-    pub(crate) exchange: &'a [Vec<f64>],
-}
-
 /// Factors of the node sums of one group at given breakpoints.
 pub(crate) struct Slots {
     /// Report probabilities of all sensors of the group, of all but one, and of all but two.
@@ -66,24 +57,20 @@ impl<'a> Active<'a> {
         self.exchange.len()
     }
 
+    /// The breakpoints as they are in the system.
+    pub(crate) fn breakpoints(&self) -> &'a [f64] {
+        self.group.quantizer().breakpoints()
+    }
+
     /// Probability of each cell at each node.
     pub(crate) fn cells(&self, b: &[f64]) -> Vec<Vec<f64>> {
-        (0..=b.len())
-            .map(|cell| {
-                let lower = if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
-                let upper = b.get(cell).copied().unwrap_or(f64::INFINITY);
-                let standardised = |edge: f64| self.means.iter().map(move |m| (edge - m) / self.deviation).collect();
-                let (mut inside, upper): (Vec<f64>, Vec<f64>) = (standardised(lower), standardised(upper));
-                kernels::interval(&mut inside, &upper);
-                inside
-            })
-            .collect()
+        cell_probabilities(&self.means, self.deviation, b)
     }
 
     /// Probability of each received symbol at each node.
     pub(crate) fn symbols(&self, b: &[f64]) -> Vec<f64> {
         let nodes = self.means.len();
-        let mut symbols = vec![0.0; self.compositions.parts() * nodes];
+        let mut symbols = vec![0.0; self.compositions.parts * nodes];
         for (cell, column) in self.cells(b).iter().enumerate() {
             for (t, row) in symbols.chunks_exact_mut(nodes).enumerate() {
                 let p = self.group.cell_transition(t, cell);
@@ -99,7 +86,7 @@ impl<'a> Active<'a> {
     fn log_symbols(&self, b: &[f64]) -> Vec<Vec<f64>> {
         let edge = |i: usize| b.get(i).copied().unwrap_or(f64::INFINITY);
         let lower = |cell: usize| if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
-        (0..self.compositions.parts())
+        (0..self.compositions.parts)
             .map(|t| {
                 let law = |m: &f64| {
                     let cells = (0..=b.len()).map(|cell| {
@@ -143,7 +130,7 @@ impl<'a> Active<'a> {
         let mut levels = self.compositions.probabilities(symbols, nodes).into_iter();
         let reports = [(); 3].map(|()| Table::new(levels.next().unwrap_or_default(), nodes));
         let mut pairs = Vec::new();
-        if self.compositions.total() >= 2 {
+        if self.compositions.total >= 2 {
             for (i, p) in densities.iter().enumerate() {
                 for q in &densities[i..] {
                     pairs.extend(p.iter().zip(q).map(|(x, y)| x * y));
@@ -157,6 +144,21 @@ impl<'a> Active<'a> {
             pairs: Table::new(pairs, nodes),
         }
     }
+}
+
+/// Probability of each cell between breakpoints for normal samples of these means, a list per cell.
+pub(crate) fn cell_probabilities(means: &[f64], deviation: f64, breakpoints: &[f64]) -> Vec<Vec<f64>> {
+    let standardised = |edge: f64| -> Vec<f64> { means.iter().map(|m| (edge - m) / deviation).collect() };
+    let mut lower = standardised(f64::NEG_INFINITY);
+    let edges = breakpoints.iter().copied().chain([f64::INFINITY]);
+    edges
+        .map(|edge| {
+            let upper = standardised(edge);
+            let mut inside = std::mem::replace(&mut lower, upper.clone());
+            kernels::interval(&mut inside, &upper);
+            inside
+        })
+        .collect()
 }
 
 /// `sum_node mass sum_t P_t ln P_t` of one sensor.
@@ -186,8 +188,8 @@ impl Reports {
         let mut log_multiplicity = vec![0.0];
         for index in 0..system.groups().len() {
             let entry = Active::new(system, index)?;
-            tables.push(entry.reports(entry.group.quantizer().breakpoints()).0);
-            log_multiplicity = sums(&log_multiplicity, entry.compositions.log_multiplicity());
+            tables.push(entry.reports(entry.breakpoints()).0);
+            log_multiplicity = sums(&log_multiplicity, &entry.compositions.log_multiplicity);
         }
         Ok(Self {
             tables,
@@ -201,6 +203,15 @@ impl Reports {
     }
 }
 
+/// Symbol probabilities at the nodes of a sensor of each group.
+pub(crate) fn symbol_tables(system: &System) -> Result<Vec<Table>, Error> {
+    let of = |g| {
+        let entry = Active::new(system, g)?;
+        Ok(Table::new(entry.symbols(entry.breakpoints()), entry.means.len()))
+    };
+    (0..system.groups().len()).map(of).collect()
+}
+
 /// `ln P(outcome | x_k)` for every joint outcome, outcomes by values: digits where the probabilities themselves underflow.
 pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
     system.check_outcomes()?;
@@ -209,12 +220,12 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
     let mut joint = vec![vec![0.0; nodes]];
     for index in 0..system.groups().len() {
         let entry = Active::new(system, index)?;
-        let symbols = entry.log_symbols(entry.group.quantizer().breakpoints());
+        let symbols = entry.log_symbols(entry.breakpoints());
         let rows: Vec<Vec<f64>> = entry
             .compositions
-            .vectors()
+            .vectors
             .iter()
-            .zip(entry.compositions.log_multiplicity())
+            .zip(&entry.compositions.log_multiplicity)
             .map(|(counts, multiplicity)| {
                 let mut row = vec![*multiplicity; nodes];
                 for (n, symbol) in counts.iter().zip(&symbols).filter(|(n, _)| **n > 0) {
@@ -223,10 +234,8 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
                 row
             })
             .collect();
-        joint = joint
-            .iter()
-            .flat_map(|a| rows.iter().map(move |b| sums_of(a, b)))
-            .collect();
+        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x + y).collect();
+        joint = joint.iter().flat_map(|a| rows.iter().map(move |b| sum(a, b))).collect();
     }
     let mut out = Vec::with_capacity(joint.len() * model.values.len());
     for row in &joint {
@@ -237,10 +246,6 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
         }
     }
     Ok(out)
-}
-
-fn sums_of(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(x, y)| x + y).collect()
 }
 
 /// All sums of an entry of `a` and an entry of `b`, the latter running faster.

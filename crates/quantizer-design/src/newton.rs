@@ -3,7 +3,7 @@
 use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
 use crate::error::Error;
-use fewbits_numerics::stored;
+use fewbits_numerics::error::{at_least_one, non_negative, positive};
 use nalgebra::{DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
@@ -48,8 +48,7 @@ impl Certificate {
 }
 
 /// What Newton's method does at a saddle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AtSaddle {
     /// Steps off along the direction of ascent and goes on. Without this a symmetric start stays symmetric.
     #[default]
@@ -59,8 +58,7 @@ pub enum AtSaddle {
 }
 
 /// Stopping and safeguards of a Newton design.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredNewton")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Newton {
     /// Most iterations, escapes from saddles included.
     pub max_iterations: usize,
@@ -71,16 +69,6 @@ pub struct Newton {
     /// What to do on arriving at a saddle.
     pub at_saddle: AtSaddle,
 }
-
-stored! { Newton as StoredNewton {
-    max_iterations: usize,
-    tolerance: f64,
-    max_step: f64,
-    at_saddle: AtSaddle,
-} => {
-    let newton = Newton { max_iterations, tolerance, max_step, at_saddle };
-    newton.check().map(|()| newton)
-}, Error }
 
 impl Default for Newton {
     fn default() -> Self {
@@ -95,10 +83,10 @@ impl Default for Newton {
 
 impl Newton {
     /// Refuses settings with which no design could end.
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        fewbits_numerics::error::at_least_one("max_iterations", self.max_iterations)?;
-        fewbits_numerics::error::non_negative("tolerance", self.tolerance)?;
-        fewbits_numerics::error::positive("max_step", self.max_step)?;
+    fn check(&self) -> Result<(), Error> {
+        at_least_one("max_iterations", self.max_iterations)?;
+        non_negative("tolerance", self.tolerance)?;
+        positive("max_step", self.max_step)?;
         Ok(())
     }
 
@@ -187,7 +175,7 @@ pub(crate) fn climb(
                 last_step = f64::INFINITY;
                 let top = eigen.eigenvectors.column(eigen.eigenvalues.imax());
                 let off = top * (0.05 * scale / top.amax());
-                b = shifted(&b, &off.into_owned(), &blocks);
+                b = moved(&b, &off, &blocks, |_| true).ok_or_else(|| not_converged(iteration, longest))?;
                 continue;
             }
             return Ok(Stationary {
@@ -201,23 +189,11 @@ pub(crate) fn climb(
         }
         last_step = longest;
         let floor = here.value - SLACK * unit;
-        let mut share = 1.0;
-        b = loop {
-            let trial: Vec<f64> = b.iter().zip(step.iter()).map(|(b, s)| b + share * s).collect();
-            if in_order(&trial, &blocks) {
-                if trusted {
-                    break trial;
-                }
-                evaluations += 1;
-                if objective.value(&trial) >= floor {
-                    break trial;
-                }
-            }
-            share *= 0.5;
-            if share < 1e-14 {
-                return Err(not_converged(iteration, longest));
-            }
-        };
+        let accepted = moved(&b, &step, &blocks, |trial| {
+            evaluations += usize::from(!trusted);
+            trusted || objective.value(trial) >= floor
+        });
+        b = accepted.ok_or_else(|| not_converged(iteration, longest))?;
     }
     Err(not_converged(newton.max_iterations, last_step))
 }
@@ -230,16 +206,22 @@ fn not_converged(iterations: usize, change: f64) -> Error {
     }
 }
 
-/// `b + off`, halved until in order.
-fn shifted(b: &[f64], off: &DVector<f64>, blocks: &[usize]) -> Vec<f64> {
+/// `b + step`, the step halved until the result is in order and accepted; `None` if it never is.
+fn moved(
+    b: &[f64],
+    step: &DVector<f64>,
+    blocks: &[usize],
+    mut is_accepted: impl FnMut(&[f64]) -> bool,
+) -> Option<Vec<f64>> {
     let mut share = 1.0;
-    loop {
-        let trial: Vec<f64> = b.iter().zip(off.iter()).map(|(b, s)| b + share * s).collect();
-        if in_order(&trial, blocks) || share < 1e-12 {
-            return trial;
+    while share >= 1e-14 {
+        let trial: Vec<f64> = b.iter().zip(step.iter()).map(|(b, s)| b + share * s).collect();
+        if in_order(&trial, blocks) && is_accepted(&trial) {
+            return Some(trial);
         }
         share *= 0.5;
     }
+    None
 }
 
 fn in_order(b: &[f64], blocks: &[usize]) -> bool {
@@ -249,26 +231,4 @@ fn in_order(b: &[f64], blocks: &[usize]) -> bool {
         rest = tail;
         head.iter().all(|x| x.is_finite()) && head.windows(2).all(|w| w[0] < w[1])
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn settings_are_stored_and_checked_when_restored() {
-        let newton = Newton::to_nearest_stationary_point();
-        let json = serde_json::to_string(&newton).unwrap();
-        assert_eq!(serde_json::from_str::<Newton>(&json).unwrap(), newton);
-        for (from, to) in [
-            ("0.3", "-0.3"),
-            ("1e-13", "-1"),
-            ("300", "0"),
-            ("\"max_step\"", "\"longest\""),
-        ] {
-            let bad = json.replacen(from, to, 1);
-            assert_ne!(bad, json);
-            assert!(serde_json::from_str::<Newton>(&bad).is_err(), "{bad}");
-        }
-    }
 }

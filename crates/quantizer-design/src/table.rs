@@ -7,8 +7,6 @@ use crate::law::Reports;
 use crate::observation_model::ObservationModel;
 use crate::system::System;
 use fewbits_numerics::error::entries;
-use fewbits_numerics::stored;
-use serde::{Deserialize, Serialize};
 
 /// Most entries of a table (outcomes times values of the unknown).
 const ENTRY_LIMIT: u64 = 1 << 25;
@@ -58,8 +56,7 @@ impl Layout {
 }
 
 /// `P(outcome | x)` for every joint outcome, up to permutations within groups, and every value of the unknown.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredTable", into = "StoredTable")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct JointTable {
     system: System,
     layout: Layout,
@@ -67,10 +64,6 @@ pub struct JointTable {
     likelihood: Vec<f64>,
     log_multiplicity: Vec<f64>,
 }
-
-stored! { JointTable as StoredTable |table| {
-    system: System = table.system,
-} => JointTable::new(&system), Error }
 
 impl JointTable {
     /// Tabulates a system.

@@ -6,7 +6,7 @@ use crate::observation_model::{Noise, Prior};
 use nalgebra::{DMatrix, DVector};
 
 /// Most sensors of a CEO bound: every subset is a constraint.
-pub const CEO_MAX_SENSORS: usize = 12;
+const CEO_MAX_SENSORS: usize = 12;
 
 /// Least mean squared error of the quadratic Gaussian CEO problem: sensor `n` measures `X + W_n`, the noises
 /// independent, and may spend `bits[n]` a sample.

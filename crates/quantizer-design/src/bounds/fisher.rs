@@ -1,9 +1,8 @@
 //! The information of the symbols about a fixed value of the unknown.
 
-use crate::criterion::Criterion;
+use super::prior_variance;
 use crate::error::{Error, refuse};
-use crate::observation_model::Prior;
-use crate::problem::Problem;
+use crate::law::Active;
 use crate::system::System;
 
 /// Fisher information about `x` in the received symbols at each value of the model, for independent noise.
@@ -19,16 +18,15 @@ pub fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
     }
     let nodes = model.values().len();
     let mut information = vec![0.0; nodes];
-    let active: Vec<usize> = (0..system.groups().len()).collect();
-    let problem = Problem::new(system, Criterion::MeanSquaredError, &active)?;
-    for (g, group) in system.groups().iter().enumerate() {
-        let law = problem.single_sensor_law(g, group.quantizer().breakpoints());
-        for (t, p) in law.symbols.chunks_exact(nodes).enumerate() {
+    for g in 0..system.groups().len() {
+        let entry = Active::new(system, g)?;
+        let densities = entry.densities(entry.breakpoints()).0;
+        for (t, p) in entry.symbols(entry.breakpoints()).chunks_exact(nodes).enumerate() {
             for (k, total) in information.iter_mut().enumerate() {
                 // Raising x is lowering all breakpoints.
-                let slope: f64 = law.exchange.iter().zip(&law.densities).map(|(c, d)| c[t] * d[k]).sum();
+                let slope: f64 = entry.exchange.iter().zip(&densities).map(|(c, d)| c[t] * d[k]).sum();
                 if p[k] > 0.0 {
-                    *total += group.sensors().len() as f64 * slope * (slope / p[k]);
+                    *total += entry.compositions.total as f64 * slope * (slope / p[k]);
                 }
             }
         }
@@ -54,12 +52,8 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated or the prior is not Gaussian.
 pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
-    match system.model().prior() {
-        Prior::Gaussian { deviation, .. } => {
-            Ok(1.0 / (mean_fisher_information(system)? + 1.0 / (deviation * deviation)))
-        }
-        _ => refuse("prior", "another prior", "a Gaussian prior for the van Trees bound"),
-    }
+    let prior_variance = prior_variance(system.model().prior())?;
+    Ok(1.0 / (mean_fisher_information(system)? + 1.0 / prior_variance))
 }
 
 #[cfg(test)]

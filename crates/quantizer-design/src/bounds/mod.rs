@@ -14,7 +14,7 @@ mod ceo;
 mod fisher;
 mod unquantised;
 
-pub use ceo::{CEO_MAX_SENSORS, CeoBound, ceo};
+pub use ceo::{CeoBound, ceo};
 pub use fisher::{bayesian_cramer_rao, fisher_information, mean_fisher_information};
 
 pub use unquantised::unquantised;
@@ -38,12 +38,10 @@ pub fn remote_distortion_rate(prior: &Prior, noise: &Noise, bits: f64) -> Result
 
 /// Variance of a Gaussian prior.
 fn prior_variance(prior: &Prior) -> Result<f64, Error> {
-    match prior {
-        Prior::Gaussian { deviation, .. } => {
-            Ok(fewbits_numerics::error::positive("prior variance", deviation * deviation)?)
-        }
-        _ => refuse("prior", "another prior", "a Gaussian prior"),
+    if !prior.is_normal() {
+        return refuse("prior", "another prior", "a Gaussian prior");
     }
+    Ok(fewbits_numerics::error::positive("prior variance", prior.deviation() * prior.deviation())?)
 }
 
 /// Variance of each sensor's noise, if they are independent.

@@ -1,7 +1,7 @@
 //! The posterior mean as a table.
 
 use crate::error::{Error, refuse};
-use crate::law::{Active, Reports};
+use crate::law::{Reports, symbol_tables};
 use crate::moments::{Table, dot};
 use crate::observation_model::{Feature, ObservationModel};
 use crate::system::System;
@@ -80,18 +80,12 @@ impl MmseDecoder {
             Err(Error::TooLarge { .. }) => Self::entries_by_moments(model, &Reports::of(&allowed)?),
             Err(error) => return Err(error),
         };
-        let symbols = (0..system.groups().len())
-            .map(|g| {
-                let entry = Active::new(system, g)?;
-                Ok(Table::new(entry.symbols(entry.group.quantizer().breakpoints()), model.nodes()))
-            })
-            .collect::<Result<_, Error>>()?;
         Ok(Self {
             layout: Layout::new(system),
             system: system.clone(),
             limit,
             entries,
-            symbols,
+            symbols: symbol_tables(system)?,
         })
     }
 
@@ -103,11 +97,7 @@ impl MmseDecoder {
                 square[given.start + i] += w * (x - model.mean) * (x - model.mean) * p;
             }
         }
-        let square = Feature {
-            start: 0,
-            weights: square,
-        };
-        let features = [model.mass.clone(), model.moment.clone(), square];
+        let features = [model.mass.clone(), model.moment.clone(), Feature::of_all(square)];
         let entry = |m: &[f64]| {
             if m[0] > 0.0 {
                 let off = m[1] / m[0];

@@ -6,16 +6,13 @@ use crate::system::System;
 use crate::table::JointTable;
 use fewbits_core::Observation;
 use fewbits_numerics::error::entries;
-use fewbits_numerics::stored;
 use fewbits_quantizers::Symbol;
-use serde::{Deserialize, Serialize};
 
 /// The randomised Neyman-Pearson test between two values of the unknown on the joint outcome.
 ///
 /// Outcomes are accepted for the second value in decreasing order of their likelihood ratio until the false-alarm budget is
 /// spent; the outcome on which it runs out is accepted with a probability.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredTest", into = "StoredTest")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct NeymanPearson {
     table: JointTable,
     false_alarm: f64,
@@ -23,11 +20,6 @@ pub struct NeymanPearson {
     acceptance: Vec<f64>,
     detection: f64,
 }
-
-stored! { NeymanPearson as StoredTest |test| {
-    system: System = test.table.system().clone(),
-    false_alarm: f64 = test.false_alarm,
-} => NeymanPearson::new(&system, false_alarm), Error }
 
 impl NeymanPearson {
     /// The most powerful test of the second value of the prior against the first with false-alarm probability `false_alarm`.
@@ -153,13 +145,6 @@ mod tests {
         assert!((spent - 0.3).abs() < 1e-13);
         assert_eq!(test.acceptance(&[Observation::Nothing; 3]).unwrap(), 0.3);
         assert!(test.acceptance(&[Observation::Lost; 2]).is_err());
-        let json = serde_json::to_string(&test).unwrap();
-        assert_eq!(serde_json::from_str::<NeymanPearson>(&json).unwrap(), test);
-        assert!(
-            serde_json::from_str::<NeymanPearson>(&json.replace("\"false_alarm\":0.3", "\"false_alarm\":1.3")).is_err()
-        );
-        let json = serde_json::to_string(&test.table).unwrap();
-        assert_eq!(serde_json::from_str::<JointTable>(&json).unwrap(), test.table);
         assert!(NeymanPearson::new(&system, 0.0).is_err());
         assert!(NeymanPearson::new(&system, 1.0).is_err());
     }

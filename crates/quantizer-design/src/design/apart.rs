@@ -7,6 +7,7 @@
 
 use crate::criterion::Criterion;
 use crate::error::Error;
+use crate::newton::Objective;
 use crate::problem::Problem;
 use crate::system::{SensorGroup, System};
 use nalgebra::{DVector, SymmetricEigen};

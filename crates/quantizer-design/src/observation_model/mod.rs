@@ -8,27 +8,23 @@
 //! than any power of the step for these integrands; Gauss-Hermite rules need many more nodes once the noise is narrower than the
 //! prior. Densities on an interval take Gauss-Legendre panels. A finite prior is its own rule.
 
-mod continuous;
+mod nodes;
 mod noise;
 mod prior;
 mod resolution;
 
-pub use continuous::{Continuous, SampleFit};
 pub use noise::Noise;
-pub use prior::Prior;
+pub use prior::{Prior, SampleFit};
 pub(crate) use resolution::Resolution;
 
 use crate::error::{Error, refuse};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
+use nodes::PRIOR_STEP;
 use serde::{Deserialize, Serialize};
 
-/// Half-width of the Gaussian prior's rule, in standard deviations.
-const PRIOR_REACH: f64 = 9.0;
 /// Half-width of the shared factor's rule.
 const FACTOR_REACH: f64 = 8.5;
-/// Largest step in units of the prior's standard deviation.
-const PRIOR_STEP: f64 = 0.25;
 /// Largest step of the prior's rule in units of the narrowest noise. Folded cells put the zeros of `P(x)`, where `P ln P` is
 /// singular, close to the real axis: at 0.4 their information is off by 3e-8 in noise of 0.3, at 0.2 by 3e-12 (measured).
 const ENTROPY_STEP: f64 = 0.2;
@@ -44,6 +40,12 @@ pub(crate) struct Feature {
     pub(crate) weights: Vec<f64>,
 }
 
+impl Feature {
+    pub(crate) fn of_all(weights: Vec<f64>) -> Self {
+        Self { start: 0, weights }
+    }
+}
+
 /// The prior of the unknown and the noise of all sensors, on quadrature nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredModel", into = "StoredModel")]
@@ -53,9 +55,8 @@ pub struct ObservationModel {
     /// Values of `X` and their probabilities.
     pub(crate) values: Vec<f64>,
     pub(crate) weights: Vec<f64>,
-    /// Nodes given which the sensors are independent: sensor `n` has mean `base + loading_n * factor`.
-    base: Vec<f64>,
-    factor: Vec<f64>,
+    /// Given a node the sensors are independent: sensor `n` has mean `base + loading_n * factor`.
+    nodes: Vec<Node>,
     /// `P(node | x_k)`.
     pub(crate) given: Vec<Feature>,
     /// Sums over the prior: `sum_k w_k P(node | x_k)` and the same with `w_k (x_k - mean)`.
@@ -64,6 +65,13 @@ pub struct ObservationModel {
     /// Prior mean, from which moments are measured, and variance.
     pub(crate) mean: f64,
     pub(crate) variance: f64,
+}
+
+/// A value of the unknown, or of the unknown plus shared noise, and of the shared factor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Node {
+    base: f64,
+    factor: f64,
 }
 
 stored! { ObservationModel as StoredModel |model| {
@@ -92,67 +100,46 @@ impl ObservationModel {
             .map(|n| noise.deviation(n))
             .fold(f64::INFINITY, f64::min);
         let noise_step = resolution.step() * f64::min(ENTROPY_STEP, PRODUCT_STEP / crowd) * narrowest;
-        let (values, weights) = match &prior {
-            Prior::Gaussian { mean, deviation } => {
-                let step = f64::min(resolution.step() * PRIOR_STEP * deviation, noise_step);
-                let offsets = grid(resolution.reach() * PRIOR_REACH * deviation, step)?;
-                let weights = normalised(offsets.iter().map(|x| normal::pdf(x / deviation)).collect());
-                (offsets.iter().map(|x| mean + x).collect(), weights)
-            }
-            Prior::Continuous(density) => {
-                let (values, weights) = density.nodes(noise_step, NODE_LIMIT)?;
-                (values, normalised(weights))
-            }
-            Prior::Discrete { values, probabilities } => (values.clone(), normalised(probabilities.clone())),
-        };
-        let mean = prior.mean();
-        let mut model = Self {
-            variance: values
-                .iter()
-                .zip(&weights)
-                .map(|(x, w)| w * (x - mean) * (x - mean))
-                .sum(),
-            mean,
-            base: values.clone(),
-            factor: vec![0.0; values.len()],
-            given: (0..values.len())
-                .map(|k| Feature {
-                    start: k,
-                    weights: vec![1.0],
-                })
-                .collect(),
-            mass: Feature {
-                start: 0,
-                weights: Vec::new(),
-            },
-            moment: Feature {
-                start: 0,
-                weights: Vec::new(),
-            },
-            prior,
-            noise,
-            values,
-            weights,
-        };
-        let in_range = |x: &f64| ((x - mean) * (x - mean)).is_finite();
-        if !model.variance.is_finite() || !model.values.iter().all(in_range) {
-            let shown = format!("mean {mean}, variance {}", model.variance);
+        let (values, weights) = prior.nodes(noise_step, resolution)?;
+        let (weights, mean) = (normalised(weights), prior.mean());
+        let squares = values.iter().zip(&weights).map(|(x, w)| (w, (x - mean) * (x - mean)));
+        let variance: f64 = squares.clone().map(|(w, square)| w * square).sum();
+        if !variance.is_finite() || !squares.map(|s| s.1).all(f64::is_finite) {
+            let shown = format!("mean {mean}, variance {variance}");
             return refuse("prior", shown, "a prior with values whose squares are in the range of numbers");
         }
-        if !model.noise.is_independent() {
-            model.resolve_shared_factor(crowd, resolution)?;
-        }
-        let mut mass = vec![0.0; model.base.len()];
-        let mut moment = mass.clone();
-        for ((feature, w), x) in model.given.iter().zip(&model.weights).zip(&model.values) {
+        let (nodes, given) = if noise.is_independent() {
+            let itself = |start| Feature {
+                start,
+                weights: vec![1.0],
+            };
+            let nodes = values.iter().map(|x| Node { base: *x, factor: 0.0 });
+            (nodes.collect(), (0..values.len()).map(itself).collect())
+        } else {
+            match on_one_axis(&prior, &noise, &values, crowd, resolution)? {
+                Some(found) => found,
+                None => on_two_axes(&noise, &values, crowd, resolution)?,
+            }
+        };
+        let (mut mass, mut moment) = (vec![0.0; nodes.len()], vec![0.0; nodes.len()]);
+        for ((feature, w), x) in given.iter().zip(&weights).zip(&values) {
             for (i, p) in feature.weights.iter().enumerate() {
                 mass[feature.start + i] += w * p;
                 moment[feature.start + i] += w * (x - mean) * p;
             }
         }
-        model.mass.weights = mass;
-        model.moment.weights = moment;
-        Ok(model)
+        Ok(Self {
+            prior,
+            noise,
+            values,
+            weights,
+            nodes,
+            given,
+            mass: Feature::of_all(mass),
+            moment: Feature::of_all(moment),
+            mean,
+            variance,
+        })
     }
 
     /// A Gaussian prior seen by sensors with independent noise, all given by their standard deviations.
@@ -161,75 +148,6 @@ impl ObservationModel {
     /// As [`Prior::gaussian_with_deviation`], [`Noise::independent_with_deviations`] and [`ObservationModel::new`].
     pub fn gaussian_with_deviations(prior: f64, noise: &[f64]) -> Result<Self, Error> {
         Self::new(Prior::gaussian_with_deviation(prior)?, Noise::independent_with_deviations(noise)?)
-    }
-
-    fn resolve_shared_factor(&mut self, crowd: f64, resolution: Resolution) -> Result<(), Error> {
-        let noise = &self.noise;
-        let shared = noise.loadings[0];
-        let residual = noise.residuals.iter().copied().fold(f64::INFINITY, f64::min);
-        let equal = noise.loadings.iter().all(|a| *a == shared);
-        if equal && !self.is_discrete() {
-            // Everything depends on s = x + a u alone: one axis of nodes instead of two.
-            let step = resolution.step() * f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
-            let reach = resolution.reach() * FACTOR_REACH * shared.abs();
-            let half_width = match &self.prior {
-                Prior::Continuous(density) => {
-                    let (low, high) = density.support();
-                    (self.mean - low).max(high - self.mean)
-                }
-                _ => resolution.reach() * PRIOR_REACH * self.prior.deviation(),
-            };
-            let one_axis = 2.0 * (half_width + reach) / step;
-            let two_axes = self.values.len() as f64 * 4.0 * FACTOR_REACH;
-            // A faint shared factor blurs less than the nodes of one axis resolve: two axes need fewer.
-            if one_axis > two_axes {
-                return self.resolve_on_two_axes(crowd, resolution);
-            }
-            let offsets = grid(half_width + reach, step)?;
-            self.base = offsets.iter().map(|s| self.mean + s).collect();
-            self.factor = vec![0.0; self.base.len()];
-            let mean = self.mean;
-            let row = |x: &f64| {
-                // About the mean, so that an offset costs no digit.
-                let x = x - mean;
-                let start = offsets.partition_point(|s| *s < x - reach);
-                let end = offsets.partition_point(|s| *s <= x + reach);
-                let weights = offsets[start..end]
-                    .iter()
-                    .map(|s| normal::pdf((s - x) / shared))
-                    .collect();
-                Feature {
-                    start,
-                    weights: normalised(weights),
-                }
-            };
-            self.given = self.values.iter().map(row).collect();
-            return Ok(());
-        }
-        self.resolve_on_two_axes(crowd, resolution)
-    }
-
-    fn resolve_on_two_axes(&mut self, crowd: f64, resolution: Resolution) -> Result<(), Error> {
-        let noise = &self.noise;
-        let steepest = (0..noise.sensors())
-            .map(|n| noise.residuals[n] / noise.loadings[n].abs())
-            .fold(f64::INFINITY, f64::min);
-        let step = resolution.step() * f64::min(2.0 * PRIOR_STEP, PRODUCT_STEP * steepest / crowd);
-        let factor = grid(resolution.reach() * FACTOR_REACH, step)?;
-        let weights = normalised(factor.iter().map(|u| normal::pdf(*u)).collect());
-        let nodes = factor.len();
-        if self.values.len().saturating_mul(nodes) > NODE_LIMIT {
-            return too_fine(self.values.len() * nodes);
-        }
-        self.base = self.values.iter().flat_map(|x| vec![*x; nodes]).collect();
-        self.factor = self.values.iter().flat_map(|_| factor.iter().copied()).collect();
-        self.given = (0..self.values.len())
-            .map(|k| Feature {
-                start: k * nodes,
-                weights: weights.clone(),
-            })
-            .collect();
-        Ok(())
     }
 
     /// The prior.
@@ -286,26 +204,27 @@ impl ObservationModel {
     }
 
     pub(crate) fn is_discrete(&self) -> bool {
-        matches!(self.prior, Prior::Discrete { .. })
+        self.prior.is_discrete()
     }
 
     pub(crate) fn nodes(&self) -> usize {
-        self.base.len()
+        self.nodes.len()
     }
 
     /// Mean of sensor `n`'s sample at each node, and its standard deviation there.
     pub(crate) fn sample_law(&self, n: usize) -> (Vec<f64>, f64) {
-        if self.is_independent() {
-            return (self.base.clone(), self.noise.deviation(n));
-        }
-        let loading = self.noise.loadings[n];
-        let means = self
-            .base
-            .iter()
-            .zip(&self.factor)
-            .map(|(b, u)| b + loading * u)
-            .collect();
-        (means, self.noise.residuals[n])
+        let (loading, deviation) = if self.is_independent() {
+            (0.0, self.noise.deviation(n))
+        } else {
+            (self.noise.loadings[n], self.noise.residuals[n])
+        };
+        (
+            self.nodes
+                .iter()
+                .map(|node| node.base + loading * node.factor)
+                .collect(),
+            deviation,
+        )
     }
 
     /// Whether two sensors have the same law.
@@ -314,20 +233,85 @@ impl ObservationModel {
     }
 }
 
+/// Nodes, and the probability of the nodes given each value.
+type Resolved = (Vec<Node>, Vec<Feature>);
+
+/// Nodes of `s = x + a u`, on which alone everything depends where all loadings `a` are equal. `None` where they are not, the
+/// prior is discrete, or two axes take fewer nodes: a faint shared factor blurs less than the nodes of one axis resolve.
+fn on_one_axis(
+    prior: &Prior,
+    noise: &Noise,
+    values: &[f64],
+    crowd: f64,
+    resolution: Resolution,
+) -> Result<Option<Resolved>, Error> {
+    let shared = noise.loadings[0];
+    let residual = noise.residuals.iter().copied().fold(f64::INFINITY, f64::min);
+    let step = resolution.step() * f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
+    let reach = resolution.reach() * FACTOR_REACH * shared.abs();
+    let (mean, (low, high)) = (prior.mean(), prior.support(resolution));
+    let half_width = (mean - low).max(high - mean) + reach;
+    let two_axes = values.len() as f64 * 4.0 * FACTOR_REACH;
+    let unequal = noise.loadings.iter().any(|a| *a != shared);
+    if unequal || prior.is_discrete() || 2.0 * half_width / step > two_axes {
+        return Ok(None);
+    }
+    let offsets = grid(half_width, step)?;
+    let given = values.iter().map(|x| {
+        // About the mean, so that an offset costs no digit.
+        let x = x - mean;
+        let start = offsets.partition_point(|s| *s < x - reach);
+        let end = offsets.partition_point(|s| *s <= x + reach);
+        let weights = offsets[start..end].iter().map(|s| normal::pdf((s - x) / shared));
+        Feature {
+            start,
+            weights: normalised(weights.collect()),
+        }
+    });
+    let given = given.collect();
+    let nodes = offsets.iter().map(|s| Node {
+        base: mean + s,
+        factor: 0.0,
+    });
+    Ok(Some((nodes.collect(), given)))
+}
+
+/// Pairs of a value of the unknown and one of the shared factor.
+fn on_two_axes(noise: &Noise, values: &[f64], crowd: f64, resolution: Resolution) -> Result<Resolved, Error> {
+    let steepest = (0..noise.sensors())
+        .map(|n| noise.residuals[n] / noise.loadings[n].abs())
+        .fold(f64::INFINITY, f64::min);
+    let step = resolution.step() * f64::min(2.0 * PRIOR_STEP, PRODUCT_STEP * steepest / crowd);
+    let factors = grid(resolution.reach() * FACTOR_REACH, step)?;
+    let weights = normalised(factors.iter().map(|u| normal::pdf(*u)).collect());
+    let count = factors.len();
+    if values.len().saturating_mul(count) > NODE_LIMIT {
+        return too_fine((values.len() * count) as f64);
+    }
+    let pairs = values
+        .iter()
+        .flat_map(|x| factors.iter().map(|u| Node { base: *x, factor: *u }));
+    let given = (0..values.len()).map(|k| Feature {
+        start: k * count,
+        weights: weights.clone(),
+    });
+    Ok((pairs.collect(), given.collect()))
+}
+
 /// `0, +-step, +-2 step, ...` as far as `reach`.
 fn grid(reach: f64, step: f64) -> Result<Vec<f64>, Error> {
     let half = (reach / step).floor();
     if !(half.is_finite() && half < NODE_LIMIT as f64 / 2.0) {
-        return too_fine((2.0 * half).min(1e18) as usize);
+        return too_fine(2.0 * half);
     }
     let half = half as i64;
     Ok((-half..=half).map(|i| i as f64 * step).collect())
 }
 
-fn too_fine<T>(needed: usize) -> Result<T, Error> {
+fn too_fine<T>(needed: f64) -> Result<T, Error> {
     Err(Error::TooLarge {
         table: "quadrature rule",
-        needed: needed as u64,
+        needed: needed.min(1e18) as u64,
         limit: NODE_LIMIT as u64,
     })
 }

@@ -20,8 +20,8 @@ use crate::axis::Axis;
 use crate::criterion::{Criterion, Scored};
 use crate::derivatives::Derivatives;
 use crate::error::Error;
-use crate::law::{Active, SensorLaw, Slots, negative_entropy, sums};
-use crate::moments::{Table, moments};
+use crate::law::{Active, Slots, negative_entropy, sums};
+use crate::moments::{Table, dot, moments};
 use crate::newton::Objective;
 use crate::system::System;
 
@@ -39,16 +39,30 @@ pub(crate) struct Problem<'a> {
 }
 
 impl Objective for Problem<'_> {
+    /// The signed criterion.
     fn value(&self, b: &[f64]) -> f64 {
-        self.value(b)
+        let mut value = self.constant;
+        let reports: Vec<Table> = self
+            .active
+            .iter()
+            .zip(self.split(b))
+            .map(|(a, b)| {
+                let (reports, symbols) = a.reports(b);
+                value += self.entropy_share(a, &symbols);
+                reports
+            })
+            .collect();
+        let tables: Vec<&Table> = self.fixed.iter().chain(&reports).collect();
+        value + self.score(&moments(&tables, self.scored.features()))
     }
 
     fn derivatives(&self, b: &[f64]) -> Derivatives {
-        self.derivatives(b)
+        self.second_order(b)
     }
 
+    /// Numbers of breakpoints of the active groups.
     fn blocks(&self) -> Vec<usize> {
-        self.blocks()
+        self.active.iter().map(Active::parameters).collect()
     }
 
     fn unit(&self, value: f64) -> f64 {
@@ -72,15 +86,15 @@ impl<'a> Problem<'a> {
                 chosen.push(entry);
                 continue;
             }
-            let (reports, symbols) = entry.reports(entry.group.quantizer().breakpoints());
+            let (reports, symbols) = entry.reports(entry.breakpoints());
             if scored.has_separable_entropy() {
                 constant += entry.group.sensors().len() as f64 * negative_entropy(&symbols, &model.mass.weights);
             }
             fixed.push(reports);
-            log_multiplicity = sums(&log_multiplicity, entry.compositions.log_multiplicity());
+            log_multiplicity = sums(&log_multiplicity, &entry.compositions.log_multiplicity);
         }
         for entry in &chosen {
-            log_multiplicity = sums(&log_multiplicity, entry.compositions.log_multiplicity());
+            log_multiplicity = sums(&log_multiplicity, &entry.compositions.log_multiplicity);
         }
         Ok(Self {
             system,
@@ -94,15 +108,7 @@ impl<'a> Problem<'a> {
 
     /// The breakpoints of the active groups as they are in the system.
     pub(crate) fn start(&self) -> Vec<f64> {
-        self.active
-            .iter()
-            .flat_map(|a| a.group.quantizer().breakpoints().to_vec())
-            .collect()
-    }
-
-    /// Numbers of breakpoints of the active groups.
-    pub(crate) fn blocks(&self) -> Vec<usize> {
-        self.active.iter().map(Active::parameters).collect()
+        self.active.iter().flat_map(|a| a.breakpoints().to_vec()).collect()
     }
 
     /// The system with the active groups' breakpoints replaced.
@@ -120,7 +126,7 @@ impl<'a> Problem<'a> {
         let mass = &self.system.model().mass.weights;
         let cells = self.active.iter().zip(self.split(b)).flat_map(|(a, b)| {
             let cells = a.cells(b).into_iter().enumerate();
-            cells.map(move |(cell, p)| (a.index, cell, inner_product(&p, mass)))
+            cells.map(move |(cell, p)| (a.index, cell, dot(&p, mass)))
         });
         cells.min_by(|x, y| x.2.total_cmp(&y.2))
     }
@@ -137,53 +143,8 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// The signed criterion.
-    pub(crate) fn value(&self, b: &[f64]) -> f64 {
-        let mut value = self.constant;
-        let reports: Vec<Table> = self
-            .active
-            .iter()
-            .zip(self.split(b))
-            .map(|(a, b)| {
-                let (reports, symbols) = a.reports(b);
-                value += self.entropy_share(a, &symbols);
-                reports
-            })
-            .collect();
-        let tables: Vec<&Table> = self.fixed.iter().chain(&reports).collect();
-        value + self.score(&moments(&tables, self.scored.features()))
-    }
-
-    /// Joint report probabilities of the fixed groups and, for the single active group, its symbol probabilities.
-    pub(crate) fn surroundings(&self) -> (Table, Table) {
-        let nodes = self.system.model().nodes();
-        let symbols = self
-            .active
-            .first()
-            .map(|a| a.symbols(a.group.quantizer().breakpoints()));
-        let joint = self
-            .fixed
-            .iter()
-            .fold(Table::new(vec![1.0; nodes], nodes), |joint, t| joint.outer(t));
-        (joint, Table::new(symbols.unwrap_or_default(), nodes))
-    }
-
     fn fixed_outcomes(&self) -> usize {
         self.fixed.iter().map(Table::rows).product()
-    }
-
-    /// Everything about one sensor of the active group number `at` with breakpoints `b`.
-    pub(crate) fn single_sensor_law(&self, at: usize, b: &[f64]) -> SensorLaw<'_> {
-        let Some(a) = self.active.get(at) else {
-            return SensorLaw::default();
-        };
-        let (densities, slopes) = a.densities(b);
-        SensorLaw {
-            symbols: a.symbols(b),
-            densities,
-            slopes,
-            exchange: &a.exchange,
-        }
     }
 
     /// Part of the criterion that does not depend on the active groups.
@@ -246,8 +207,4 @@ enum Slot {
     First,
     Slope,
     Second,
-}
-
-fn inner_product(a: &[f64], b: &[f64]) -> f64 {
-    crate::moments::dot(a, b)
 }

@@ -1,15 +1,16 @@
 //! Gradients and Hessians of a criterion.
 
-use super::{Problem, Slot, inner_product};
+use super::{Problem, Slot};
 use crate::axis::{Axis, reduce, scatter, slice};
 use crate::criterion::LOG_FLOOR;
 use crate::derivatives::Derivatives;
 use crate::law::Active;
+use crate::moments::dot;
 use nalgebra::{DMatrix, DVector};
 
 impl Problem<'_> {
     /// The signed criterion with gradient and Hessian.
-    pub(crate) fn derivatives(&self, b: &[f64]) -> Derivatives {
+    pub(super) fn second_order(&self, b: &[f64]) -> Derivatives {
         let parts = self.split(b);
         let total = b.len();
         let features = self.scored.features();
@@ -57,7 +58,7 @@ impl Problem<'_> {
             let n = a.parameters();
             let (first, bend) =
                 (self.node_sums(&slots, &[(g, Slot::First)]), self.node_sums(&slots, &[(g, Slot::Slope)]));
-            let second = if a.compositions.total() >= 2 {
+            let second = if a.compositions.total >= 2 {
                 self.node_sums(&slots, &[(g, Slot::Second)])
             } else {
                 Vec::new()
@@ -72,14 +73,14 @@ impl Problem<'_> {
                 let row = offsets[g] + i;
                 let reduced = reduce(&worth, axis, &a.compositions, 0, &a.exchange[i]);
                 let moved = slice(&first, axis, n, below, i);
-                gradient[row] += inner_product(&reduced, &moved);
-                hessian[(row, row)] += inner_product(&reduced, &slice(&bend, axis, n, below, i));
-                if a.compositions.total() >= 2 {
+                gradient[row] += dot(&reduced, &moved);
+                hessian[(row, row)] += dot(&reduced, &slice(&bend, axis, n, below, i));
+                if a.compositions.total >= 2 {
                     let pairs = n * (n + 1) / 2;
                     let twice = a.compositions.len_below(2);
                     for j in i..n {
                         let both = reduce(&reduced, axis, &a.compositions, 1, &a.exchange[j]);
-                        let term = inner_product(&both, &slice(&second, axis, pairs, twice, pair));
+                        let term = dot(&both, &slice(&second, axis, pairs, twice, pair));
                         add_symmetric(&mut hessian, row, offsets[g] + j, term);
                         pair += 1;
                     }
@@ -111,7 +112,7 @@ impl Problem<'_> {
                             below,
                             i,
                         );
-                        add_symmetric(&mut hessian, row, offsets[h] + j, inner_product(&both, &of_ij));
+                        add_symmetric(&mut hessian, row, offsets[h] + j, dot(&both, &of_ij));
                     }
                 }
                 changes.push(scatter(&moved, axis, &a.compositions, &a.exchange[i]));
@@ -126,7 +127,7 @@ impl Problem<'_> {
                 self.scored.curvature(m, d, out);
             }
             for q in p..total {
-                add_symmetric(&mut hessian, p, q, inner_product(&bent, &changes[q]));
+                add_symmetric(&mut hessian, p, q, dot(&bent, &changes[q]));
             }
         }
         Derivatives {

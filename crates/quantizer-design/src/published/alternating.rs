@@ -18,15 +18,13 @@
 
 use super::cells::{gains_of, level_gains, single_sensor};
 use crate::AllowedCells;
-use crate::criterion::Criterion;
+use crate::criterion::{Criterion, Scored};
 use crate::error::Error;
-use crate::law::log_likelihoods;
+use crate::law::{Active, log_likelihoods};
 use crate::moments::{Table, dot};
-use crate::problem::Problem;
 use crate::system::System;
 use fewbits_numerics::newton;
 use fewbits_quantizers::Quantizer;
-use serde::{Deserialize, Serialize};
 
 /// Scan of the sample axis: this many standard deviations either side, in this many steps.
 const REACH: f64 = 7.0;
@@ -57,13 +55,11 @@ impl Default for Alternating {
 }
 
 /// Result of [`alternate`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Alternated {
     /// The system with the designed quantizer.
     pub system: System,
     /// Value of the criterion.
-    #[serde(deserialize_with = "crate::error::stored_size")]
     pub value: f64,
     /// Steps taken.
     pub iterations: usize,
@@ -120,9 +116,17 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
 /// As [`alternate`].
 pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> Result<Quantizer, Error> {
     let entry = single_sensor(system, group)?;
-    let problem = Problem::new(system, criterion, &[group])?;
-    let model = system.model();
-    let (others, symbols) = problem.surroundings();
+    system.check_outcomes()?;
+    Scored::new(criterion, system.model())?;
+    let (model, own) = (system.model(), Active::new(system, group)?);
+    // Joint report probabilities of the other groups.
+    let nodes = model.nodes();
+    let mut others = Table::new(vec![1.0; nodes], nodes);
+    for index in (0..system.groups().len()).filter(|index| *index != group) {
+        let other = Active::new(system, index)?;
+        others = others.outer(&other.reports(other.breakpoints()).0);
+    }
+    let symbols = Table::new(own.symbols(own.breakpoints()), nodes);
     let channel = entry.channel();
     let gains = if model.is_discrete() {
         // Hypotheses may be so far apart that the probability of a wrong symbol underflows: its logarithm counts.
@@ -141,11 +145,10 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
     } else {
         level_gains(model, criterion, &others, &symbols, channel)
     };
-    let (means, deviation) = model.sample_law(entry.sensors()[0]);
     let worth = Worth {
         gains: &gains,
-        means: &means,
-        deviation,
+        means: &own.means,
+        deviation: own.deviation,
     };
 
     let spread = model.sample_deviation(entry.sensors()[0]);

@@ -15,8 +15,6 @@ use fewbits_quantizers::Channel;
 use fewbits_quantizers::Labelling;
 use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::lloyd_max;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 /// Longest word whose assignments are enumerated: `8! / 48` of them.
@@ -25,7 +23,7 @@ const MAX_BITS: u32 = 3;
 const MAX_COMBINATIONS: usize = 20_000;
 
 /// An assignment of words and the design found for it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct WordsDesign {
     /// Word of each cell from left to right, for each group of the design.
     pub words: Vec<Vec<u32>>,
@@ -42,7 +40,8 @@ pub enum Words {
     PerSensor,
 }
 
-/// One representative of every class of injective assignments of `bits`-bit words to `cells` cells.
+/// One representative of every class of injective assignments of `bits`-bit words to `cells` cells: the smallest sequence that bit
+/// inversions and exchanges of bit positions lead to.
 ///
 /// # Errors
 /// If `bits` is not in `1..=3` or `cells` is not in `2..=2^bits`.
@@ -53,48 +52,27 @@ fn word_classes(bits: u32, cells: usize) -> Result<Vec<Vec<u32>>, Error> {
     if !(2..=1usize << bits).contains(&cells) {
         return refuse("cells", cells, format!("2 to {} cells", 1 << bits));
     }
-    let mut classes = BTreeSet::new();
-    let mut sequence = Vec::with_capacity(cells);
-    extend(bits, cells, &mut sequence, &mut classes);
-    Ok(classes.into_iter().collect())
-}
-
-fn extend(bits: u32, cells: usize, sequence: &mut Vec<u32>, classes: &mut BTreeSet<Vec<u32>>) {
-    if sequence.len() == cells {
-        classes.insert(representative(bits, sequence));
-        return;
-    }
-    for word in 0..1 << bits {
-        if !sequence.contains(&word) {
-            sequence.push(word);
-            extend(bits, cells, sequence, classes);
-            sequence.pop();
-        }
-        if sequence.is_empty() {
-            // Complementing bits brings any first word to 0.
-            return;
-        }
-    }
-}
-
-/// The smallest sequence that bit inversions and exchanges of bit positions lead to.
-fn representative(bits: u32, words: &[u32]) -> Vec<u32> {
-    let orders: &[&[u32]] = match bits {
-        1 => &[&[0]],
-        2 => &[&[0, 1], &[1, 0]],
-        _ => &[&[0, 1, 2], &[0, 2, 1], &[1, 0, 2], &[1, 2, 0], &[2, 0, 1], &[2, 1, 0]],
+    let orders = arrangements(bits, bits as usize);
+    let permuted = |w: u32, order: &[u32]| (0..).zip(order).map(|(to, from)| (w >> from & 1) << to).sum::<u32>();
+    let is_smallest = |words: &Vec<u32>| {
+        let image = |order: &Vec<u32>| words.iter().map(|w| permuted(w ^ words[0], order)).collect::<Vec<_>>();
+        orders.iter().all(|order| image(order) >= *words)
     };
-    let images = orders.iter().map(|order| -> Vec<u32> {
-        let permuted = |w: u32| {
-            order
-                .iter()
-                .enumerate()
-                .map(|(to, from)| (w >> from & 1) << to)
-                .sum::<u32>()
+    // Complementing bits brings any first word to 0.
+    let mut words = arrangements(1 << bits, cells);
+    words.retain(|words| words[0] == 0 && is_smallest(words));
+    Ok(words)
+}
+
+/// All sequences of so many different numbers below `count`, in lexicographic order.
+fn arrangements(count: u32, length: usize) -> Vec<Vec<u32>> {
+    (0..length).fold(vec![Vec::new()], |lists: Vec<Vec<u32>>, _| {
+        let longer = |list: Vec<u32>| {
+            let free: Vec<u32> = (0..count).filter(|n| !list.contains(n)).collect();
+            free.into_iter().map(move |n| [list.as_slice(), &[n]].concat())
         };
-        words.iter().map(|w| permuted(w ^ words[0])).collect()
-    });
-    images.min().unwrap_or_else(|| words.to_vec())
+        lists.into_iter().flat_map(longer).collect()
+    })
 }
 
 /// Designs the sensors of `model` for every class of assignments, best first.

@@ -1,12 +1,12 @@
 //! Quantizers that keep two hypotheses apart, one sensor at a time (Poor and Thomas).
 
-use crate::criterion::{Criterion, LOG_FLOOR};
+use crate::criterion::LOG_FLOOR;
 use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
 use crate::error::{Error, refuse};
+use crate::law::Active;
 use crate::newton::{Newton, Objective, climb};
 use crate::observation_model::{Noise, ObservationModel, Prior};
-use crate::problem::Problem;
 use crate::system::System;
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
@@ -81,10 +81,9 @@ pub fn separate(
     }
     let model = ObservationModel::new(Prior::binary(signal, 0.5)?, Noise::independent_with_deviations(&[deviation])?)?;
     let system = System::distinct(model, vec![start.clone()], vec![channel.clone()])?;
-    let problem = Problem::new(&system, Criterion::BayesError, &[0])?;
     let objective = Separated {
         distance,
-        problem: &problem,
+        sensor: Active::new(&system, 0)?,
     };
     let found = climb(&objective, start.breakpoints(), deviation, newton, Deadline::NEVER)?;
     let (p0, p1) = objective.distributions(&found.point);
@@ -93,17 +92,12 @@ pub fn separate(
 
 struct Separated<'a> {
     distance: Separation,
-    problem: &'a Problem<'a>,
+    sensor: Active<'a>,
 }
 
 impl Separated<'_> {
     fn distributions(&self, b: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        self.problem
-            .single_sensor_law(0, b)
-            .symbols
-            .chunks_exact(2)
-            .map(|p| (p[0], p[1]))
-            .unzip()
+        self.sensor.symbols(b).chunks_exact(2).map(|p| (p[0], p[1])).unzip()
     }
 }
 
@@ -118,20 +112,20 @@ impl Objective for Separated<'_> {
     }
 
     fn derivatives(&self, b: &[f64]) -> Derivatives {
-        let law = self.problem.single_sensor_law(0, b);
+        let (densities, slopes) = self.sensor.densities(b);
         let n = b.len();
         let mut gradient = DVector::zeros(n);
         let mut hessian = DMatrix::zeros(n, n);
-        for (t, p) in law.symbols.chunks_exact(2).enumerate() {
+        for (t, p) in self.sensor.symbols(b).chunks_exact(2).enumerate() {
             let (slope, bend) = self.distance.bend(p[0], p[1]);
             for i in 0..n {
-                let c = law.exchange[i][t];
-                let d = [c * law.densities[i][0], c * law.densities[i][1]];
+                let c = self.sensor.exchange[i][t];
+                let d = [c * densities[i][0], c * densities[i][1]];
                 gradient[i] += slope[0] * d[0] + slope[1] * d[1];
-                hessian[(i, i)] += c * (slope[0] * law.slopes[i][0] + slope[1] * law.slopes[i][1]);
+                hessian[(i, i)] += c * (slope[0] * slopes[i][0] + slope[1] * slopes[i][1]);
                 for j in 0..n {
-                    let e = law.exchange[j][t];
-                    let e = [e * law.densities[j][0], e * law.densities[j][1]];
+                    let e = self.sensor.exchange[j][t];
+                    let e = [e * densities[j][0], e * densities[j][1]];
                     let cross = bend[1] * (d[0] * e[1] + d[1] * e[0]);
                     hessian[(i, j)] += bend[0] * d[0] * e[0] + cross + bend[2] * d[1] * e[1];
                 }
@@ -145,7 +139,7 @@ impl Objective for Separated<'_> {
     }
 
     fn blocks(&self) -> Vec<usize> {
-        self.problem.blocks()
+        vec![self.sensor.parameters()]
     }
 
     fn unit(&self, value: f64) -> f64 {

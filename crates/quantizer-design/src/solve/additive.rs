@@ -2,7 +2,7 @@
 
 use super::solution::Solution;
 use crate::error::{Error, refuse};
-use crate::law::Active;
+use crate::law::symbol_tables;
 use crate::moments::{Table, dot, moments};
 use fewbits_numerics::error::entries;
 use nalgebra::{DMatrix, DVector};
@@ -46,10 +46,8 @@ impl Solution {
     pub fn additive_decoder(&self) -> Result<AdditiveDecoder, Error> {
         let (system, model) = (self.system(), self.system().model());
         let mut tables: Vec<Table> = vec![Table::default(); model.sensors()];
-        for g in 0..system.groups().len() {
-            let entry = Active::new(system, g)?;
-            let symbols = Table::new(entry.symbols(entry.group.quantizer().breakpoints()), model.nodes());
-            entry.group.sensors().iter().for_each(|n| tables[*n] = symbols.clone());
+        for (group, symbols) in system.groups().iter().zip(symbol_tables(system)?) {
+            group.sensors().iter().for_each(|n| tables[*n] = symbols.clone());
         }
         let firsts: Vec<usize> = tables
             .iter()
@@ -64,23 +62,16 @@ impl Solution {
         for (m, first) in tables.iter().zip(&firsts) {
             for t in 0..m.rows() {
                 moment[first + t] = dot(&model.moment.weights, m.row(t));
+                // A sensor sends one symbol: the block of its own is diagonal.
+                gram[(first + t, first + t)] = dot(&model.mass.weights, m.row(t));
             }
         }
         for m in 0..tables.len() {
-            for n in m..tables.len() {
+            for n in m + 1..tables.len() {
                 let joint = moments(&[&tables[m], &tables[n]], std::slice::from_ref(&model.mass));
                 for (at, p) in joint.iter().enumerate() {
-                    let (i, j) = (at / tables[n].rows(), at % tables[n].rows());
-                    let (row, column) = (firsts[m] + i, firsts[n] + j);
-                    if m == n {
-                        // A sensor sends one symbol.
-                        if i == j {
-                            gram[(row, row)] = dot(&model.mass.weights, tables[m].row(i));
-                        }
-                    } else {
-                        gram[(row, column)] = *p;
-                        gram[(column, row)] = *p;
-                    }
+                    let (row, column) = (firsts[m] + at / tables[n].rows(), firsts[n] + at % tables[n].rows());
+                    (gram[(row, column)], gram[(column, row)]) = (*p, *p);
                 }
             }
         }

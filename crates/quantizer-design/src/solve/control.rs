@@ -16,7 +16,7 @@ pub struct Progress {
     pub elapsed: Duration,
 }
 
-/// A part of a design.
+/// A part of a design. Each has a share of the time limit; what one leaves, the next may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Each sensor by itself.
@@ -29,23 +29,14 @@ pub enum Stage {
     Certificate,
 }
 
-/// A part of the time limit, in the order in which the parts are used up. What one part leaves, the next may use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Share {
-    SingleSensors,
-    AllSensors,
-    Refinement,
-    All,
-}
-
-impl Share {
-    /// The part of the time after which this share ends.
+impl Stage {
+    /// The part of the time after which this stage ends.
     fn end(self) -> f64 {
         match self {
             Self::SingleSensors => 0.2,
             Self::AllSensors => 0.5,
             Self::Refinement => 0.75,
-            Self::All => 1.0,
+            Self::Certificate => 1.0,
         }
     }
 }
@@ -79,20 +70,14 @@ impl<'a> Control<'a> {
     /// The stages from here on end at this portion of the time limit.
     pub(super) fn end_with(&mut self, portion: f64) {
         self.portion = portion;
-        self.enter(Share::All);
+        self.enter(Stage::Certificate, 1);
     }
 
-    /// Goes on to another share of the time.
-    pub(super) fn enter(&mut self, share: Share) {
-        let end = |limit: Duration| limit.mul_f64(self.portion * share.end());
-        self.deadline = Deadline::after(self.started, self.limit.map(end));
-    }
-
-    /// Goes on to one of `parts` equal parts of what is left of a share.
-    pub(super) fn enter_part(&mut self, share: Share, parts: usize) {
+    /// Goes on to one of `parts` equal parts of the time that is left of a stage.
+    pub(super) fn enter(&mut self, stage: Stage, parts: usize) {
         let now = self.started.elapsed();
         let end = |limit: Duration| {
-            let left = limit.mul_f64(self.portion * share.end()).saturating_sub(now);
+            let left = limit.mul_f64(self.portion * stage.end()).saturating_sub(now);
             now + left / parts as u32
         };
         self.deadline = Deadline::after(self.started, self.limit.map(end));

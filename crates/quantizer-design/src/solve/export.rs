@@ -5,8 +5,7 @@ use super::additive::AdditiveDecoder;
 use super::solution::{SensorDesign, Solution};
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::entries;
-use serde_json::{Value, json};
-use std::fmt::Write;
+use serde_json::json;
 
 /// The JSON schema of [`Export::to_json`].
 pub const JSON_SCHEMA: &str = include_str!("design.schema.json");
@@ -146,22 +145,17 @@ impl Export {
     /// As [`Solution::mean_squared_error`].
     pub fn to_json(&self) -> Result<String, Error> {
         let solution = &self.solution;
-        let sensors: Vec<Value> = solution
-            .sensors()
-            .iter()
-            .enumerate()
-            .map(|(n, s)| {
-                json!({
-                    "sensor": s.sensor,
-                    "bits": s.bits,
-                    "breakpoints": s.breakpoints,
-                    "words": s.words,
-                    "symbols": s.symbols(),
-                    "link": { "loss": s.link.loss(), "erasure": s.link.erasure(), "crossover": s.link.crossover() },
-                    "thresholds": self.codes.as_ref().map(|codes| &codes[n]),
-                })
+        let sensor = |(n, s): (usize, &SensorDesign)| {
+            json!({
+                "sensor": s.sensor,
+                "bits": s.bits,
+                "breakpoints": s.breakpoints,
+                "words": s.words,
+                "symbols": s.symbols(),
+                "link": { "loss": s.link.loss(), "erasure": s.link.erasure(), "crossover": s.link.crossover() },
+                "thresholds": self.codes.as_ref().map(|codes| &codes[n]),
             })
-            .collect();
+        };
         let decoder = match &self.decoder {
             Decoder::Joint { means, deviations } => json!({
                 "kind": "joint",
@@ -173,19 +167,16 @@ impl Export {
                 json!({ "kind": "additive", "offset": decoder.offset, "weights": decoder.weights })
             }
         };
-        let bound = solution
-            .bound()
-            .map(|b| json!({ "value": b.value, "kind": format!("{:?}", b.kind) }));
         let document = json!({
             "schema": "fewbits-design-1",
             "name": self.name,
-            "criterion": serde_json::to_value(solution.criterion()).unwrap_or(Value::Null),
+            "criterion": solution.criterion(),
             "value": solution.value(),
-            "bound": bound,
-            "certificate": serde_json::to_value(solution.certificate()).unwrap_or(Value::Null),
-            "scope": serde_json::to_value(solution.scope()).unwrap_or(Value::Null),
+            "bound": solution.bound(),
+            "certificate": solution.certificate(),
+            "scope": solution.scope(),
             "mean_squared_error": self.mean_squared_error()?,
-            "sensors": sensors,
+            "sensors": solution.sensors().iter().enumerate().map(sensor).collect::<Vec<_>>(),
             "decoder": decoder,
         });
         Ok(format!("{document:#}\n"))
@@ -195,10 +186,7 @@ impl Export {
     pub fn to_c_header(&self) -> String {
         let (name, upper) = (&self.name, self.name.to_uppercase());
         let sensors = self.solution.sensors();
-        let mut text = String::new();
-        // Writing to a string cannot fail.
-        let _ = write!(
-            text,
+        let mut text = format!(
             "/* Quantizers and decoder, designed by fewbits. Criterion {:?}: {:?}. */\n#ifndef {upper}_H\n#define {upper}_H\n\n\
              #define {upper}_SENSORS {}\n",
             self.solution.criterion(),
@@ -206,88 +194,65 @@ impl Export {
             sensors.len()
         );
         for (n, sensor) in sensors.iter().enumerate() {
-            let breakpoints = sensor.breakpoints.len();
-            if breakpoints == 0 {
-                // C has no empty arrays. A sensor behind a useless link may send one word only.
-                let _ = write!(
-                    text,
-                    "\n/* Sensor {}: one word. */\n\
-                     static inline unsigned {name}_encode_{n}(double sample)\n{{\n    (void)sample;\n    return {};\n}}\n",
-                    sensor.sensor, sensor.words[0],
-                );
-                if self.codes.is_some() {
-                    let _ = write!(
-                        text,
-                        "static inline unsigned {name}_encode_code_{n}(unsigned long code)\n{{\n    (void)code;\n    \
-                         return {};\n}}\n",
-                        sensor.words[0],
-                    );
-                }
-                continue;
-            }
-            let _ = write!(
-                text,
-                "\n/* Sensor {}: words of {} bits. A sample on a breakpoint belongs to the cell above it; NaN is word of cell 0. */\n\
-                 static const double {name}_breakpoints_{n}[{breakpoints}] = {{{}}};\n\
-                 static const unsigned short {name}_words_{n}[{}] = {{{}}};\n\
-                 static inline unsigned {name}_encode_{n}(double sample)\n{{\n    unsigned cell = 0;\n    \
-                 while (cell < {breakpoints} && {name}_breakpoints_{n}[cell] <= sample)\n        ++cell;\n    \
-                 return {name}_words_{n}[cell];\n}}\n",
-                sensor.sensor,
-                sensor.bits,
-                list(&sensor.breakpoints),
-                sensor.words.len(),
-                list(&sensor.words),
-            );
-            if let Some(codes) = self.codes.as_ref().map(|codes| &codes[n]) {
-                let _ = write!(
-                    text,
-                    "static const unsigned long {name}_thresholds_{n}[{breakpoints}] = {{{}}};\n\
-                     static inline unsigned {name}_encode_code_{n}(unsigned long code)\n{{\n    unsigned cell = 0;\n    \
-                     while (cell < {breakpoints} && {name}_thresholds_{n}[cell] <= code)\n        ++cell;\n    \
-                     return {name}_words_{n}[cell];\n}}\n",
-                    list(codes),
-                );
-            }
+            text += &self.c_encoders(n, sensor);
         }
-        let last = |s: &SensorDesign| s.symbols() - 1;
-        let symbol = |n: usize, s: &SensorDesign| format!("(symbols[{n}] < {0} ? symbols[{n}] : {0})", last(s));
-        let _ = write!(
-            text,
-            "\n/* symbols[n]: the word received from sensor n. A word that is missing is the number 2^bits, if the design has losses. */\n"
-        );
-        match &self.decoder {
+        text += "\n/* symbols[n]: the word received from sensor n. A word that is missing is the number 2^bits, if the design has losses. */\n";
+        let symbol = |n: usize| format!("(symbols[{n}] < {0} ? symbols[{n}] : {0})", sensors[n].symbols() - 1);
+        let numbers = 0..sensors.len();
+        let body = match &self.decoder {
             Decoder::Joint { means, .. } => {
-                let index = sensors
-                    .iter()
-                    .enumerate()
-                    .fold(String::from("0"), |index, (n, s)| format!("({index}) * {} + {}", s.symbols(), symbol(n, s)));
-                let _ = write!(
-                    text,
-                    "static const double {name}_means[{}] = {{{}}};\n\
-                     static inline double {name}_decode(const unsigned symbols[{upper}_SENSORS])\n{{\n    \
-                     return {name}_means[{index}];\n}}\n",
-                    means.len(),
-                    list(means),
-                );
+                text += &c_array("double", &format!("{name}_means"), means);
+                let next = |index: String, n: usize| format!("({index}) * {} + {}", sensors[n].symbols(), symbol(n));
+                format!("    return {name}_means[{}];\n", numbers.fold(String::from("0"), next))
             }
             Decoder::Additive(decoder) => {
                 for (n, weights) in decoder.weights.iter().enumerate() {
-                    let count = weights.len();
-                    let _ = writeln!(text, "static const double {name}_weights_{n}[{count}] = {{{}}};", list(weights));
+                    text += &c_array("double", &format!("{name}_weights_{n}"), weights);
                 }
-                let _ = write!(
-                    text,
-                    "static inline double {name}_decode(const unsigned symbols[{upper}_SENSORS])\n{{\n    double sum = {:?};\n",
-                    decoder.offset
-                );
-                for (n, s) in sensors.iter().enumerate() {
-                    let _ = writeln!(text, "    sum += {name}_weights_{n}[{}];", symbol(n, s));
-                }
-                let _ = write!(text, "    return sum;\n}}\n");
+                let terms = numbers.map(|n| format!("    sum += {name}_weights_{n}[{}];\n", symbol(n)));
+                format!("    double sum = {:?};\n{}    return sum;\n", decoder.offset, terms.collect::<String>())
             }
+        };
+        text += &c_function(
+            "double",
+            &format!("{name}_decode"),
+            &format!("const unsigned symbols[{upper}_SENSORS]"),
+            &body,
+        );
+        text + "\n#endif\n"
+    }
+
+    /// Tables and encoders of one sensor, for samples and, if there is a converter, for its codes.
+    fn c_encoders(&self, n: usize, sensor: &SensorDesign) -> String {
+        let (name, count) = (&self.name, sensor.breakpoints.len());
+        let encoder = |function: &str, kind: &str, argument: &str, edges: &str| {
+            let body = if count == 0 {
+                // C has no empty arrays. A sensor behind a useless link may send one word only.
+                format!("    (void){argument};\n    return {};\n", sensor.words[0])
+            } else {
+                format!(
+                    "    unsigned cell = 0;\n    while (cell < {count} && {name}_{edges}_{n}[cell] <= {argument})\n        \
+                     ++cell;\n    return {name}_words_{n}[cell];\n"
+                )
+            };
+            c_function("unsigned", &format!("{name}_{function}_{n}"), &format!("{kind} {argument}"), &body)
+        };
+        let words = if count == 0 {
+            "one word.".to_owned()
+        } else {
+            let rule = "A sample on a breakpoint belongs to the cell above it; NaN is word of cell 0.";
+            format!("words of {} bits. {rule}", sensor.bits)
+        };
+        let mut text = format!("\n/* Sensor {}: {words} */\n", sensor.sensor);
+        text += &c_array("double", &format!("{name}_breakpoints_{n}"), &sensor.breakpoints);
+        if count > 0 {
+            text += &c_array("unsigned short", &format!("{name}_words_{n}"), &sensor.words);
         }
-        let _ = write!(text, "\n#endif\n");
+        text += &encoder("encode", "double", "sample", "breakpoints");
+        if let Some(codes) = &self.codes {
+            text += &c_array("unsigned long", &format!("{name}_thresholds_{n}"), &codes[n]);
+            text += &encoder("encode_code", "unsigned long", "code", "thresholds");
+        }
         text
     }
 
@@ -295,38 +260,45 @@ impl Export {
     /// `WORDS_0[cell_of(&BREAKPOINTS_0, sample)?]`, or that of `THRESHOLDS_0` for the code of a converter.
     pub fn to_rust(&self) -> String {
         let mut text = String::from("// Quantizers and decoder, designed by fewbits.\n");
-        let mut constant = |doc: &str, name: String, kind: &str, count: usize, values: String| {
-            // Writing to a string cannot fail.
-            let _ = write!(text, "/// {doc}\npub const {name}: [{kind}; {count}] = [{values}];\n");
-        };
         for (n, s) in self.solution.sensors().iter().enumerate() {
-            let (b, w) = (&s.breakpoints, &s.words);
-            constant(
-                "Breakpoints; a sample on one belongs to the cell above.",
-                format!("BREAKPOINTS_{n}"),
-                "f64",
-                b.len(),
-                list(b),
-            );
-            constant("Word of each cell.", format!("WORDS_{n}"), "u16", w.len(), list(w));
-            if let Some(codes) = self.codes.as_ref().map(|codes| &codes[n]) {
-                constant("Thresholds in codes.", format!("THRESHOLDS_{n}"), "u32", codes.len(), list(codes));
+            let doc = "Breakpoints; a sample on one belongs to the cell above.";
+            text += &rust_array(doc, &format!("BREAKPOINTS_{n}"), "f64", &s.breakpoints);
+            text += &rust_array("Word of each cell.", &format!("WORDS_{n}"), "u16", &s.words);
+            if let Some(codes) = &self.codes {
+                text += &rust_array("Thresholds in codes.", &format!("THRESHOLDS_{n}"), "u32", &codes[n]);
             }
         }
         match &self.decoder {
             Decoder::Joint { means, .. } => {
                 let doc = "Estimate for every joint symbol, the first sensor's slowest.";
-                constant(doc, "MEANS".to_owned(), "f64", means.len(), list(means));
+                text += &rust_array(doc, "MEANS", "f64", means);
             }
             Decoder::Additive(decoder) => {
-                constant("Estimate before any symbol.", "OFFSET".to_owned(), "f64", 1, format!("{:?}", decoder.offset));
-                for (n, w) in decoder.weights.iter().enumerate() {
-                    constant("What a symbol adds to the estimate.", format!("WEIGHTS_{n}"), "f64", w.len(), list(w));
+                text += &rust_array("Estimate before any symbol.", "OFFSET", "f64", &[decoder.offset]);
+                for (n, weights) in decoder.weights.iter().enumerate() {
+                    let doc = "What a symbol adds to the estimate.";
+                    text += &rust_array(doc, &format!("WEIGHTS_{n}"), "f64", weights);
                 }
             }
         }
         text
     }
+}
+
+/// A table in C; nothing if it is empty.
+fn c_array<T: std::fmt::Debug>(kind: &str, name: &str, values: &[T]) -> String {
+    if values.is_empty() {
+        return String::new();
+    }
+    format!("static const {kind} {name}[{}] = {{{}}};\n", values.len(), list(values))
+}
+
+fn c_function(kind: &str, name: &str, argument: &str, body: &str) -> String {
+    format!("static inline {kind} {name}({argument})\n{{\n{body}}}\n")
+}
+
+fn rust_array<T: std::fmt::Debug>(doc: &str, name: &str, kind: &str, values: &[T]) -> String {
+    format!("/// {doc}\npub const {name}: [{kind}; {}] = [{}];\n", values.len(), list(values))
 }
 
 /// Numbers that read back as they were.

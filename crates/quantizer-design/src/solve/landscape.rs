@@ -4,10 +4,10 @@
 //! each grid cell are a table, the *block* of that sensor. With the block at hand neither the breakpoints nor the words of the
 //! sensor need the quadrature nodes again: a change costs a few thousand multiplications.
 
-use crate::criterion::{Criterion, Scored};
+use crate::criterion::{Criterion, LOG_FLOOR, Scored};
 use crate::deadline::Deadline;
 use crate::error::Error;
-use crate::law::negative_entropy;
+use crate::law::{cell_probabilities, negative_entropy};
 use crate::moments::{Table, dot, moments_until};
 use crate::observation_model::{Feature, ObservationModel, Resolution};
 use fewbits_numerics::kernels;
@@ -18,8 +18,6 @@ pub(super) const REACH: f64 = 4.5;
 const PLACES: usize = 400;
 /// Sweeps over the cells of a sensor that a block serves, about.
 const SWEEPS: f64 = 5.0;
-/// Below this a probability is taken as zero in a logarithm.
-const LOG_FLOOR: f64 = 1e-300;
 
 /// Transition probabilities from sent words to received symbols, a row per symbol.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,16 +135,9 @@ impl Landscape {
             .map(|(model, (weight, _))| {
                 let features = if criterion == Criterion::MeanSquaredError {
                     // Moments of all scenarios are about one point.
-                    let offset = model.mean - reference;
-                    let mass = model.mass.weights.clone();
-                    let moment = model
-                        .moment
-                        .weights
-                        .iter()
-                        .zip(&mass)
-                        .map(|(m, w)| m + offset * w)
-                        .collect();
-                    [mass, moment].map(|weights| Feature { start: 0, weights }).to_vec()
+                    let (offset, mass) = (model.mean - reference, &model.mass.weights);
+                    let moment = model.moment.weights.iter().zip(mass).map(|(m, w)| m + offset * w);
+                    vec![model.mass.clone(), Feature::of_all(moment.collect())]
                 } else {
                     scored.features().to_vec()
                 };
@@ -192,16 +183,7 @@ impl Landscape {
     pub(super) fn grid(&self, sensor: usize, edges: Vec<f64>) -> Grid {
         let cells = self.scenarios.iter().map(|scenario| {
             let (means, deviation) = scenario.model.sample_law(sensor);
-            let mut cells = Vec::with_capacity((edges.len() + 1) * means.len());
-            for c in 0..=edges.len() {
-                let lower = if c == 0 { f64::NEG_INFINITY } else { edges[c - 1] };
-                let upper = edges.get(c).copied().unwrap_or(f64::INFINITY);
-                let mut inside: Vec<f64> = means.iter().map(|m| (lower - m) / deviation).collect();
-                let above: Vec<f64> = means.iter().map(|m| (upper - m) / deviation).collect();
-                kernels::interval(&mut inside, &above);
-                cells.extend(inside);
-            }
-            Table::new(cells, means.len())
+            Table::new(cell_probabilities(&means, deviation, &edges).concat(), means.len())
         });
         Grid {
             cells: cells.collect(),
@@ -216,14 +198,15 @@ impl Landscape {
 
     /// Probability of each symbol of a sensor at each node, scenario by scenario.
     pub(super) fn symbols(&self, sensor: usize, grid: &Grid, words: &[usize]) -> Vec<Table> {
-        (0..self.scenarios.len())
-            .map(|s| self.symbols_in(s, sensor, grid, words))
+        grid.cells
+            .iter()
+            .map(|cells| self.symbols_in(cells, sensor, words))
             .collect()
     }
 
-    fn symbols_in(&self, scenario: usize, sensor: usize, grid: &Grid, words: &[usize]) -> Table {
+    /// The same in one scenario, given the probabilities of the grid's cells.
+    fn symbols_in(&self, cells: &Table, sensor: usize, words: &[usize]) -> Table {
         let law = &self.laws[sensor];
-        let cells = &grid.cells[scenario];
         let nodes = cells.nodes;
         let mut levels = vec![0.0; law.words * nodes];
         for (c, word) in words.iter().enumerate() {
@@ -312,7 +295,7 @@ impl Landscape {
         }
         if self.scored.has_separable_entropy() {
             let renamed: Words = words.iter().map(|w| renamed[*w]).collect();
-            value += self.own_entropy(&self.symbols_in(0, block.sensor, grid, &renamed));
+            value += self.own_entropy(&self.symbols_in(&grid.cells[0], block.sensor, &renamed));
         }
         value
     }
@@ -368,7 +351,7 @@ impl Landscape {
             }
         }
         if self.scored.has_separable_entropy() {
-            let symbols = self.symbols_in(0, block.sensor, grid, words);
+            let symbols = self.symbols_in(&grid.cells[0], block.sensor, words);
             let mass = &self.scenarios[0].model.mass.weights;
             for t in 0..outputs {
                 let logs = symbols.row(t).iter().zip(mass).map(|(p, w)| w * p.max(LOG_FLOOR).ln());

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_core::Link;
-use fewbits_quantizers::{Channel, Quantizer};
+use fewbits_quantizers::{Channel, Quantizer, lloyd_max};
 
 /// A sensor that takes part.
 #[derive(Debug, Clone)]
@@ -19,32 +19,29 @@ pub(super) struct Participant {
 impl Participant {
     /// The sensors that have bits.
     pub(super) fn all(bits: &[u32], links: &[Link]) -> Vec<Self> {
-        let of = |n: usize| Self {
-            sensor: n,
-            bits: bits[n],
-            link: links[n],
-        };
-        (0..bits.len()).filter(|n| bits[*n] > 0).map(of).collect()
+        let pairs = bits.iter().zip(links).enumerate().filter(|(_, (bits, _))| **bits > 0);
+        pairs
+            .map(|(sensor, (bits, link))| Self {
+                sensor,
+                bits: *bits,
+                link: *link,
+            })
+            .collect()
     }
 
     /// Transition probabilities from words to received symbols: the words, and one more symbol "missing" if the link loses words.
     pub(super) fn law(&self) -> WordLaw {
         let words = 1usize << self.bits;
         let missing = missing(&self.link);
-        let outputs = words + usize::from(missing > 0.0);
-        let mut transition = vec![0.0; outputs * words];
-        for t in 0..words {
-            for w in 0..words {
-                let arrives = self.link.word_probability(w as u64, t as u64, self.bits);
-                transition[t * words + w] = self.link.arrival() * arrives;
-            }
-        }
+        let arrives = |t: usize, w: usize| self.link.word_probability(w as u64, t as u64, self.bits);
+        let received = (0..words * words).map(|at| self.link.arrival() * arrives(at / words, at % words));
+        let mut transition: Vec<f64> = received.collect();
         if missing > 0.0 {
-            transition[words * words..].fill(missing);
+            transition.resize(words * (words + 1), missing);
         }
         WordLaw {
             words,
-            outputs,
+            outputs: transition.len() / words,
             transition,
         }
     }
@@ -90,6 +87,33 @@ impl WordedCells {
     }
 }
 
+/// Lloyd-Max cells of a normal sample with the word of each level.
+pub(super) fn plain(
+    model: &ObservationModel,
+    participants: &[Participant],
+    word: fn(usize) -> usize,
+) -> Result<Vec<WordedCells>, Error> {
+    let of = |(n, participant): (usize, &Participant)| {
+        let levels = 1usize << participant.bits;
+        let lloyd = lloyd_max::gaussian(levels)?.affine(model.sample_mean(), model.sample_deviation(n))?;
+        Ok(WordedCells {
+            breakpoints: lloyd.breakpoints().to_vec(),
+            words: (0..levels).map(word).collect(),
+        })
+    };
+    participants.iter().enumerate().map(of).collect()
+}
+
+/// Gray words.
+pub(super) fn gray(level: usize) -> usize {
+    level ^ (level >> 1)
+}
+
+/// Natural words.
+pub(super) fn natural(level: usize) -> usize {
+    level
+}
+
 /// The system of these cells and words; symbols are the received words, and one more if a word may be missing.
 pub(super) fn system_of(
     model: &ObservationModel,
@@ -97,21 +121,22 @@ pub(super) fn system_of(
     cells: &[WordedCells],
     apart: bool,
 ) -> Result<System, Error> {
-    let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
+    let mut groups: Vec<Vec<usize>> = Vec::new();
     for n in 0..participants.len() {
-        let alike = groups.iter_mut().find(|(first, _)| {
+        let alike = groups.iter_mut().find(|group| {
+            let first = group[0];
             !apart
-                && cells[*first] == cells[n]
-                && participants[*first].law() == participants[n].law()
-                && model.interchangeable(*first, n)
+                && cells[first] == cells[n]
+                && participants[first].law() == participants[n].law()
+                && model.interchangeable(first, n)
         });
         match alike {
-            Some((_, sensors)) => sensors.push(n),
-            None => groups.push((n, vec![n])),
+            Some(group) => group.push(n),
+            None => groups.push(vec![n]),
         }
     }
-    let groups = groups.into_iter().map(|(first, sensors)| {
-        let (quantizer, channel) = parts_of(model, first, &participants[first], &cells[first])?;
+    let groups = groups.into_iter().map(|sensors| {
+        let (quantizer, channel) = parts_of(model, &participants[sensors[0]], &cells[sensors[0]])?;
         SensorGroup::new(quantizer, channel, sensors)
     });
     System::new(model.clone(), groups.collect::<Result<_, _>>()?)
@@ -120,7 +145,6 @@ pub(super) fn system_of(
 /// Quantizer and channel of one sensor. A sensor with a single cell gets a second one that is sent as the same word.
 fn parts_of(
     model: &ObservationModel,
-    sensor: usize,
     participant: &Participant,
     cells: &WordedCells,
 ) -> Result<(Quantizer, Channel), Error> {
@@ -137,7 +161,6 @@ fn parts_of(
     if used.len() == 1 {
         used.push(used[0]);
         (labels, breakpoints) = (vec![0, 1], vec![model.sample_mean()]);
-        debug_assert!(sensor < model.sensors());
     }
     let law = participant.law();
     let rows: Vec<Vec<f64>> = law

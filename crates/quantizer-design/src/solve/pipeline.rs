@@ -1,12 +1,12 @@
 //! From a request to solutions: shares of a total, the search, Newton's method.
 
-use super::control::{Control, Share, Stage};
-use super::participant::{Participant, WordedCells};
-use super::polish::{Polished, polish};
+use super::control::{Control, Stage};
+use super::participant::{Participant, WordedCells, gray, plain};
+use super::polish::polish;
 use super::request::{Bits, MAX_BITS, MAX_TOTAL, Request};
 use super::share;
 use super::solution::{Solution, Solutions};
-use super::starts::{Search, gray, plain};
+use super::starts::Search;
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::entries;
@@ -72,25 +72,20 @@ impl Request<'_> {
             given: given.as_deref(),
         };
         let mut searched = search.run(control)?;
-        control.enter(Share::All);
+        control.enter(Stage::Certificate, 1);
         if self.criterion == Criterion::BayesError {
             // The error probability has kinks and many flat places: the design of most information is a good start.
             let cells = plain(&model, &participants, gray)?;
             let deadline = control.deadline();
             let informed = polish(&model, Criterion::MutualInformation, &participants, cells, false, deadline)?;
-            searched.designs.push(informed.cells);
+            searched.designs.push(informed.cells());
         }
         let parts = searched.designs.len();
         let mut found: Vec<Solution> = Vec::new();
         for (done, cells) in searched.designs.into_iter().enumerate() {
             control.report(Stage::Certificate, done, parts);
-            let Polished {
-                system,
-                cells,
-                certificate,
-                scope,
-            } = polish(&model, self.criterion, &participants, cells, searched.apart, control.deadline())?;
-            found.push(Solution::new(self.criterion, &participants, system, cells, certificate, scope)?);
+            let deadline = control.deadline();
+            found.push(polish(&model, self.criterion, &participants, cells, searched.apart, deadline)?);
         }
         control.report(Stage::Certificate, parts, parts);
         Ok(found)

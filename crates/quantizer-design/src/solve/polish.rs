@@ -1,13 +1,13 @@
 //! Newton's method on the breakpoints of a design found on grids, on the full nodes; a cell that vanishes is merged.
 
 use super::participant::{Participant, WordedCells, system_of};
+use super::solution::Solution;
 use crate::criterion::{Criterion, Scored};
 use crate::deadline::Deadline;
 use crate::design::{Scope, joint_until};
 use crate::error::Error;
 use crate::newton::{Certificate, Newton};
 use crate::observation_model::{ObservationModel, Resolution};
-use crate::system::System;
 
 /// Newton's method is left out where the second derivatives take more multiplications than this.
 const MAX_HESSIAN_WORK: f64 = 1e8;
@@ -17,15 +17,6 @@ const MAX_VALUE_WORK: f64 = 1e9;
 const LATE_VALUE_WORK: f64 = 1e8;
 /// When the time is over, and one evaluation on coarse nodes takes more than this, the value is taken on rough ones.
 const LATE_COARSE_WORK: f64 = 3e8;
-
-/// A design on the full nodes, or on fewer if it is too large.
-pub(super) struct Polished {
-    pub(super) system: System,
-    /// Cells and words of each participant.
-    pub(super) cells: Vec<WordedCells>,
-    pub(super) certificate: Certificate,
-    pub(super) scope: Scope,
-}
 
 /// Whether Newton's method on the full nodes is worth its time.
 pub(super) fn is_affordable(model: &ObservationModel, criterion: Criterion, outcomes: f64) -> bool {
@@ -48,7 +39,7 @@ pub(super) fn evaluation_work(model: &ObservationModel, criterion: Criterion, ou
 }
 
 /// Climbs to the stationary point next to a design. Where Newton's method does not converge, or would take too long, the design
-/// stays as it is and its certificate says so.
+/// stays as it is and its certificate says so. A design too large for the full nodes is evaluated on fewer.
 pub(super) fn polish(
     model: &ObservationModel,
     criterion: Criterion,
@@ -56,7 +47,7 @@ pub(super) fn polish(
     mut cells: Vec<WordedCells>,
     apart: bool,
     deadline: Deadline,
-) -> Result<Polished, Error> {
+) -> Result<Solution, Error> {
     let scope = if apart {
         Scope::EverySensor
     } else {
@@ -75,12 +66,7 @@ pub(super) fn polish(
         } else if work > if is_late { LATE_VALUE_WORK } else { MAX_VALUE_WORK } {
             system = system_of(&coarse, participants, &cells, apart)?;
         }
-        Ok(Polished {
-            system,
-            cells,
-            certificate: Certificate::Unproved,
-            scope,
-        })
+        Solution::new(criterion, participants, system, cells, Certificate::Unproved, scope)
     };
     let mut is_coarse = true;
     loop {
@@ -103,12 +89,8 @@ pub(super) fn polish(
                     is_coarse = false;
                     continue;
                 }
-                return Ok(Polished {
-                    system: design.system,
-                    cells,
-                    certificate: design.certificate,
-                    scope: design.scope,
-                });
+                let (certificate, scope) = (design.certificate, design.scope);
+                return Solution::new(criterion, participants, design.system, cells, certificate, scope);
             }
             Err(Error::VanishingCell { quantizer, cell, .. }) => {
                 let mut merged = false;
@@ -135,14 +117,8 @@ fn merge(cells: &mut WordedCells, cell: usize) -> bool {
     cells.words.remove(cell);
     cells.breakpoints.remove(cell.min(cells.breakpoints.len() - 1));
     // Its neighbours may have been one cell.
-    let mut i = 1;
-    while i < cells.words.len() {
-        if cells.words[i] == cells.words[i - 1] && cells.words.len() > 2 {
-            cells.words.remove(i);
-            cells.breakpoints.remove(i - 1);
-        } else {
-            i += 1;
-        }
+    if cells.words.len() > 2 {
+        *cells = WordedCells::of(&cells.breakpoints, &cells.words);
     }
     true
 }

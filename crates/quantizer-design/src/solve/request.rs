@@ -4,7 +4,7 @@ use super::control::Progress;
 use super::participant::WordedCells;
 use crate::criterion::{AllowedCells, Criterion};
 use crate::error::{Error, refuse};
-use crate::observation_model::{ObservationModel, Prior};
+use crate::observation_model::ObservationModel;
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
 use fewbits_quantizers::quantizer::check_increasing;
@@ -77,7 +77,7 @@ impl<'a> Request<'a> {
     /// # Errors
     /// If the prior is not discrete.
     pub fn detection(model: ObservationModel, bits: Bits, link: Link) -> Result<Self, Error> {
-        if !matches!(model.prior(), Prior::Discrete { .. }) {
+        if !model.prior().is_discrete() {
             return refuse("prior", "a continuous prior", "a discrete prior: the hypotheses");
         }
         Ok(Self {

@@ -49,7 +49,7 @@ impl Solution {
         let own = self.system_in(self.system().model())?;
         let other = self.system_in(model)?;
         Ok(Mismatch {
-            mean_squared_error: error_of(&other, &estimates(&own)?)?,
+            mean_squared_error: error_of(&other, &estimates(&[own], &[1.0])?)?,
             with_best_decoder: other.value(Criterion::MeanSquaredError)?,
         })
     }
@@ -84,7 +84,7 @@ impl Solution {
 /// The model with its prior moved and stretched about its mean, and its noise stretched.
 fn varied(model: &ObservationModel, offset: f64, prior: f64, noise: f64) -> Result<ObservationModel, Error> {
     let mean = model.prior().mean();
-    let moved = model.prior().rescaled(prior)?.shifted(offset + mean - prior * mean)?;
+    let moved = model.prior().affine(offset + mean - prior * mean, prior)?;
     ObservationModel::new(moved, model.noise().rescaled(noise)?)
 }
 
@@ -92,15 +92,6 @@ fn varied(model: &ObservationModel, offset: f64, prior: f64, noise: f64) -> Resu
 fn outcome_moments(system: &System) -> Result<Vec<f64>, Error> {
     let model = system.model();
     Ok(Reports::of(system)?.moments(&[model.mass.clone(), model.moment.clone()]))
-}
-
-/// The posterior mean for every joint symbol; the prior mean for what cannot happen.
-fn estimates(system: &System) -> Result<Vec<f64>, Error> {
-    let mean = system.model().mean;
-    Ok(outcome_moments(system)?
-        .chunks_exact(2)
-        .map(|m| if m[0] > 0.0 { mean + m[1] / m[0] } else { mean })
-        .collect())
 }
 
 /// Mean squared error of a table of estimates: `E (X - m)^2 + sum_t (P_t d_t^2 + 2 d_t M_t)` with `d_t = m - estimate_t`.
@@ -116,14 +107,6 @@ fn error_of(system: &System, estimates: &[f64]) -> Result<f64, Error> {
         })
         .sum();
     Ok((model.variance + change).max(0.0))
-}
-
-/// A box of models: how far the true model may be from the one of the request.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Corner {
-    mean: f64,
-    deviation: f64,
-    noise: f64,
 }
 
 /// A design for the worst model of a box.
@@ -176,9 +159,9 @@ pub fn minimax(
     let nominal = solutions.best();
     let own: Vec<usize> = nominal.sensors().iter().map(|s| s.sensor).collect();
     let centre = centre.subset(&own)?;
-    let models = corners(mean_offset, deviation_share, noise_share)
+    let models = corners([mean_offset, deviation_share, noise_share])
         .into_iter()
-        .map(|c| varied(&centre, c.mean, 1.0 + c.deviation, 1.0 + c.noise))
+        .map(|[mean, deviation, noise]| varied(&centre, mean, 1.0 + deviation, 1.0 + noise))
         .collect::<Result<Vec<_>, _>>()?;
     let participants = nominal.participants();
     let laws: Vec<WordLaw> = participants.iter().map(Participant::law).collect();
@@ -186,20 +169,24 @@ pub fn minimax(
     let weighted: Vec<(f64, &ObservationModel)> = weights.iter().copied().zip(&models).collect();
     let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws, Resolution::Coarse)?;
     let mut cells = nominal.cells();
-    let nominal_estimates = estimates(&nominal.system_in(&centre)?)?;
-    let nominal_worst_case = worst(&models, nominal, &nominal_estimates)?.0;
+    let nominal_estimates = estimates(&[nominal.system_in(&centre)?], &[1.0])?;
+    let systems_of = |design: &Solution| {
+        models
+            .iter()
+            .map(|m| design.system_in(m))
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let nominal_worst_case = worst(&errors_of(&systems_of(nominal)?, &nominal_estimates)?);
     let mut best: Option<Minimax> = None;
     let mut bound = 0.0_f64;
     for round in 0..ROUNDS {
         landscape.set_weights(&weights);
         cells = best_cells(&landscape, &cells);
         let design = nominal.with_cells(cells.clone())?;
-        let systems = models
-            .iter()
-            .map(|s| design.system_in(s))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mixed = mixed_estimates(&systems, &weights)?;
-        let (worst_case, errors) = worst(&models, &design, &mixed)?;
+        let systems = systems_of(&design)?;
+        let mixed = estimates(&systems, &weights)?;
+        let errors = errors_of(&systems, &mixed)?;
+        let worst_case = worst(&errors);
         let average: f64 = errors.iter().zip(&weights).map(|(e, w)| e * w).sum();
         bound = bound.max(average);
         if best.as_ref().is_none_or(|b| worst_case < b.worst_case) {
@@ -230,22 +217,14 @@ pub fn minimax(
     }
 }
 
-/// The centre of the box and its corners, those that coincide once.
-fn corners(mean: f64, deviation: f64, noise: f64) -> Vec<Corner> {
-    let ends = |size: f64| if size > 0.0 { vec![-size, size] } else { vec![0.0] };
-    let mut all = vec![Corner {
-        mean: 0.0,
-        deviation: 0.0,
-        noise: 0.0,
-    }];
-    for mean in ends(mean) {
-        for deviation in ends(deviation) {
-            for noise in ends(noise) {
-                let corner = Corner { mean, deviation, noise };
-                if !all.contains(&corner) {
-                    all.push(corner);
-                }
-            }
+/// The centre of a box and its corners, those that coincide once.
+fn corners(sizes: [f64; 3]) -> Vec<[f64; 3]> {
+    let mut all = vec![[0.0; 3]];
+    for corner in 0..8 {
+        let sign = |axis: usize| if corner >> (2 - axis) & 1 == 0 { -1.0 } else { 1.0 };
+        let corner = [0, 1, 2].map(|axis| sign(axis) * sizes[axis]);
+        if !all.contains(&corner) {
+            all.push(corner);
         }
     }
     all
@@ -268,17 +247,17 @@ fn best_cells(landscape: &Landscape, cells: &[WordedCells]) -> Vec<WordedCells> 
     cells_of(&point)
 }
 
-/// The largest error over the models, and all of them.
-fn worst(models: &[ObservationModel], design: &Solution, estimates: &[f64]) -> Result<(f64, Vec<f64>), Error> {
-    let errors = models
-        .iter()
-        .map(|model| error_of(&design.system_in(model)?, estimates))
-        .collect::<Result<Vec<_>, _>>()?;
-    Ok((errors.iter().copied().fold(0.0, f64::max), errors))
+/// The error of a table of estimates in each model.
+fn errors_of(systems: &[System], estimates: &[f64]) -> Result<Vec<f64>, Error> {
+    systems.iter().map(|system| error_of(system, estimates)).collect()
 }
 
-/// The posterior mean under a mixture of models.
-fn mixed_estimates(systems: &[System], weights: &[f64]) -> Result<Vec<f64>, Error> {
+fn worst(errors: &[f64]) -> f64 {
+    errors.iter().copied().fold(0.0, f64::max)
+}
+
+/// The posterior mean for every joint symbol under a mixture of models; the first prior mean for what cannot happen.
+fn estimates(systems: &[System], weights: &[f64]) -> Result<Vec<f64>, Error> {
     let reference = systems[0].model().mean;
     let mut sums: Vec<[f64; 2]> = Vec::new();
     for (system, weight) in systems.iter().zip(weights) {

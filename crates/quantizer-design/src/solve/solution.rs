@@ -7,11 +7,12 @@ use crate::decoder::MmseDecoder;
 use crate::design::Scope;
 use crate::error::{Error, refuse};
 use crate::newton::Certificate;
-use crate::observation_model::{ObservationModel, Prior};
+use crate::observation_model::ObservationModel;
 use crate::system::System;
 use fewbits_core::Link;
 use fewbits_numerics::error::entries;
 use fewbits_quantizers::quantizer::cell_of;
+use serde::Serialize;
 use std::fmt::Write;
 
 /// The designs that a request found, best first.
@@ -85,7 +86,7 @@ impl SensorDesign {
 }
 
 /// A bound on the criterion over all designs with these bits and links.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bound {
     /// In the unit of the criterion: a lower bound on an error, an upper bound on information.
     pub value: f64,
@@ -94,7 +95,7 @@ pub struct Bound {
 }
 
 /// Where a bound comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum BoundKind {
     /// Quadratic Gaussian CEO problem: codes of any length at separate sensors, links at their capacity.
     Ceo,
@@ -134,16 +135,7 @@ impl Solution {
             words: cells.words,
             link: p.link,
         });
-        Self::assembled(criterion, system, sensors.collect(), certificate, scope)
-    }
-
-    pub(super) fn assembled(
-        criterion: Criterion,
-        system: System,
-        sensors: Vec<SensorDesign>,
-        certificate: Certificate,
-        scope: Scope,
-    ) -> Result<Self, Error> {
+        let sensors: Vec<SensorDesign> = sensors.collect();
         Ok(Self {
             value: system.value(criterion)?,
             bound: tightest_bound(&system, &sensors, criterion)?,
@@ -249,12 +241,7 @@ impl Solution {
         let participants = self.participants();
         let apart = self.system.groups().len() == self.sensors.len();
         let system = system_of(self.system.model(), &participants, &cells, apart)?;
-        let sensors = self.sensors.iter().zip(cells).map(|(s, c)| SensorDesign {
-            breakpoints: c.breakpoints,
-            words: c.words,
-            ..s.clone()
-        });
-        Self::assembled(self.criterion, system, sensors.collect(), Certificate::Unproved, self.scope)
+        Self::new(self.criterion, &participants, system, cells, Certificate::Unproved, self.scope)
     }
 
     pub(super) fn participants(&self) -> Vec<Participant> {
@@ -325,42 +312,23 @@ fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterio
     let total: f64 = capacities.iter().sum();
     let mut found = Vec::new();
     if let Some(value) = bounds::unquantised(model, criterion)? {
-        found.push(Bound {
-            value,
-            kind: BoundKind::Unquantised,
-        });
+        found.push((value, BoundKind::Unquantised));
     }
     match criterion {
-        Criterion::MutualInformation => {
-            found.push(Bound {
-                value: total * std::f64::consts::LN_2,
-                kind: BoundKind::Capacity,
-            });
-        }
-        Criterion::MeanSquaredError if matches!(model.prior(), Prior::Gaussian { .. }) => {
+        Criterion::MutualInformation => found.push((total * std::f64::consts::LN_2, BoundKind::Capacity)),
+        Criterion::MeanSquaredError if model.prior().is_normal() => {
             let prior = model.prior_variance();
             let left = 1.0 / (1.0 / prior + model.noise().precision_of_mean());
-            let value = left + (prior - left) * (-2.0 * total).exp2();
-            found.push(Bound {
-                value,
-                kind: BoundKind::Together,
-            });
-            if model.is_independent() && sensors.len() <= bounds::CEO_MAX_SENSORS {
-                // A bound that does not converge is no bound.
-                if let Ok(ceo) = bounds::ceo(model.prior(), model.noise(), &capacities) {
-                    found.push(Bound {
-                        value: ceo.lower(),
-                        kind: BoundKind::Ceo,
-                    });
-                }
-            }
+            found.push((left + (prior - left) * (-2.0 * total).exp2(), BoundKind::Together));
+            // Not for correlated noise or too many sensors; a bound that does not converge is no bound.
+            let ceo = bounds::ceo(model.prior(), model.noise(), &capacities);
+            found.extend(ceo.ok().map(|bound| (bound.lower(), BoundKind::Ceo)));
         }
         _ => {}
     }
     let sense = criterion.sense();
-    Ok(found
-        .into_iter()
-        .min_by(|a, b| (sense * a.value).total_cmp(&(sense * b.value))))
+    let tightest = found.into_iter().min_by(|a, b| (sense * a.0).total_cmp(&(sense * b.0)));
+    Ok(tightest.map(|(value, kind)| Bound { value, kind }))
 }
 
 /// Bits per word that a link can carry: words arrive with their bits inverted, or not at all.

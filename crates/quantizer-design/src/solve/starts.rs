@@ -1,8 +1,8 @@
 //! The search over all sensors: single sensors first, then all of them from several starts, then finer grids.
 
-use super::control::{Control, Share, Stage};
+use super::control::{Control, Stage};
 use super::landscape::{Grid, Landscape, WordLaw, Words};
-use super::participant::{Participant, WordedCells, system_of};
+use super::participant::{Participant, WordedCells, gray, natural, plain, system_of};
 use super::polish;
 use super::search::{Point, best_of, cells_of, climb, gray_walk, grid_with, random_start, refine, spacing, start};
 use crate::criterion::{AllowedCells, Criterion};
@@ -10,7 +10,6 @@ use crate::error::Error;
 use crate::observation_model::{ObservationModel, Resolution};
 use crate::system::OUTCOME_LIMIT;
 use fewbits_monte_carlo::Stream;
-use fewbits_quantizers::lloyd_max;
 
 /// The joint search is left out where one round over the sensors takes more multiplications than this.
 const MAX_JOINT_WORK: f64 = 2e10;
@@ -60,44 +59,36 @@ pub(super) struct Search<'a> {
 
 impl Search<'_> {
     pub(super) fn run(&self, control: &mut Control<'_>) -> Result<Searched, Error> {
-        let Self {
-            model,
-            criterion,
-            participants,
-            ..
-        } = *self;
+        let (model, participants) = (self.model, self.participants);
         let laws: Vec<WordLaw> = participants.iter().map(Participant::law).collect();
         let singles = self.single_sensors(&laws, control)?;
-        let best_alone = singles.iter().map(|s| s[0].clone()).collect::<Vec<_>>();
+        let mut first = singles.iter().map(|s| s[0].clone()).collect::<Vec<_>>();
         let outcomes: f64 = laws.iter().map(|l| l.outputs as f64).product();
         if outcomes > OUTCOME_LIMIT as f64 {
             return Ok(Searched {
-                designs: vec![best_alone],
+                designs: vec![first],
                 value: f64::NAN,
                 apart: false,
             });
         }
-        let mut landscape = Landscape::new(&[(1.0, model)], criterion, laws.clone(), Resolution::Coarse)?;
+        let mut landscape = Landscape::new(&[(1.0, model)], self.criterion, laws.clone(), Resolution::Coarse)?;
         let mut cells: Vec<usize> = participants.iter().map(|p| grid_cells(p.bits)).collect();
-        let largest = cells.iter().copied().max().unwrap_or(0);
-        let mut work = landscape.work(largest);
-        control.enter(Share::AllSensors);
-        let climbs = LEAST_CLIMBS * CLIMB_ROUNDS * work;
-        let is_short = control.deadline().is_short_for(climbs);
+        let largest = |cells: &[usize]| cells.iter().copied().max().unwrap_or(0);
+        let mut work = landscape.work(largest(&cells));
+        control.enter(Stage::AllSensors, 1);
+        let is_short = control.deadline().is_short_for(LEAST_CLIMBS * CLIMB_ROUNDS * work);
         control.is_cut_short |= is_short;
         let work_is_large = work > MAX_COARSE_WORK || is_short;
-        let mut first = best_alone;
         let mut search = *self;
         if is_short {
-            cells = participants
-                .iter()
-                .map(|p| grid_cells(p.bits).min((4 << p.bits).max(16)))
-                .collect();
+            for (cells, p) in cells.iter_mut().zip(participants) {
+                *cells = grid_cells(p.bits).min((4 << p.bits).max(16));
+            }
         }
         if work_is_large {
             let rough = model.at(Resolution::Rough)?;
-            landscape = Landscape::new(&[(1.0, model)], criterion, laws, Resolution::Rough)?;
-            work = landscape.work(cells.iter().copied().max().unwrap_or(0));
+            landscape = Landscape::new(&[(1.0, model)], self.criterion, laws, Resolution::Rough)?;
+            work = landscape.work(largest(&cells));
             // Where few climbs are possible the first one starts from the best design at hand.
             first = self.best_at_hand(&rough, first, control)?;
             search.given = self.given.or(Some(&first));
@@ -107,10 +98,16 @@ impl Search<'_> {
         } else {
             search.joint_points(&landscape, &cells, &singles, work, control)
         };
-        let unit = size_of(&landscape, &points);
-        let refined = self.refined(&landscape, &cells, best_of(points, SAME * unit), outcomes, control);
-        let mut refined = best_of(refined, SAME_REFINED * unit);
+        control.enter(Stage::Refinement, 1);
+        // Newton's method needs a close start; where it is not affordable the grids alone do it.
+        let refinements = if polish::is_affordable(model, self.criterion, outcomes) {
+            REFINEMENTS
+        } else {
+            MORE_REFINEMENTS
+        };
+        let mut refined = self.refined(&landscape, &cells, points, refinements, control, Some(Stage::Refinement));
         let best = refined.first().map_or(f64::NAN, |p| p.value);
+        let unit = size_of(&landscape, &refined);
         refined.retain(|p| best - p.value <= CLOSE * unit);
         let mut designs: Vec<Vec<WordedCells>> = refined.iter().map(cells_of).collect();
         if designs.is_empty() || work_is_large || control.is_cut_short {
@@ -119,9 +116,9 @@ impl Search<'_> {
             if designs.is_empty() {
                 designs.push(first.clone());
             }
-            if polish::is_quick(model, criterion, outcomes)? {
+            if polish::is_quick(model, self.criterion, outcomes)? {
                 designs.push(plain(model, participants, gray)?);
-                designs.push(plain(model, participants, |level| level)?);
+                designs.push(plain(model, participants, natural)?);
             }
         }
         Ok(Searched {
@@ -138,12 +135,11 @@ impl Search<'_> {
         design: Vec<WordedCells>,
         control: &mut Control<'_>,
     ) -> Result<Vec<WordedCells>, Error> {
-        let gray = plain(self.model, self.participants, gray)?;
-        let natural = plain(self.model, self.participants, |level| level)?;
+        let [gray, natural] = [gray, natural].map(|word| plain(self.model, self.participants, word));
         let outcomes = self.participants.iter().map(|p| p.law().outputs as f64).product();
         let work = polish::evaluation_work(rough, self.criterion, outcomes);
         let mut best = (f64::NEG_INFINITY, design.clone());
-        for cells in [design, gray, natural] {
+        for cells in [design, gray?, natural?] {
             if !control.go_on() || control.deadline().is_short_for(work) {
                 break;
             }
@@ -170,6 +166,7 @@ impl Search<'_> {
                 grid_with(landscape, n, cells[n], more)
             })
             .collect();
+        let on_grids = |cells: &[WordedCells]| cells.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect();
         let folded = match self.shape {
             AllowedCells::Intervals => Vec::new(),
             AllowedCells::Any => folded_starts(landscape, self.participants, singles),
@@ -178,13 +175,12 @@ impl Search<'_> {
         let starts = affordable.clamp(2, self.starts.max(2) + folded.len());
         let mut points = Vec::new();
         if let Some(given) = self.given {
-            let words = given.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect();
-            points.extend(climb(landscape, grids.clone(), words, self.shape, control));
+            points.extend(climb(landscape, grids.clone(), on_grids(given), self.shape, control));
         }
         for i in 0..starts {
             // The best single sensors first, then folded cells, then the rest.
             let words = match i.checked_sub(1).and_then(|at| folded.get(at)) {
-                Some(cells) => cells.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect(),
+                Some(cells) => on_grids(cells),
                 None => self.joint_start(landscape, &grids, singles, if i == 0 { 0 } else { i - folded.len() }),
             };
             points.extend(climb(landscape, grids.clone(), words, self.shape, control));
@@ -196,22 +192,18 @@ impl Search<'_> {
         points
     }
 
-    /// Points on finer grids, as far as there is time; the best first, which has more of it.
+    /// The best points on finer grids, as far as there is time; the best first, which has more of it.
     fn refined(
         &self,
         landscape: &Landscape,
         cells: &[usize],
         points: Vec<Point>,
-        outcomes: f64,
+        refinements: usize,
         control: &mut Control<'_>,
+        shown_as: Option<Stage>,
     ) -> Vec<Point> {
-        control.enter(Share::Refinement);
-        // Newton's method needs a close start; where it is not affordable the grids alone do it.
-        let refinements = if polish::is_affordable(self.model, self.criterion, outcomes) {
-            REFINEMENTS
-        } else {
-            MORE_REFINEMENTS
-        };
+        let unit = size_of(landscape, &points);
+        let points = best_of(points, SAME * unit);
         let parts = points.len() * refinements;
         let mut refined = Vec::new();
         for (p, mut point) in points.into_iter().enumerate() {
@@ -221,11 +213,13 @@ impl Search<'_> {
                     break;
                 }
                 point = refine(landscape, point, &mut spacings, self.shape, control);
-                control.report(Stage::Refinement, p * refinements + r + 1, parts);
+                if let Some(stage) = shown_as {
+                    control.report(stage, p * refinements + r + 1, parts);
+                }
             }
             refined.push(point);
         }
-        refined
+        best_of(refined, SAME_REFINED * unit)
     }
 
     /// The best designs of every sensor by itself, best first.
@@ -243,7 +237,7 @@ impl Search<'_> {
                 found.push(found[m].clone());
                 continue;
             }
-            control.enter_part(Share::SingleSensors, participants.len() - n);
+            control.enter(Stage::SingleSensors, participants.len() - n);
             let own = model.subset(&[n])?;
             let landscape = Landscape::new(&[(1.0, &own)], criterion, vec![laws[n].clone()], Resolution::Coarse)?;
             let bits = participants[n].bits;
@@ -262,23 +256,12 @@ impl Search<'_> {
                     break;
                 }
             }
-            let unit = size_of(&landscape, &points);
-            let mut best = Vec::new();
-            for mut point in best_of(points, SAME * unit) {
-                let mut spacings = [spacing(&landscape, 0, cells)];
-                for _ in 0..REFINEMENTS {
-                    point = refine(&landscape, point, &mut spacings, self.shape, control);
-                }
-                best.push(point);
-            }
-            let mut designs: Vec<WordedCells> = best_of(best, SAME_REFINED * unit)
-                .iter()
-                .map(|p| cells_of(p).remove(0))
-                .collect();
-            if designs.is_empty() {
-                designs = plain(&own, &participants[n..=n], gray)?;
-            }
-            found.push(designs);
+            let best = self.refined(&landscape, &[cells], points, REFINEMENTS, control, None);
+            found.push(if best.is_empty() {
+                plain(&own, &participants[n..=n], gray)?
+            } else {
+                best.iter().flat_map(cells_of).collect()
+            });
             control.report(Stage::SingleSensors, n + 1, participants.len());
         }
         Ok(found)
@@ -312,28 +295,6 @@ impl Search<'_> {
 fn size_of(landscape: &Landscape, points: &[Point]) -> f64 {
     let sizes = points.iter().map(|p| landscape.unit(p.value));
     sizes.fold(f64::MIN_POSITIVE, f64::max)
-}
-
-/// Lloyd-Max cells of a normal sample with the word of each level.
-pub(super) fn plain(
-    model: &ObservationModel,
-    participants: &[Participant],
-    word: fn(usize) -> usize,
-) -> Result<Vec<WordedCells>, Error> {
-    let of = |(n, participant): (usize, &Participant)| {
-        let levels = 1usize << participant.bits;
-        let lloyd = lloyd_max::gaussian(levels)?.affine(model.sample_mean(), model.sample_deviation(n))?;
-        Ok(WordedCells {
-            breakpoints: lloyd.breakpoints().to_vec(),
-            words: (0..levels).map(word).collect(),
-        })
-    };
-    participants.iter().enumerate().map(of).collect()
-}
-
-/// Gray words.
-pub(super) fn gray(level: usize) -> usize {
-    level ^ (level >> 1)
 }
 
 /// Start `i` of a sensor: Gray words, natural words, Gray words of three quarters of the levels, then random ones.
