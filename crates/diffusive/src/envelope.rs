@@ -2,8 +2,7 @@
 
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
-use fewbits_models::diffusion::Air;
-use fewbits_models::{Homogeneous, Receptor, SourceModel};
+use fewbits_models::{Homogeneous, Receptor};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, finite, positive, refuse, within};
 use fewbits_numerics::golden::maximum;
@@ -22,8 +21,8 @@ const PEAK_TOLERANCE: f64 = 1e-8;
 
 /// A posterior over position and rate, asked about concentrations at the height of the sensors, in their medium.
 #[derive(Debug, Clone)]
-pub struct Envelope<M = Air> {
-    sensor: SourceSensor<M>,
+pub struct Envelope {
+    sensor: SourceSensor,
     points: Vec<Point>,
 }
 
@@ -34,50 +33,41 @@ struct Point {
     rate: Rate,
 }
 
+/// Normal of this mean and deviation, cut to an interval; a known rate is both ends.
 #[derive(Debug, Clone, Copy)]
-enum Rate {
-    Known(f64),
-    /// Normal of this mean and deviation, cut to an interval.
-    Cut {
-        mean: f64,
-        deviation: f64,
-        low: f64,
-        high: f64,
-    },
+struct Rate {
+    mean: f64,
+    deviation: f64,
+    low: f64,
+    high: f64,
 }
 
 impl Rate {
     /// `P(rate > level)`.
     fn exceeds(&self, level: f64) -> f64 {
-        match *self {
-            Self::Known(rate) => f64::from(u8::from(rate > level)),
-            Self::Cut { low, .. } if level <= low => 1.0,
-            Self::Cut { high, .. } if level >= high => 0.0,
-            Self::Cut {
-                mean,
-                deviation,
-                low,
-                high,
-            } => {
-                let z = |x: f64| (x - mean) / deviation;
-                let (above, below) = (interval(z(level), z(high)), interval(z(low), z(level)));
-                let total = above + below;
-                if total > 0.0 {
-                    above / total
-                } else {
-                    f64::from(u8::from(mean > level))
-                }
-            }
+        if level >= self.high {
+            return 0.0;
+        }
+        if level <= self.low {
+            return 1.0;
+        }
+        let z = |x: f64| (x - self.mean) / self.deviation;
+        let (above, below) = (interval(z(level), z(self.high)), interval(z(self.low), z(level)));
+        let total = above + below;
+        if total > 0.0 {
+            above / total
+        } else {
+            f64::from(u8::from(self.mean > level))
         }
     }
 }
 
-impl<M: SourceModel + Clone> Envelope<M> {
+impl Envelope {
     /// The envelope of a posterior; `likelihood` holds the records that it was formed from, and what was assumed of the rate.
     ///
     /// # Errors
     /// If the rate was redrawn for each node or sample: it then has no posterior.
-    pub fn new(posterior: &Posterior, likelihood: &SourceLikelihood<M>) -> Result<Self, Error> {
+    pub fn new(posterior: &Posterior, likelihood: &SourceLikelihood) -> Result<Self, Error> {
         let sensor = likelihood.records().first().map(|r| r.sensor().clone());
         let Some(sensor) = sensor else {
             return refuse("records", "empty", "at least one");
@@ -99,12 +89,17 @@ impl<M: SourceModel + Clone> Envelope<M> {
         for i in order {
             let position = Vector2::new(x[i], y[i]);
             let rate = match likelihood.rate() {
-                RateModel::Known(rate) => Rate::Known(*rate),
+                RateModel::Known(rate) => Rate {
+                    mean: *rate,
+                    deviation: 0.0,
+                    low: *rate,
+                    high: *rate,
+                },
                 RateModel::Joint(range) => {
                     let sums = likelihood.sums(&position);
                     // No response at all leaves the uniform prior: a normal far wider than the range.
                     let a = sums.response.max(1e-12 / (range.high() * range.high()));
-                    Rate::Cut {
+                    Rate {
                         mean: if sums.response > 0.0 {
                             sums.correlation / a
                         } else {
@@ -209,10 +204,7 @@ impl<M: SourceModel + Clone> Envelope<M> {
     /// No concentration exceeds the threshold farther from the source: in the steady state over impermeable ground it is
     /// `mu / (2 pi kappa R)`.
     fn widest(&self, medium: &Homogeneous, threshold: f64) -> f64 {
-        let largest = self.points.iter().map(|p| match p.rate {
-            Rate::Known(rate) => rate,
-            Rate::Cut { high, .. } => high,
-        });
+        let largest = self.points.iter().map(|p| p.rate.high);
         largest.fold(0.0, f64::max) / (std::f64::consts::TAU * medium.diffusivity * threshold)
     }
 }
@@ -229,8 +221,8 @@ impl Point {
 }
 
 /// Concentration per unit rate along a horizontal ray from the source.
-struct AlongRay<'a, M> {
-    sensor: &'a SourceSensor<M>,
+struct AlongRay<'a> {
+    sensor: &'a SourceSensor,
     receptor: Receptor,
     ray: &'a Vector2<f64>,
     age: f64,
@@ -238,8 +230,8 @@ struct AlongRay<'a, M> {
     peak: (f64, f64),
 }
 
-impl<'a, M: SourceModel> AlongRay<'a, M> {
-    fn new(sensor: &'a SourceSensor<M>, ray: &'a Vector2<f64>, age: f64, widest: f64) -> Result<Self, Error> {
+impl<'a> AlongRay<'a> {
+    fn new(sensor: &'a SourceSensor, ray: &'a Vector2<f64>, age: f64, widest: f64) -> Result<Self, Error> {
         let mut along = Self {
             receptor: sensor.receptor(&Vector2::zeros())?,
             sensor,

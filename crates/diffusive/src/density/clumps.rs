@@ -1,6 +1,6 @@
 //! A weighted cloud summed up by a few clumps.
 
-use super::Error;
+use crate::Error;
 use fewbits_core::Columns;
 use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use nalgebra::{SMatrix, SVector};
@@ -95,6 +95,14 @@ impl<const D: usize> Clumps<D> {
     /// The clumps.
     pub fn clumps(&self) -> &[Clump<D>] {
         &self.clumps
+    }
+
+    /// The same clumps with other weights of any sum above zero, one for each.
+    pub(crate) fn reweighted(&self, weights: &[f64]) -> Self {
+        let (mut other, total) = (self.clone(), weights.iter().sum::<f64>());
+        let pairs = other.clumps.iter_mut().zip(weights);
+        pairs.for_each(|(clump, weight)| clump.weight = weight / total);
+        other
     }
 
     /// Mean of the whole.
