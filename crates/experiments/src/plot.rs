@@ -186,6 +186,22 @@ impl Panel {
         self
     }
 
+    /// Adds a solid line for each column of the rows, in colours by their order; columns without values are left out.
+    #[must_use]
+    pub fn with_lines<'r, R: 'r, Y: Into<Option<f64>>>(
+        self,
+        rows: impl IntoIterator<Item = &'r R>,
+        x: impl Fn(&R) -> f64,
+        columns: &[(&str, fn(&R) -> Y)],
+    ) -> Self {
+        let rows: Vec<&R> = rows.into_iter().collect();
+        let line = |(colour, (label, y)): (usize, &(&str, fn(&R) -> Y))| {
+            Layer::line(*label, points(&rows, |r| (x(r), y(r)))).coloured(colour)
+        };
+        let lines = columns.iter().enumerate().map(line);
+        self.with_all(lines.filter(|line| !line.is_empty()))
+    }
+
     /// Whether it is a map: its axes are the coordinates `x` and `y` in one unit. A metre is then as long on both.
     pub fn is_map(&self) -> bool {
         let linear = |axis: &Axis| axis.scale == Scale::Linear && axis.names.is_empty();

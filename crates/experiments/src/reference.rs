@@ -61,7 +61,10 @@ fn of(key: &str) -> Result<&'static [Reference], String> {
 }
 
 /// The references `<figure>/<quantity>/...` with the rest of their keys.
-pub(crate) fn group(figure: &str, quantity: &str) -> Result<Vec<(&'static str, &'static Reference)>, String> {
+///
+/// # Errors
+/// If the system's file cannot be read.
+pub fn group(figure: &str, quantity: &str) -> Result<Vec<(&'static str, &'static Reference)>, String> {
     let rest = |r: &'static Reference| {
         let key = r
             .key

@@ -184,6 +184,22 @@ impl<T: Field> Field for Option<T> {
     }
 }
 
+/// Columns of one meaning, numbered from 1.
+impl<T: Field, const N: usize> Field for [T; N] {
+    const COLUMNS: usize = N * T::COLUMNS;
+
+    fn describe(about: Column, to: &mut Described) {
+        for number in 1..=N {
+            let name = format!("{}{number}", about.name).into();
+            T::describe(Column { name, ..about.clone() }, to);
+        }
+    }
+
+    fn put(&self, to: &mut Cells) {
+        self.iter().for_each(|field| field.put(to));
+    }
+}
+
 /// The main table has no name. One of measured times has the unit `"time"`.
 impl<T: Field> Field for Vec<T> {
     fn describe(about: Column, to: &mut Described) {

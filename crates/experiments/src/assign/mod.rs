@@ -11,8 +11,8 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
         &shapes::Landings,
         &table6_1::Table,
-        &networks::Spread,
-        &networks::Mean,
+        &networks::SPREAD,
+        &networks::MEAN,
         &shapes::BitErrors,
     ]
 }

@@ -22,27 +22,17 @@ parameters! {
 rows! {
     pub struct Landing {
         x: f64 ["V"] => "Source.",
-        f1: f64 ["V"] => "Estimate with bit 1, the coarsest, wrong.",
-        f2: f64 ["V"] => "Estimate with bit 2 wrong.",
-        f3: f64 ["V"] => "Estimate with bit 3 wrong.",
-        f4: f64 ["V"] => "Estimate with bit 4 wrong.",
+        f: [f64; BITS] ["V"] => "Estimate with the bit of this number wrong, the coarsest being 1.",
     }
 }
 
 impl Landing {
     fn at(x: f64) -> Result<Self, Error> {
-        let wrong = |bit| flipped_estimate(x, bit, BITS, 1.0).map_err(Error::failed);
-        Ok(Self {
-            x,
-            f1: wrong(0)?,
-            f2: wrong(1)?,
-            f3: wrong(2)?,
-            f4: wrong(3)?,
-        })
-    }
-
-    fn estimates(&self) -> [f64; BITS] {
-        [self.f1, self.f2, self.f3, self.f4]
+        let mut f = [0.0; BITS];
+        for (bit, estimate) in f.iter_mut().enumerate() {
+            *estimate = flipped_estimate(x, bit, BITS, 1.0)?;
+        }
+        Ok(Self { x, f })
     }
 }
 
@@ -70,14 +60,12 @@ impl Figure for Landings {
         let here = claims.at_defaults();
         let centre = |x: f64| tables.centres.iter().find(|l| (l.x - x).abs() < 1e-14);
         claims.all("involution", "flipping a bit twice returns to the centre", &tables.centres, |l| {
-            let back = |bit: usize| {
-                centre(l.estimates()[bit]).is_some_and(|there| (there.estimates()[bit] - l.x).abs() < 1e-14)
-            };
+            let back = |bit: usize| centre(l.f[bit]).is_some_and(|there| (there.f[bit] - l.x).abs() < 1e-14);
             (0..BITS).all(back)
         });
         let what = "every curve takes exactly the sixteen centres as values";
         here.all("staircase", what, 0..BITS, |bit| {
-            let mut values: Vec<f64> = tables.curve.iter().map(|l| l.estimates()[bit]).collect();
+            let mut values: Vec<f64> = tables.curve.iter().map(|l| l.f[bit]).collect();
             values.sort_by(f64::total_cmp);
             values.dedup();
             values.len() == 16 && values.iter().all(|v| centre(*v).is_some())
@@ -88,7 +76,7 @@ impl Figure for Landings {
         let panel = |bit: usize| {
             let (x, y) = (Axis::linear("source x / V"), Axis::linear("estimate / V").between(-1.1, 1.1));
             Panel::new(format!("Bit {} wrong", bit + 1), x, y)
-                .with(Layer::line("", points(&tables.curve, |l| (l.x, l.estimates()[bit]))).coloured(0))
+                .with(Layer::line("", points(&tables.curve, |l| (l.x, l.f[bit]))).coloured(0))
                 .with(Layer::dashed("", vec![(-1.0, -1.0), (1.0, 1.0)]).coloured(7))
                 .without_legend()
         };
@@ -108,16 +96,7 @@ parameters! {
 rows! {
     pub struct Wrong {
         x: f64 ["V"] => "Source.",
-        pa1: f64 => "Probability that bit 1, the coarsest, is wrong.",
-        pa2: f64 => "Probability that bit 2 is wrong.",
-        pa3: f64 => "Probability that bit 3 is wrong.",
-        pa4: f64 => "Probability that bit 4 is wrong.",
-    }
-}
-
-impl Wrong {
-    fn probabilities(&self) -> [f64; BITS] {
-        [self.pa1, self.pa2, self.pa3, self.pa4]
+        pa: [f64; BITS] => "Probability that the bit of this number is wrong, the coarsest being 1.",
     }
 }
 
@@ -130,34 +109,30 @@ impl Figure for BitErrors {
     fn run(&self, p: &ErrorParameters, _: &Context<'_>) -> Result<Vec<Wrong>, Error> {
         let sensors = CodedSensors::with_variances(1.0, &[p.variance; BITS])?;
         let at = |x: f64| {
-            let wrong = |bit: usize| bit_error(&sensors.quantizers()[bit], x, p.variance.sqrt()).map_err(Error::failed);
-            Ok(Wrong {
-                x,
-                pa1: wrong(0)?,
-                pa2: wrong(1)?,
-                pa3: wrong(2)?,
-                pa4: wrong(3)?,
-            })
+            let mut pa = [0.0; BITS];
+            for (probability, quantizer) in pa.iter_mut().zip(sensors.quantizers()) {
+                *probability = bit_error(quantizer, x, p.variance.sqrt())?;
+            }
+            Ok(Wrong { x, pa })
         };
         axis_points(p.step).map(at).collect()
     }
 
     fn claims(&self, _: &ErrorParameters, rows: &Vec<Wrong>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let near = |x: f64| rows.iter().find(|r| (r.x - x).abs() < 1e-9).map(|r| r.pa1);
+        let near = |x: f64| rows.iter().find(|r| (r.x - x).abs() < 1e-9).map(|r| r.pa[0]);
         here.near("half", "the sign bit is a coin at zero", near(0.0), 0.5, 1e-12);
         claims
             .references("pa1", "the sign bit is wrong with this probability, x =", [0.2], |x| (x.to_string(), near(x)));
         let what = "all values are probabilities";
-        claims.all("probabilities", what, rows, |r| r.probabilities().iter().all(|p| (0.0..=1.0).contains(p)));
-        let mean = |bit: usize| rows.iter().map(|r| r.probabilities()[bit]).sum::<f64>() / rows.len() as f64;
+        claims.all("probabilities", what, rows, |r| r.pa.iter().all(|p| (0.0..=1.0).contains(p)));
+        let mean = |bit: usize| rows.iter().map(|r| r.pa[bit]).sum::<f64>() / rows.len() as f64;
         here.increasing("order", "finer bits are wrong more often on average", (0..BITS).map(mean));
     }
 
     fn plot(&self, p: &ErrorParameters, rows: &Vec<Wrong>) -> Plot {
-        let line = |bit: usize| {
-            Layer::line(format!("bit {}", bit + 1), points(rows, |r| (r.x, r.probabilities()[bit]))).coloured(bit)
-        };
+        let line =
+            |bit: usize| Layer::line(format!("bit {}", bit + 1), points(rows, |r| (r.x, r.pa[bit]))).coloured(bit);
         let y = Axis::linear("probability that the bit is wrong").between(0.0, 0.9);
         let title = format!("Noise variance {} V²", p.variance);
         Plot::of(Panel::new(title, Axis::linear("source x / V"), y).with_all((0..BITS).map(line)))

@@ -92,7 +92,7 @@ fn tables(variances: &[f64]) -> Result<Rows, Failure> {
 }
 
 fn find<'a>(rows: &'a [Row], name: &str) -> Option<&'a Row> {
-    rows.iter().find(|r| r.assign == name)
+    first(rows, |r| r.assign == name)
 }
 
 impl Figure for Table {
@@ -107,31 +107,21 @@ impl Figure for Table {
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let all = || rows.assignments.iter();
-        claims.keyed("approx", "approximate error, assignment", all(), |r| r.approx);
-        claims.keyed("center", "error of the cell's centre, assignment", all(), |r| r.center);
-        claims.keyed(
-            "mmse",
-            "error of the posterior mean, a fifth below that of the cell's centre (erratum assign-2), assignment",
-            all(),
-            |r| r.mmse,
-        );
-        let cells = all().flat_map(|r| {
-            [
-                (format!("approx {}", r.assign), r.approx),
-                (format!("center {}", r.assign), r.center),
-            ]
-        });
+        let all = &rows.assignments;
+        claims.keyed("approx", "approximate error, assignment", all, |r| r.approx);
+        claims.keyed("center", "error of the cell's centre, assignment", all, |r| r.center);
+        let what =
+            "error of the posterior mean, a fifth below that of the cell's centre (erratum assign-2), assignment";
+        claims.keyed("mmse", what, all, |r| r.mmse);
+        let values =
+            |r: &Row| [("approx", r.approx), ("center", r.center)].map(|(what, v)| (format!("{what} {}", r.assign), v));
+        let cells = all.iter().flat_map(values);
         let what = "the printed values, to their digits (the simulated 0.0392 of assignment I lies within its noise of 0.0391)";
         claims.references("printed", what, cells, |cell| cell);
+        let best = "5 6 7 8 4 3 2 1";
         for (id, what, name, expected) in [
-            ("optimum", "the optimal assignment is 5 6 7 8 4 3 2 1", "optimal", "5 6 7 8 4 3 2 1"),
-            (
-                "exact",
-                "it is the exact optimum of the centre decoder among all",
-                "best, centre",
-                "5 6 7 8 4 3 2 1",
-            ),
+            ("optimum", "the optimal assignment is 5 6 7 8 4 3 2 1", "optimal", best),
+            ("exact", "it is the exact optimum of the centre decoder among all", "best, centre", best),
             (
                 "exact-mmse",
                 "the posterior mean prefers 5 6 7 8 4 1 2 3",
@@ -139,15 +129,14 @@ impl Figure for Table {
                 "5 6 7 8 4 1 2 3",
             ),
         ] {
-            here.all(id, what, find(&rows.assignments, name), |r| r.sensors == expected);
+            here.all(id, what, find(all, name), |r| r.sensors == expected);
         }
-        let pair = find(&rows.assignments, "optimal").zip(find(&rows.assignments, "best, posterior mean"));
+        let pair = find(all, "optimal").zip(find(all, "best, posterior mean"));
         let gain = pair.map(|(linear, best)| linear.mmse / best.mmse - 1.0);
         here.near("exact-mmse-error", "by 7e-6 only", gain, 7e-6, 0.05 * 7e-6);
         let bits: f64 = select(&rows.costs, |c| c.sensor == 1).map(|c| c.dual_bit).sum();
         let dual = bits + select(&rows.costs, |c| c.bit == 1).map(|c| c.dual_sensor).sum::<f64>();
-        let matched = find(&rows.assignments, "optimal")
-            .map_or(f64::NAN, |r| r.approx - quantization_error(1.0, p.variances.len()));
+        let matched = find(all, "optimal").map_or(f64::NAN, |r| r.approx - quantization_error(1.0, p.variances.len()));
         let what = "the dual variables prove the optimum: their sum is the cost (erratum binary-20)";
         claims.near("duality", what, dual, matched, 1e-15 + 1e-12 * matched);
         let what = "and none exceeds a cost";
@@ -157,7 +146,7 @@ impl Figure for Table {
         here.near("deviations", what, other, 2.0e-4, 1e-5);
         let what = "and another assignment optimal";
         let other = find(&rows.as_deviations, "optimal");
-        here.all("deviations-optimum", what, other, |r| r.sensors != "5 6 7 8 4 3 2 1");
+        here.all("deviations-optimum", what, other, |r| r.sensors != best);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {

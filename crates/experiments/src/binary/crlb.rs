@@ -1,6 +1,6 @@
 //! `binary-fig5-6`: equation 5.13 for three sets of patterns, and why it misleads.
 
-use super::{Scene, crossing, each, sweep, swept};
+use super::{ERROR, SNR, Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
 use crate::reference;
 use fewbits_binary_patterns::bounds::printed_crlb;
@@ -12,40 +12,25 @@ swept! { 0.0 to 30.0, step => quick 2.0,
     bits: Vec<usize> [1..=5; 1..=4] = vec![3, 4] => "Bits, and sensors.",
 }
 
-#[derive(Clone, Copy)]
-enum Kind {
-    Fixed,
-    Natural,
-    Gray,
+/// The masks of fixed thresholds, of natural and of Gray patterns: as many sensors as bits.
+fn sets(bits: usize) -> Result<[Vec<Mask>; 3], Error> {
+    Ok([vec![1 << (bits - 1); bits], natural_basis(bits)?, gray_basis(bits)?])
 }
 
-fn masks(kind: Kind, bits: usize) -> Result<Vec<Mask>, Error> {
-    match kind {
-        Kind::Fixed => Ok(vec![1 << (bits - 1); bits]),
-        Kind::Natural => Ok(natural_basis(bits)?),
-        Kind::Gray => Ok(gray_basis(bits)?),
-    }
-}
-
-/// Equation 5.13.
-fn printed(kind: Kind, bits: usize, snr: f64) -> Result<f64, Error> {
-    Ok(printed_crlb(&Scene::uniform(bits, snr)?.bank(&masks(kind, bits)?)?)?)
-}
-
-fn exact(kind: Kind, bits: usize, snr: f64) -> Result<f64, Error> {
-    Scene::uniform(bits, snr)?.mmse(&masks(kind, bits)?)
-}
-
-/// Where two sets have the same value, near where the thesis's curves cross.
-fn meet(a: Kind, b: Kind, bits: usize, name: &str) -> Result<Option<f64>, Error> {
+/// Where equation 5.13 has the same value for two sets, near where the thesis's curves cross.
+fn meet(bits: usize, name: &str, [a, b]: [&[Mask]; 2]) -> Result<Option<f64>, Error> {
     let Some(about) = reference::value(&format!("binary-fig5-6/crossing/{name} {bits} bits")) else {
         return Ok(None);
     };
-    let difference = |snr| Ok(printed(a, bits, snr)? - printed(b, bits, snr)?);
+    let difference = |snr| {
+        let scene = Scene::uniform(bits, snr)?;
+        Ok(printed_crlb(&scene.bank(a)?)? - printed_crlb(&scene.bank(b)?)?)
+    };
     crossing(about - 3.0, about + 3.0, difference).map(Some)
 }
 
 rows! {
+    #[derive(Default)]
     pub struct Rows {
         sets: Vec<Row> => "Values and errors.",
         crossings: Vec<Crossing> => "Crossings of equation 5.13.",
@@ -76,32 +61,34 @@ impl Figure for PrintedBounds {
          formula averages information and does not see that natural bits fail together.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        let (mut sets, mut crossings) = (Vec::new(), Vec::new());
+        let mut rows = Rows::default();
         for &bits in &p.bits {
-            let ratios = sweep(p.from_db, p.to_db, p.step_db);
-            sets.extend(each(&ratios, |snr_db| {
+            let [fixed, natural, gray] = sets(bits)?;
+            rows.sets.extend(each(&sweep(p.from_db, p.to_db, p.step_db), |snr_db| {
+                let scene = Scene::uniform(bits, snr_db)?;
+                let crlb = |masks: &[Mask]| Ok::<_, Error>(printed_crlb(&scene.bank(masks)?)?);
                 Ok(Row {
                     bits,
                     snr_db,
-                    crlb_fixed: printed(Kind::Fixed, bits, snr_db)?,
-                    crlb_natural: printed(Kind::Natural, bits, snr_db)?,
-                    crlb_gray: printed(Kind::Gray, bits, snr_db)?,
-                    mse_fixed: exact(Kind::Fixed, bits, snr_db)?,
-                    mse_natural: exact(Kind::Natural, bits, snr_db)?,
-                    mse_gray: exact(Kind::Gray, bits, snr_db)?,
+                    crlb_fixed: crlb(&fixed)?,
+                    crlb_natural: crlb(&natural)?,
+                    crlb_gray: crlb(&gray)?,
+                    mse_fixed: scene.mmse(&fixed)?,
+                    mse_natural: scene.mmse(&natural)?,
+                    mse_gray: scene.mmse(&gray)?,
                 })
             })?);
-            let fixed_gray_db = meet(Kind::Fixed, Kind::Gray, bits, "fixed-gray")?;
-            let gray_natural_db = meet(Kind::Gray, Kind::Natural, bits, "gray-natural")?;
+            let fixed_gray_db = meet(bits, "fixed-gray", [&fixed, &gray])?;
+            let gray_natural_db = meet(bits, "gray-natural", [&gray, &natural])?;
             if fixed_gray_db.is_some() {
-                crossings.push(Crossing {
+                rows.crossings.push(Crossing {
                     bits,
                     fixed_gray_db,
                     gray_natural_db,
                 });
             }
         }
-        Ok(Rows { sets, crossings })
+        Ok(rows)
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
@@ -118,25 +105,28 @@ impl Figure for PrintedBounds {
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        type Column = fn(&Row) -> f64;
-        let kinds: [(&str, &str, [Column; 3]); 2] = [
-            ("Equation 5.13", "value / V²", [|r| r.crlb_fixed, |r| r.crlb_natural, |r| r.crlb_gray]),
-            ("Exact error", "mean squared error / V²", [|r| r.mse_fixed, |r| r.mse_natural, |r| r.mse_gray]),
-        ];
         let panels = p.bits.iter().flat_map(|&bits| {
-            kinds.map(|(title, axis, columns)| {
-                let curves = ["fixed threshold", "natural patterns", "Gray patterns"]
-                    .into_iter()
-                    .zip(columns)
-                    .enumerate();
-                let own = || rows.sets.iter().filter(move |r| r.bits == bits);
-                let x = Axis::linear("signal-to-noise ratio / dB");
-                Panel::new(format!("{title}, {bits} sensors of {bits} bits"), x, Axis::log(axis)).with_all(
-                    curves.map(|(i, (label, value))| {
-                        Layer::line(label, points(own(), |r| (r.snr_db, value(r)))).coloured(i)
-                    }),
-                )
-            })
+            let own = || select(&rows.sets, move |r| r.bits == bits);
+            let title = |what: &str| format!("{what}, {bits} sensors of {bits} bits");
+            let values = Panel::semilog(title("Equation 5.13"), SNR, "value / V²").with_lines(
+                own(),
+                |r| r.snr_db,
+                &[
+                    ("fixed threshold", |r| r.crlb_fixed),
+                    ("natural patterns", |r| r.crlb_natural),
+                    ("Gray patterns", |r| r.crlb_gray),
+                ],
+            );
+            let errors = Panel::semilog(title("Exact error"), SNR, ERROR).with_lines(
+                own(),
+                |r| r.snr_db,
+                &[
+                    ("fixed threshold", |r| r.mse_fixed),
+                    ("natural patterns", |r| r.mse_natural),
+                    ("Gray patterns", |r| r.mse_gray),
+                ],
+            );
+            [values, errors]
         });
         Plot::grid(2, panels.collect())
     }

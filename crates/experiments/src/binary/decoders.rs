@@ -1,6 +1,6 @@
 //! `binary-fig5-8`: decoders and bounds for three Gray bits.
 
-use super::{Scene, each, sweep, swept};
+use super::{ERROR, SNR, Scene, each, sweep, swept};
 use crate::prelude::*;
 use crate::schema::label;
 use fewbits_binary_patterns::bounds::{
@@ -98,23 +98,19 @@ impl Figure for Decoders {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
         let of = |kind| each(&ratios, move |snr| row(kind, snr));
         Ok(Rows {
-            curves: [of(Kind::Uniform)?, of(Kind::Gaussian)?]
-                .into_iter()
-                .flatten()
-                .collect(),
+            curves: of(Kind::Uniform)?.into_iter().chain(of(Kind::Gaussian)?).collect(),
             tightness: each(&[-20.0, 0.0, 5.0, 8.0, 10.0, 15.0, 20.0, 25.0, 40.0], tightness)?,
         })
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let of = |kind: Kind| rows.curves.iter().filter(move |r| r.source == kind);
+        let of = |kind: Kind| select(&rows.curves, move |r| r.source == kind);
         let at_most = 1.0 + 1e-9;
         let what = "the posterior mean is no worse than any other decoder, for either source (erratum binary-17)";
         claims.all("mmse", what, &rows.curves, |r| {
-            [r.cmap, r.dmap, r.dmap_print, r.dmap_exact]
-                .iter()
-                .all(|other| r.mmse <= other * at_most)
+            let others = [r.cmap, r.dmap, r.dmap_print, r.dmap_exact];
+            others.iter().all(|other| r.mmse <= other * at_most)
         });
         type Bound = (&'static str, &'static str, fn(&Row) -> f64);
         let bounds: [Bound; 3] = [
@@ -143,12 +139,8 @@ impl Figure for Decoders {
         claims.keyed("as-printed", what, of(Kind::Gaussian), |r| r.dmap_print);
         claims.keyed("corrected", "the same corrected", of(Kind::Gaussian), |r| r.dmap);
         claims.keyed("tightness", "van Trees bound over error", &rows.tightness, |r| r.ratio);
-        claims.keyed(
-            "crlb",
-            "equation 5.13 with the denominators of its scores (erratum binary-8), uniform source",
-            &rows.tightness,
-            |r| r.crlb,
-        );
+        let what = "equation 5.13 with the denominators of its scores (erratum binary-8), uniform source";
+        claims.keyed("crlb", what, &rows.tightness, |r| r.crlb);
         let what =
             "it exceeds the true error at -20, 0, 15 and 20 dB: no bound for a uniform source (erratum binary-7)";
         let beyond = select(&rows.tightness, |r| [-20.0, 0.0, 15.0, 20.0].contains(&r.snr_db));
@@ -156,34 +148,33 @@ impl Figure for Decoders {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        type Curve = (&'static str, fn(&Row) -> f64);
-        let decoders: [Curve; 4] = [
-            ("posterior mean", |r| r.mmse),
-            ("continuous MAP", |r| r.cmap),
-            ("discrete MAP", |r| r.dmap),
-            ("discrete MAP as printed", |r| r.dmap_print),
-        ];
-        let bounds: [Curve; 6] = [
-            ("posterior mean", |r| r.mmse),
-            ("equation 5.13", |r| r.crlb),
-            ("van Trees", |r| r.vt),
-            ("rate-distortion, printed", |r| r.rd_print),
-            ("rate-distortion, N bits", |r| r.rd_per_n),
-            ("centralised", |r| r.central),
-        ];
-        let panels = [(Kind::Uniform, "uniform"), (Kind::Gaussian, "Gaussian")]
-            .into_iter()
-            .flat_map(|(kind, name)| {
-                let own = || rows.curves.iter().filter(move |r| r.source == kind);
-                let panel = |title: &str, curves: &[Curve]| {
-                    let layers = curves.iter().enumerate();
-                    let layers = layers
-                        .map(|(i, (label, of))| Layer::line(*label, points(own(), |r| (r.snr_db, of(r)))).coloured(i));
-                    let axes = (Axis::linear("signal-to-noise ratio / dB"), Axis::log("mean squared error / V²"));
-                    Panel::new(format!("{title}, {name} source"), axes.0, axes.1).with_all(layers.collect::<Vec<_>>())
-                };
-                [panel("Decoders", &decoders), panel("Bounds", &bounds)]
-            });
-        Plot::grid(2, panels.collect())
+        let panels = [(Kind::Uniform, "uniform"), (Kind::Gaussian, "Gaussian")].map(|(kind, name)| {
+            let own = || select(&rows.curves, move |r| r.source == kind);
+            let panel = |title: &str| Panel::semilog(format!("{title}, {name} source"), SNR, ERROR);
+            let decoders = panel("Decoders").with_lines(
+                own(),
+                |r| r.snr_db,
+                &[
+                    ("posterior mean", |r| r.mmse),
+                    ("continuous MAP", |r| r.cmap),
+                    ("discrete MAP", |r| r.dmap),
+                    ("discrete MAP as printed", |r| r.dmap_print),
+                ],
+            );
+            let bounds = panel("Bounds").with_lines(
+                own(),
+                |r| r.snr_db,
+                &[
+                    ("posterior mean", |r| r.mmse),
+                    ("equation 5.13", |r| r.crlb),
+                    ("van Trees", |r| r.vt),
+                    ("rate-distortion, printed", |r| r.rd_print),
+                    ("rate-distortion, N bits", |r| r.rd_per_n),
+                    ("centralised", |r| r.central),
+                ],
+            );
+            [decoders, bounds]
+        });
+        Plot::grid(2, panels.concat())
     }
 }

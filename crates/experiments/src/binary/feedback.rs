@@ -1,6 +1,6 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
-use super::{Scene, descent_from, each, mask_text, sweep, swept};
+use super::{ERROR, SNR, Scene, descent_from, each, mask_text, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::bounds::ConditionalMean;
 use fewbits_binary_patterns::published::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
@@ -18,13 +18,13 @@ swept! { 0.0 to 40.0 => quick 30.0, step => quick 10.0,
 /// Finer cells than this share of the noise are not tried: they never win.
 const FINEST_CELL: f64 = 0.5;
 
-/// The best masks that a descent from the repeated Gray basis and `extra` scattered starts finds.
-pub(super) fn descend(bits: usize, sensors: usize, snr: f64, extra: usize) -> Result<(Vec<Mask>, f64), Error> {
+/// The best masks that a descent from the repeated Gray basis finds.
+fn descend(bits: usize, sensors: usize, snr: f64) -> Result<(Vec<Mask>, f64), Error> {
     // Both the fine and the coarse end of the basis may need the spare sensors.
     let gray = gray_basis(bits)?;
     let reversed = gray.iter().rev().copied().collect();
     let cycle = |masks: Vec<Mask>| masks.into_iter().cycle().take(sensors).collect::<Vec<_>>();
-    descent_from(&Scene::uniform(bits, snr)?, bits, sensors, &[cycle(gray), cycle(reversed)], extra)
+    descent_from(&Scene::uniform(bits, snr)?, bits, sensors, &[cycle(gray), cycle(reversed)], 0)
 }
 
 rows! {
@@ -54,7 +54,7 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
         if 2.0 / f64::from(1u32 << bits) < FINEST_CELL * scene.noise {
             break;
         }
-        let (masks, mse) = descend(bits, p.sensors, snr_db, 0)?;
+        let (masks, mse) = descend(bits, p.sensors, snr_db)?;
         if mse < best.2 {
             best = (bits, masks, mse);
         }
@@ -92,9 +92,8 @@ impl Figure for Feedback {
          than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
-        let ratios = sweep(p.from_db, p.to_db, p.step_db);
         // The costly points first, so that no thread is left alone with one at the end.
-        let mut points = ratios;
+        let mut points = sweep(p.from_db, p.to_db, p.step_db);
         points.reverse();
         let mut rows = each(&points, |snr| row(p, snr))?;
         rows.reverse();
@@ -125,25 +124,21 @@ impl Figure for Feedback {
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
         let points = |of: fn(&Row) -> Option<f64>| points(rows, |r| (r.snr_db, of(r)));
-        let axis = || Axis::linear("signal-to-noise ratio / dB");
+        let errors = Panel::semilog(format!("{} sensors", p.sensors), SNR, ERROR)
+            .with(Layer::line("patterns, best resolution", points(|r| Some(r.lbqp_best))).coloured(0))
+            .with(Layer::line("patterns, three bits", points(|r| Some(r.lbqp_b3))).coloured(5))
+            .with(Layer::line("fixed threshold", points(|r| Some(r.fixed))).coloured(4))
+            .with(Layer::line("Luo, linear", points(|r| r.luo_soft)).coloured(3))
+            .with(Layer::dashed("multi-threshold bound", points(|r| Some(r.ribeiro_relaxed))).coloured(6))
+            .with(Layer::line("AQ-VS", points(|r| Some(r.aqvs_mle))).coloured(2))
+            .with(Layer::line("AQ-ML", points(|r| Some(r.aqml_mle))).coloured(1))
+            .with(Layer::dashed("AQ, posterior mean", points(|r| Some(r.aq_posterior_mean))).coloured(1))
+            .with(Layer::dashed("unquantized", points(|r| Some(r.clairvoyant))).coloured(7));
         let bits = Axis::linear("bits of the cell index").between(2.5, p.most_bits as f64 + 0.5);
-        Plot::grid(
-            2,
-            vec![
-                Panel::new(format!("{} sensors", p.sensors), axis(), Axis::log("mean squared error / V²"))
-                    .with(Layer::line("patterns, best resolution", points(|r| Some(r.lbqp_best))).coloured(0))
-                    .with(Layer::line("patterns, three bits", points(|r| Some(r.lbqp_b3))).coloured(5))
-                    .with(Layer::line("fixed threshold", points(|r| Some(r.fixed))).coloured(4))
-                    .with(Layer::line("Luo, linear", points(|r| r.luo_soft)).coloured(3))
-                    .with(Layer::dashed("multi-threshold bound", points(|r| Some(r.ribeiro_relaxed))).coloured(6))
-                    .with(Layer::line("AQ-VS", points(|r| Some(r.aqvs_mle))).coloured(2))
-                    .with(Layer::line("AQ-ML", points(|r| Some(r.aqml_mle))).coloured(1))
-                    .with(Layer::dashed("AQ, posterior mean", points(|r| Some(r.aq_posterior_mean))).coloured(1))
-                    .with(Layer::dashed("unquantized", points(|r| Some(r.clairvoyant))).coloured(7)),
-                Panel::new("Best resolution", axis(), bits.named((3..=p.most_bits).map(|b| (b as f64, b.to_string()))))
-                    .with(Layer::points("", points(|r| Some(r.bits as f64))).coloured(0))
-                    .without_legend(),
-            ],
-        )
+        let bits = bits.named((3..=p.most_bits).map(|b| (b as f64, b.to_string())));
+        let resolution = Panel::new("Best resolution", Axis::linear(SNR), bits)
+            .with(Layer::points("", points(|r| Some(r.bits as f64))).coloured(0))
+            .without_legend();
+        Plot::grid(2, vec![errors, resolution])
     }
 }

@@ -1,6 +1,6 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
-use super::{Scene, crossing, each, mask_text, sweep, swept};
+use super::{SNR, Scene, crossing, each, mask_text, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
@@ -71,10 +71,8 @@ impl Figure for GaussianSource {
                 let scene = Scene::gaussian(snr)?;
                 Ok(scene.mmse(a)? - scene.mmse(b)?)
             };
-            Ok(Crossing {
-                pair,
-                snr_db: crossing(low, high, gap)?,
-            })
+            let snr_db = crossing(low, high, gap)?;
+            Ok(Crossing { pair, snr_db })
         };
         let crossings = vec![
             meet("{4,5,6} and {4,6,7}", &[4, 5, 6], &OTHER, 4.0, 5.5)?,
@@ -105,21 +103,23 @@ impl Figure for GaussianSource {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let curve = |value: fn(&Row) -> f64| points(&rows.errors, |r| (r.snr_db, value(r)));
+        let bound = |value: fn(&Row) -> f64| points(&rows.errors, |r| (r.snr_db, value(r)));
         Plot::of(
-            Panel::semilog(
-                "Three sensors, Gaussian source of variance 0.1",
-                "signal-to-noise ratio / dB",
-                "mean squared error",
-            )
-            .with(Layer::line("best basis", curve(|r| r.mse_opt)).coloured(0))
-            .with(Layer::line("any three masks", curve(|r| r.mse_unconstrained)).coloured(1))
-            .with(Layer::line("Gray", curve(|r| r.mse_gray)).coloured(2))
-            .with(Layer::line("natural", curve(|r| r.mse_natural)).coloured(3))
-            .with(Layer::line("three signs", curve(|r| r.mse_signs)).coloured(4))
-            .with(Layer::dashed("D(R), printed", curve(|r| r.dr_print)).coloured(6))
-            .with(Layer::dashed("D(R), three observations", curve(|r| r.dr_per_n)).coloured(7))
-            .with(Layer::dashed("van Trees bound, best basis", curve(|r| r.vt)).coloured(5)),
+            Panel::semilog("Three sensors, Gaussian source of variance 0.1", SNR, "mean squared error")
+                .with_lines(
+                    &rows.errors,
+                    |r| r.snr_db,
+                    &[
+                        ("best basis", |r| r.mse_opt),
+                        ("any three masks", |r| r.mse_unconstrained),
+                        ("Gray", |r| r.mse_gray),
+                        ("natural", |r| r.mse_natural),
+                        ("three signs", |r| r.mse_signs),
+                    ],
+                )
+                .with(Layer::dashed("D(R), printed", bound(|r| r.dr_print)).coloured(6))
+                .with(Layer::dashed("D(R), three observations", bound(|r| r.dr_per_n)).coloured(7))
+                .with(Layer::dashed("van Trees bound, best basis", bound(|r| r.vt)).coloured(5)),
         )
     }
 }

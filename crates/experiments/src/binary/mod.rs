@@ -2,7 +2,6 @@
 //!
 //! Everything here is exact: no figure of this system draws a random number.
 
-mod beyond;
 mod crlb;
 mod decoders;
 mod feedback;
@@ -22,9 +21,9 @@ use fewbits_monte_carlo::parallel;
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
         &patterns::Clipping,
-        &patterns::Natural,
-        &patterns::Gray,
-        &patterns::Extra,
+        &patterns::NATURAL,
+        &patterns::GRAY,
+        &patterns::EXTRA,
         &patterns::Response,
         &crlb::PrintedBounds,
         &table5_1::Table,
@@ -33,9 +32,12 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &gaussian::GaussianSource,
         &table5_2::Table,
         &feedback::Feedback,
-        &beyond::Beyond,
     ]
 }
+
+/// Axes of the curves.
+const SNR: &str = "signal-to-noise ratio / dB";
+const ERROR: &str = "mean squared error / V²";
 
 /// Variance of the thesis's Gaussian source.
 const GAUSSIAN_VARIANCE: f64 = 0.1;

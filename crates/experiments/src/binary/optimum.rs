@@ -1,6 +1,6 @@
 //! `binary-fig5-7`: optimal linear patterns against the signal-to-noise ratio, shortcuts, and Luo's scheme.
 
-use super::{Scene, crossing, descent_from, each, mask_text, not_below, sweep};
+use super::{ERROR, SNR, Scene, crossing, descent_from, each, mask_text, not_below, sweep};
 use crate::prelude::*;
 use fewbits_binary_patterns::published::{Luo, by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
@@ -111,7 +111,14 @@ impl Figure for Optimum {
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
         let of = |n: &usize| each(&ratios, |snr| row(p.bits, *n, snr));
-        let errors = p.sensors.iter().map(of).collect::<Result<Vec<_>, _>>()?;
+        let errors = p
+            .sensors
+            .iter()
+            .map(of)
+            .collect::<Result<Vec<_>, _>>()?
+            .into_iter()
+            .flatten()
+            .collect();
         let at = |masks: &[Mask], snr: f64| Scene::uniform(3, snr)?.mmse(masks);
         let eight = [2, 2, 3, 3, 3, 3, 4, 6];
         let meet = crossing(6.0, 10.0, |snr| Ok(at(&[4, 5, 6], snr)? - at(&[4, 6, 3], snr)?))?;
@@ -122,7 +129,7 @@ impl Figure for Optimum {
             ("three Gray bits at 50 dB, V^2", at(&[4, 6, 3], 50.0)?),
         ];
         Ok(Rows {
-            errors: errors.into_iter().flatten().collect(),
+            errors,
             special: special.map(|(quantity, value)| Special { quantity, value }).into(),
             tiling: tiling()?,
         })
@@ -131,16 +138,15 @@ impl Figure for Optimum {
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let all = &rows.errors;
-        let of = |sensors: usize| all.iter().filter(move |r| r.sensors == sensors);
+        let of = |sensors: usize| select(all, move |r| r.sensors == sensors);
         let what = "dropping the rank constraint never hurts, forcing the Gray basis never helps";
         claims.all("order", what, all, |r| {
             r.mse_unconstrained <= r.mse_opt * (1.0 + 1e-9) && r.mse_strategy1 >= r.mse_opt * (1.0 - 1e-9)
         });
         let what = "from 5 dB on eight optimal sensors beat Luo's under every fusion rule";
         here.all("luo", what, of(8).filter(|r| r.snr_db >= 5.0), |r| {
-            [r.luo_soft, r.luo_mmse, r.luo_majority]
-                .iter()
-                .all(|luo| luo.is_some_and(|luo| r.mse_opt < luo))
+            let luo = [r.luo_soft, r.luo_mmse, r.luo_majority];
+            luo.iter().all(|luo| luo.is_some_and(|luo| r.mse_opt < luo))
         });
         let least = of(8).min_by(|a, b| a.mse_opt.total_cmp(&b.mse_opt)).map(|r| r.snr_db);
         let what = "the error of eight sensors is least near 22 dB and rises beyond (erratum binary-18)";
@@ -181,23 +187,21 @@ impl Figure for Optimum {
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        type Curve = (&'static str, fn(&Row) -> Option<f64>);
-        let curves: [Curve; 6] = [
-            ("best of full rank", |r| Some(r.mse_opt)),
-            ("best of any rank", |r| Some(r.mse_unconstrained)),
-            ("Gray basis forced", |r| Some(r.mse_strategy1)),
-            ("Gray, filled by eq. 5.13", |r| Some(r.mse_strategy13)),
-            ("Luo, linear", |r| r.luo_soft),
-            ("Luo, posterior mean", |r| r.luo_mmse),
-        ];
         let panel = |&sensors: &usize| {
-            let own = || rows.errors.iter().filter(move |r| r.sensors == sensors);
-            let layers = curves.iter().enumerate().map(|(colour, (label, of))| {
-                Layer::line(*label, points(own(), |r| (r.snr_db, of(r)))).coloured(colour)
-            });
-            let shown = layers.filter(|layer| !layer.is_empty());
-            let axes = (Axis::linear("signal-to-noise ratio / dB"), Axis::log("mean squared error / V²"));
-            Panel::new(format!("{sensors} sensors, {} bits", p.bits), axes.0, axes.1).with_all(shown)
+            let own = select(&rows.errors, move |r| r.sensors == sensors);
+            let title = format!("{sensors} sensors, {} bits", p.bits);
+            Panel::semilog(title, SNR, ERROR).with_lines(
+                own,
+                |r| r.snr_db,
+                &[
+                    ("best of full rank", |r| Some(r.mse_opt)),
+                    ("best of any rank", |r| Some(r.mse_unconstrained)),
+                    ("Gray basis forced", |r| Some(r.mse_strategy1)),
+                    ("Gray, filled by eq. 5.13", |r| Some(r.mse_strategy13)),
+                    ("Luo, linear", |r| r.luo_soft),
+                    ("Luo, posterior mean", |r| r.luo_mmse),
+                ],
+            )
         };
         Plot::grid(2, p.sensors.iter().map(panel).collect())
     }

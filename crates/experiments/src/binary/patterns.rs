@@ -89,20 +89,12 @@ impl Figure for Clipping {
             Ok(wide.pattern_bank(&patterns)?.mmse()?)
         };
         let best = parallel::try_map(&all, |set| swapped(&set.masks))?;
-        let errors = vec![
-            Rule {
-                rule: "nearest outer cell",
-                mse: own,
-            },
-            Rule {
-                rule: "sides swapped",
-                mse: swapped(&p.masks)?,
-            },
-            Rule {
-                rule: "sides swapped, best masks for that",
-                mse: best.into_iter().fold(f64::INFINITY, f64::min),
-            },
+        let errors = [
+            ("nearest outer cell", own),
+            ("sides swapped", swapped(&p.masks)?),
+            ("sides swapped, best masks for that", best.into_iter().fold(f64::INFINITY, f64::min)),
         ];
+        let errors = errors.map(|(rule, mse)| Rule { rule, mse }).into();
         Ok(Clipped { cells, errors })
     }
 
@@ -135,141 +127,89 @@ rows! {
     }
 }
 
-fn bits_of(rows: impl IntoIterator<Item = (String, Mask)>, bits: usize) -> Result<Vec<Bit>, Error> {
-    let mut table = Vec::new();
-    for (name, mask) in rows {
-        for (l, bit) in pattern(mask, bits)?.bits().iter().enumerate() {
-            table.push(Bit {
-                pattern: name.clone(),
-                mask,
-                l: l + 1,
-                bit: u32::from(*bit),
-            });
-        }
-    }
-    Ok(table)
-}
-
-/// Names and bits of the patterns of a table.
-fn strings(table: &[Bit]) -> Vec<(&str, String)> {
-    let digits = |chunk: &[Bit]| chunk.iter().map(|b| b.bit.to_string()).collect::<String>();
-    table
-        .chunk_by(|a, b| a.pattern == b.pattern)
-        .map(|chunk| (chunk[0].pattern.as_str(), digits(chunk)))
-        .collect()
-}
-
-fn bits_plot(title: &str, table: &[Bit]) -> Plot {
-    let parsed = |(name, digits): (&str, String)| Some((name.to_owned(), digits.parse().ok()?));
-    Plot::of(pattern_panel(title, &strings(table).into_iter().filter_map(parsed).collect::<Vec<_>>()))
-}
-
-/// Claims that the patterns are the printed ones.
-fn claim_printed(claims: &mut Claims, what: &str, table: &[Bit], printed: &[&str]) {
-    let here = claims.at_defaults();
-    let ours = strings(table);
-    here.all("bits", what, printed.iter().enumerate(), |(i, bits)| {
-        ours.get(i).is_some_and(|(_, own)| own == bits)
-    });
+/// Some patterns of a figure, with the printed ones.
+pub struct Patterns {
+    about: About,
+    what: &'static str,
+    printed: &'static [&'static str],
+    /// Masks beyond the Gray basis; without them the figure has no such parameter.
+    extra: Option<&'static [Mask]>,
+    masks: fn(&PatternParameters) -> Result<Vec<(String, Mask)>, Error>,
+    /// What is claimed besides.
+    claims: fn(&PatternParameters, &Claims),
 }
 
 parameters! {
-    pub struct BitsParameters {
+    pub struct PatternParameters {
         bits: usize [1..=8] = 4 => "Bits of the cell index.",
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        extra: Option<Vec<Mask>> [1..=255; 1..=20] = None => "Masks beyond the Gray basis, below 2^bits.",
+    }
+    check |p| fit("extra", p.extra(), p.bits);
+}
+
+impl PatternParameters {
+    fn extra(&self) -> &[Mask] {
+        self.extra.as_deref().unwrap_or_default()
     }
 }
 
 /// Numbers patterns after their kind.
-fn numbered(kind: &str, masks: Vec<Mask>) -> impl Iterator<Item = (String, Mask)> {
-    masks
-        .into_iter()
-        .enumerate()
-        .map(move |(b, mask)| (format!("{kind}{}", b + 1), mask))
+fn numbered(kind: &str, masks: Vec<Mask>) -> Vec<(String, Mask)> {
+    let numbers = (1..).map(|b| format!("{kind}{b}"));
+    numbers.zip(masks).collect()
 }
 
-pub struct Natural;
+pub static NATURAL: Patterns = Patterns {
+    about: About::of("binary-fig5-3", "Natural patterns", "Movaghati, thesis, figure 5.3").showing(
+        "The binary digits of the cell's index, most significant first. The finest of them changes at every edge.",
+    ),
+    what: "the patterns are those printed",
+    printed: &[
+        "0000000011111111",
+        "0000111100001111",
+        "0011001100110011",
+        "0101010101010101",
+    ],
+    extra: None,
+    masks: |p| Ok(numbered("N", natural_basis(p.bits)?)),
+    claims: |_, _| {},
+};
 
-impl Figure for Natural {
-    figure!(BitsParameters => Vec<Bit>, "binary-fig5-3", "Natural patterns", "Movaghati, thesis, figure 5.3",
-        "The binary digits of the cell's index, most significant first. The finest of them changes at every edge.");
-
-    fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
-        bits_of(numbered("N", natural_basis(p.bits)?), p.bits)
-    }
-
-    fn claims(&self, _: &BitsParameters, table: &Vec<Bit>, claims: &mut Claims) {
-        let printed = [
-            "0000000011111111",
-            "0000111100001111",
-            "0011001100110011",
-            "0101010101010101",
-        ];
-        claim_printed(claims, "the patterns are those printed", table, &printed);
-    }
-
-    fn plot(&self, _: &BitsParameters, table: &Vec<Bit>) -> Plot {
-        bits_plot("Natural patterns", table)
-    }
-}
-
-pub struct Gray;
-
-impl Figure for Gray {
-    figure!(BitsParameters => Vec<Bit>, "binary-fig5-4", "Gray patterns", "Movaghati, thesis, figure 5.4",
+pub static GRAY: Patterns = Patterns {
+    about: About::of("binary-fig5-4", "Gray patterns", "Movaghati, thesis, figure 5.4").showing(
         "XORs of neighbouring natural patterns. Every edge belongs to exactly one pattern, so that a measurement near an edge \
-         endangers one bit only.");
+         endangers one bit only.",
+    ),
+    what: "the patterns are those printed",
+    printed: &[
+        "0000000011111111",
+        "0000111111110000",
+        "0011110000111100",
+        "0110011001100110",
+    ],
+    extra: None,
+    masks: |p| Ok(numbered("G", gray_basis(p.bits)?)),
+    claims: |p, claims| {
+        let matrix = gray_basis(p.bits).and_then(|basis| generator_matrix(&basis, p.bits));
+        let matrix = matrix.unwrap_or_default();
+        claims.all("adjacent", "neighbouring cells differ in exactly one bit", matrix.windows(2), |w| {
+            w[0].iter().zip(&w[1]).filter(|(a, b)| a != b).count() == 1
+        });
+    },
+};
 
-    fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
-        bits_of(numbered("G", gray_basis(p.bits)?), p.bits)
-    }
-
-    fn claims(&self, p: &BitsParameters, table: &Vec<Bit>, claims: &mut Claims) {
-        let printed = [
-            "0000000011111111",
-            "0000111111110000",
-            "0011110000111100",
-            "0110011001100110",
-        ];
-        claim_printed(claims, "the patterns are those printed", table, &printed);
-        let matrix = gray_basis(p.bits)
-            .and_then(|basis| generator_matrix(&basis, p.bits))
-            .unwrap_or_default();
-        let what = "neighbouring cells differ in exactly one bit";
-        claims
-            .all("adjacent", what, matrix.windows(2), |w| w[0].iter().zip(&w[1]).filter(|(a, b)| a != b).count() == 1);
-    }
-
-    fn plot(&self, _: &BitsParameters, table: &Vec<Bit>) -> Plot {
-        bits_plot("Gray patterns", table)
-    }
-}
-
-pub struct Extra;
-
-parameters! {
-    pub struct ExtraParameters {
-        bits: usize [1..=8] = 4 => "Bits of the cell index.",
-        extra: Vec<Mask> [1..=255; 1..=20] = vec![14, 5, 11] => "Masks beyond the Gray basis, below 2^bits.",
-    }
-    check |p| fit("extra", &p.extra, p.bits);
-}
-
-impl Figure for Extra {
-    figure!(ExtraParameters => Vec<Bit>, "binary-fig5-5", "Further linear patterns", "Movaghati, thesis, figure 5.5 and equation 5.6",
+pub static EXTRA: Patterns = Patterns {
+    about: About::of("binary-fig5-5", "Further linear patterns", "Movaghati, thesis, figure 5.5 and equation 5.6").showing(
         "With more sensors than bits, further XORs of the natural patterns join the Gray basis: columns 5 to 7 of the \
-         thesis's generator matrix (5.6).");
-
-    fn run(&self, p: &ExtraParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
-        bits_of(p.extra.iter().map(|&mask| (format!("mask {mask}"), mask)), p.bits)
-    }
-
-    fn claims(&self, p: &ExtraParameters, table: &Vec<Bit>, claims: &mut Claims) {
-        let printed = ["0011110011000011", "0101101001011010", "0110011010011001"];
-        claim_printed(claims, "the patterns are columns 5 to 7 of matrix (5.6)", table, &printed);
-        let masks = gray_basis(p.bits)
-            .unwrap_or_default()
-            .into_iter()
-            .chain(p.extra.iter().copied());
+         thesis's generator matrix (5.6).",
+    ),
+    what: "the patterns are columns 5 to 7 of matrix (5.6)",
+    printed: &["0011110011000011", "0101101001011010", "0110011010011001"],
+    extra: Some(&[14, 5, 11]),
+    masks: |p| Ok(p.extra().iter().map(|&mask| (format!("mask {mask}"), mask)).collect()),
+    claims: |p, claims| {
+        let masks = gray_basis(p.bits).unwrap_or_default().into_iter().chain(p.extra().iter().copied());
         let all: Option<Vec<Pattern>> = masks.map(|mask| pattern(mask, p.bits).ok()).collect();
         let what = "with the Gray basis they separate all cells";
         claims.all("separating", what, all, |patterns| check_separation(&patterns).is_ok());
@@ -278,10 +218,56 @@ impl Figure for Extra {
         let counterexample: Option<Vec<Pattern>> = texts.iter().map(|text| text.parse().ok()).collect();
         let what = "independent patterns that are not linear need not separate the cells (erratum binary-3)";
         claims.all("independence", what, counterexample, |patterns| check_separation(&patterns).is_err());
+    },
+};
+
+impl Figure for Patterns {
+    type Parameters = PatternParameters;
+    type Tables = Vec<Bit>;
+
+    fn about(&self) -> About {
+        self.about
     }
 
-    fn plot(&self, _: &ExtraParameters, table: &Vec<Bit>) -> Plot {
-        bits_plot("Further linear patterns", table)
+    fn defaults(&self) -> PatternParameters {
+        PatternParameters {
+            extra: self.extra.map(<[Mask]>::to_vec),
+            ..PatternParameters::default()
+        }
+    }
+
+    fn run(&self, p: &PatternParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
+        let mut table = Vec::new();
+        for (name, mask) in (self.masks)(p)? {
+            for (l, bit) in pattern(mask, p.bits)?.bits().iter().enumerate() {
+                table.push(Bit {
+                    pattern: name.clone(),
+                    mask,
+                    l: l + 1,
+                    bit: u32::from(*bit),
+                });
+            }
+        }
+        Ok(table)
+    }
+
+    fn claims(&self, p: &PatternParameters, table: &Vec<Bit>, claims: &mut Claims) {
+        let printed = self.printed.concat();
+        let same = |(row, digit): (&Bit, char)| char::from_digit(row.bit, 2) == Some(digit);
+        let rows = if table.len() == printed.len() { &table[..] } else { &[] };
+        claims
+            .at_defaults()
+            .all("bits", self.what, rows.iter().zip(printed.chars()), same);
+        (self.claims)(p, claims);
+    }
+
+    fn plot(&self, _: &PatternParameters, table: &Vec<Bit>) -> Plot {
+        let named = |chunk: &[Bit]| {
+            let bits = chunk.iter().map(|b| b.bit == 1).collect();
+            Some((chunk[0].pattern.clone(), Pattern::new(bits).ok()?))
+        };
+        let chunks = table.chunk_by(|a, b| a.pattern == b.pattern);
+        Plot::of(pattern_panel(self.about.title, &chunks.filter_map(named).collect::<Vec<_>>()))
     }
 }
 

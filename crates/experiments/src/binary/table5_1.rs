@@ -49,7 +49,7 @@ rows! {
     struct Listed {
         masks: String => "Masks.",
         mse_mmse: f64 ["V^2"] => "Error of the posterior mean.",
-        mse_dmap: Option<f64> ["V^2"] => "Error of the discrete decoder.",
+        mse_dmap: f64 ["V^2"] => "Error of the discrete decoder.",
     }
 }
 
@@ -62,11 +62,17 @@ impl Figure for Table {
         let scene = Scene::uniform(BITS, p.snr_db)?;
         let search = scene.search(p.printed.len())?;
         let ranking = search.ranking()?;
-        let mut by_map = parallel::try_map(&ranking, |set| {
-            let mse = search.bank(&set.masks)?.mse(Decoder::DiscreteMap(&scene.grid))?;
-            let masks = set.masks.clone();
-            Ok::<_, Error>(MaskSet { masks, mse })
+        let other = parallel::try_map(&ranking, |set| {
+            Ok::<_, Error>(search.bank(&set.masks)?.mse(Decoder::DiscreteMap(&scene.grid))?)
         })?;
+        let listed = ranking.iter().zip(&other).map(|(set, mse_dmap)| Listed {
+            masks: mask_text(&set.masks),
+            mse_mmse: set.mse,
+            mse_dmap: *mse_dmap,
+        });
+        let listed = listed.collect();
+        let mut by_map = ranking.clone();
+        by_map.iter_mut().zip(other).for_each(|(set, mse)| set.mse = mse);
         by_map.sort_by(|a, b| a.mse.total_cmp(&b.mse).then_with(|| a.masks.cmp(&b.masks)));
         let place = |sets: &[MaskSet], masks: &[Mask]| sets.iter().position(|s| s.masks == masks);
         let mut printed = p.printed.clone();
@@ -101,17 +107,10 @@ impl Figure for Table {
             })
         };
         let spaces = [(2, 4), (3, 5), (3, 8), (3, 10), (4, 7), (4, 8), (4, 10)];
-        let other: std::collections::BTreeMap<&[Mask], f64> =
-            by_map.iter().map(|s| (s.masks.as_slice(), s.mse)).collect();
-        let listed = ranking.iter().map(|set| Listed {
-            masks: mask_text(&set.masks),
-            mse_mmse: set.mse,
-            mse_dmap: other.get(set.masks.as_slice()).copied(),
-        });
         Ok(Rows {
             sets: sets.into_iter().map(set).collect::<Result<_, Error>>()?,
             search_spaces: spaces.into_iter().map(space).collect::<Result<_, Error>>()?,
-            listed: listed.collect(),
+            listed,
         })
     }
 

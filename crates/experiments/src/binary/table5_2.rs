@@ -60,30 +60,17 @@ rows! {
 
 /// All labelings of the cells by three bits, up to the order and the complements of the bits: triples of balanced patterns
 /// that separate the cells.
-fn labelings() -> Result<Vec<Vec<Pattern>>, Error> {
+fn labelings() -> Result<Vec<[Pattern; 3]>, Error> {
     let mut balanced = Pattern::all(CELLS)?;
     balanced.retain(|p| p.bits().iter().filter(|b| **b).count() == CELLS / 2);
     let mut found = Vec::new();
     for (i, a) in balanced.iter().enumerate() {
-        for (j, b) in balanced.iter().enumerate().skip(i + 1) {
-            for c in &balanced[j + 1..] {
-                let triple = vec![a.clone(), b.clone(), c.clone()];
-                if check_separation(&triple).is_ok() {
-                    found.push(triple);
-                }
-            }
+        for (j, b) in balanced[..i].iter().enumerate() {
+            let triples = balanced[..j].iter().map(|c| [a.clone(), b.clone(), c.clone()]);
+            found.extend(triples.filter(|triple| check_separation(triple).is_ok()));
         }
     }
     Ok(found)
-}
-
-/// Place of `printed` among the labelings under the posterior mean, from 0.
-fn place(scene: &Scene, labelings: &[Vec<Pattern>], printed: &[Pattern]) -> Result<usize, Error> {
-    let error = |patterns: &[Pattern]| Ok::<_, Error>(scene.pattern_bank(patterns)?.mmse()?);
-    let own = error(printed)?;
-    let errors = parallel::try_map(labelings, |l| error(l))?;
-    // Mirror images tie with it up to rounding.
-    Ok(errors.iter().filter(|e| **e < own * (1.0 - 1e-9)).count())
 }
 
 fn over_gray(snr_db: f64, printed: &[Pattern]) -> Result<OverGray, Error> {
@@ -111,18 +98,20 @@ impl Figure for Table {
         let search = scene.search(3)?;
         let best = search.best()?.masks;
         let any = search.any_rank().best()?.masks;
-        let all = labelings()?;
+        let all = parallel::try_map(&labelings()?, |l| Ok::<_, Error>(scene.pattern_bank(l)?.mmse()?))?;
         let linear = |masks: &[u32]| masks.iter().map(|&m| pattern(m, 3)).collect::<Result<Vec<_>, _>>();
         let set = |(set, patterns): (_, Vec<Pattern>)| {
-            let separated = check_separation(&patterns).is_ok();
             let bank = scene.pattern_bank(&patterns)?;
+            let mse_mmse = bank.mmse()?;
+            // Mirror images tie up to rounding.
+            let better = || all.iter().filter(|e| **e < mse_mmse * (1.0 - 1e-9)).count();
             Ok(Set {
                 set,
                 patterns: joined(&patterns, " "),
                 linear: patterns.iter().filter(|p| mask_of(p).is_some()).count(),
-                mse_mmse: bank.mmse()?,
+                mse_mmse,
                 mse_dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
-                rank: separated.then(|| place(&scene, &all, &patterns)).transpose()?,
+                rank: check_separation(&patterns).is_ok().then(better),
             })
         };
         let sets = [
@@ -140,7 +129,7 @@ impl Figure for Table {
         Ok(Rows {
             sets: sets.into_iter().map(set).collect::<Result<_, Error>>()?,
             over_gray: each(&sweep(5.0, 52.0, 1.0), |snr| over_gray(snr, &printed))?,
-            sizes: sizes.into_iter().map(|(what, count)| Size { what, count }).collect(),
+            sizes: sizes.map(|(what, count)| Size { what, count }).into(),
         })
     }
 
@@ -155,10 +144,8 @@ impl Figure for Table {
         here.near("rank", "708 of the 840 labelings are better", rank, 708.0, 0.0);
         claims.keyed("count", "number of sets", &rows.sizes, |r| r.count);
         let what = "from 5 to 52 dB, under five decoders, Gray is better: nothing makes the print optimal";
-        let ratios = rows
-            .over_gray
-            .iter()
-            .flat_map(|r| [r.mmse, r.dmap, r.dmap_print, r.dmap_exact, r.cmap]);
+        let decoders = |r: &OverGray| [r.mmse, r.dmap, r.dmap_print, r.dmap_exact, r.cmap];
+        let ratios = rows.over_gray.iter().flat_map(decoders);
         here.all("never-best", what, ratios, |ratio| ratio > 1.0);
         let what = "the best basis is 00001111, 00111100, 01101001";
         here.all("best-patterns", what, at("best basis"), |r| r.patterns == "00001111 00111100 01101001");

@@ -1,46 +1,29 @@
-//! What the tables of this system share: scenes, starting quantizers and rows of designs.
+//! What the tables of this system share: scenes, starting quantizers, rows of designs and their panel.
 
 use crate::prelude::*;
 use fewbits_quantizer_design::design::{self, Design};
 use fewbits_quantizer_design::{
-    Channel, Criterion, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System, lloyd_max,
+    Channel, Criterion, Error as Refused, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System,
+    lloyd_max,
 };
 
 pub(super) const MI: Criterion = Criterion::MutualInformation;
 pub(super) const MSE: Criterion = Criterion::MeanSquaredError;
 
-/// Name of a criterion in the tables.
-pub(super) fn name(criterion: Criterion) -> &'static str {
-    match criterion {
-        Criterion::MutualInformation => "mi",
-        Criterion::MeanSquaredError => "mse",
-        Criterion::BayesError => "pe",
-    }
-}
-
 /// A standard normal unknown in noise of these standard deviations and this common correlation.
-pub(super) fn scene(sds: &[f64], rho: f64) -> Result<ObservationModel, Error> {
-    Ok(ObservationModel::new(
-        Prior::gaussian_with_deviation(1.0)?,
-        Noise::equicorrelated_with_deviations(sds, rho)?,
-    )?)
+pub(super) fn scene(sds: &[f64], rho: f64) -> Result<ObservationModel, Refused> {
+    ObservationModel::new(Prior::gaussian_with_deviation(1.0)?, Noise::equicorrelated_with_deviations(sds, rho)?)
 }
 
-/// The Lloyd-Max quantizer of a normal variable of standard deviation `sd`.
-pub(super) fn lloyd(levels: usize, sd: f64) -> Result<Quantizer, Error> {
-    Ok(Quantizer::from(&lloyd_max::gaussian(levels)?.affine(0.0, sd)?))
-}
-
-/// A Lloyd-Max quantizer at every sensor, scaled as `sd` says.
+/// A Lloyd-Max quantizer of a normal variable at every sensor, its standard deviation as `sd` says.
 pub(super) fn lloyd_system(
     scene: &ObservationModel,
     levels: usize,
     sd: impl Fn(usize) -> f64,
 ) -> Result<System, Error> {
-    let quantizers = (0..scene.sensors())
-        .map(|n| lloyd(levels, sd(n)))
-        .collect::<Result<_, _>>()?;
-    Ok(System::ideal(scene.clone(), quantizers)?)
+    let unit = lloyd_max::gaussian(levels)?;
+    let scaled = |n| Ok(Quantizer::from(&unit.affine(0.0, sd(n))?));
+    Ok(System::ideal(scene.clone(), (0..scene.sensors()).map(scaled).collect::<Result<_, Error>>()?)?)
 }
 
 /// How many of so many random starts about a system end at the best design's value.
@@ -51,27 +34,29 @@ pub(super) fn arrived(about: &System, criterion: Criterion, starts: usize, best:
     design::random_starts(about, starts, 1).iter().filter(reached).count()
 }
 
-/// The odd quantizer with these positive breakpoints and one at zero.
-pub(super) fn odd(positive: &[f64]) -> Result<Quantizer, Error> {
-    let mirrored = positive.iter().rev().map(|b| -b);
-    Ok(Quantizer::new(mirrored.chain([0.0]).chain(positive.iter().copied()).collect())?)
+/// Sensors with the odd quantizers of these positive breakpoints and one at zero.
+pub(super) fn odd(start: &System, positive: [&[f64]; 2]) -> Result<System, Error> {
+    let quantizer = |positive: &[f64]| {
+        let mirrored = positive.iter().rev().map(|b| -b);
+        Quantizer::new(mirrored.chain([0.0]).chain(positive.iter().copied()).collect())
+    };
+    Ok(start.with_quantizers(vec![quantizer(positive[0])?, quantizer(positive[1])?])?)
 }
 
-/// The binary symmetric channel of these words.
-pub(super) fn bsc(words: &[u32], crossover: f64) -> Result<Channel, Error> {
-    Ok(Channel::binary_symmetric_with_gaps(&Labelling::new(words.to_vec())?, crossover)?)
+/// The binary symmetric channel of these words at both sensors.
+pub(super) fn over_bsc(system: &System, words: &[u32], crossover: f64) -> Result<System, Error> {
+    let channel = Channel::binary_symmetric_with_gaps(&Labelling::new(words.to_vec())?, crossover)?;
+    Ok(system.with_channels(vec![channel; 2])?)
 }
 
-/// Breakpoints as text, ten decimals.
-pub(super) fn breakpoints(quantizer: &Quantizer) -> String {
-    // Zero has a sign, and an optimum at zero a rounding error.
-    let rounded = |b: &f64| format!("{:.10}", if b.abs() < 5e-11 { 0.0 } else { *b });
-    joined(quantizer.breakpoints().iter().map(rounded), " ")
+/// The largest breakpoint of a sensor.
+pub(super) fn outer(system: &System, sensor: usize) -> f64 {
+    let own = system.quantizers()[sensor].breakpoints().last().copied();
+    own.unwrap_or_default()
 }
 
 rows! {
     /// A design of two sensors.
-    #[derive(Debug, Clone)]
     pub(super) struct Pair {
         pub(super) gamma1: String => "Breakpoints of sensor 1.",
         pub(super) gamma2: String => "Breakpoints of sensor 2.",
@@ -82,33 +67,62 @@ rows! {
         pub(super) mse: f64 => "Mean squared error of the posterior mean, in prior variances.",
         /// Largest eigenvalue of the criterion's Hessian where it was a joint design.
         pub(super) curvature: Option<f64>,
+        pub(super) printed_mse: Option<f64> => "The publication's squared error.",
     }
 }
 
 impl Pair {
-    /// The first and the last sensor of a system.
+    /// The design of a system.
     pub(super) fn of(system: &System) -> Result<Self, Error> {
-        let quantizers = system.quantizers();
-        let (first, last) = (&quantizers[0], &quantizers[quantizers.len() - 1]);
-        let outer = |q: &Quantizer| q.breakpoints().last().copied().unwrap_or_default();
+        // Zero has a sign, and an optimum at zero a rounding error.
+        let rounded = |b: &f64| format!("{:.10}", if b.abs() < 5e-11 { 0.0 } else { *b });
+        let breakpoints = |sensor: usize| joined(system.quantizers()[sensor].breakpoints().iter().map(rounded), " ");
         let mi_nats = system.value(MI)?;
         Ok(Self {
-            gamma1: breakpoints(first),
-            gamma2: breakpoints(last),
-            outer1: outer(first),
-            outer2: outer(last),
+            gamma1: breakpoints(0),
+            gamma2: breakpoints(1),
+            outer1: outer(system, 0),
+            outer2: outer(system, 1),
             mi_nats,
             mi_bits: mi_nats / std::f64::consts::LN_2,
             mse: system.value(MSE)?,
             curvature: None,
+            printed_mse: None,
         })
     }
 
-    /// As [`Pair::of`], with the curvature of a joint design.
+    /// A joint design, with its curvature.
     pub(super) fn joint(design: &Design) -> Result<Self, Error> {
-        Ok(Self {
-            curvature: Some(design.largest_curvature),
-            ..Self::of(&design.system)?
-        })
+        let curvature = Some(design.largest_curvature);
+        let pair = Self::of(&design.system)?;
+        Ok(Self { curvature, ..pair })
     }
+
+    /// With the error that the publication prints for it.
+    pub(super) fn beside(self, printed_mse: Option<f64>) -> Self {
+        Self { printed_mse, ..self }
+    }
+}
+
+/// Squared errors of designs, one a line.
+pub(super) fn errors<'a>(title: &str, rows: impl Iterator<Item = (String, &'a Pair)>) -> Panel {
+    let rows: Vec<_> = rows.collect();
+    let criteria = [
+        ("mi ", "information, "),
+        ("mse ", "squared error, "),
+        ("lloyd ", "Lloyd-Max, for "),
+    ];
+    let in_words = |name: &String| {
+        let name = name.replace('-', " ");
+        let long = |(short, long): &(&str, &str)| Some(format!("{long}{}", name.strip_prefix(short)?));
+        criteria.iter().find_map(long).unwrap_or(name)
+    };
+    let marks = |of: fn(&Pair) -> Option<f64>| {
+        let place = |(i, (_, pair)): (usize, &(String, &'a Pair))| Some((of(pair)?, -(i as f64)));
+        rows.iter().enumerate().filter_map(place).collect()
+    };
+    let y = Axis::ladder(rows.iter().map(|(name, _)| in_words(name)));
+    Panel::new(title, Axis::linear("mean squared error / prior variances"), y)
+        .with(Layer::points("exact", marks(|pair| Some(pair.mse))))
+        .with(Layer::points("printed", marks(|pair| pair.printed_mse)).marked(Marker::Cross))
 }

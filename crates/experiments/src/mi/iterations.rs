@@ -1,7 +1,7 @@
 //! Figures 4.2 to 4.5: how alternating maximisation proceeds. Figures 4.2 and 4.3 (clean channel), 4.4 and 4.5 (binary symmetric
 //! channels) show two columns of the same run; each judges its own.
 
-use super::common::{MI, MSE, bsc, lloyd_system, scene};
+use super::common::{MI, MSE, lloyd_system, outer, over_bsc, scene};
 use crate::prelude::*;
 use fewbits_quantizer_design::{System, published};
 use std::f64::consts::LN_2;
@@ -24,6 +24,7 @@ impl Parameters {
 }
 
 rows! {
+    #[derive(Default)]
     pub struct Rows {
         chain: Vec<Step> => "Sensor by sensor.",
         cyclic: Vec<Step> => "One step of each sensor in turn.",
@@ -51,14 +52,6 @@ fn first_alone(both: &System) -> Result<System, Error> {
 
 fn step(crossover: f64, [iteration, stage, iter_in_stage]: [usize; 3], both: &System) -> Result<Step, Error> {
     let (one, two) = (first_alone(both)?.value(MI)?, both.value(MI)?);
-    let outer = |g: usize| {
-        both.groups()[g]
-            .quantizer()
-            .breakpoints()
-            .last()
-            .copied()
-            .unwrap_or_default()
-    };
     Ok(Step {
         crossover,
         iteration,
@@ -69,25 +62,25 @@ fn step(crossover: f64, [iteration, stage, iter_in_stage]: [usize; 3], both: &Sy
         mi_x_z1_bits: one / LN_2,
         mi_x_z1z2_bits: two / LN_2,
         mse: both.value(MSE)?,
-        gamma1_outer: outer(0),
-        gamma2_outer: outer(1),
+        gamma1_outer: outer(both, 0),
+        gamma2_outer: outer(both, 1),
     })
 }
 
-/// Which column a figure shows.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Shows {
-    Information,
-    Error,
-}
+/// A column as a figure draws it, and its name there.
+type Column = (fn(&Step) -> f64, &'static str);
 
-/// One of Figures 4.2 to 4.5.
+/// One of Figures 4.2 to 4.5: its columns, and what it claims of them.
 pub struct Iterations {
     about: About,
-    shows: Shows,
     crossovers: Option<&'static [f64]>,
+    axis: &'static str,
+    columns: &'static [Column],
+    judge: fn(&Parameters, &Rows, &Claims),
 }
 
+const INFORMATION: &str = "mutual information / bits";
+const ERROR: &str = "mean squared error / prior variances";
 /// The channels of Figures 4.4 and 4.5.
 const CHANNELS: Option<&[f64]> = Some(&[0.0, 0.001, 0.01, 0.05]);
 
@@ -95,16 +88,34 @@ const CHANNELS: Option<&[f64]> = Some(&[0.0, 0.001, 0.01, 0.05]);
 pub static FIGURE42: Iterations = Iterations {
     about: About::of("mi-fig4-2", "Information over iterations, clean channel", "thesis, Figure 4.2")
         .showing("Mutual information rises in two steps, one per sensor, to a plateau each."),
-    shows: Shows::Information,
     crossovers: None,
+    axis: INFORMATION,
+    columns: &[(|r| r.mi_x_z1_bits, "sensor 1"), (|r| r.mi_x_z1z2_bits, "both sensors")],
+    judge: |p, rows, claims| {
+        information_rises(rows, claims);
+        claims.keyed("mi_x_z1_nats", "information of sensor 1", rows.clean(p), |r| r.mi_x_z1_nats);
+        claims.keyed("mi_x_z1z2_nats", "information of both", rows.clean(p), |r| r.mi_x_z1z2_nats);
+        // The prior has variance one, so that its entropy is ln(2 pi e) / 2.
+        let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E).ln();
+        let objective = rows.chain.last().map(|r| r.mi_x_z1z2_nats - entropy);
+        let what = "the printed objective E ln p(x given z) is negative (erratum mi-1)";
+        claims
+            .at_defaults()
+            .near("printed-objective", what, objective, -0.944, 5e-4);
+    },
 };
 
 /// Figure 4.3.
 pub static FIGURE43: Iterations = Iterations {
     about: About::of("mi-fig4-3", "Squared error over iterations, clean channel", "thesis, Figure 4.3")
         .showing("The squared error falls while the information rises, though it is not what is optimised."),
-    shows: Shows::Error,
     crossovers: None,
+    axis: ERROR,
+    columns: &[(|r| r.mse, "both sensors")],
+    judge: |p, rows, claims| {
+        error_falls(rows, claims);
+        claims.keyed("mse", "squared error", rows.clean(p), |r| r.mse);
+    },
 };
 
 /// Figure 4.4.
@@ -112,34 +123,77 @@ pub static FIGURE44: Iterations = Iterations {
     about: About::of("mi-fig4-4", "Information over iterations, noisy channels", "thesis, Figure 4.4")
         .showing("Joint information at four crossovers, natural words. It rises for the better channels; at 0.05 the first stage \
                   lowers it, and the greedy result is below its start."),
-    shows: Shows::Information,
     crossovers: CHANNELS,
+    axis: INFORMATION,
+    columns: &[(|r| r.mi_x_z1z2_bits, "")],
+    judge: |p, rows, claims| {
+        information_rises(rows, claims);
+        let here = claims.at_defaults();
+        let what = "the smaller the crossover, the higher the information, at every step";
+        here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mi_x_z1z2_nats > b.mi_x_z1z2_nats);
+        let worst: Vec<&Step> = select(&rows.chain, |r| r.crossover == 0.05).collect();
+        let gain = |k: usize| minus(worst.get(k).map(|r| r.mi_x_z1z2_nats), worst.first().map(|r| r.mi_x_z1z2_nats));
+        let what = "at 0.05 the joint information falls in stage 1, which designs for sensor 1 alone (erratum mi-15)";
+        here.below("not-monotone", what, gain(p.steps), 0.0);
+        let what = "what the greedy design gains on the Lloyd-Max start: it loses";
+        claims.references("greedy-loss", what, [gain(2 * p.steps)], |gain| ("0.05".to_owned(), gain));
+    },
 };
 
 /// Figure 4.5.
 pub static FIGURE45: Iterations = Iterations {
     about: About::of("mi-fig4-5", "Squared error over iterations, noisy channels", "thesis, Figure 4.5")
         .showing("Squared error at four crossovers, natural words. It falls at every step, on every channel."),
-    shows: Shows::Error,
     crossovers: CHANNELS,
+    axis: ERROR,
+    columns: &[(|r| r.mse, "")],
+    judge: |_, rows, claims| {
+        error_falls(rows, claims);
+        let what = "the smaller the crossover, the lower the error, at every step";
+        claims
+            .at_defaults()
+            .all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse);
+    },
 };
+
+impl Rows {
+    /// The chain's steps on a clean channel, where there is no other.
+    fn clean(&self, p: &Parameters) -> impl Iterator<Item = &Step> {
+        let clean = p.crossovers() == [0.0];
+        select(&self.chain, move |_| clean)
+    }
+}
 
 /// Neighbouring rows of one channel.
 fn neighbours(rows: &[Step]) -> impl Iterator<Item = (&Step, &Step)> {
-    rows.windows(2)
-        .map(|w| (&w[0], &w[1]))
-        .filter(|(a, b)| a.crossover == b.crossover)
+    let pairs = rows.windows(2).map(|w| (&w[0], &w[1]));
+    pairs.filter(|(a, b)| a.crossover == b.crossover)
 }
 
 /// Rows of the same step on two channels of which the first is the better.
 fn pairs(rows: &[Step]) -> impl Iterator<Item = (&Step, &Step)> {
-    rows.iter()
-        .flat_map(|a| rows.iter().map(move |b| (a, b)))
-        .filter(|(a, b)| a.iteration == b.iteration && a.crossover < b.crossover)
+    let pairs = rows.iter().flat_map(|a| rows.iter().map(move |b| (a, b)));
+    pairs.filter(|(a, b)| a.iteration == b.iteration && a.crossover < b.crossover)
 }
 
 /// Rounding that does not count as a fall.
 const ROUNDING: f64 = 1e-13;
+
+fn information_rises(rows: &Rows, claims: &Claims) {
+    claims.all("stage-criterion", "each stage's own information never falls", neighbours(&rows.chain), |(a, b)| {
+        let own = |r: &Step| if b.stage == 1 { r.mi_x_z1_nats } else { r.mi_x_z1z2_nats };
+        own(b) >= own(a) - ROUNDING
+    });
+    let what = "alternating single steps never lower the joint information";
+    claims.all("cyclic", what, neighbours(&rows.cyclic), |(a, b)| b.mi_x_z1z2_nats >= a.mi_x_z1z2_nats - ROUNDING);
+}
+
+fn error_falls(rows: &Rows, claims: &Claims) {
+    let what = "the squared error never rises";
+    claims
+        .at_defaults()
+        .all("error-falls", what, neighbours(&rows.chain), |(a, b)| b.mse <= a.mse + ROUNDING);
+}
 
 impl Figure for Iterations {
     type Parameters = Parameters;
@@ -157,141 +211,69 @@ impl Figure for Iterations {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let (steps, crossovers, noise_sd) = (p.steps, p.crossovers(), p.noise_sd);
-        let (mut chain, mut cyclic) = (Vec::new(), Vec::new());
-        for &crossover in crossovers {
+        let steps = p.steps;
+        let mut rows = Rows::default();
+        for &crossover in p.crossovers() {
             context.check()?;
-            let channel = bsc(&[0, 1, 2, 3], crossover)?;
-            let start = lloyd_system(&scene(&[noise_sd; 2], 0.0)?, 4, |_| 1.0)?.with_channels(vec![channel; 2])?;
-            let mut both = start.clone();
-            chain.push(step(crossover, [0, 1, 0], &both)?);
+            let start = lloyd_system(&scene(&[p.noise_sd; 2], 0.0)?, 4, |_| 1.0)?;
+            let start = over_bsc(&start, &[0, 1, 2, 3], crossover)?;
+            let (mut chain, mut cyclic) = (start.clone(), start);
+            rows.chain.push(step(crossover, [0, 1, 0], &chain)?);
+            rows.cyclic.push(step(crossover, [0, 1, 0], &cyclic)?);
             for k in 1..=2 * steps {
-                let stage = if k <= steps { 1 } else { 2 };
-                let quantizer = if stage == 1 {
-                    published::alternating_step(&first_alone(&both)?, 0, MI)?
+                let sensor = usize::from(k > steps);
+                let designed_for = if sensor == 0 {
+                    first_alone(&chain)?
                 } else {
-                    published::alternating_step(&both, 1, MI)?
+                    chain.clone()
                 };
-                both = both.with_quantizer(stage - 1, quantizer)?;
-                chain.push(step(crossover, [k, stage, k - (stage - 1) * steps], &both)?);
-            }
-            let mut both = start;
-            cyclic.push(step(crossover, [0, 1, 0], &both)?);
-            for k in 1..=2 * steps {
+                let quantizer = published::alternating_step(&designed_for, sensor, MI)?;
+                chain = chain.with_quantizer(sensor, quantizer)?;
+                rows.chain
+                    .push(step(crossover, [k, sensor + 1, k - sensor * steps], &chain)?);
                 let sensor = (k - 1) % 2;
-                both = both.with_quantizer(sensor, published::alternating_step(&both, sensor, MI)?)?;
-                cyclic.push(step(crossover, [k, sensor + 1, k.div_ceil(2)], &both)?);
+                cyclic = cyclic.with_quantizer(sensor, published::alternating_step(&cyclic, sensor, MI)?)?;
+                rows.cyclic
+                    .push(step(crossover, [k, sensor + 1, k.div_ceil(2)], &cyclic)?);
             }
         }
-        Ok(Rows { chain, cyclic })
+        Ok(rows)
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
-        let here = claims.at_defaults();
-        let (steps, crossovers) = (p.steps, p.crossovers());
-        let clean = || rows.chain.iter().filter(|_| crossovers == [0.0]);
-        match self.shows {
-            Shows::Information => {
-                let what = "each stage's own information never falls";
-                claims.all("stage-criterion", what, neighbours(&rows.chain), |(a, b)| {
-                    let rise = if b.stage == 1 {
-                        b.mi_x_z1_nats - a.mi_x_z1_nats
-                    } else {
-                        b.mi_x_z1z2_nats - a.mi_x_z1z2_nats
-                    };
-                    rise >= -ROUNDING
-                });
-                let what = "alternating single steps never lower the joint information";
-                claims.all("cyclic", what, neighbours(&rows.cyclic), |(a, b)| {
-                    b.mi_x_z1z2_nats >= a.mi_x_z1z2_nats - ROUNDING
-                });
-            }
-            Shows::Error => {
-                let what = "the squared error never rises";
-                here.all("error-falls", what, neighbours(&rows.chain), |(a, b)| b.mse <= a.mse + ROUNDING);
-            }
-        }
-        match self.about.id {
-            "mi-fig4-2" => {
-                claims.keyed("mi_x_z1_nats", "information of sensor 1", clean(), |r| r.mi_x_z1_nats);
-                claims.keyed("mi_x_z1z2_nats", "information of both", clean(), |r| r.mi_x_z1z2_nats);
-                // The prior has variance one, so that its entropy is ln(2 pi e) / 2.
-                let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E).ln();
-                let objective = rows.chain.last().map(|r| r.mi_x_z1z2_nats - entropy);
-                let what = "the printed objective E ln p(x given z) is negative (erratum mi-1)";
-                here.near("printed-objective", what, objective, -0.944, 5e-4);
-            }
-            "mi-fig4-3" => {
-                claims.keyed("mse", "squared error", clean(), |r| r.mse);
-            }
-            "mi-fig4-4" => {
-                let what = "the smaller the crossover, the higher the information, at every step";
-                here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mi_x_z1z2_nats > b.mi_x_z1z2_nats);
-                let worst: Vec<&Step> = rows.chain.iter().filter(|r| r.crossover == 0.05).collect();
-                let information = |k: usize| worst.get(k).map(|r| r.mi_x_z1z2_nats);
-                let what =
-                    "at 0.05 the joint information falls in stage 1, which designs for sensor 1 alone (erratum mi-15)";
-                let fall = minus(information(steps), information(0));
-                here.below("not-monotone", what, fall, 0.0);
-                let what = "what the greedy design gains on the Lloyd-Max start: it loses";
-                let gain = minus(information(2 * steps), information(0));
-                claims.references("greedy-loss", what, [gain], |gain| ("0.05".to_owned(), gain));
-            }
-            _ => {
-                let what = "the smaller the crossover, the lower the error, at every step";
-                here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse);
-            }
-        }
+        (self.judge)(p, rows, claims);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let (steps, crossovers) = (p.steps, p.crossovers());
-        let several = crossovers.len() > 1;
-        type Column = fn(&Step) -> f64;
-        let (axis, columns): (&str, &[(Column, &str)]) = match (self.shows, several) {
-            (Shows::Information, true) => ("mutual information / bits", &[(|r| r.mi_x_z1z2_bits, "")]),
-            (Shows::Information, false) => (
-                "mutual information / bits",
-                &[(|r| r.mi_x_z1_bits, "sensor 1"), (|r| r.mi_x_z1z2_bits, "both sensors")],
-            ),
-            (Shows::Error, _) => ("mean squared error / prior variances", &[(|r| r.mse, "both sensors")]),
-        };
-        let curve = |crossover: f64, column: Column| {
-            points(rows.chain.iter().filter(|r| r.crossover == crossover), |r| (r.iteration as f64, column(r)))
-        };
-        type Curve = (String, Vec<(f64, f64)>, usize);
-        let panel = |title: String, drawn: Vec<Curve>| {
-            let heights = drawn.iter().flat_map(|(_, curve, _)| curve).map(|p| p.1);
+        let (several, edge) = (p.crossovers().len() > 1, p.steps as f64);
+        // Label, points and place in the palette of each curve.
+        let all = p.crossovers().iter().flat_map(|crossover| {
+            self.columns.iter().map(move |(column, name)| {
+                let own = select(&rows.chain, |r| r.crossover == *crossover);
+                let shared = if several {
+                    format!("crossover {crossover}")
+                } else {
+                    (*name).to_owned()
+                };
+                (shared, points(own, |r| (r.iteration as f64, column(r))))
+            })
+        });
+        let all: Vec<_> = all.enumerate().collect();
+        let panel = |title: String, drawn: &[(usize, (String, Vec<(f64, f64)>))]| {
+            let heights = drawn.iter().flat_map(|(_, (_, curve))| curve).map(|p| p.1);
             let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
-            let edge = steps as f64;
             let divider = Layer::dashed("stage 2 begins", vec![(edge, low), (edge, high)]).coloured(6);
-            let curves = drawn.into_iter().flat_map(|(label, curve, i)| {
-                [
-                    Layer::line("", curve.clone()).coloured(i),
-                    Layer::points(label, curve).coloured(i),
-                ]
-            });
-            Panel::linear(title, "iteration", axis).with_all(curves).with(divider)
+            let curves = drawn
+                .iter()
+                .flat_map(|(i, (label, curve))| Layer::marked_line(label, *i, curve.clone()));
+            Panel::linear(title, "iteration", self.axis)
+                .with_all(curves)
+                .with(divider)
         };
-        let label = |crossover: f64, name: &str| {
-            if several {
-                format!("crossover {crossover}")
-            } else {
-                name.to_owned()
-            }
-        };
-        let all = crossovers
-            .iter()
-            .flat_map(|c| columns.iter().map(move |(column, name)| (*c, *column, *name)));
-        let all = all
-            .enumerate()
-            .map(|(i, (c, column, name))| (label(c, name), curve(c, column), i))
-            .collect();
-        let mut panels = vec![panel(self.about.title.to_owned(), all)];
-        if let (Some(worst), true) = (crossovers.last(), several) {
+        let mut panels = vec![panel(self.about.title.to_owned(), &all)];
+        if let (Some(worst), true) = (p.crossovers().last(), several) {
             // On the common scale the worst channel's curve looks flat.
-            let alone = vec![(label(*worst, ""), curve(*worst, columns[0].0), crossovers.len() - 1)];
-            panels.push(panel(format!("Crossover {worst} alone"), alone));
+            panels.push(panel(format!("Crossover {worst} alone"), &all[all.len() - 1..]));
         }
         Plot::grid(2, panels)
     }

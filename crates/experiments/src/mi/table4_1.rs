@@ -1,10 +1,9 @@
 //! Table 4.1: two sensors of equal noise, independent or correlated.
 
-use super::common::{MI, MSE, Pair, arrived, lloyd_system, name, odd, scene};
-use super::plots::errors;
+use super::common::{MI, MSE, Pair, arrived, errors, lloyd_system, odd, scene};
 use crate::prelude::*;
 use crate::reference;
-use fewbits_quantizer_design::{Newton, System, bounds, design};
+use fewbits_quantizer_design::{Newton, bounds, design};
 
 parameters! {
     pub struct Parameters {
@@ -17,22 +16,15 @@ parameters! {
 /// Name, title, levels, whether correlated, and the printed positive breakpoints of both sensors for each criterion.
 type Case = (&'static str, &'static str, usize, bool, [[&'static [f64]; 2]; 2]);
 
+const EIGHT: [&[f64]; 2] = [&[0.73, 1.51, 2.49], &[0.71, 1.48, 2.48]];
 const CASES: [Case; 3] = [
-    ("rho0-L4", "Independent noise, 4 levels", 4, false, [[&[1.37], &[1.37]], [&[1.39], &[1.39]]]),
-    (
-        "rho0-L8",
-        "Independent noise, 8 levels",
-        8,
-        false,
-        [
-            [&[0.73, 1.51, 2.49], &[0.73, 1.51, 2.49]],
-            [&[0.71, 1.48, 2.48], &[0.71, 1.48, 2.48]],
-        ],
-    ),
+    ("rho0-L4", "Independent noise, 4 levels", 4, false, [[&[1.37]; 2], [&[1.39]; 2]]),
+    ("rho0-L8", "Independent noise, 8 levels", 8, false, [[EIGHT[0]; 2], [EIGHT[1]; 2]]),
     ("rho85-L4", "Correlated noise, 4 levels", 4, true, [[&[1.15], &[2.1]], [&[1.13], &[2.08]]]),
 ];
 
 rows! {
+    #[derive(Default)]
     pub struct Rows {
         designs: Vec<Row> => "Designs.",
         searches: Vec<Search> => "Random starts of the joint designs.",
@@ -43,11 +35,8 @@ rows! {
         method: &'static str => "Criterion of the design, or the baseline.",
         design: &'static str => "How it was reached.",
         pair: Pair,
-        printed_mse: Option<f64> => "The publication's squared error.",
     }
-}
 
-rows! {
     struct Search {
         case: &'static str => "Noise correlation and levels.",
         criterion: &'static str => "Criterion of the design.",
@@ -69,109 +58,96 @@ impl Figure for Table41 {
          a saddle: the best contiguous pair is asymmetric.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let (mut designs, mut searches) = (Vec::new(), Vec::new());
+        let mut rows = Rows::default();
+        let newton = Newton::default();
         for (case, _, levels, correlated, printed) in CASES {
             let as_printed = p.noise_sd == 1.0 && (!correlated || p.correlation == 0.85);
-            let value = |key: String| reference::value(&format!("mi-table4-1/{key}")).filter(|_| as_printed);
-            let mut push = |method, design, pair| {
-                let printed_mse = value(format!("printed/{case} {method} {design}"));
-                designs.push(Row {
+            let print = |key: String| reference::value(&format!("mi-table4-1/{key}")).filter(|_| as_printed);
+            let mut push = |method, design, pair: Pair| {
+                let pair = pair.beside(print(format!("printed/{case} {method} {design}")));
+                rows.designs.push(Row {
                     case,
                     method,
                     design,
                     pair,
-                    printed_mse,
                 });
             };
             let scene = scene(&[p.noise_sd; 2], if correlated { p.correlation } else { 0.0 })?;
             let sample = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
-            for (criterion, [first, second]) in [MI, MSE].into_iter().zip(printed) {
+            for (criterion, method, printed) in [(MI, "mi", printed[0]), (MSE, "mse", printed[1])] {
                 context.check()?;
-                let method = name(criterion);
-                let chain = design::greedy(&sample, &[0, 1], criterion, &Newton::default())?;
-                let greedy = &chain[chain.len() - 1];
+                let greedy = design::greedy(&sample, &[0, 1], criterion, &newton)?.swap_remove(1);
                 push(method, "greedy", Pair::of(&greedy.system)?);
                 let nearest = design::joint(&greedy.system, criterion, &Newton::to_nearest_stationary_point())?;
-                let best = design::multi_start(&sample, criterion, p.starts, 1, &Newton::default())?;
+                let best = design::multi_start(&sample, criterion, p.starts, 1, &newton)?;
                 push(method, if correlated { "symmetric" } else { "joint" }, Pair::joint(&nearest)?);
                 if correlated {
                     push(method, "joint", Pair::joint(&best)?);
                 }
-                let system = System::ideal(scene.clone(), vec![odd(first)?, odd(second)?])?;
-                push(method, "printed", Pair::of(&system)?);
-                searches.push(Search {
+                push(method, "printed", Pair::of(&odd(&sample, printed)?)?);
+                let van_trees = || bounds::bayesian_cramer_rao(&best.system);
+                rows.searches.push(Search {
                     case,
                     criterion: method,
                     starts: p.starts,
                     arrived: arrived(&sample, criterion, p.starts, &best),
-                    van_trees: (!correlated)
-                        .then(|| bounds::bayesian_cramer_rao(&best.system))
-                        .transpose()?,
-                    printed_primal_mse: value(format!("printed-primal/{case}")),
+                    van_trees: (!correlated).then(van_trees).transpose()?,
+                    printed_primal_mse: print(format!("printed-primal/{case}")),
                 });
             }
             push("lloyd-x", "independent", Pair::of(&lloyd_system(&scene, levels, |_| 1.0)?)?);
             push("lloyd-y", "independent", Pair::of(&sample)?);
         }
-        Ok(Rows { designs, searches })
+        Ok(rows)
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let designs = || rows.designs.iter();
-        let mse = |case: &str, method: &str, design: &str| {
-            first(&rows.designs, |r| (r.case, r.method, r.design) == (case, method, design)).map(|r| r.pair.mse)
+        let designs = &rows.designs;
+        let find = |key: String| first(designs, |r| r.key() == key).map(|r| &r.pair);
+        let mse = |case: &str, reached: &str| find(format!("{case} {reached}")).map(|pair| pair.mse);
+        claims.keyed("mse", "squared error", designs, |r| r.pair.mse);
+        claims.keyed("outer1", "outer breakpoint of sensor 1", designs, |r| r.pair.outer1);
+        claims.keyed("mi_nats", "information", designs, |r| r.pair.mi_nats);
+        claims.keyed("printed", "errors are exact at printed breakpoints", designs, |r| r.pair.mse);
+        let curvature = |design: &'static str| {
+            let correlated = select(designs, move |r| r.case == "rho85-L4" && r.design == design);
+            correlated.map(|r| r.pair.curvature.unwrap_or(f64::NAN))
         };
-        claims.keyed("mse", "squared error", designs(), |r| r.pair.mse);
-        claims.keyed("outer1", "outer breakpoint of sensor 1", designs(), |r| r.pair.outer1);
-        claims.keyed("mi_nats", "information", designs(), |r| r.pair.mi_nats);
-        claims.keyed("printed", "errors are exact at printed breakpoints", designs(), |r| r.pair.mse);
-        let curvature = |design: &'static str| designs().filter(move |r| r.case == "rho85-L4" && r.design == design);
         let what = "the printed (mirror-symmetric) solution at 0.85 is a saddle (erratum mi-10)";
-        here.all("saddle", what, curvature("symmetric"), |r| r.pair.curvature.is_some_and(|c| c > 1e-3));
+        here.all("saddle", what, curvature("symmetric"), |c| c > 1e-3);
         let what = "the best pair found at 0.85 is a local optimum";
-        claims.all("optimum", what, curvature("joint"), |r| r.pair.curvature.is_some_and(|c| c < 0.0));
+        claims.all("optimum", what, curvature("joint"), |c| c < 0.0);
         let what = "printed errors of (4.2) without correlation lie below the best any contiguous pair reached, so they are not \
                     exact (erratum mi-6)";
-        let independent = || rows.searches.iter().filter(|s| s.case != "rho85-L4");
+        let independent = || select(&rows.searches, |s| s.case != "rho85-L4");
         here.all("primal-too-low", what, independent(), |s| {
-            s.printed_primal_mse
-                .zip(mse(s.case, "mse", "joint"))
-                .is_some_and(|(printed, best)| printed < best)
+            minus(s.printed_primal_mse, mse(s.case, "mse joint")).is_some_and(|gap| gap < 0.0)
         });
-        let first =
-            |case: &str| first(&rows.designs, |r| r.key() == format!("{case} mi greedy")).map(|r| r.pair.outer1);
-        let difference = minus(first("rho0-L4"), first("rho85-L4"));
+        let chain = |case: &str| find(format!("{case} mi greedy")).map(|pair| pair.outer1);
         let what =
             "the greedy chain's first sensor does not depend on correlation, unlike the printed one (erratum mi-5)";
-        claims.near("greedy-first", what, difference, 0.0, 1e-9);
-        let loss = |case: &'static str| {
-            let pair = mse(case, "mi", "greedy").zip(mse(case, "mi", "joint"));
-            (case.to_owned(), pair.map(|(greedy, joint)| greedy - joint))
-        };
+        claims.near("greedy-first", what, minus(chain("rho0-L4"), chain("rho85-L4")), 0.0, 1e-9);
+        let loss = |case: &str| (case.to_owned(), minus(mse(case, "mi greedy"), mse(case, "mi joint")));
         let what = "squared error lost by the greedy chain, no correlation";
         claims.references("chain-loss", what, ["rho0-L4", "rho0-L8"], loss);
-        let lost = mse("rho85-L4", "mi", "greedy")
-            .zip(mse("rho85-L4", "mi", "joint"))
-            .map(|(a, b)| a / b - 1.0);
+        let lost = over(mse("rho85-L4", "mi greedy"), mse("rho85-L4", "mi joint")).map(|ratio| ratio - 1.0);
         let what = "at 0.85 the greedy chain costs half a percent: not negligible (erratum mi-6)";
         here.near("rho85-loss", what, lost, 0.00506, 1e-4);
         let what = "without correlation every random start reaches the same optimum";
         here.all("one-optimum", what, independent(), |s| s.arrived == s.starts);
         let what = "squared error >= exp(-2 I) for every design";
-        claims.all("shannon", what, designs(), |r| r.pair.mse >= (-2.0 * r.pair.mi_nats).exp());
+        claims.all("shannon", what, designs, |r| r.pair.mse >= (-2.0 * r.pair.mi_nats).exp());
         let what = "no pair's error is below the van Trees bound";
         claims.all("van-trees", what, independent(), |s| {
-            mse(s.case, s.criterion, "joint")
-                .zip(s.van_trees)
-                .is_some_and(|(mse, bound)| mse > bound)
+            minus(mse(s.case, &format!("{} joint", s.criterion)), s.van_trees).is_some_and(|gap| gap > 0.0)
         });
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let panel = |(case, title, ..): Case| {
-            let rows = rows.designs.iter().filter(|r| r.case == case);
-            errors(title, rows.map(|r| (format!("{} {}", r.method, r.design), r.pair.mse, r.printed_mse)))
+            let rows = select(&rows.designs, |r| r.case == case);
+            errors(title, rows.map(|r| (format!("{} {}", r.method, r.design), &r.pair)))
         };
         Plot::grid(2, CASES.map(panel).to_vec())
     }

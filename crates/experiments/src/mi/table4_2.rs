@@ -1,10 +1,9 @@
 //! Table 4.2: two sensors of unequal noise.
 
-use super::common::{MI, MSE, Pair, arrived, lloyd_system, odd, scene};
-use super::plots::errors;
+use super::common::{MI, MSE, Pair, arrived, errors, lloyd_system, odd, scene};
 use crate::prelude::*;
 use crate::reference;
-use fewbits_quantizer_design::{Newton, System, bounds, design};
+use fewbits_quantizer_design::{Newton, bounds, design};
 
 parameters! {
     pub struct Parameters {
@@ -14,9 +13,13 @@ parameters! {
 }
 
 /// Levels, and the printed positive breakpoints of both sensors.
-const PRINTED: [(usize, &[f64], &[f64]); 2] = [(4, &[1.38], &[1.135]), (8, &[0.69, 1.45, 2.43], &[0.58, 1.22, 2.05])];
+const PRINTED: [(usize, [&[f64]; 2]); 2] = [
+    (4, [&[1.38], &[1.135]]),
+    (8, [&[0.69, 1.45, 2.43], &[0.58, 1.22, 2.05]]),
+];
 
 rows! {
+    #[derive(Default)]
     pub struct Rows {
         designs: Vec<Row> => "Designs.",
         searches: Vec<Search> => "Random starts of the joint information design.",
@@ -26,7 +29,6 @@ rows! {
         levels: usize => "Levels of each sensor.",
         method: &'static str => "Criterion and how it was reached.",
         design: Pair,
-        printed_mse: Option<f64> => "The publication's squared error.",
     }
 
     struct Search by "{levels} levels" {
@@ -47,22 +49,18 @@ impl Figure for Table42 {
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let as_printed = p.noise_variances == [1.0, 0.5];
-        let (mut designs, mut searches) = (Vec::new(), Vec::new());
+        let mut rows = Rows::default();
         let sds: Vec<f64> = p.noise_variances.iter().map(|v| v.sqrt()).collect();
         let scene = scene(&sds, 0.0)?;
         let newton = Newton::default();
-        for (levels, first, second) in PRINTED {
-            let mut push = |method: &'static str, design: Pair| {
-                let printed = reference::value(&format!("mi-table4-2/printed/{levels} levels {method}"));
-                designs.push(Row {
-                    levels,
-                    method,
-                    design,
-                    printed_mse: printed.filter(|_| as_printed),
-                });
+        for (levels, printed) in PRINTED {
+            let mut push = |method, design: Pair| {
+                let print = reference::value(&format!("mi-table4-2/printed/{levels} levels {method}"));
+                let design = design.beside(print.filter(|_| as_printed));
+                rows.designs.push(Row { levels, method, design });
             };
             let sample = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
-            push("mi-printed", Pair::of(&System::ideal(scene.clone(), vec![odd(first)?, odd(second)?])?)?);
+            push("mi-printed", Pair::of(&odd(&sample, printed)?)?);
             for (criterion, greedy, reversed, joint) in [
                 (MI, "mi-greedy", "mi-greedy-better-first", "mi-joint"),
                 (MSE, "mse-greedy", "mse-greedy-better-first", "mse-joint"),
@@ -70,17 +68,16 @@ impl Figure for Table42 {
                 push(greedy, Pair::of(&design::greedy(&sample, &[0, 1], criterion, &newton)?[1].system)?);
                 let mut quantizers = design::greedy(&sample, &[1, 0], criterion, &newton)?[1].quantizers();
                 quantizers.reverse();
-                push(reversed, Pair::of(&System::ideal(scene.clone(), quantizers)?)?);
+                push(reversed, Pair::of(&sample.with_quantizers(quantizers)?)?);
                 let best = design::joint(&sample, criterion, &newton)?;
                 push(joint, Pair::joint(&best)?);
                 if criterion == MI {
                     let bits = (levels as f64).log2();
-                    let ceo_bound = bounds::ceo(scene.prior(), scene.noise(), &[bits, bits])?.distortion;
-                    searches.push(Search {
+                    rows.searches.push(Search {
                         levels,
                         starts: p.starts,
                         arrived: arrived(&sample, MI, p.starts, &best),
-                        ceo_bound,
+                        ceo_bound: bounds::ceo(scene.prior(), scene.noise(), &[bits, bits])?.distortion,
                     });
                 }
             }
@@ -88,38 +85,37 @@ impl Figure for Table42 {
             push("lloyd-x", Pair::of(&lloyd_system(&scene, levels, |_| 1.0)?)?);
             push("lloyd-y", Pair::of(&sample)?);
         }
-        Ok(Rows { designs, searches })
+        Ok(rows)
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let designs = || rows.designs.iter();
-        claims.keyed("mse", "squared error", designs(), |r| r.design.mse);
-        claims.keyed("outer1", "outer breakpoint of sensor 1", designs(), |r| r.design.outer1);
-        claims.keyed("outer2", "outer breakpoint of sensor 2", designs(), |r| r.design.outer2);
+        let designs = &rows.designs;
+        claims.keyed("mse", "squared error", designs, |r| r.design.mse);
+        claims.keyed("outer1", "outer breakpoint of sensor 1", designs, |r| r.design.outer1);
+        claims.keyed("outer2", "outer breakpoint of sensor 2", designs, |r| r.design.outer2);
         let what = "the printed error is exact to 1.5 % for the designs, 0.6 % for Lloyd-Max (erratum mi-8)";
-        claims.keyed("printed", what, designs(), |r| r.design.mse);
-        for (levels, ..) in PRINTED {
-            let mse =
-                |method: &str| first(&rows.designs, |r| r.levels == levels && r.method == method).map(|r| r.design.mse);
+        claims.keyed("printed", what, designs, |r| r.design.mse);
+        for (levels, _) in PRINTED {
+            let mse = |method: &str| first(designs, |r| r.levels == levels && r.method == method).map(|r| r.design.mse);
             let what = "squared-error design < Lloyd-Max of the sample < information design, against the printed claim (erratum \
                         mi-7) < the printed baseline, scaled to the noise";
             let order = ["mse-joint", "lloyd-y", "mi-joint", "lloyd-noise"];
             here.increasing(format!("L{levels}-order"), what, order.map(mse));
             let what = "that baseline is worse than Lloyd-Max of the unknown";
-            here.increasing(format!("L{levels}-baseline"), what, [mse("lloyd-x"), mse("lloyd-noise")]);
+            here.increasing(format!("L{levels}-baseline"), what, ["lloyd-x", "lloyd-noise"].map(mse));
         }
         let what = "every random start reaches the same joint optimum";
         here.all("one-optimum", what, &rows.searches, |s| s.arrived == s.starts);
         claims.keyed("ceo", "bound with all subset constraints", &rows.searches, |s| s.ceo_bound);
-        let bound = |r: &Row| rows.searches.iter().find(|s| s.levels == r.levels).map(|s| s.ceo_bound);
-        claims.all("ceo-gap", "no design beats the bound", designs(), |r| bound(r).is_some_and(|b| r.design.mse > b));
+        let bound = |r: &Row| first(&rows.searches, |s| s.levels == r.levels).map(|s| s.ceo_bound);
+        claims.all("ceo-gap", "no design beats the bound", designs, |r| bound(r).is_some_and(|b| r.design.mse > b));
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let panel = |(levels, ..): (usize, _, _)| {
-            let rows = rows.designs.iter().filter(|r| r.levels == levels);
-            errors(&format!("{levels} levels"), rows.map(|r| (r.method.to_owned(), r.design.mse, r.printed_mse)))
+        let panel = |(levels, _): (usize, _)| {
+            let rows = select(&rows.designs, |r| r.levels == levels);
+            errors(&format!("{levels} levels"), rows.map(|r| (r.method.to_owned(), &r.design)))
         };
         Plot::grid(2, PRINTED.map(panel).to_vec())
     }

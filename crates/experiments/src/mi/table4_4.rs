@@ -58,10 +58,8 @@ rows! {
 }
 
 fn scene(signal: f64, sensors: usize) -> Result<ObservationModel, Error> {
-    Ok(ObservationModel::new(
-        Prior::binary(signal, 0.5)?,
-        Noise::independent_with_deviations(&vec![1.0; sensors])?,
-    )?)
+    let noise = Noise::independent_with_deviations(&vec![1.0; sensors])?;
+    Ok(ObservationModel::new(Prior::binary(signal, 0.5)?, noise)?)
 }
 
 fn about(signal: f64, t: f64) -> Result<Quantizer, Error> {
@@ -69,27 +67,33 @@ fn about(signal: f64, t: f64) -> Result<Quantizer, Error> {
     Ok(Quantizer::new(vec![middle - t, middle, middle + t])?)
 }
 
-impl Design {
-    /// The row of a system whose sensors have these offsets.
-    fn of(p: &Parameters, signal: f64, method: &'static str, offsets: &[f64], system: &System) -> Result<Self, Error> {
-        let as_printed = p.sensors == 5;
-        let printed = reference::value(&format!("mi-table4-4/printed/{signal} {method}"));
-        let differ = if offsets.len() > 1 { offsets } else { &[] };
-        Ok(Self {
-            signal,
-            method,
-            t: offsets[0],
-            offsets: joined(differ.iter().map(|t| format!("{t:.8}")), " "),
-            pe: system.value(PE)?,
-            printed_pe: printed.filter(|_| as_printed),
-            mi_nats: system.value(MI)?,
-            equivocation_nats: JointTable::new(system)?.equivocation()?,
-            matusita: None,
-            j_divergence: None,
-            bhattacharyya: None,
-            detection: NeymanPearson::new(system, p.false_alarm)?.detection_probability(),
-        })
-    }
+/// The row of a system; of one sensor's symbol where all sensors are the same.
+fn row(p: &Parameters, signal: f64, method: &'static str, system: &System) -> Result<Design, Error> {
+    let printed = reference::value(&format!("mi-table4-4/printed/{signal} {method}"));
+    let quantizers = system.quantizers();
+    let offset = |q: &Quantizer| q.breakpoints()[2] - 0.5 * signal;
+    let symbol = if quantizers.len() == 1 {
+        let law = JointTable::new(&System::identical(scene(signal, 1)?, quantizers[0].clone())?)?;
+        Some((0..4).map(|t| (law.likelihood(t)[0], law.likelihood(t)[1])).unzip())
+    } else {
+        None
+    };
+    let separation = |of: Separation| symbol.as_ref().map(|(p0, p1): &(Vec<f64>, Vec<f64>)| of.of(p0, p1));
+    let differ = if quantizers.len() > 1 { &quantizers[..] } else { &[] };
+    Ok(Design {
+        signal,
+        method,
+        t: offset(&quantizers[0]),
+        offsets: joined(differ.iter().map(|q| format!("{:.8}", offset(q))), " "),
+        pe: system.value(PE)?,
+        printed_pe: printed.filter(|_| p.sensors == 5),
+        mi_nats: system.value(MI)?,
+        equivocation_nats: JointTable::new(system)?.equivocation()?,
+        matusita: separation(Separation::Matusita),
+        j_divergence: separation(Separation::JDivergence),
+        bhattacharyya: separation(Separation::Bhattacharyya).map(|distance| (-distance).exp()),
+        detection: NeymanPearson::new(system, p.false_alarm)?.detection_probability(),
+    })
 }
 
 /// Table 4.4.
@@ -110,34 +114,24 @@ impl Figure for Table44 {
             let start = about(signal, 1.0)?;
             let all = System::identical(scene(signal, p.sensors)?, start.clone())?;
             let one = System::identical(scene(signal, 1)?, start.clone())?;
-            let separated = |d| published::separate(d, signal, 1.0, &start, &ideal, &newton).map(|found| found.0);
-            let best = design::joint(&all, PE, &newton)?.quantizers().remove(0);
+            let joint = |system, criterion| Ok::<_, Error>(design::joint(system, criterion, &newton)?.quantizers());
+            let separated = |d| Ok::<_, Error>(published::separate(d, signal, 1.0, &start, &ideal, &newton)?.0);
+            let best = joint(&all, PE)?.remove(0);
             let common = [
-                ("mi-joint", design::joint(&all, MI, &newton)?.quantizers().remove(0)),
-                ("mi-single", design::joint(&one, MI, &newton)?.quantizers().remove(0)),
+                ("mi-joint", joint(&all, MI)?.remove(0)),
+                ("mi-single", joint(&one, MI)?.remove(0)),
                 ("matusita", separated(Separation::Matusita)?),
                 ("j-divergence", separated(Separation::JDivergence)?),
                 ("pe", best.clone()),
             ];
-            let offset = |q: &Quantizer| q.breakpoints()[2] - 0.5 * signal;
             for (method, quantizer) in common {
-                let system = all.with_quantizer(0, quantizer.clone())?;
-                let law = JointTable::new(&one.with_quantizer(0, quantizer.clone())?)?;
-                let (p0, p1): (Vec<f64>, Vec<f64>) =
-                    (0..4).map(|t| (law.likelihood(t)[0], law.likelihood(t)[1])).unzip();
-                rows.designs.push(Design {
-                    matusita: Some(Separation::Matusita.of(&p0, &p1)),
-                    j_divergence: Some(Separation::JDivergence.of(&p0, &p1)),
-                    bhattacharyya: Some((-Separation::Bhattacharyya.of(&p0, &p1)).exp()),
-                    ..Design::of(p, signal, method, &[offset(&quantizer)], &system)?
-                });
+                rows.designs
+                    .push(row(p, signal, method, &all.with_quantizer(0, quantizer)?)?);
             }
             let apart = System::ideal(scene(signal, p.sensors)?, vec![start; p.sensors])?;
             let order: Vec<usize> = (0..p.sensors).collect();
             if let Some(chain) = design::greedy(&apart, &order, MI, &newton)?.pop() {
-                let offsets: Vec<f64> = chain.quantizers().iter().map(offset).collect();
-                rows.designs
-                    .push(Design::of(p, signal, "mi-greedy", &offsets, &chain.system)?);
+                rows.designs.push(row(p, signal, "mi-greedy", &chain.system)?);
             }
             // Person by person from the identical minimum: no sensor alone can do better.
             let minimum = apart.with_quantizers(vec![best.clone(); p.sensors])?;
@@ -146,20 +140,15 @@ impl Figure for Table44 {
             grid.sort_by(f64::total_cmp);
             grid.dedup_by(|a, b| *a - *b < 1e-9);
             let alone = published::best_contiguous(&minimum, 0, PE, &grid)?.1;
-            let unquantized_pe = normal::cdf(-0.5 * signal * (p.sensors as f64).sqrt());
-            let single_change_gain = 1.0 - alone / minimum.value(PE)?;
             rows.checks.push(Check {
                 signal,
-                unquantized_pe,
-                single_change_gain,
+                unquantized_pe: normal::cdf(-0.5 * signal * (p.sensors as f64).sqrt()),
+                single_change_gain: 1.0 - alone / minimum.value(PE)?,
             });
             for i in 0..=50 {
                 let t = 0.5 + 0.03 * f64::from(i);
-                rows.curve.push(Point {
-                    signal,
-                    t,
-                    pe: all.with_quantizer(0, about(signal, t)?)?.value(PE)?,
-                });
+                let pe = all.with_quantizer(0, about(signal, t)?)?.value(PE)?;
+                rows.curve.push(Point { signal, t, pe });
             }
         }
         Ok(rows)
@@ -167,18 +156,18 @@ impl Figure for Table44 {
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let designs = || rows.designs.iter();
-        claims.keyed("pe", "error probability", designs(), |d| d.pe);
-        claims.keyed("t", "offset", designs(), |d| d.t);
-        claims.keyed("printed", "printed errors are within about 10 % of the exact ones", designs(), |d| d.pe);
-        claims.keyed("equivocation", "ln 2 minus the information", designs(), |d| d.equivocation_nats);
+        let designs = &rows.designs;
+        claims.keyed("pe", "error probability", designs, |d| d.pe);
+        claims.keyed("t", "offset", designs, |d| d.t);
+        claims.keyed("printed", "printed errors are within about 10 % of the exact ones", designs, |d| d.pe);
+        claims.keyed("equivocation", "ln 2 minus the information", designs, |d| d.equivocation_nats);
         claims.keyed("unquantized_pe", "error from samples", &rows.checks, |c| c.unquantized_pe);
-        let pe = |signal, method| first(&rows.designs, |d| d.signal == signal && d.method == method).map(|d| d.pe);
+        let pe = |signal, method| first(designs, |d| d.signal == signal && d.method == method).map(|d| d.pe);
         for &signal in &p.signals {
             let what = "least error < Matusita < mutual information < J-divergence (erratum mi-11)";
             let order = ["pe", "matusita", "mi-joint", "j-divergence"].map(|method| pe(signal, method));
             here.increasing(format!("{signal}-order"), what, order);
-            let others = designs().filter(|d| d.signal == signal && d.method != "j-divergence");
+            let others = select(designs, |d| d.signal == signal && d.method != "j-divergence");
             let worst = pe(signal, "j-divergence").unwrap_or(0.0);
             here.all(format!("{signal}-j-worst"), "the J-divergence is worst of all", others, |d| d.pe < worst);
         }
@@ -192,31 +181,23 @@ impl Figure for Table44 {
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let methods = [
+            ("mi-joint", "information, all sensors"),
+            ("mi-single", "information, one sensor"),
+            ("matusita", "Matusita distance"),
+            ("j-divergence", "J-divergence"),
+            ("pe", "least error"),
+        ];
         let panel = |&signal: &f64| {
-            let curve = points(rows.curve.iter().filter(|r| r.signal == signal), |r| (r.t, r.pe));
-            let designs = |(method, label): (&str, &str)| {
-                let own = rows.designs.iter().filter(|d| d.signal == signal && d.method == method);
-                Layer::points(label, points(own, |d| (d.t, d.pe)))
-            };
-            let methods = [
-                ("mi-joint", "information, all sensors"),
-                ("mi-single", "information, one sensor"),
-                ("matusita", "Matusita distance"),
-                ("j-divergence", "J-divergence"),
-                ("pe", "least error"),
-            ];
-            Panel::semilog(
-                format!("Signal of {signal} noise deviations"),
-                "offset t / noise deviations",
-                "error probability",
-            )
-            .with(Layer::line("identical quantizers", curve).coloured(6))
-            .with_all(
-                methods
-                    .into_iter()
-                    .enumerate()
-                    .map(|(i, method)| designs(method).coloured(i)),
-            )
+            let designs = methods.iter().enumerate().map(|(i, (method, label))| {
+                let own = select(&rows.designs, |d| d.signal == signal && d.method == *method);
+                Layer::points(*label, points(own, |d| (d.t, d.pe))).coloured(i)
+            });
+            let curve = points(select(&rows.curve, |r| r.signal == signal), |r| (r.t, r.pe));
+            let title = format!("Signal of {signal} noise deviations");
+            Panel::semilog(title, "offset t / noise deviations", "error probability")
+                .with(Layer::line("identical quantizers", curve).coloured(6))
+                .with_all(designs)
         };
         Plot::grid(2, p.signals.iter().map(panel).collect())
     }

@@ -1,6 +1,6 @@
 //! Table 4.5: words over a binary symmetric channel, and what a wrong assumption about it costs.
 
-use super::common::{MI, MSE, Pair, bsc, lloyd_system, odd, scene};
+use super::common::{MI, MSE, Pair, lloyd_system, odd, over_bsc, scene};
 use crate::prelude::*;
 use crate::reference;
 use fewbits_quantizer_design::{Newton, System, design};
@@ -17,7 +17,7 @@ const PRINTED: [(f64, f64); 4] = [(0.0, 1.370), (0.001, 1.358), (0.01, 1.260), (
 
 parameters! {
     pub struct Parameters {
-        /// Crossover probabilities; beyond 0.06 a design of four levels loses a cell (see mi-beyond).
+        /// Crossover probabilities; beyond 0.06 a design of four levels loses a cell.
         crossovers: Vec<f64> [0.0..=0.06; 1..=100] = PRINTED.map(|p| p.0).to_vec(),
         noise_sd: f64 [1e-2..=1e2] = 1.0 => "Noise standard deviation, in prior standard deviations.",
     }
@@ -25,8 +25,7 @@ parameters! {
 
 impl Parameters {
     fn start(&self, words: &[u32], crossover: f64) -> Result<System, Error> {
-        let channel = bsc(words, crossover)?;
-        Ok(lloyd_system(&scene(&[self.noise_sd; 2], 0.0)?, 4, |_| 1.2)?.with_channels(vec![channel; 2])?)
+        over_bsc(&lloyd_system(&scene(&[self.noise_sd; 2], 0.0)?, 4, |_| 1.2)?, words, crossover)
     }
 
     fn printed(&self, key: String) -> Option<f64> {
@@ -40,7 +39,6 @@ rows! {
         labelling: &'static str => "Words of the levels.",
         design: &'static str => "Criterion and how it was reached.",
         pair: Pair,
-        printed_mse: Option<f64> => "The publication's squared error.",
     }
 }
 
@@ -55,27 +53,27 @@ impl Figure for Table45 {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
+        let newton = Newton::default();
         for &crossover in &p.crossovers {
-            for (labelling, _, words) in &LABELLINGS {
+            for (labelling, _, words) in LABELLINGS {
                 context.check()?;
-                let mut push = |design, pair| {
-                    let printed_mse = p.printed(format!("mi-table4-5/printed/{crossover} {labelling} {design}"));
+                let mut push = |design, pair: Pair| {
+                    let key = format!("mi-table4-5/printed/{crossover} {labelling} {design}");
+                    let pair = pair.beside(p.printed(key));
                     rows.push(Row {
                         crossover,
                         labelling,
                         design,
                         pair,
-                        printed_mse,
                     });
                 };
-                let start = p.start(words, crossover)?;
+                let start = p.start(&words, crossover)?;
                 for (criterion, greedy, both) in [(MI, "mi-greedy", "mi-joint"), (MSE, "mse-greedy", "mse-joint")] {
-                    let chain = design::greedy(&start, &[0, 1], criterion, &Newton::default())?;
-                    push(greedy, Pair::of(&chain[1].system)?);
-                    push(both, Pair::joint(&design::joint(&start, criterion, &Newton::default())?)?);
+                    push(greedy, Pair::of(&design::greedy(&start, &[0, 1], criterion, &newton)?[1].system)?);
+                    push(both, Pair::joint(&design::joint(&start, criterion, &newton)?)?);
                 }
                 if let Some((_, outer)) = PRINTED.iter().find(|print| print.0 == crossover) {
-                    push("printed", Pair::of(&start.with_quantizers(vec![odd(&[*outer])?; 2])?)?);
+                    push("printed", Pair::of(&odd(&start, [&[*outer]; 2])?)?);
                 }
             }
         }
@@ -110,32 +108,24 @@ impl Figure for Table45 {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let panel = |title: &str, axis: &str, value: fn(&Row) -> f64, printed: fn(&Row) -> Option<f64>| {
+        let panel = |title, axis: &str, value: fn(&Pair) -> f64, printed: fn(&Pair) -> Option<f64>| {
             let lines = LABELLINGS.iter().enumerate().flat_map(|(i, (labelling, title, _))| {
                 let own = select(rows, |r| r.labelling == *labelling && r.design == "mi-joint");
-                let line = points(own, |r| (r.crossover, value(r)));
-                [
-                    Layer::line(*title, line.clone()).coloured(i),
-                    Layer::points("", line).coloured(i),
-                ]
+                Layer::marked_line(*title, i, points(own, |r| (r.crossover, value(&r.pair))))
             });
             let print = select(rows, |r| r.labelling == "natural" && r.design == "printed");
+            let print = points(print, |r| (r.crossover, printed(&r.pair)));
             Panel::linear(title, "crossover probability", axis)
                 .with_all(lines)
-                .with(Layer::points("printed", points(print, |r| (r.crossover, printed(r)))).styled(6, Marker::Cross))
+                .with(Layer::points("printed", print).styled(6, Marker::Cross))
         };
-        Plot::grid(
-            2,
-            vec![
-                panel(
-                    "Information designs",
-                    "outer breakpoint / prior deviations",
-                    |r| r.pair.outer2,
-                    |r| Some(r.pair.outer2),
-                ),
-                panel("Their squared error", "mean squared error / prior variances", |r| r.pair.mse, |r| r.printed_mse),
-            ],
-        )
+        let [breakpoint, error] = [
+            "outer breakpoint / prior deviations",
+            "mean squared error / prior variances",
+        ];
+        let breakpoints = panel("Information designs", breakpoint, |d| d.outer2, |d| Some(d.outer2));
+        let errors = panel("Their squared error", error, |d| d.mse, |d| d.printed_mse);
+        Plot::grid(2, vec![breakpoints, errors])
     }
 }
 
@@ -172,83 +162,73 @@ impl Figure for Mismatch {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Mismatches, Error> {
         let (mut rows, mut printed) = (Vec::new(), Vec::new());
-        for (labelling, _, words) in &LABELLINGS {
+        for (labelling, _, words) in LABELLINGS {
             for &designed_for in &p.crossovers {
                 context.check()?;
-                let design = design::joint(&p.start(words, designed_for)?, MI, &Newton::default())?;
+                let design = design::joint(&p.start(&words, designed_for)?, MI, &Newton::default())?;
                 for &true_crossover in &p.crossovers {
-                    let met = design.system.with_channels(vec![bsc(words, true_crossover)?; 2])?;
+                    let met = over_bsc(&design.system, &words, true_crossover)?;
                     let key = format!("mi-table4-5-mismatch/printed/{labelling} {designed_for} {true_crossover}");
-                    let (mse, mi_nats) = (met.value(MSE)?, met.value(MI)?);
                     rows.push(Met {
                         labelling,
                         designed_for,
                         true_crossover,
-                        mse,
-                        mi_nats,
+                        mse: met.value(MSE)?,
+                        mi_nats: met.value(MI)?,
                         printed_mse: p.printed(key),
                     });
                 }
             }
-            let system = p.start(words, 0.05)?.with_quantizers(vec![odd(&[1.37])?; 2])?;
-            printed.push(AtPrinted {
-                labelling,
-                mse: system.value(MSE)?,
-            });
+            let mse = odd(&p.start(&words, 0.05)?, [&[1.37]; 2])?.value(MSE)?;
+            printed.push(AtPrinted { labelling, mse });
         }
         Ok(Mismatches { rows, printed })
     }
 
     fn claims(&self, p: &Parameters, tables: &Mismatches, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let rows = &tables.rows;
         claims.keyed("at-printed", "printed design at 0.05", &tables.printed, |r| r.mse);
-        claims.keyed("mse", "words, designed for, met", rows, |r| r.mse);
-        let natural = tables.printed.iter().filter(|r| r.labelling == "natural");
+        claims.keyed("mse", "words, designed for, met", &tables.rows, |r| r.mse);
+        let natural = select(&tables.printed, |r| r.labelling == "natural");
         let what = "the printed 0.497 is natural words' value at the printed breakpoints to 0.3 %";
         claims.references("printed", what, natural, |r| (format!("{} 0 0.05", r.labelling), r.mse));
         for (labelling, matched) in [("natural", &[0.0, 0.01, 0.05][..]), ("gray", &[0.0, 0.05])] {
-            let least_is_matched = |truth: &f64| {
-                let met = || select(rows, |r| r.labelling == labelling && r.true_crossover == *truth);
-                met()
-                    .min_by(|a, b| a.mse.total_cmp(&b.mse))
-                    .is_some_and(|best| best.designed_for == *truth)
+            let least_is_matched = |truth: f64| {
+                let best = tables.met(labelling, truth).min_by(|a, b| a.mse.total_cmp(&b.mse));
+                best.is_some_and(|best| best.designed_for == truth)
             };
             let what = format!(
                 "{labelling} words: the matched design has the least squared error at {matched:?} and nowhere else"
             );
             here.all(format!("{labelling}-diagonal"), what, &p.crossovers, |c| {
-                least_is_matched(c) == matched.contains(c)
+                least_is_matched(*c) == matched.contains(c)
             });
         }
     }
 
     fn plot(&self, p: &Parameters, tables: &Mismatches) -> Plot {
-        let place = |crossover: f64| p.crossovers.iter().position(|c| *c == crossover).unwrap_or(0) as f64;
-        let panel = |(labelling, title, _): &(&'static str, &str, [u32; 4])| {
-            let own = |r: &&Met| r.labelling == *labelling;
-            let met = |truth: f64| {
-                tables
-                    .rows
-                    .iter()
-                    .filter(own)
-                    .filter(move |r| r.true_crossover == truth)
-            };
-            let least = |truth: f64| met(truth).map(|r| r.mse).fold(f64::INFINITY, f64::min);
+        let panel = |(labelling, title, _): (&'static str, &str, [u32; 4])| {
             let lines = p.crossovers.iter().enumerate().flat_map(|(i, designed)| {
-                let line = points(tables.rows.iter().filter(own).filter(|r| r.designed_for == *designed), |r| {
-                    (place(r.true_crossover), 100.0 * (r.mse / least(r.true_crossover) - 1.0))
-                });
-                let label = format!("designed for {designed}");
-                [
-                    Layer::line("", line.clone()).coloured(i),
-                    Layer::points(label, line).coloured(i),
-                ]
+                let excess = |(place, truth): (usize, &f64)| {
+                    let met = || tables.met(labelling, *truth);
+                    let least = met().map(|r| r.mse).fold(f64::INFINITY, f64::min);
+                    let own = met().find(|r| r.designed_for == *designed)?;
+                    Some((place as f64, 100.0 * (own.mse / least - 1.0)))
+                };
+                let line = p.crossovers.iter().enumerate().filter_map(excess).collect();
+                Layer::marked_line(format!("designed for {designed}"), i, line)
             });
-            let x = Axis::linear("true crossover probability")
-                .named(p.crossovers.iter().map(|c| (place(*c), c.to_string())));
-            Panel::new(*title, x, Axis::linear("excess squared error / %")).with_all(lines)
+            let places = (0..).map(f64::from).zip(p.crossovers.iter().map(f64::to_string));
+            let x = Axis::linear("true crossover probability").named(places);
+            Panel::new(title, x, Axis::linear("excess squared error / %")).with_all(lines)
         };
-        Plot::grid(2, LABELLINGS.iter().map(panel).collect())
+        Plot::grid(2, LABELLINGS.map(panel).to_vec())
+    }
+}
+
+impl Mismatches {
+    /// The designs for these words at a true crossover.
+    fn met(&self, labelling: &'static str, truth: f64) -> impl Iterator<Item = &Met> {
+        select(&self.rows, move |r| r.labelling == labelling && r.true_crossover == truth)
     }
 }

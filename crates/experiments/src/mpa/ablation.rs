@@ -1,8 +1,8 @@
 //! `mpa-ablation`: improved message passing with one erratum put back at a time.
 
-use super::scores::{Row, agree, ladder, mse};
+use super::scores::{self, Row, agree, ladder, mse};
 use super::sweeps::SPEED;
-use super::world::{Field, Method, Point, compare};
+use super::world::{Method, Point};
 use crate::prelude::*;
 use fewbits_pf_mpa::published::{DynamicsWeight, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight};
 use fewbits_pf_mpa::{IntervalRule, Velocity};
@@ -17,71 +17,29 @@ parameters! {
 pub struct Ablation;
 
 /// The variants by name.
-fn variants(n: usize) -> Result<Vec<(&'static str, MessagePassing, IntervalRule)>, Error> {
+fn variants(n: usize) -> Result<[(&'static str, MessagePassing, IntervalRule); 13], Error> {
     let base = MessagePassing::improved(n)?;
-    let sweeps = |sweeps| MessagePassing {
-        sampler: ProductSampler::Gibbs { sweeps },
-        ..base
+    let with = |change: fn(&mut MessagePassing)| {
+        let mut changed = base;
+        change(&mut changed);
+        changed
     };
-    let correct = [
-        ("1 sweep", sweeps(1)),
-        ("2 sweeps", sweeps(2)),
-        ("improved", base),
-        ("20 sweeps", sweeps(20)),
-        (
-            "importance",
-            MessagePassing {
-                sampler: ProductSampler::MixtureImportance { draws: 300 },
-                ..base
-            },
-        ),
-        (
-            "uniform ring",
-            MessagePassing {
-                ring_weight: RingWeight::Uniform,
-                ..base
-            },
-        ),
-        (
-            "ring ratio",
-            MessagePassing {
-                ring_weight: RingWeight::PrintedRatio,
-                ..base
-            },
-        ),
-        (
-            "dynamics ratio",
-            MessagePassing {
-                dynamics_weight: DynamicsWeight::PrintedRatio,
-                ..base
-            },
-        ),
-        (
-            "printed kernel",
-            MessagePassing {
-                kernel: KernelRule::Printed,
-                ..base
-            },
-        ),
-        (
-            "transfer",
-            MessagePassing {
-                velocity: Velocity::Transfer,
-                ..base
-            },
-        ),
-        (
-            "full ring",
-            MessagePassing {
-                ring: Ring::Full,
-                ..base
-            },
-        ),
-        ("published", MessagePassing::published(n)?),
-    ];
-    let mut all: Vec<_> = correct.map(|(name, m)| (name, m, IntervalRule::Correct)).to_vec();
-    all.push(("printed interval", base, IntervalRule::Printed));
-    Ok(all)
+    let correct = IntervalRule::Correct;
+    Ok([
+        ("1 sweep", with(|m| m.sampler = ProductSampler::Gibbs { sweeps: 1 }), correct),
+        ("2 sweeps", with(|m| m.sampler = ProductSampler::Gibbs { sweeps: 2 }), correct),
+        ("improved", base, correct),
+        ("20 sweeps", with(|m| m.sampler = ProductSampler::Gibbs { sweeps: 20 }), correct),
+        ("importance", with(|m| m.sampler = ProductSampler::MixtureImportance { draws: 300 }), correct),
+        ("uniform ring", with(|m| m.ring_weight = RingWeight::Uniform), correct),
+        ("ring ratio", with(|m| m.ring_weight = RingWeight::PrintedRatio), correct),
+        ("dynamics ratio", with(|m| m.dynamics_weight = DynamicsWeight::PrintedRatio), correct),
+        ("printed kernel", with(|m| m.kernel = KernelRule::Printed), correct),
+        ("transfer", with(|m| m.velocity = Velocity::Transfer), correct),
+        ("full ring", with(|m| m.ring = Ring::Full), correct),
+        ("published", MessagePassing::published(n)?, correct),
+        ("printed interval", base, IntervalRule::Printed),
+    ])
 }
 
 impl Figure for Ablation {
@@ -97,17 +55,11 @@ impl Figure for Ablation {
                     interval,
                     ..Point::published(snr, 4, SPEED)?
                 };
-                let method = Method::Messages(messages);
-                let score = compare(context, &point, Field::Confined, &[(method, p.trials)])?.remove(0);
-                rows.push(Row {
-                    point: format!("{snr}dB"),
-                    snr_db: snr,
-                    levels: 4,
-                    method: name.to_owned(),
-                    family: method.family(),
-                    size: method.size(),
-                    score,
-                });
+                let method = [(Method::Messages(messages), p.trials)];
+                for row in scores::rows(context, &format!("{snr}dB"), &point, &method)? {
+                    let method = name.to_owned();
+                    rows.push(Row { method, ..row });
+                }
             }
         }
         Ok(rows)
@@ -117,25 +69,17 @@ impl Figure for Ablation {
         let paper = claims.at_defaults().at_full_trials();
         agree(claims, t, "", true);
         let ratio = |name: &str| Some(mse(t, "50dB", name)? / mse(t, "50dB", "improved")?);
-        paper.above(
-            "transfer",
-            "transferring velocities costs half as much again (erratum mpa-7)",
-            ratio("transfer"),
-            1.25,
-        );
+        let what = "transferring velocities costs half as much again (erratum mpa-7)";
+        paper.above("transfer", what, ratio("transfer"), 1.25);
         paper.above("full-ring", "a full ring loses what its kernel cannot hold", ratio("full ring"), 4.0);
         paper.above("interval", "the printed interval costs a factor (erratum mpa-1)", ratio("printed interval"), 1.8);
-        paper.above(
-            "ratios",
-            "ratio weights of the dynamics only add noise (erratum mpa-4, erratum mpa-16)",
-            ratio("dynamics ratio"),
-            1.05,
-        );
+        let what = "ratio weights of the dynamics only add noise (erratum mpa-4, erratum mpa-16)";
+        paper.above("ratios", what, ratio("dynamics ratio"), 1.05);
         paper.near("radius", "the missing radius costs little here (erratum mpa-3)", ratio("uniform ring"), 1.04, 0.12);
     }
 
     fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
-        let panel = |snr: f64| ladder(&format!("{snr} dB"), t.iter().filter(|r| r.snr_db == snr));
+        let panel = |snr: f64| ladder(&format!("{snr} dB"), select(t, |r| r.snr_db == snr));
         Plot::grid(2, vec![panel(50.0), panel(30.0)])
     }
 }

@@ -17,33 +17,34 @@ const START: f64 = 1e-6;
 /// Steps.
 const STEPS: usize = 100;
 
-/// One world.
-struct World {
-    targets: Vec<[f64; 2]>,
-    measured: Vec<[f64; 2]>,
-    straight: Vec<bool>,
+/// What happens in one step.
+struct Moment {
+    targets: [f64; 2],
+    /// In the order in which they arrive.
+    measured: [f64; 2],
+    /// Whether that is the targets' order.
+    straight: bool,
 }
 
-impl World {
-    fn draw(stream: Stream, variance: f64, apart: f64) -> Self {
-        let mut rng = stream.named("truth").rng();
-        let mut normal = |variance: f64| variance.sqrt() * rng.sample::<f64, _>(StandardNormal);
-        let mut at = [1.0 + normal(START), 1.0 + apart + normal(START)];
-        let mut targets = Vec::new();
-        let mut noisy = Vec::new();
-        for _ in 0..STEPS {
-            at = at.map(|x| x + normal(WALK));
-            targets.push(at);
-            noisy.push(at.map(|x| x + normal(variance)));
-        }
-        let straight: Vec<bool> = (0..STEPS).map(|_| rng.random()).collect();
-        let order = |(z, s): (&[f64; 2], &bool)| if *s { *z } else { [z[1], z[0]] };
-        Self {
-            measured: noisy.iter().zip(&straight).map(order).collect(),
+/// The world of one trial.
+fn draw(stream: Stream, variance: f64, apart: f64) -> Vec<Moment> {
+    let mut rng = stream.named("truth").rng();
+    let mut normal = |variance: f64| variance.sqrt() * rng.sample::<f64, _>(StandardNormal);
+    let mut at = [1.0 + normal(START), 1.0 + apart + normal(START)];
+    let mut step = |_| {
+        at = at.map(|x| x + normal(WALK));
+        (at, at.map(|x| x + normal(variance)))
+    };
+    let steps: Vec<_> = (0..STEPS).map(&mut step).collect();
+    let moment = |(targets, z): ([f64; 2], [f64; 2])| {
+        let straight = rng.random();
+        Moment {
             targets,
+            measured: if straight { z } else { [z[1], z[0]] },
             straight,
         }
-    }
+    };
+    steps.into_iter().map(moment).collect()
 }
 
 /// A way to associate.
@@ -86,36 +87,33 @@ impl Method {
     }
 
     /// Estimates and `P(r = 0)` of every step.
-    fn run(self, world: &World, variance: f64, apart: f64, stream: Stream) -> Result<Vec<([f64; 2], f64)>, Error> {
-        let prior = [Gaussian::scalar(1.0, START)?, Gaussian::scalar(1.0 + apart, START)?];
-        let steps = world.measured.iter().zip(&world.straight);
+    fn run(self, world: &[Moment], variance: f64, apart: f64, stream: Stream) -> Result<Vec<([f64; 2], f64)>, Error> {
+        let mut targets = [Gaussian::scalar(1.0, START)?, Gaussian::scalar(1.0 + apart, START)?];
         match self {
             Self::Pair(_, tracker) => {
-                let mut targets = prior;
-                let step = |(z, s): (&[f64; 2], &bool)| {
-                    let after = tracker.step(&targets, *z, WALK, variance, *s)?;
+                let step = |now: &Moment| {
+                    let after = tracker.step(&targets, now.measured, WALK, variance, now.straight)?;
                     targets = after.targets;
                     Ok((targets.map(|t| t.mean()[0]), after.straight))
                 };
-                steps.map(step).collect()
+                world.iter().map(step).collect()
             }
             Self::Hypotheses => {
-                let mut kept = Hypotheses::new(16, prior)?;
-                let step = |(z, _): (&[f64; 2], &bool)| {
-                    let p = kept.step(*z, WALK, variance)?;
+                let mut kept = Hypotheses::new(16, targets)?;
+                let step = |now: &Moment| {
+                    let p = kept.step(now.measured, WALK, variance)?;
                     Ok((kept.means(), p))
                 };
-                steps.map(step).collect()
+                world.iter().map(step).collect()
             }
             Self::Cloud(name, rule) => {
                 let mut rng = stream.named(name).fast_rng();
-                let mut clouds = prior.map(|p| {
+                let mut clouds = targets.map(|p| {
                     let at = |_| p.mean()[0] + START.sqrt() * rng.sample::<f64, _>(StandardNormal);
                     (0..PAIRS).map(at).collect()
                 });
-                steps
-                    .map(|(z, _)| cloud_step(&mut rng, &mut clouds, *z, variance, rule))
-                    .collect()
+                let step = |now: &Moment| cloud_step(&mut rng, &mut clouds, now.measured, variance, rule);
+                world.iter().map(step).collect()
             }
         }
     }
@@ -135,10 +133,10 @@ fn cloud_step<R: Rng>(
     let fit = |t: f64, z: f64| normal::log_pdf_with(z, t, variance);
     let pairs: Vec<[f64; 2]> = clouds[0].iter().zip(&clouds[1]).map(|(a, b)| [*a, *b]).collect();
     let straight: Vec<f64> = match rule {
-        CloudRule::Tanh => pairs
-            .iter()
-            .map(|t| tanh_rule(separation(*t, z), PRINTED_GAIN))
-            .collect(),
+        CloudRule::Tanh => {
+            let own = |t: &[f64; 2]| tanh_rule(separation(*t, z), PRINTED_GAIN);
+            pairs.iter().map(own).collect()
+        }
         CloudRule::Exact => {
             let evidence = |z: [f64; 2]| {
                 let logs: Vec<f64> = pairs.iter().map(|t| fit(t[0], z[0]) + fit(t[1], z[1])).collect();
@@ -178,14 +176,12 @@ parameters! {
 rows! {
     pub struct Step {
         variance: f64 => "Variance of the measurements.",
-        rule: String => "Rule.",
+        rule: &'static str => "Rule.",
         k: usize => "Step, from 1.",
-        t1: f64 => "First target.",
-        t2: f64 => "Second target.",
+        t: [f64; 2] => "The target of this number.",
         za: f64 => "First measurement received.",
         zb: f64 => "Second measurement received.",
-        estimate1: f64 => "Estimate of the first target.",
-        estimate2: f64 => "Estimate of the second.",
+        estimate: [f64; 2] => "Estimate of the target of this number.",
         p0: f64 => "Probability that the first measurement is of the first target.",
     }
 }
@@ -197,22 +193,20 @@ impl Figure for Fig37 {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Step>, Error> {
         let mut tracks = Vec::new();
-        for variance in &p.variance {
+        for &variance in &p.variance {
             let stream = context.stream("mpa-fig3-7");
-            let world = World::draw(stream, *variance, p.apart);
+            let world = draw(stream, variance, p.apart);
             for method in [METHODS[2], METHODS[5]] {
-                let run = method.run(&world, *variance, p.apart, stream)?;
-                for (k, (estimate, p0)) in run.into_iter().enumerate() {
+                let run = method.run(&world, variance, p.apart, stream)?;
+                for (k, (now, (estimate, p0))) in world.iter().zip(run).enumerate() {
                     tracks.push(Step {
-                        variance: *variance,
-                        rule: method.name().to_owned(),
+                        variance,
+                        rule: method.name(),
                         k: k + 1,
-                        t1: world.targets[k][0],
-                        t2: world.targets[k][1],
-                        za: world.measured[k][0],
-                        zb: world.measured[k][1],
-                        estimate1: estimate[0],
-                        estimate2: estimate[1],
+                        t: now.targets,
+                        za: now.measured[0],
+                        zb: now.measured[1],
+                        estimate,
                         p0,
                     });
                 }
@@ -225,23 +219,24 @@ impl Figure for Fig37 {
         let here = claims.at_defaults();
         claims.all("probabilities", "rules give probabilities", t, |r| (0.0..=1.0).contains(&r.p0));
         let near = |r: &Step| {
-            let to = |x: f64| (x - r.t1).abs().min((x - r.t2).abs());
-            to(r.estimate1).max(to(r.estimate2)) < 8.0 * r.variance.sqrt()
+            let to = |x: f64| r.t.map(|t| (x - t).abs()).into_iter().fold(f64::INFINITY, f64::min);
+            r.estimate.iter().all(|x| to(*x) < 8.0 * r.variance.sqrt())
         };
         here.all("follow", "every estimate follows one of the targets", t, near);
     }
 
     fn plot(&self, p: &Parameters, t: &Vec<Step>) -> Plot {
         let panel = |variance: &f64| {
-            let of = |rule: &'static str| select(t, move |r| r.variance == *variance && r.rule == rule);
-            let k = |r: &Step| r.k as f64;
+            let of = |rule: &'static str, value: fn(&Step) -> f64| {
+                points(select(t, |r| r.variance == *variance && r.rule == rule), |r| (r.k as f64, value(r)))
+            };
             Panel::linear(format!("R = {variance}"), "step", "position")
-                .with(Layer::unbroken("target 1", points(of("jpda"), |r| (k(r), r.t1))))
-                .with(Layer::unbroken("target 2", points(of("jpda"), |r| (k(r), r.t2))).coloured(7))
-                .with(Layer::points("printed, 1", points(of("tanh"), |r| (k(r), r.estimate1))).coloured(2))
-                .with(Layer::points("printed, 2", points(of("tanh"), |r| (k(r), r.estimate2))).coloured(3))
-                .with(Layer::dashed("exact, 1", points(of("jpda"), |r| (k(r), r.estimate1))).coloured(4))
-                .with(Layer::dashed("exact, 2", points(of("jpda"), |r| (k(r), r.estimate2))).coloured(5))
+                .with(Layer::unbroken("target 1", of("jpda", |r| r.t[0])))
+                .with(Layer::unbroken("target 2", of("jpda", |r| r.t[1])).coloured(7))
+                .with(Layer::points("printed, 1", of("tanh", |r| r.estimate[0])).coloured(2))
+                .with(Layer::points("printed, 2", of("tanh", |r| r.estimate[1])).coloured(3))
+                .with(Layer::dashed("exact, 1", of("jpda", |r| r.estimate[0])).coloured(4))
+                .with(Layer::dashed("exact, 2", of("jpda", |r| r.estimate[1])).coloured(5))
         };
         Plot::grid(1, p.variance.iter().map(panel).collect())
     }
@@ -277,20 +272,18 @@ impl Figure for Table {
         for variance in [1e-4, 4e-4] {
             for apart in [0.1, 0.3] {
                 let one = |sums: &mut Vec<[Moments; 3]>, trial: Trial| -> Result<(), Error> {
-                    let world = World::draw(trial.stream, variance, apart);
-                    for (sum, method) in sums.iter_mut().zip(METHODS) {
-                        let run = method.run(&world, variance, apart, trial.stream)?;
+                    let world = draw(trial.stream, variance, apart);
+                    for (sums, method) in sums.iter_mut().zip(METHODS) {
                         let mut means = [0.0; 3];
-                        for (k, (estimate, p0)) in run.iter().enumerate() {
-                            let t = world.targets[k];
-                            let squared = |a: f64, b: f64| (a - b) * (a - b);
-                            let labelled = squared(estimate[0], t[0]) + squared(estimate[1], t[1]);
-                            let swapped = squared(estimate[0], t[1]) + squared(estimate[1], t[0]);
-                            let truth = f64::from(u8::from(world.straight[k]));
+                        let run = method.run(&world, variance, apart, trial.stream)?;
+                        for (now, (estimate, p0)) in world.iter().zip(run) {
+                            let apart = |i: usize, j: usize| (estimate[i] - now.targets[j]).powi(2);
+                            let (labelled, swapped) = (apart(0, 0) + apart(1, 1), apart(0, 1) + apart(1, 0));
+                            let truth = f64::from(u8::from(now.straight));
                             let all = [labelled, labelled.min(swapped), (p0 - truth).abs()];
                             means.iter_mut().zip(all).for_each(|(m, x)| *m += x / STEPS as f64);
                         }
-                        sum.iter_mut().zip(means).for_each(|(s, m)| s.add(m));
+                        sums.iter_mut().zip(means).for_each(|(s, m)| s.add(m));
                     }
                     Ok(())
                 };
@@ -325,27 +318,24 @@ impl Figure for Table {
             let errors = ["jpda", "tanh", "pf-tanh"].map(|m| of(m).map(|r| r.association.value));
             let what = "exact < printed rule < printed rule over particles (erratum mpa-12)";
             full.increasing(format!("order-{variance}"), what, errors);
-            let ratio = of("pf-tanh")
-                .zip(of("pf-exact"))
-                .map(|(a, b)| a.unlabelled.value / b.unlabelled.value);
+            let [printed, exact] = ["pf-tanh", "pf-exact"].map(|m| of(m).map(|r| r.unlabelled));
+            let ratio = over(printed, exact);
             let what = "over particles the printed rule blurs the targets";
             full.above(format!("particles-{variance}"), what, ratio, blur);
         }
         let genie = |r: &Row| first(t, |g| g.variance == r.variance && g.apart == r.apart && g.method == "genie");
-        let known = t.iter().filter(|r| r.method != "genie");
-        full.all("genie", "no rule is below the genie", known, |r| {
+        full.all("genie", "no rule is below the genie", select(t, |r| r.method != "genie"), |r| {
             genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
         });
     }
 
     fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
         let panel = |variance: f64| {
-            let here: Vec<&Row> = t.iter().filter(|r| r.variance == variance && r.apart == 0.1).collect();
-            let names = here.iter().map(|r| r.method.to_owned());
-            let numbered: Vec<(usize, &Row)> = here.iter().copied().enumerate().collect();
-            Panel::new(format!("R = {variance}"), Axis::categories("", names), Axis::log("mean squared error"))
-                .with(Layer::measured("labelled", numbered.clone(), |(i, r)| (i as f64, r.labelled)))
-                .with(Layer::measured("unlabelled", numbered, |(i, r)| (i as f64, r.unlabelled)))
+            let here = || select(t, move |r| r.variance == variance && r.apart == 0.1).enumerate();
+            let names = Axis::categories("", here().map(|(_, r)| r.method));
+            Panel::new(format!("R = {variance}"), names, Axis::log("mean squared error"))
+                .with(Layer::measured("labelled", here(), |(i, r)| (i as f64, r.labelled)))
+                .with(Layer::measured("unlabelled", here(), |(i, r)| (i as f64, r.unlabelled)))
         };
         Plot::grid(2, vec![panel(1e-4), panel(4e-4)])
     }

@@ -3,7 +3,6 @@
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, Score, World, prior};
 use crate::prelude::*;
-use fewbits_core::Gaussian;
 use fewbits_pf_mpa::{CramerRao, Target, position_information};
 use nalgebra::{Matrix4, Vector2};
 
@@ -48,27 +47,21 @@ impl Figure for Bounds {
         let mut bounds = Vec::new();
         for snr_db in SNRS {
             for levels in LEVELS {
-                let point = Point::published(snr_db, levels, SPEED)?;
-                let network = point.network()?;
-                let methods = [Method::Grid(25), Method::GMPA, Method::EKF_U];
-                let one = |trial: Trial| -> Result<(Vec<f64>, Sums), Error> {
+                let network = Point::published(snr_db, levels, SPEED)?.network()?;
+                let one = |trial: Trial| -> Result<([f64; 3], Sums), Error> {
                     let world = World::draw(trial.stream, &target, Field::Free, 5)?;
-                    let mut runs = Vec::new();
-                    for method in &methods {
-                        runs.push(method.run(&world, &network, &target, trial.stream)?);
-                    }
+                    let run = |method: Method| method.run(&world, &network, &target, trial.stream);
+                    let runs = [run(Method::Grid(25))?, run(Method::GMPA)?, run(Method::EKF_U)?];
+                    let mut previous = prior()?;
                     let mut sums = Vec::with_capacity(STEPS);
-                    let start = prior()?;
                     for (k, x) in world.track.iter().enumerate() {
-                        let previous: &Gaussian<4> = if k == 0 { &start } else { &runs[0].estimates[k - 1] };
-                        let references = network.references(&target, k, previous)?;
+                        let references = network.references(&target, k, &previous)?;
                         let place = Vector2::new(x[0], x[1]);
-                        sums.push([
-                            position_information(network.sensors(), &place, Some((&references, levels)))?,
-                            position_information(network.sensors(), &place, None)?,
-                        ]);
+                        let information = |levels| position_information(network.sensors(), &place, levels);
+                        sums.push([information(Some((&references, levels)))?, information(None)?]);
+                        previous = runs[0][k];
                     }
-                    Ok((runs.iter().map(|r| r.mse(&world)).collect(), sums))
+                    Ok((runs.map(|run| world.mse(&run)), sums))
                 };
                 let all = context.trials("mpa-free", p.trials, one)?;
                 // The bound without the trajectories of one group of `GROUPS`.
@@ -85,10 +78,8 @@ impl Figure for Bounds {
                 };
                 // Standard error by the jackknife: the information is averaged before it is inverted.
                 let bound = |which: usize| -> Result<Measured, Error> {
-                    let mut spread = Moments::default();
-                    for group in 0..GROUPS {
-                        spread.add(without(which, Some(group))?);
-                    }
+                    let groups = (0..GROUPS).map(|group| without(which, Some(group)));
+                    let spread: Moments = groups.collect::<Result<Vec<f64>, Error>>()?.into_iter().collect();
                     Ok(Measured {
                         value: without(which, None)?,
                         standard_error: Some(spread.standard_error() * (GROUPS - 1) as f64),
@@ -116,12 +107,8 @@ impl Figure for Bounds {
     fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         full.keyed("quantized", "bound for levels", t, |r| r.quantized);
-        full.keyed(
-            "unquantized",
-            "bound for ranges, which has no mean over free trajectories (erratum mpa-17)",
-            t,
-            |r| r.unquantized,
-        );
+        let what = "bound for ranges, which has no mean over free trajectories (erratum mpa-17)";
+        full.keyed("unquantized", what, t, |r| r.unquantized);
         full.keyed("grid-median", "median of the grid", t, |r| r.grid_median);
         claims.all("floor", "no tracker of levels is below its bound", t, |r| {
             let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.standard_error.unwrap_or(0.0);
@@ -129,22 +116,22 @@ impl Figure for Bounds {
         });
         claims.all("order", "levels never tell more than ranges", t, |r| r.quantized.value > r.unquantized.value);
         for snr in SNRS {
-            let of = t.iter().filter(|r| r.snr_db == snr).map(|r| r.quantized.value);
+            let of = select(t, |r| r.snr_db == snr).map(|r| r.quantized.value);
             full.decreasing(format!("levels-{snr}"), "fewer levels, larger bound", of);
         }
-        let loose = t.iter().find(|r| r.snr_db == 50.0 && r.levels == 4);
+        let loose = first(t, |r| r.snr_db == 50.0 && r.levels == 4);
         full.above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0);
     }
 
     fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
         let panel = |levels: usize| {
-            let here: Vec<&Row> = t.iter().filter(|r| r.levels == levels).collect();
-            let snr = |r: &&Row| r.snr_db;
+            let here = || select(t, move |r| r.levels == levels);
+            let of = |value: fn(&Row) -> f64| points(here(), |r| (r.snr_db, value(r)));
             Panel::semilog(format!("{levels} levels"), "SNR / dB", super::scores::MSE)
-                .with(Layer::line("bound", points(&here, |r| (snr(r), r.quantized.value))).coloured(0))
-                .with(Layer::points("grid, median", points(&here, |r| (snr(r), r.grid_median))).coloured(1))
-                .with(Layer::measured("grid, mean", &here, |r| (snr(r), r.grid)).coloured(2))
-                .with(Layer::dashed("bound of ranges", points(&here, |r| (snr(r), r.unquantized.value))).coloured(3))
+                .with(Layer::line("bound", of(|r| r.quantized.value)).coloured(0))
+                .with(Layer::points("grid, median", of(|r| r.grid_median)).coloured(1))
+                .with(Layer::measured("grid, mean", here(), |r| (r.snr_db, r.grid)).coloured(2))
+                .with(Layer::dashed("bound of ranges", of(|r| r.unquantized.value)).coloured(3))
         };
         Plot::grid(3, LEVELS.map(panel).to_vec())
     }

@@ -31,11 +31,12 @@ impl Figure for Encoders {
          four bits reach the filter of unquantized ranges.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let methods = [
-            (Method::Grid(15), p.trials),
-            (Method::GMPA, p.trials),
-            (Method::EKF_U, p.trials),
-        ];
+        let methods = [Method::Grid(15), Method::GMPA, Method::EKF_U].map(|m| (m, p.trials));
+        let guided = [Method::Guided(10), Method::Guided(40)].map(|m| (m, p.trials));
+        let at = |snr, levels, encoder| {
+            let published = Point::published(snr, levels, SPEED)?;
+            Ok::<_, Error>(Point { encoder, ..published })
+        };
         let (mut encoders, mut loadings) = (Vec::new(), Vec::new());
         for snr in [50.0, 40.0, 30.0] {
             for levels in LEVELS {
@@ -45,31 +46,21 @@ impl Figure for Encoders {
                     Encoder::adaptive(levels)?,
                 ];
                 for (name, encoder) in NAMES.into_iter().zip(all) {
-                    let point = Point {
-                        encoder,
-                        ..Point::published(snr, levels, SPEED)?
-                    };
+                    let point = at(snr, levels, encoder)?;
                     encoders.extend(rows(context, &format!("{name} {snr}dB-L{levels}"), &point, &methods)?);
                 }
             }
         }
-        let guided = [(Method::Guided(10), p.trials), (Method::Guided(40), p.trials)];
         for (snr, levels, list) in [
             (50.0, 4, &[1.2, 1.6, 2.5, 3.2][..]),
             (30.0, 4, &[1.2, 1.6, 2.5, 3.2]),
             (50.0, 8, &[1.8, 3.0, 4.0]),
         ] {
-            for loading in list {
-                let point = Point {
-                    encoder: Encoder::Adaptive { loading: *loading },
-                    ..Point::published(snr, levels, SPEED)?
-                };
+            for &loading in list {
+                let point = at(snr, levels, Encoder::Adaptive { loading })?;
                 loadings.extend(rows(context, &format!("{loading} {snr}dB-L{levels}"), &point, &methods[..1])?);
             }
-            let point = Point {
-                encoder: Encoder::adaptive(levels)?,
-                ..Point::published(snr, levels, SPEED)?
-            };
+            let point = at(snr, levels, Encoder::adaptive(levels)?)?;
             loadings.extend(rows(context, &format!("best {snr}dB-L{levels}"), &point, &guided)?);
         }
         Ok(Rows { encoders, loadings })
@@ -82,16 +73,12 @@ impl Figure for Encoders {
         let grid = |name: &str, point: &str| mse(&t.encoders, &format!("{name} {point}"), "grid-15");
         for (point, factor) in [("50dB-L4", 20.0), ("40dB-L4", 8.0), ("30dB-L4", 2.4)] {
             let gain = over(grid("published", point), grid("adaptive", point));
-            full.at_least(
-                format!("gain-{point}"),
-                "the adaptive encoder divides the error (erratum mpa-2)",
-                gain,
-                factor,
-            );
+            let what = "the adaptive encoder divides the error (erratum mpa-2)";
+            full.at_least(format!("gain-{point}"), what, gain, factor);
         }
         for snr in ["50dB", "40dB", "30dB"] {
             let point = format!("{snr}-L16");
-            let of = |method: &str| find(&t.encoders, &format!("adaptive {point}"), method).map(Row::mse);
+            let of = |method: &str| find(&t.encoders, &format!("adaptive {point}"), method).map(|r| r.score.mse);
             // The error of the extended filter has a heavy tail at 50 dB: 8 % standard error in 200 tracks.
             let ratio = of("grid-15").zip(of("EKF-U")).map(|(a, b)| {
                 let relative = |m: Measured| m.standard_error.unwrap_or(0.0) / m.value;
@@ -107,18 +94,14 @@ impl Figure for Encoders {
 
     fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
         let panel = |snr: f64| {
-            let lines = NAMES.iter().enumerate().map(|(i, name)| {
-                let of: Vec<&Row> = t
-                    .encoders
-                    .iter()
-                    .filter(|r| r.snr_db == snr && r.method == "grid-15" && r.point.starts_with(name))
-                    .collect();
+            let marks = NAMES.iter().enumerate().map(|(i, name)| {
+                let of = select(&t.encoders, |r| r.snr_db == snr && r.method == "grid-15" && r.point.starts_with(name));
                 Layer::measured(*name, of, |r| ((r.levels as f64).log2(), r.score.mse)).coloured(i)
             });
-            let reference = t.encoders.iter().find(|r| r.snr_db == snr && r.method == "EKF-U");
+            let reference = first(&t.encoders, |r| r.snr_db == snr && r.method == "EKF-U");
             let level = reference.map_or(Vec::new(), |r| vec![(1.0, r.score.mse.value), (4.0, r.score.mse.value)]);
             Panel::semilog(format!("{snr} dB"), "bits", super::scores::MSE)
-                .with_all(lines)
+                .with_all(marks)
                 .with(Layer::dashed("EKF-U", level))
         };
         Plot::grid(3, [50.0, 40.0, 30.0].map(panel).to_vec())

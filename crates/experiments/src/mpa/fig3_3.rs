@@ -3,7 +3,9 @@
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, World, canonical};
 use crate::prelude::*;
+use fewbits_core::Gaussian;
 use fewbits_pf_mpa::Target;
+use nalgebra::Vector4;
 
 parameters! {
     pub struct Parameters {
@@ -45,19 +47,16 @@ impl Figure for Fig33 {
         let network = point.network()?;
         let stream = context.stream("mpa-trajectories").indexed(p.trajectory);
         let world = World::draw(stream, &target, Field::Confined, network.sensors().len())?;
-        let place = |method: &str, k: usize, x: f64, y: f64| Row {
-            method: method.to_owned(),
-            k: k + 1,
-            x,
-            y,
+        let (mut track, mut errors) = (Vec::new(), Vec::new());
+        let mut add = |method: &str, places: &mut dyn Iterator<Item = &Vector4<f64>>| {
+            track.extend(places.enumerate().map(|(k, state)| Row {
+                method: method.to_owned(),
+                k: k + 1,
+                x: state[0],
+                y: state[1],
+            }));
         };
-        let mut track: Vec<Row> = world
-            .track
-            .iter()
-            .enumerate()
-            .map(|(k, s)| place("truth", k, s[0], s[1]))
-            .collect();
-        let mut errors = Vec::new();
+        add("truth", &mut world.track.iter());
         let methods = [
             Method::EKF_NAIVE,
             Method::TRANSFER,
@@ -67,37 +66,31 @@ impl Figure for Fig33 {
             Method::Grid(15),
         ];
         for method in methods {
-            let run = method.run(&world, &network, &target, stream)?;
-            let name = method.name();
-            let of = run.estimates.iter().enumerate();
-            track.extend(of.map(|(k, e)| place(&name, k, e.mean()[0], e.mean()[1])));
-            errors.push(ErrorRow {
-                mse: run.mse(&world),
-                method: name,
-            });
+            let estimates = method.run(&world, &network, &target, stream)?;
+            let (method, mse) = (method.name(), world.mse(&estimates));
+            add(&method, &mut estimates.iter().map(Gaussian::mean));
+            errors.push(ErrorRow { method, mse });
         }
         Ok(Rows { track, errors })
     }
 
     fn claims(&self, p: &Parameters, t: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let of = |method: &str| t.errors.iter().find(|e| e.method == method).map(|e| e.mse);
+        let of = |method: &str| first(&t.errors, |e| e.method == method).map(|e| e.mse);
         here.at_most("grid", "the grid filter stays on the track", of("grid-15"), 0.3);
         here.at_most("improved", "so does improved message passing", of(&format!("improved-{}", p.particles)), 0.5);
     }
 
     fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
-        let names: Vec<&str> = t.errors.iter().map(|e| e.method.as_str()).collect();
-        let line = |(i, name): (usize, &&str)| {
-            Layer::points(*name, points(t.track.iter().filter(|r| r.method == **name), |r| (r.x, r.y))).coloured(i + 1)
-        };
-        let truth = points(select(&t.track, |r| r.method == "truth"), |r| (r.x, r.y));
+        let path = |method: &str| points(select(&t.track, |r| r.method == method), |r| (r.x, r.y));
+        let marks = |(i, e): (usize, &ErrorRow)| Layer::points(&e.method, path(&e.method)).coloured(i + 1);
+        let truth = path("truth");
         let sensors = canonical().iter().map(|s| (s[0], s[1])).collect();
         let square = |title, [x, y]: [(f64, f64); 2]| {
             let axis = |label, (low, high)| Axis::linear(label).between(low, high);
             Panel::new(title, axis("x / m", x), axis("y / m", y))
                 .with(Layer::unbroken("truth", truth.clone()))
-                .with_all(names.iter().enumerate().map(line))
+                .with_all(t.errors.iter().enumerate().map(marks))
         };
         // A quarter of the field's side, round the middle of the true track.
         let (x, y) = truth.get(truth.len() / 2).copied().unwrap_or((10.0, 10.0));
@@ -107,12 +100,7 @@ impl Figure for Fig33 {
             .with(Layer::points("sensors", sensors).coloured(8))
             .with(Layer::dashed("", frame).coloured(7))
             .without_legend();
-        Plot::grid(
-            2,
-            vec![
-                field,
-                square("the dashed square, four times as large", [(left, right), (low, high)]),
-            ],
-        )
+        let close = square("the dashed square, four times as large", [(left, right), (low, high)]);
+        Plot::grid(2, vec![field, close])
     }
 }

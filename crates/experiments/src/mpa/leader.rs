@@ -54,18 +54,19 @@ impl Figure for Leaders {
                 for k in 0..STEPS {
                     let ranges = world.ranges(&network, k);
                     let observed = network.observe(&target, k, &shared, &ranges, Reports::Levels)?;
-                    let mut copies = Vec::with_capacity(sensors.len());
-                    for rng in &mut streams {
-                        let stepped = tracker.step(rng, &target, k, &shared, &observed);
-                        copies.push(stepped.map_or(shared, |s| s.0));
-                    }
-                    let places: Vec<Vector2<f64>> =
-                        copies.iter().map(|c| Vector2::new(c.mean()[0], c.mean()[1])).collect();
+                    let step = |rng| {
+                        tracker
+                            .step(rng, &target, k, &shared, &observed)
+                            .map_or(shared, |s| s.0)
+                    };
+                    let copies: Vec<_> = streams.iter_mut().map(step).collect();
+                    let place = |c: &Gaussian<4>| Vector2::new(c.mean()[0], c.mean()[1]);
+                    let places: Vec<_> = copies.iter().map(place).collect();
                     let election = elect(&sensors, &places)?;
                     let truth = Vector2::new(world.track[k][0], world.track[k][1]);
                     let mean = places.iter().sum::<Vector2<f64>>() / places.len() as f64;
-                    let spread =
-                        places.iter().map(|p| (p - mean).norm_squared()).sum::<f64>() / (places.len() - 1) as f64;
+                    let squares = places.iter().map(|p| (p - mean).norm_squared()).sum::<f64>();
+                    let spread = squares / (places.len() - 1) as f64;
                     shared = Handover::new(&copies[election.leader], &NumberFormat::Single)?.belief();
                     let is = |yes: bool| f64::from(u8::from(yes));
                     let count = election.claimants.len();
@@ -108,13 +109,13 @@ impl Figure for Leaders {
 
     fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
         let names = t.iter().map(|r| format!("{} dB, N = {}", r.snr_db, r.particles));
-        let rows: Vec<(usize, &Row)> = t.iter().enumerate().collect();
+        let rows = || t.iter().enumerate();
         let rest = |share: Measured| (share - 1.0).scaled(-1.0);
         Plot::of(
             Panel::new("Elections", Axis::categories("", names), Axis::linear("share of steps"))
-                .with(Layer::measured("none claims", rows.clone(), |(i, r)| (i as f64, r.none)))
-                .with(Layer::measured("none or several claim", rows.clone(), |(i, r)| (i as f64, rest(r.one))))
-                .with(Layer::measured("another than the nearest leads", rows, |(i, r)| (i as f64, rest(r.nearest)))),
+                .with(Layer::measured("none claims", rows(), |(i, r)| (i as f64, r.none)))
+                .with(Layer::measured("none or several claim", rows(), |(i, r)| (i as f64, rest(r.one))))
+                .with(Layer::measured("another than the nearest leads", rows(), |(i, r)| (i as f64, rest(r.nearest)))),
         )
     }
 }

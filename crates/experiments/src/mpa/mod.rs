@@ -5,9 +5,7 @@ mod association;
 mod bound;
 mod encoder;
 mod fig3_3;
-mod gibbs;
 mod leader;
-mod ring;
 mod scores;
 mod sweeps;
 mod world;
@@ -27,8 +25,6 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &ablation::Ablation,
         &bound::Bounds,
         &encoder::Encoders,
-        &gibbs::Gibbs,
-        &ring::Rings,
         &leader::Leaders,
     ]
 }

@@ -35,15 +35,9 @@ rows! {
         pub(super) snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
         pub(super) levels: usize => "Levels of the quantizer.",
         pub(super) method: String => "Tracker and its particles, draws or nodes an axis.",
-        pub(super) family: String => "Kind of tracker.",
+        pub(super) family: &'static str => "Kind of tracker.",
         pub(super) size: Option<usize> => "Particles, draws, or nodes an axis.",
         pub(super) score: Score,
-    }
-}
-
-impl Row {
-    pub(super) fn mse(&self) -> Measured {
-        self.score.mse
     }
 }
 
@@ -71,7 +65,7 @@ pub(super) fn rows(
 pub(super) fn agree(claims: &mut Claims, rows: &[Row], prefix: &str, heavy_tailed: bool) {
     let full = claims.at_full_trials();
     let quantity = |what: &str| format!("{prefix}{what}");
-    full.keyed(&quantity("mse"), "mean squared position error", rows, |r| r.mse());
+    full.keyed(&quantity("mse"), "mean squared position error", rows, |r| r.score.mse);
     if heavy_tailed {
         full.keyed(&quantity("median"), "median of the squared position error", rows, |r| r.score.median);
         full.keyed(&quantity("lost"), "share of lost tracks", rows, |r| r.score.lost);
@@ -89,7 +83,7 @@ pub(super) const MSE: &str = "mean squared error / m^2";
 
 /// The score of a method at a point.
 pub(super) fn find<'a>(rows: &'a [Row], point: &str, method: &str) -> Option<&'a Row> {
-    rows.iter().find(|r| r.point == point && r.method == method)
+    first(rows, |r| r.point == point && r.method == method)
 }
 
 /// Its mean squared error.
@@ -100,12 +94,12 @@ pub(super) fn mse(rows: &[Row], point: &str, method: &str) -> Option<f64> {
 /// Means and medians, a tracker a line.
 pub(super) fn ladder<'a>(title: &str, rows: impl IntoIterator<Item = &'a Row>) -> Panel {
     let rows: Vec<&Row> = rows.into_iter().collect();
-    let numbered = || rows.iter().enumerate().map(|(i, r)| (-(i as f64), *r));
     let y = Axis::ladder(rows.iter().map(|r| r.method.as_str()));
     let lying = |label: &str, of: fn(&Row) -> Measured| {
-        let errors = rows.iter().map(|r| of(r).standard_error.unwrap_or(0.0)).collect();
-        Layer::points(label, points(numbered(), |(at, r)| (of(r).value, at)))
-            .with_errors(errors)
+        let marks = rows.iter().enumerate().map(|(i, r)| (of(r).value, -(i as f64)));
+        let errors = rows.iter().map(|r| of(r).standard_error.unwrap_or(0.0));
+        Layer::points(label, marks.collect())
+            .with_errors(errors.collect())
             .lying()
     };
     Panel::new(title, Axis::log(MSE), y)
@@ -113,20 +107,24 @@ pub(super) fn ladder<'a>(title: &str, rows: impl IntoIterator<Item = &'a Row>) -
         .with(lying("median", |r| r.score.median))
 }
 
-/// All the cheap Gaussian trackers.
-pub(super) fn gaussian() -> Vec<Method> {
-    vec![
-        Method::EKF_U,
-        Method::EKF_NAIVE,
-        Method::EKF,
-        Method::GMPA,
-        Method::TRANSFER,
-    ]
+/// The Gaussian trackers that linearise.
+pub(super) const GAUSSIAN: [Method; 5] = [
+    Method::EKF_U,
+    Method::EKF_NAIVE,
+    Method::EKF,
+    Method::GMPA,
+    Method::TRANSFER,
+];
+
+/// They and quadratures on these numbers of nodes an axis.
+pub(super) fn deterministic(nodes: &[usize]) -> Vec<Method> {
+    let grids = nodes.iter().map(|n| Method::Grid(*n));
+    GAUSSIAN.into_iter().chain(grids).collect()
 }
 
 /// The particle trackers of one size.
-pub(super) fn clouds(n: usize) -> Vec<Method> {
-    vec![
+pub(super) fn clouds(n: usize) -> [Method; 4] {
+    [
         Method::Guided(n),
         Method::Bootstrap(n, Reports::Levels),
         Method::RaoBlackwell(n),
@@ -135,6 +133,6 @@ pub(super) fn clouds(n: usize) -> Vec<Method> {
 }
 
 /// Message passing of one size: as published, with narrow kernels, improved.
-pub(super) fn messages(n: usize) -> Result<Vec<Method>, Error> {
-    Ok(vec![Method::published(n)?, Method::narrow(n)?, Method::improved(n)?])
+pub(super) fn messages(n: usize) -> Result<[Method; 3], Error> {
+    Ok([Method::published(n)?, Method::narrow(n)?, Method::improved(n)?])
 }

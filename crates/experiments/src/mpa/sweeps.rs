@@ -1,6 +1,8 @@
 //! `mpa-table3-mse`, `mpa-fig3-4`, `mpa-fig3-5`, `mpa-table3-low`: all trackers over particles, levels and noise.
 
-use super::scores::{Effort, MSE, Row, agree, clouds, find, gaussian, ladder, loses_no_more, messages, mse, rows};
+use super::scores::{
+    Effort, GAUSSIAN, MSE, Row, agree, clouds, deterministic, find, ladder, loses_no_more, messages, mse, rows,
+};
 use super::world::{LAYOUTS, Method, Point};
 use crate::prelude::*;
 use fewbits_pf_mpa::Reports;
@@ -26,8 +28,7 @@ impl Figure for Mse {
          message passing; particle message passing as published loses the target.");
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Mses, Error> {
-        let mut methods = gaussian();
-        methods.extend([9, 15, 31].map(Method::Grid));
+        let mut methods = deterministic(&[9, 15, 31]);
         for n in [5, 10, 40] {
             methods.extend(clouds(n));
             methods.extend(messages(n)?);
@@ -36,15 +37,13 @@ impl Figure for Mse {
         methods.extend(clouds(500));
         let canonical = Point::published(50.0, 4, SPEED)?;
         let trackers = rows(context, "50dB-L4", &canonical, &p.of(&methods))?;
-        let mut cheap = gaussian();
-        cheap.push(Method::Guided(40));
+        let cheap = [&GAUSSIAN[..], &[Method::Guided(40)]].concat();
         let (mut speeds, mut layouts, mut floor) = (Vec::new(), Vec::new(), Vec::new());
         for speed in [1.0, 1.5, 2.0, 3.0, 4.0] {
             let point = Point::published(50.0, 4, speed)?;
             speeds.extend(rows(context, &format!("V{speed}"), &point, &p.of(&cheap))?);
         }
-        let mut some = gaussian();
-        some.extend([9, 15].map(Method::Grid));
+        let mut some = deterministic(&[9, 15]);
         for n in [10, 40] {
             some.push(Method::Guided(n));
             some.extend(messages(n)?);
@@ -96,25 +95,18 @@ impl Figure for Mse {
         let what = "the naive filter's median, too, is above that with quantization noise";
         full.increasing("naive", what, ["EKF-Q", "EKF-Q-naive"].map(median));
         let lost = find(&t.trackers, "50dB-L4", "published-40").map(|r| r.score.lost);
-        full.at_least(
-            "published",
-            "as printed, particle message passing loses the target in most tracks (erratum mpa-8)",
-            lost,
-            0.7,
-        );
-        let grid = (0..4).map(|i| format!("layout{i}"));
-        let pairs: Vec<_> = grid
-            .map(|l| (mse(&t.layouts, &l, "grid-15"), mse(&t.layouts, &l, "GMPA")))
-            .collect();
-        full.all("layouts-grid", "the grid is below Gaussian message passing in all layouts", pairs, |(a, b)| {
-            a < b && b.is_some()
-        });
-        let ratios: Vec<_> = (0..4)
-            .map(|i| format!("layout{i}"))
-            .map(|l| Some(mse(&t.layouts, &l, "improved-40")? / mse(&t.layouts, &l, "GMPA-transfer")?))
-            .collect();
+        let what = "as printed, particle message passing loses the target in most tracks (erratum mpa-8)";
+        full.at_least("published", what, lost, 0.7);
+        let layout = |i: u32, over: &str, under: &str| {
+            let at = |method| mse(&t.layouts, &format!("layout{i}"), method);
+            Some(at(over)? / at(under)?)
+        };
+        let what = "the grid is below Gaussian message passing in all layouts";
+        full.all("layouts-grid", what, 0..4, |i| layout(i, "grid-15", "GMPA").is_some_and(|r| r < 1.0));
         let what = "improved message passing is at most 1.15 of Gaussian with transfer, in other layouts";
-        full.all("layouts-improved", what, ratios, |r| r.is_some_and(|r| r <= 1.15));
+        full.all("layouts-improved", what, 0..4, |i| {
+            layout(i, "improved-40", "GMPA-transfer").is_some_and(|r| r <= 1.15)
+        });
         let gmpa = |speed: &str| mse(&t.speeds, speed, "GMPA");
         let growth = over(gmpa("V4"), gmpa("V1.5"));
         let what = "the error grows with the square of the speed: a ratio 7.1 of squares gives 5.7";
@@ -122,38 +114,31 @@ impl Figure for Mse {
     }
 
     fn plot(&self, _: &Effort, t: &Mses) -> Plot {
-        let shown = t
-            .trackers
-            .iter()
-            .filter(|r| !matches!(r.family.as_str(), "published" | "narrow" | "EKF-Q-naive" | "unquantized" | "EKF-U"));
-        let first = ladder("50 dB, four levels", shown);
+        let left_out = ["published", "narrow", "EKF-Q-naive", "unquantized", "EKF-U"];
+        let first = ladder("50 dB, four levels", select(&t.trackers, |r| !left_out.contains(&r.family)));
         let families = ["EKF-Q", "GMPA", "GMPA-transfer", "guided"];
         let speed = |r: &Row| r.point.trim_start_matches('V').parse().unwrap_or(f64::NAN);
         let lines = families.map(|f| {
-            let of: Vec<&Row> = t.speeds.iter().filter(|r| r.family == f).collect();
+            let of = select(&t.speeds, |r| r.family == f);
             Layer::measured(f, of, |r| (speed(r), r.score.mse))
         });
-        let second = Panel::new(
-            "Speed that the encoder expects",
-            Axis::linear("speed V / (m/step)").between(0.8, 4.2),
-            Axis::log(MSE),
-        )
-        .with_all(lines);
+        let x = Axis::linear("speed V / (m/step)").between(0.8, 4.2);
+        let second = Panel::new("Speed that the encoder expects", x, Axis::log(MSE)).with_all(lines);
         Plot::grid(1, vec![first, second])
     }
 }
 
-/// Lines of the families over a coordinate of the rows.
-fn families(rows: &[Row], shown: &[&str], x: impl Fn(&Row) -> f64) -> Vec<Layer> {
-    let line = |(i, family): (usize, &&str)| {
-        let of: Vec<&Row> = rows.iter().filter(|r| r.family == **family).collect();
+/// Marks of the families over a coordinate of the rows.
+fn families<'a>(rows: impl Iterator<Item = &'a Row> + Clone, shown: &[&str], x: impl Fn(&Row) -> f64) -> Vec<Layer> {
+    let marks = |(i, family): (usize, &&str)| {
         let label = match *family {
             "improved" | "narrow" | "published" => format!("messages, {family}"),
             other => other.to_owned(),
         };
+        let of = rows.clone().filter(|r| r.family == *family);
         Layer::measured(label, of, |r| (x(r), r.score.mse)).coloured(i)
     };
-    shown.iter().enumerate().map(line).collect()
+    shown.iter().enumerate().map(marks).collect()
 }
 
 pub struct Fig34;
@@ -166,8 +151,7 @@ impl Figure for Fig34 {
          of unquantized ranges.");
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
-        let mut methods = gaussian();
-        methods.extend([9, 15, 31].map(Method::Grid));
+        let mut methods = deterministic(&[9, 15, 31]);
         for n in SIZES {
             methods.extend(clouds(n));
             match n {
@@ -213,7 +197,7 @@ impl Figure for Fig34 {
         let particles = Axis::log("particles").named(SIZES.map(|n| (n as f64, n.to_string())));
         Plot::of(
             Panel::new("40 dB, four levels", particles, Axis::log(MSE))
-                .with_all(families(t, &shown, size))
+                .with_all(families(t.iter(), &shown, size))
                 .with(Layer::dashed("grid of 15", level("grid-15")))
                 .with(Layer::dashed("EKF-U", level("EKF-U"))),
         )
@@ -237,8 +221,7 @@ impl Figure for Fig35 {
     }
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
-        let mut methods = gaussian();
-        methods.extend([9, 15, 31].map(Method::Grid));
+        let mut methods = deterministic(&[9, 15, 31]);
         methods.push(Method::Guided(40));
         methods.extend(messages(40)?);
         let mut trackers = Vec::new();
@@ -260,20 +243,11 @@ impl Figure for Fig35 {
             full.decreasing(format!("levels-{method}"), format!("more levels, less error: {what}"), values);
         }
         let of = |levels: usize, method: &str| find(t, &format!("50dB-L{levels}"), method);
-        let slope = |method: &str| {
-            let ratio = of(4, method)?.score.mse.value / of(64, method)?.score.mse.value;
-            Some(ratio.powf(0.25))
-        };
-        full.near("slope", "a bit is worth a factor of about four", slope("GMPA"), 3.4, 0.6);
-        let ratio = of(16, "improved-40")
-            .zip(of(16, "EKF-U"))
-            .map(|(a, b)| a.score.mse.value / b.score.mse.value);
-        full.above(
-            "four-bits",
-            "four bits are not nearly unquantized with the published encoder (erratum mpa-13)",
-            ratio,
-            5.0,
-        );
+        let ratio = |a: Option<&Row>, b: Option<&Row>| Some(a?.score.mse.value / b?.score.mse.value);
+        let slope = ratio(of(4, "GMPA"), of(64, "GMPA")).map(|ratio| ratio.powf(0.25));
+        full.near("slope", "a bit is worth a factor of about four", slope, 3.4, 0.6);
+        let what = "four bits are not nearly unquantized with the published encoder (erratum mpa-13)";
+        full.above("four-bits", what, ratio(of(16, "improved-40"), of(16, "EKF-U")), 5.0);
         let median = |levels: usize, method: &str| of(levels, method).map(|r| r.score.median.value);
         let what = "with eight bits, in the median, still above the unquantized filter";
         full.increasing("eight-bits", what, [median(256, "EKF-U"), median(256, "improved-40")]);
@@ -282,13 +256,12 @@ impl Figure for Fig35 {
     fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
         let shown = ["EKF-Q", "GMPA", "GMPA-transfer", "improved", "guided"];
         let bits = |r: &Row| (r.levels as f64).log2();
-        let grid: Vec<&Row> = t.iter().filter(|r| r.method == "grid-15").collect();
-        let unquantized: Vec<&Row> = t.iter().filter(|r| r.method == "EKF-U").collect();
+        let of = |method: &'static str| select(t, move |r| r.method == method);
         Plot::of(
             Panel::semilog("50 dB, forty particles", "bits", MSE)
-                .with_all(families(t, &shown, bits))
-                .with(Layer::measured("grid of 15", grid, |r| (bits(r), r.score.mse)))
-                .with(Layer::dashed("EKF-U", points(unquantized, |r| (bits(r), r.score.mse.value)))),
+                .with_all(families(t.iter(), &shown, bits))
+                .with(Layer::measured("grid of 15", of("grid-15"), |r| (bits(r), r.score.mse)))
+                .with(Layer::dashed("EKF-U", points(of("EKF-U"), |r| (bits(r), r.score.mse.value)))),
         )
     }
 }
@@ -303,16 +276,14 @@ impl Figure for Low {
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut trackers = Vec::new();
         for snr in [30.0, 20.0] {
-            let mut methods = gaussian();
-            methods.extend([9, 15, 31].map(Method::Grid));
+            let mut methods = deterministic(&[9, 15, 31]);
             for n in [3, 10, 30] {
                 methods.extend(clouds(n));
                 methods.extend(messages(n)?);
             }
             methods.extend(clouds(500));
             trackers.extend(rows(context, &format!("{snr}dB-L4"), &Point::published(snr, 4, SPEED)?, &p.of(&methods))?);
-            let mut cheap = gaussian();
-            cheap.push(Method::Guided(40));
+            let cheap = [&GAUSSIAN[..], &[Method::Guided(40)]].concat();
             for levels in [8, 16, 64] {
                 let point = Point::published(snr, levels, SPEED)?;
                 trackers.extend(rows(context, &format!("{snr}dB-L{levels}"), &point, &p.of(&cheap))?);
@@ -335,16 +306,9 @@ impl Figure for Low {
 
     fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
         let panel = |snr: f64| {
-            let here: Vec<Row> = t
-                .iter()
-                .filter(|r| r.snr_db == snr && r.size != Some(500))
-                .cloned()
-                .collect();
-            Panel::loglog(format!("{snr} dB"), "levels", MSE).with_all(families(
-                &here,
-                &["EKF-U", "EKF-Q", "GMPA", "GMPA-transfer"],
-                |r| r.levels as f64,
-            ))
+            let here = t.iter().filter(move |r| r.snr_db == snr && r.size != Some(500));
+            let shown = ["EKF-U", "EKF-Q", "GMPA", "GMPA-transfer"];
+            Panel::loglog(format!("{snr} dB"), "levels", MSE).with_all(families(here, &shown, |r| r.levels as f64))
         };
         Plot::grid(2, vec![panel(30.0), panel(20.0)])
     }

@@ -91,10 +91,18 @@ impl World {
             }
         };
         let mut noise = stream.named("noise").rng();
-        let normals = (0..STEPS)
-            .map(|_| (0..sensors).map(|_| noise.sample(StandardNormal)).collect())
-            .collect();
+        let mut step = |_| (0..sensors).map(|_| noise.sample(StandardNormal)).collect();
+        let normals = (0..STEPS).map(&mut step).collect();
         Ok(Self { track, normals })
+    }
+
+    /// Mean squared position error.
+    pub(super) fn mse(&self, estimates: &[Gaussian<4>]) -> f64 {
+        let error = |(e, x): (&Gaussian<4>, &Vector4<f64>)| {
+            let (dx, dy) = (e.mean()[0] - x[0], e.mean()[1] - x[1]);
+            (dx * dx + dy * dy).min(1e12)
+        };
+        estimates.iter().zip(&self.track).map(error).sum::<f64>() / self.track.len() as f64
     }
 
     /// What the sensors measure at step `k`.
@@ -121,9 +129,7 @@ pub(super) enum Method {
 }
 
 /// What one trajectory gave: the estimate after every step.
-pub(super) struct Run {
-    pub(super) estimates: Vec<Gaussian<4>>,
-}
+pub(super) type Estimates = Vec<Gaussian<4>>;
 
 impl Method {
     pub(super) const EKF_U: Self = Self::Linear(Linearised::EKF, Reports::Ranges);
@@ -150,33 +156,22 @@ impl Method {
         }))
     }
 
-    /// The name in tables and keys.
-    pub(super) fn name(&self) -> String {
+    /// Its kind.
+    pub(super) fn family(&self) -> &'static str {
         match *self {
-            Self::Linear(_, Reports::Ranges) => "EKF-U".into(),
-            Self::Linear(Linearised::EKF_NAIVE, _) => "EKF-Q-naive".into(),
-            Self::Linear(Linearised::EKF, _) => "EKF-Q".into(),
-            Self::Linear(l, _) if l.velocity == Velocity::Transfer => "GMPA-transfer".into(),
-            Self::Linear(..) => "GMPA".into(),
-            Self::Grid(n) => format!("grid-{n}"),
-            Self::Guided(n) => format!("guided-{n}"),
-            Self::Bootstrap(n, Reports::Levels) => format!("bootstrap-{n}"),
-            Self::Bootstrap(n, Reports::Ranges) => format!("unquantized-{n}"),
-            Self::RaoBlackwell(n) => format!("rao-blackwell-{n}"),
-            Self::Messages(m) if m.ring == Ring::Local => format!("improved-{}", m.particles),
-            Self::Messages(m) if m.kernel == KernelRule::Narrow => format!("narrow-{}", m.particles),
-            Self::Messages(m) => format!("published-{}", m.particles),
-        }
-    }
-
-    /// Its family, without the number of particles.
-    pub(super) fn family(&self) -> String {
-        let name = self.name();
-        match self {
-            Self::Linear(..) => name,
-            _ => name
-                .rsplit_once('-')
-                .map_or(name.clone(), |(family, _)| family.to_owned()),
+            Self::Linear(_, Reports::Ranges) => "EKF-U",
+            Self::Linear(Linearised::EKF_NAIVE, _) => "EKF-Q-naive",
+            Self::Linear(Linearised::EKF, _) => "EKF-Q",
+            Self::Linear(l, _) if l.velocity == Velocity::Transfer => "GMPA-transfer",
+            Self::Linear(..) => "GMPA",
+            Self::Grid(_) => "grid",
+            Self::Guided(_) => "guided",
+            Self::Bootstrap(_, Reports::Levels) => "bootstrap",
+            Self::Bootstrap(_, Reports::Ranges) => "unquantized",
+            Self::RaoBlackwell(_) => "rao-blackwell",
+            Self::Messages(m) if m.ring == Ring::Local => "improved",
+            Self::Messages(m) if m.kernel == KernelRule::Narrow => "narrow",
+            Self::Messages(_) => "published",
         }
     }
 
@@ -189,6 +184,12 @@ impl Method {
         }
     }
 
+    /// The name in tables and keys: the family and the size.
+    pub(super) fn name(&self) -> String {
+        let family = self.family();
+        self.size().map_or(family.to_owned(), |size| format!("{family}-{size}"))
+    }
+
     fn reports(&self) -> Reports {
         match self {
             Self::Linear(_, reports) | Self::Bootstrap(_, reports) => *reports,
@@ -196,7 +197,13 @@ impl Method {
         }
     }
 
-    pub(super) fn run(&self, world: &World, network: &Network, target: &Target, stream: Stream) -> Result<Run, Error> {
+    pub(super) fn run(
+        &self,
+        world: &World,
+        network: &Network,
+        target: &Target,
+        stream: Stream,
+    ) -> Result<Estimates, Error> {
         let mut rng = stream.named(&self.name()).fast_rng();
         let all = (world, network, target, self.reports());
         match self {
@@ -229,18 +236,14 @@ fn track<T: Tracker>(
     tracker: &T,
     all: (&World, &Network, &Target, Reports),
     rng: &mut impl rand::Rng,
-) -> Result<Run, Error> {
+) -> Result<Estimates, Error> {
     let belief = tracker.start(rng, all.2, &prior()?)?;
     let mut workspace = T::Workspace::default();
-    follow(
-        all,
-        belief,
-        |belief| tracker.estimate(belief),
-        |k, belief, observed| {
-            tracker.step_in_place(rng, all.2, k, belief, observed, &mut workspace)?;
-            Ok(())
-        },
-    )
+    let estimate = |belief: &T::Belief| tracker.estimate(belief);
+    follow(all, belief, estimate, |k, belief, observed| {
+        tracker.step_in_place(rng, all.2, k, belief, observed, &mut workspace)?;
+        Ok(())
+    })
 }
 
 /// One trajectory. Where a step fails (a lost cloud in a region of probability zero, points without spread), the belief stays.
@@ -249,7 +252,7 @@ fn follow<B>(
     mut belief: B,
     estimate: impl Fn(&B) -> Gaussian<4>,
     mut step: impl FnMut(usize, &mut B, &[Ranged]) -> Result<(), fewbits_pf_mpa::Error>,
-) -> Result<Run, Error> {
+) -> Result<Estimates, Error> {
     let mut estimates = Vec::with_capacity(STEPS);
     for k in 0..world.track.len() {
         let ranges = world.ranges(network, k);
@@ -257,18 +260,7 @@ fn follow<B>(
         let _ = observed.and_then(|o| step(k, &mut belief, &o));
         estimates.push(estimate(&belief));
     }
-    Ok(Run { estimates })
-}
-
-impl Run {
-    /// Mean squared position error.
-    pub(super) fn mse(&self, world: &World) -> f64 {
-        let error = |(e, x): (&Gaussian<4>, &Vector4<f64>)| {
-            let (dx, dy) = (e.mean()[0] - x[0], e.mean()[1] - x[1]);
-            (dx * dx + dy * dy).min(1e12)
-        };
-        self.estimates.iter().zip(&world.track).map(error).sum::<f64>() / world.track.len() as f64
-    }
+    Ok(estimates)
 }
 
 /// Where a comparison is held.
@@ -317,15 +309,19 @@ impl Score {
         let moments: Moments = errors.iter().copied().collect();
         errors.sort_by(f64::total_cmp);
         let n = errors.len();
+        let at = |rank: f64| {
+            errors
+                .get(rank.max(0.0) as usize)
+                .or(errors.last())
+                .copied()
+                .unwrap_or(f64::NAN)
+        };
         // Ranks: half the trajectories are below the median, give or take sqrt(n) / 2.
-        let at = |rank: f64| errors.get(rank.max(0.0) as usize).or(errors.last()).copied();
         let (middle, give) = (0.5 * n as f64 - 0.5, 0.5 * (n as f64).sqrt());
-        let between = |low: f64, high: f64| Some((at(low.floor())?, at(high.ceil())?));
+        let error = || 0.5 * (at((middle + give).ceil()) - at((middle - give).floor()));
         let median = Measured {
-            value: between(middle, middle).map_or(f64::NAN, |(a, b)| 0.5 * (a + b)),
-            standard_error: between(middle - give, middle + give)
-                .filter(|_| n > 1)
-                .map(|(a, b)| 0.5 * (b - a)),
+            value: 0.5 * (at(middle.floor()) + at(middle.ceil())),
+            standard_error: (n > 1).then(error),
         };
         Self {
             mse: (&moments).into(),
@@ -351,16 +347,15 @@ pub(super) fn compare(
         methods
             .iter()
             .filter(|(_, count)| trial.index < *count)
-            .map(|(method, _)| Ok(method.run(&world, &network, &target, trial.stream)?.mse(&world)))
+            .map(|(method, _)| Ok(world.mse(&method.run(&world, &network, &target, trial.stream)?)))
             .collect()
     };
     let all = context.trials("mpa-trajectories", most, one)?;
-    let mut errors: Vec<Vec<f64>> = methods.iter().map(|_| Vec::new()).collect();
-    for (index, trial) in all.into_iter().enumerate() {
-        let taking = (0..methods.len()).filter(|m| (index as u64) < methods[*m].1);
-        for (m, error) in taking.zip(trial) {
-            errors[m].push(error);
-        }
-    }
-    Ok(errors.into_iter().map(Score::of).collect())
+    // A trial has the errors of the methods whose count is not reached, in their order.
+    let errors = |m: usize| {
+        let place = |index: usize| methods[..m].iter().filter(|method| (index as u64) < method.1).count();
+        let own = all.iter().take(methods[m].1 as usize).enumerate();
+        own.map(|(index, trial)| trial[place(index)]).collect()
+    };
+    Ok((0..methods.len()).map(|m| Score::of(errors(m))).collect())
 }

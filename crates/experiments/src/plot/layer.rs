@@ -194,6 +194,11 @@ impl Layer {
         Self::points(label, points).with_errors(errors)
     }
 
+    /// A line through markers, in one colour: values at given settings.
+    pub fn marked_line(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> [Self; 2] {
+        [Self::line("", points.clone()), Self::points(label, points)].map(|layer| layer.coloured(colour))
+    }
+
     /// A line through markers with error bars, in one colour.
     pub fn curve(label: impl Into<String>, colour: usize, marks: Vec<(f64, Measured)>) -> [Self; 2] {
         let line = Self::line(label, points(&marks, |(x, y)| (*x, y.value)));
