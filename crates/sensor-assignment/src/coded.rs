@@ -15,6 +15,9 @@ const MAX_SENSORS: usize = 16;
 /// Panel width in noise standard deviations.
 const PANEL: f64 = 2.0;
 
+/// The first two moments of `u` at the nodes, as [`CodedSensors::centre_mse`] defines them.
+pub(crate) type Moments = (Vec<f64>, Vec<f64>);
+
 /// `N` sensors that share the `N` Gray bits of `2^N` cells over `[-V, V]`.
 ///
 /// Construction tabulates every bit's probabilities at every sensor's noise, so that errors of assignments are cheap.
@@ -131,10 +134,6 @@ impl CodedSensors {
         &self.nodes
     }
 
-    pub(crate) fn contrast(&self, bit: usize, sensor: usize) -> &[f64] {
-        &self.contrast[bit][sensor]
-    }
-
     pub(crate) fn probability(&self, bit: usize, sensor: usize) -> &[Vec<f64>; 2] {
         &self.probability[bit][sensor]
     }
@@ -213,12 +212,13 @@ impl CodedSensors {
     /// If the assignment is not a permutation.
     pub fn centre_mse(&self, assignment: &[usize]) -> Result<f64, Error> {
         self.check(assignment)?;
-        let mut m1 = vec![0.0; self.nodes.len()];
-        let mut m2 = m1.clone();
+        let zeros = || (vec![0.0; self.nodes.len()], vec![0.0; self.nodes.len()]);
+        let (mut moments, mut next) = (zeros(), zeros());
         for (bit, &sensor) in assignment.iter().enumerate().rev() {
-            self.push_bit(bit, sensor, &mut m1, &mut m2);
+            self.push_bit(bit, sensor, &moments, &mut next);
+            std::mem::swap(&mut moments, &mut next);
         }
-        Ok(self.centre_error(&m1, &m2))
+        Ok(self.centre_error(&moments))
     }
 
     /// The estimate from one observation per bit, the coarsest first: the centre of the cell that the Gray bits name. Where a
@@ -243,14 +243,15 @@ impl CodedSensors {
 
     /// One step of the recursion.
     #[inline]
-    fn push_bit(&self, bit: usize, sensor: usize, m1: &mut [f64], m2: &mut [f64]) {
-        for ((m1, m2), t) in m1.iter_mut().zip(m2).zip(self.contrast(bit, sensor)) {
-            *m2 = 0.25 + 0.5 * *m1 + 0.25 * *m2;
-            *m1 = t * (0.5 + 0.5 * *m1);
+    pub(crate) fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
+        let from = m1.iter().zip(m2).zip(&self.contrast[bit][sensor]);
+        for (((m1, m2), t), (next1, next2)) in from.zip(next.0.iter_mut().zip(&mut next.1)) {
+            *next2 = 0.25 + 0.5 * m1 + 0.25 * m2;
+            *next1 = t * (0.5 + 0.5 * m1);
         }
     }
 
-    fn centre_error(&self, m1: &[f64], m2: &[f64]) -> f64 {
+    pub(crate) fn centre_error(&self, (m1, m2): &Moments) -> f64 {
         let v = self.half_width;
         let mut sum = 0.0;
         for (((m1, m2), x), w) in m1.iter().zip(m2).zip(&self.nodes.x).zip(&self.nodes.w) {

@@ -4,7 +4,6 @@
 //! request, which knows all the rest: the edges of the patterns move, cells merge, and the decoder is that of least squared
 //! error.
 
-use crate::linear::{JonkerVolgenant, LinearAssignment};
 use crate::{CodedSensors, Error, pair_costs};
 use fewbits_core::Link;
 use fewbits_quantizer_design::{AllowedCells, Bits, ObservationModel, Request};
@@ -21,7 +20,7 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
     let half_width = 3f64.sqrt() * model.prior().deviation();
     let deviations: Vec<f64> = (0..model.sensors()).map(|n| model.noise().deviation(n)).collect();
     let sensors = CodedSensors::with_deviations(half_width, &deviations)?;
-    let assignment = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
+    let assignment = pair_costs(&sensors).solve();
     let mean = model.prior().mean();
     let mut cells = vec![(Vec::new(), Vec::new()); deviations.len()];
     for (sensor, quantizer) in assignment.iter().zip(sensors.quantizers()) {
@@ -64,7 +63,7 @@ mod tests {
     fn designed_cells_are_no_worse_than_patterns() {
         let deviations = [0.2, 0.1, 0.05, 0.12];
         let sensors = CodedSensors::with_deviations(1.0, &deviations).unwrap();
-        let assignment = JonkerVolgenant.solve(&pair_costs(&sensors).unwrap()).unwrap();
+        let assignment = pair_costs(&sensors).solve();
         for (scale, mean) in [(1.0, 0.0), (1e-4, 3.0)] {
             let noise = Noise::independent_with_deviations(&deviations.map(|d| scale * d)).unwrap();
             let prior = Prior::uniform(mean - scale, mean + scale).unwrap();

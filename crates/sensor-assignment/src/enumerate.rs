@@ -1,6 +1,7 @@
 //! All assignments, for small `N`, and local search for larger.
 
 use super::CodedSensors;
+use super::coded::Moments;
 use crate::Error;
 use fewbits_binary_patterns::IMPOSSIBLE;
 use fewbits_numerics::error::refuse;
@@ -90,15 +91,6 @@ pub fn exchange(sensors: &CodedSensors, start: &[usize], estimator: Estimator) -
     }
 }
 
-/// The best of all `N!` assignments.
-///
-/// # Errors
-/// As [`all_errors`].
-pub fn brute_force(sensors: &CodedSensors, estimator: Estimator) -> Result<(Vec<usize>, f64), Error> {
-    let all = all_errors(sensors, estimator)?;
-    Ok((all.best, all.least))
-}
-
 /// Exact errors of all `N!` assignments.
 ///
 /// For the centre decoder the recursion runs from the finest bit, and assignments that agree on the finest bits share it. For
@@ -159,33 +151,19 @@ fn centre_tree(
     left: usize,
     assignment: &mut Vec<usize>,
     used: u32,
-    moments: &mut [(Vec<f64>, Vec<f64>)],
+    moments: &mut [Moments],
     tally: &mut Tally,
 ) {
     let bit = left - 1;
     for sensor in (0..assignment.len()).filter(|s| used >> s & 1 == 0) {
         assignment[bit] = sensor;
-        let contrast = sensors.contrast(bit, sensor);
-        if bit == 0 {
-            let (m1, m2) = &moments[1];
-            let (nodes, v) = (sensors.nodes(), sensors.half_width());
-            let mut error = 0.0;
-            for i in 0..contrast.len() {
-                let last2 = 0.25 + 0.5 * m1[i] + 0.25 * m2[i];
-                let last1 = contrast[i] * (0.5 + 0.5 * m1[i]);
-                error += nodes.w[i] * (nodes.x[i] * (nodes.x[i] + 2.0 * v * last1) + v * v * last2);
-            }
-            tally.add(assignment, error);
-            continue;
-        }
         let (below, above) = moments.split_at_mut(left);
-        let (next1, next2) = &mut below[bit];
-        let (m1, m2) = &above[0];
-        for i in 0..contrast.len() {
-            next2[i] = 0.25 + 0.5 * m1[i] + 0.25 * m2[i];
-            next1[i] = contrast[i] * (0.5 + 0.5 * m1[i]);
+        sensors.push_bit(bit, sensor, &above[0], &mut below[bit]);
+        if bit == 0 {
+            tally.add(assignment, sensors.centre_error(&moments[0]));
+        } else {
+            centre_tree(sensors, bit, assignment, used | 1 << sensor, moments, tally);
         }
-        centre_tree(sensors, bit, assignment, used | 1 << sensor, moments, tally);
     }
 }
 
@@ -307,7 +285,7 @@ mod tests {
     fn exchange_ends_at_or_below_its_start() {
         let sensors = CodedSensors::with_variances(1.0, &[0.004, 0.01, 0.02, 0.03, 0.05]).unwrap();
         let found = exchange(&sensors, &[4, 3, 2, 1, 0], Estimator::PosteriorMean).unwrap();
-        let (_, least) = brute_force(&sensors, Estimator::PosteriorMean).unwrap();
+        let least = all_errors(&sensors, Estimator::PosteriorMean).unwrap().least;
         assert_relative_eq!(found.error, least, max_relative = 1e-9);
         assert!(exchange(&sensors, &[0, 0, 1, 2, 3], Estimator::CellCentre).is_err());
         assert!(all_errors(&CodedSensors::with_variances(1.0, &[0.01; 11]).unwrap(), Estimator::CellCentre).is_err());

@@ -5,7 +5,6 @@ use crate::Source;
 use crate::decoding::decoder::{moments, squared_error};
 use crate::observation::bank::{IMPOSSIBLE, MAX_OUTCOMES};
 use crate::observation::source::Nodes;
-use crate::observation::source::noise_in_range;
 use fewbits_numerics::error::{all_finite, at_least_one, positive, refuse};
 use fewbits_numerics::golden::maximum;
 use fewbits_numerics::newton;
@@ -191,7 +190,7 @@ pub fn bounded_mle(bits: &[(f64, bool)], noise_deviation: f64, bound: f64) -> Re
     at_least_one("bits", bits.len())?;
     let thresholds: Vec<f64> = bits.iter().map(|b| b.0).collect();
     all_finite("thresholds", &thresholds)?;
-    Ok(maximum_likelihood(bits, noise_in_range(noise_deviation)?, positive("bound", bound)?))
+    Ok(maximum_likelihood(bits, positive("noise_deviation", noise_deviation)?, positive("bound", bound)?))
 }
 
 fn maximum_likelihood(bits: &[(f64, bool)], noise_deviation: f64, bound: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use crate::prelude::*;
 use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
+    CodedSensors, Estimator, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,
 };
 use rand_distr::{Distribution, StandardNormal};
@@ -34,7 +34,7 @@ fn draw(stream: Stream, sensors: usize, mean: f64, std: f64) -> Result<Vec<f64>,
 /// The five errors of each decoder, and how far the linear assignment's exceeds the least, relative.
 fn evaluate(variances: &[f64]) -> Result<[[f64; 6]; 2], fewbits_sensor_assignment::Error> {
     let sensors = CodedSensors::with_variances(1.0, variances)?;
-    let linear = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
+    let linear = pair_costs(&sensors).solve();
     let second = by_precision(variances);
     let mut errors = [[0.0; 6]; 2];
     for (criterion, part) in [Estimator::CellCentre, Estimator::PosteriorMean]

@@ -8,7 +8,7 @@ use fewbits_binary_patterns::search::{Descent, free_breakpoints};
 use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source, gray_basis};
 use fewbits_monte_carlo::parallel;
 use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, brute_force, exchange, pair_costs,
+    CodedSensors, Estimator, all_errors, exchange, pair_costs,
 };
 
 pub struct Beyond;
@@ -227,14 +227,14 @@ const UNEQUAL: &str = "sensors of table 6.1";
 
 fn decoder_of_table_6_1() -> Result<Outcome, Error> {
     let sensors = unequal()?;
-    let best = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
+    let best = pair_costs(&sensors).solve();
     let (before, after) = (sensors.centre_mse(&best)?, sensors.mmse(&best)?);
     Ok(change("assign-mmse".into(), "posterior mean for Gray bits", UNEQUAL.into(), before, after))
 }
 
 fn exchange_of_table_6_1() -> Result<Outcome, Error> {
     let sensors = unequal()?;
-    let linear = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
+    let linear = pair_costs(&sensors).solve();
     let after = exchange(&sensors, &linear, Estimator::PosteriorMean)?.error;
     let case = format!("{UNEQUAL}, posterior mean");
     Ok(change("exchange".into(), "exchange of two sensors", case, sensors.mmse(&linear)?, after))
@@ -242,7 +242,7 @@ fn exchange_of_table_6_1() -> Result<Outcome, Error> {
 
 fn joint_of_table_6_1() -> Result<Outcome, Error> {
     let sensors = unequal()?;
-    let before = brute_force(&sensors, Estimator::PosteriorMean)?.1;
+    let before = all_errors(&sensors, Estimator::PosteriorMean)?.least;
     let scene = Scene {
         source: Source::uniform(1.0)?,
         grid: Grid::uniform(1.0, 4)?,

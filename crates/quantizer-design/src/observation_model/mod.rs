@@ -102,9 +102,10 @@ impl ObservationModel {
         let noise_step = resolution.step() * f64::min(ENTROPY_STEP, PRODUCT_STEP / crowd) * narrowest;
         let (values, weights) = prior.nodes(noise_step, resolution)?;
         let (weights, mean) = (normalised(weights), prior.mean());
-        let squares = values.iter().zip(&weights).map(|(x, w)| (w, (x - mean) * (x - mean)));
-        let variance: f64 = squares.clone().map(|(w, square)| w * square).sum();
-        if !variance.is_finite() || !squares.map(|s| s.1).all(f64::is_finite) {
+        let weighted_square = |(x, w): (&f64, &f64)| w * (x - mean) * (x - mean);
+        let variance: f64 = values.iter().zip(&weights).map(weighted_square).sum();
+        let in_range = |x: &f64| ((x - mean) * (x - mean)).is_finite();
+        if !variance.is_finite() || !values.iter().all(in_range) {
             let shown = format!("mean {mean}, variance {variance}");
             return refuse("prior", shown, "a prior with values whose squares are in the range of numbers");
         }

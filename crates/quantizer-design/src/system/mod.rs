@@ -141,37 +141,6 @@ impl System {
         Ok(system.with_outcome_limit(self.outcome_limit))
     }
 
-    /// Distribution of the symbol received from one sensor, whatever the unknown.
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn symbol_distribution(&self, sensor: usize) -> Result<Vec<f64>, Error> {
-        let per_value = self.symbol_distributions_given_values(sensor)?;
-        let outputs = per_value.first().map_or(0, Vec::len);
-        let mixed = |t: usize| per_value.iter().zip(&self.model.weights).map(|(p, w)| w * p[t]).sum();
-        Ok((0..outputs).map(mixed).collect())
-    }
-
-    /// Distribution of the symbol received from one sensor for each value of the unknown ([`ObservationModel::values`]).
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn symbol_distributions_given_values(&self, sensor: usize) -> Result<Vec<Vec<f64>>, Error> {
-        let Some(group) = self.groups.iter().find(|g| g.sensors.contains(&sensor)) else {
-            return refuse("sensor", sensor, format!("a number below {}", self.model.sensors()));
-        };
-        let deviation = self.model.noise().deviation(sensor);
-        self.model
-            .values
-            .iter()
-            .map(|x| {
-                Ok(group
-                    .channel
-                    .received(&group.quantizer.level_probabilities(*x, deviation)?)?)
-            })
-            .collect()
-    }
-
     /// Allows at most `limit` joint outcomes in any computation (default [`OUTCOME_LIMIT`]).
     pub fn with_outcome_limit(mut self, limit: u64) -> Self {
         self.outcome_limit = limit;

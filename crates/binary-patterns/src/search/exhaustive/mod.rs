@@ -76,7 +76,7 @@ impl LinearSearch {
             });
         }
         let walk = Walk::new(self, keep)?;
-        let root = Outcomes::new(&walk.nodes.w);
+        let root = Outcomes::new(&walk.candidates.nodes.w);
         let mut found = walk.branch(0, self.sensors, Span::default(), &[], root);
         found.finish();
         Ok(found.sets)
