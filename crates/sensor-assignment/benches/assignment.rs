@@ -4,9 +4,7 @@
 
 use divan::Bencher;
 use fewbits_binary_patterns::BinaryQuantizer;
-use fewbits_sensor_assignment::{
-    CodedSensors, CostMatrix, Estimator, all_errors, pair_costs,
-};
+use fewbits_sensor_assignment::{CodedSensors, CostMatrix, Estimator, all_errors, pair_costs};
 
 fn main() {
     divan::main();

@@ -54,7 +54,9 @@ pub fn pair_costs(sensors: &CodedSensors) -> CostMatrix {
     let size = sensors.sensors();
     CostMatrix {
         size,
-        costs: (0..size * size).map(|at| pair_cost(sensors, at / size, at % size)).collect(),
+        costs: (0..size * size)
+            .map(|at| pair_cost(sensors, at / size, at % size))
+            .collect(),
     }
 }
 

@@ -39,8 +39,10 @@ pub fn centralised_bound_of_levels(
     levels: usize,
 ) -> Result<f64, Error> {
     at_least_one("measurements", measurements)?;
-    let measurement =
-        ConditionalMean::with_deviation(*source, positive("noise_deviation", noise_deviation)? / (measurements as f64).sqrt())?;
+    let measurement = ConditionalMean::with_deviation(
+        *source,
+        positive("noise_deviation", noise_deviation)? / (measurements as f64).sqrt(),
+    )?;
     let estimate = EstimateDensity::new(measurement);
     let quantizer = lloyd_max::design(&estimate, levels)?;
     Ok(measurement.estimation_error() + quantizer.mean_squared_error())

@@ -160,7 +160,10 @@ impl Bank {
     /// Walks all outcomes. `visit` gets the counts' index (last group fastest) and `w p(x) P(outcome|x)` at the nodes.
     pub fn for_outcomes(&self, nodes: &Nodes, mut visit: impl FnMut(usize, &[f64])) {
         let table_of = |g: &Exchangeable| {
-            let p = g.sensor.quantizer().probabilities_at(&nodes.x, g.sensor.noise_deviation());
+            let p = g
+                .sensor
+                .quantizer()
+                .probabilities_at(&nodes.x, g.sensor.noise_deviation());
             CountTable::from_probabilities(&p, g.count)
         };
         let tables: Vec<CountTable> = self.groups.iter().map(table_of).collect();

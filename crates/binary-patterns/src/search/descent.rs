@@ -173,7 +173,9 @@ impl<'a> Kernel<'a> {
         let candidates = Candidates::new(&descent.source, &descent.candidates, &noises);
         let of_noise = |noise: &f64| -> Vec<Vec<[f64; 2]>> {
             let quantizers = descent.candidates.iter();
-            quantizers.map(|q| q.probabilities_at(&candidates.nodes.x, *noise)).collect()
+            quantizers
+                .map(|q| q.probabilities_at(&candidates.nodes.x, *noise))
+                .collect()
         };
         let p: Vec<Vec<Vec<[f64; 2]>>> = noises.iter().map(of_noise).collect();
         let product = |p: &Vec<Vec<[f64; 2]>>| {
@@ -245,7 +247,10 @@ impl<'a> Kernel<'a> {
         }
         let product = &self.products[self.class[n]];
         let sums = others.integrals(product);
-        let explained = |c| self.candidates.explained(&others, &sums, [product.nrows(), 4 * c], 1, c);
+        let explained = |c| {
+            self.candidates
+                .explained(&others, &sums, [product.nrows(), 4 * c], 1, c)
+        };
         Ok((0..self.descent.candidates.len()).map(explained).collect())
     }
 }

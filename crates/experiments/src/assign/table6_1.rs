@@ -1,10 +1,7 @@
 //! `assign-table6-1`: eight sensors, three assignments.
 
 use crate::prelude::*;
-use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, all_errors, by_precision, pair_costs,
-    quantization_error,
-};
+use fewbits_sensor_assignment::{CodedSensors, Estimator, all_errors, by_precision, pair_costs, quantization_error};
 
 pub struct Table;
 

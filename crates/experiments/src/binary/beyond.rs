@@ -7,9 +7,7 @@ use fewbits_binary_patterns::published::{AdaptiveRule, adaptive};
 use fewbits_binary_patterns::search::{Descent, free_breakpoints};
 use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source, gray_basis};
 use fewbits_monte_carlo::parallel;
-use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, all_errors, exchange, pair_costs,
-};
+use fewbits_sensor_assignment::{CodedSensors, Estimator, all_errors, exchange, pair_costs};
 
 pub struct Beyond;
 

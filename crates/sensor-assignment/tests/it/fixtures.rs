@@ -2,8 +2,7 @@
 
 use crate::entry::{Entry, check};
 use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, all_errors, bit_error, by_precision,
-    flipped_estimate, pair_costs, quantization_error,
+    CodedSensors, Estimator, all_errors, bit_error, by_precision, flipped_estimate, pair_costs, quantization_error,
 };
 use serde_json::Value;
 

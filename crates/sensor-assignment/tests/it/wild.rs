@@ -3,8 +3,7 @@
 use fewbits_core::Observation;
 use fewbits_numerics::wild;
 use fewbits_sensor_assignment::{
-    CodedSensors, CostMatrix, Estimator, by_precision, flipped_estimate, pair_costs,
-    variances_with_moments,
+    CodedSensors, CostMatrix, Estimator, by_precision, flipped_estimate, pair_costs, variances_with_moments,
 };
 use proptest::prelude::*;
 
