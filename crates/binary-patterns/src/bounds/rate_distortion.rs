@@ -174,14 +174,6 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    #[test]
-    fn gaussian_is_equation_5_12() {
-        let source = Source::gaussian_with_deviation(0.1f64.sqrt()).unwrap();
-        let s = source.noise_deviation(-5.0).unwrap();
-        assert_relative_eq!(remote_distortion(&source, s).unwrap().at(3.0).unwrap(), 0.076350, max_relative = 1e-5);
-        assert_relative_eq!(network_rate_distortion(&source, s, 3).unwrap(), 0.052077, max_relative = 1e-5);
-    }
-
     /// Erratum `binary-9`.
     #[test]
     fn variance_splits_into_estimation_error_and_estimate() {

@@ -1,5 +1,6 @@
 //! A source observed through a bank of one-bit sensors, and the exact enumeration of what they may report.
 
+use crate::error::at_most;
 use crate::observation::source::{Nodes, Threshold};
 use crate::{BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_numerics::binomial;
@@ -113,12 +114,7 @@ impl Bank {
 
     pub(crate) fn checked_outcomes(&self) -> Result<usize, Error> {
         let outcomes = self.outcomes();
-        if outcomes > MAX_OUTCOMES {
-            return Err(Error::TooManyOutcomes {
-                outcomes,
-                limit: MAX_OUTCOMES,
-            });
-        }
+        at_most(outcomes, MAX_OUTCOMES)?;
         Ok(outcomes as usize)
     }
 

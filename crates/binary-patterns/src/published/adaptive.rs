@@ -3,7 +3,8 @@
 use crate::Error;
 use crate::Source;
 use crate::decoding::decoder::{moments, squared_error};
-use crate::observation::bank::{IMPOSSIBLE, MAX_OUTCOMES};
+use crate::error::at_most;
+use crate::observation::bank::IMPOSSIBLE;
 use crate::observation::source::Nodes;
 use fewbits_numerics::error::{all_finite, at_least_one, positive, refuse};
 use fewbits_numerics::golden::maximum;
@@ -65,12 +66,7 @@ pub fn adaptive(
 ) -> Result<AdaptiveErrors, Error> {
     let noise_deviation = source.resolvable(noise_deviation)?;
     at_least_one("sensors", sensors)?;
-    if sensors > MAX_SENSORS {
-        return Err(Error::TooManyOutcomes {
-            outcomes: 1u128.checked_shl(sensors as u32).unwrap_or(MAX_OUTCOMES),
-            limit: 1 << MAX_SENSORS,
-        });
-    }
+    at_most(2u128.saturating_pow(sensors as u32), 1 << MAX_SENSORS)?;
     let mut step = 0.0;
     if let AdaptiveRule::VariableStep { step: first, factor } = rule {
         step = positive("step", first)?;

@@ -2,6 +2,7 @@
 
 use super::outcomes::{Candidates, Outcomes};
 use crate::Error;
+use crate::error::at_most;
 use crate::observation::bank::{CountTable, MAX_OUTCOMES};
 use crate::{Bank, BinaryQuantizer, Grid, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
@@ -9,7 +10,6 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 use nalgebra::DMatrix;
 use rand::RngExt;
-use serde::{Deserialize, Serialize};
 
 /// Relative improvement that counts as one.
 const IMPROVEMENT: f64 = 1e-11;
@@ -45,14 +45,13 @@ impl Descended {
 }
 
 /// A local optimum.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Descended {
     /// Index of the candidate that each sensor uses.
     pub choice: Vec<usize>,
     /// The sensors with the quantizers chosen for them.
     pub sensors: Vec<PatternSensor>,
     /// Exact mean squared error of the posterior mean.
-    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 
@@ -234,12 +233,7 @@ impl<'a> Kernel<'a> {
             }
         }
         let outcomes = groups.iter().fold(1u128, |o, g| o.saturating_mul(g.2 as u128 + 1));
-        if outcomes > MAX_OUTCOMES {
-            return Err(Error::TooManyOutcomes {
-                outcomes,
-                limit: MAX_OUTCOMES,
-            });
-        }
+        at_most(outcomes, MAX_OUTCOMES)?;
         let mut others = Outcomes::new(&self.candidates.nodes.w);
         for (class, c, count) in groups {
             let table = CountTable::from_probabilities(&self.p[class][c], count);

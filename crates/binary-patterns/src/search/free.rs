@@ -13,7 +13,6 @@ use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::gauss_legendre;
 use rand::RngExt;
-use serde::{Deserialize, Serialize};
 
 /// Most sensors: the outcome tree of distinct sensors has `2^N` leaves.
 const MAX_SENSORS: usize = 16;
@@ -23,12 +22,11 @@ const STOP: Stop = Stop {
 };
 
 /// The result of [`free_breakpoints`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FreeDesign {
     /// The sensors with their new thresholds.
     pub sensors: Vec<PatternSensor>,
     /// Exact mean squared error of the posterior mean.
-    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 

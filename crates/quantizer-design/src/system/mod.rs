@@ -5,7 +5,7 @@ mod group;
 pub use group::SensorGroup;
 
 use crate::compositions::count;
-use crate::error::{Error, refuse};
+use crate::error::{Error, at_most, refuse};
 use crate::observation_model::ObservationModel;
 use fewbits_numerics::error::entries;
 use fewbits_numerics::stored;
@@ -174,26 +174,12 @@ impl System {
 
     /// Refuses tables of more outcomes than allowed.
     pub(crate) fn check_outcomes(&self) -> Result<(), Error> {
-        let (needed, limit) = (self.outcomes(), self.outcome_limit);
-        if needed > limit {
-            return Err(Error::TooLarge {
-                table: "joint outcome table",
-                needed,
-                limit,
-            });
-        }
+        at_most("joint outcome table", self.outcomes(), self.outcome_limit)?;
         // Counts of fewer reports are tabulated on the way.
-        for group in &self.groups {
+        self.groups.iter().try_for_each(|group| {
             let needed = count(group.sensors.len(), group.channel.outputs() + 1);
-            if needed > limit {
-                return Err(Error::TooLarge {
-                    table: "table of counts",
-                    needed,
-                    limit,
-                });
-            }
-        }
-        Ok(())
+            at_most("table of counts", needed, self.outcome_limit)
+        })
     }
 
     /// The same system with another quantizer in group `group`.

@@ -4,15 +4,13 @@ use crate::patterns::count::{full_rank_multisets, multisets};
 use crate::patterns::linear::{check_mask, grid_bits, sensors_of};
 use crate::{Bank, Error, Grid, Mask, Source};
 use fewbits_numerics::error::{at_least_one, positive};
-use serde::{Deserialize, Serialize};
 
 /// A set of masks, one a sensor, in increasing order, with the error it achieves.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MaskSet {
     /// The masks.
     pub masks: Vec<Mask>,
     /// Mean squared error of the posterior mean.
-    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 
