@@ -24,7 +24,12 @@ pub struct SampleFit {
 }
 
 /// Where the bells of a sample stand: so close to the mean that the density has the sample's variance.
-pub(super) fn drawn_together(values: &[f64], mean: f64, deviation: f64, bandwidth: f64) -> impl Iterator<Item = f64> + '_ {
+pub(super) fn drawn_together(
+    values: &[f64],
+    mean: f64,
+    deviation: f64,
+    bandwidth: f64,
+) -> impl Iterator<Item = f64> + '_ {
     let shrink = (1.0 - (bandwidth / deviation).powi(2)).sqrt();
     values.iter().map(move |x| mean + shrink * (x - mean))
 }
