@@ -29,11 +29,11 @@ pub struct CodedSensors {
     noise_deviations: Vec<f64>,
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`: the code is symmetric up to its first bit.
-    nodes: Nodes,
+    pub(crate) nodes: Nodes,
     /// `P(bit = 0|x) - P(bit = 1|x)` at the nodes, `[bit][sensor]`.
     contrast: Vec<Vec<Vec<f64>>>,
     /// `[P0, P1]` at the nodes, `[bit][sensor][value]`.
-    probability: Vec<Vec<[Vec<f64>; 2]>>,
+    pub(crate) probability: Vec<Vec<[Vec<f64>; 2]>>,
 }
 
 stored! { CodedSensors as StoredSensors |sensors| {
@@ -130,25 +130,12 @@ impl CodedSensors {
         &self.quantizers
     }
 
-    pub(crate) fn nodes(&self) -> &Nodes {
-        &self.nodes
-    }
-
-    pub(crate) fn probability(&self, bit: usize, sensor: usize) -> &[Vec<f64>; 2] {
-        &self.probability[bit][sensor]
-    }
-
-    /// Accepts permutations of the sensors only.
-    pub(crate) fn check(&self, assignment: &[usize]) -> Result<(), Error> {
-        check_permutation(assignment, self.sensors())
-    }
-
     /// The sensors as a bank, bit by bit.
     ///
     /// # Errors
     /// If the assignment is not a permutation.
     pub fn bank(&self, assignment: &[usize]) -> Result<Bank, Error> {
-        self.check(assignment)?;
+        check_permutation(assignment, self.sensors())?;
         let sensors = assignment
             .iter()
             .zip(&self.quantizers)
@@ -162,7 +149,7 @@ impl CodedSensors {
     /// # Errors
     /// If the assignment is not a permutation.
     pub fn mmse(&self, assignment: &[usize]) -> Result<f64, Error> {
-        self.check(assignment)?;
+        check_permutation(assignment, self.sensors())?;
         let mut levels = vec![self.nodes.w.clone(); self.sensors()];
         // The nodes cover one side; both sides share the weight.
         levels[0].iter_mut().for_each(|w| *w *= 0.5);
@@ -175,7 +162,7 @@ impl CodedSensors {
     fn explained(&self, assignment: &[usize], bit: usize, levels: &mut [Vec<f64>]) -> f64 {
         let (own, below) = levels.split_at_mut(1);
         if bit == assignment.len() {
-            let [zero, one] = self.probability(0, assignment[0]);
+            let [zero, one] = &self.probability[0][assignment[0]];
             let (mut mass, mut moment) = (0.0, 0.0);
             for (((w, x), zero), one) in own[0].iter().zip(&self.nodes.x).zip(zero).zip(one) {
                 mass += w * (zero + one);
@@ -188,7 +175,7 @@ impl CodedSensors {
             };
         }
         let mut explained = 0.0;
-        for p in self.probability(bit, assignment[bit]) {
+        for p in &self.probability[bit][assignment[bit]] {
             for ((child, w), p) in below[0].iter_mut().zip(&own[0]).zip(p) {
                 *child = w * p;
             }
@@ -211,7 +198,7 @@ impl CodedSensors {
     /// # Errors
     /// If the assignment is not a permutation.
     pub fn centre_mse(&self, assignment: &[usize]) -> Result<f64, Error> {
-        self.check(assignment)?;
+        check_permutation(assignment, self.sensors())?;
         let zeros = || (vec![0.0; self.nodes.len()], vec![0.0; self.nodes.len()]);
         let (mut moments, mut next) = (zeros(), zeros());
         for (bit, &sensor) in assignment.iter().enumerate().rev() {
@@ -228,7 +215,7 @@ impl CodedSensors {
     /// # Errors
     /// If the assignment is not a permutation, or there is not one observation per bit.
     pub fn decode(&self, assignment: &[usize], observations: &[Observation<bool>]) -> Result<f64, Error> {
-        self.check(assignment)?;
+        check_permutation(assignment, self.sensors())?;
         entries("observations", observations.len(), self.sensors())?;
         // From the finest bit on, as in `centre_mse`.
         let centre = observations.iter().rev().try_fold(0.0, |u, o| {

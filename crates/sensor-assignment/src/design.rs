@@ -40,7 +40,7 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
 /// let noise = Noise::independent_with_deviations(&[0.2, 0.1, 0.05])?;
 /// let model = ObservationModel::new(Prior::uniform(0.0, 2.0)?, noise)?;
 /// let solutions = fewbits_sensor_assignment::bit_per_sensor(model, Link::flipping(0.01)?)?.with_starts(4).run()?;
-/// assert!(solutions.best().value() < 0.08);
+/// assert!(solutions.best().value < 0.08);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -68,7 +68,7 @@ mod tests {
             let noise = Noise::independent_with_deviations(&deviations.map(|d| scale * d)).unwrap();
             let prior = Prior::uniform(mean - scale, mean + scale).unwrap();
             let request = bit_per_sensor(ObservationModel::new(prior, noise).unwrap(), Link::PERFECT).unwrap();
-            let found = request.with_starts(2).run().unwrap().best().value() / (scale * scale);
+            let found = request.with_starts(2).run().unwrap().best().value / (scale * scale);
             let patterns = sensors.mmse(&assignment).unwrap();
             assert!(found <= patterns * (1.0 + 1e-6), "{found} {patterns}");
         }

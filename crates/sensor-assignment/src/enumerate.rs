@@ -104,43 +104,44 @@ pub fn all_errors(sensors: &CodedSensors, estimator: Estimator) -> Result<AllErr
     if n > MAX_ENUMERATED {
         return refuse("sensors", n, "at most 10 sensors");
     }
-    let mut tally = Tally::default();
+    let mut tally = Tally {
+        errors: AllErrors {
+            best: Vec::new(),
+            least: f64::INFINITY,
+            mean: 0.0,
+            largest: 0.0,
+        },
+        count: 0,
+    };
     match estimator {
         Estimator::CellCentre => {
-            let rows = sensors.nodes().len();
+            let rows = sensors.nodes.len();
             let mut moments = vec![(vec![0.0; rows], vec![0.0; rows]); n + 1];
             centre_tree(sensors, n, &mut vec![0; n], 0, &mut moments, &mut tally);
         }
         Estimator::PosteriorMean => mmse_halves(sensors, &mut tally),
     }
-    Ok(AllErrors {
-        best: tally.best,
-        least: tally.least,
-        mean: tally.sum / tally.count as f64,
-        largest: tally.largest,
-    })
+    tally.errors.mean /= tally.count as f64;
+    Ok(tally.errors)
 }
 
-#[derive(Default)]
+/// Errors so far; the mean is their sum until all are there.
 struct Tally {
-    best: Vec<usize>,
-    least: f64,
-    largest: f64,
-    sum: f64,
+    errors: AllErrors,
     count: usize,
 }
 
 impl Tally {
     fn add(&mut self, assignment: &[usize], error: f64) {
-        let first = self.count == 0;
-        let better = error < self.least * (1.0 - IMPROVEMENT);
-        let tied = error <= self.least * (1.0 + IMPROVEMENT) && assignment < self.best.as_slice();
-        if first || better || tied {
-            self.best = assignment.to_vec();
-            self.least = if tied && !first { self.least.min(error) } else { error };
+        let all = &mut self.errors;
+        let better = error < all.least * (1.0 - IMPROVEMENT);
+        let tied = error <= all.least * (1.0 + IMPROVEMENT) && assignment < all.best.as_slice();
+        if better || tied {
+            all.best = assignment.to_vec();
+            all.least = if tied { all.least.min(error) } else { error };
         }
-        self.largest = self.largest.max(error);
-        self.sum += error;
+        all.largest = all.largest.max(error);
+        all.mean += error;
         self.count += 1;
     }
 }
@@ -179,12 +180,12 @@ impl Half {
         let mut orders = Vec::new();
         for_permutations(members.len(), |p| orders.push(p.iter().map(|&i| members[i]).collect::<Vec<_>>()));
         let outcomes = 1usize << members.len();
-        let rows = DMatrix::from_fn(orders.len() * outcomes, sensors.nodes().len(), |row, node| {
+        let rows = DMatrix::from_fn(orders.len() * outcomes, sensors.nodes.len(), |row, node| {
             let (order, outcome) = (&orders[row / outcomes], row % outcomes);
             order
                 .iter()
                 .enumerate()
-                .map(|(at, &sensor)| sensors.probability(first_bit + at, sensor)[outcome >> at & 1][node])
+                .map(|(at, &sensor)| sensors.probability[first_bit + at][sensor][outcome >> at & 1][node])
                 .product()
         });
         Self { orders, rows }
@@ -195,7 +196,7 @@ fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
     let n = sensors.sensors();
     let coarse_bits = n.div_ceil(2);
     let (coarse, fine) = (1usize << coarse_bits, 1usize << (n - coarse_bits));
-    let nodes = sensors.nodes();
+    let nodes = &sensors.nodes;
     let variance = sensors.half_width() * sensors.half_width() / 3.0;
     for members in (0u32..1 << n).filter(|m| m.count_ones() as usize == coarse_bits) {
         let (chosen, others): (Vec<usize>, Vec<usize>) = (0..n).partition(|s| members >> s & 1 == 1);

@@ -108,14 +108,9 @@ impl MmseDecoder {
         &self.system
     }
 
-    /// Number of entries.
-    pub fn len(&self) -> usize {
+    /// Number of entries, one per joint outcome.
+    pub fn outcomes(&self) -> usize {
         self.entries.len()
-    }
-
-    /// Whether there is no entry; never so.
-    pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
     }
 
     /// The estimate of every joint outcome, `None` for one that cannot be received. Outcomes are in the order of

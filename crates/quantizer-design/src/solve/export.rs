@@ -164,11 +164,11 @@ impl Export {
         let document = json!({
             "schema": "fewbits-design-1",
             "name": self.name,
-            "criterion": solution.criterion(),
-            "value": solution.value(),
-            "bound": solution.bound(),
-            "certificate": solution.certificate(),
-            "scope": solution.scope(),
+            "criterion": solution.criterion,
+            "value": solution.value,
+            "bound": solution.bound,
+            "certificate": solution.certificate,
+            "scope": solution.scope,
             "mean_squared_error": self.mean_squared_error()?,
             "sensors": solution.sensors().iter().enumerate().map(sensor).collect::<Vec<_>>(),
             "decoder": decoder,
@@ -183,8 +183,8 @@ impl Export {
         let mut text = format!(
             "/* Quantizers and decoder, designed by fewbits. Criterion {:?}: {:?}. */\n#ifndef {upper}_H\n#define {upper}_H\n\n\
              #define {upper}_SENSORS {}\n",
-            self.solution.criterion(),
-            self.solution.value(),
+            self.solution.criterion,
+            self.solution.value,
             sensors.len()
         );
         for (n, sensor) in sensors.iter().enumerate() {
