@@ -85,11 +85,7 @@ fn two_correlated_sensors_over_a_flipping_link() {
     assert_eq!((solution.certificate, solution.scope), (Certificate::LocalOptimum, Scope::EverySensor));
     assert!(solution.gap().unwrap() > 0.0);
     let (error, standard_error) = simulated(solution, &[1.0, 1.0], 0.5, 100_000);
-    assert!(
-        (error - solution.value).abs() < 4.0 * standard_error,
-        "{error} {standard_error} {}",
-        solution.value
-    );
+    assert!((error - solution.value).abs() < 4.0 * standard_error, "{error} {standard_error} {}", solution.value);
 }
 
 /// The same job where a word may stand for several intervals: below the 1.365 that is asked of it.
