@@ -82,8 +82,10 @@ impl From<Error> for fewbits_core::Error {
     }
 }
 
-/// A stored mean squared error: finite and not negative.
-pub(crate) fn stored_size<'de, D: serde::Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
-    let size = <f64 as serde::Deserialize>::deserialize(source)?;
-    fewbits_numerics::error::non_negative("mse", size).map_err(serde::de::Error::custom)
+/// Accepts so many outcomes up to a limit.
+pub(crate) fn at_most(outcomes: u128, limit: u128) -> Result<(), Error> {
+    if outcomes > limit {
+        return Err(Error::TooManyOutcomes { outcomes, limit });
+    }
+    Ok(())
 }

@@ -161,7 +161,7 @@ fn solve(options: &DesignOptions, model: ObservationModel) -> Result<Solution, E
     };
     let solutions = request.with_progress(&mut show).run().map_err(&failed)?;
     bar.finish_and_clear();
-    if solutions.is_cut_short() {
+    if solutions.is_cut_short {
         eprintln!("--time-limit ended the search: this is the best design so far");
     }
     Ok(solutions.best().clone())
@@ -208,7 +208,7 @@ fn written(options: &DesignOptions, solution: &Solution, rounded: Option<&Rounde
         let mut text = rounded.map_or(solution, |rounded| &rounded.solution).table();
         if let Some(rounded) = rounded {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "before rounding to the converter: {:.9}", solution.value());
+            let _ = writeln!(text, "before rounding to the converter: {:.9}", solution.value);
             for (sensor, codes) in rounded.solution.sensors().iter().zip(&rounded.thresholds) {
                 let codes: Vec<String> = codes.iter().map(u32::to_string).collect();
                 let _ = writeln!(text, "sensor {}: thresholds in codes {}", sensor.sensor, codes.join(", "));

@@ -55,14 +55,14 @@ fn compare(i: u64, limit: Duration) -> Result<String, Box<dyn std::error::Error>
     let found = task.solve(Some(limit))?;
     let error = task.exact(found.solutions.best())?;
     let reference = task.nelder_mead(found.time)?;
-    let unit = if found.solutions.is_cut_short() {
+    let unit = if found.solutions.is_cut_short {
         "-".into()
     } else {
         let (other, ratio) = (models::task(i, scale(i + 1), 5, 4)?, scale(i) / scale(i + 1));
         let again = other.exact(other.solve(Some(10 * limit))?.solutions.best())?;
         format!("{:.1e}", again * ratio * ratio / error - 1.0)
     };
-    let certificate = found.solutions.best().certificate();
+    let certificate = found.solutions.best().certificate;
     Ok(format!(
         "{:.9} {:.3} {unit} {certificate:?} {}",
         error / reference,

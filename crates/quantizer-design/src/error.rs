@@ -64,6 +64,14 @@ fewbits_numerics::lift!(fewbits_quantizers => Quantizer);
 
 pub(crate) use fewbits_numerics::error::refuse;
 
+/// Accepts a table of so many entries up to a limit.
+pub(crate) fn at_most(table: &'static str, needed: u64, limit: u64) -> Result<(), Error> {
+    if needed > limit {
+        return Err(Error::TooLarge { table, needed, limit });
+    }
+    Ok(())
+}
+
 /// A stored number that is a size: not negative, but for rounding, and finite.
 pub(crate) fn stored_size<'de, D: serde::Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     let size = <f64 as serde::Deserialize>::deserialize(source)?;

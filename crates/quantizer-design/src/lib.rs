@@ -14,7 +14,7 @@
 //! let best = solutions.best();
 //! let words = best.encode(&[21.3, 22.0])?;
 //! let estimate = best.decoder(16)?.decode_symbols(&words)?;
-//! assert!((estimate.mean - 21.5).abs() < 2.0 && best.value() < 16.0);
+//! assert!((estimate.mean - 21.5).abs() < 2.0 && best.value < 16.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -221,22 +221,6 @@ impl Channel {
         self.inputs == self.outputs
             && (0..self.inputs).all(|t| (0..self.inputs).all(|z| self.probability(t, z) == f64::from(u8::from(t == z))))
     }
-
-    /// This channel followed by `next`.
-    ///
-    /// # Errors
-    /// If `next` does not take this channel's outputs.
-    pub fn then(&self, next: &Self) -> Result<Self, Error> {
-        if next.inputs != self.outputs {
-            return refuse("next", format!("{} inputs", next.inputs), format!("{} inputs", self.outputs));
-        }
-        Self::from_fn(self.inputs, next.outputs, |t, z| {
-            (0..self.outputs)
-                .map(|m| next.probability(t, m) * self.probability(m, z))
-                .sum::<f64>()
-                .min(1.0)
-        })
-    }
 }
 
 #[cfg(test)]
@@ -248,17 +232,6 @@ mod tests {
         for labelling in [Labelling::gray(8).unwrap(), Labelling::new(vec![0, 3, 1, 2]).unwrap()] {
             assert!(Channel::binary_symmetric(&labelling, 0.0).unwrap().is_ideal());
         }
-    }
-
-    #[test]
-    fn cascades_multiply() {
-        let words = Labelling::natural(4).unwrap();
-        let [once, twice] = [0.1, 2.0 * 0.1 * 0.9].map(|eps| Channel::binary_symmetric(&words, eps).unwrap());
-        let cascade = once.then(&once).unwrap();
-        for (t, z) in [(0, 0), (0, 3), (2, 1)] {
-            assert!((cascade.probability(t, z) - twice.probability(t, z)).abs() < 1e-15);
-        }
-        assert!(once.then(&Channel::ideal(3).unwrap()).is_err());
     }
 
     #[test]

@@ -4,9 +4,7 @@
 
 use divan::Bencher;
 use fewbits_binary_patterns::BinaryQuantizer;
-use fewbits_sensor_assignment::{
-    CodedSensors, CostMatrix, Estimator, JonkerVolgenant, LinearAssignment, all_errors, pair_costs,
-};
+use fewbits_sensor_assignment::{CodedSensors, CostMatrix, Estimator, all_errors, pair_costs};
 
 fn main() {
     divan::main();
@@ -53,13 +51,13 @@ fn random_costs(size: usize) -> Vec<f64> {
 #[divan::bench(sample_count = 20)]
 fn assignment_1000(bencher: Bencher) {
     let costs = CostMatrix::new(1000, random_costs(1000)).unwrap();
-    bencher.bench(|| JonkerVolgenant.solve(&costs));
+    bencher.bench(|| costs.solve());
 }
 
 /// The proof of optimality, beyond the solution.
 #[divan::bench(sample_count = 20)]
 fn assignment_1000_certificate(bencher: Bencher) {
     let costs = CostMatrix::new(1000, random_costs(1000)).unwrap();
-    let found = JonkerVolgenant.solve(&costs).unwrap();
+    let found = costs.solve();
     bencher.bench(|| costs.certificate(&found));
 }

@@ -15,6 +15,9 @@ const MAX_SENSORS: usize = 16;
 /// Panel width in noise standard deviations.
 const PANEL: f64 = 2.0;
 
+/// The first two moments of `u` at the nodes, as [`CodedSensors::centre_mse`] defines them.
+pub(crate) type Moments = (Vec<f64>, Vec<f64>);
+
 /// `N` sensors that share the `N` Gray bits of `2^N` cells over `[-V, V]`.
 ///
 /// Construction tabulates every bit's probabilities at every sensor's noise, so that errors of assignments are cheap.
@@ -26,11 +29,11 @@ pub struct CodedSensors {
     noise_deviations: Vec<f64>,
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`: the code is symmetric up to its first bit.
-    nodes: Nodes,
+    pub(crate) nodes: Nodes,
     /// `P(bit = 0|x) - P(bit = 1|x)` at the nodes, `[bit][sensor]`.
     contrast: Vec<Vec<Vec<f64>>>,
     /// `[P0, P1]` at the nodes, `[bit][sensor][value]`.
-    probability: Vec<Vec<[Vec<f64>; 2]>>,
+    pub(crate) probability: Vec<Vec<[Vec<f64>; 2]>>,
 }
 
 stored! { CodedSensors as StoredSensors |sensors| {
@@ -127,29 +130,12 @@ impl CodedSensors {
         &self.quantizers
     }
 
-    pub(crate) fn nodes(&self) -> &Nodes {
-        &self.nodes
-    }
-
-    pub(crate) fn contrast(&self, bit: usize, sensor: usize) -> &[f64] {
-        &self.contrast[bit][sensor]
-    }
-
-    pub(crate) fn probability(&self, bit: usize, sensor: usize) -> &[Vec<f64>; 2] {
-        &self.probability[bit][sensor]
-    }
-
-    /// Accepts permutations of the sensors only.
-    pub(crate) fn check(&self, assignment: &[usize]) -> Result<(), Error> {
-        check_permutation(assignment, self.sensors())
-    }
-
     /// The sensors as a bank, bit by bit.
     ///
     /// # Errors
     /// If the assignment is not a permutation.
     pub fn bank(&self, assignment: &[usize]) -> Result<Bank, Error> {
-        self.check(assignment)?;
+        check_permutation(assignment, self.sensors())?;
         let sensors = assignment
             .iter()
             .zip(&self.quantizers)
@@ -163,7 +149,7 @@ impl CodedSensors {
     /// # Errors
     /// If the assignment is not a permutation.
     pub fn mmse(&self, assignment: &[usize]) -> Result<f64, Error> {
-        self.check(assignment)?;
+        check_permutation(assignment, self.sensors())?;
         let mut levels = vec![self.nodes.w.clone(); self.sensors()];
         // The nodes cover one side; both sides share the weight.
         levels[0].iter_mut().for_each(|w| *w *= 0.5);
@@ -176,7 +162,7 @@ impl CodedSensors {
     fn explained(&self, assignment: &[usize], bit: usize, levels: &mut [Vec<f64>]) -> f64 {
         let (own, below) = levels.split_at_mut(1);
         if bit == assignment.len() {
-            let [zero, one] = self.probability(0, assignment[0]);
+            let [zero, one] = &self.probability[0][assignment[0]];
             let (mut mass, mut moment) = (0.0, 0.0);
             for (((w, x), zero), one) in own[0].iter().zip(&self.nodes.x).zip(zero).zip(one) {
                 mass += w * (zero + one);
@@ -189,7 +175,7 @@ impl CodedSensors {
             };
         }
         let mut explained = 0.0;
-        for p in self.probability(bit, assignment[bit]) {
+        for p in &self.probability[bit][assignment[bit]] {
             for ((child, w), p) in below[0].iter_mut().zip(&own[0]).zip(p) {
                 *child = w * p;
             }
@@ -212,13 +198,14 @@ impl CodedSensors {
     /// # Errors
     /// If the assignment is not a permutation.
     pub fn centre_mse(&self, assignment: &[usize]) -> Result<f64, Error> {
-        self.check(assignment)?;
-        let mut m1 = vec![0.0; self.nodes.len()];
-        let mut m2 = m1.clone();
+        check_permutation(assignment, self.sensors())?;
+        let zeros = || (vec![0.0; self.nodes.len()], vec![0.0; self.nodes.len()]);
+        let (mut moments, mut next) = (zeros(), zeros());
         for (bit, &sensor) in assignment.iter().enumerate().rev() {
-            self.push_bit(bit, sensor, &mut m1, &mut m2);
+            self.push_bit(bit, sensor, &moments, &mut next);
+            std::mem::swap(&mut moments, &mut next);
         }
-        Ok(self.centre_error(&m1, &m2))
+        Ok(self.centre_error(&moments))
     }
 
     /// The estimate from one observation per bit, the coarsest first: the centre of the cell that the Gray bits name. Where a
@@ -228,7 +215,7 @@ impl CodedSensors {
     /// # Errors
     /// If the assignment is not a permutation, or there is not one observation per bit.
     pub fn decode(&self, assignment: &[usize], observations: &[Observation<bool>]) -> Result<f64, Error> {
-        self.check(assignment)?;
+        check_permutation(assignment, self.sensors())?;
         entries("observations", observations.len(), self.sensors())?;
         // From the finest bit on, as in `centre_mse`.
         let centre = observations.iter().rev().try_fold(0.0, |u, o| {
@@ -243,14 +230,15 @@ impl CodedSensors {
 
     /// One step of the recursion.
     #[inline]
-    fn push_bit(&self, bit: usize, sensor: usize, m1: &mut [f64], m2: &mut [f64]) {
-        for ((m1, m2), t) in m1.iter_mut().zip(m2).zip(self.contrast(bit, sensor)) {
-            *m2 = 0.25 + 0.5 * *m1 + 0.25 * *m2;
-            *m1 = t * (0.5 + 0.5 * *m1);
+    pub(crate) fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
+        let from = m1.iter().zip(m2).zip(&self.contrast[bit][sensor]);
+        for (((m1, m2), t), (next1, next2)) in from.zip(next.0.iter_mut().zip(&mut next.1)) {
+            *next2 = 0.25 + 0.5 * m1 + 0.25 * m2;
+            *next1 = t * (0.5 + 0.5 * m1);
         }
     }
 
-    fn centre_error(&self, m1: &[f64], m2: &[f64]) -> f64 {
+    pub(crate) fn centre_error(&self, (m1, m2): &Moments) -> f64 {
         let v = self.half_width;
         let mut sum = 0.0;
         for (((m1, m2), x), w) in m1.iter().zip(m2).zip(&self.nodes.x).zip(&self.nodes.w) {

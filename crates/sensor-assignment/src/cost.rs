@@ -50,18 +50,14 @@ pub fn quantization_error(half_width: f64, bits: usize) -> f64 {
 /// The sum of the costs of an assignment plus [`quantization_error`] approximates the error of the centre decoder
 /// (equation 6.6): it counts single wrong bits only. The integrand jumps where the cell changes, so every cell has its own
 /// panel; symmetry saves half of them.
-///
-/// # Errors
-/// If the cost matrix would not be finite; cannot happen for constructed sensors.
-pub fn pair_costs(sensors: &CodedSensors) -> Result<CostMatrix, Error> {
-    let bits = sensors.sensors();
-    let mut costs = Vec::with_capacity(bits * bits);
-    for bit in 0..bits {
-        for sensor in 0..bits {
-            costs.push(pair_cost(sensors, bit, sensor));
-        }
+pub fn pair_costs(sensors: &CodedSensors) -> CostMatrix {
+    let size = sensors.sensors();
+    CostMatrix {
+        size,
+        costs: (0..size * size)
+            .map(|at| pair_cost(sensors, at / size, at % size))
+            .collect(),
     }
-    CostMatrix::new(bits, costs)
 }
 
 /// One entry of [`pair_costs`].
@@ -128,7 +124,7 @@ mod tests {
     #[test]
     fn costs_agree_with_a_plain_midpoint_sum() {
         let sensors = CodedSensors::with_variances(1.3, &[0.04, 0.0009, 0.3]).unwrap();
-        let costs = pair_costs(&sensors).unwrap();
+        let costs = pair_costs(&sensors);
         let points = 16_000;
         for bit in 0..3 {
             for (sensor, &noise) in sensors.noise_deviations().iter().enumerate() {

@@ -4,7 +4,6 @@
 //! request, which knows all the rest: the edges of the patterns move, cells merge, and the decoder is that of least squared
 //! error.
 
-use crate::linear::{JonkerVolgenant, LinearAssignment};
 use crate::{CodedSensors, Error, pair_costs};
 use fewbits_core::Link;
 use fewbits_quantizer_design::{AllowedCells, Bits, ObservationModel, Request};
@@ -21,7 +20,7 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
     let half_width = 3f64.sqrt() * model.prior().deviation();
     let deviations: Vec<f64> = (0..model.sensors()).map(|n| model.noise().deviation(n)).collect();
     let sensors = CodedSensors::with_deviations(half_width, &deviations)?;
-    let assignment = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
+    let assignment = pair_costs(&sensors).solve();
     let mean = model.prior().mean();
     let mut cells = vec![(Vec::new(), Vec::new()); deviations.len()];
     for (sensor, quantizer) in assignment.iter().zip(sensors.quantizers()) {
@@ -41,7 +40,7 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
 /// let noise = Noise::independent_with_deviations(&[0.2, 0.1, 0.05])?;
 /// let model = ObservationModel::new(Prior::uniform(0.0, 2.0)?, noise)?;
 /// let solutions = fewbits_sensor_assignment::bit_per_sensor(model, Link::flipping(0.01)?)?.with_starts(4).run()?;
-/// assert!(solutions.best().value() < 0.08);
+/// assert!(solutions.best().value < 0.08);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -64,12 +63,12 @@ mod tests {
     fn designed_cells_are_no_worse_than_patterns() {
         let deviations = [0.2, 0.1, 0.05, 0.12];
         let sensors = CodedSensors::with_deviations(1.0, &deviations).unwrap();
-        let assignment = JonkerVolgenant.solve(&pair_costs(&sensors).unwrap()).unwrap();
+        let assignment = pair_costs(&sensors).solve();
         for (scale, mean) in [(1.0, 0.0), (1e-4, 3.0)] {
             let noise = Noise::independent_with_deviations(&deviations.map(|d| scale * d)).unwrap();
             let prior = Prior::uniform(mean - scale, mean + scale).unwrap();
             let request = bit_per_sensor(ObservationModel::new(prior, noise).unwrap(), Link::PERFECT).unwrap();
-            let found = request.with_starts(2).run().unwrap().best().value() / (scale * scale);
+            let found = request.with_starts(2).run().unwrap().best().value / (scale * scale);
             let patterns = sensors.mmse(&assignment).unwrap();
             assert!(found <= patterns * (1.0 + 1e-6), "{found} {patterns}");
         }

@@ -1,6 +1,7 @@
 //! All assignments, for small `N`, and local search for larger.
 
 use super::CodedSensors;
+use super::coded::Moments;
 use crate::Error;
 use fewbits_binary_patterns::IMPOSSIBLE;
 use fewbits_numerics::error::refuse;
@@ -90,15 +91,6 @@ pub fn exchange(sensors: &CodedSensors, start: &[usize], estimator: Estimator) -
     }
 }
 
-/// The best of all `N!` assignments.
-///
-/// # Errors
-/// As [`all_errors`].
-pub fn brute_force(sensors: &CodedSensors, estimator: Estimator) -> Result<(Vec<usize>, f64), Error> {
-    let all = all_errors(sensors, estimator)?;
-    Ok((all.best, all.least))
-}
-
 /// Exact errors of all `N!` assignments.
 ///
 /// For the centre decoder the recursion runs from the finest bit, and assignments that agree on the finest bits share it. For
@@ -112,43 +104,44 @@ pub fn all_errors(sensors: &CodedSensors, estimator: Estimator) -> Result<AllErr
     if n > MAX_ENUMERATED {
         return refuse("sensors", n, "at most 10 sensors");
     }
-    let mut tally = Tally::default();
+    let mut tally = Tally {
+        errors: AllErrors {
+            best: Vec::new(),
+            least: f64::INFINITY,
+            mean: 0.0,
+            largest: 0.0,
+        },
+        count: 0,
+    };
     match estimator {
         Estimator::CellCentre => {
-            let rows = sensors.nodes().len();
+            let rows = sensors.nodes.len();
             let mut moments = vec![(vec![0.0; rows], vec![0.0; rows]); n + 1];
             centre_tree(sensors, n, &mut vec![0; n], 0, &mut moments, &mut tally);
         }
         Estimator::PosteriorMean => mmse_halves(sensors, &mut tally),
     }
-    Ok(AllErrors {
-        best: tally.best,
-        least: tally.least,
-        mean: tally.sum / tally.count as f64,
-        largest: tally.largest,
-    })
+    tally.errors.mean /= tally.count as f64;
+    Ok(tally.errors)
 }
 
-#[derive(Default)]
+/// Errors so far; the mean is their sum until all are there.
 struct Tally {
-    best: Vec<usize>,
-    least: f64,
-    largest: f64,
-    sum: f64,
+    errors: AllErrors,
     count: usize,
 }
 
 impl Tally {
     fn add(&mut self, assignment: &[usize], error: f64) {
-        let first = self.count == 0;
-        let better = error < self.least * (1.0 - IMPROVEMENT);
-        let tied = error <= self.least * (1.0 + IMPROVEMENT) && assignment < self.best.as_slice();
-        if first || better || tied {
-            self.best = assignment.to_vec();
-            self.least = if tied && !first { self.least.min(error) } else { error };
+        let all = &mut self.errors;
+        let better = error < all.least * (1.0 - IMPROVEMENT);
+        let tied = error <= all.least * (1.0 + IMPROVEMENT) && assignment < all.best.as_slice();
+        if better || tied {
+            all.best = assignment.to_vec();
+            all.least = if tied { all.least.min(error) } else { error };
         }
-        self.largest = self.largest.max(error);
-        self.sum += error;
+        all.largest = all.largest.max(error);
+        all.mean += error;
         self.count += 1;
     }
 }
@@ -159,33 +152,19 @@ fn centre_tree(
     left: usize,
     assignment: &mut Vec<usize>,
     used: u32,
-    moments: &mut [(Vec<f64>, Vec<f64>)],
+    moments: &mut [Moments],
     tally: &mut Tally,
 ) {
     let bit = left - 1;
     for sensor in (0..assignment.len()).filter(|s| used >> s & 1 == 0) {
         assignment[bit] = sensor;
-        let contrast = sensors.contrast(bit, sensor);
-        if bit == 0 {
-            let (m1, m2) = &moments[1];
-            let (nodes, v) = (sensors.nodes(), sensors.half_width());
-            let mut error = 0.0;
-            for i in 0..contrast.len() {
-                let last2 = 0.25 + 0.5 * m1[i] + 0.25 * m2[i];
-                let last1 = contrast[i] * (0.5 + 0.5 * m1[i]);
-                error += nodes.w[i] * (nodes.x[i] * (nodes.x[i] + 2.0 * v * last1) + v * v * last2);
-            }
-            tally.add(assignment, error);
-            continue;
-        }
         let (below, above) = moments.split_at_mut(left);
-        let (next1, next2) = &mut below[bit];
-        let (m1, m2) = &above[0];
-        for i in 0..contrast.len() {
-            next2[i] = 0.25 + 0.5 * m1[i] + 0.25 * m2[i];
-            next1[i] = contrast[i] * (0.5 + 0.5 * m1[i]);
+        sensors.push_bit(bit, sensor, &above[0], &mut below[bit]);
+        if bit == 0 {
+            tally.add(assignment, sensors.centre_error(&moments[0]));
+        } else {
+            centre_tree(sensors, bit, assignment, used | 1 << sensor, moments, tally);
         }
-        centre_tree(sensors, bit, assignment, used | 1 << sensor, moments, tally);
     }
 }
 
@@ -201,12 +180,12 @@ impl Half {
         let mut orders = Vec::new();
         for_permutations(members.len(), |p| orders.push(p.iter().map(|&i| members[i]).collect::<Vec<_>>()));
         let outcomes = 1usize << members.len();
-        let rows = DMatrix::from_fn(orders.len() * outcomes, sensors.nodes().len(), |row, node| {
+        let rows = DMatrix::from_fn(orders.len() * outcomes, sensors.nodes.len(), |row, node| {
             let (order, outcome) = (&orders[row / outcomes], row % outcomes);
             order
                 .iter()
                 .enumerate()
-                .map(|(at, &sensor)| sensors.probability(first_bit + at, sensor)[outcome >> at & 1][node])
+                .map(|(at, &sensor)| sensors.probability[first_bit + at][sensor][outcome >> at & 1][node])
                 .product()
         });
         Self { orders, rows }
@@ -217,7 +196,7 @@ fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
     let n = sensors.sensors();
     let coarse_bits = n.div_ceil(2);
     let (coarse, fine) = (1usize << coarse_bits, 1usize << (n - coarse_bits));
-    let nodes = sensors.nodes();
+    let nodes = &sensors.nodes;
     let variance = sensors.half_width() * sensors.half_width() / 3.0;
     for members in (0u32..1 << n).filter(|m| m.count_ones() as usize == coarse_bits) {
         let (chosen, others): (Vec<usize>, Vec<usize>) = (0..n).partition(|s| members >> s & 1 == 1);
@@ -307,7 +286,7 @@ mod tests {
     fn exchange_ends_at_or_below_its_start() {
         let sensors = CodedSensors::with_variances(1.0, &[0.004, 0.01, 0.02, 0.03, 0.05]).unwrap();
         let found = exchange(&sensors, &[4, 3, 2, 1, 0], Estimator::PosteriorMean).unwrap();
-        let (_, least) = brute_force(&sensors, Estimator::PosteriorMean).unwrap();
+        let least = all_errors(&sensors, Estimator::PosteriorMean).unwrap().least;
         assert_relative_eq!(found.error, least, max_relative = 1e-9);
         assert!(exchange(&sensors, &[0, 0, 1, 2, 3], Estimator::CellCentre).is_err());
         assert!(all_errors(&CodedSensors::with_variances(1.0, &[0.01; 11]).unwrap(), Estimator::CellCentre).is_err());

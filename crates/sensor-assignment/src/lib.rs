@@ -9,10 +9,10 @@
 //! An assignment lists a sensor for every bit, both counted from 0, the coarsest bit first. The thesis counts from 1.
 //!
 //! ```
-//! use fewbits_sensor_assignment::{CodedSensors, JonkerVolgenant, LinearAssignment, pair_costs};
+//! use fewbits_sensor_assignment::{CodedSensors, pair_costs};
 //! let sensors = CodedSensors::with_variances(1.0, &[0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001])?;
-//! let costs = pair_costs(&sensors)?;
-//! let best = JonkerVolgenant.solve(&costs)?;
+//! let costs = pair_costs(&sensors);
+//! let best = costs.solve();
 //! assert_eq!(best, [4, 5, 6, 7, 3, 2, 1, 0]);
 //! assert!(costs.certificate(&best)?.is_optimal());
 //! assert!(sensors.centre_mse(&best)? < sensors.centre_mse(&[7, 6, 5, 4, 3, 2, 1, 0])?);
@@ -37,7 +37,7 @@ mod setup;
 pub use coded::CodedSensors;
 pub use cost::{bit_error, flipped_estimate, pair_cost, pair_costs, quantization_error};
 pub use design::{BitCells, bit_cells, bit_per_sensor};
-pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, brute_force, exchange};
+pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, exchange};
 pub use error::Error;
-pub use linear::{CostMatrix, DualCertificate, JonkerVolgenant, LinearAssignment};
+pub use linear::{CostMatrix, DualCertificate};
 pub use setup::{by_precision, variances_with_moments};

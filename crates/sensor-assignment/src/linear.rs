@@ -12,9 +12,9 @@ const SLACK: f64 = 1e-12;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
 pub struct CostMatrix {
-    size: usize,
+    pub(crate) size: usize,
     /// Row by row.
-    costs: Vec<f64>,
+    pub(crate) costs: Vec<f64>,
 }
 
 impl From<CostMatrix> for Vec<Vec<f64>> {
@@ -73,6 +73,72 @@ impl CostMatrix {
     pub fn cost(&self, assignment: &[usize]) -> Result<f64, Error> {
         check_permutation(assignment, self.size())?;
         Ok(assignment.iter().zip(self.rows()).map(|(&j, row)| row[j]).sum())
+    }
+
+    /// The column of each row such that the total cost is least, by shortest augmenting paths (Jonker and Volgenant 1987), `O(n^3)` in
+    /// the worst case. Equal costs give equal answers.
+    ///
+    /// ```text
+    /// u, v <- 0                                            # duals: u_i + v_j <= c_ij throughout
+    /// for each row
+    ///     slack_j <- c_ij - u_i - v_j along paths from that row that alternate between free and matched entries
+    ///     repeat
+    ///         raise the duals of what is reached until another column has slack 0
+    ///     until that column is free
+    ///     exchange matched and free entries along the path to it
+    /// ```
+    ///
+    /// The thesis describes the older Hungarian method with its Hopcroft-Karp step; the answer is the same, which
+    /// [`CostMatrix::certificate`] proves.
+    pub fn solve(&self) -> Vec<usize> {
+        let n = self.size;
+        let largest = self.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
+        // Differences of the largest numbers would overflow.
+        let unit = if largest > 0.0 { largest } else { 1.0 };
+        let cost = |row: usize, column: usize| self.costs[(row - 1) * n + column - 1] / unit;
+        // Rows and columns count from 1; column 0 stands for the row that is being matched, row 0 for none.
+        let (mut u, mut v, mut row_of) = (vec![0.0; n + 1], vec![0.0; n + 1], vec![0; n + 1]);
+        for row in 1..=n {
+            row_of[0] = row;
+            let (mut slack, mut before) = (vec![f64::INFINITY; n + 1], vec![0; n + 1]);
+            let mut reached = vec![false; n + 1];
+            let mut column = 0;
+            loop {
+                reached[column] = true;
+                let here = row_of[column];
+                let (mut least, mut next) = (f64::INFINITY, 0);
+                for j in (1..=n).filter(|j| !reached[*j]) {
+                    let reduced = cost(here, j) - u[here] - v[j];
+                    if reduced < slack[j] {
+                        (slack[j], before[j]) = (reduced, column);
+                    }
+                    if slack[j] < least {
+                        (least, next) = (slack[j], j);
+                    }
+                }
+                for j in 0..=n {
+                    if reached[j] {
+                        u[row_of[j]] += least;
+                        v[j] -= least;
+                    } else {
+                        slack[j] -= least;
+                    }
+                }
+                column = next;
+                if row_of[column] == 0 {
+                    break;
+                }
+            }
+            while column != 0 {
+                row_of[column] = row_of[before[column]];
+                column = before[column];
+            }
+        }
+        let mut columns = vec![0; n];
+        for column in 1..=n {
+            columns[row_of[column] - 1] = column - 1;
+        }
+        columns
     }
 
     /// Dual variables that prove (or disprove) that an assignment is optimal.
@@ -150,87 +216,6 @@ impl DualCertificate {
     }
 }
 
-/// A solver of the linear assignment problem.
-///
-/// Laws: the answer is a permutation whose [`CostMatrix::certificate`] is optimal, and equal input gives equal output.
-pub trait LinearAssignment {
-    /// The column of each row such that the total cost is least.
-    ///
-    /// # Errors
-    /// If the solver gives up.
-    fn solve(&self, costs: &CostMatrix) -> Result<Vec<usize>, Error>;
-}
-
-/// Shortest augmenting paths (Jonker and Volgenant 1987), `O(n^3)` in the worst case.
-///
-/// ```text
-/// u, v <- 0                                            # duals: u_i + v_j <= c_ij throughout
-/// for each row
-///     slack_j <- c_ij - u_i - v_j along paths from that row that alternate between free and matched entries
-///     repeat
-///         raise the duals of what is reached until another column has slack 0
-///     until that column is free
-///     exchange matched and free entries along the path to it
-/// ```
-///
-/// The thesis describes the older Hungarian method with its Hopcroft-Karp step; the answer is the same, which the certificate
-/// proves.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct JonkerVolgenant;
-
-impl LinearAssignment for JonkerVolgenant {
-    fn solve(&self, costs: &CostMatrix) -> Result<Vec<usize>, Error> {
-        let n = costs.size;
-        let largest = costs.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
-        // Differences of the largest numbers would overflow.
-        let unit = if largest > 0.0 { largest } else { 1.0 };
-        let cost = |row: usize, column: usize| costs.costs[(row - 1) * n + column - 1] / unit;
-        // Rows and columns count from 1; column 0 stands for the row that is being matched, row 0 for none.
-        let (mut u, mut v, mut row_of) = (vec![0.0; n + 1], vec![0.0; n + 1], vec![0; n + 1]);
-        for row in 1..=n {
-            row_of[0] = row;
-            let (mut slack, mut before) = (vec![f64::INFINITY; n + 1], vec![0; n + 1]);
-            let mut reached = vec![false; n + 1];
-            let mut column = 0;
-            loop {
-                reached[column] = true;
-                let here = row_of[column];
-                let (mut least, mut next) = (f64::INFINITY, 0);
-                for j in (1..=n).filter(|j| !reached[*j]) {
-                    let reduced = cost(here, j) - u[here] - v[j];
-                    if reduced < slack[j] {
-                        (slack[j], before[j]) = (reduced, column);
-                    }
-                    if slack[j] < least {
-                        (least, next) = (slack[j], j);
-                    }
-                }
-                for j in 0..=n {
-                    if reached[j] {
-                        u[row_of[j]] += least;
-                        v[j] -= least;
-                    } else {
-                        slack[j] -= least;
-                    }
-                }
-                column = next;
-                if row_of[column] == 0 {
-                    break;
-                }
-            }
-            while column != 0 {
-                row_of[column] = row_of[before[column]];
-                column = before[column];
-            }
-        }
-        let mut columns = vec![0; n];
-        for column in 1..=n {
-            columns[row_of[column] - 1] = column - 1;
-        }
-        Ok(columns)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::enumerate::for_permutations;
@@ -248,7 +233,7 @@ mod tests {
         fn the_solver_is_optimal_and_proves_it(size in 1usize..7, seed in prop::collection::vec(-50i32..50, 36)) {
             // Small whole numbers make many ties.
             let costs = CostMatrix::new(size, seed.iter().take(size * size).map(|&c| f64::from(c / 7)).collect()).unwrap();
-            let found = JonkerVolgenant.solve(&costs).unwrap();
+            let found = costs.solve();
             prop_assert_eq!(costs.cost(&found).unwrap(), least(&costs));
             prop_assert!(costs.certificate(&found).unwrap().is_optimal());
         }
@@ -256,7 +241,7 @@ mod tests {
         #[test]
         fn wide_ranges_of_costs_do_no_harm(size in 2usize..6, exponents in prop::collection::vec(-250f64..250.0, 25)) {
             let costs = CostMatrix::new(size, exponents.iter().take(size * size).map(|e| e.exp2()).collect()).unwrap();
-            let found = JonkerVolgenant.solve(&costs).unwrap();
+            let found = costs.solve();
             let (cost, best) = (costs.cost(&found).unwrap(), least(&costs));
             let largest = exponents.iter().take(size * size).fold(f64::NEG_INFINITY, |m, e| m.max(*e)).exp2();
             prop_assert!(cost - best <= 1e-12 * largest);
@@ -278,14 +263,8 @@ mod tests {
     #[test]
     fn costs_near_the_largest_number_are_assigned() {
         let costs = CostMatrix::new(2, vec![1e308, -1e308, -1e308, 1e308]).unwrap();
-        assert_eq!(JonkerVolgenant.solve(&costs).unwrap(), [1, 0]);
-        assert_eq!(
-            JonkerVolgenant
-                .solve(&CostMatrix::new(3, vec![0.0; 9]).unwrap())
-                .unwrap()
-                .len(),
-            3
-        );
+        assert_eq!(costs.solve(), [1, 0]);
+        assert_eq!(CostMatrix::new(3, vec![0.0; 9]).unwrap().solve().len(), 3);
     }
 
     #[test]

@@ -3,8 +3,7 @@
 use super::rate_distortion::ConditionalMean;
 use crate::Error;
 use crate::Source;
-use crate::observation::source::noise_in_range;
-use fewbits_numerics::error::{at_least_one, refuse};
+use fewbits_numerics::error::{at_least_one, positive, refuse};
 use fewbits_numerics::newton;
 use fewbits_quantizers::density::{CellMoments, Density};
 use fewbits_quantizers::lloyd_max;
@@ -40,8 +39,10 @@ pub fn centralised_bound_of_levels(
     levels: usize,
 ) -> Result<f64, Error> {
     at_least_one("measurements", measurements)?;
-    let measurement =
-        ConditionalMean::with_deviation(*source, noise_in_range(noise_deviation)? / (measurements as f64).sqrt())?;
+    let measurement = ConditionalMean::with_deviation(
+        *source,
+        positive("noise_deviation", noise_deviation)? / (measurements as f64).sqrt(),
+    )?;
     let estimate = EstimateDensity::new(measurement);
     let quantizer = lloyd_max::design(&estimate, levels)?;
     Ok(measurement.estimation_error() + quantizer.mean_squared_error())

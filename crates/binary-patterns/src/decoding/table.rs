@@ -1,5 +1,6 @@
 //! Estimates for all that a bank may report.
 
+use crate::error::at_most;
 use crate::observation::source::Nodes;
 use crate::{Bank, Error};
 use fewbits_core::Observation;
@@ -88,12 +89,7 @@ impl LookupTable {
     /// If there are more than 24 sensors.
     pub fn expand(&self) -> Result<Vec<f64>, Error> {
         let sensors = self.bank.sensors();
-        if sensors > MAX_TABLE_SENSORS {
-            return Err(Error::TooManyOutcomes {
-                outcomes: 1u128.checked_shl(sensors as u32).unwrap_or(u128::MAX),
-                limit: 1 << MAX_TABLE_SENSORS,
-            });
-        }
+        at_most(2u128.saturating_pow(sensors as u32), 1 << MAX_TABLE_SENSORS)?;
         (0usize..1 << sensors)
             .map(|word| {
                 let bits: Vec<bool> = (0..sensors).rev().map(|at| word >> at & 1 == 1).collect();

@@ -1,5 +1,6 @@
 //! A source observed through a bank of one-bit sensors, and the exact enumeration of what they may report.
 
+use crate::error::at_most;
 use crate::observation::source::{Nodes, Threshold};
 use crate::{BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_numerics::binomial;
@@ -113,12 +114,7 @@ impl Bank {
 
     pub(crate) fn checked_outcomes(&self) -> Result<usize, Error> {
         let outcomes = self.outcomes();
-        if outcomes > MAX_OUTCOMES {
-            return Err(Error::TooManyOutcomes {
-                outcomes,
-                limit: MAX_OUTCOMES,
-            });
-        }
+        at_most(outcomes, MAX_OUTCOMES)?;
         Ok(outcomes as usize)
     }
 
@@ -157,17 +153,16 @@ impl Bank {
             .collect()
     }
 
-    /// `P(k of the group say 1 | x)` for every group, count and node.
-    pub(crate) fn count_tables(&self, nodes: &Nodes) -> Vec<CountTable> {
-        self.groups
-            .iter()
-            .map(|g| CountTable::new(&g.sensor, g.count, nodes))
-            .collect()
-    }
-
     /// Walks all outcomes. `visit` gets the counts' index (last group fastest) and `w p(x) P(outcome|x)` at the nodes.
     pub fn for_outcomes(&self, nodes: &Nodes, mut visit: impl FnMut(usize, &[f64])) {
-        let tables = self.count_tables(nodes);
+        let table_of = |g: &Exchangeable| {
+            let p = g
+                .sensor
+                .quantizer()
+                .probabilities_at(&nodes.x, g.sensor.noise_deviation());
+            CountTable::from_probabilities(&p, g.count)
+        };
+        let tables: Vec<CountTable> = self.groups.iter().map(table_of).collect();
         let mut levels = vec![vec![0.0; nodes.len()]; tables.len() + 1];
         levels[0].copy_from_slice(&nodes.w);
         descend(&tables, &mut levels, 0, &mut visit);
@@ -221,11 +216,6 @@ pub(crate) struct CountTable {
 const LOG_COUNT: usize = 60;
 
 impl CountTable {
-    pub fn new(sensor: &PatternSensor, count: usize, nodes: &Nodes) -> Self {
-        let p = sensor.quantizer().probabilities_at(&nodes.x, sensor.noise_deviation());
-        Self::from_probabilities(&p, count)
-    }
-
     pub fn from_probabilities(p: &[[f64; 2]], count: usize) -> Self {
         let log_choose = binomial::log_row(count);
         let rows = (0..=count)

@@ -1,10 +1,10 @@
 //! One sensor with a one-bit quantizer, and the scheme by which it reports.
 
-use crate::observation::source::noise_in_range;
 use crate::{BinaryQuantizer, Error};
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::SVector;
 use fewbits_core::{Link, Memoryless, Observation};
+use fewbits_numerics::error::positive;
 use fewbits_numerics::stored;
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ impl PatternSensor {
     /// # Errors
     /// If `noise_deviation` is not positive and finite.
     pub fn with_deviation(quantizer: BinaryQuantizer, noise_deviation: f64) -> Result<Self, Error> {
-        let noise_deviation = noise_in_range(noise_deviation)?;
+        let noise_deviation = positive("noise_deviation", noise_deviation)?;
         Ok(Self {
             quantizer,
             noise_deviation,

@@ -151,7 +151,7 @@ impl Source {
 
     /// Refuses noise too small for an even grid of nodes to resolve.
     pub(crate) fn resolvable(&self, noise_deviation: f64) -> Result<f64, Error> {
-        let noise_deviation = noise_in_range(noise_deviation)?;
+        let noise_deviation = positive("noise_deviation", noise_deviation)?;
         let least = FINEST * self.reach();
         if noise_deviation >= least {
             return Ok(noise_deviation);
@@ -257,12 +257,6 @@ impl Nodes {
     pub fn expectation(&self, f: impl Fn(f64) -> f64) -> f64 {
         self.x.iter().zip(&self.w).map(|(&x, &w)| w * f(x)).sum()
     }
-}
-
-/// Noise standard deviations are checked once, here.
-pub(crate) fn noise_in_range(noise_deviation: f64) -> Result<f64, Error> {
-    finite("noise_deviation", noise_deviation)?;
-    Ok(positive("noise_deviation", noise_deviation)?)
 }
 
 #[cfg(test)]

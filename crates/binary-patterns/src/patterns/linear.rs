@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::patterns::grid::bits_in_range;
-use crate::{Grid, Pattern};
+use crate::{Grid, Pattern, PatternSensor};
 use fewbits_numerics::error::refuse;
 
 /// Selects which natural patterns are XORed: the most significant of the `bits` binary digits selects pattern 1.
@@ -119,10 +119,11 @@ pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
     (linear_pattern(mask, bits).as_ref() == Ok(pattern)).then_some(mask)
 }
 
-/// True if the noise statistics of linear patterns on `grid` are symmetric under `x -> -x`: a mask of even weight keeps its
-/// bit, one of odd weight flips it.
-pub(crate) fn flips_under_reflection(mask: Mask) -> bool {
-    mask.count_ones() % 2 == 1
+/// Sensors of equal noise with the patterns of these masks.
+pub(crate) fn sensors_of(masks: &[Mask], grid: &Grid, noise_deviation: f64) -> Result<Vec<PatternSensor>, Error> {
+    let bits = grid_bits(grid)?;
+    let sensor = |mask: &Mask| PatternSensor::with_deviation(linear_pattern(*mask, bits)?.on(grid)?, noise_deviation);
+    masks.iter().map(sensor).collect()
 }
 
 /// The grid's number of bits.

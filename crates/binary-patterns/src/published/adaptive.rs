@@ -3,9 +3,9 @@
 use crate::Error;
 use crate::Source;
 use crate::decoding::decoder::{moments, squared_error};
-use crate::observation::bank::{IMPOSSIBLE, MAX_OUTCOMES};
+use crate::error::at_most;
+use crate::observation::bank::IMPOSSIBLE;
 use crate::observation::source::Nodes;
-use crate::observation::source::noise_in_range;
 use fewbits_numerics::error::{all_finite, at_least_one, positive, refuse};
 use fewbits_numerics::golden::maximum;
 use fewbits_numerics::newton;
@@ -66,12 +66,7 @@ pub fn adaptive(
 ) -> Result<AdaptiveErrors, Error> {
     let noise_deviation = source.resolvable(noise_deviation)?;
     at_least_one("sensors", sensors)?;
-    if sensors > MAX_SENSORS {
-        return Err(Error::TooManyOutcomes {
-            outcomes: 1u128.checked_shl(sensors as u32).unwrap_or(MAX_OUTCOMES),
-            limit: 1 << MAX_SENSORS,
-        });
-    }
+    at_most(2u128.saturating_pow(sensors as u32), 1 << MAX_SENSORS)?;
     let mut step = 0.0;
     if let AdaptiveRule::VariableStep { step: first, factor } = rule {
         step = positive("step", first)?;
@@ -191,7 +186,7 @@ pub fn bounded_mle(bits: &[(f64, bool)], noise_deviation: f64, bound: f64) -> Re
     at_least_one("bits", bits.len())?;
     let thresholds: Vec<f64> = bits.iter().map(|b| b.0).collect();
     all_finite("thresholds", &thresholds)?;
-    Ok(maximum_likelihood(bits, noise_in_range(noise_deviation)?, positive("bound", bound)?))
+    Ok(maximum_likelihood(bits, positive("noise_deviation", noise_deviation)?, positive("bound", bound)?))
 }
 
 fn maximum_likelihood(bits: &[(f64, bool)], noise_deviation: f64, bound: f64) -> f64 {

@@ -2,11 +2,10 @@
 
 use crate::Error;
 use crate::observation::bank::CountTable;
-use crate::observation::source::noise_in_range;
-use crate::observation::source::{Kind, Nodes, Threshold};
+use crate::observation::source::{Kind, Nodes};
 use crate::patterns::grid::bits_in_range;
-use crate::{Bank, BinaryQuantizer, Decoder, Grid, PatternSensor, Source, linear_pattern, natural_basis};
-use fewbits_numerics::error::refuse;
+use crate::{Bank, BinaryQuantizer, Grid, PatternSensor, Source, linear_pattern, natural_basis};
+use fewbits_numerics::error::{positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 
 /// The allocation of sensors to natural bits, for a uniform source.
@@ -41,7 +40,7 @@ impl Luo {
             return refuse("source", "Gaussian", "a uniform source");
         };
         let bits = bits_in_range(bits)?;
-        let noise_deviation = noise_in_range(noise_deviation)?;
+        let noise_deviation = positive("noise_deviation", noise_deviation)?;
         let mut allocation: Vec<usize> = (1..bits).map(|b| sensors.checked_shr(b as u32).unwrap_or(0)).collect();
         allocation.push(sensors - allocation.iter().sum::<usize>());
         if allocation.contains(&0) {
@@ -85,13 +84,8 @@ impl Luo {
     /// # Errors
     /// If the bank has too many outcomes.
     pub fn errors(&self) -> Result<LuoErrors, Error> {
-        let thresholds = self
-            .quantizers
-            .iter()
-            .flat_map(|q| Threshold::of(q.breakpoints(), self.noise_deviation));
-        let thresholds: Vec<Threshold> = thresholds.collect();
-        let v = self.half_width;
-        let nodes = Nodes::adapted(&self.source, -v, v, &thresholds, 1.0, gauss_legendre::<12>());
+        let (bank, v) = (self.bank()?, self.half_width);
+        let nodes = Nodes::adapted(&self.source, -v, v, &bank.thresholds(), 1.0, gauss_legendre::<12>());
         let (mut soft, mut majority) = (0.0, 0.0);
         for (&x, &w) in nodes.x.iter().zip(&nodes.w) {
             // (mean, variance) of both estimates given x.
@@ -112,7 +106,7 @@ impl Luo {
         Ok(LuoErrors {
             soft,
             majority,
-            mmse: self.bank()?.mse(Decoder::Mmse)?,
+            mmse: bank.mmse()?,
         })
     }
 }

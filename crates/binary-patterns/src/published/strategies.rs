@@ -2,9 +2,8 @@
 
 use crate::Error;
 use crate::bounds::mean_information;
-use crate::patterns::linear::grid_bits;
-use crate::{Bank, Grid, PatternSensor, linear_pattern};
-use crate::{Mask, Source};
+use crate::patterns::linear::{grid_bits, sensors_of};
+use crate::{Bank, Grid, Mask, Source};
 use fewbits_numerics::error::refuse;
 
 /// Strategy 2: repeats the masks of a smaller optimum until there are `sensors` of them, in increasing order.
@@ -41,8 +40,7 @@ pub fn by_information(
     let bits = grid_bits(grid)?;
     let mut best = (0, f64::NEG_INFINITY);
     for mask in 1..1 << bits {
-        let sensor = PatternSensor::with_deviation(linear_pattern(mask, bits)?.on(grid)?, noise_deviation)?;
-        let information = mean_information(&Bank::new(*source, vec![sensor])?);
+        let information = mean_information(&Bank::new(*source, sensors_of(&[mask], grid, noise_deviation)?)?);
         // Mirror images and rounding make ties; the lowest mask keeps them.
         if information > best.1 * (1.0 + 1e-12) || best.0 == 0 {
             best = (mask, information);

@@ -1,18 +1,15 @@
 //! Coordinate descent: one sensor at a time takes its best pattern, all candidates in one matrix product.
 
-use super::outcomes::{Outcomes, SEARCH_PANEL};
+use super::outcomes::{Candidates, Outcomes};
 use crate::Error;
-use crate::observation::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
-use crate::observation::source::noise_in_range;
-use crate::observation::source::{Nodes, Threshold};
+use crate::error::at_most;
+use crate::observation::bank::{CountTable, MAX_OUTCOMES};
 use crate::{Bank, BinaryQuantizer, Grid, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, refuse};
-use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::error::{at_least_one, positive, refuse};
 use nalgebra::DMatrix;
 use rand::RngExt;
-use serde::{Deserialize, Serialize};
 
 /// Relative improvement that counts as one.
 const IMPROVEMENT: f64 = 1e-11;
@@ -48,14 +45,13 @@ impl Descended {
 }
 
 /// A local optimum.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Descended {
     /// Index of the candidate that each sensor uses.
     pub choice: Vec<usize>,
     /// The sensors with the quantizers chosen for them.
     pub sensors: Vec<PatternSensor>,
     /// Exact mean squared error of the posterior mean.
-    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 
@@ -72,7 +68,7 @@ impl Descent {
         at_least_one("noise_deviations", noise_deviations.len())?;
         at_least_one("candidates", candidates.len())?;
         for &noise in &noise_deviations {
-            noise_in_range(noise)?;
+            positive("noise_deviation", noise)?;
         }
         Ok(Self {
             source,
@@ -151,21 +147,13 @@ impl Descent {
 
 struct Kernel<'a> {
     descent: &'a Descent,
-    nodes: Nodes,
-    folded: bool,
+    candidates: Candidates,
     /// Which of the distinct noises each sensor has.
     class: Vec<usize>,
     /// `[P0, P1]` of every class and candidate.
     p: Vec<Vec<Vec<[f64; 2]>>>,
     /// For each class, rows (candidate, bit, moment).
     products: Vec<DMatrix<f64>>,
-}
-
-/// `Some(flips)` if reflecting `x` keeps the quantizer up to flipping its bit.
-fn symmetry(quantizer: &BinaryQuantizer) -> Option<bool> {
-    let t = quantizer.breakpoints();
-    let symmetric = t.iter().zip(t.iter().rev()).all(|(a, b)| a + b == 0.0);
-    symmetric.then_some(t.len() % 2 == 1)
 }
 
 impl<'a> Kernel<'a> {
@@ -181,48 +169,24 @@ impl<'a> Kernel<'a> {
                 })
             })
             .collect();
-        let folded = descent.candidates.iter().all(|q| symmetry(q).is_some());
-        let reach = descent.source.reach();
-        let mut thresholds: Vec<f64> = descent
-            .candidates
-            .iter()
-            .flat_map(|q| q.breakpoints())
-            .copied()
-            .collect();
-        thresholds.sort_by(f64::total_cmp);
-        thresholds.dedup();
-        let thresholds: Vec<Threshold> = noises
-            .iter()
-            .flat_map(|&noise| Threshold::of(&thresholds, noise))
-            .collect();
-        let from = if folded { 0.0 } else { -reach };
-        let nodes = Nodes::adapted(&descent.source, from, reach, &thresholds, SEARCH_PANEL, gauss_legendre::<8>());
-        let p: Vec<Vec<Vec<[f64; 2]>>> = noises
-            .iter()
-            .map(|&noise| {
-                descent
-                    .candidates
-                    .iter()
-                    .map(|q| q.probabilities_at(&nodes.x, noise))
-                    .collect()
-            })
-            .collect();
-        let products = p
-            .iter()
-            .map(|rows: &Vec<Vec<[f64; 2]>>| {
-                DMatrix::from_fn(rows.len() * 4, nodes.len(), |row, at| {
-                    let p = rows[row / 4][at][row / 2 % 2];
-                    if row % 2 == 0 { p } else { p * nodes.x[at] }
-                })
-            })
-            .collect();
+        let candidates = Candidates::new(&descent.source, &descent.candidates, &noises);
+        let of_noise = |noise: &f64| -> Vec<Vec<[f64; 2]>> {
+            let quantizers = descent.candidates.iter();
+            quantizers
+                .map(|q| q.probabilities_at(&candidates.nodes.x, *noise))
+                .collect()
+        };
+        let p: Vec<Vec<Vec<[f64; 2]>>> = noises.iter().map(of_noise).collect();
+        let product = |p: &Vec<Vec<[f64; 2]>>| {
+            let single: Vec<CountTable> = p.iter().map(|p| CountTable::from_probabilities(p, 1)).collect();
+            candidates.integrands(single.iter())
+        };
         Self {
             descent,
-            nodes,
-            folded,
             class,
+            products: p.iter().map(product).collect(),
             p,
-            products,
+            candidates,
         }
     }
 
@@ -269,46 +233,19 @@ impl<'a> Kernel<'a> {
             }
         }
         let outcomes = groups.iter().fold(1u128, |o, g| o.saturating_mul(g.2 as u128 + 1));
-        if outcomes > MAX_OUTCOMES {
-            return Err(Error::TooManyOutcomes {
-                outcomes,
-                limit: MAX_OUTCOMES,
-            });
-        }
-        let mut others = Outcomes::new(&self.nodes.w);
+        at_most(outcomes, MAX_OUTCOMES)?;
+        let mut others = Outcomes::new(&self.candidates.nodes.w);
         for (class, c, count) in groups {
             let table = CountTable::from_probabilities(&self.p[class][c], count);
-            others = others.with(&table, symmetry(&self.descent.candidates[c]).unwrap_or(false));
+            others = others.with(&table, self.candidates.flips[c]);
         }
         let product = &self.products[self.class[n]];
-        let rows = product.nrows();
         let sums = others.integrals(product);
-        let explained = self
-            .descent
-            .candidates
-            .iter()
-            .enumerate()
-            .map(|(c, quantizer)| {
-                let flips = symmetry(quantizer).unwrap_or(false);
-                let mut explained = 0.0;
-                for (outcome, &image) in others.mirror.iter().enumerate() {
-                    for bit in 0..2 {
-                        let here = outcome * rows + 4 * c + 2 * bit;
-                        let (mut mass, mut moment) = (sums[here], sums[here + 1]);
-                        if self.folded {
-                            let there = image * rows + 4 * c + 2 * if flips { 1 - bit } else { bit };
-                            mass += sums[there];
-                            moment -= sums[there + 1];
-                        }
-                        if mass > IMPOSSIBLE {
-                            explained += moment * moment / mass;
-                        }
-                    }
-                }
-                explained
-            })
-            .collect();
-        Ok(explained)
+        let explained = |c| {
+            self.candidates
+                .explained(&others, &sums, [product.nrows(), 4 * c], 1, c)
+        };
+        Ok((0..self.descent.candidates.len()).map(explained).collect())
     }
 }
 

@@ -6,14 +6,13 @@ use crate::Error;
 use crate::decoding::decoder::moments;
 use crate::observation::bank::IMPOSSIBLE;
 use crate::observation::source::Nodes;
-use crate::patterns::linear::grid_bits;
-use crate::{Bank, BinaryQuantizer, Grid, Mask, PatternSensor, Source, linear_pattern};
+use crate::patterns::linear::sensors_of;
+use crate::{Bank, BinaryQuantizer, Grid, Mask, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::gauss_legendre;
 use rand::RngExt;
-use serde::{Deserialize, Serialize};
 
 /// Most sensors: the outcome tree of distinct sensors has `2^N` leaves.
 const MAX_SENSORS: usize = 16;
@@ -23,12 +22,11 @@ const STOP: Stop = Stop {
 };
 
 /// The result of [`free_breakpoints`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FreeDesign {
     /// The sensors with their new thresholds.
     pub sensors: Vec<PatternSensor>,
     /// Exact mean squared error of the posterior mean.
-    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 
@@ -90,12 +88,7 @@ pub fn free_breakpoints_of_masks(
     jitter: f64,
     starts: usize,
 ) -> Result<FreeDesign, Error> {
-    let bits = grid_bits(grid)?;
-    let sensors = masks
-        .iter()
-        .map(|mask| PatternSensor::with_deviation(linear_pattern(*mask, bits)?.on(grid)?, noise_deviation))
-        .collect::<Result<Vec<_>, _>>()?;
-    free_breakpoints(source, &sensors, jitter, starts)
+    free_breakpoints(source, &sensors_of(masks, grid, noise_deviation)?, jitter, starts)
 }
 
 /// The sensor in units in which every number is `factor` times as large.
@@ -352,8 +345,8 @@ mod tests {
             let grid = Grid::uniform(v, 3).unwrap();
             let noise = source.noise_deviation(5.0).unwrap();
             let found = free_breakpoints_of_masks(&source, &grid, &[4, 4, 6], noise, 0.05, 2).unwrap();
-            let start = PatternSensor::with_deviation(linear_pattern(4, 3).unwrap().on(&grid).unwrap(), noise).unwrap();
-            assert!(found.sensors.iter().any(|s| *s != start));
+            let start = sensors_of(&[4], &grid, noise).unwrap();
+            assert!(found.sensors.iter().any(|s| *s != start[0]));
             (found.mse / (v * v), found.sensors[2].quantizer().breakpoints()[0] / v)
         };
         let one = run(1.0);

@@ -1,7 +1,10 @@
-//! Joint outcomes on the nodes of a search.
+//! Quantizers and joint outcomes on the nodes of a search.
 
-use crate::observation::bank::CountTable;
-use nalgebra::{DMatrixView, DMatrixViewMut, Dyn, Matrix, Storage};
+use crate::observation::bank::{CountTable, IMPOSSIBLE};
+use crate::observation::source::{Nodes, Threshold};
+use crate::{BinaryQuantizer, Source};
+use fewbits_numerics::quadrature::gauss_legendre;
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, Matrix, Storage};
 
 /// Nodes for searching: half the width of the final ones suffices with fewer points, to about `1e-10`.
 pub(crate) const SEARCH_PANEL: f64 = 1.6;
@@ -45,5 +48,75 @@ impl Outcomes {
         let w = DMatrixView::from_slice(&self.w, functions.ncols(), outcomes);
         DMatrixViewMut::from_slice(&mut sums, rows, outcomes).gemm(1.0, functions, &w, 0.0);
         sums
+    }
+}
+
+/// The quantizers of a search on its nodes.
+pub(crate) struct Candidates {
+    pub(crate) nodes: Nodes,
+    /// All quantizers are symmetric about zero: only half of the nodes are there, and outcomes are paired with their mirror images.
+    folded: bool,
+    /// Whether reflecting `x` flips the bit of a quantizer.
+    pub(crate) flips: Vec<bool>,
+}
+
+impl Candidates {
+    /// Nodes for these quantizers at sensors of these noises.
+    pub(crate) fn new(source: &Source, quantizers: &[BinaryQuantizer], noise_deviations: &[f64]) -> Self {
+        let is_symmetric = |q: &BinaryQuantizer| {
+            let t = q.breakpoints();
+            t.iter().zip(t.iter().rev()).all(|(a, b)| a + b == 0.0)
+        };
+        let folded = quantizers.iter().all(is_symmetric);
+        let mut edges: Vec<f64> = quantizers.iter().flat_map(|q| q.breakpoints()).copied().collect();
+        edges.sort_by(f64::total_cmp);
+        edges.dedup();
+        let of_noise = |noise: &f64| Threshold::of(&edges, *noise);
+        let thresholds: Vec<Threshold> = noise_deviations.iter().flat_map(of_noise).collect();
+        let reach = source.reach();
+        let from = if folded { 0.0 } else { -reach };
+        Self {
+            nodes: Nodes::adapted(source, from, reach, &thresholds, SEARCH_PANEL, gauss_legendre::<8>()),
+            folded,
+            flips: quantizers.iter().map(|q| q.breakpoints().len() % 2 == 1).collect(),
+        }
+    }
+
+    /// For every table and count the probability at the nodes, and the same times `x`; a row each.
+    pub(crate) fn integrands<'t>(&self, tables: impl Iterator<Item = &'t CountTable>) -> DMatrix<f64> {
+        let rows: Vec<&Vec<f64>> = tables.flat_map(|t| &t.rows).collect();
+        DMatrix::from_fn(2 * rows.len(), self.nodes.len(), |row, at| {
+            let p = rows[row / 2][at];
+            if row % 2 == 0 { p } else { p * self.nodes.x[at] }
+        })
+    }
+
+    /// Variance explained by the outcomes of some groups and the counts of one more, of `count` sensors with quantizer `candidate`.
+    /// `sums` has `rows` [`integrals`](Outcomes::integrals) an outcome, those of this group from `first` on.
+    pub(crate) fn explained(
+        &self,
+        outcomes: &Outcomes,
+        sums: &[f64],
+        [rows, first]: [usize; 2],
+        count: usize,
+        candidate: usize,
+    ) -> f64 {
+        let mut explained = 0.0;
+        for (outcome, &image) in outcomes.mirror.iter().enumerate() {
+            for k in 0..=count {
+                let at = |outcome: usize, k: usize| outcome * rows + first + 2 * k;
+                let here = at(outcome, k);
+                let (mut mass, mut moment) = (sums[here], sums[here + 1]);
+                if self.folded {
+                    let there = at(image, if self.flips[candidate] { count - k } else { k });
+                    mass += sums[there];
+                    moment -= sums[there + 1];
+                }
+                if mass > IMPOSSIBLE {
+                    explained += moment * moment / mass;
+                }
+            }
+        }
+        explained
     }
 }

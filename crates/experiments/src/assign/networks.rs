@@ -2,7 +2,7 @@
 
 use crate::prelude::*;
 use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
+    CodedSensors, Estimator, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,
 };
 use rand_distr::{Distribution, StandardNormal};
@@ -72,7 +72,7 @@ fn draw(stream: Stream, sensors: usize, moment: &Moment) -> Result<Vec<f64>, Err
 /// The errors of each decoder in the order of the columns.
 fn evaluate(variances: &[f64]) -> Result<[[f64; 6]; 2], Error> {
     let sensors = CodedSensors::with_variances(1.0, variances)?;
-    let linear = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
+    let linear = pair_costs(&sensors).solve();
     let second = by_precision(variances);
     let mut errors = [[0.0; 6]; 2];
     for (errors, (.., decoder)) in errors.iter_mut().zip(DECODERS) {

@@ -1,10 +1,7 @@
 //! `assign-table6-1`: eight sensors, three assignments.
 
 use crate::prelude::*;
-use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
-    quantization_error,
-};
+use fewbits_sensor_assignment::{CodedSensors, Estimator, all_errors, by_precision, pair_costs, quantization_error};
 
 pub struct Table;
 
@@ -42,7 +39,7 @@ rows! {
 type Failure = fewbits_sensor_assignment::Error;
 
 fn row(assign: &'static str, sensors: &CodedSensors, assignment: &[usize]) -> Result<Row, Failure> {
-    let cost = pair_costs(sensors)?.cost(assignment)?;
+    let cost = pair_costs(sensors).cost(assignment)?;
     Ok(Row {
         assign,
         // Counted from 1, as the thesis does.
@@ -55,7 +52,7 @@ fn row(assign: &'static str, sensors: &CodedSensors, assignment: &[usize]) -> Re
 
 /// The three assignments of the thesis.
 fn three(sensors: &CodedSensors, variances: &[f64]) -> Result<Vec<Row>, Failure> {
-    let best = JonkerVolgenant.solve(&pair_costs(sensors)?)?;
+    let best = pair_costs(sensors).solve();
     Ok(vec![
         row("I", sensors, &(0..variances.len()).collect::<Vec<_>>())?,
         row("II", sensors, &by_precision(variances))?,
@@ -74,8 +71,8 @@ fn tables(variances: &[f64]) -> Result<Rows, Failure> {
     }
     let squares: Vec<f64> = variances.iter().map(|v| v * v).collect();
     let as_deviations = three(&CodedSensors::with_variances(1.0, &squares)?, variances)?;
-    let matrix = pair_costs(&sensors)?;
-    let proof = matrix.certificate(&JonkerVolgenant.solve(&matrix)?)?;
+    let matrix = pair_costs(&sensors);
+    let proof = matrix.certificate(&matrix.solve())?;
     let cells = (0..matrix.size()).flat_map(|bit| (0..matrix.size()).map(move |sensor| (bit, sensor)));
     let cost = |(bit, sensor): (usize, usize)| Cost {
         bit: bit + 1,

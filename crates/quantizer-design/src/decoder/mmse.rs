@@ -1,6 +1,6 @@
 //! The posterior mean as a table.
 
-use crate::error::{Error, refuse};
+use crate::error::{Error, at_most, refuse};
 use crate::law::{Reports, symbol_tables};
 use crate::moments::{Table, dot};
 use crate::observation_model::{Feature, ObservationModel};
@@ -62,13 +62,7 @@ impl MmseDecoder {
     /// # Errors
     /// [`Error::TooLarge`] beyond `limit`: decode such systems by a filter on the likelihoods instead.
     pub fn new(system: &System, limit: usize) -> Result<Self, Error> {
-        if system.outcomes() > limit as u64 {
-            return Err(Error::TooLarge {
-                table: "decoder",
-                needed: system.outcomes(),
-                limit: limit as u64,
-            });
-        }
+        at_most("decoder", system.outcomes(), limit as u64)?;
         let model = system.model();
         let allowed = system
             .clone()
@@ -114,14 +108,9 @@ impl MmseDecoder {
         &self.system
     }
 
-    /// Number of entries.
-    pub fn len(&self) -> usize {
+    /// Number of entries, one per joint outcome.
+    pub fn outcomes(&self) -> usize {
         self.entries.len()
-    }
-
-    /// Whether there is no entry; never so.
-    pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
     }
 
     /// The estimate of every joint outcome, `None` for one that cannot be received. Outcomes are in the order of

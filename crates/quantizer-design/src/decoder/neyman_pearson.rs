@@ -133,13 +133,13 @@ mod tests {
         }
         // Averaged over what the first and the last sensor report, the test without the second spends the same.
         let test = NeymanPearson::new(&system, 0.3).unwrap();
-        let given = system.symbol_distributions_given_values(0).unwrap();
+        let given = JointTable::new(&system.subset(&[0]).unwrap()).unwrap();
         let received = |t: usize| Observation::Received(Symbol(t));
         let mut spent = 0.0;
         for a in 0..4 {
             for b in 0..4 {
                 let accepted = test.acceptance(&[received(a), Observation::Lost, received(b)]).unwrap();
-                spent += given[0][a] * given[0][b] * accepted;
+                spent += given.likelihood(a)[0] * given.likelihood(b)[0] * accepted;
             }
         }
         assert!((spent - 0.3).abs() < 1e-13);

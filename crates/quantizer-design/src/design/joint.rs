@@ -56,31 +56,6 @@ impl Design {
         self.system.quantizers()
     }
 
-    /// The system with one group in halves, moved along the steepest of the curvatures that make this a saddle; `None` if no group
-    /// has such a curvature.
-    fn leave_shared_saddle(&self, criterion: Criterion) -> Result<Option<System>, Error> {
-        let mut steepest: Option<(usize, Opposed)> = None;
-        for group in 0..self.system.groups().len() {
-            let found = match opposed(&self.system, group, criterion) {
-                Err(Error::TooLarge { .. }) => None,
-                other => other?,
-            };
-            if let Some(found) = found
-                && found.curvature > steepest.as_ref().map_or(0.0, |s| s.1.curvature)
-            {
-                steepest = Some((group, found));
-            }
-        }
-        let Some((group, found)) = steepest else {
-            return Ok(None);
-        };
-        let length = STEP_OFF * breakpoint_scale(&self.system, &[group]);
-        match halved(&self.system, group, &found.direction, length) {
-            Ok(apart) if apart.check_outcomes().is_ok() => Ok(Some(apart)),
-            _ => Ok(None),
-        }
-    }
-
     /// Whether the point is a saddle: some change of the breakpoints improves it to second order.
     pub fn is_saddle(&self) -> bool {
         self.certificate == Certificate::Saddle
@@ -109,18 +84,23 @@ pub(crate) fn joint_until(
     deadline: Deadline,
 ) -> Result<Design, Error> {
     let every = |system: &System| (0..system.groups().len()).collect::<Vec<_>>();
-    let mut design = optimise_until(system, &every(system), criterion, newton, deadline)?;
-    while newton.at_saddle == AtSaddle::StepOff && design.is_saddle() {
-        let Some(apart) = design.leave_shared_saddle(criterion)? else {
+    let (mut design, mut steepest) = optimise_until(system, &every(system), criterion, newton, deadline)?;
+    while newton.at_saddle == AtSaddle::StepOff
+        && design.is_saddle()
+        && let Some((group, opposed)) = steepest.filter(|(_, opposed)| opposed.curvature > 0.0)
+    {
+        let length = STEP_OFF * breakpoint_scale(&design.system, &[group]);
+        let Ok(apart) = halved(&design.system, group, &opposed.direction, length) else {
             break;
         };
         match optimise_until(&apart, &every(&apart), criterion, newton, deadline) {
-            Ok(next) if criterion.sense() * (next.value - design.value) > 0.0 => {
+            Ok((next, other)) if criterion.sense() * (next.value - design.value) > 0.0 => {
                 design = Design {
                     iterations: design.iterations + next.iterations,
                     evaluations: design.evaluations + next.evaluations,
                     ..next
                 };
+                steepest = other;
             }
             _ => break,
         }
@@ -138,16 +118,17 @@ pub fn optimise_groups(
     criterion: Criterion,
     newton: &Newton,
 ) -> Result<Design, Error> {
-    optimise_until(system, active, criterion, newton, Deadline::NEVER)
+    Ok(optimise_until(system, active, criterion, newton, Deadline::NEVER)?.0)
 }
 
+/// A design, and the group whose sensors gain most to second order if they move against each other.
 fn optimise_until(
     system: &System,
     active: &[usize],
     criterion: Criterion,
     newton: &Newton,
     deadline: Deadline,
-) -> Result<Design, Error> {
+) -> Result<(Design, Option<(usize, Opposed)>), Error> {
     if active.is_empty() {
         return refuse("active", "empty", "at least one group");
     }
@@ -168,8 +149,11 @@ fn optimise_until(
     }
     let designed = problem.system_at(&found.point)?;
     let unit = problem.unit(found.value);
-    let (largest_curvature, scope) = with_opposed(&designed, active, criterion, found.largest_curvature)?;
-    Ok(Design {
+    let (steepest, scope) = steepest_opposed(&designed, active, criterion)?;
+    let largest_curvature = steepest
+        .iter()
+        .fold(found.largest_curvature, |largest, (_, opposed)| largest.max(opposed.curvature));
+    let design = Design {
         system: designed,
         value: (found.value + problem.offset()) * criterion.sense(),
         largest_curvature,
@@ -177,26 +161,28 @@ fn optimise_until(
         scope,
         iterations: found.iterations,
         evaluations: found.evaluations,
-    })
+    };
+    Ok((design, steepest))
 }
 
-/// The largest of a curvature and those over moves of the sensors of a group against each other.
-fn with_opposed(
+/// The largest curvature over moves of the sensors of a group against each other, and whether all groups were looked at.
+fn steepest_opposed(
     system: &System,
     groups: &[usize],
     criterion: Criterion,
-    mut curvature: f64,
-) -> Result<(f64, Scope), Error> {
-    let mut scope = Scope::EverySensor;
+) -> Result<(Option<(usize, Opposed)>, Scope), Error> {
+    let (mut steepest, mut scope) = (None::<(usize, Opposed)>, Scope::EverySensor);
     for group in groups {
         match opposed(system, *group, criterion) {
-            Ok(Some(found)) => curvature = curvature.max(found.curvature),
-            Ok(None) => {}
+            Ok(Some(found)) if steepest.as_ref().is_none_or(|s| found.curvature > s.1.curvature) => {
+                steepest = Some((*group, found));
+            }
+            Ok(_) => {}
             Err(Error::TooLarge { .. }) => scope = Scope::SharedBreakpoints,
             Err(error) => return Err(error),
         }
     }
-    Ok((curvature, scope))
+    Ok((steepest, scope))
 }
 
 /// The size of the breakpoints of some groups: the least standard deviation of their samples.

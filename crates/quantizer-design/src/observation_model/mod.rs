@@ -12,10 +12,12 @@ mod nodes;
 mod noise;
 mod prior;
 mod resolution;
+mod sample;
 
 pub use noise::Noise;
-pub use prior::{Prior, SampleFit};
+pub use prior::Prior;
 pub(crate) use resolution::Resolution;
+pub use sample::SampleFit;
 
 use crate::error::{Error, refuse};
 use fewbits_numerics::normal;
@@ -86,7 +88,7 @@ impl ObservationModel {
     /// If the noise is so much narrower than the prior that more than a million nodes would be needed, or squares of the
     /// prior's values are beyond the range of numbers.
     pub fn new(prior: Prior, noise: Noise) -> Result<Self, Error> {
-        Self::resolved(prior, noise, Resolution::Full)
+        Self::resolved(prior, noise, Resolution::FULL)
     }
 
     /// The model on fewer nodes.
@@ -99,12 +101,13 @@ impl ObservationModel {
         let narrowest = (0..noise.sensors())
             .map(|n| noise.deviation(n))
             .fold(f64::INFINITY, f64::min);
-        let noise_step = resolution.step() * f64::min(ENTROPY_STEP, PRODUCT_STEP / crowd) * narrowest;
+        let noise_step = resolution.step * f64::min(ENTROPY_STEP, PRODUCT_STEP / crowd) * narrowest;
         let (values, weights) = prior.nodes(noise_step, resolution)?;
         let (weights, mean) = (normalised(weights), prior.mean());
-        let squares = values.iter().zip(&weights).map(|(x, w)| (w, (x - mean) * (x - mean)));
-        let variance: f64 = squares.clone().map(|(w, square)| w * square).sum();
-        if !variance.is_finite() || !squares.map(|s| s.1).all(f64::is_finite) {
+        let weighted_square = |(x, w): (&f64, &f64)| w * (x - mean) * (x - mean);
+        let variance: f64 = values.iter().zip(&weights).map(weighted_square).sum();
+        let in_range = |x: &f64| ((x - mean) * (x - mean)).is_finite();
+        if !variance.is_finite() || !values.iter().all(in_range) {
             let shown = format!("mean {mean}, variance {variance}");
             return refuse("prior", shown, "a prior with values whose squares are in the range of numbers");
         }
@@ -247,8 +250,8 @@ fn on_one_axis(
 ) -> Result<Option<Resolved>, Error> {
     let shared = noise.loadings[0];
     let residual = noise.residuals.iter().copied().fold(f64::INFINITY, f64::min);
-    let step = resolution.step() * f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
-    let reach = resolution.reach() * FACTOR_REACH * shared.abs();
+    let step = resolution.step * f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
+    let reach = resolution.reach * FACTOR_REACH * shared.abs();
     let (mean, (low, high)) = (prior.mean(), prior.support(resolution));
     let half_width = (mean - low).max(high - mean) + reach;
     let two_axes = values.len() as f64 * 4.0 * FACTOR_REACH;
@@ -281,8 +284,8 @@ fn on_two_axes(noise: &Noise, values: &[f64], crowd: f64, resolution: Resolution
     let steepest = (0..noise.sensors())
         .map(|n| noise.residuals[n] / noise.loadings[n].abs())
         .fold(f64::INFINITY, f64::min);
-    let step = resolution.step() * f64::min(2.0 * PRIOR_STEP, PRODUCT_STEP * steepest / crowd);
-    let factors = grid(resolution.reach() * FACTOR_REACH, step)?;
+    let step = resolution.step * f64::min(2.0 * PRIOR_STEP, PRODUCT_STEP * steepest / crowd);
+    let factors = grid(resolution.reach * FACTOR_REACH, step)?;
     let weights = normalised(factors.iter().map(|u| normal::pdf(*u)).collect());
     let count = factors.len();
     if values.len().saturating_mul(count) > NODE_LIMIT {

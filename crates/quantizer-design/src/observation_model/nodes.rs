@@ -23,8 +23,8 @@ impl Prior {
     pub(super) fn nodes(&self, step: f64, resolution: Resolution) -> Result<(Vec<f64>, Vec<f64>), Error> {
         match &self.shape {
             Shape::Gaussian { mean, deviation } => {
-                let step = f64::min(resolution.step() * PRIOR_STEP * deviation, step);
-                let offsets = grid(resolution.reach() * REACH * deviation, step)?;
+                let step = f64::min(resolution.step * PRIOR_STEP * deviation, step);
+                let offsets = grid(resolution.reach * REACH * deviation, step)?;
                 Ok(offsets.iter().map(|x| (mean + x, normal::pdf(x / deviation))).unzip())
             }
             Shape::Uniform { low, high } => panels(*low, *high, step, 1, |_| 1.0),
@@ -42,7 +42,7 @@ impl Prior {
         let bells = self.bells();
         let narrowest = bells.iter().map(|b| b.2).fold(f64::INFINITY, f64::min);
         let step = step.min(BELL_STEP * narrowest);
-        let (low, high) = self.support(Resolution::Full);
+        let (low, high) = self.support(Resolution::FULL);
         let count = ((high - low) / step).ceil();
         if count.is_nan() || count >= NODE_LIMIT as f64 {
             return too_fine(count);
@@ -66,7 +66,7 @@ impl Prior {
         match &self.shape {
             Shape::Uniform { low, high } | Shape::Table { low, high, .. } => (*low, *high),
             Shape::Gaussian { mean, deviation } => {
-                let reach = resolution.reach() * REACH * deviation;
+                let reach = resolution.reach * REACH * deviation;
                 (mean - reach, mean + reach)
             }
             Shape::Mixture { .. } | Shape::Sample { .. } => range(self.bells().into_iter().map(|b| (b.1, REACH * b.2))),

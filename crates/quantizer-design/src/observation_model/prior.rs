@@ -1,17 +1,15 @@
 //! The unknown before anything is received.
 
 use super::nodes::{TABLE_NODES, TABLE_PANELS};
+use super::sample::{SampleFit, drawn_together, fitted};
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::{all_finite, at_least_one, entries, finite, positive, probabilities, within};
-use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
 /// Largest relative difference of the integrals by half the panels and by all: a rougher function is refused.
 const ROUGHNESS: f64 = 1e-6;
-/// Fewest values of a sample.
-const MIN_SAMPLE: usize = 5;
 
 /// Prior of the scalar unknown, in any unit.
 ///
@@ -71,22 +69,6 @@ pub(super) enum Shape {
         values: Vec<f64>,
         probabilities: Vec<f64>,
     },
-}
-
-/// Errors of a prior that was estimated from a sample: by smoothing, and because the sample is finite.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SampleFit {
-    /// Standard deviation of the bell at each value, in the unit of the sample.
-    pub bandwidth: f64,
-    /// Largest difference of the distribution functions of the smooth density and of the sample: what smoothing changes.
-    pub smoothing_error: f64,
-    /// With a probability of 95 % no distribution function of the source differs from the sample's by more than this
-    /// (Kolmogorov): what is not known because the sample is finite.
-    pub sampling_error: f64,
-    /// Standard error of the mean, in the unit of the sample.
-    pub mean_standard_error: f64,
-    /// Standard error of the standard deviation, in the unit of the sample.
-    pub deviation_standard_error: f64,
 }
 
 impl From<Prior> for Shape {
@@ -326,53 +308,6 @@ fn mean_of(values: &[f64], weights: &[f64], total: f64) -> f64 {
     first + weights.iter().zip(values).map(|(w, x)| w * (x - first)).sum::<f64>() / total
 }
 
-/// Where the bells of a sample stand: so close to the mean that the density has the sample's variance.
-fn drawn_together(values: &[f64], mean: f64, deviation: f64, bandwidth: f64) -> impl Iterator<Item = f64> + '_ {
-    let shrink = (1.0 - (bandwidth / deviation).powi(2)).sqrt();
-    values.iter().map(move |x| mean + shrink * (x - mean))
-}
-
-/// Sorts a sample; its fit by bells of Silverman's width `0.9 min(s, IQR / 1.34) n^(-1/5)`, its mean and its standard deviation.
-fn fitted(values: &mut [f64]) -> Result<(SampleFit, f64, f64), Error> {
-    all_finite("values", values)?;
-    let count = values.len();
-    if count < MIN_SAMPLE {
-        return refuse("values", format!("{count} values"), format!("at least {MIN_SAMPLE} values"));
-    }
-    values.sort_by(f64::total_cmp);
-    let n = count as f64;
-    let mean = values[0] + values.iter().map(|x| x - values[0]).sum::<f64>() / n;
-    let moment = |power: i32| values.iter().map(|x| (x - mean).powi(power)).sum::<f64>() / n;
-    let variance = moment(2);
-    if !(variance > 0.0 && variance.is_finite()) {
-        return refuse("values", format!("a sample of variance {variance}"), "values that differ");
-    }
-    let deviation = variance.sqrt();
-    let quartile = |share: f64| values[((n - 1.0) * share).round() as usize];
-    let spread = (quartile(0.75) - quartile(0.25)) / 1.34;
-    // Where half of the values are equal the quartiles say nothing.
-    let spread = if spread > 0.0 { spread.min(deviation) } else { deviation };
-    let bandwidth = 0.9 * spread * n.powf(-0.2);
-    let centres: Vec<f64> = drawn_together(values, mean, deviation, bandwidth).collect();
-    let smooth = |y: f64| centres.iter().map(|c| normal::cdf((y - c) / bandwidth)).sum::<f64>() / n;
-    // 200 places find the largest difference to well below the sampling error.
-    let smoothing_error = values.iter().step_by(count.div_ceil(200)).fold(0.0, |worst: f64, y| {
-        let here = smooth(*y);
-        let first = values.partition_point(|x| x < y) as f64;
-        let last = values.partition_point(|x| x <= y) as f64;
-        worst.max((here - first / n).abs()).max((here - last / n).abs())
-    });
-    let kurtosis = moment(4) / (variance * variance);
-    let fit = SampleFit {
-        bandwidth,
-        smoothing_error,
-        sampling_error: 1.358 / n.sqrt(),
-        mean_standard_error: deviation / n.sqrt(),
-        deviation_standard_error: deviation * ((kurtosis - 1.0).max(0.0) / (4.0 * n)).sqrt(),
-    };
-    Ok((fit, mean, deviation))
-}
-
 /// Normalises a table of densities; mean and standard deviation.
 fn tabulated(low: f64, high: f64, densities: &mut [f64]) -> Result<(f64, f64), Error> {
     check_interval(low, high)?;
@@ -396,6 +331,7 @@ fn tabulated(low: f64, high: f64, densities: &mut [f64]) -> Result<(f64, f64), E
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fewbits_numerics::normal;
 
     #[test]
     fn moments_of_priors_are_those_of_their_formulas() {

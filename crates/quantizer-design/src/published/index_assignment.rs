@@ -7,7 +7,7 @@
 
 use crate::criterion::Criterion;
 use crate::design::{Design, joint};
-use crate::error::{Error, refuse};
+use crate::error::{Error, at_most, refuse};
 use crate::newton::Newton;
 use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
@@ -20,7 +20,7 @@ use std::ops::RangeInclusive;
 /// Longest word whose assignments are enumerated: `8! / 48` of them.
 const MAX_BITS: u32 = 3;
 /// Largest number of classes combined over sensors.
-const MAX_COMBINATIONS: usize = 20_000;
+const MAX_COMBINATIONS: u64 = 20_000;
 
 /// An assignment of words and the design found for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,13 +100,7 @@ pub fn assign_words(
     let sensors = model.sensors();
     let combinations: Vec<Vec<usize>> = if words == Words::PerSensor {
         let needed = (classes.len() as u64).saturating_pow(sensors as u32);
-        if needed > MAX_COMBINATIONS as u64 {
-            return Err(Error::TooLarge {
-                table: "list of assignments",
-                needed,
-                limit: MAX_COMBINATIONS as u64,
-            });
-        }
+        at_most("list of assignments", needed, MAX_COMBINATIONS)?;
         (0..sensors).fold(vec![Vec::new()], |lists: Vec<Vec<usize>>, n| {
             let longer = |list: &Vec<usize>| {
                 // Sensors of one law may be exchanged: keep their classes in order.

@@ -3,7 +3,7 @@
 use super::adc::Rounded;
 use super::additive::AdditiveDecoder;
 use super::solution::{SensorDesign, Solution};
-use crate::error::{Error, refuse};
+use crate::error::{Error, at_most, refuse};
 use fewbits_numerics::error::entries;
 use serde_json::json;
 
@@ -51,13 +51,7 @@ impl Solution {
             self.joint_decoder(&shape, outcomes)?
         } else {
             let needed = shape.iter().sum::<usize>() * NUMBER_BYTES;
-            if needed > max_bytes {
-                return Err(Error::TooLarge {
-                    table: "decoder",
-                    needed: needed as u64,
-                    limit: max_bytes as u64,
-                });
-            }
+            at_most("decoder", needed as u64, max_bytes as u64)?;
             Decoder::Additive(self.additive_decoder()?)
         };
         Ok(Export {
@@ -170,11 +164,11 @@ impl Export {
         let document = json!({
             "schema": "fewbits-design-1",
             "name": self.name,
-            "criterion": solution.criterion(),
-            "value": solution.value(),
-            "bound": solution.bound(),
-            "certificate": solution.certificate(),
-            "scope": solution.scope(),
+            "criterion": solution.criterion,
+            "value": solution.value,
+            "bound": solution.bound,
+            "certificate": solution.certificate,
+            "scope": solution.scope,
             "mean_squared_error": self.mean_squared_error()?,
             "sensors": solution.sensors().iter().enumerate().map(sensor).collect::<Vec<_>>(),
             "decoder": decoder,
@@ -189,8 +183,8 @@ impl Export {
         let mut text = format!(
             "/* Quantizers and decoder, designed by fewbits. Criterion {:?}: {:?}. */\n#ifndef {upper}_H\n#define {upper}_H\n\n\
              #define {upper}_SENSORS {}\n",
-            self.solution.criterion(),
-            self.solution.value(),
+            self.solution.criterion,
+            self.solution.value,
             sensors.len()
         );
         for (n, sensor) in sensors.iter().enumerate() {

@@ -22,8 +22,12 @@ impl Request<'_> {
         let bits = self.checked_bits(&mut control)?;
         let mut found = self.solve(&bits, &mut control)?;
         let sense = self.criterion.sense();
-        found.sort_by(|a, b| (sense * b.value()).total_cmp(&(sense * a.value())));
-        Ok(Solutions::new(found, control.steps, control.is_cut_short))
+        found.sort_by(|a, b| (sense * b.value).total_cmp(&(sense * a.value)));
+        Ok(Solutions {
+            all: found,
+            steps: control.steps,
+            is_cut_short: control.is_cut_short,
+        })
     }
 
     /// Bits of every sensor.

@@ -28,7 +28,7 @@ pub(super) fn is_affordable(model: &ObservationModel, criterion: Criterion, outc
 
 /// Whether designs can be compared after the time is over.
 pub(super) fn is_quick(model: &ObservationModel, criterion: Criterion, outcomes: f64) -> Result<bool, Error> {
-    Ok(evaluation_work(&model.at(Resolution::Coarse)?, criterion, outcomes) <= LATE_COARSE_WORK)
+    Ok(evaluation_work(&model.at(Resolution::COARSE)?, criterion, outcomes) <= LATE_COARSE_WORK)
 }
 
 /// Multiplications that one evaluation takes.
@@ -54,7 +54,7 @@ pub(super) fn polish(
         Scope::SharedBreakpoints
     };
     // Most of the way goes on coarse nodes, which are a tenth as many.
-    let coarse = model.at(Resolution::Coarse)?;
+    let coarse = model.at(Resolution::COARSE)?;
     let unproved = |cells: Vec<WordedCells>| {
         let mut system = system_of(model, participants, &cells, apart)?;
         let outcomes = system.outcomes() as f64;
@@ -62,7 +62,7 @@ pub(super) fn polish(
         let is_late = deadline.is_short_for(work);
         let coarse_work = evaluation_work(&coarse, criterion, outcomes);
         if coarse_work > LATE_COARSE_WORK && deadline.is_short_for(coarse_work) {
-            system = system_of(&model.at(Resolution::Rough)?, participants, &cells, apart)?;
+            system = system_of(&model.at(Resolution::ROUGH)?, participants, &cells, apart)?;
         } else if work > if is_late { LATE_VALUE_WORK } else { MAX_VALUE_WORK } {
             system = system_of(&coarse, participants, &cells, apart)?;
         }
@@ -141,7 +141,7 @@ mod tests {
                 let noise = Noise::equicorrelated_with_deviations(&deviations, rho).unwrap();
                 let model = ObservationModel::new(prior.clone(), noise).unwrap();
                 let full = System::lloyd_max(model.clone(), 4).unwrap();
-                let coarse = System::ideal(model.at(Resolution::Coarse).unwrap(), full.quantizers()).unwrap();
+                let coarse = System::ideal(model.at(Resolution::COARSE).unwrap(), full.quantizers()).unwrap();
                 for criterion in [Criterion::MeanSquaredError, Criterion::MutualInformation] {
                     let [a, b] = [&full, &coarse].map(|s| s.value(criterion).unwrap());
                     assert!((a / b - 1.0).abs() < 1e-5, "{prior:?} {rho} {criterion:?}: {a} {b}");

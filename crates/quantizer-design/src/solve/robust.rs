@@ -167,7 +167,7 @@ pub fn minimax(
     let laws: Vec<WordLaw> = participants.iter().map(Participant::law).collect();
     let mut weights = vec![1.0 / models.len() as f64; models.len()];
     let weighted: Vec<(f64, &ObservationModel)> = weights.iter().copied().zip(&models).collect();
-    let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws, Resolution::Coarse)?;
+    let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws, Resolution::COARSE)?;
     let mut cells = nominal.cells();
     let nominal_estimates = estimates(&[nominal.system_in(&centre)?], &[1.0])?;
     let systems_of = |design: &Solution| {

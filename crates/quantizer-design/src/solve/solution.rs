@@ -18,20 +18,15 @@ use std::fmt::Write;
 /// The designs that a request found, best first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solutions {
-    all: Vec<Solution>,
-    steps: usize,
-    is_cut_short: bool,
+    pub(super) all: Vec<Solution>,
+    /// Steps of the search. In each, cells and words of one sensor were improved with the other sensors as they were. The number
+    /// depends on the request alone, unless a time limit ended the search.
+    pub steps: usize,
+    /// Whether the time limit ended the search.
+    pub is_cut_short: bool,
 }
 
 impl Solutions {
-    pub(super) fn new(all: Vec<Solution>, steps: usize, is_cut_short: bool) -> Self {
-        Self {
-            all,
-            steps,
-            is_cut_short,
-        }
-    }
-
     /// The best design.
     pub fn best(&self) -> &Solution {
         // A request that runs returns one design at least.
@@ -41,17 +36,6 @@ impl Solutions {
     /// All designs, best first.
     pub fn all(&self) -> &[Solution] {
         &self.all
-    }
-
-    /// Steps of the search. In each, cells and words of one sensor were improved with the other sensors as they were. The number
-    /// depends on the request alone, unless a time limit ended the search.
-    pub fn steps(&self) -> usize {
-        self.steps
-    }
-
-    /// Whether the time limit ended the search.
-    pub fn is_cut_short(&self) -> bool {
-        self.is_cut_short
     }
 }
 
@@ -112,11 +96,18 @@ pub enum BoundKind {
 pub struct Solution {
     system: System,
     sensors: Vec<SensorDesign>,
-    criterion: Criterion,
-    value: f64,
-    bound: Option<Bound>,
-    certificate: Certificate,
-    scope: Scope,
+    /// What was optimised.
+    pub criterion: Criterion,
+    /// Value of the criterion: squared units, nats, or a probability. Exact to 1e-12, or to 1e-5 for a design with so many joint
+    /// symbols and nodes that one evaluation would take seconds; to some parts in a thousand if, besides, a time limit is over.
+    pub value: f64,
+    /// A bound on the criterion over all designs with these bits and links, if one is known.
+    pub bound: Option<Bound>,
+    /// What the second derivatives with respect to the breakpoints prove. Words, the number of cells and their order were
+    /// searched; nothing is proved about them.
+    pub certificate: Certificate,
+    /// The breakpoints over which the certificate holds.
+    pub scope: Scope,
 }
 
 impl Solution {
@@ -158,17 +149,6 @@ impl Solution {
         &self.system
     }
 
-    /// What was optimised.
-    pub fn criterion(&self) -> Criterion {
-        self.criterion
-    }
-
-    /// Value of the criterion: squared units, nats, or a probability. Exact to 1e-12, or to 1e-5 for a design with so many joint
-    /// symbols and nodes that one evaluation would take seconds; to some parts in a thousand if, besides, a time limit is over.
-    pub fn value(&self) -> f64 {
-        self.value
-    }
-
     /// `E (X - E[X | T])^2`, in squared units.
     ///
     /// # Errors
@@ -177,25 +157,9 @@ impl Solution {
         self.system.value(Criterion::MeanSquaredError)
     }
 
-    /// A bound on the criterion over all designs with these bits and links, if one is known.
-    pub fn bound(&self) -> Option<Bound> {
-        self.bound
-    }
-
     /// How far the value is from the bound, relative to the bound: 0 would be perfect.
     pub fn gap(&self) -> Option<f64> {
         self.bound.map(|b| (self.value - b.value).abs() / b.value)
-    }
-
-    /// What the second derivatives with respect to the breakpoints prove. Words, the number of cells and their order were
-    /// searched; nothing is proved about them.
-    pub fn certificate(&self) -> Certificate {
-        self.certificate
-    }
-
-    /// The breakpoints over which the certificate holds.
-    pub fn scope(&self) -> Scope {
-        self.scope
     }
 
     /// The word of each sensor for one sample per sensor, in the order of [`Solution::sensors`].

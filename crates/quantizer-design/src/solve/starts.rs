@@ -71,7 +71,7 @@ impl Search<'_> {
                 apart: false,
             });
         }
-        let mut landscape = Landscape::new(&[(1.0, model)], self.criterion, laws.clone(), Resolution::Coarse)?;
+        let mut landscape = Landscape::new(&[(1.0, model)], self.criterion, laws.clone(), Resolution::COARSE)?;
         let mut cells: Vec<usize> = participants.iter().map(|p| grid_cells(p.bits)).collect();
         let largest = |cells: &[usize]| cells.iter().copied().max().unwrap_or(0);
         let mut work = landscape.work(largest(&cells));
@@ -86,8 +86,8 @@ impl Search<'_> {
             }
         }
         if work_is_large {
-            let rough = model.at(Resolution::Rough)?;
-            landscape = Landscape::new(&[(1.0, model)], self.criterion, laws, Resolution::Rough)?;
+            let rough = model.at(Resolution::ROUGH)?;
+            landscape = Landscape::new(&[(1.0, model)], self.criterion, laws, Resolution::ROUGH)?;
             work = landscape.work(largest(&cells));
             // Where few climbs are possible the first one starts from the best design at hand.
             first = self.best_at_hand(&rough, first, control)?;
@@ -239,7 +239,7 @@ impl Search<'_> {
             }
             control.enter(Stage::SingleSensors, participants.len() - n);
             let own = model.subset(&[n])?;
-            let landscape = Landscape::new(&[(1.0, &own)], criterion, vec![laws[n].clone()], Resolution::Coarse)?;
+            let landscape = Landscape::new(&[(1.0, &own)], criterion, vec![laws[n].clone()], Resolution::COARSE)?;
             let bits = participants[n].bits;
             let cells = grid_cells(bits);
             let grid = grid_with(&landscape, 0, cells, &[]);

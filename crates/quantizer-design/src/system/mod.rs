@@ -5,7 +5,7 @@ mod group;
 pub use group::SensorGroup;
 
 use crate::compositions::count;
-use crate::error::{Error, refuse};
+use crate::error::{Error, at_most, refuse};
 use crate::observation_model::ObservationModel;
 use fewbits_numerics::error::entries;
 use fewbits_numerics::stored;
@@ -141,37 +141,6 @@ impl System {
         Ok(system.with_outcome_limit(self.outcome_limit))
     }
 
-    /// Distribution of the symbol received from one sensor, whatever the unknown.
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn symbol_distribution(&self, sensor: usize) -> Result<Vec<f64>, Error> {
-        let per_value = self.symbol_distributions_given_values(sensor)?;
-        let outputs = per_value.first().map_or(0, Vec::len);
-        let mixed = |t: usize| per_value.iter().zip(&self.model.weights).map(|(p, w)| w * p[t]).sum();
-        Ok((0..outputs).map(mixed).collect())
-    }
-
-    /// Distribution of the symbol received from one sensor for each value of the unknown ([`ObservationModel::values`]).
-    ///
-    /// # Errors
-    /// If there is no such sensor.
-    pub fn symbol_distributions_given_values(&self, sensor: usize) -> Result<Vec<Vec<f64>>, Error> {
-        let Some(group) = self.groups.iter().find(|g| g.sensors.contains(&sensor)) else {
-            return refuse("sensor", sensor, format!("a number below {}", self.model.sensors()));
-        };
-        let deviation = self.model.noise().deviation(sensor);
-        self.model
-            .values
-            .iter()
-            .map(|x| {
-                Ok(group
-                    .channel
-                    .received(&group.quantizer.level_probabilities(*x, deviation)?)?)
-            })
-            .collect()
-    }
-
     /// Allows at most `limit` joint outcomes in any computation (default [`OUTCOME_LIMIT`]).
     pub fn with_outcome_limit(mut self, limit: u64) -> Self {
         self.outcome_limit = limit;
@@ -205,26 +174,12 @@ impl System {
 
     /// Refuses tables of more outcomes than allowed.
     pub(crate) fn check_outcomes(&self) -> Result<(), Error> {
-        let (needed, limit) = (self.outcomes(), self.outcome_limit);
-        if needed > limit {
-            return Err(Error::TooLarge {
-                table: "joint outcome table",
-                needed,
-                limit,
-            });
-        }
+        at_most("joint outcome table", self.outcomes(), self.outcome_limit)?;
         // Counts of fewer reports are tabulated on the way.
-        for group in &self.groups {
+        self.groups.iter().try_for_each(|group| {
             let needed = count(group.sensors.len(), group.channel.outputs() + 1);
-            if needed > limit {
-                return Err(Error::TooLarge {
-                    table: "table of counts",
-                    needed,
-                    limit,
-                });
-            }
-        }
-        Ok(())
+            at_most("table of counts", needed, self.outcome_limit)
+        })
     }
 
     /// The same system with another quantizer in group `group`.

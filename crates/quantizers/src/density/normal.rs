@@ -58,7 +58,6 @@ impl Density for Normal {
     /// The exponentials of narrow cells are taken many at a time.
     fn cells(&self, breakpoints: &[f64], cells: &mut [CellMoments]) {
         let s = self.deviation;
-        let nodes = gauss_legendre::<NODES>().nodes();
         for (batch, cells) in cells.chunks_mut(BATCH).enumerate() {
             let standard = |i: usize| {
                 let (lower, upper) = edges(breakpoints, batch * BATCH + i);
@@ -68,10 +67,7 @@ impl Density for Normal {
             for (i, densities) in densities.iter_mut().enumerate().take(cells.len()) {
                 let (a, b) = standard(i);
                 if let Some((middle, half)) = narrow(a, b) {
-                    for (density, node) in densities.iter_mut().zip(nodes) {
-                        let t = half * node;
-                        *density = -t * (middle + 0.5 * t);
-                    }
+                    *densities = log_densities(middle, half);
                 }
             }
             kernels::exp(densities[..cells.len()].as_flattened_mut());
@@ -135,15 +131,22 @@ fn narrow(a: f64, b: f64) -> Option<(f64, f64)> {
 fn standard_cell(a: f64, b: f64) -> CellMoments {
     match narrow(a, b) {
         Some((middle, half)) => {
-            let mut densities = [0.0; NODES];
-            for (density, node) in densities.iter_mut().zip(gauss_legendre::<NODES>().nodes()) {
-                let t = half * node;
-                *density = kernels::scalar::exp(-t * (middle + 0.5 * t));
-            }
+            let densities = log_densities(middle, half).map(kernels::scalar::exp);
             narrow_cell(middle, half, &densities)
         }
         None => wide_cell(a, b),
     }
+}
+
+/// Logarithms of the density at the nodes of a narrow cell, relative to that in its middle.
+#[inline]
+fn log_densities(middle: f64, half: f64) -> [f64; NODES] {
+    let mut logs = [0.0; NODES];
+    for (log, node) in logs.iter_mut().zip(gauss_legendre::<NODES>().nodes()) {
+        let t = half * node;
+        *log = -t * (middle + 0.5 * t);
+    }
+    logs
 }
 
 /// A narrow cell, given the density at its nodes relative to that in its middle.
@@ -166,38 +169,20 @@ fn narrow_cell(middle: f64, half: f64, densities: &[f64; NODES]) -> CellMoments 
 
 /// A cell that is not narrow.
 fn wide_cell(a: f64, b: f64) -> CellMoments {
-    let mass = normal::interval(a, b);
-    if b == f64::INFINITY {
-        let from_lower = normal::inverse_mills(-a) - a;
-        return CellMoments {
-            mass,
-            from_lower,
-            to_upper: f64::INFINITY,
-        };
-    }
-    if a == f64::NEG_INFINITY {
-        let to_upper = normal::inverse_mills(b) + b;
-        return CellMoments {
-            mass,
-            from_lower: f64::INFINITY,
-            to_upper,
-        };
-    }
-    match normal::truncated_moments(a, b) {
-        Ok(inside) => CellMoments {
-            mass,
-            from_lower: inside.mean - a,
-            to_upper: b - inside.mean,
-        },
-        Err(_) => halved(mass, a, b),
-    }
-}
-
-/// A cell whose centroid is taken to be its middle.
-fn halved(mass: f64, a: f64, b: f64) -> CellMoments {
+    let (from_lower, to_upper) = if b == f64::INFINITY {
+        (normal::inverse_mills(-a) - a, f64::INFINITY)
+    } else if a == f64::NEG_INFINITY {
+        (f64::INFINITY, normal::inverse_mills(b) + b)
+    } else {
+        match normal::truncated_moments(a, b) {
+            Ok(inside) => (inside.mean - a, b - inside.mean),
+            // The middle of an empty cell.
+            Err(_) => (0.5 * (b - a), 0.5 * (b - a)),
+        }
+    };
     CellMoments {
-        mass,
-        from_lower: 0.5 * (b - a),
-        to_upper: 0.5 * (b - a),
+        mass: normal::interval(a, b),
+        from_lower,
+        to_upper,
     }
 }

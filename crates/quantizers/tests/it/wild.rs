@@ -79,9 +79,6 @@ proptest! {
                 let tame = x[..channel.inputs().min(8)].iter().all(|p| (0.0..=1.0).contains(p));
                 prop_assert!(!tame || received.iter().all(|p| p.is_finite()), "{:?}", received);
             }
-            for next in &all {
-                let _ = channel.then(next);
-            }
         }
         let _ = Labelling::new(x.iter().map(|x| *x as u32).collect());
         let _ = Labelling::with_words(levels as u32, x.iter().map(|x| *x as u32).collect());

@@ -1,10 +1,7 @@
 //! Laws of assignments on random sensors.
 
 use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
-use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, exchange, pair_costs,
-    variances_with_moments,
-};
+use fewbits_sensor_assignment::{CodedSensors, Estimator, all_errors, exchange, pair_costs, variances_with_moments};
 use proptest::prelude::*;
 
 fn variances() -> impl Strategy<Value = Vec<f64>> {
@@ -18,8 +15,8 @@ proptest! {
     #[test]
     fn enumeration_bounds_every_assignment(variances in variances(), half_width in 0.5f64..2.0) {
         let sensors = CodedSensors::with_variances(half_width, &variances).unwrap();
-        let costs = pair_costs(&sensors).unwrap();
-        let found = JonkerVolgenant.solve(&costs).unwrap();
+        let costs = pair_costs(&sensors);
+        let found = costs.solve();
         prop_assert!(costs.certificate(&found).unwrap().is_optimal());
         for estimator in [Estimator::CellCentre, Estimator::PosteriorMean] {
             let all = all_errors(&sensors, estimator).unwrap();
@@ -65,7 +62,7 @@ fn exchanges_close_the_gap_of_the_linear_assignment() {
             panic!("a variance is too small");
         };
         let sensors = CodedSensors::with_variances(1.0, &v).unwrap();
-        let found = JonkerVolgenant.solve(&pair_costs(&sensors).unwrap()).unwrap();
+        let found = pair_costs(&sensors).solve();
         let centre = all_errors(&sensors, Estimator::CellCentre).unwrap();
         assert!(sensors.centre_mse(&found).unwrap() <= 1.09 * centre.least);
         let mmse = all_errors(&sensors, Estimator::PosteriorMean).unwrap();

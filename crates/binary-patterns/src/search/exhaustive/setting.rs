@@ -1,19 +1,16 @@
 //! The search space of an exhaustive search.
 
-use crate::observation::source::noise_in_range;
 use crate::patterns::count::{full_rank_multisets, multisets};
-use crate::patterns::linear::{check_mask, grid_bits};
-use crate::{Bank, Error, Grid, Mask, PatternSensor, Source, linear_pattern};
-use fewbits_numerics::error::at_least_one;
-use serde::{Deserialize, Serialize};
+use crate::patterns::linear::{check_mask, grid_bits, sensors_of};
+use crate::{Bank, Error, Grid, Mask, Source};
+use fewbits_numerics::error::{at_least_one, positive};
 
 /// A set of masks, one a sensor, in increasing order, with the error it achieves.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MaskSet {
     /// The masks.
     pub masks: Vec<Mask>,
     /// Mean squared error of the posterior mean.
-    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 
@@ -54,7 +51,7 @@ impl LinearSearch {
         Ok(Self {
             source,
             bits,
-            noise_deviation: noise_in_range(noise_deviation)?,
+            noise_deviation: positive("noise_deviation", noise_deviation)?,
             sensors,
             full_rank: true,
             forced: vec![0; (1 << bits) - 1],
@@ -99,12 +96,6 @@ impl LinearSearch {
     /// # Errors
     /// If a mask is out of range or there is none.
     pub fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
-        let sensors = masks
-            .iter()
-            .map(|&mask| {
-                PatternSensor::with_deviation(linear_pattern(mask, self.bits)?.on(&self.grid)?, self.noise_deviation)
-            })
-            .collect::<Result<_, _>>()?;
-        Bank::new(self.source, sensors)
+        Bank::new(self.source, sensors_of(masks, &self.grid, self.noise_deviation)?)
     }
 }

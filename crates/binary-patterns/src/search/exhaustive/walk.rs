@@ -1,12 +1,10 @@
 //! The tree of all multisets of masks.
 
 use super::setting::{LinearSearch, MaskSet};
-use crate::observation::bank::{CountTable, IMPOSSIBLE};
-use crate::observation::source::{Nodes, Threshold};
-use crate::patterns::linear::{Span, flips_under_reflection};
-use crate::search::outcomes::{Outcomes, SEARCH_PANEL};
-use crate::{Error, Mask, linear_pattern};
-use fewbits_numerics::quadrature::gauss_legendre;
+use crate::observation::bank::CountTable;
+use crate::patterns::linear::Span;
+use crate::search::outcomes::{Candidates, Outcomes};
+use crate::{BinaryQuantizer, Error, Mask, linear_pattern};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -64,13 +62,11 @@ impl Top {
 pub(super) struct Walk<'a> {
     search: &'a LinearSearch,
     keep: usize,
-    pub(super) nodes: Nodes,
-    /// Only half of the nodes are there, and outcomes are paired with their mirror images.
-    folded: bool,
+    pub(super) candidates: Candidates,
     variance: f64,
     /// `tables[j][m - 1]`: probabilities of the counts of `m` sensors with mask `j + 1`.
     tables: Vec<Vec<CountTable>>,
-    /// `leaves[r - 1]`: for every mask and count of `r` sensors the probability, and the same times `x`; a row each.
+    /// `leaves[r - 1]`: the integrands of all masks at `r` sensors.
     leaves: Vec<DMatrix<f64>>,
     /// Sensors whose masks are forced, from mask `j + 1` on.
     forced_from: Vec<usize>,
@@ -78,30 +74,19 @@ pub(super) struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     pub(super) fn new(search: &'a LinearSearch, keep: usize) -> Result<Self, Error> {
-        let folded = search.grid.is_symmetric();
-        let reach = search.source.reach();
-        let thresholds: Vec<Threshold> = Threshold::of(search.grid.breakpoints(), search.noise_deviation).collect();
-        let from = if folded { 0.0 } else { -reach };
-        let nodes = Nodes::adapted(&search.source, from, reach, &thresholds, SEARCH_PANEL, gauss_legendre::<8>());
         let kinds = search.forced.len();
-        let mut tables = Vec::with_capacity(kinds);
-        for mask in 1..=kinds {
-            let quantizer = linear_pattern(mask as Mask, search.bits)?.on(&search.grid)?;
-            let p = quantizer.probabilities_at(&nodes.x, search.noise_deviation);
-            tables.push(
-                (1..=search.sensors)
-                    .map(|count| CountTable::from_probabilities(&p, count))
-                    .collect::<Vec<_>>(),
-            );
-        }
-        let leaves = (1..=search.sensors)
-            .map(|r| {
-                DMatrix::from_fn(kinds * (r + 1) * 2, nodes.len(), |row, at| {
-                    let (j, k, moment) = (row / 2 / (r + 1), row / 2 % (r + 1), row % 2);
-                    let p = tables[j][r - 1].rows[k][at];
-                    if moment == 0 { p } else { p * nodes.x[at] }
-                })
-            })
+        let quantizers = (1..=kinds)
+            .map(|mask| linear_pattern(mask as Mask, search.bits)?.on(&search.grid))
+            .collect::<Result<Vec<_>, _>>()?;
+        let candidates = Candidates::new(&search.source, &quantizers, &[search.noise_deviation]);
+        let tables_of = |quantizer: &BinaryQuantizer| {
+            let p = quantizer.probabilities_at(&candidates.nodes.x, search.noise_deviation);
+            let counts = 1..=search.sensors;
+            counts.map(|count| CountTable::from_probabilities(&p, count)).collect()
+        };
+        let tables: Vec<Vec<CountTable>> = quantizers.iter().map(tables_of).collect();
+        let leaves = (0..search.sensors)
+            .map(|r| candidates.integrands(tables.iter().map(|t| &t[r])))
             .collect();
         let mut forced_from = vec![0; kinds + 1];
         for j in (0..kinds).rev() {
@@ -110,8 +95,7 @@ impl<'a> Walk<'a> {
         Ok(Self {
             search,
             keep,
-            nodes,
-            folded,
+            candidates,
             variance: search.source.variance(),
             tables,
             leaves,
@@ -147,7 +131,8 @@ impl<'a> Walk<'a> {
         let descend = |&(j, m, next): &(usize, usize, Span)| {
             let mut chosen = chosen.to_vec();
             chosen.push((j as Mask + 1, m));
-            self.branch(j + 1, left - m, next, &chosen, self.extend(&level, j, m))
+            let level = level.with(&self.tables[j][m - 1], self.candidates.flips[j]);
+            self.branch(j + 1, left - m, next, &chosen, level)
         };
         if chosen.len() < PARALLEL_LEVELS {
             let parts: Vec<Top> = steps.par_iter().map(descend).collect();
@@ -155,11 +140,6 @@ impl<'a> Walk<'a> {
         } else {
             steps.iter().map(descend).fold(found, Top::merge)
         }
-    }
-
-    /// One group of `m` sensors with mask `j + 1` more.
-    fn extend(&self, level: &Outcomes, j: usize, m: usize) -> Outcomes {
-        level.with(&self.tables[j][m - 1], self.folded && flips_under_reflection(j as Mask + 1))
     }
 
     /// Evaluates all sets in which the `left` sensors share one last mask.
@@ -187,25 +167,9 @@ impl<'a> Walk<'a> {
         let rows = (until - from) * rows_each;
         let sums = level.integrals(&self.leaves[left - 1].rows(from * rows_each, rows));
         for j in (from..until).filter(|&j| allowed(j)) {
-            let mask = j as Mask + 1;
-            let flips = flips_under_reflection(mask);
-            let mut explained = 0.0;
-            for (outcome, &image) in level.mirror.iter().enumerate() {
-                for k in 0..=left {
-                    let at = |outcome: usize, k: usize| outcome * rows + (j - from) * rows_each + 2 * k;
-                    let here = at(outcome, k);
-                    let (mut mass, mut moment) = (sums[here], sums[here + 1]);
-                    if self.folded {
-                        let there = at(image, if flips { left - k } else { k });
-                        mass += sums[there];
-                        moment -= sums[there + 1];
-                    }
-                    if mass > IMPOSSIBLE {
-                        explained += moment * moment / mass;
-                    }
-                }
-            }
-            found.push(chosen, (mask, left), self.variance - explained);
+            let at = [rows, (j - from) * rows_each];
+            let explained = self.candidates.explained(level, &sums, at, left, j);
+            found.push(chosen, (j as Mask + 1, left), self.variance - explained);
         }
     }
 }
