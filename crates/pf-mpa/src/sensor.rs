@@ -98,20 +98,10 @@ pub struct RangeSensor {
     noise: RangeNoise,
 }
 
-#[derive(Deserialize)]
-#[serde(rename = "RangeSensor", deny_unknown_fields)]
-struct Place {
+stored! { #[serde(rename = "RangeSensor")] RangeSensor as Place {
     position: Vector2<f64>,
     noise: RangeNoise,
-}
-
-impl TryFrom<Place> for RangeSensor {
-    type Error = Error;
-
-    fn try_from(stored: Place) -> Result<Self, Error> {
-        Self::new(stored.position, stored.noise)
-    }
-}
+} => RangeSensor::new(position, noise), Error }
 
 impl RangeSensor {
     /// A sensor at `position`.

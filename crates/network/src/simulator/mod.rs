@@ -168,11 +168,13 @@ impl<P: Protocol> Simulator<P> {
         let frame = Frame::decode(&bytes, self.core.check_of(Frame::kind_of(&bytes)));
         let mut context = Context::new(&mut self.core, id);
         let node = &mut self.nodes[id.index()];
-        if let Ok(frame) = frame {
-            self.protocol.on_frame(node, &mut context, from, &frame)
-        } else {
-            context.note(Note::Damaged);
-            self.protocol.on_damaged(node, &mut context, from)
+        match frame {
+            Ok(frame) => self.protocol.on_frame(node, &mut context, from, &frame),
+            Err(error) => {
+                let (with, note) = (from, error.into());
+                context.note(Note::Frame { with, note });
+                self.protocol.on_damaged(node, &mut context, from)
+            }
         }
     }
 
@@ -190,11 +192,6 @@ impl<P: Protocol> Simulator<P> {
             }
         }
         Ok(())
-    }
-
-    /// The protocol.
-    pub fn protocol(&self) -> &P {
-        &self.protocol
     }
 
     /// The nodes.
