@@ -237,22 +237,19 @@ impl<P: Protocol> Simulator<P> {
     /// Cost, lifetime and faults until now. [`Summary::with_errors`] adds the estimation error.
     pub fn summary(&self) -> Summary {
         let now = self.now();
-        let lives = (0..self.nodes.len() as u32).filter_map(|node| {
-            let (radio, account) = (self.core.setup.radio_of(SensorId(node)), &self.ledger().accounts()[node as usize]);
-            let power = account.total(radio, now).value() / now.since_start().value();
+        let spent = || {
+            let accounts = (0..).map(SensorId).zip(self.ledger().accounts());
+            accounts.map(|(node, account)| (node, account, self.core.setup.radio_of(node)))
+        };
+        let lives = spent().filter_map(|(node, account, radio)| {
             let life = match account.died {
                 Some(died) => died.since_start().value(),
-                None => radio.battery?.value() / power,
+                None => radio.battery?.value() / (account.total(radio, now).value() / now.since_start().value()),
             };
-            Seconds::new(life).ok().map(|life| (life, SensorId(node)))
+            Some((Seconds::new(life).ok()?, node))
         });
         let first = lives.min_by(|a, b| a.0.value().total_cmp(&b.0.value()));
-        let energy = (0..self.nodes.len() as u32)
-            .map(|node| {
-                let account = &self.ledger().accounts()[node as usize];
-                account.total(self.core.setup.radio_of(SensorId(node)), now)
-            })
-            .sum();
+        let energy = spent().map(|(_, account, radio)| account.total(radio, now)).sum();
         Summary::new(now.since_start(), self.ledger(), energy, first)
     }
 

@@ -33,7 +33,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                 Action::Send { to, frame } => {
                     let frame = decoded(&frame)?;
                     match to {
-                        Recipient::All => context.broadcast(&frame)?,
+                        Recipient::All => context.broadcast(&frame),
                         Recipient::Sensor(i) => self.send_down(context, SensorId(i as u32 + 1), &frame)?,
                     }
                 }

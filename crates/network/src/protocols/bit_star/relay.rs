@@ -99,7 +99,7 @@ impl<R, const M: usize> BitStar<R, M> {
             && self.routes(context.field()).is_some_and(passes)
         {
             sensor.passed = frame.slot.number();
-            context.broadcast(frame)?;
+            context.broadcast(frame);
         }
         Ok(())
     }
