@@ -15,64 +15,64 @@ pub fn folded(lane: [f64; LANES]) -> f64 {
     ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]))
 }
 
-/// Takes every row of `columns`, as many as the shortest has, to one of the lanes: first those behind the last eight, then eight at a time.
-#[inline(always)]
-fn in_lanes<const K: usize, T>(lanes: &mut [T; LANES], columns: [&[f64]; K], step: impl Fn(&mut T, [f64; K])) {
-    let count = columns.iter().map(|column| column.len()).min().unwrap_or(0);
-    let groups = columns.map(|column| column[..count].as_chunks::<LANES>());
-    for (j, lane) in lanes.iter_mut().take(count % LANES).enumerate() {
-        step(lane, groups.map(|(_, rest)| rest[j]));
-    }
-    for i in 0..count / LANES {
-        let rows = groups.map(|(whole, _)| whole[i]);
-        for (j, lane) in lanes.iter_mut().enumerate() {
-            step(lane, rows.map(|row| row[j]));
-        }
-    }
-}
-
-/// The sum of a term of every row.
-#[inline(always)]
-fn summed<const K: usize>(columns: [&[f64]; K], term: impl Fn([f64; K]) -> f64) -> f64 {
+/// `sum a_i b_i` over the shorter of the two.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     vectorised(
         #[inline(always)]
         || {
-            let mut lanes = [0.0; LANES];
-            in_lanes(
-                &mut lanes,
-                columns,
-                #[inline(always)]
-                |lane, row| *lane += term(row),
-            );
-            folded(lanes)
+            let count = a.len().min(b.len());
+            let (a, b) = (a[..count].chunks_exact(LANES), b[..count].chunks_exact(LANES));
+            let mut lane = [0.0; LANES];
+            for (j, (x, y)) in a.remainder().iter().zip(b.remainder()).enumerate() {
+                lane[j] = x * y;
+            }
+            for (x, y) in a.zip(b) {
+                for j in 0..LANES {
+                    lane[j] += x[j] * y[j];
+                }
+            }
+            folded(lane)
         },
-    )
-}
-
-/// `sum a_i b_i` over the shorter of the two.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    summed(
-        [a, b],
-        #[inline(always)]
-        |[x, y]| x * y,
     )
 }
 
 /// `sum w_i (a_i - mean_a) (b_i - mean_b)` over the weights; columns must be at least as long, shorter ones end the sum.
 pub fn weighted_covariance(weights: &[f64], (a, mean_a): (&[f64], f64), (b, mean_b): (&[f64], f64)) -> f64 {
-    summed(
-        [weights, a, b],
+    vectorised(
         #[inline(always)]
-        |[w, x, y]| w * (x - mean_a) * (y - mean_b),
+        || {
+            let count = weights.len().min(a.len()).min(b.len());
+            let whole = count - count % LANES;
+            let mut lane = [0.0; LANES];
+            for i in whole..count {
+                lane[i - whole] = weights[i] * (a[i] - mean_a) * (b[i] - mean_b);
+            }
+            let columns = a[..whole].chunks_exact(LANES).zip(b[..whole].chunks_exact(LANES));
+            for (w, (a, b)) in weights[..whole].chunks_exact(LANES).zip(columns) {
+                for j in 0..LANES {
+                    lane[j] += w[j] * (a[j] - mean_a) * (b[j] - mean_b);
+                }
+            }
+            folded(lane)
+        },
     )
 }
 
 /// `sum a_i`.
 pub fn sum(a: &[f64]) -> f64 {
-    summed(
-        [a],
+    vectorised(
         #[inline(always)]
-        |[x]| x,
+        || {
+            let chunks = a.chunks_exact(LANES);
+            let mut lane = [0.0; LANES];
+            lane[..chunks.remainder().len()].copy_from_slice(chunks.remainder());
+            for chunk in chunks {
+                for j in 0..LANES {
+                    lane[j] += chunk[j];
+                }
+            }
+            folded(lane)
+        },
     )
 }
 
@@ -81,14 +81,17 @@ pub fn largest(a: &[f64]) -> f64 {
     vectorised(
         #[inline(always)]
         || {
-            let mut lanes = [f64::NEG_INFINITY; LANES];
-            in_lanes(
-                &mut lanes,
-                [a],
-                #[inline(always)]
-                |lane, [x]| *lane = if x > *lane { x } else { *lane },
-            );
-            lanes.into_iter().fold(f64::NEG_INFINITY, f64::max)
+            let chunks = a.chunks_exact(LANES);
+            let mut lane = [f64::NEG_INFINITY; LANES];
+            for (largest, x) in lane.iter_mut().zip(chunks.remainder()) {
+                *largest = if *x > *largest { *x } else { *largest };
+            }
+            for chunk in chunks {
+                for j in 0..LANES {
+                    lane[j] = if chunk[j] > lane[j] { chunk[j] } else { lane[j] };
+                }
+            }
+            lane.into_iter().fold(f64::NEG_INFINITY, f64::max)
         },
     )
 }
@@ -98,13 +101,13 @@ pub fn largest_number(a: &[f64]) -> Option<f64> {
     vectorised(
         #[inline(always)]
         || {
+            let chunks = a.chunks_exact(LANES);
             let (mut lane, mut numbers) = ([f64::NEG_INFINITY; LANES], [true; LANES]);
-            let (whole, rest) = a.as_chunks::<LANES>();
-            for (j, x) in rest.iter().enumerate() {
+            for (j, x) in chunks.remainder().iter().enumerate() {
                 lane[j] = *x;
                 numbers[j] = !x.is_nan();
             }
-            for chunk in whole {
+            for chunk in chunks {
                 for j in 0..LANES {
                     lane[j] = if chunk[j] > lane[j] { chunk[j] } else { lane[j] };
                     numbers[j] &= !chunk[j].is_nan();
@@ -132,25 +135,27 @@ pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
         #[inline(always)]
         || {
             let count = logs.len().min(out.len());
-            let mut lanes = [(0.0, 0.0); LANES];
+            let (mut lane, mut square) = ([0.0; LANES], [0.0; LANES]);
             // In blocks that stay in the nearest cache: a loop that only exponentiates, then one that only adds.
             for (out, logs) in out[..count].chunks_mut(BLOCK).zip(logs[..count].chunks(BLOCK)) {
                 for (out, log) in out.iter_mut().zip(logs) {
                     *out = elementary::exp(log - offset);
                 }
-                in_lanes(
-                    &mut lanes,
-                    [&*out],
-                    #[inline(always)]
-                    |(sum, square), [e]| {
-                        *sum += e;
-                        *square += e * e;
-                    },
-                );
+                let chunks = out.chunks_exact(LANES);
+                for (j, e) in chunks.remainder().iter().enumerate() {
+                    lane[j] += e;
+                    square[j] += e * e;
+                }
+                for chunk in chunks {
+                    for j in 0..LANES {
+                        lane[j] += chunk[j];
+                        square[j] += chunk[j] * chunk[j];
+                    }
+                }
             }
             ExpSums {
-                sum: folded(lanes.map(|lane| lane.0)),
-                sum_of_squares: folded(lanes.map(|lane| lane.1)),
+                sum: folded(lane),
+                sum_of_squares: folded(square),
             }
         },
     )
@@ -166,10 +171,21 @@ pub fn log_sum_exp(logs: &[f64]) -> f64 {
             offset
         };
     }
-    let total = summed(
-        [logs],
+    let total = vectorised(
         #[inline(always)]
-        |[log]| elementary::exp(log - offset),
+        || {
+            let chunks = logs.chunks_exact(LANES);
+            let mut lane = [0.0; LANES];
+            for (j, log) in chunks.remainder().iter().enumerate() {
+                lane[j] = elementary::exp(log - offset);
+            }
+            for chunk in chunks {
+                for j in 0..LANES {
+                    lane[j] += elementary::exp(chunk[j] - offset);
+                }
+            }
+            folded(lane)
+        },
     );
     offset + elementary::ln(total)
 }
