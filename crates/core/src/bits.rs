@@ -63,8 +63,10 @@ pub enum CodecError {
     },
 }
 
-/// A finished sequence of bits; up to 16 bytes need no memory of the heap.
+/// A finished sequence of bits; up to 16 bytes need no memory of the heap. Stored as its bytes and the number of bits.
 #[derive(Debug, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "(Vec<u8>, usize)", into = "(Vec<u8>, usize)"))]
 pub struct BitString {
     bytes: SmallVec<[u8; 16]>,
     bits: usize,
@@ -117,6 +119,20 @@ impl BitString {
             self.bytes[index / 8] ^= 0x80 >> (index % 8);
         }
         self
+    }
+}
+
+impl TryFrom<(Vec<u8>, usize)> for BitString {
+    type Error = CodecError;
+
+    fn try_from((bytes, bits): (Vec<u8>, usize)) -> Result<Self, CodecError> {
+        Self::from_bytes(bytes, bits)
+    }
+}
+
+impl From<BitString> for (Vec<u8>, usize) {
+    fn from(message: BitString) -> Self {
+        (message.bytes.into_vec(), message.bits)
     }
 }
 

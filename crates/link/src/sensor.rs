@@ -166,8 +166,7 @@ impl SensorLink {
     }
 
     fn seal(&mut self, frame: Frame<'_>) -> Result<Request, Error> {
-        let mut bytes = vec![0; frame.len()];
-        frame.encode(self.sensor.settings().check, &mut bytes);
+        let bytes = frame.to_bytes(self.sensor.settings().check);
         let request = self.envelope(&bytes)?;
         if frame.kind == Kind::Report {
             self.last = bytes;

@@ -6,7 +6,7 @@ use crate::store::Store;
 use fewbits_core::{BitString, Observation};
 use fewbits_protocol::{
     Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, SensorHealth,
-    update_asked,
+    predict_and_ask, update_asked,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -36,7 +36,6 @@ pub struct Step {
     /// The slot.
     pub slot: u64,
     /// What was observed of each sensor.
-    #[serde(with = "fewbits_protocol::stored")]
     pub observed: Vec<Observation<BitString>>,
     /// Whether each sensor was asked, and answered what it was asked. One whose address is not known yet cannot be asked; that nothing comes
     /// of it says nothing.
@@ -126,7 +125,7 @@ struct Stored {
     windows: Vec<ReplayWindow>,
     /// Where sensors were last: a centre that goes on need not wait until they speak.
     addresses: Vec<Option<String>>,
-    receiver: (Vec<u8>, usize),
+    receiver: BitString,
     last: Option<Step>,
 }
 
@@ -205,9 +204,9 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
             if !stored.sensors.iter().eq(peers.iter().map(|peer| &peer.number)) || stored.windows.len() != sensors {
                 return Err(refused(format!("it knows the sensors {:?}", stored.sensors)));
             }
-            let (bytes, bits) = stored.receiver;
-            let state = BitString::from_bytes(bytes, bits).map_err(|error| refused(error.to_string()))?;
-            receiver.restore(&state).map_err(|error| refused(error.to_string()))?;
+            receiver
+                .restore(&stored.receiver)
+                .map_err(|error| refused(error.to_string()))?;
             centre.resume(stored.slot);
             windows = stored.windows;
             for (peer, stored) in peers.iter_mut().zip(stored.addresses) {
@@ -344,14 +343,7 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
         self.asked = reached
             .map(|(member, peer)| member.feedback == Feedback::Clock || peer.address.is_some())
             .collect();
-        let follows = members.iter().any(|member| member.feedback == Feedback::Echoed);
-        let prepared = (|| {
-            let state = if follows { Some(self.receiver.state()?) } else { None };
-            self.receiver.predict(slot)?;
-            let feedback = (0..self.peers.len()).map(|i| self.receiver.feedback(i));
-            Ok::<_, fewbits_protocol::BoxError>((feedback.collect::<Result<Vec<_>, _>>()?, state))
-        })();
-        match prepared {
+        match predict_and_ask(&mut self.receiver, members, slot) {
             Ok((feedback, state)) => {
                 let mut actions = Vec::new();
                 self.centre.on_predicted(&feedback, state.as_ref(), &mut actions);
@@ -377,7 +369,6 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
 
     fn save(&self) -> Result<(), Error> {
         let Some(store) = &self.store else { return Ok(()) };
-        let state = self.receiver.state().map_err(Error::Estimator)?;
         store.save(&Stored {
             version: STATE_VERSION,
             sensors: self.peers.iter().map(|peer| peer.number).collect(),
@@ -388,7 +379,7 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
                 .iter()
                 .map(|peer| peer.address.as_ref().map(A::to_string))
                 .collect(),
-            receiver: (state.bytes().to_vec(), state.bits()),
+            receiver: self.receiver.state().map_err(Error::Estimator)?,
             last: self.last.clone(),
         })
     }

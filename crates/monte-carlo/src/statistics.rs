@@ -1,6 +1,5 @@
 //! Summary statistics with standard errors.
 
-use fewbits_numerics::ArgumentError;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -123,19 +122,4 @@ impl Estimate {
             deviation / self.standard_error
         }
     }
-}
-
-/// Paired comparison of two schemes that ran on common random numbers: statistics of the per-trial difference `a - b`.
-///
-/// # Errors
-/// If the slices differ in length or are empty.
-pub fn paired_difference(a: &[f64], b: &[f64]) -> Result<Moments, ArgumentError> {
-    if a.len() != b.len() || a.is_empty() {
-        return Err(ArgumentError::new(
-            "b",
-            format!("{} values against {}", b.len(), a.len()),
-            "as many values as in `a`, at least 1",
-        ));
-    }
-    Ok(a.iter().zip(b).map(|(x, y)| x - y).collect())
 }

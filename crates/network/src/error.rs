@@ -119,11 +119,6 @@ impl Error {
             source: source.into(),
         }
     }
-
-    /// The message with those of all sources, as one line of a log.
-    pub fn in_full(&self) -> String {
-        in_full(self)
-    }
 }
 
 /// The message of an error with those of all sources.

@@ -2,7 +2,7 @@
 
 use crate::error::in_full;
 use crate::units::SensorId;
-use fewbits_protocol as machines;
+use fewbits_protocol::BoxError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -11,25 +11,12 @@ use std::fmt;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Note {
-    /// A frame failed its check.
-    Damaged,
-    /// A frame's payload is no message of its format.
-    Malformed,
-    /// A frame came a second time.
-    Duplicate,
-    /// A frame belongs to a slot that is over.
-    Late,
-    /// The sender's state is not the receiver's.
-    Disagreement {
-        /// Sender of the frame that showed it.
+    /// What the node's machine noticed of a frame.
+    Frame {
+        /// Sender of the frame.
         with: SensorId,
-        /// The slot of the frame.
-        slot: u32,
-    },
-    /// A replica took the state that was sent to it.
-    Resynchronised {
-        /// From which slot on.
-        slot: u32,
+        /// What was noticed.
+        note: fewbits_protocol::Note,
     },
     /// The update failed with the observations as they arrived, and succeeded without the sensors of which nothing arrived.
     SilenceIgnored {
@@ -52,11 +39,6 @@ pub enum Note {
         /// The slot.
         slot: u32,
     },
-    /// A handover was not acknowledged: the leader stays.
-    Retained {
-        /// The slot.
-        slot: u32,
-    },
     /// The node began anew without its memory.
     Restarted,
     /// The node died.
@@ -64,26 +46,9 @@ pub enum Note {
 }
 
 impl Note {
-    pub(crate) fn failed(stage: Stage, slot: u32, error: &machines::BoxError) -> Self {
+    pub(crate) fn failed(stage: Stage, slot: u32, error: &BoxError) -> Self {
         let reason = in_full(&**error);
         Self::Failed { stage, slot, reason }
-    }
-
-    /// A machine's note of a frame of `with`, in the log's words.
-    pub(crate) fn noticed(with: SensorId, note: machines::Note) -> Self {
-        use machines::Note as Noticed;
-        match note {
-            Noticed::Damaged(_) | Noticed::FutureVersion { .. } => Self::Damaged,
-            Noticed::Duplicate { .. } => Self::Duplicate,
-            Noticed::Late { .. } => Self::Late,
-            Noticed::Disagreement { slot } => Self::Disagreement {
-                with,
-                slot: slot.number(),
-            },
-            Noticed::Retained { slot } => Self::Retained { slot: slot.number() },
-            Noticed::Resynchronised { slot } => Self::Resynchronised { slot: slot.number() },
-            _ => Self::Malformed,
-        }
     }
 }
 
@@ -116,18 +81,12 @@ impl fmt::Display for Stage {
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Damaged => f.write_str("damaged frame"),
-            Self::Malformed => f.write_str("malformed frame"),
-            Self::Duplicate => f.write_str("frame came a second time"),
-            Self::Late => f.write_str("late frame"),
-            Self::Disagreement { with, slot } => write!(f, "disagreement with {with}, slot {slot}"),
-            Self::Resynchronised { slot } => write!(f, "resynchronised, slot {slot}"),
+            Self::Frame { with, note } => write!(f, "{note}, {with}"),
             Self::SilenceIgnored { slot, reason } => {
                 write!(f, "missing reports ignored, slot {slot}: {reason}")
             }
             Self::Failed { stage, slot, reason } => write!(f, "{stage} failed, slot {slot}: {reason}"),
             Self::NotMeasured { slot } => write!(f, "no measurement, slot {slot}"),
-            Self::Retained { slot } => write!(f, "handover not acknowledged, slot {slot}"),
             Self::Restarted => f.write_str("restarted"),
             Self::Died => f.write_str("died"),
         }

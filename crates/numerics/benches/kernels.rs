@@ -37,7 +37,7 @@ fn standard_normals_block(bencher: Bencher) {
     let mut rng = Pcg64Mcg::seed_from_u64(1);
     let mut out = vec![0.0; COUNT];
     bencher.counter(ItemsCount::new(COUNT)).bench_local(|| {
-        kernels::fill_standard_normals(&mut rng, &mut out);
+        kernels::StandardNormals::new(&mut rng).fill(&mut out);
         black_box(&out);
     });
 }
@@ -62,11 +62,6 @@ fn ln(bencher: Bencher) {
 }
 
 #[divan::bench]
-fn erfcx(bencher: Bencher) {
-    in_place(bencher, kernels::erfcx, normals(3.0));
-}
-
-#[divan::bench]
 fn cdf(bencher: Bencher) {
     in_place(bencher, kernels::cdf, normals(3.0));
 }
@@ -84,11 +79,6 @@ fn log_cdf_scalar(bencher: Bencher) {
             .for_each(|x| *x = fewbits_numerics::normal::log_cdf(*x))
     };
     in_place(bencher, one_by_one, normals(3.0));
-}
-
-#[divan::bench]
-fn inverse_mills(bencher: Bencher) {
-    in_place(bencher, kernels::inverse_mills, normals(3.0));
 }
 
 #[divan::bench]

@@ -44,8 +44,3 @@ pub fn number(bits: u64) -> f64 {
         _ => 10.0_f64.powi((rest % 600) as i32 - 300),
     }
 }
-
-/// A number for each of some bits.
-pub fn numbers<const N: usize>(bits: [u64; N]) -> [f64; N] {
-    bits.map(number)
-}

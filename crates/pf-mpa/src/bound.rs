@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::error::refuse;
+use crate::factor::log_inside;
 use crate::quantized::RangeReference;
 use crate::sensor::{RangeNoise, RangeSensor};
 use crate::target::Target;
@@ -43,10 +44,10 @@ pub fn level_information(
         return refuse("levels", levels, "at least 2 levels");
     }
     let (sigma, slope) = (noise.deviation(distance), noise.slope(distance));
-    // Place of an edge in deviations, and the slope of Phi there.
+    // An edge, and the slope of Phi there.
     let at = |edge: f64| {
         let t = (edge - distance) / sigma;
-        (t, -normal::pdf(t) * (1.0 + t * slope) / sigma)
+        (edge, -normal::pdf(t) * (1.0 + t * slope) / sigma)
     };
     let mut sum = 0.0;
     let mut lower = (f64::NEG_INFINITY, 0.0);
@@ -59,21 +60,11 @@ pub fn level_information(
         };
         let change: f64 = upper.1 - lower.1;
         if change != 0.0 {
-            sum += (2.0 * change.abs().ln() - log_inside(lower.0, upper.0)).exp();
+            sum += (2.0 * change.abs().ln() - log_inside(lower.0, upper.0, distance, sigma)).exp();
         }
         lower = upper;
     }
     information(sum)
-}
-
-fn log_inside(a: f64, b: f64) -> f64 {
-    if b == f64::INFINITY {
-        normal::log_cdf(-a)
-    } else if a == f64::NEG_INFINITY {
-        normal::log_cdf(b)
-    } else {
-        normal::log_interval(a, b)
-    }
 }
 
 /// The posterior Cramer-Rao bound of `[x, y, vx, vy]`, step by step. The accelerations count as known: a bound for a filter that
@@ -91,26 +82,8 @@ impl CramerRao {
         }
     }
 
-    /// `J_k = (F J_{k-1}^-1 F' + G q G')^-1 + sum_s I_s u_s u_s'`, held as `J^-1`. `information` lists each sensor's information
-    /// about its distance, averaged over what is unknown, and its direction at the target.
-    ///
-    /// # Errors
-    /// If an information is negative or no number.
-    pub fn step(
-        &mut self,
-        target: &Target,
-        information: impl IntoIterator<Item = (f64, Vector2<f64>)>,
-    ) -> Result<(), Error> {
-        let mut total = Matrix4::zeros();
-        for (own, u) in information {
-            let part = u * u.transpose() * fewbits_numerics::error::non_negative("information", own)?;
-            let mut block = total.fixed_view_mut::<2, 2>(0, 0);
-            block += part;
-        }
-        self.step_with(target, &total)
-    }
-
-    /// The same from the expected information matrix about the position.
+    /// `J_k = (F J_{k-1}^-1 F' + G q G')^-1 + I`, held as `J^-1`. `information` is expected: [`position_information`], averaged over what is
+    /// unknown.
     ///
     /// # Errors
     /// If a matrix is not positive semidefinite.

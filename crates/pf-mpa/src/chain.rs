@@ -113,7 +113,7 @@ fn times(row: &[f64; 3], matrix: &[[f64; 3]; 3]) -> [f64; 3] {
     product.map(|p| p / total)
 }
 
-fn draw<R: Rng + ?Sized>(rng: &mut R, law: &[f64; 3], values: &[f64; 3]) -> f64 {
+pub(crate) fn draw<R: Rng + ?Sized>(rng: &mut R, law: &[f64; 3], values: &[f64; 3]) -> f64 {
     let u: f64 = rng.random();
     if u < law[0] {
         values[0]
@@ -142,12 +142,5 @@ mod tests {
         let swap = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         let swapping = AccelerationChain::new(1.0, [1.0, 0.0, 0.0], swap).unwrap();
         assert_eq!((swapping.law(usize::MAX), swapping.law(1 << 60)), ([0.0, 1.0, 0.0], [1.0, 0.0, 0.0]));
-    }
-
-    #[test]
-    fn bad_chains_are_refused() {
-        let printed = AccelerationChain::printed(0.1).unwrap();
-        assert!(AccelerationChain::new(0.1, [0.7, 0.2, 0.2], printed.transition).is_err());
-        assert!(AccelerationChain::new(f64::NAN, printed.initial, printed.transition).is_err());
     }
 }

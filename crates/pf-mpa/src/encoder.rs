@@ -7,7 +7,7 @@ use crate::sensor::RangeNoise;
 use crate::target::Target;
 use fewbits_core::{Gaussian, Sensing};
 use fewbits_numerics::error::positive;
-use fewbits_numerics::normal;
+use fewbits_numerics::{golden, normal};
 use serde::{Deserialize, Serialize};
 
 /// Terms of the published normalisation `N_f` (3.13), whose last one is dimensionally inconsistent (erratum `mpa-2`).
@@ -162,23 +162,8 @@ pub fn optimal_loading(levels: usize) -> Result<f64, Error> {
         };
         (0..levels).map(cell).sum::<f64>()
     };
-    // Unimodal: golden section.
-    const SHARE: f64 = 0.618_033_988_749_894_9;
-    let (mut low, mut high) = (0.5, 12.0);
-    let (mut a, mut b) = (high - SHARE * (high - low), low + SHARE * (high - low));
-    let (mut at_a, mut at_b) = (error(a), error(b));
-    for _ in 0..48 {
-        if at_a < at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - SHARE * (high - low);
-            at_a = error(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + SHARE * (high - low);
-            at_b = error(b);
-        }
-    }
-    Ok(0.5 * (low + high))
+    // Of loadings whose errors differ by less than rounding the largest is kept: the search runs over `-loading`.
+    Ok(-golden::maximum(|x| -error(-x), -12.0, -0.5, 1e-10).0)
 }
 
 #[cfg(test)]

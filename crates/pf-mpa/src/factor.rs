@@ -197,7 +197,7 @@ impl RangeFactor {
 
 /// `ln P(d + v in [lower, upper))`.
 #[inline]
-fn log_inside(lower: f64, upper: f64, d: f64, deviation: f64) -> f64 {
+pub(crate) fn log_inside(lower: f64, upper: f64, d: f64, deviation: f64) -> f64 {
     if upper == f64::INFINITY {
         normal::log_cdf((d - lower) / deviation)
     } else if lower == f64::NEG_INFINITY {
@@ -223,6 +223,19 @@ fn log_mixed(edges: &[f64], given: &[f64], d: f64, deviation: f64) -> f64 {
     largest + terms.map(|t| (t - largest).exp()).sum::<f64>().ln()
 }
 
+/// Adds `log(d)` of every distance, in vector registers. `log` must be inlined.
+#[inline(always)]
+fn add_to_each(log_weights: &mut [f64], distances: &[f64], log: impl Fn(f64) -> f64) {
+    vectorised(
+        #[inline(always)]
+        || {
+            for (log_weight, d) in log_weights.iter_mut().zip(distances) {
+                *log_weight += log(*d);
+            }
+        },
+    );
+}
+
 impl Factor<1> for RangeFactor {
     #[inline]
     fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
@@ -233,17 +246,16 @@ impl Factor<1> for RangeFactor {
         if !lengths_agree(means, log_weights) {
             return;
         }
-        let noise = self.noise;
-        let pairs = log_weights.iter_mut().zip(means[0]);
+        let (noise, distances) = (self.noise, means[0]);
         match &self.kind {
-            Kind::Value { range, log_share } => vectorised(
+            Kind::Value { range, log_share } => add_to_each(
+                log_weights,
+                distances,
                 #[inline(always)]
-                || {
-                    for (log_weight, d) in pairs {
-                        let deviation = noise.deviation(*d);
-                        let t = (range - d) / deviation;
-                        *log_weight += log_share - (0.5 * t * t + normal::LN_SQRT_2PI + scalar::ln(deviation));
-                    }
+                |d| {
+                    let deviation = noise.deviation(d);
+                    let t = (range - d) / deviation;
+                    log_share - (0.5 * t * t + normal::LN_SQRT_2PI + scalar::ln(deviation))
                 },
             ),
             Kind::Cell {
@@ -261,38 +273,35 @@ impl Factor<1> for RangeFactor {
                     None
                 };
                 match cut {
-                    Some((edge, sign)) => vectorised(
+                    Some((edge, sign)) => add_to_each(
+                        log_weights,
+                        distances,
                         #[inline(always)]
-                        || {
-                            for (log_weight, d) in pairs {
-                                *log_weight += log_share + scalar::log_cdf(sign * ((d - edge) / noise.deviation(*d)));
-                            }
+                        |d| log_share + scalar::log_cdf(sign * ((d - edge) / noise.deviation(d))),
+                    ),
+                    None if self.is_wide(upper - lower, distances) => add_to_each(
+                        log_weights,
+                        distances,
+                        #[inline(always)]
+                        |d| {
+                            let (above, below) = (d - lower, upper - d);
+                            let inside = if above < below { above } else { below };
+                            log_share + scalar::log_cdf(inside / noise.deviation(d))
                         },
                     ),
-                    None if self.is_wide(upper - lower, means[0]) => vectorised(
+                    None => add_to_each(
+                        log_weights,
+                        distances,
                         #[inline(always)]
-                        || {
-                            for (log_weight, d) in pairs {
-                                let (above, below) = (d - lower, upper - d);
-                                let inside = if above < below { above } else { below };
-                                *log_weight += log_share + scalar::log_cdf(inside / noise.deviation(*d));
-                            }
-                        },
-                    ),
-                    None => vectorised(
-                        #[inline(always)]
-                        || {
-                            for (log_weight, d) in pairs {
-                                let deviation = noise.deviation(*d);
-                                let (a, b) = ((lower - d) / deviation, (upper - d) / deviation);
-                                *log_weight += log_share + scalar::log_interval(a, b);
-                            }
+                        |d| {
+                            let deviation = noise.deviation(d);
+                            log_share + scalar::log_interval((lower - d) / deviation, (upper - d) / deviation)
                         },
                     ),
                 }
             }
             Kind::Levels { .. } | Kind::Constant(_) => {
-                for (log_weight, d) in pairs {
+                for (log_weight, d) in log_weights.iter_mut().zip(distances) {
                     *log_weight += self.log_probability(*d);
                 }
             }

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::error::refuse;
 use crate::linearised::Linearised;
 use crate::target::{Manoeuvres, Target};
-use crate::tracker::{Ranged, StepInfo, Tracker};
+use crate::tracker::{GaussianTracker, Ranged, StepInfo};
 use fewbits_core::columns::set_state;
 use fewbits_core::{Gaussian, Likelihood};
 use fewbits_numerics::kernels;
@@ -55,7 +55,7 @@ impl GuidedGaussian {
         Ok(Self { draws })
     }
 
-    /// Weighted draws of the position; log evidence, ESS, mean and covariance, or none where ESS is too small.
+    /// The belief by weighted draws of the position; none where their effective sample size is too small.
     fn update<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -63,7 +63,7 @@ impl GuidedGaussian {
         guide: &Gaussian<4>,
         observed: &[Ranged],
         workspace: &mut GuidedWorkspace,
-    ) -> Result<Option<(Gaussian<4>, f64, f64)>, Error> {
+    ) -> Result<Option<(Gaussian<4>, StepInfo)>, Error> {
         let prior = position(predicted).factored()?;
         let about = position(guide);
         let proposal = Gaussian::from_trusted_parts(*about.mean(), about.covariance() * INFLATION).factored()?;
@@ -94,23 +94,23 @@ impl GuidedGaussian {
             kernels::weighted_covariance(weights, (&places[a], mean[a]), (&places[b], mean[b])) * size / (size - 1.0)
         };
         let covariance = Matrix2::new(spread(0, 0), spread(0, 1), spread(0, 1), spread(1, 1));
-        let updated = regressed(predicted, &mean, &covariance)?;
-        Ok(Some((updated, peak + (total / self.draws as f64).ln(), size)))
+        let info = StepInfo {
+            log_likelihood: Some(peak + (total / self.draws as f64).ln()),
+            effective_sample_size: Some(size),
+            fallbacks: 0,
+        };
+        Ok(Some((regressed(predicted, &mean, &covariance)?, info)))
     }
 }
 
 /// The belief about the position.
-pub(crate) fn position(belief: &Gaussian<4>) -> Gaussian<2> {
+fn position(belief: &Gaussian<4>) -> Gaussian<2> {
     let covariance: Matrix2<f64> = belief.covariance().fixed_view::<2, 2>(0, 0).into();
     Gaussian::from_trusted_parts(Vector2::new(belief.mean()[0], belief.mean()[1]), covariance)
 }
 
 /// The belief when the position's has become `N(mean, covariance)`: the velocity follows by regression.
-pub(crate) fn regressed(
-    predicted: &Gaussian<4>,
-    mean: &Vector2<f64>,
-    covariance: &Matrix2<f64>,
-) -> Result<Gaussian<4>, Error> {
+fn regressed(predicted: &Gaussian<4>, mean: &Vector2<f64>, covariance: &Matrix2<f64>) -> Result<Gaussian<4>, Error> {
     let own = position(predicted);
     let factor = own.cholesky()?;
     let cross = predicted.covariance().fixed_view::<2, 4>(0, 0).into_owned();
@@ -118,57 +118,27 @@ pub(crate) fn regressed(
     let kept = predicted.covariance() - gain * cross;
     let covariance = symmetrised(&(kept + gain * covariance * gain.transpose()));
     let mean = predicted.mean() + gain * (mean - own.mean());
-    if !mean.iter().chain(covariance.iter()).all(|x| x.is_finite()) {
-        return Err(Error::IMPOSSIBLE);
-    }
     Ok(Gaussian::from_trusted_parts(mean, covariance))
 }
 
-impl Tracker for GuidedGaussian {
-    type Belief = Gaussian<4>;
+impl GaussianTracker for GuidedGaussian {
     type Workspace = GuidedWorkspace;
 
-    fn start<R: Rng + ?Sized>(&self, _: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<Gaussian<4>, Error> {
-        Ok(*prior)
-    }
-
-    fn estimate(&self, belief: &Gaussian<4>) -> Gaussian<4> {
-        *belief
-    }
-
-    fn step_in_place<R: Rng + ?Sized>(
+    fn advance<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
         target: &Target,
         k: usize,
-        belief: &mut Gaussian<4>,
+        belief: &Gaussian<4>,
         observed: &[Ranged],
         workspace: &mut GuidedWorkspace,
-    ) -> Result<StepInfo, Error> {
+    ) -> Result<(Gaussian<4>, StepInfo), Error> {
         let predicted = target.predict(belief, k, Manoeuvres::AsNoise);
         let (guide, guess) = Linearised::MESSAGE_PASSING.update(&predicted, observed)?;
-        let (next, info) = match self.update(rng, &predicted, &guide, observed, workspace)? {
-            Some((updated, log_likelihood, size)) => {
-                let info = StepInfo {
-                    log_likelihood: Some(log_likelihood),
-                    effective_sample_size: Some(size),
-                    fallbacks: 0,
-                };
-                (updated, info)
-            }
-            None => {
-                let info = StepInfo {
-                    log_likelihood: Some(guess),
-                    effective_sample_size: None,
-                    fallbacks: 1,
-                };
-                (guide, info)
-            }
-        };
-        if !next.is_finite() {
+        if !guide.is_finite() {
             return Err(Error::IMPOSSIBLE);
         }
-        *belief = next;
-        Ok(info)
+        let updated = self.update(rng, &predicted, &guide, observed, workspace)?;
+        Ok(updated.unwrap_or((guide, StepInfo { fallbacks: 1, ..guess })))
     }
 }

@@ -2,11 +2,11 @@
 
 use crate::Error;
 use crate::target::{Manoeuvres, Target};
-use crate::tracker::{Ranged, StepInfo, Tracker};
+use crate::tracker::{GaussianTracker, Ranged, StepInfo};
 use fewbits_core::Gaussian;
 use fewbits_filters::kalman;
 use fewbits_models::LinearSensor;
-use nalgebra::{Matrix1, Matrix4, RowVector4, Vector1, Vector4};
+use nalgebra::{Matrix1, Matrix4, RowVector4, Vector1, Vector2, Vector4};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -71,29 +71,21 @@ impl Linearised {
         ..Self::MESSAGE_PASSING
     };
 
-    /// Measurement update of a predicted belief; returns `ln p(reconstructions | past)`.
+    /// Measurement update of a predicted belief, with `ln p(reconstructions | past)`.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if the result is no number.
-    pub fn update(&self, predicted: &Gaussian<4>, observed: &[Ranged]) -> Result<(Gaussian<4>, f64), Error> {
+    /// If a range is no number.
+    pub fn update(&self, predicted: &Gaussian<4>, observed: &[Ranged]) -> Result<(Gaussian<4>, StepInfo), Error> {
         let (mut next, mut log_likelihood) = (*predicted, 0.0);
         let about = *predicted.mean();
-        for range in observed {
-            let Some((value, quantization)) = range.factor.reconstruction() else {
-                continue;
+        for range in observed.iter().filter_map(|range| LinearRange::at(range, about.xy())) {
+            let quantization = match self.quantization {
+                QuantizationNoise::Ignored => 0.0,
+                QuantizationNoise::Uniform => range.quantization_variance,
             };
-            let direction = range.sensing.direction(about[0], about[1]);
-            let distance = range.sensing.distance(about[0], about[1]);
-            let row = RowVector4::new(direction[0], direction[1], 0.0, 0.0);
-            let sigma = range.factor.noise().deviation(distance);
-            let noise = sigma * sigma
-                + match self.quantization {
-                    QuantizationNoise::Ignored => 0.0,
-                    QuantizationNoise::Uniform => quantization,
-                };
-            // The range as a linear function of the state about the predicted mean.
-            let sensing = LinearSensor::new(row, Matrix1::new(noise))?;
-            let measured = row * about + Vector1::new(value - distance);
+            let row = RowVector4::new(range.direction[0], range.direction[1], 0.0, 0.0);
+            let sensing = LinearSensor::new(row, Matrix1::new(range.noise_variance + quantization))?;
+            let measured = row * about + Vector1::new(range.innovation);
             let (updated, info) = kalman::update(&sensing, &next, &measured)?;
             next = updated;
             log_likelihood += info.log_likelihood;
@@ -101,10 +93,35 @@ impl Linearised {
         if self.velocity == Velocity::Transfer {
             next = transferred(predicted, &next);
         }
-        if !next.is_finite() {
-            return Err(Error::IMPOSSIBLE);
-        }
-        Ok((next, log_likelihood))
+        let info = StepInfo {
+            log_likelihood: Some(log_likelihood),
+            ..StepInfo::default()
+        };
+        Ok((next, info))
+    }
+}
+
+/// A range as a linear function of the position about some place, where it says anything.
+pub(crate) struct LinearRange {
+    /// Slope of the distance.
+    pub(crate) direction: Vector2<f64>,
+    /// The reconstruction less the distance of the place.
+    pub(crate) innovation: f64,
+    pub(crate) noise_variance: f64,
+    pub(crate) quantization_variance: f64,
+}
+
+impl LinearRange {
+    pub(crate) fn at(range: &Ranged, place: Vector2<f64>) -> Option<Self> {
+        let (value, quantization_variance) = range.factor.reconstruction()?;
+        let distance = range.sensing.distance(place[0], place[1]);
+        let deviation = range.factor.noise().deviation(distance);
+        Some(Self {
+            direction: range.sensing.direction(place[0], place[1]),
+            innovation: value - distance,
+            noise_variance: deviation * deviation,
+            quantization_variance,
+        })
     }
 }
 
@@ -119,32 +136,18 @@ fn transferred(predicted: &Gaussian<4>, updated: &Gaussian<4>) -> Gaussian<4> {
     Gaussian::from_trusted_parts(Vector4::new(mean[0], mean[1], own[2], own[3]), joined)
 }
 
-impl Tracker for Linearised {
-    type Belief = Gaussian<4>;
+impl GaussianTracker for Linearised {
     type Workspace = ();
 
-    fn start<R: Rng + ?Sized>(&self, _: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<Gaussian<4>, Error> {
-        Ok(*prior)
-    }
-
-    fn estimate(&self, belief: &Gaussian<4>) -> Gaussian<4> {
-        *belief
-    }
-
-    fn step_in_place<R: Rng + ?Sized>(
+    fn advance<R: Rng + ?Sized>(
         &self,
         _: &mut R,
         target: &Target,
         k: usize,
-        belief: &mut Gaussian<4>,
+        belief: &Gaussian<4>,
         observed: &[Ranged],
         (): &mut (),
-    ) -> Result<StepInfo, Error> {
-        let (next, log_likelihood) = self.update(&target.predict(belief, k, self.manoeuvres), observed)?;
-        *belief = next;
-        Ok(StepInfo {
-            log_likelihood: Some(log_likelihood),
-            ..StepInfo::default()
-        })
+    ) -> Result<(Gaussian<4>, StepInfo), Error> {
+        self.update(&target.predict(belief, k, self.manoeuvres), observed)
     }
 }

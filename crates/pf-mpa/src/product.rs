@@ -1,15 +1,13 @@
-//! Products of mixtures: exact by enumeration, Gibbs sampling over labels, importance sampling.
+//! Products of mixtures: exact by enumeration, and Gibbs sampling over labels.
 //!
 //! The product of `F` mixtures is a mixture of one Gaussian for each choice of labels `b_1 .. b_F`, with
 //! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form: exact where the labels can
-//! be enumerated. Where they cannot, Gibbs sweeps draw one label at a time given the others, and importance sampling draws from
-//! one factor and weighs by the rest.
+//! be enumerated. Where they cannot, Gibbs sweeps draw one label at a time given the others. Where one factor is as concentrated as the
+//! product, as a prediction is, [`MixtureImportance`](crate::published::ProductSampler::MixtureImportance) is better.
 
 use crate::Error;
 use fewbits_densities::{Component, Mixture, Particles};
-use fewbits_filters::Resampling;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
@@ -19,12 +17,12 @@ use rand_distr::StandardNormal;
 /// The most label choices that [`exact`] enumerates.
 pub const MOST_TERMS: usize = 1_000_000;
 
-/// A normalised product and the logarithm of its normaliser `int prod_l p_l(x) dx`.
+/// A normalised product and the logarithm of its normaliser.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Product<B> {
+pub struct Product<const D: usize> {
     /// The normalised product.
-    pub belief: B,
-    /// `ln int prod_l p_l(x) dx`: exact, or its estimate.
+    pub belief: Mixture<D>,
+    /// `ln int prod_l p_l(x) dx`.
     pub log_normaliser: f64,
 }
 
@@ -72,19 +70,15 @@ fn check<const D: usize>(factors: &[&Mixture<D>]) -> Result<SVector<f64, D>, Err
 /// # Errors
 /// If there is no factor, there are more than [`MOST_TERMS`] choices, or every weight underflows
 /// ([`fewbits_core::Error::Impossible`]: factors that contradict each other astronomically).
-pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<D>>, Error> {
+pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<D>, Error> {
     let origin = check(factors)?;
     let terms = factors
         .iter()
         .try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MOST_TERMS));
     if terms.is_none() {
         let sizes: Vec<usize> = factors.iter().map(|f| f.len()).collect();
-        return Err(ArgumentError::new(
-            "factors",
-            format!("mixtures of {sizes:?} components"),
-            format!("at most {MOST_TERMS} choices of labels"),
-        )
-        .into());
+        let expected = format!("at most {MOST_TERMS} choices of labels");
+        return refuse("factors", format!("mixtures of {sizes:?} components"), expected);
     }
     let zero = Information {
         precision: SMatrix::zeros(),
@@ -233,51 +227,4 @@ fn pick<R: Rng + ?Sized>(rng: &mut R, weights: impl Iterator<Item = f64> + Clone
         }
     }
     last
-}
-
-/// `count` weighted draws of the product: from factor `proposal`, weighed by all others. The better choice than Gibbs whenever
-/// that factor is as concentrated as the product, as a prediction is; its weights tell when it is not.
-///
-/// # Errors
-/// If there is no factor, no draw, no such factor, or no weight is left ([`fewbits_core::Error::Impossible`]).
-pub fn importance<const D: usize, R: Rng + ?Sized>(
-    rng: &mut R,
-    factors: &[&Mixture<D>],
-    proposal: usize,
-    count: usize,
-) -> Result<Product<Particles<D>>, Error> {
-    check(factors)?;
-    let Some(from) = factors.get(proposal) else {
-        return Err(ArgumentError::new("proposal", proposal, format!("below {}", factors.len())).into());
-    };
-    let mut belief = from.sample_systematic(rng, count)?;
-    let mut log = vec![0.0; count];
-    let log_normaliser = belief.reweigh(|columns, weights| {
-        for (l, factor) in factors.iter().enumerate() {
-            if l != proposal {
-                factor.log_pdf_columns(columns, &mut log);
-                weights.iter_mut().zip(&log).for_each(|(w, x)| *w += x);
-            }
-        }
-    })?;
-    Ok(Product { belief, log_normaliser })
-}
-
-/// [`importance`], resampled to equally weighted draws by systematic selection.
-///
-/// # Errors
-/// As [`importance`].
-pub fn importance_resampled<const D: usize, R: Rng + ?Sized>(
-    rng: &mut R,
-    factors: &[&Mixture<D>],
-    proposal: usize,
-    draws: usize,
-    count: usize,
-) -> Result<Particles<D>, Error> {
-    at_least_one("count", count)?;
-    let mut belief = importance(rng, factors, proposal, draws)?.belief;
-    let mut ancestors = vec![0; count];
-    Resampling::Systematic.ancestors(rng, belief.weights(), &mut ancestors)?;
-    belief.select(&ancestors)?;
-    Ok(belief)
 }

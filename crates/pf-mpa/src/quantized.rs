@@ -275,13 +275,5 @@ mod tests {
         };
         let levels = [-1e300, 2.9, 3.0, 4.0, 5.0, 6.999, 7.0, 1e300].map(|z| scheme.level(z, &reference).unwrap().0);
         assert_eq!(levels, [0, 0, 0, 1, 2, 3, 3, 3]);
-        assert!(scheme.level(f64::NAN, &reference).is_err());
-        let broken = RangeReference {
-            centre: 5.0,
-            half_width: 0.0,
-        };
-        assert!(scheme.level(5.0, &broken).is_err());
-        assert!(scheme.received(Symbol(4), &reference).is_err());
-        assert!(QuantizedRange::new(1, *scheme.noise()).is_err());
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::error::refuse;
+use crate::linearised::LinearRange;
 use crate::target::{Target, WithManoeuvre};
 use crate::tracker::{Ranged, StepInfo, Tracker};
 use fewbits_core::columns::set_state;
@@ -157,16 +158,10 @@ fn propose<R: Rng + ?Sized>(rng: &mut R, mean: &Vector2<f64>, spread: f64, obser
     let spread = spread.max(f64::MIN_POSITIVE);
     let mut precision = Matrix2::identity() / spread;
     let mut shift = Vector2::zeros();
-    for range in observed {
-        let Some((value, quantization)) = range.factor.reconstruction() else {
-            continue;
-        };
-        let direction = range.sensing.direction(mean[0], mean[1]);
-        let distance = range.sensing.distance(mean[0], mean[1]);
-        let sigma = range.factor.noise().deviation(distance);
-        let noise = sigma * sigma + quantization;
+    for range in observed.iter().filter_map(|range| LinearRange::at(range, *mean)) {
+        let (direction, noise) = (range.direction, range.noise_variance + range.quantization_variance);
         precision += direction * direction.transpose() / noise;
-        shift += direction * ((value - distance) / noise);
+        shift += direction * (range.innovation / noise);
     }
     let Some(factor) = Cholesky::new(precision) else {
         return (*mean, f64::NEG_INFINITY);

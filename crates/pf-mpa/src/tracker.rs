@@ -78,6 +78,65 @@ pub trait Tracker {
     }
 }
 
+/// A tracker whose belief is a Gaussian, and what makes it a [`Tracker`].
+pub trait GaussianTracker {
+    /// Buffers kept from step to step.
+    type Workspace: Default;
+
+    /// Checks the settings, before the first step.
+    ///
+    /// # Errors
+    /// If one is out of range.
+    fn check(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// The belief after step `k`. A mean or covariance that is no number is [`fewbits_core::Error::Impossible`].
+    ///
+    /// # Errors
+    /// As [`Tracker::step_in_place`].
+    fn advance<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        target: &Target,
+        k: usize,
+        belief: &Gaussian<4>,
+        observed: &[Ranged],
+        workspace: &mut Self::Workspace,
+    ) -> Result<(Gaussian<4>, StepInfo), Error>;
+}
+
+impl<T: GaussianTracker> Tracker for T {
+    type Belief = Gaussian<4>;
+    type Workspace = T::Workspace;
+
+    fn start<R: Rng + ?Sized>(&self, _: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<Gaussian<4>, Error> {
+        self.check()?;
+        Ok(*prior)
+    }
+
+    fn estimate(&self, belief: &Gaussian<4>) -> Gaussian<4> {
+        *belief
+    }
+
+    fn step_in_place<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        target: &Target,
+        k: usize,
+        belief: &mut Gaussian<4>,
+        observed: &[Ranged],
+        workspace: &mut T::Workspace,
+    ) -> Result<StepInfo, Error> {
+        let (next, info) = self.advance(rng, target, k, belief, observed, workspace)?;
+        if !next.is_finite() {
+            return Err(Error::IMPOSSIBLE);
+        }
+        *belief = next;
+        Ok(info)
+    }
+}
+
 /// What the sensors report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -127,7 +127,6 @@ pub struct Centre {
     open: bool,
     /// Digests of what the sensors were told.
     digests: Vec<u32>,
-    #[serde(with = "crate::centre::stored")]
     observed: Vec<Observation<BitString>>,
     /// Sensors whose answer rests on something else than they were told in the slot.
     unusable: Vec<bool>,
@@ -220,11 +219,7 @@ impl Centre {
         let empty = BitString::default();
         let told = |i: usize| feedback.get(i).unwrap_or(&empty);
         let members = &self.settings.members;
-        let encode = |frame: Frame<'_>| {
-            let mut bytes = vec![0; frame.len()];
-            frame.encode(self.settings.check, &mut bytes);
-            bytes
-        };
+        let encode = |frame: Frame<'_>| frame.to_bytes(self.settings.check);
 
         // One frame for all where all are told the same.
         let mut spoken = false;
@@ -353,43 +348,8 @@ impl Centre {
         self.heard[sensor] = Some(slot);
         if kind == Kind::Report && self.settings.acknowledges {
             let ack = Frame::new(Kind::Acknowledgement, slot, frame.digest, Payload::EMPTY);
-            let mut bytes = vec![0; ack.len()];
-            ack.encode(self.settings.check, &mut bytes);
-            let to = Recipient::Sensor(sensor);
-            actions.push(Action::Send { to, frame: bytes });
+            let (to, frame) = (Recipient::Sensor(sensor), ack.to_bytes(self.settings.check));
+            actions.push(Action::Send { to, frame });
         }
-    }
-}
-
-/// Observations for serde, by `#[serde(with = "fewbits_protocol::stored")]`: bits as bytes and their number.
-pub mod stored {
-    use super::{BitString, Deserialize, Observation, Serialize};
-    use serde::{Deserializer, Serializer, de::Error};
-
-    /// Writes a list.
-    ///
-    /// # Errors
-    /// Those of the format.
-    pub fn serialize<S: Serializer>(observed: &[Observation<BitString>], to: S) -> Result<S::Ok, S::Error> {
-        let bytes = |o: &Observation<BitString>| o.clone().map(|bits| (bits.bytes().to_vec(), bits.bits()));
-        observed.iter().map(bytes).collect::<Vec<_>>().serialize(to)
-    }
-
-    /// Reads a list.
-    ///
-    /// # Errors
-    /// Those of the format; if bits are missing.
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Observation<BitString>>, D::Error> {
-        let stored = Vec::<Observation<(Vec<u8>, usize)>>::deserialize(from)?;
-        let bits = |observation| {
-            Ok(match observation {
-                Observation::Received((bytes, bits)) => {
-                    Observation::Received(BitString::from_bytes(bytes, bits).map_err(D::Error::custom)?)
-                }
-                Observation::Nothing => Observation::Nothing,
-                Observation::Lost => Observation::Lost,
-            })
-        };
-        stored.into_iter().map(bits).collect()
     }
 }

@@ -142,6 +142,15 @@ impl<'a> Frame<'a> {
         Some(bytes)
     }
 
+    /// The bytes of the frame.
+    #[cfg(feature = "std")]
+    pub fn to_bytes(&self, check: Check) -> Vec<u8> {
+        let mut bytes = vec![0; self.len()];
+        // The buffer is as long as the frame.
+        self.encode(check, &mut bytes);
+        bytes
+    }
+
     /// What bytes say they carry, unchecked; `None` if there are none.
     pub fn kind_of(bytes: &[u8]) -> Option<Kind> {
         // Three bits: always one of the eight.
@@ -190,6 +199,8 @@ impl<'a> Frame<'a> {
 
 /// Why bytes are no frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum DecodeError {
     /// The frame is of another version of the format, 0 to 3. Nothing else of it was looked at.

@@ -7,7 +7,7 @@ use crate::receiver::BoxError;
 use crate::slot::{Schedule, Slot};
 use fewbits_core::BitString;
 use fewbits_core::rand::Rng;
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+use serde::{Deserialize, Serialize};
 
 /// What a leader does with the belief that it was handed. Object-safe.
 pub trait Leader {
@@ -63,29 +63,12 @@ pub enum Errand {
     },
 }
 
-/// A belief as it is stored: bytes and their number of bits.
-#[derive(Debug, Clone, PartialEq)]
-struct Belief(BitString);
-
-impl Serialize for Belief {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        (self.0.bytes(), self.0.bits()).serialize(to)
-    }
-}
-
-impl<'de> Deserialize<'de> for Belief {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let (bytes, bits) = <(Vec<u8>, usize)>::deserialize(from)?;
-        BitString::from_bytes(bytes, bits).map(Self).map_err(D::Error::custom)
-    }
-}
-
 /// A handover that was sent and is not acknowledged yet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Pending {
     name: (Slot, u32),
     destination: u32,
-    belief: Belief,
+    belief: BitString,
 }
 
 /// A node of a walk: it leads where it was handed the belief, and passes on what is for others. Events in, [`Errand`]s out.
@@ -106,9 +89,9 @@ pub struct Bearer {
     /// Whether a link tells what became of a handover.
     acknowledged: bool,
     /// The slot in which it leads, and the belief that it was handed.
-    leading: Option<(Slot, Option<Belief>)>,
+    leading: Option<(Slot, Option<BitString>)>,
     /// The same while the driver leads.
-    acting: Option<(Slot, Option<Belief>)>,
+    acting: Option<(Slot, Option<BitString>)>,
     /// Name of the last handover that it took.
     taken: Option<(Slot, u32)>,
     /// Name of the last handover that it passed on.
@@ -167,7 +150,7 @@ impl Bearer {
         if let Some((slot, belief)) = &self.acting {
             errands.push(Errand::Lead {
                 slot: *slot,
-                message: belief.as_ref().map(|belief| belief.0.clone()),
+                message: belief.clone(),
             });
         }
     }
@@ -177,11 +160,11 @@ impl Bearer {
         let (Some((slot, _)), Some(next)) = (self.acting.take(), lead.next) else {
             return;
         };
-        let (after, belief) = (slot.after(), Belief(lead.message));
+        let (after, belief) = (slot.after(), lead.message);
         if next == self.address {
             self.stay(now, after, Some(belief), errands);
         } else if slot.nearest_count(self.schedule.count(now)) < self.last {
-            let sum = digest(after, Payload::from(&belief.0));
+            let sum = digest(after, Payload::from(&belief));
             self.pass(next, (after, sum), belief, errands);
         }
     }
@@ -194,7 +177,7 @@ impl Bearer {
     }
 
     /// Leads in a slot to come.
-    fn stay(&mut self, now: u64, slot: Slot, belief: Option<Belief>, errands: &mut Vec<Errand>) {
+    fn stay(&mut self, now: u64, slot: Slot, belief: Option<BitString>, errands: &mut Vec<Errand>) {
         if slot.nearest_count(self.schedule.count(now)) <= self.last {
             self.leading = Some((slot, belief));
             let at = self.begins(slot, now);
@@ -202,17 +185,15 @@ impl Bearer {
         }
     }
 
-    fn pass(&mut self, destination: u32, name: (Slot, u32), belief: Belief, errands: &mut Vec<Errand>) {
+    fn pass(&mut self, destination: u32, name: (Slot, u32), belief: BitString, errands: &mut Vec<Errand>) {
         let frame = Frame {
             destination,
-            ..Frame::new(Kind::Handover, name.0, name.1, Payload::from(&belief.0))
+            ..Frame::new(Kind::Handover, name.0, name.1, Payload::from(&belief))
         };
-        let mut bytes = vec![0; frame.len()];
-        frame.encode(Check::Whole, &mut bytes);
         errands.push(Errand::Send {
             destination,
             name,
-            frame: bytes,
+            frame: frame.to_bytes(Check::Whole),
         });
         // Kept even where nothing is acknowledged until the driver has found a route.
         self.pending.retain(|pending| self.acknowledged && pending.name != name);
@@ -241,7 +222,7 @@ impl Bearer {
             Some((seen, _)) if own && seen.is_after(slot) => return note(Note::Late { slot }),
             _ => *last = Some(name),
         }
-        let belief = Belief(frame.payload.into());
+        let belief = frame.payload.into();
         match own {
             true => self.take_over(now, from, slot, belief, errands),
             false => self.pass(frame.destination, name, belief, errands),
@@ -250,7 +231,7 @@ impl Bearer {
 
     /// Takes a belief that another node was to lead with, or has sent. Where this node leads already, the belief that has seen more slots stays, of
     /// equals the one that is here.
-    fn take_over(&mut self, now: u64, with: u32, slot: Slot, belief: Belief, errands: &mut Vec<Errand>) {
+    fn take_over(&mut self, now: u64, with: u32, slot: Slot, belief: BitString, errands: &mut Vec<Errand>) {
         if let Some(leads) = self.leads() {
             let note = Note::Disagreement { slot };
             errands.push(Errand::Note { with, note });

@@ -55,7 +55,7 @@ mod sensor;
 mod slot;
 
 #[cfg(feature = "std")]
-pub use centre::{Action, Centre, CentreSettings, CentreTimer, Member, Recipient, stored};
+pub use centre::{Action, Centre, CentreSettings, CentreTimer, Member, Recipient};
 #[cfg(feature = "std")]
 pub use echo::{ReportLength, echo, reports_of};
 pub use frame::{CHECK_BYTES, Check, DESTINATION_BYTES, DecodeError, Frame, HEADER_BYTES, Kind, VERSION, digest};
@@ -66,6 +66,6 @@ pub use note::Note;
 pub use over_bits::{Estimator, OverBits, moments};
 pub use payload::Payload;
 #[cfg(feature = "std")]
-pub use receiver::{BoxError, Outcome, Receiver, SensorHealth, update_asked, update_or_drop};
+pub use receiver::{BoxError, Outcome, Receiver, SensorHealth, predict_and_ask, update_asked, update_or_drop};
 pub use sensor::{Feedback, Reaction, Sensor, SensorSettings, SensorTimer, Task};
 pub use slot::{SLOT_BITS, Schedule, Slot};

@@ -6,6 +6,8 @@ use core::fmt;
 
 /// Something worth writing down. None of it stops a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Note {
     /// Bytes that are no frame.

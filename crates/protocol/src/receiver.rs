@@ -1,5 +1,7 @@
 //! An estimator as the centre's machine needs it: bits in, bits out.
 
+use crate::centre::Member;
+use crate::sensor::Feedback;
 use fewbits_core::{BitString, Observation};
 use serde::{Deserialize, Serialize};
 
@@ -99,6 +101,23 @@ impl<R: Receiver + ?Sized> Receiver for Box<R> {
     fn restore(&mut self, state: &BitString) -> Result<(), BoxError> {
         (**self).restore(state)
     }
+}
+
+/// Predicts into a slot. Returns what each of the `members` is told and, where one of them follows by echo, the state before the
+/// prediction: what [`Centre::on_predicted`](crate::Centre::on_predicted) takes.
+///
+/// # Errors
+/// Those of the receiver.
+pub fn predict_and_ask<R: Receiver + ?Sized>(
+    receiver: &mut R,
+    members: &[Member],
+    slot: u64,
+) -> Result<(Vec<BitString>, Option<BitString>), BoxError> {
+    let follows = members.iter().any(|member| member.feedback == Feedback::Echoed);
+    let state = follows.then(|| receiver.state()).transpose()?;
+    receiver.predict(slot)?;
+    let feedback = (0..members.len()).map(|sensor| receiver.feedback(sensor));
+    Ok((feedback.collect::<Result<_, _>>()?, state))
 }
 
 /// How an update went.

@@ -8,7 +8,6 @@ const UNREACHED: u32 = u32::MAX;
 /// neighbours that is one hop nearer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hops {
-    root: usize,
     distances: Vec<u32>,
     parents: Vec<u32>,
     /// Reached nodes, by distance.
@@ -16,11 +15,6 @@ pub struct Hops {
 }
 
 impl Hops {
-    /// The node that all distances are from.
-    pub fn root(&self) -> usize {
-        self.root
-    }
-
     /// Hops to `node`, or `None` where no route leads.
     pub fn distance(&self, node: usize) -> Option<usize> {
         self.distances
@@ -92,7 +86,6 @@ impl Graph {
     pub fn hops_from(&self, root: usize) -> Result<Hops, Error> {
         self.check(root)?;
         let mut hops = Hops {
-            root,
             distances: vec![UNREACHED; self.len()],
             parents: vec![UNREACHED; self.len()],
             order: Vec::new(),

@@ -1,6 +1,5 @@
 //! The Monte-Carlo engine: determinism, failures, cancellation; summary statistics.
 
-use fewbits_monte_carlo::statistics::paired_difference;
 use fewbits_monte_carlo::{Moments, MonteCarlo, MonteCarloError, Stream, Trial};
 use proptest::prelude::*;
 use rand::RngExt;
@@ -133,13 +132,6 @@ fn a_root_mean_square_has_the_standard_error_of_the_delta_method() {
     let expected = (2.0 / f64::from(n)).sqrt() / 2.0;
     assert!((rmse.standard_error / expected - 1.0).abs() < 0.05);
     assert!(rmse.z_score(1.0).abs() < 4.0);
-}
-
-#[test]
-fn paired_comparison_and_consistency() {
-    let difference = paired_difference(&[1.0, 2.0, 4.0], &[0.5, 1.5, 3.5]).unwrap();
-    assert_eq!((difference.mean(), difference.standard_error()), (0.5, 0.0));
-    assert!(paired_difference(&[1.0], &[]).is_err());
 }
 
 /// Defect: after a failure all other chunks ran to their end.

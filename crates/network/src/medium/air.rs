@@ -3,13 +3,10 @@
 use crate::units::SensorId;
 use fewbits_core::BitString;
 use fewbits_protocol::{CHECK_BYTES, Check, Frame, Kind};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The bits of a frame as they travel: the bytes that it has over a socket, where the check follows the payload's last bit at once.
 pub fn on_air(frame: &Frame<'_>, check: Check) -> BitString {
-    let mut bytes = vec![0; frame.len()];
-    // The buffer is as long as the frame.
-    frame.encode(check, &mut bytes);
+    let mut bytes = frame.to_bytes(check);
     let padding = 8 * frame.payload.bytes().len() - frame.payload.bits();
     if padding > 0 {
         let check = bytes.len() - CHECK_BYTES;
@@ -71,25 +68,6 @@ pub(crate) fn payload_bits(bits: &BitString) -> usize {
         None => 0,
     };
     bits.bits().saturating_sub(overhead)
-}
-
-/// Bits as they are stored.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Stored(#[serde(with = "stored")] pub BitString);
-
-/// `BitString` for serde: bytes and length.
-pub(crate) mod stored {
-    use super::{BitString, Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(crate) fn serialize<S: Serializer>(bits: &BitString, to: S) -> Result<S::Ok, S::Error> {
-        (bits.bytes(), bits.bits()).serialize(to)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<BitString, D::Error> {
-        let (bytes, bits) = <(Vec<u8>, usize)>::deserialize(from)?;
-        BitString::from_bytes(bytes, bits).map_err(serde::de::Error::custom)
-    }
 }
 
 #[cfg(test)]

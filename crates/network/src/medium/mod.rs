@@ -6,7 +6,7 @@ pub(crate) mod field;
 pub(crate) mod loss;
 pub(crate) mod radio;
 
-pub use air::{Stored, on_air};
+pub use air::on_air;
 pub use channel::{Channel, ReceivedCopy};
 pub use field::Field;
 pub use loss::Loss;

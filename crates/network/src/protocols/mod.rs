@@ -4,7 +4,15 @@ pub(crate) mod bit_star;
 pub(crate) mod walk;
 
 use crate::error::Error;
+use crate::note::Note;
+use crate::units::SensorId;
 use fewbits_protocol::{Check, Frame};
+
+/// The note of a frame that no machine takes.
+fn malformed(with: SensorId, frame: &Frame<'_>) -> Note {
+    let note = fewbits_protocol::Note::Malformed { slot: frame.slot };
+    Note::Frame { with, note }
+}
 
 /// The frame that a machine has written.
 fn decoded(bytes: &[u8]) -> Result<Frame<'_>, Error> {

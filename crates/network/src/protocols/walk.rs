@@ -1,6 +1,6 @@
 //! A belief that travels, from leader to leader or along a chain of nodes, hop by hop: the machines of `fewbits-protocol` over the simulated radio.
 
-use super::decoded;
+use super::{decoded, malformed};
 use crate::clock::Clock;
 use crate::error::{Cause, Error};
 use crate::medium::Field;
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// slot k, leader:  belief = lead(message);  send it to the next leader, hop by hop along a shortest route, named slot k + 1
 ///         others:  a handover for somebody else goes on; one for oneself makes a leader; a second one of its slot is noted
 /// ```
-/// With acknowledgements, a node that gives up a handover leads itself and notes it ([`Note::Retained`]): should the belief have arrived all the same,
+/// With acknowledgements, a node that gives up a handover leads itself and notes it: should the belief have arrived all the same,
 /// there are two leaders from then on, and where they meet the log has the disagreement. A leader draws from a stream of its slot.
 #[derive(Debug, Clone)]
 pub struct Walk<L> {
@@ -67,11 +67,6 @@ impl<L: Leader> Walk<L> {
         })
     }
 
-    /// The slots.
-    pub fn clock(&self) -> &Clock {
-        &self.clock
-    }
-
     /// The network before its first slot, in which `first` leads.
     ///
     /// # Errors
@@ -101,7 +96,10 @@ impl<L: Leader> Walk<L> {
             for errand in errands {
                 match errand {
                     Errand::SetTimer { at } => context.at(Instant(at), 0),
-                    Errand::Note { with, note } => context.note(Note::noticed(SensorId(with), note)),
+                    Errand::Note { with, note } => {
+                        let with = SensorId(with);
+                        context.note(Note::Frame { with, note });
+                    }
                     Errand::Send {
                         destination,
                         name,
@@ -183,7 +181,7 @@ impl<L: Leader> Protocol for Walk<L> {
         frame: &Frame<'_>,
     ) -> Result<(), Error> {
         if (frame.destination as usize) >= context.field().len() {
-            context.note(Note::Malformed);
+            context.note(malformed(from, frame));
             return Ok(());
         }
         let mut errands = Vec::new();

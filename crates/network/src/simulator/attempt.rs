@@ -4,7 +4,7 @@ use super::core::{BufferPool, SimulatorCore};
 use super::log::{Detail, Entry, Reception, Transmission};
 use super::queue::Arrival;
 use crate::medium::air::{from_air, payload_bits};
-use crate::medium::{Loss, ReceivedCopy, Stored, Transceiver};
+use crate::medium::{Loss, ReceivedCopy, Transceiver};
 use crate::units::{Bits, Joules, SensorId};
 use fewbits_core::BitString;
 use fewbits_protocol::Frame;
@@ -30,7 +30,7 @@ pub(super) struct Size {
 pub(super) struct Attempt<'a> {
     pub(super) from: SensorId,
     pub(super) to: Option<SensorId>,
-    pub(super) frames: &'a [Stored],
+    pub(super) frames: &'a [BitString],
     pub(super) size: Size,
     /// How many attempts there were before.
     pub(super) before: u32,
@@ -44,9 +44,9 @@ pub(super) struct Attempt<'a> {
 
 impl SimulatorCore {
     /// Bits of frames that travel together.
-    pub(super) fn size(&self, from: SensorId, frames: &[Stored]) -> Size {
+    pub(super) fn size(&self, from: SensorId, frames: &[BitString]) -> Size {
         let radio = self.setup.radio_of(from);
-        let own: usize = frames.iter().map(|frame| frame.0.bits()).sum();
+        let own: usize = frames.iter().map(|frame| frame.bits()).sum();
         let lengths = if frames.len() > 1 {
             LENGTH_BITS * frames.len() as u64
         } else {
@@ -54,7 +54,7 @@ impl SimulatorCore {
         };
         let body = Bits(own as u64 + lengths);
         Size {
-            payload: frames.iter().map(|frame| payload_bits(&frame.0) as u64).sum(),
+            payload: frames.iter().map(|frame| payload_bits(frame) as u64).sum(),
             own,
             link_frames: radio.link_frames(body),
             air: radio.on_air(body),
@@ -249,7 +249,7 @@ impl SimulatorCore {
         self.occupy(attempt.from, self.state.now, attempt.size.air, arrivals);
     }
 
-    fn is_intact(&self, frames: &[Stored], copy: &ReceivedCopy) -> bool {
+    fn is_intact(&self, frames: &[BitString], copy: &ReceivedCopy) -> bool {
         copy.flipped.is_empty()
             || frames_of(frames, copy).all(|bits| {
                 let bytes = from_air(&bits);
@@ -259,9 +259,9 @@ impl SimulatorCore {
 }
 
 /// The frames of a batch as they arrive.
-fn frames_of<'a>(frames: &'a [Stored], copy: &'a ReceivedCopy) -> impl Iterator<Item = BitString> + 'a {
+fn frames_of<'a>(frames: &'a [BitString], copy: &'a ReceivedCopy) -> impl Iterator<Item = BitString> + 'a {
     let mut start = 0;
-    frames.iter().map(move |Stored(frame)| {
+    frames.iter().map(move |frame| {
         let from = start;
         start += frame.bits();
         copy.flipped

@@ -127,7 +127,7 @@ impl<'a> Context<'a> {
     /// [`Protocol::on_give_up`] is called with the ticket later.
     ///
     /// # Errors
-    /// [`Error::UnknownNode`], [`Error::SelfLink`], [`Error::OutOfRange`]; if the frame does not fit its format.
+    /// [`Error::UnknownNode`], [`Error::SelfLink`], [`Error::OutOfRange`].
     pub fn send(&mut self, to: SensorId, frame: &Frame<'_>) -> Result<Ticket, Error> {
         self.core.field.check_link(self.node, to)?;
         Ok(self.core.submit(self.node, Some(to), frame))
@@ -143,12 +143,8 @@ impl<'a> Context<'a> {
     }
 
     /// Sends to all neighbours, perhaps later in a batch. Nobody acknowledges it.
-    ///
-    /// # Errors
-    /// If the frame does not fit its format.
-    pub fn broadcast(&mut self, frame: &Frame<'_>) -> Result<(), Error> {
+    pub fn broadcast(&mut self, frame: &Frame<'_>) {
         self.core.submit(self.node, None, frame);
-        Ok(())
     }
 
     /// Whether frames to one receiver are acknowledged.

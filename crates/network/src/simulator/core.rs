@@ -9,12 +9,13 @@ use super::queue::{Arrival, Event, EventKind, Queue};
 use super::setup::{FaultKind, Setup};
 use crate::error::Error;
 use crate::medium::loss::BurstState;
-use crate::medium::{Field, ReceivedCopy, Stored};
+use crate::medium::{Field, ReceivedCopy};
 use crate::note::Note;
 use crate::units::{Instant, Joules, Seconds, SensorId};
+use fewbits_core::BitString;
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
-use fewbits_protocol::{Check, Kind};
+use fewbits_protocol::{Check, Kind, Note as FrameNote};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -30,7 +31,7 @@ pub struct Ticket(pub(super) u64);
 pub(super) struct Batch {
     /// The timer of the batch names this number. A batch that is full is sent before its timer fires, and the next batch has another number.
     pub(super) number: u32,
-    pub(super) frames: Vec<Stored>,
+    pub(super) frames: Vec<BitString>,
     pub(super) tickets: Vec<Ticket>,
 }
 
@@ -40,7 +41,7 @@ pub(super) struct Batch {
 pub(super) struct Outgoing {
     pub(super) from: SensorId,
     pub(super) to: Option<SensorId>,
-    pub(super) frames: Vec<Stored>,
+    pub(super) frames: Vec<BitString>,
     pub(super) tickets: Vec<Ticket>,
     /// Attempts so far.
     pub(super) attempts: u32,
@@ -227,12 +228,15 @@ impl SimulatorCore {
 
     pub(super) fn note(&mut self, node: SensorId, note: Note) {
         let faults = &mut self.state.ledger.faults;
-        match note {
-            Note::Damaged | Note::Malformed => faults.damaged += 1,
-            Note::Duplicate => faults.duplicates += 1,
-            Note::Late => faults.late += 1,
-            Note::Disagreement { .. } => faults.disagreements += 1,
-            Note::Resynchronised { .. } => faults.resynchronisations += 1,
+        match &note {
+            Note::Frame { note, .. } => match note {
+                FrameNote::Duplicate { .. } => faults.duplicates += 1,
+                FrameNote::Late { .. } => faults.late += 1,
+                FrameNote::Disagreement { .. } => faults.disagreements += 1,
+                FrameNote::Resynchronised { .. } => faults.resynchronisations += 1,
+                FrameNote::Retained { .. } => {}
+                _ => faults.damaged += 1,
+            },
             Note::SilenceIgnored { .. } => faults.silence_ignored += 1,
             Note::Failed { .. } => faults.failures += 1,
             _ => {}

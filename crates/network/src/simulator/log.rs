@@ -1,9 +1,10 @@
 //! The message log: what was sent, what arrived of it, and what the nodes noticed. It can be written and read.
 
 use crate::error::Error;
-use crate::medium::{ReceivedCopy, Stored};
+use crate::medium::ReceivedCopy;
 use crate::note::Note;
 use crate::units::{Instant, Joules, SensorId};
+use fewbits_core::BitString;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 
@@ -41,7 +42,7 @@ pub struct Transmission {
     /// The receiver; `None` for a broadcast.
     pub to: Option<SensorId>,
     /// Its bits: the frames of a batch, each as a string.
-    pub frames: Vec<Stored>,
+    pub frames: Vec<BitString>,
     /// Which attempt to send these frames this is, from 0.
     pub attempt: u32,
     /// Payload bits among its bits.

@@ -168,11 +168,13 @@ impl<P: Protocol> Simulator<P> {
         let frame = Frame::decode(&bytes, self.core.check_of(Frame::kind_of(&bytes)));
         let mut context = Context::new(&mut self.core, id);
         let node = &mut self.nodes[id.index()];
-        if let Ok(frame) = frame {
-            self.protocol.on_frame(node, &mut context, from, &frame)
-        } else {
-            context.note(Note::Damaged);
-            self.protocol.on_damaged(node, &mut context, from)
+        match frame {
+            Ok(frame) => self.protocol.on_frame(node, &mut context, from, &frame),
+            Err(error) => {
+                let (with, note) = (from, error.into());
+                context.note(Note::Frame { with, note });
+                self.protocol.on_damaged(node, &mut context, from)
+            }
         }
     }
 
@@ -190,11 +192,6 @@ impl<P: Protocol> Simulator<P> {
             }
         }
         Ok(())
-    }
-
-    /// The protocol.
-    pub fn protocol(&self) -> &P {
-        &self.protocol
     }
 
     /// The nodes.
@@ -240,22 +237,19 @@ impl<P: Protocol> Simulator<P> {
     /// Cost, lifetime and faults until now. [`Summary::with_errors`] adds the estimation error.
     pub fn summary(&self) -> Summary {
         let now = self.now();
-        let lives = (0..self.nodes.len() as u32).filter_map(|node| {
-            let (radio, account) = (self.core.setup.radio_of(SensorId(node)), &self.ledger().accounts()[node as usize]);
-            let power = account.total(radio, now).value() / now.since_start().value();
+        let spent = || {
+            let accounts = (0..).map(SensorId).zip(self.ledger().accounts());
+            accounts.map(|(node, account)| (node, account, self.core.setup.radio_of(node)))
+        };
+        let lives = spent().filter_map(|(node, account, radio)| {
             let life = match account.died {
                 Some(died) => died.since_start().value(),
-                None => radio.battery?.value() / power,
+                None => radio.battery?.value() / (account.total(radio, now).value() / now.since_start().value()),
             };
-            Seconds::new(life).ok().map(|life| (life, SensorId(node)))
+            Some((Seconds::new(life).ok()?, node))
         });
         let first = lives.min_by(|a, b| a.0.value().total_cmp(&b.0.value()));
-        let energy = (0..self.nodes.len() as u32)
-            .map(|node| {
-                let account = &self.ledger().accounts()[node as usize];
-                account.total(self.core.setup.radio_of(SensorId(node)), now)
-            })
-            .sum();
+        let energy = spent().map(|(_, account, radio)| account.total(radio, now)).sum();
         Summary::new(now.since_start(), self.ledger(), energy, first)
     }
 

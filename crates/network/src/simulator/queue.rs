@@ -1,6 +1,5 @@
 //! Events to come, in order, and the frames that are on their way.
 
-use crate::medium::air::stored;
 use crate::units::{Instant, SensorId};
 use fewbits_core::BitString;
 use serde::{Deserialize, Serialize};
@@ -102,7 +101,6 @@ pub(crate) struct Arrival {
     pub(crate) from: SensorId,
     /// The outgoing frame that the receiver's radio acknowledges when these bits arrive.
     pub(crate) answer: Option<u32>,
-    #[serde(with = "stored")]
     pub(crate) bits: BitString,
 }
 

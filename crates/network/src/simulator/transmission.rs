@@ -14,8 +14,9 @@ use super::attempt::{Attempt, LENGTH_BITS};
 use super::core::{Batch, Outgoing, SimulatorCore, Ticket};
 use super::log::{Acknowledgement, Detail, Entry};
 use super::queue::EventKind;
-use crate::medium::{Radio, Stored, on_air};
+use crate::medium::{Radio, on_air};
 use crate::units::{Bits, Instant, Seconds, SensorId};
+use fewbits_core::BitString;
 use fewbits_protocol::Frame;
 
 impl SimulatorCore {
@@ -25,14 +26,14 @@ impl SimulatorCore {
         if batching.max_frames <= 1 {
             return self.send(from, to, frame);
         }
-        let bits = Stored(on_air(frame, self.check_of(Some(frame.kind))));
+        let bits = on_air(frame, self.check_of(Some(frame.kind)));
         let radio = self.setup.radio_of(from);
         if let Some(waiting) = self.state.batches.get(&(from, to)) {
             let together: u64 = waiting
                 .frames
                 .iter()
                 .chain([&bits])
-                .map(|f| f.0.bits() as u64 + LENGTH_BITS)
+                .map(|f| f.bits() as u64 + LENGTH_BITS)
                 .sum();
             if radio.link_frames(Bits(together)) > 1 {
                 self.send_batch(from, to);
@@ -60,7 +61,7 @@ impl SimulatorCore {
 
     /// Sends a frame as soon as the air is free, alone.
     pub(super) fn send(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Ticket {
-        let bits = Stored(on_air(frame, self.check_of(Some(frame.kind))));
+        let bits = on_air(frame, self.check_of(Some(frame.kind)));
         let ticket = self.next_ticket();
         self.dispatch(from, to, std::slice::from_ref(&bits), &[ticket]);
         ticket
@@ -85,7 +86,7 @@ impl SimulatorCore {
     }
 
     /// Books the air for frames and sends them when it is free.
-    fn dispatch(&mut self, from: SensorId, to: Option<SensorId>, frames: &[Stored], tickets: &[Ticket]) {
+    fn dispatch(&mut self, from: SensorId, to: Option<SensorId>, frames: &[BitString], tickets: &[Ticket]) {
         self.drain(from);
         let acknowledged = self.is_acknowledged(to);
         if !self.is_alive(from) || (!acknowledged && !self.listens(from)) {

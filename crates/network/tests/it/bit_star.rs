@@ -121,8 +121,24 @@ fn followers_come_back_after_losses_and_restarts() {
         },
     );
     let noted = |wanted: fn(&Note) -> bool| network.log().notes().filter(|(_, _, note)| wanted(note)).count();
-    assert!(noted(|note| matches!(note, Note::Disagreement { .. })) > 10);
-    assert!(noted(|note| matches!(note, Note::Resynchronised { .. })) > 10);
+    assert!(
+        noted(|note| matches!(
+            note,
+            Note::Frame {
+                note: fewbits_protocol::Note::Disagreement { .. },
+                ..
+            }
+        )) > 10
+    );
+    assert!(
+        noted(|note| matches!(
+            note,
+            Note::Frame {
+                note: fewbits_protocol::Note::Resynchronised { .. },
+                ..
+            }
+        )) > 10
+    );
     // The centre began anew after slot 100. Frames pass two links of 10 % loss, and a missed echo costs a slot more.
     let reports = count(&network, SLOTS) - count(&network, 102);
     assert!(reports > 0.5 * 98.0 * SENSORS as f64, "{reports}");

@@ -264,7 +264,15 @@ fn a_relay_that_leads_keeps_its_newer_belief() {
         handover(2.0, 1, 8, 1);
         handover(2.1, 2, relayed, 2);
         network.run_until(at(3.0)).unwrap();
-        let kept = |note: &Note| matches!(note, Note::Retained { .. });
+        let kept = |note: &Note| {
+            matches!(
+                note,
+                Note::Frame {
+                    note: fewbits_protocol::Note::Retained { .. },
+                    ..
+                }
+            )
+        };
         assert_eq!(network.log().notes().filter(|(_, _, note)| kept(note)).count(), 1);
         network.nodes()[1].leads()
     };

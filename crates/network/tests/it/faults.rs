@@ -88,7 +88,15 @@ fn faulty_star(feedback: Feedback) -> Counted {
 
 fn disagreements(log: &Log) -> usize {
     log.notes()
-        .filter(|(_, _, note)| matches!(note, Note::Disagreement { .. }))
+        .filter(|(_, _, note)| {
+            matches!(
+                note,
+                Note::Frame {
+                    note: fewbits_protocol::Note::Disagreement { .. },
+                    ..
+                }
+            )
+        })
         .count()
 }
 
@@ -177,7 +185,7 @@ proptest! {
         network.run_until(clock().end(slots)).unwrap();
         conserves(network.ledger());
         let leaders = network.nodes().iter().filter(|node| node.leads().is_some()).count();
-        let retained = network.log().notes().any(|(_, _, note)| matches!(note, Note::Retained { .. }));
+        let retained = network.log().notes().any(|(_, _, note)| matches!(note, Note::Frame { note: fewbits_protocol::Note::Retained { .. }, .. }));
         prop_assert!(leaders <= 1 || retained);
         let mut led: Vec<u32> = network.nodes().iter().flat_map(|n| n.estimates().iter().map(|(slot, _)| *slot)).collect();
         led.sort_unstable();

@@ -12,11 +12,10 @@
 //! | kernel | result | bound in units of the last place |
 //! |---|---|---|
 //! | [`exp`], [`ln`] | in place | 1 (subnormal results 1.5) |
-//! | [`cdf`], [`log_cdf`], [`erfcx`] | in place | 6 |
-//! | [`inverse_mills`] | in place | 8 |
+//! | [`cdf`], [`log_cdf`] | in place | 6 |
 //! | [`interval`], [`log_interval`] | in place of the lower edges | 10, 8 |
 //! | [`sum`], [`dot`], [`largest`], [`largest_number`], [`log_sum_exp`] | a number | as a sum in eight lanes |
-//! | [`StandardNormals`], [`fill_standard_normals`] | independent draws, exact in law | |
+//! | [`StandardNormals`] | independent draws, exact in law | |
 //! | [`exp_minus`] | weights from log weights, with their sum and sum of squares | 1 each |
 //!
 //! The bounds are measured against values with 40 digits, in `tests/it/kernels.rs`: tails, subnormal numbers, infinities and
@@ -50,7 +49,7 @@ mod reduce;
 pub(crate) mod tail;
 
 #[cfg(feature = "std")]
-pub use normals::{StandardNormals, fill_standard_normals};
+pub use normals::StandardNormals;
 #[cfg(feature = "std")]
 pub use reduce::{
     ExpSums, LANES, dot, exp_minus, folded, largest, largest_number, log_sum_exp, sum, weighted_covariance,
@@ -104,14 +103,10 @@ in_place! {
     exp
     /// `ln(x)` of every element, in place.
     ln
-    /// `exp(x^2) erfc(x)` of every element, in place.
-    erfcx
     /// `Phi(x)` of every element, in place.
     cdf
     /// `ln Phi(x)` of every element, in place.
     log_cdf
-    /// `phi(x)/Phi(x)` of every element, in place.
-    inverse_mills
 }
 
 #[cfg(feature = "std")]

@@ -174,11 +174,6 @@ impl StandardNormals {
     }
 }
 
-/// Fills `out` with independent `N(0, 1)` draws from a source seeded by `rng`.
-pub fn fill_standard_normals<R: Rng + ?Sized>(rng: &mut R, out: &mut [f64]) {
-    StandardNormals::new(rng).fill(out);
-}
-
 /// A layer from the low eight bits, a uniform number in `(-1, 1)` from the high 52.
 #[inline(always)]
 fn split(bits: u64) -> (usize, f64) {

@@ -1,7 +1,7 @@
 //! Covariances of Gaussian densities, factored once: Cholesky factor, whitener, determinant.
 
 use crate::error::{ArgumentError, all_finite};
-use crate::linalg::SYMMETRY_TOLERANCE;
+use crate::linalg::agree;
 use nalgebra::{SMatrix, SVector};
 
 /// A squared pivot of the correlation matrix below this counts as singular.
@@ -34,8 +34,7 @@ impl<const D: usize> Factored<D> {
         let scale = covariance.diagonal().map(f64::sqrt);
         for i in 0..D {
             for j in 0..i {
-                let gap = (covariance[(i, j)] - covariance[(j, i)]).abs();
-                if gap > SYMMETRY_TOLERANCE * scale[i] * scale[j] {
+                if !agree(covariance[(i, j)], covariance[(j, i)], scale[i], scale[j]) {
                     return Err(refuse("a symmetric matrix"));
                 }
             }

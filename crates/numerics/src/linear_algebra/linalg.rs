@@ -4,9 +4,9 @@ use crate::error::{self, ArgumentError};
 use nalgebra::{ArrayStorage, Cholesky, Const, SMatrix, SVector};
 
 /// Pivots below this share of the variance of their own coordinate count as zero.
-pub const SEMIDEFINITE_TOLERANCE: f64 = 1e-12;
+const SEMIDEFINITE_TOLERANCE: f64 = 1e-12;
 /// Asymmetries above this share of the standard deviations of their row and column are refused.
-pub const SYMMETRY_TOLERANCE: f64 = 1e-9;
+const SYMMETRY_TOLERANCE: f64 = 1e-9;
 
 /// `(m + m')/2`.
 pub fn symmetrised<const D: usize>(m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
@@ -62,7 +62,7 @@ pub fn congruence_of<const M: usize, const D: usize>(
 /// Whether the entries `(i, j)` and `(j, i)` agree to rounding, relative to the standard deviations of their row and column. The one
 /// rule of symmetry: a tolerance relative to the largest entry would let a coordinate of a large unit hide an asymmetry among
 /// small ones.
-fn agree(below: f64, above: f64, row: f64, column: f64) -> bool {
+pub(crate) fn agree(below: f64, above: f64, row: f64, column: f64) -> bool {
     (below / row / column - above / row / column).abs() <= SYMMETRY_TOLERANCE
 }
 

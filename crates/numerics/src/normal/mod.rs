@@ -13,13 +13,6 @@
 //! | mean and variance in a cell | [`truncated_moments`] | narrow, far and unbounded cells |
 //! | a draw from a cell | [`sample_truncated`] | the same |
 //!
-//! ```
-//! use fewbits_numerics::normal;
-//! // Forty standard deviations out the probability underflows; its logarithm does not.
-//! assert_eq!(normal::cdf(-40.0), 0.0);
-//! assert!((normal::log_cdf(-40.0) + 804.608_442_013_754).abs() < 1e-9);
-//! ```
-//!
 //! Arguments are plain `f64` and are not checked: NaN in gives NaN out, infinities are meant. Over slices the same functions,
 //! to the last bit, are in [`kernels`](crate::kernels), which states their bounds.
 

@@ -143,42 +143,6 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lower: f64, upper: f64, toleranc
     })
 }
 
-/// The root of a monotone `f` right of `start`: the bracket starts with `step` and doubles until the sign changes.
-///
-/// # Errors
-/// As [`bracketed`]; also if `step` is not above zero, or no sign change is met before the argument overflows.
-pub fn beyond(mut f: impl FnMut(f64) -> f64, start: f64, step: f64, tolerance: f64) -> Result<f64, RootError> {
-    error::finite("start", start)?;
-    error::positive("step", step)?;
-    let at_start = f(start);
-    if at_start == 0.0 {
-        return Ok(start);
-    }
-    let (mut low, mut reach) = (start, step);
-    loop {
-        let high = start + reach;
-        let at_high = f(high);
-        if at_high.is_nan() || at_start.is_nan() {
-            return Err(RootError::NotANumber {
-                at: if at_start.is_nan() { start } else { high },
-            });
-        }
-        if !high.is_finite() {
-            return Err(RootError::NotBracketed {
-                lower: start,
-                at_lower: at_start,
-                upper: high,
-                at_upper: at_high,
-            });
-        }
-        if (at_high > 0.0) != (at_start > 0.0) && high > low {
-            return bracketed(f, low, high, tolerance);
-        }
-        low = high;
-        reach *= 2.0;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -234,13 +198,5 @@ mod tests {
         assert!(matches!(bracketed(|x| x.sqrt() - 0.1, -1.0, 1.0, 0.0), Err(RootError::NotANumber { .. })));
         assert!(matches!(bracketed(|_| f64::NAN, -1.0, 1.0, 0.0), Err(RootError::NotANumber { .. })));
         assert_eq!(bracketed(|x| x, 0.0, 1.0, 0.0), Ok(0.0));
-    }
-
-    #[test]
-    fn a_root_far_to_the_right_is_reached() {
-        let root = beyond(|x| (x + 1.0).ln() - 12.0, 0.0, 1e-3, 0.0).unwrap();
-        assert!((root / 12.0_f64.exp_m1() - 1.0).abs() < 1e-14);
-        assert!(matches!(beyond(|_| 1.0, 0.0, 1.0, 0.0), Err(RootError::NotBracketed { .. })));
-        assert!(matches!(beyond(|_| f64::NAN, 0.0, 1.0, 0.0), Err(RootError::NotANumber { .. })));
     }
 }

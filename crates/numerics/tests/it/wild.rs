@@ -48,7 +48,7 @@ proptest! {
         let _ = (kernels::dot(&x, &x[..2]), kernels::sum(&x), kernels::largest(&x), kernels::largest_number(&x));
         let mut out = [0.0; 3];
         let _ = kernels::exp_minus(&x, x[0], &mut out);
-        kernels::fill_standard_normals(&mut Pcg64Mcg::seed_from_u64(2), &mut out);
+        kernels::StandardNormals::new(&mut Pcg64Mcg::seed_from_u64(2)).fill(&mut out);
         prop_assert!(out.iter().all(|x| x.is_finite()));
     }
 
@@ -73,9 +73,6 @@ proptest! {
             prop_assert!(solved.iter().all(|x| x.is_finite()), "{:?}: {:?}", x, solved);
         }
         if let Ok(root) = roots::bracketed(|t| (t - x[0]) * x[1], x[2], x[3], x[4]) {
-            prop_assert!(root.is_finite(), "{:?}: {}", x, root);
-        }
-        if let Ok(root) = roots::beyond(|t| t - x[0], x[2], x[3], x[4]) {
             prop_assert!(root.is_finite(), "{:?}: {}", x, root);
         }
         let _ = (binomial::exact(n as u128, k as u128), binomial::saturating(n, k), binomial::log_row(n));

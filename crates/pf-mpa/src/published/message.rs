@@ -61,7 +61,8 @@ pub(crate) struct KernelMessage {
     pub(crate) log_weights: Vec<f64>,
     pub(crate) cumulative: Vec<f64>,
     pub(crate) kernel: Matrix2<f64>,
-    effective: f64,
+    /// `1 / sum w^2`.
+    pub(crate) effective: f64,
     /// Points in the coordinates that whiten their own kernel plus the rest of the product.
     pub(crate) white: [Vec<f64>; 2],
 }
@@ -107,11 +108,6 @@ impl KernelMessage {
             covariance += d * d.transpose() * self.weight(i);
         }
         (mean, covariance, fallbacks)
-    }
-
-    /// `1 / sum w^2`.
-    pub(crate) fn effective(&self) -> f64 {
-        self.effective
     }
 
     /// A label by its weight.

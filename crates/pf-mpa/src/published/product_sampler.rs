@@ -6,7 +6,7 @@ use crate::product;
 use crate::published::message::KernelMessage;
 use fewbits_densities::Mixture;
 use fewbits_numerics::kernels::{self, scalar, vectorised};
-use nalgebra::{Cholesky, Matrix2, Vector2};
+use nalgebra::{Cholesky, Const, Matrix2, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
@@ -75,19 +75,20 @@ impl ProductSampler {
     }
 }
 
-fn inverse(m: &Matrix2<f64>) -> Result<Matrix2<f64>, Error> {
+fn cholesky(m: &Matrix2<f64>) -> Result<Cholesky<f64, Const<2>>, Error> {
     match Cholesky::new(*m) {
-        Some(factor) => Ok(factor.inverse()),
+        Some(factor) => Ok(factor),
         None => refuse("kernel", format!("{m:?}"), "a positive definite matrix"),
     }
 }
 
+fn inverse(m: &Matrix2<f64>) -> Result<Matrix2<f64>, Error> {
+    Ok(cholesky(m)?.inverse())
+}
+
 fn whitener(m: &Matrix2<f64>) -> Result<Matrix2<f64>, Error> {
-    let lower = Cholesky::new(*m).map(|f| f.l());
-    match lower.and_then(|l| l.solve_lower_triangular(&Matrix2::identity())) {
-        Some(w) => Ok(w),
-        None => refuse("kernel", format!("{m:?}"), "a positive definite matrix"),
-    }
+    let solved = cholesky(m)?.l().solve_lower_triangular(&Matrix2::identity());
+    solved.ok_or(Error::IMPOSSIBLE)
 }
 
 /// Gibbs sweeps with what the shared kernels allow: all precisions are the same for every choice of labels, so that a label's
@@ -118,9 +119,7 @@ fn gibbs<R: Rng + ?Sized>(
         });
     }
     let covariance = inverse(&total)?;
-    let Some(spread) = Cholesky::new(covariance).map(|f| f.l()) else {
-        return refuse("kernel", format!("{covariance:?}"), "a positive definite matrix");
-    };
+    let spread = cholesky(&covariance)?.l();
     let alone = messages.len() == 1;
     for (part, message) in parts.iter_mut().zip(messages.iter_mut()) {
         message.x.iter_mut().for_each(|x| *x -= origin[0]);
@@ -233,20 +232,14 @@ fn importance<R: Rng + ?Sized>(
     } = workspace;
     places.iter_mut().for_each(|p| p.resize(draws, 0.0));
     chosen.resize(draws, 0);
+    log_weights.clear();
     log_weights.resize(draws, 0.0);
-    log_weights.fill(0.0);
-    let Some(spread) = Cholesky::new(first.kernel).map(|f| f.l()) else {
-        return refuse("kernel", format!("{:?}", first.kernel), "a positive definite matrix");
-    };
-    let (offset, mut label): (f64, usize) = (rng.random(), 0);
+    let spread = cholesky(&first.kernel)?.l();
+    first.resample(rng, chosen);
     for n in 0..draws {
-        let level = (n as f64 + offset) / draws as f64;
-        while label + 1 < first.cumulative.len() && first.cumulative[label] <= level {
-            label += 1;
-        }
         let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
-        let place = first.point(label) + spread * z;
-        (places[0][n], places[1][n], chosen[n]) = (place[0], place[1], label);
+        let place = first.point(chosen[n]) + spread * z;
+        (places[0][n], places[1][n]) = (place[0], place[1]);
     }
     for message in others {
         let white = whitener(&message.kernel)?;

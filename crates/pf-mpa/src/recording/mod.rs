@@ -26,9 +26,10 @@ use fewbits_core::{Gaussian, Link, NumberFormat, Observed, SchemeNode, SensorNod
 use fewbits_filters::centre::{Event, FalseAlarms, FusionCentre, Reporting, Slot};
 use fewbits_filters::{GridFilter, GridWorkspace, MomentFilter, NoiseBank};
 use fewbits_numerics::error::{finite, within};
+use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2};
 use rand::Rng;
-use scheme::{FullRange, Tolerant};
+use scheme::{FullRange, Tolerant, stray_level};
 use std::collections::BTreeMap;
 
 /// Coordinates of position and bias in the state.
@@ -294,21 +295,23 @@ impl RangeTracker {
             .with_false_alarms(FalseAlarms { sensor, centre })?;
         for anchor in self.anchors.values() {
             let sensing = BiasedRangeSensor(anchor.sensor).on_axes::<5>(AXES)?;
-            let settings = self.settings;
+            let RangeSettings { outliers, stray, .. } = self.settings;
             match self.travel {
                 Travel::Full => {
                     let scheme = Tolerant {
                         scheme: FullRange(self.noise),
-                        settings,
+                        outliers,
+                        stray: move |(): &(), _: &f64| 1.0 / stray,
                     };
                     let remote = Reporting::new(sensing, scheme, Link::PERFECT, |_: &Gaussian<5>, _: &Gaussian<1>| ());
                     centre.join(anchor.number, remote.sending_values())?;
                 }
                 Travel::Bits(bits) => {
-                    let loading = optimal_loading(1 << bits)?;
+                    let (levels, loading) = (1 << bits, optimal_loading(1 << bits)?);
                     let scheme = Tolerant {
                         scheme: quantizer(bits, self.noise)?,
-                        settings,
+                        outliers,
+                        stray: move |r: &RangeReference, level: &Symbol| stray_level(levels, stray, r, level),
                     };
                     let ask = move |_: &Gaussian<5>, expected: &Gaussian<1>| RangeReference::about(expected, loading);
                     centre.join(anchor.number, Reporting::new(sensing, scheme, Link::PERFECT, ask))?;

@@ -6,8 +6,9 @@ use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::published::{MessagePassing, ProductSampler};
 use fewbits_pf_mpa::{
-    AccelerationChain, Encoder, GridFilter, GridWorkspace, GuidedGaussian, Linearised, Network, POSITION,
-    QuantizedRange, RangeNoise, RangeReference, RaoBlackwellGuided, Reports, Target, Tracker, WithManoeuvre,
+    AccelerationChain, BiasedRangeSensor, Encoder, GridFilter, GridWorkspace, GuidedGaussian, Linearised, Network,
+    POSITION, QuantizedRange, RangeNoise, RangeReference, RangeSensor, RaoBlackwellGuided, Reports, Target, Tracker,
+    WithManoeuvre,
 };
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, Vector2, Vector4};
@@ -164,6 +165,7 @@ fn settings_are_checked() {
 #[test]
 fn every_kind_of_bad_input_is_a_typed_error() {
     let (noise, nan) = (RangeNoise::from_snr_db(40.0).unwrap(), f64::NAN);
+    let sensor = RangeSensor::new(Vector2::zeros(), noise).unwrap();
     let printed = AccelerationChain::printed(0.1).unwrap();
     let (initial, transition) = ([0.7, 0.15, 0.15], [[0.6, 0.2, 0.2], [0.4, 0.5, 0.1], [0.4, 0.1, 0.5]]);
     let scheme = QuantizedRange::new(4, noise).unwrap();
@@ -176,7 +178,7 @@ fn every_kind_of_bad_input_is_a_typed_error() {
     let mut indefinite = Matrix4::identity();
     indefinite[(0, 0)] = -1e-3;
     let refused = [
-        ("one particle", MessagePassing::improved(1).is_err()),
+        ("one particle", MessagePassing::improved(1).is_err() && MessagePassing::published(1).is_err()),
         ("no particle", RaoBlackwellGuided::new(0).is_err()),
         ("one draw", GuidedGaussian::new(1).is_err()),
         ("two nodes", GridFilter::new(2).is_err()),
@@ -188,9 +190,16 @@ fn every_kind_of_bad_input_is_a_typed_error() {
                 .all(|v| Encoder::published(*v).is_err() && Encoder::predicted(*v).is_err()),
         ),
         ("interval", [0.0, -1.0, nan].iter().all(|t| Target::new(*t, 0.02, printed).is_err())),
+        ("process noise", Target::new(1.0, -0.1, printed).is_err()),
+        ("acceleration", AccelerationChain::new(nan, initial, transition).is_err()),
+        ("no noise", RangeNoise::new(0.0, 0.0).is_err() && RangeNoise::new(-1.0, 1.0).is_err()),
+        ("no stored noise", serde_json::from_str::<RangeNoise>(r#"{"constant":0,"relative":0}"#).is_err()),
+        ("place", RangeSensor::new(Vector2::new(nan, 0.0), noise).is_err()),
+        ("axes", [[0, 0], [0, 4]].iter().all(|axes| sensor.on_axes::<4>(*axes).is_err())),
+        ("axes with bias", BiasedRangeSensor(sensor).on_axes::<4>([0, 2, 2]).is_err()),
         (
             "signal-to-noise ratio",
-            [nan, f64::INFINITY]
+            [nan, f64::INFINITY, 1e9, -1e9]
                 .iter()
                 .all(|r| RangeNoise::from_snr_db(*r).is_err()),
         ),
@@ -245,6 +254,12 @@ fn every_kind_of_bad_input_is_a_typed_error() {
     let known = Gaussian::known(*prior(1.0).mean()).unwrap();
     assert!(exhaustive.step(&mut rng, &still, 0, &known, &observed).is_err());
     assert!(still.simulate(&mut rng, known.mean(), 0).is_empty());
+}
+
+#[test]
+fn a_stored_target_is_the_same() {
+    let json = serde_json::to_string(&Target::printed().unwrap()).unwrap();
+    assert_eq!(serde_json::from_str::<Target>(&json).unwrap(), Target::printed().unwrap());
 }
 
 fn weighted(log_weight: f64) -> Result<Particles<1>, fewbits_densities::Error> {

@@ -3,7 +3,7 @@
 use crate::common::{lobe, random_mixture};
 use fewbits_densities::{Component, Mixture};
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::product::{exact, gibbs, importance, importance_resampled};
+use fewbits_pf_mpa::product::{exact, gibbs};
 use nalgebra::{Matrix1, SVector, Vector1};
 
 fn line(means: &[f64], variance: f64, weights: &[f64]) -> Mixture<1> {
@@ -157,7 +157,7 @@ fn gibbs_sweeps_have_the_law_of_their_chain() {
 }
 
 #[test]
-fn gibbs_and_importance_agree_in_the_plane() {
+fn gibbs_draws_the_product_in_the_plane() {
     let [a, b] = case_c();
     let truth = exact(&[&a, &b]).unwrap();
     let mut rng = Stream::new(33).rng();
@@ -165,12 +165,6 @@ fn gibbs_and_importance_agree_in_the_plane() {
     let slack = 4.0 * (truth.belief.covariance()[(0, 0)] / n as f64).sqrt();
     let draws = gibbs(&mut rng, &[&a, &b], n, 10).unwrap();
     assert!((draws.mean() - truth.belief.mean()).amax() < slack);
-    let weighed = importance(&mut rng, &[&a, &b], 0, n).unwrap();
-    assert!((weighed.belief.mean() - truth.belief.mean()).amax() < 3.0 * slack);
-    assert!((weighed.log_normaliser - truth.log_normaliser).abs() < 0.02);
-    let resampled = importance_resampled(&mut rng, &[&a, &b], 1, n, 2000).unwrap();
-    assert_eq!(resampled.len(), 2000);
-    assert!((resampled.mean() - truth.belief.mean()).amax() < 4.0 * (0.42_f64 / 2000.0).sqrt());
 }
 
 /// Components of one factor with widths of their own, two factors: the labels' law by enumeration.
@@ -204,9 +198,8 @@ fn contradictions_and_bad_arguments_are_errors() {
     let a = line(&[0.0], 1e-6, &[1.0]);
     let b = line(&[1e200], 1e-6, &[1.0]);
     assert!(exact(&[&a, &b]).is_err());
-    assert!(importance(&mut rng, &[&a, &b], 0, 10).is_err());
     assert!(exact::<1>(&[]).is_err() && gibbs::<1, _>(&mut rng, &[], 5, 5).is_err());
-    assert!(gibbs(&mut rng, &[&a], 0, 5).is_err() && importance(&mut rng, &[&a], 1, 5).is_err());
+    assert!(gibbs(&mut rng, &[&a], 0, 5).is_err());
     let many = line(&[0.0; 101], 1.0, &[1.0; 101]);
     let refusal = exact(&[&many, &many, &many]).unwrap_err().to_string();
     assert!(refusal.contains("factors") && refusal.contains("1000000"), "{refusal}");

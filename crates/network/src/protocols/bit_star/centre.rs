@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::note::{Note, Stage};
 use crate::simulator::Context;
 use crate::units::{Instant, SensorId};
-use fewbits_protocol::{Action, BoxError, CentreTimer, Feedback, Outcome, Receiver, Recipient, update_or_drop};
+use fewbits_protocol::{Action, CentreTimer, Outcome, Receiver, Recipient, predict_and_ask, update_or_drop};
 
 impl<R: Receiver, const M: usize> BitStar<R, M> {
     pub(super) fn carry_out(
@@ -26,16 +26,19 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                     };
                     context.at(Instant(at), token);
                 }
-                Action::Note { sensor, note } => context.note(Note::noticed(SensorId(sensor as u32 + 1), note)),
+                Action::Note { sensor, note } => {
+                    let with = SensorId(sensor as u32 + 1);
+                    context.note(Note::Frame { with, note });
+                }
                 Action::Send { to, frame } => {
                     let frame = decoded(&frame)?;
                     match to {
-                        Recipient::All => context.broadcast(&frame)?,
+                        Recipient::All => context.broadcast(&frame),
                         Recipient::Sensor(i) => self.send_down(context, SensorId(i as u32 + 1), &frame)?,
                     }
                 }
                 Action::Predict { slot } if slot > u64::from(slots) => {}
-                Action::Predict { slot } => match self.predict(&mut centre.receiver, slot) {
+                Action::Predict { slot } => match predict_and_ask(&mut centre.receiver, &self.members, slot) {
                     Ok((feedback, state)) => {
                         let mut sent = Vec::new();
                         centre.machine.on_predicted(&feedback, state.as_ref(), &mut sent);
@@ -65,15 +68,4 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         }
         Ok(())
     }
-
-    /// Predicts into a slot. Returns what each sensor is told, and the state before, where a sensor follows.
-    pub(super) fn predict(&self, receiver: &mut R, slot: u64) -> Result<Predicted, BoxError> {
-        let follows = self.members.iter().any(|m| m.feedback == Feedback::Echoed);
-        let state = if follows { Some(receiver.state()?) } else { None };
-        receiver.predict(slot)?;
-        let feedback = (0..self.members.len()).map(|i| receiver.feedback(i));
-        Ok((feedback.collect::<Result<_, _>>()?, state))
-    }
 }
-
-type Predicted = (Vec<fewbits_core::BitString>, Option<fewbits_core::BitString>);

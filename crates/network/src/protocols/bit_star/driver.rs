@@ -1,13 +1,12 @@
 //! Events of the simulator as those of the machines, and nodes as a snapshot has them.
 
-use super::super::decoded;
+use super::super::{decoded, malformed};
 use super::node::{BitNode, CentreNode, SensingNode, StoredBitNode, StoredNode};
 use super::relay::is_for_all;
 use super::routes::CENTRE;
 use super::{BitStar, SLOT_BEGINS};
 use crate::error::Error;
 use crate::medium::air::carried;
-use crate::note::Note;
 use crate::simulator::{Context, Protocol, Storable};
 use crate::units::SensorId;
 use fewbits_protocol::{BoxError, CentreTimer, Frame, Kind, Receiver, SensorTimer, Slot};
@@ -67,7 +66,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
             },
             // In a star no belief walks.
             (Kind::Handover, None) => {
-                context.note(Note::Malformed);
+                context.note(malformed(from, frame));
                 return Ok(());
             }
             _ => (from, frame, false),
@@ -138,7 +137,7 @@ impl<R: Receiver, const M: usize> Storable for BitStar<R, M> {
         match (index.checked_sub(1), stored.0) {
             (None, StoredNode::Centre(machine, state, estimates, failures)) => {
                 let mut receiver = (self.receiver)()?;
-                receiver.restore(&state.0)?;
+                receiver.restore(&state)?;
                 Ok(BitNode::Centre(Box::new(CentreNode {
                     machine,
                     receiver,
@@ -150,9 +149,9 @@ impl<R: Receiver, const M: usize> Storable for BitStar<R, M> {
                 if sensor < self.members.len() =>
             {
                 let (mut half, mut replica) = ((self.node)(sensor), self.replica(sensor)?);
-                half.restore(&memory.0)?;
+                half.restore(&memory)?;
                 if let (Some(replica), Some(state)) = (&mut replica, &state) {
-                    replica.restore(&state.0)?;
+                    replica.restore(state)?;
                 }
                 Ok(BitNode::Sensor(Box::new(SensingNode {
                     machine,

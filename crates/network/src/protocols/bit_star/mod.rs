@@ -23,6 +23,7 @@ use fewbits_core::{Scheme, SchemeNode, SensorNode};
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{
     BoxError, Centre, CentreSettings, Feedback, Kind, Member, Receiver, ReportLength, Sensor, SensorSettings,
+    predict_and_ask,
 };
 use nalgebra::SVector;
 use node::Failures;
@@ -183,11 +184,6 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         }
     }
 
-    /// The slots.
-    pub fn clock(&self) -> &Clock {
-        &self.clock
-    }
-
     /// The network before its first slot: the centre in the middle of its sensors, `radius` metres away.
     ///
     /// # Errors
@@ -278,9 +274,8 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
     /// per sensor, reports without payload, since their lengths are not known beforehand.
     fn check_fits(&self, setup: &Setup, hops: &[usize]) -> Result<(), Error> {
         let mut receiver = self.started()?;
-        let (told, state) = self
-            .predict(&mut receiver, 1)
-            .map_err(|error| Error::estimator("receiver", error))?;
+        let (told, state) =
+            predict_and_ask(&mut receiver, &self.members, 1).map_err(|error| Error::estimator("receiver", error))?;
         let members = || self.members.iter().zip(&told);
         let mut bodies: Vec<u64> = members()
             .filter(|(member, _)| member.feedback == Feedback::Told)

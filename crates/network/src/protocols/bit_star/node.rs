@@ -1,10 +1,9 @@
 //! The nodes of a star, and how they are stored.
 
 use crate::error::Error;
-use crate::medium::Stored;
 use crate::note::Note;
 use crate::simulator::Context;
-use fewbits_core::SensorNode;
+use fewbits_core::{BitString, SensorNode};
 use fewbits_protocol::{BoxError, Centre, Receiver, Sensor};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -50,8 +49,8 @@ pub struct StoredBitNode(pub(super) StoredNode);
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum StoredNode {
-    Centre(Centre, Stored, Vec<SlotEstimate>, Failures),
-    Sensor(Sensor, Stored, [u32; 2], Option<Stored>, Failures),
+    Centre(Centre, BitString, Vec<SlotEstimate>, Failures),
+    Sensor(Sensor, BitString, [u32; 2], Option<BitString>, Failures),
 }
 
 impl<R, const M: usize> fmt::Debug for BitNode<R, M> {
@@ -115,24 +114,18 @@ impl<R: Receiver, const M: usize> BitNode<R, M> {
         Ok(StoredBitNode(match self {
             Self::Centre(centre) => StoredNode::Centre(
                 centre.machine.clone(),
-                Stored(centre.receiver.state()?),
+                centre.receiver.state()?,
                 centre.estimates.clone(),
                 centre.failures,
             ),
             Self::Sensor(sensor) => StoredNode::Sensor(
                 sensor.machine.clone(),
-                Stored(
-                    sensor
-                        .half
-                        .stored()
-                        .ok_or("the sensor's half is of a kind that cannot be stored")?,
-                ),
-                [sensor.counted, sensor.passed],
                 sensor
-                    .replica
-                    .as_ref()
-                    .map(|replica| replica.state().map(Stored))
-                    .transpose()?,
+                    .half
+                    .stored()
+                    .ok_or("the sensor's half is of a kind that cannot be stored")?,
+                [sensor.counted, sensor.passed],
+                sensor.replica.as_ref().map(Receiver::state).transpose()?,
                 sensor.failures,
             ),
         }))

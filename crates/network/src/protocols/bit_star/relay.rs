@@ -1,12 +1,12 @@
 //! Frames over several hops: what sensors pass on for others.
 
+use super::super::malformed;
 use super::BitStar;
 use super::node::SensingNode;
 use super::routes::{CENTRE, Routes};
 use crate::error::Error;
 use crate::medium::Field;
 use crate::medium::air::{carrying, on_air};
-use crate::note::Note;
 use crate::simulator::Context;
 use crate::units::SensorId;
 use fewbits_protocol::{Check, Frame, Kind};
@@ -65,12 +65,12 @@ impl<R, const M: usize> BitStar<R, M> {
     ) -> Result<Option<SensorId>, Error> {
         let (id, sensor) = (context.id(), SensorId(frame.destination));
         let Some(routes) = self.routes(context.field()) else {
-            context.note(Note::Malformed);
+            context.note(malformed(sensor, frame));
             return Ok(None);
         };
         let exists = sensor != CENTRE && sensor.index() < context.field().len();
         match (goes_up(inner.kind), exists) {
-            (_, false) => context.note(Note::Malformed),
+            (_, false) => context.note(malformed(sensor, frame)),
             (true, _) if id == CENTRE => return Ok(Some(sensor)),
             (false, _) if id == sensor => return Ok(Some(CENTRE)),
             (true, _) => drop(context.send(routes.parent(id), frame)?),
@@ -99,7 +99,7 @@ impl<R, const M: usize> BitStar<R, M> {
             && self.routes(context.field()).is_some_and(passes)
         {
             sensor.passed = frame.slot.number();
-            context.broadcast(frame)?;
+            context.broadcast(frame);
         }
         Ok(())
     }

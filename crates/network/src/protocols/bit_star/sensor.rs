@@ -27,7 +27,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             context.at(Instant(at), token);
         }
         if let Some(note) = reaction.note {
-            context.note(Note::noticed(CENTRE, note));
+            context.note(Note::Frame { with: CENTRE, note });
         }
         match reaction.task {
             // The radio repeats by itself.
