@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import erfc
 
-from common import Recipes, log_between, mean_and_error, phi
+from common import Recipes, log_between
 
 RECIPES = Recipes()
 K, RATES, BIAS = 40.0, (0.5, 1.5), 1e-5
@@ -57,22 +57,22 @@ class Search:
                 v = v + (slope * h / 2) ** 2
             a2, ay, yy = a2 + (a * a / v).sum(1), ay + (a * y / v).sum(1), yy + (y * y / v * np.ones_like(a)).sum(1)
         if known:
-            return logs - 0.5 * (a2 - 2 * ay + yy), None
+            return logs - 0.5 * (a2 - 2 * ay + yy)
         a2 = np.maximum(a2, 1e-20)
         root, best = np.sqrt(a2), ay / a2
         inside = log_between((RATES[0] - best) * root, (RATES[1] - best) * root)
         inside = np.where(np.isfinite(inside), inside, -1e9)
-        return logs - 0.5 * (yy - ay * best) - np.log(root) + inside, (best, root)
+        return logs - 0.5 * (yy - ay * best) - np.log(root) + inside
 
     def belief(self, used, known, prior=None):
-        """Cells (centres, weights, rate's law) that carry the posterior, refined until their side is small against it."""
+        """Mean and covariance of the position, from cells that are refined until their side is small against it."""
         h, box = 2.0, np.arange(-59, 160, 2.0)
         theta = np.stack(np.meshgrid(box, box, indexing="ij"), -1).reshape(-1, 2)
         corners = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)]) / 4
         for _ in range(14):
-            wide = self.log_density(theta, used, known, h, prior)[0]
+            wide = self.log_density(theta, used, known, h, prior)
             theta = theta[wide > wide.max() - 18]
-            logs, law = self.log_density(theta, used, known, 0.0, prior)
+            logs = self.log_density(theta, used, known, 0.0, prior)
             w = np.exp(logs - logs.max())
             w /= w.sum()
             mean = w @ theta
@@ -83,25 +83,7 @@ class Search:
             if h < 0.35 * sd and not rough or h < 1e-3 or len(theta) > 60000:
                 break
             theta, h = (theta[:, None] + corners * h).reshape(-1, 2), h / 2
-        return theta, w, law, mean, cov
-
-    def information(self, node, theta, w, law):
-        """1/2 ln det(I + Cov(mu a) / sigma^2): Gaussian bound of what a node's samples tell."""
-        a = response(np.linalg.norm(theta - self.nodes[node], axis=1), self.times)
-        if law is not None:
-            best, root = law
-            lo, hi = (RATES[0] - best) * root, (RATES[1] - best) * root
-            mass = np.exp(log_between(lo, hi))
-            mass = np.maximum(mass, 1e-300)
-            shift = np.clip((phi(lo) - phi(hi)) / mass, lo, hi)
-            mu = np.clip(best + shift / root, *RATES)
-            spread = np.clip((1 + (lo * phi(lo) - hi * phi(hi)) / mass - shift**2), 0, 1) / root**2
-            more = (a * (w * spread)[:, None]).T @ a
-            a = a * mu[:, None]
-        else:
-            more = 0
-        d = a - w @ a
-        return 0.5 * np.linalg.slogdet(np.eye(len(self.times)) + ((d * w[:, None]).T @ d + more) / self.variance)[1]
+        return mean, cov
 
     def candidates(self, at, used):
         """Unvisited neighbours; if there are none, the unvisited nodes fewest hops away."""
@@ -114,29 +96,26 @@ class Search:
                 return fresh
         return []
 
-    def run(self, known, rule, cap, gaussian):
+    def run(self, known, cap, gaussian):
         """(whether the determinant fell below the threshold, nodes used, distance of the estimate from the source)."""
         at, used, prior = self.first, [self.first], None
         while True:
-            theta, w, law, mean, cov = self.belief(used[-1:] if gaussian else used, known, prior)
+            mean, cov = self.belief(used[-1:] if gaussian else used, known, prior)
             if gaussian:
                 prior = mean, cov
             reached = np.linalg.det(cov) < self.threshold
             choice = self.candidates(at, used)
             if reached or len(used) >= cap or not choice:
                 return reached, len(used), np.linalg.norm(mean - self.source)
-            if rule == "information":
-                score = [self.information(n, theta, w, law) for n in choice]
-            else:
-                d = self.nodes[choice] - mean
-                score = -np.einsum("ni,ij,nj->n", d, np.linalg.inv(cov), d)
+            d = self.nodes[choice] - mean
+            score = -np.einsum("ni,ij,nj->n", d, np.linalg.inv(cov), d)
             at = choice[int(np.argmax(score))]
             used.append(at)
 
 
 @lru_cache(None)
-def searches(example, reach, known=False, rule="mahalanobis", cap=30, gaussian=False, quantized=False, count=60):
-    return np.array([Search(example, reach, 1000 + s, quantized).run(known, rule, cap, gaussian) for s in range(count)], float)
+def searches(example, reach, known=False, cap=30, gaussian=False, quantized=False, count=60):
+    return np.array([Search(example, reach, 1000 + s, quantized).run(known, cap, gaussian) for s in range(count)], float)
 
 
 def answer(quantity, runs):
@@ -145,8 +124,6 @@ def answer(quantity, runs):
         p = reached.mean()
         return p, np.sqrt((p + 0.01) * (1.01 - p) / len(runs))
     samples = runs[reached, 1 if quantity.startswith("nodes") else 2]
-    if quantity.endswith("mean"):
-        return mean_and_error(samples)
     rng = np.random.default_rng(1)
     return np.median(samples), np.std([np.median(rng.choice(samples, len(samples))) for _ in range(300)])
 
@@ -167,10 +144,6 @@ for quantity in ("reach", "nodes_median", "final_err_median"):
             lambda row, runs=chain(figure), quantity=quantity: answer(quantity, runs(row)))
     RECIPES.of(f"diffusive-bytes/{quantity}", "^raw")(
         lambda row, quantity=quantity: answer(quantity, searches("B", 15.0, quantized=True)))
-
-for quantity in ("reach", "nodes_mean"):
-    RECIPES.of(f"diffusive-selection/{quantity}")(
-        lambda row, quantity=quantity: answer(quantity, searches(row[0], float(row[1:3]), rule=row[4:])))
 
 
 @RECIPES.of("diffusive-envelope/radius")

@@ -4,12 +4,13 @@
 //! features and with none, then with the example of its front page and with each file in `examples` as its program, which is run. Examples
 //! that read arguments are built only, those that share a file with tests are left out. With `--git` the dependency is on a repository instead of this checkout.
 
+use crate::Error;
+use crate::files::{read, write};
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
 use clap::Args;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-use thiserror::Error;
 
 /// Options of `cargo xtask alone`.
 #[derive(Debug, Clone, Args)]
@@ -27,29 +28,6 @@ pub struct Options {
 /// Crates that others take alone, small by promise.
 const LEAN: [&str; 3] = ["fewbits-core", "fewbits-quantizers", "fewbits-dymbo"];
 
-/// Why crates could not be tried.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// The workspace's manifests could not be read.
-    #[error(transparent)]
-    Metadata(#[from] cargo_metadata::Error),
-    /// A file could not be read or written, or cargo not be started.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file or program.
-        path: PathBuf,
-        /// What went wrong.
-        source: std::io::Error,
-    },
-    /// No crate has that name.
-    #[error("no library crate is called `{name}`")]
-    UnknownCrate {
-        /// The name.
-        name: String,
-    },
-}
-
 /// Tries the crates and prints what failed; `Ok(false)` if anything did.
 ///
 /// # Errors
@@ -60,7 +38,15 @@ pub fn run(options: &Options) -> Result<bool, Error> {
     let libraries: Vec<&Package> = metadata.packages.iter().filter(is_library).collect();
     let unknown = |name: &&String| libraries.iter().all(|p| p.name.as_str() != name.as_str());
     if let Some(name) = options.crates.iter().find(unknown) {
-        return Err(Error::UnknownCrate { name: name.clone() });
+        let valid = libraries
+            .iter()
+            .map(|package| package.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ");
+        return Err(Error::UnknownCrate {
+            name: name.clone(),
+            valid,
+        });
     }
     let root = metadata.workspace_root.as_std_path();
     let target = metadata.target_directory.as_std_path().join("alone");
@@ -82,14 +68,8 @@ fn try_crate(package: &Package, root: &Path, target: &Path, options: &Options) -
     let git = options.git.as_deref();
     let folder = target.join("packages").join(package.name.as_str());
     let source = folder.join("src");
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| Error::Io { path, source }
-    };
-    std::fs::create_dir_all(&source).map_err(failed(&source))?;
-    let lock = folder.join("Cargo.lock");
-    std::fs::copy(root.join("Cargo.lock"), &lock).map_err(failed(&lock))?;
-    let write = |path: PathBuf, text: &str| std::fs::write(&path, text).map_err(failed(&path));
+    std::fs::create_dir_all(&source).map_err(Error::writing(&source))?;
+    write(&folder.join("Cargo.lock"), &read(&root.join("Cargo.lock"))?)?;
     let cargo = |verb: &str| {
         let status = Command::new("cargo")
             .args([verb, "--quiet"])
@@ -99,9 +79,7 @@ fn try_crate(package: &Package, root: &Path, target: &Path, options: &Options) -
             .env("CARGO_TARGET_DIR", target)
             .stdout(std::process::Stdio::null())
             .status();
-        status
-            .map(|status| status.success())
-            .map_err(failed(Path::new("cargo")))
+        status.map(|status| status.success()).map_err(Error::Cargo)
     };
 
     let mut good = true;
@@ -109,15 +87,14 @@ fn try_crate(package: &Package, root: &Path, target: &Path, options: &Options) -
         println!("{:4} {} {what}", if passed { "ok" } else { "FAIL" }, package.name);
         good &= passed;
     };
-    write(source.join("main.rs"), "fn main() {}\n")?;
+    write(&source.join("main.rs"), "fn main() {}\n")?;
     for (what, features) in [("with default features", true), ("without features", false)] {
-        write(folder.join("Cargo.toml"), &manifest(package, git, features, &BTreeSet::new()))?;
+        write(&folder.join("Cargo.toml"), &manifest(package, git, features, &BTreeSet::new()))?;
         report(what, cargo("check")?);
     }
     if options.fast {
         return Ok(good);
     }
-    let read = |path: &Path| std::fs::read_to_string(path).map_err(failed(path));
     let mut programs = Vec::new();
     for part in &package.targets {
         let path = part.src_path.as_std_path();
@@ -132,8 +109,8 @@ fn try_crate(package: &Package, root: &Path, target: &Path, options: &Options) -
         }
     }
     for (what, text) in programs {
-        write(folder.join("Cargo.toml"), &manifest(package, git, true, &used(&text)))?;
-        write(source.join("main.rs"), &text)?;
+        write(&folder.join("Cargo.toml"), &manifest(package, git, true, &used(&text)))?;
+        write(&source.join("main.rs"), &text)?;
         let (verb, note) = match text.contains("env::args") {
             true => ("build", " (not run: it reads arguments)"),
             false => ("run", ""),

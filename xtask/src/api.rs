@@ -1,9 +1,9 @@
 //! `cargo xtask api`: every public item of the library crates, one file per crate, so that no public change passes unseen.
 
+#[cfg(not(feature = "api"))]
+use crate::Error;
 use clap::Args;
-use std::path::PathBuf;
 use std::process::Command;
-use thiserror::Error;
 
 /// Options of `cargo xtask api`.
 #[derive(Debug, Clone, Args)]
@@ -11,35 +11,6 @@ pub struct Options {
     /// Compare with the files instead of writing them.
     #[arg(long)]
     pub check: bool,
-}
-
-/// Why the public items could not be listed.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// The workspace's manifests could not be read.
-    #[error(transparent)]
-    Metadata(#[from] cargo_metadata::Error),
-    /// A file could not be read or written, or cargo not be started.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file or program.
-        path: PathBuf,
-        /// What went wrong.
-        source: std::io::Error,
-    },
-    /// rustdoc failed; its own messages were printed.
-    #[error("rustdoc failed")]
-    Rustdoc,
-    /// rustdoc's description of a crate could not be read: `public-api` must fit the toolchain.
-    #[cfg(feature = "api")]
-    #[error("{path}: {source}; the version of the crate `public-api` must fit the toolchain's")]
-    Description {
-        /// The description.
-        path: PathBuf,
-        /// What went wrong.
-        source: Box<public_api::Error>,
-    },
 }
 
 /// Names the real rustdoc to the copy of this program that cargo runs in its place.
@@ -70,9 +41,7 @@ pub fn run(options: &Options) -> Result<bool, Error> {
     if options.check {
         cargo.arg("--check");
     }
-    let path = PathBuf::from("cargo");
-    let status = cargo.status().map_err(|source| Error::Io { path, source })?;
-    Ok(status.success())
+    Ok(cargo.status().map_err(Error::Cargo)?.success())
 }
 
 #[cfg(feature = "api")]
@@ -80,7 +49,8 @@ pub use listing::run;
 
 #[cfg(feature = "api")]
 mod listing {
-    use super::{Error, Options, RUSTDOC};
+    use super::{Options, RUSTDOC};
+    use crate::{Error, files};
     use cargo_metadata::MetadataCommand;
     use std::path::Path;
     use std::process::Command;
@@ -91,7 +61,7 @@ mod listing {
     /// If rustdoc fails or a file cannot be read or written.
     pub fn run(options: &Options) -> Result<bool, Error> {
         let metadata = MetadataCommand::new().no_deps().exec()?;
-        let me = std::env::current_exe().map_err(failed(Path::new("xtask")))?;
+        let me = std::env::current_exe().map_err(Error::Cargo)?;
         let rustdoc = std::env::var_os("RUSTDOC").unwrap_or_else(|| "rustdoc".into());
         let status = Command::new("cargo")
             .args(["doc", "--workspace", "--no-deps", "--lib", "--quiet"])
@@ -99,12 +69,12 @@ mod listing {
             .env(RUSTDOC, rustdoc)
             .env("RUSTDOCFLAGS", "-Z unstable-options --output-format json --cap-lints allow")
             .status()
-            .map_err(failed(Path::new("cargo")))?;
+            .map_err(Error::Cargo)?;
         if !status.success() {
             return Err(Error::Rustdoc);
         }
         let folder = metadata.workspace_root.as_std_path().join("docs/api");
-        std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+        std::fs::create_dir_all(&folder).map_err(Error::writing(&folder))?;
         let mut same = true;
         for package in &metadata.packages {
             let private = package.publish.as_ref().is_some_and(Vec::is_empty);
@@ -119,18 +89,13 @@ mod listing {
             let listed = list(&description)?;
             let path = folder.join(format!("{}.txt", package.name));
             if !options.check {
-                std::fs::write(&path, listed).map_err(failed(&path))?;
+                files::write(&path, &listed)?;
             } else if std::fs::read_to_string(&path).unwrap_or_default() != listed {
                 println!("public items changed: {} (`cargo xtask api` writes it anew)", path.display());
                 same = false;
             }
         }
         Ok(same)
-    }
-
-    fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> Error + use<> {
-        let path = path.to_owned();
-        move |source| Error::Io { path, source }
     }
 
     /// One line per public item; derived and blanket implementations are left out.

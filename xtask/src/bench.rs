@@ -4,41 +4,16 @@
 //! a benchmark named `standard_normal` (one draw) or ending in `_unit`, and each median is printed as a multiple of the
 //! unit's median.
 
+use crate::{Error, files};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::Command;
-use thiserror::Error;
 
 /// Options of `cargo xtask bench`.
 #[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Crates to measure, by folder name (`core`, `dymbo`, ...); all with benchmarks without any.
     pub crates: Vec<String>,
-}
-
-/// Why benchmarks could not be run.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// No such crate, or it has no benchmarks.
-    #[error("crate `{name}` has no benchmarks; these have: {valid}")]
-    UnknownCrate {
-        /// What was asked for.
-        name: String,
-        /// Crates with benchmarks.
-        valid: String,
-    },
-    /// Benchmarks ran and their table was not understood: divan prints no other format.
-    #[error("the benchmarks of crate `{name}` ran, but their table was not understood: {line}")]
-    Unread {
-        /// The crate.
-        name: String,
-        /// What was met.
-        line: String,
-    },
-    /// cargo could not be run, or the output not read.
-    #[error("cannot run cargo bench: {0}")]
-    Cargo(#[from] std::io::Error),
 }
 
 /// One measured line.
@@ -71,7 +46,8 @@ pub fn run(options: &Options) -> Result<bool, Error> {
     for name in chosen {
         let output = Command::new(env!("CARGO"))
             .args(["bench", "-q", "-p", &format!("fewbits-{name}"), "--benches"])
-            .output()?;
+            .output()
+            .map_err(Error::Cargo)?;
         if !output.status.success() {
             eprintln!("{}", String::from_utf8_lossy(&output.stderr));
             fine = false;
@@ -88,16 +64,10 @@ pub fn run(options: &Options) -> Result<bool, Error> {
 }
 
 fn crates_with_benches() -> Result<Vec<String>, Error> {
-    let crates = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../crates");
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(crates)? {
-        let entry = entry?;
-        if entry.path().join("benches").is_dir() {
-            names.push(entry.file_name().to_string_lossy().into_owned());
-        }
-    }
-    names.sort();
-    Ok(names)
+    let crates = files::list(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../crates")))?;
+    let with_benches = crates.iter().filter(|path| path.join("benches").is_dir());
+    let names = with_benches.filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
+    Ok(names.collect())
 }
 
 /// Splits the output of divan into bench binaries and reads name and median of each line; else the line that has none, or that

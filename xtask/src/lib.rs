@@ -14,5 +14,9 @@ pub mod alone;
 pub mod api;
 pub mod bench;
 mod errata;
+mod error;
 pub mod figures;
+mod files;
 pub mod tidy;
+
+pub use error::Error;

@@ -32,15 +32,11 @@ fn main() -> ExitCode {
     }
     let ended = |good: bool| if good { Ending::Good } else { Ending::Failed };
     let done = match Cli::parse().task {
-        Task::Figures(options) => xtask::figures::run(&options).map_err(|error| error.to_string()),
-        Task::Bench(options) => xtask::bench::run(&options)
-            .map(ended)
-            .map_err(|error| error.to_string()),
-        Task::Alone(options) => xtask::alone::run(&options)
-            .map(ended)
-            .map_err(|error| error.to_string()),
-        Task::Api(options) => xtask::api::run(&options).map(ended).map_err(|error| error.to_string()),
-        Task::Tidy => xtask::tidy::run().map(ended).map_err(|error| error.to_string()),
+        Task::Figures(options) => xtask::figures::run(&options),
+        Task::Bench(options) => xtask::bench::run(&options).map(ended),
+        Task::Alone(options) => xtask::alone::run(&options).map(ended),
+        Task::Api(options) => xtask::api::run(&options).map(ended),
+        Task::Tidy => xtask::tidy::run().map(ended),
     };
     match done {
         Ok(Ending::Good) => ExitCode::SUCCESS,

@@ -11,28 +11,12 @@
 pub(crate) mod errata;
 mod files;
 
+use crate::Error;
+use crate::files::{list, read};
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
 use fewbits_experiments::all;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why the rules could not be checked.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// A file could not be read.
-    #[error("cannot read {path}: {source}")]
-    Read {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The workspace's manifests could not be read.
-    #[error(transparent)]
-    Metadata(#[from] cargo_metadata::Error),
-}
 
 /// Checks the workspace and prints what is wrong; `Ok(false)` if anything is.
 ///
@@ -92,26 +76,6 @@ pub fn check(root: &Path) -> Result<Vec<String>, Error> {
 /// Files beside a test binary's root that are none of its modules.
 fn unlisted<'a>(root: &str, stems: impl Iterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
     stems.filter(move |stem| *stem != "main" && !root.contains(&format!("mod {stem};")))
-}
-
-fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::Read {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-fn list(path: &Path) -> Result<Vec<PathBuf>, Error> {
-    let failed = |source| Error::Read {
-        path: path.to_owned(),
-        source,
-    };
-    let mut entries = Vec::new();
-    for entry in std::fs::read_dir(path).map_err(failed)? {
-        entries.push(entry.map_err(failed)?.path());
-    }
-    entries.sort();
-    Ok(entries)
 }
 
 /// The library crates of the workspace.

@@ -28,7 +28,7 @@ pub enum Verdict {
 }
 
 /// What was expected of a measured value.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Expected {
     /// A number, within the claim's tolerance.
@@ -43,17 +43,8 @@ impl Expected {
     }
 }
 
-impl fmt::Display for Expected {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number(number) => write!(f, "{}", Value::Number(*number)),
-            Self::Condition(condition) => f.write_str(condition),
-        }
-    }
-}
-
 /// A statement about a figure, measured.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Claim {
     /// Short name, unique within the figure.
     pub id: String,
@@ -61,8 +52,8 @@ pub struct Claim {
     pub statement: String,
     /// Verdict.
     pub verdict: Verdict,
-    /// What was measured; `NaN` (in JSON: null) where the row it speaks of is absent.
-    pub value: f64,
+    /// What was measured; none where the row it speaks of is absent, or what is not finite.
+    pub value: Option<f64>,
     /// What was expected of it.
     pub expected: Expected,
     /// Allowed deviation, where the expectation is a number.
@@ -164,7 +155,7 @@ impl Claims {
             id: id.into(),
             statement,
             verdict,
-            value: value.unwrap_or(f64::NAN),
+            value: value.filter(|value| value.is_finite()),
             expected,
             tolerance: None,
             at_defaults: self.at_defaults,

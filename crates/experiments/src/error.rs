@@ -28,14 +28,6 @@ pub enum Error {
         /// Why.
         reason: String,
     },
-    /// A parameter that changes nothing beside the others' values.
-    #[error("parameter `{name}` of figure `{figure}` is without effect at these settings; see `describe {figure}`")]
-    Idle {
-        /// Id of the figure.
-        figure: &'static str,
-        /// The parameter.
-        name: String,
-    },
     /// A run that would take too long or too much memory.
     #[error("figure `{figure}` would need about {need:.1e} {unit} at these settings, beyond {limit:.1e}")]
     TooLarge {

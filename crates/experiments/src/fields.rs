@@ -120,7 +120,7 @@ macro_rules! limits {
 ///         bit: u32 => "Bit received.",
 ///     }
 /// }
-/// assert_eq!(fewbits_experiments::Tables::of(&vec![Row { distance: 2.0, bit: 1 }])?.main.columns()[0].unit, "m");
+/// assert_eq!(fewbits_experiments::Table::of(&vec![Row { distance: 2.0, bit: 1 }])?[0].columns[0].unit, "m");
 /// # Ok::<(), fewbits_experiments::Error>(())
 /// ```
 #[macro_export]

@@ -4,10 +4,9 @@ use crate::arguments::{self, Argument, Parameter, Quick};
 use crate::claim::{Claim, Claims};
 use crate::error::Error;
 use crate::kept::Kept;
-use crate::parameters::{self, Settings};
+use crate::parameters;
 use crate::plot::Plot;
-use crate::schema::{self, Field, Fields};
-use crate::table::Tables;
+use crate::schema::{self, Field, Table};
 use fewbits_monte_carlo::{MonteCarlo, Stream};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value as Json};
@@ -146,7 +145,7 @@ pub trait Figure: Sync {
     /// [`parameters!`](crate::parameters!) writes it.
     type Parameters: Serialize + DeserializeOwned + Argument + Default + Quick;
 
-    /// `Vec<Row>`, or a struct of such lists (the first is the main table): see [`Tables::of`].
+    /// `Vec<Row>`, or a struct of such lists (the first is the main table): see [`Table::of`].
     type Tables: Field;
 
     /// What stands above the figure, unless [`Figure::about`] says so of each value of the type.
@@ -160,11 +159,6 @@ pub trait Figure: Sync {
     /// The paper's setting.
     fn defaults(&self) -> Self::Parameters {
         Self::Parameters::default()
-    }
-
-    /// Parameters without effect under these values: setting one is refused.
-    fn idle(&self, _parameters: &Self::Parameters) -> Vec<&'static str> {
-        Vec::new()
     }
 
     /// What a run with these parameters needs, roughly: more than a day or 2 GB is refused before it starts.
@@ -200,8 +194,8 @@ pub trait Figure: Sync {
 pub struct Outcome {
     /// All parameters as they were used.
     pub parameters: Map<String, Json>,
-    /// The tables.
-    pub tables: Tables,
+    /// The tables, main table first.
+    pub tables: Vec<Table>,
     /// The judged claims.
     pub claims: Vec<Claim>,
     /// The picture.
@@ -222,15 +216,15 @@ pub trait AnyFigure: Sync {
     /// The parameters with defaults, ranges and meanings.
     fn parameters(&self) -> Vec<Parameter>;
 
-    /// The tables and their columns, main table first.
-    fn tables(&self) -> Vec<Fields>;
+    /// The tables and their columns, main table first, without rows.
+    fn tables(&self) -> Vec<Table>;
 
     /// The defaults, quickened if asked for, with `overrides` (`name`, text) applied on top, checked.
     ///
     /// A list is written `0.5,0.9`, a list of points `0.5:0.1,0.9:0.2` (entries in the order of the point's fields).
     ///
     /// # Errors
-    /// If a parameter is unknown, out of range or without effect, or the run would be too large.
+    /// If a parameter is unknown or out of range, or the run would be too large.
     fn configure(&self, overrides: &[(String, String)], quick: bool) -> Result<Map<String, Json>, Error>;
 
     /// Runs the figure with a full set of parameters, as [`AnyFigure::configure`] gives it.
@@ -278,7 +272,7 @@ impl<F: Figure> AnyFigure for F {
         arguments::described::<F::Parameters>(&parameters::map(&self.defaults()))
     }
 
-    fn tables(&self) -> Vec<Fields> {
+    fn tables(&self) -> Vec<Table> {
         schema::tables::<F::Tables>()
     }
 
@@ -288,25 +282,18 @@ impl<F: Figure> AnyFigure for F {
         if quick {
             start.quicken();
         }
-        let mut settings = Settings::new(figure, parameters::map(&start), AnyFigure::parameters(self));
+        let (mut values, described) = (parameters::map(&start), AnyFigure::parameters(self));
         for (name, text) in overrides {
-            settings.set(name, text)?;
+            parameters::set(figure, &mut values, &described, name, text)?;
         }
-        let map = settings.into_map();
-        let idle = self.idle(&typed(self, &map)?);
-        if let Some((name, _)) = overrides.iter().find(|(name, _)| idle.contains(&name.as_str())) {
-            return Err(Error::Idle {
-                figure,
-                name: name.clone(),
-            });
-        }
-        Ok(map)
+        typed(self, &values)?;
+        Ok(values)
     }
 
     fn produce(&self, parameters: &Map<String, Json>, context: &Context<'_>) -> Result<Outcome, Error> {
         let typed = typed(self, parameters)?;
         let rows = self.run(&typed, context)?;
-        let tables = Tables::of(&rows)?;
+        let tables = Table::of(&rows)?;
         let mut claims = Claims::about(Figure::about(self).id);
         Figure::claims(self, &typed, &rows, &mut claims);
         let (defaults, full) = parameters::meaning(parameters, &parameters::map(&self.defaults()));

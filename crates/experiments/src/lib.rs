@@ -36,7 +36,6 @@ pub mod real;
 pub mod reference;
 pub mod schema;
 mod sweep;
-mod table;
 mod words;
 
 #[doc(hidden)]
@@ -47,9 +46,8 @@ pub use error::Error;
 pub use figure::{About, AnyFigure, Context, Cost, Figure, Outcome};
 pub use kept::Kept;
 pub use measured::Measured;
-pub use schema::{Column, Fields, Value};
+pub use schema::{Column, Table, Value};
 pub use sweep::{Comparison, Tally};
-pub use table::{Table, Tables};
 
 /// Every figure and table, in the order of the publications.
 pub fn all() -> Vec<&'static dyn AnyFigure> {

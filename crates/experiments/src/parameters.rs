@@ -77,77 +77,61 @@ fn pointed<'a>(json: &'a Json, path: &str) -> Option<&'a Json> {
     json.pointer(&format!("/{}", path.replace(['.', '['], "/").replace(']', "")))
 }
 
-/// Parameters as they are being set.
-pub(crate) struct Settings {
+/// Sets one parameter of a figure from its text.
+pub(crate) fn set(
     figure: &'static str,
-    values: Map<String, Json>,
-    described: Vec<Parameter>,
-}
-
-impl Settings {
-    pub(crate) fn new(figure: &'static str, values: Map<String, Json>, described: Vec<Parameter>) -> Self {
-        Self {
-            figure,
-            values,
-            described,
-        }
-    }
-
-    pub(crate) fn into_map(self) -> Map<String, Json> {
-        self.values
-    }
-
-    /// Sets one parameter from its text.
-    pub(crate) fn set(&mut self, name: &str, text: &str) -> Result<(), Error> {
-        let (figure, described) = (self.figure, &self.described);
-        let Some(slot) = self.values.get_mut(name) else {
-            let valid: Vec<_> = described.iter().map(|p| p.name.as_str()).collect();
-            let valid = if valid.is_empty() {
-                "none".to_owned()
-            } else {
-                valid.join(", ")
-            };
-            return Err(Error::UnknownParameter {
-                figure,
-                name: name.to_owned(),
-                valid,
-            });
+    values: &mut Map<String, Json>,
+    described: &[Parameter],
+    name: &str,
+    text: &str,
+) -> Result<(), Error> {
+    let Some(slot) = values.get_mut(name) else {
+        let valid: Vec<_> = described.iter().map(|p| p.name.as_str()).collect();
+        let valid = if valid.is_empty() {
+            "none".to_owned()
+        } else {
+            valid.join(", ")
         };
-        let entries = described
-            .iter()
-            .find(|p| p.name == name)
-            .map_or(&[][..], |p| &p.entries);
-        let refused = |reason: &str| Error::Refused {
+        return Err(Error::UnknownParameter {
             figure,
             name: name.to_owned(),
-            value: text.to_owned(),
-            reason: reason.to_owned(),
-        };
-        *slot = match slot {
-            _ if text.trim_start().starts_with(['[', '{']) => {
-                serde_json::from_str(text).map_err(|error| refused(&error.to_string()))?
-            }
-            Json::Array(list) if list.first().is_some_and(Json::is_string) => {
-                text.split(',').map(|word| Json::from(word.trim())).collect()
-            }
-            Json::Array(_) if entries.is_empty() => text.split(',').map(scalar).collect(),
-            Json::Array(_) => {
-                let point = |text: &str| -> Result<Json, Error> {
-                    let values: Vec<&str> = text.split(':').collect();
-                    if values.len() != entries.len() {
-                        return Err(refused(&format!("expected points {}, separated by commas", entries.join(":"))));
-                    }
-                    Ok(Json::Object(entries.iter().cloned().zip(values.into_iter().map(scalar)).collect()))
-                };
-                text.split(',').map(point).collect::<Result<_, _>>()?
-            }
-            _ => scalar(text),
-        };
-        if is_effort(name) && slot.as_u64() == Some(0) {
-            return Err(refused("expected at least 1"));
+            valid,
+        });
+    };
+    let entries = described
+        .iter()
+        .find(|p| p.name == name)
+        .map_or(&[][..], |p| &p.entries);
+    let refused = |reason: &str| Error::Refused {
+        figure,
+        name: name.to_owned(),
+        value: text.to_owned(),
+        reason: reason.to_owned(),
+    };
+    *slot = match slot {
+        _ if text.trim_start().starts_with(['[', '{']) => {
+            serde_json::from_str(text).map_err(|error| refused(&error.to_string()))?
         }
-        Ok(())
+        Json::Array(list) if list.first().is_some_and(Json::is_string) => {
+            text.split(',').map(|word| Json::from(word.trim())).collect()
+        }
+        Json::Array(_) if entries.is_empty() => text.split(',').map(scalar).collect(),
+        Json::Array(_) => {
+            let point = |text: &str| -> Result<Json, Error> {
+                let values: Vec<&str> = text.split(':').collect();
+                if values.len() != entries.len() {
+                    return Err(refused(&format!("expected points {}, separated by commas", entries.join(":"))));
+                }
+                Ok(Json::Object(entries.iter().cloned().zip(values.into_iter().map(scalar)).collect()))
+            };
+            text.split(',').map(point).collect::<Result<_, _>>()?
+        }
+        _ => scalar(text),
+    };
+    if is_effort(name) && slot.as_u64() == Some(0) {
+        return Err(refused("expected at least 1"));
     }
+    Ok(())
 }
 
 /// A number, `true`, `false`, or else a word. Whole numbers may be written `1e5`.
@@ -198,10 +182,9 @@ mod tests {
     }
 
     fn set(name: &str, text: &str) -> Result<Parameters, Error> {
-        let (start, described) = described();
-        let mut settings = Settings::new("demo-fig1", start, described);
-        settings.set(name, text)?;
-        typed("demo-fig1", &settings.into_map())
+        let (mut values, described) = described();
+        super::set("demo-fig1", &mut values, &described, name, text)?;
+        typed("demo-fig1", &values)
     }
 
     #[test]

@@ -162,11 +162,6 @@ impl Panel {
         Self::new(title, Axis::linear(x), Axis::log(y))
     }
 
-    /// An empty panel, its horizontal axis logarithmic.
-    pub fn log_x(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
-        Self::new(title, Axis::log(x), Axis::linear(y))
-    }
-
     /// An empty panel, both axes logarithmic.
     pub fn loglog(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
         Self::new(title, Axis::log(x), Axis::log(y))

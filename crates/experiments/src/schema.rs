@@ -1,5 +1,10 @@
-//! What the fields of a row say about themselves: names, units and meanings of columns, and their cells.
+//! Tables ready to be written: typed rows become named columns with units and meanings.
+//!
+//! A figure's result is a plain value: `Vec<Row>`, or a struct of such lists whose first field is the main table. The fields of
+//! a row *are* the columns ([`rows!`](crate::rows!)): their documentation is the meaning, `Option` may be empty, and a
+//! [`Measured`] fills two columns (`mse`, `mse_se`).
 
+use crate::error::Error;
 use crate::measured::Measured;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -9,20 +14,20 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Column {
     /// Name in the header: lower case with underscores.
-    pub name: Cow<'static, str>,
+    pub name: String,
     /// Unit; empty for pure numbers and labels.
-    pub unit: Cow<'static, str>,
+    pub unit: &'static str,
     /// What the column holds, in a few words.
-    pub meaning: Cow<'static, str>,
+    pub meaning: String,
 }
 
 impl Column {
     /// A column of this name, unit and documentation.
     pub fn of(name: &str, unit: &'static str, documentation: &str) -> Self {
         Self {
-            name: name.trim_start_matches("r#").to_owned().into(),
-            unit: unit.into(),
-            meaning: on_one_line(documentation).into(),
+            name: name.trim_start_matches("r#").to_owned(),
+            unit,
+            meaning: on_one_line(documentation),
         }
     }
 }
@@ -60,22 +65,52 @@ impl fmt::Display for Value {
     }
 }
 
-/// A table as its rows describe it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fields {
+/// Rows under named columns.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Table {
     /// Name in file names; the main table's is `main`.
     pub name: String,
     /// What it holds.
     pub meaning: String,
-    /// Whether it holds measured times.
+    /// Whether it holds measured times, and so differs from run to run.
     pub volatile: bool,
-    pub(crate) columns: Vec<Column>,
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// A cell for each column.
+    pub rows: Vec<Vec<Value>>,
 }
 
-impl Fields {
-    /// The columns.
-    pub fn columns(&self) -> impl Iterator<Item = &Column> {
-        self.columns.iter()
+impl Table {
+    /// The tables of a figure's result, main table first.
+    ///
+    /// # Errors
+    /// If a cell is not finite: what did not converge must say so.
+    pub fn of<T: Field>(result: &T) -> Result<Vec<Self>, Error> {
+        let mut cells = Cells::default();
+        result.put(&mut cells);
+        let mut tables = tables::<T>();
+        for (table, rows) in tables.iter_mut().zip(cells.tables) {
+            for (index, row) in rows.iter().enumerate() {
+                for (column, cell) in table.columns.iter().zip(row) {
+                    if let Value::Number(number) = cell
+                        && !number.is_finite()
+                    {
+                        let place = format!("column `{}`, row {index} of `{}`", column.name, table.name);
+                        return Err(Error::Table(format!("{number} in {place}")));
+                    }
+                }
+            }
+            table.rows = rows;
+        }
+        Ok(tables)
+    }
+
+    /// Name of the CSV file in the figure of this id.
+    pub fn file(&self, id: &str) -> String {
+        match self.name.as_str() {
+            "main" => format!("{id}.csv"),
+            name => format!("{id}-{name}.csv"),
+        }
     }
 }
 
@@ -83,7 +118,7 @@ impl Fields {
 #[derive(Debug, Default)]
 pub struct Described {
     columns: Vec<Column>,
-    pub(crate) tables: Vec<Fields>,
+    pub(crate) tables: Vec<Table>,
 }
 
 /// The cells of a row, or the rows of the tables, in the order in which [`Described`] has columns and tables.
@@ -156,9 +191,9 @@ impl Field for Measured {
 
     fn describe(about: Column, to: &mut Described) {
         let error = Column {
-            name: format!("{}_se", about.name).into(),
-            unit: about.unit.clone(),
-            meaning: format!("{} (its standard error)", about.meaning).into(),
+            name: format!("{}_se", about.name),
+            unit: about.unit,
+            meaning: format!("{} (its standard error)", about.meaning),
         };
         to.columns.extend([about, error]);
     }
@@ -205,15 +240,17 @@ impl<T: Field> Field for Vec<T> {
     fn describe(about: Column, to: &mut Described) {
         let mut row = Described::default();
         T::describe(Column::of("", "", ""), &mut row);
-        to.tables.push(Fields {
+        let further = about.name.replace('_', "-");
+        to.tables.push(Table {
             name: if to.tables.is_empty() {
                 "main".to_owned()
             } else {
-                about.name.replace('_', "-")
+                further
             },
-            meaning: about.meaning.into_owned(),
+            meaning: about.meaning,
             volatile: about.unit == "time",
             columns: row.columns,
+            rows: Vec::new(),
         });
     }
 
@@ -228,8 +265,99 @@ impl<T: Field> Field for Vec<T> {
 }
 
 /// The tables that `T` describes.
-pub(crate) fn tables<T: Field>() -> Vec<Fields> {
+pub(crate) fn tables<T: Field>() -> Vec<Table> {
     let mut all = Described::default();
     T::describe(Column::of("", "", ""), &mut all);
     all.tables
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug)]
+    enum Method {
+        Lloyd,
+    }
+    label!(Method);
+
+    rows! {
+        struct Key {
+            method: Method => "How.",
+        }
+
+        struct Row {
+            key: Key,
+            time: f64 ["s"] => "Time.",
+            /// Squared error,
+            /// in square metres.
+            mse: Measured ["m^2"],
+            other: Option<Measured> => "Of another.",
+            printed: Option<f64> => "As printed.",
+        }
+
+        struct Two {
+            rows: Vec<Row> => "Main.",
+            run_times: Vec<Count> ["time"] => "Counts.",
+        }
+
+        struct Count {
+            n: u64 => "A count.",
+        }
+    }
+
+    fn row(time: f64) -> Row {
+        let mse = Measured {
+            value: 2.0,
+            standard_error: Some(0.5),
+        };
+        Row {
+            key: Key { method: Method::Lloyd },
+            time,
+            mse,
+            other: None,
+            printed: None,
+        }
+    }
+
+    #[test]
+    fn the_fields_are_the_columns() {
+        let table = Table::of(&vec![row(1.0)]).unwrap().remove(0);
+        let cells: Vec<_> = table
+            .columns
+            .iter()
+            .zip(&table.rows[0])
+            .map(|(c, v)| format!("{}[{}]={v}", c.name, c.unit))
+            .collect();
+        let expected = [
+            "method[]=lloyd",
+            "time[s]=1",
+            "mse[m^2]=2",
+            "mse_se[m^2]=0.5",
+            "other[]=",
+            "other_se[]=",
+            "printed[]=",
+        ];
+        assert_eq!(cells, expected);
+        assert_eq!(table.columns[3].meaning, "Squared error, in square metres. (its standard error)");
+    }
+
+    #[test]
+    fn a_struct_of_lists_is_several_tables() {
+        let two = Two {
+            rows: Vec::new(),
+            run_times: vec![Count { n: 3 }],
+        };
+        let tables = Table::of(&two).unwrap();
+        assert_eq!((tables[0].rows.len(), tables[0].columns.len()), (0, 7));
+        assert_eq!((tables[1].name.as_str(), tables[1].rows.len(), tables[1].volatile), ("run-times", 1, true));
+    }
+
+    #[test]
+    fn a_cell_that_is_not_finite_is_refused_by_name() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let message = Table::of(&vec![row(1.0), row(bad)]).unwrap_err().to_string();
+            assert!(message.contains("`time`, row 1"), "{message}");
+        }
+    }
 }

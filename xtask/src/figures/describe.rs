@@ -41,15 +41,10 @@ pub(super) fn one(figure: &dyn AnyFigure) -> String {
         }
     }
     for table in figure.tables() {
-        let name = if table.name == "main" {
-            String::new()
-        } else {
-            format!("-{}", table.name)
-        };
         let volatile = if table.volatile { " (measured times)" } else { "" };
-        let _ = writeln!(page, "\n{}{name}.csv{volatile}", about.id);
+        let _ = writeln!(page, "\n{}{volatile}", table.file(about.id));
         wrap(&mut page, "  ", &table.meaning);
-        for Column { name, unit, meaning } in table.columns() {
+        for Column { name, unit, meaning } in &table.columns {
             let unit = if unit.is_empty() {
                 String::new()
             } else {

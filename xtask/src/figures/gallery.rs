@@ -2,8 +2,8 @@
 //! runs stand greyed at the end of their system.
 
 use super::draw::typeset;
-use super::record::{Judged, Record};
-use fewbits_experiments::{Verdict, plain};
+use super::record::{Record, expectation, measured};
+use fewbits_experiments::{Claim, Verdict, plain};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value as Json;
 use std::collections::BTreeSet;
@@ -289,7 +289,7 @@ fn columns_of(name: &str, columns: &Json) -> Markup {
     }
 }
 
-fn claims(claims: &[&Judged]) -> Markup {
+fn claims(claims: &[&Claim]) -> Markup {
     html! {
         div.scroll tabindex="0" role="region" aria-label="Claims" {
             table {
@@ -300,8 +300,8 @@ fn claims(claims: &[&Judged]) -> Markup {
                             @let verdict = match c.verdict { Verdict::Pass => "pass", Verdict::Fail => "fail", Verdict::Skipped => "skipped" };
                             td class=(verdict) { (verdict) }
                             td { (typeset(&c.statement)) " " small { (c.id) } }
-                            td.number { (c.measured()) }
-                            td.number { (c.expectation()) }
+                            td.number { (measured(c)) }
+                            td.number { (expectation(c)) }
                         }
                     }
                 }

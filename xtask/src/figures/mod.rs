@@ -2,7 +2,6 @@
 
 mod describe;
 mod draw;
-mod error;
 mod gallery;
 mod options;
 mod produce;
@@ -19,10 +18,9 @@ mod times;
 mod write;
 
 pub use draw::to_svg;
-pub use error::Error;
 pub use options::{Action, Options};
 
-use crate::{errata, tidy};
+use crate::{Error, errata, files, tidy};
 use options::in_workspace;
 use record::Record;
 use std::io::Write;
@@ -99,7 +97,7 @@ fn merge(from: &[PathBuf], out: &Path, json: bool) -> Result<Ending, Error> {
         for record in Record::read_all(&folder)?.into_values() {
             for name in record.files.iter().chain([&format!("{}.json", record.id)]) {
                 let path = folder.join(name);
-                let content = std::fs::read(&path).map_err(|source| Error::Read { path, source })?;
+                let content = std::fs::read(&path).map_err(Error::reading(&path))?;
                 out.write(name, &content)?;
             }
             records.push(record);
@@ -120,10 +118,7 @@ fn errata(from: &Path, check: bool) -> Result<Ending, Error> {
     let records = Record::read_all(from)?;
     let tests = tidy::errata::tests(&in_workspace(Path::new(".")))?;
     let path = in_workspace(Path::new("docs/errata.md"));
-    let page = std::fs::read_to_string(&path).map_err(|source| Error::Read {
-        path: path.clone(),
-        source,
-    })?;
+    let page = files::read(&path)?;
     let ids: Vec<&'static str> = fewbits_experiments::all()
         .iter()
         .map(|figure| figure.about().id)
@@ -145,7 +140,7 @@ fn errata(from: &Path, check: bool) -> Result<Ending, Error> {
             Ok(Ending::Failed)
         }
         (false, false) => {
-            std::fs::write(&path, new).map_err(|source| Error::Write { path, source })?;
+            files::write(&path, &new)?;
             Ok(Ending::Good)
         }
     }

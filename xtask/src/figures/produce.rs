@@ -3,7 +3,8 @@
 use super::record::Record;
 use super::select::Job;
 use super::write::Made;
-use super::{Error, Options, reuse};
+use super::{Options, reuse};
+use crate::Error;
 use fewbits_experiments::{Context, Kept, Outcome};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -96,7 +97,7 @@ fn message(payload: &(dyn Any + Send)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fewbits_experiments::{About, AnyFigure, Fields, Parameter};
+    use fewbits_experiments::{About, AnyFigure, Parameter, Table};
     use serde_json::{Map, Value as Json};
 
     struct Panics;
@@ -114,7 +115,7 @@ mod tests {
         fn parameters(&self) -> Vec<Parameter> {
             Vec::new()
         }
-        fn tables(&self) -> Vec<Fields> {
+        fn tables(&self) -> Vec<Table> {
             Vec::new()
         }
         fn configure(&self, _: &[(String, String)], _: bool) -> Result<Map<String, Json>, fewbits_experiments::Error> {

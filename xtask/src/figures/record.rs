@@ -1,10 +1,11 @@
 //! What is on disk about a figure: the content of its JSON, which gallery, summary, `--failed` and `merge` read back.
 
-use super::{Error, Options};
+use super::Options;
+use crate::{Error, files};
 use fewbits_experiments::plot::{Plot, Shape};
-use fewbits_experiments::{About, Claim, Outcome, Verdict, plain};
+use fewbits_experiments::{About, Claim, Expected, Outcome, Verdict, plain};
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value as Json, json};
+use serde_json::{Map, Value as Json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -36,48 +37,22 @@ pub(super) struct Record {
     #[serde(default)]
     pub(super) rows: usize,
     pub(super) columns: Map<String, Json>,
-    pub(super) claims: Vec<Judged>,
+    pub(super) claims: Vec<Claim>,
     #[serde(default)]
     pub(super) error: Option<String>,
 }
 
-/// A claim as it was judged.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Judged {
-    pub(super) id: String,
-    pub(super) statement: String,
-    pub(super) verdict: Verdict,
-    /// None where what the claim speaks of is absent.
-    pub(super) value: Option<f64>,
-    pub(super) expected: Json,
-    pub(super) tolerance: Option<f64>,
+/// What was measured of a claim, for a reader.
+pub(super) fn measured(claim: &Claim) -> String {
+    claim.value.map_or_else(|| "nothing".to_owned(), short)
 }
 
-impl From<&Claim> for Judged {
-    fn from(claim: &Claim) -> Self {
-        Self {
-            id: claim.id.clone(),
-            statement: claim.statement.clone(),
-            verdict: claim.verdict,
-            value: claim.value.is_finite().then_some(claim.value),
-            expected: json!(claim.expected),
-            tolerance: claim.tolerance,
-        }
-    }
-}
-
-impl Judged {
-    /// What was measured, for a reader.
-    pub(super) fn measured(&self) -> String {
-        self.value.map_or_else(|| "nothing".to_owned(), short)
-    }
-
-    /// What was expected, for a reader.
-    pub(super) fn expectation(&self) -> String {
-        let tolerance = self.tolerance.map_or_else(String::new, |t| format!(" ± {}", short(t)));
-        self.expected
-            .as_f64()
-            .map_or_else(|| plain(&self.expected), |number| short(number) + &tolerance)
+/// What was expected of it, for a reader.
+pub(super) fn expectation(claim: &Claim) -> String {
+    let tolerance = claim.tolerance.map_or_else(String::new, |t| format!(" ± {}", short(t)));
+    match &claim.expected {
+        Expected::Number(number) => short(*number) + &tolerance,
+        Expected::Condition(condition) => condition.clone(),
     }
 }
 
@@ -139,8 +114,8 @@ impl Record {
 
     /// With the claims of an outcome; its files are added as they are written.
     pub(super) fn with(mut self, outcome: &Outcome) -> Self {
-        self.rows = outcome.tables.main.len();
-        self.claims = outcome.claims.iter().map(Judged::from).collect();
+        self.rows = outcome.tables.first().map_or(0, |table| table.rows.len());
+        self.claims = outcome.claims.clone();
         if has_error_bars(&outcome.plot) && !self.caption.contains("standard error") {
             self.caption.push_str(" Error bars: one standard error.");
         }
@@ -196,13 +171,8 @@ impl Record {
 
     /// The records in a directory, by id. What cannot be read as one is left out.
     pub(super) fn read_all(folder: &Path) -> Result<BTreeMap<String, Self>, Error> {
-        let unreadable = |source| Error::Read {
-            path: folder.to_owned(),
-            source,
-        };
         let mut records = BTreeMap::new();
-        for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
+        for path in files::list(folder)? {
             if path.extension().is_some_and(|extension| extension == "json")
                 && let Some(id) = path.file_stem().and_then(|stem| stem.to_str())
                 && let Ok(record) = Self::read_one(folder, id)
@@ -215,7 +185,7 @@ impl Record {
 }
 
 /// A number with enough digits to read and no more.
-pub(super) fn short(number: f64) -> String {
+fn short(number: f64) -> String {
     if number == 0.0 {
         return "0".to_owned();
     }

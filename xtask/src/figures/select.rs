@@ -1,6 +1,7 @@
 //! Which figures, with which parameters.
 
-use super::{Error, Options};
+use super::Options;
+use crate::Error;
 use fewbits_experiments::{AnyFigure, all};
 use globset::Glob;
 use serde_json::{Map, Value as Json};

@@ -1,6 +1,6 @@
 //! `--serve`: the output directory in a browser.
 
-use super::Error;
+use crate::Error;
 use std::path::{Component, Path, PathBuf};
 use std::thread::JoinHandle;
 use tiny_http::{Header, Method, Request, Response, StatusCode};

@@ -1,6 +1,6 @@
 //! The table at the end.
 
-use super::record::Record;
+use super::record::{Record, expectation, measured};
 use fewbits_experiments::Verdict;
 use serde_json::json;
 use std::fmt::Write;
@@ -28,7 +28,7 @@ pub(super) fn text(records: &[Record], folder: &Path, elapsed: Duration) -> Stri
     }
     for r in records {
         for c in r.claims.iter().filter(|c| c.verdict == Verdict::Fail) {
-            let (measured, expected) = (c.measured(), c.expectation());
+            let (measured, expected) = (measured(c), expectation(c));
             let _ =
                 writeln!(page, "FAIL {} {}: {} (measured {measured}, expected {expected})", r.id, c.id, c.statement);
         }

@@ -1,7 +1,8 @@
 //! Files: each is written under a temporary name and then renamed, so that none is ever half-written.
 
 use super::record::Record;
-use super::{Ending, Error, draw, gallery, print, summary};
+use super::{Ending, draw, gallery, print, summary};
+use crate::Error;
 use fewbits_experiments::{Outcome, Table};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -17,15 +18,11 @@ pub(super) struct Directory {
 impl Directory {
     /// Makes the directory if it is missing.
     pub(super) fn create(path: &Path) -> Result<Self, Error> {
-        let refused = |source| Error::Write {
-            path: path.to_owned(),
-            source,
-        };
-        std::fs::create_dir_all(path).map_err(refused)?;
+        std::fs::create_dir_all(path).map_err(Error::writing(path))?;
         let directory = Self { path: path.to_owned() };
         // Find out now, not after an hour of trials, whether files can be written.
         directory.write(".probe", b"")?;
-        std::fs::remove_file(path.join(".probe")).map_err(refused)?;
+        std::fs::remove_file(path.join(".probe")).map_err(Error::writing(path))?;
         Ok(directory)
     }
 
@@ -42,7 +39,7 @@ impl Directory {
             .map_err(|source| {
                 // The write has failed already; a left-over is the lesser harm.
                 let _ = std::fs::remove_file(&unfinished);
-                Error::Write { path, source }
+                Error::writing(&path)(source)
             })
     }
 
@@ -88,18 +85,12 @@ impl Made {
 
     fn add(&mut self, outcome: &Outcome, plots: bool) -> Result<(), Error> {
         let id = self.record.id.clone();
-        let main = (format!("{id}.csv"), &outcome.tables.main);
-        let further = outcome
-            .tables
-            .further
-            .iter()
-            .map(|(name, table)| (format!("{id}-{name}.csv"), table));
-        for (name, table) in std::iter::once(main).chain(further) {
-            let csv = to_csv(table).map_err(|error| Error::Write {
-                path: PathBuf::from(&name),
-                source: std::io::Error::other(error),
-            })?;
-            self.record.columns.insert(name.clone(), json!(table.columns()));
+        for table in &outcome.tables {
+            let name = table.file(&id);
+            let csv = to_csv(table)
+                .map_err(std::io::Error::other)
+                .map_err(Error::writing(Path::new(&name)))?;
+            self.record.columns.insert(name.clone(), json!(table.columns));
             self.files.push((name, csv));
         }
         if plots {
@@ -134,8 +125,8 @@ impl Made {
 
 fn to_csv(table: &Table) -> Result<String, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(table.columns().iter().map(|column| column.name.as_ref()))?;
-    for row in table.rows() {
+    writer.write_record(table.columns.iter().map(|column| &column.name))?;
+    for row in &table.rows {
         writer.write_record(row.iter().map(ToString::to_string))?;
     }
     let bytes = writer.into_inner().map_err(|error| error.into_error())?;

@@ -1,7 +1,9 @@
 //! Errata and what shows them cite each other.
 
-use super::{Error, list, read, rust_files};
+use super::rust_files;
+use crate::Error;
 use crate::errata::{NOTATION, add_tests, cited, rows};
+use crate::files::{list, read};
 use fewbits_experiments::all;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

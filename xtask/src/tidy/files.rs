@@ -2,7 +2,9 @@
 //!
 //! Files that break a rule today stand in `allowed.txt`. An entry that is no longer needed is a problem too, so the list only shrinks.
 
-use super::{Error, read, rust_files};
+use super::rust_files;
+use crate::Error;
+use crate::files::read;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 

@@ -16,6 +16,7 @@ mod diffusion_entries;
 mod envelopes;
 mod fit;
 mod fixtures;
+mod forms;
 mod gridded;
 mod laplace;
 mod laws;

@@ -9,7 +9,7 @@ use nalgebra::Vector2;
 
 const SOURCE: [f64; 2] = [62.0, 50.0];
 
-fn run(seed: u64, unit: f64, windy: bool, nodes: usize, change: impl FnOnce(&mut Search)) -> Outcome {
+pub fn run(seed: u64, unit: f64, windy: bool, nodes: usize, change: impl FnOnce(&mut Search)) -> Outcome {
     let mut rng = Stream::new(seed).rng();
     let alarm = Vector2::new(44.396, 52.042) * unit;
     let deployed = Deployment::uniform(&mut rng, [0.0; 2], [100.0 * unit; 2], nodes).unwrap();

@@ -1,28 +1,17 @@
 //! Figures 5 and 6.
 
-use super::common::{B, LPG, Scheme, Settings};
+use super::common::{B, CHAINS, LPG, Scheme, Settings};
 use crate::prelude::*;
 use fewbits_core::Density;
 use fewbits_diffusive::density::{Clumps, MixtureFit};
-use fewbits_diffusive::{Form, Outcome, PositionBelief, Posterior, RateModel, Travelling, project};
+use fewbits_diffusive::{Form, PositionBelief, Posterior, RateModel, Travelling, project};
 use nalgebra::Vector2;
 
 /// Only the position is approximated here.
-pub(super) const POSITION_ONLY: RateModel = RateModel::Known(1.0);
-
-/// The exact posterior of the position after so many nodes of example B, the rate integrated out.
-fn exact(settings: &Settings, trial: Trial, nodes: usize) -> Result<Option<Posterior>, Error> {
-    Ok(exact_search(settings, trial, nodes)?.posterior)
-}
-
-pub(super) fn exact_search(settings: &Settings, trial: Trial, nodes: usize) -> Result<Outcome, Error> {
-    // The threshold must not end the search early.
-    let endless = super::common::Example { threshold: 1e-300, ..B };
-    Scheme::new("exact", endless).up_to(nodes).run(settings, trial)
-}
+const POSITION_ONLY: RateModel = RateModel::Known(1.0);
 
 /// `KL(exact || form)`, nats.
-pub(super) fn divergence(posterior: &Posterior, form: Form) -> Result<f64, Error> {
+fn divergence(posterior: &Posterior, form: Form) -> Result<f64, Error> {
     let Some(Travelling::Position(belief)) = project(posterior, form, &POSITION_ONLY)? else {
         return Ok(0.0);
     };
@@ -72,7 +61,7 @@ rows! {
 
     struct Divergence {
         deployment: u64 => "The deployment shown.",
-        form: String => "What the belief is approximated by.",
+        form: &'static str => "What the belief is approximated by.",
         scalars: usize => "Numbers in a message.",
         kl: f64 ["nats"] => "`KL(exact || form)`.",
         lobes: f64 => "Distance of the exact belief's two lobes in standard deviations.",
@@ -107,11 +96,12 @@ pub static FIG6: Lobes = Lobes {
 
 fn fields(p: &Parameters, context: &Context<'_>, form: Option<Form>) -> Result<Fields, Error> {
     let settings = Settings::default();
-    let run = context.monte_carlo(context.stream("diffusive-chains"), 1);
+    let run = context.monte_carlo(context.stream(CHAINS), 1);
     let mut shown = None;
     for deployment in p.deployment..p.deployment + 100 {
         context.check()?;
-        let Some(posterior) = exact(&settings, run.trial(deployment), p.nodes)? else {
+        let outcome = Scheme::exact(p.nodes).run(&settings, run.trial(deployment))?;
+        let Some(posterior) = outcome.posterior else {
             continue;
         };
         let apart = lobes(&posterior)?;
@@ -150,20 +140,21 @@ fn fields(p: &Parameters, context: &Context<'_>, form: Option<Form>) -> Result<F
         }
     });
     let field = field.collect();
-    let mut divergences = Vec::new();
-    for (name, form) in [
+    let forms = [
         ("gaussian", Form::Gaussian),
         ("gmm-2", Form::Mixture(2)),
         ("lpg-2x5", LPG),
-    ] {
-        divergences.push(Divergence {
+    ];
+    let divergence = |(name, form): (&'static str, Form)| -> Result<Divergence, Error> {
+        Ok(Divergence {
             deployment,
-            form: name.to_owned(),
+            form: name,
             scalars: form.scalars(&POSITION_ONLY).unwrap_or(0),
             kl: divergence(&posterior, form)?,
             lobes: apart,
-        });
-    }
+        })
+    };
+    let divergences = forms.into_iter().map(divergence).collect::<Result<_, _>>()?;
     Ok(Fields { field, divergences })
 }
 

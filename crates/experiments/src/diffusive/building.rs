@@ -25,7 +25,6 @@ const FREE_RATES: [f64; 2] = [0.3, 30.0];
 /// One way to report.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Case {
-    pub(super) name: &'static str,
     pub(super) windy: bool,
     /// Standard deviation of the noise as a share of the typical concentration.
     pub(super) noise: f64,
@@ -33,13 +32,16 @@ pub(super) struct Case {
     pub(super) readings: usize,
 }
 
-pub(super) const fn case(name: &'static str, windy: bool, noise: f64, report: Report, readings: usize) -> Case {
-    Case {
-        name,
-        windy,
-        noise,
-        report,
-        readings,
+impl Case {
+    /// Air, noise, report and number of readings in words.
+    pub(super) fn name(&self) -> String {
+        let air = if self.windy { "wind" } else { "still" };
+        let report = match (self.report, self.readings) {
+            (Report::Value, _) => "values",
+            (Report::Word, 1) => "three bits",
+            (Report::Word, _) => "three bits, five readings",
+        };
+        format!("{air}, {} %, {report}", 100.0 * self.noise)
     }
 }
 

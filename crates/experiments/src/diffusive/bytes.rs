@@ -1,30 +1,33 @@
 //! Bytes until the threshold is reached.
 
-use super::common::{B, LPG, Scheme, Settings, tracks};
-use super::summary::{Summary, summaries};
+use super::common::{B, CHAINS, Scheme, Settings, tracks};
+use super::summary::{Summary, summary};
 use crate::prelude::*;
-use fewbits_diffusive::Form;
 use fewbits_diffusive::message::{SampleCode, Wire};
 
 fn schemes() -> Vec<Scheme> {
-    let nine_bits = Wire {
-        samples: Some(SampleCode { bits: 9, step: 1.0 }),
-        ..Wire::default()
+    let raw = |name, samples| Scheme {
+        wire: Wire {
+            samples,
+            ..Wire::default()
+        },
+        ..Scheme::new(name, B, 15.0)
     };
-    let six_bits = Wire {
-        samples: Some(SampleCode { bits: 6, step: 8.0 }),
-        ..Wire::default()
-    };
-    vec![
-        Scheme::new("raw-64-bit", B).up_to(30),
-        Scheme::new("raw-9-bit", B).up_to(30).wired(nine_bits),
-        Scheme::new("raw-6-bit", B).up_to(30).wired(six_bits),
-        Scheme::new("gmm-4", B).of(Form::Mixture(4)),
-        Scheme::new("gaussian-9", B).of(Form::Gaussian),
-        Scheme::new("gaussian known rate", B).of(Form::Gaussian).known(),
-        Scheme::new("gmm-4 known rate", B).of(Form::Mixture(4)).known(),
-        Scheme::new("lpg-2x5 known rate", B).of(LPG).known(),
-    ]
+    let raw = [
+        raw("raw-64-bit", None),
+        raw("raw-9-bit", Some(SampleCode { bits: 9, step: 1.0 })),
+        raw("raw-6-bit", Some(SampleCode { bits: 6, step: 8.0 })),
+    ];
+    let forms = [
+        "gmm-4",
+        "gaussian-9",
+        "gaussian known rate",
+        "gmm-4 known rate",
+        "lpg-2x5 known rate",
+    ];
+    raw.into_iter()
+        .chain(forms.map(|name| Scheme::new(name, B, 15.0)))
+        .collect()
 }
 
 /// Bytes to the threshold.
@@ -37,7 +40,7 @@ impl Figure for Bytes {
          cheapest message and lose nothing.");
 
     fn world(&self) -> Option<&'static str> {
-        Some("diffusive-chains")
+        Some(CHAINS)
     }
 
     fn cost(&self, p: &Settings) -> Cost {
@@ -46,8 +49,12 @@ impl Figure for Bytes {
 
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Summary>, Error> {
         let schemes = schemes();
-        let all = tracks(context, "diffusive-chains", p, &schemes)?;
-        summaries(&schemes, p, &all)
+        let all = tracks(context, p, &schemes)?;
+        schemes
+            .iter()
+            .zip(&all)
+            .map(|(scheme, tracks)| summary(scheme, p, tracks))
+            .collect()
     }
 
     fn claims(&self, _: &Settings, rows: &Vec<Summary>, claims: &mut Claims) {

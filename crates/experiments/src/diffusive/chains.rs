@@ -1,97 +1,61 @@
 //! Figures 3, 4, 7 to 10: error and determinant along many searches.
 
 use super::chain_claims;
-use super::common::{A, B, LPG, Scheme, Settings, Track, tracks};
-use super::summary::{Rows, curve, summaries};
+use super::common::{A, B, CHAINS, Example, Scheme, Settings, tracks};
+use super::summary::{Rows, curve, summary};
 use crate::prelude::*;
-use fewbits_diffusive::{Form, Rule};
 
 /// One of these figures.
 pub struct Chains {
     about: About,
-    schemes: fn() -> Vec<Scheme>,
+    example: Example,
+    /// Names of schemes and radio ranges.
+    schemes: &'static [(&'static str, f64)],
     claims: fn(&Rows, &mut Claims),
 }
 
-fn schemes_a_few() -> Vec<Scheme> {
-    [15.0, 10.0]
-        .into_iter()
-        .flat_map(|range| {
-            [
-                Scheme::new("exact", A).at(range).up_to(30),
-                Scheme::new("gmm-4", A).at(range).of(Form::Mixture(4)),
-                Scheme::new("gaussian known rate", A)
-                    .at(range)
-                    .of(Form::Gaussian)
-                    .known(),
-            ]
-        })
-        .collect()
-}
-
-fn schemes_a() -> Vec<Scheme> {
-    let mut all = schemes_a_few();
-    for range in [15.0, 10.0] {
-        all.push(Scheme::new("gaussian-9", A).at(range).of(Form::Gaussian));
+impl Chains {
+    fn schemes(&self) -> Vec<Scheme> {
+        let of = |(name, range): &(&'static str, f64)| Scheme::new(name, self.example, *range);
+        self.schemes.iter().map(of).collect()
     }
-    all.push(Scheme::new("lpg-2x5 known rate", A).of(LPG).known());
-    all
 }
 
-fn schemes_b_few() -> Vec<Scheme> {
-    vec![
-        Scheme::new("exact", B).up_to(30),
-        Scheme::new("lpg-2x5 known rate", B).of(LPG).known(),
-        Scheme::new("gaussian known rate", B).of(Form::Gaussian).known(),
-        Scheme::new("gaussian-9", B).of(Form::Gaussian),
-        Scheme::new("lpg-2x5", B).of(LPG),
-        Scheme::new("exact known rate", B).known().up_to(30),
-    ]
-}
-
-fn schemes_b() -> Vec<Scheme> {
-    let mut all = schemes_b_few();
-    all.extend([
-        Scheme::new("gmm-4", B).of(Form::Mixture(4)),
-        Scheme::new("gmm-4 known rate", B).of(Form::Mixture(4)).known(),
-        Scheme::new("lpg-1x5 known rate", B)
-            .of(Form::Lpg {
-                components: 1,
-                degree: 5,
-            })
-            .known(),
-        Scheme::new("particles-25 known rate", B)
-            .of(Form::Particles(25))
-            .known(),
-        Scheme::new("mode and curvature known rate", B)
-            .of(Form::Laplace)
-            .known(),
-    ]);
-    all
-}
-
-fn windy(example: super::common::Example) -> Vec<Scheme> {
-    [
-        ("covariance", Rule::Covariance),
-        ("information", Rule::MutualInformation),
-        ("mahalanobis", Rule::Mahalanobis),
-    ]
-    .map(|(name, rule)| {
-        Scheme::new(name, example)
-            .of(Form::Mixture(4))
-            .by(rule)
-            .in_wind()
-            .up_to(14)
-    })
-    .to_vec()
-}
+/// Those of figure 4; the first six are those of figure 3.
+const OF_A: [(&str, f64); 9] = [
+    ("exact", 15.0),
+    ("gmm-4", 15.0),
+    ("gaussian known rate", 15.0),
+    ("exact", 10.0),
+    ("gmm-4", 10.0),
+    ("gaussian known rate", 10.0),
+    ("gaussian-9", 15.0),
+    ("gaussian-9", 10.0),
+    ("lpg-2x5 known rate", 15.0),
+];
+/// Those of figure 8; the first six are those of figure 7.
+const OF_B: [(&str, f64); 11] = [
+    ("exact", 15.0),
+    ("lpg-2x5 known rate", 15.0),
+    ("gaussian known rate", 15.0),
+    ("gaussian-9", 15.0),
+    ("lpg-2x5", 15.0),
+    ("exact known rate", 15.0),
+    ("gmm-4", 15.0),
+    ("gmm-4 known rate", 15.0),
+    ("lpg-1x5 known rate", 15.0),
+    ("particles-25 known rate", 15.0),
+    ("mode and curvature known rate", 15.0),
+];
+const IN_WIND: [(&str, f64); 3] = [("covariance", 15.0), ("information", 15.0), ("mahalanobis", 15.0)];
 
 /// Figure 3: error, example A.
 pub static FIG3: Chains = Chains {
     about: About::of("diffusive-fig3", "Error along the search, two radio ranges", "Zhao and Nehorai 2007, Fig. 3")
         .showing("Median distance of estimate and source after each node (bands: deciles), example A, ranges of 15 and 10 m, \
                   over random deployments. What the paper calls bias is the root of this distance; both are in the table."),
-    schemes: schemes_a_few,
+    example: A,
+    schemes: OF_A.split_at(6).0,
     claims: chain_claims::fig3,
 };
 
@@ -101,7 +65,8 @@ pub static FIG4: Chains = Chains {
         .showing("Median log10 determinant of the position's covariance after each node, example A, ranges of 15 and 10 m. The \
                   threshold is 1e-6. One Gaussian spends about ten nodes near the start, because a ring matched by moments is a \
                   broad blob; mixtures and the exact belief do not."),
-    schemes: schemes_a,
+    example: A,
+    schemes: &OF_A,
     claims: chain_claims::fig4,
 };
 
@@ -116,7 +81,8 @@ pub static FIG7: Chains = Chains {
         "Median distance of estimate and source after each node, example B: polynomial Gaussians of degree 5 with two \
                   components against one Gaussian, and the exact belief as the referee.",
     ),
-    schemes: schemes_b_few,
+    example: B,
+    schemes: OF_B.split_at(6).0,
     claims: chain_claims::fig7,
 };
 
@@ -127,7 +93,8 @@ pub static FIG8: Chains = Chains {
             "Median log10 determinant after each node, example B, threshold 1e-5, for every form of the belief. A \
                   determinant alone can mislead: the summary says how many searches end more than a metre off.",
         ),
-    schemes: schemes_b,
+    example: B,
+    schemes: &OF_B,
     claims: chain_claims::fig8,
 };
 
@@ -137,7 +104,8 @@ pub static FIG9: Chains = Chains {
         .showing("Error and determinant along searches in a wind of (-20, -10) m/s, source at (62, 50), by the rule that chooses \
                   nodes. A mixture of four Gaussians over position and rate travels. The paper does not print its source: \
                   diffusive-fig10 has the other one."),
-    schemes: || windy(B),
+    example: B,
+    schemes: &IN_WIND,
     claims: chain_claims::wind,
 };
 
@@ -149,7 +117,8 @@ pub static FIG10: Chains = Chains {
         "Zhao and Nehorai 2007, Figs. 9 and 10",
     )
     .showing("The same with the source at (73, 38), ten samples a node and threshold 1e-6."),
-    schemes: || windy(A),
+    example: A,
+    schemes: &IN_WIND,
     claims: chain_claims::wind,
 };
 
@@ -162,28 +131,23 @@ impl Figure for Chains {
     }
 
     fn cost(&self, p: &Settings) -> Cost {
-        Cost::new(
-            p.trials as f64 * (self.schemes)().len() as f64 * 0.1,
-            p.trials as f64 * (self.schemes)().len() as f64 * 2e3,
-        )
+        let searches = p.trials as f64 * self.schemes.len() as f64;
+        Cost::new(0.1 * searches, 2e3 * searches)
     }
 
     fn world(&self) -> Option<&'static str> {
-        Some("diffusive-chains")
+        Some(CHAINS)
     }
 
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Rows, Error> {
-        let schemes = (self.schemes)();
-        // One name for all: every figure sees the same deployments and noise.
-        let all = tracks(context, "diffusive-chains", p, &schemes)?;
-        let own = |i: usize| all.iter().map(|tracks| &tracks[i]).collect::<Vec<&Track>>();
-        let curves = schemes
-            .iter()
-            .enumerate()
-            .flat_map(|(i, scheme)| curve(scheme, &own(i)));
+        let schemes = self.schemes();
+        let all = tracks(context, p, &schemes)?;
+        let each = || schemes.iter().zip(&all);
         Ok(Rows {
-            curves: curves.collect(),
-            summary: summaries(&schemes, p, &all)?,
+            curves: each().flat_map(|(scheme, tracks)| curve(scheme, tracks)).collect(),
+            summary: each()
+                .map(|(scheme, tracks)| summary(scheme, p, tracks))
+                .collect::<Result<_, _>>()?,
         })
     }
 
@@ -192,7 +156,7 @@ impl Figure for Chains {
     }
 
     fn plot(&self, _: &Settings, rows: &Rows) -> Plot {
-        let schemes = (self.schemes)();
+        let schemes = self.schemes();
         let several = schemes.iter().any(|s| s.range != schemes[0].range);
         let label = |s: &Scheme| {
             if several {

@@ -118,6 +118,33 @@ pub(super) fn search_box() -> SearchBox {
     }
 }
 
+/// Forms of the belief, each with its place in the palette: one colour in every figure, whether the rate is known or not.
+const FORMS: [(&str, Form, usize); 8] = [
+    ("exact", Form::Raw, 0),
+    ("gmm-4", Form::Mixture(4), 1),
+    ("gaussian", Form::Gaussian, 2),
+    ("gaussian-9", Form::Gaussian, 3),
+    ("lpg-2x5", LPG, 4),
+    (
+        "lpg-1x5",
+        Form::Lpg {
+            components: 1,
+            degree: 5,
+        },
+        5,
+    ),
+    ("particles-25", Form::Particles(25), 6),
+    ("mode and curvature", Form::Laplace, 8),
+];
+/// Rules that choose nodes in wind, with a mixture of four Gaussians over position and rate.
+const RULES: [(&str, Rule, usize); 3] = [
+    ("information", Rule::MutualInformation, 0),
+    ("covariance", Rule::Covariance, 1),
+    ("mahalanobis", Rule::Mahalanobis, 2),
+];
+/// Ends the name of a form that travels without the rate.
+const KNOWN: &str = " known rate";
+
 /// How one search is done.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scheme {
@@ -133,55 +160,46 @@ pub(super) struct Scheme {
 }
 
 impl Scheme {
-    /// Raw records, unknown rate, 15 m, Mahalanobis, at most 40 nodes.
-    pub fn new(name: &'static str, example: Example) -> Self {
+    /// The scheme of this name. A form travels in still air to the node that is nearest by Mahalanobis distance, a rule chooses in wind; any
+    /// other name is that of raw records.
+    pub fn new(name: &'static str, example: Example, range: f64) -> Self {
+        let form = FORMS.iter().find(|form| form.0 == name.trim_end_matches(KNOWN));
+        let rule = RULES.iter().find(|rule| rule.0 == name);
+        let form = match rule {
+            Some(_) => Form::Mixture(4),
+            None => form.map_or(Form::Raw, |form| form.1),
+        };
         Self {
             name,
             example,
-            windy: false,
-            range: 15.0,
-            form: Form::Raw,
-            known_rate: false,
-            rule: Rule::Mahalanobis,
-            most_nodes: 40,
+            windy: rule.is_some(),
+            range,
+            form,
+            known_rate: name.ends_with(KNOWN),
+            rule: rule.map_or(Rule::Mahalanobis, |rule| rule.1),
+            most_nodes: match (rule, form) {
+                (Some(_), _) => 14,
+                (None, Form::Raw) => 30,
+                (None, _) => 40,
+            },
             wire: Wire::default(),
         }
     }
 
-    /// Its place in the palette: a form of the belief, or a rule, has one colour in every figure, whether the rate is known or not.
-    pub fn place(&self) -> usize {
-        place(self.name)
-    }
-
-    pub fn at(self, range: f64) -> Self {
-        Self { range, ..self }
-    }
-
-    pub fn of(self, form: Form) -> Self {
-        Self { form, ..self }
-    }
-
-    pub fn known(self) -> Self {
+    /// The exact search of example B until so many nodes have sampled: no threshold ends it early.
+    pub fn exact(nodes: usize) -> Self {
+        let endless = Example { threshold: 1e-300, ..B };
         Self {
-            known_rate: true,
-            ..self
+            most_nodes: nodes,
+            ..Self::new("exact", endless, 15.0)
         }
     }
 
-    pub fn by(self, rule: Rule) -> Self {
-        Self { rule, ..self }
-    }
-
-    pub fn up_to(self, most_nodes: usize) -> Self {
-        Self { most_nodes, ..self }
-    }
-
-    pub fn in_wind(self) -> Self {
-        Self { windy: true, ..self }
-    }
-
-    pub fn wired(self, wire: Wire) -> Self {
-        Self { wire, ..self }
+    /// Its place in the palette; 7 is the threshold's.
+    pub fn place(&self) -> usize {
+        let name = self.name.trim_end_matches(KNOWN);
+        let mut places = FORMS.iter().map(|f| (f.0, f.2)).chain(RULES.iter().map(|r| (r.0, r.2)));
+        places.find(|(known, _)| *known == name).map_or(8, |(_, place)| place)
     }
 
     /// The search of this scheme from the alarm node.
@@ -222,20 +240,6 @@ impl Scheme {
         self.search(settings)?
             .run(&sensor, &network.deployment, &network.graph, network.start, samples)
             .map_err(Error::failed)
-    }
-}
-
-/// The place in the palette of a form of the belief, or of a rule; 7 is the threshold's.
-pub(super) fn place(name: &str) -> usize {
-    match name.trim_end_matches(" known rate") {
-        "exact" | "information" => 0,
-        "gmm-4" | "covariance" => 1,
-        "gaussian" | "mahalanobis" => 2,
-        "gaussian-9" | "pairwise" => 3,
-        "lpg-2x5" => 4,
-        "lpg-1x5" => 5,
-        "particles-25" => 6,
-        _ => 8,
     }
 }
 
@@ -282,17 +286,15 @@ impl Track {
     }
 }
 
-/// Every scheme on every trial: `tracks[trial][scheme]`.
-pub(super) fn tracks(
-    context: &Context<'_>,
-    experiment: &str,
-    settings: &Settings,
-    schemes: &[Scheme],
-) -> Result<Vec<Vec<Track>>, Error> {
+/// The experiment of all searches: every figure sees the same deployments and noise.
+pub(super) const CHAINS: &str = "diffusive-chains";
+
+/// Every scheme on every trial: `tracks[scheme][trial]`.
+pub(super) fn tracks(context: &Context<'_>, settings: &Settings, schemes: &[Scheme]) -> Result<Vec<Vec<Track>>, Error> {
     // All that the tracks of a scheme depend on; its name is none of it.
     let name = |scheme: &Scheme| {
         let unnamed = Scheme { name: "", ..*scheme };
-        format!("{experiment} {} {settings:?} {unnamed:?}", context.seed)
+        format!("{CHAINS} {} {settings:?} {unnamed:?}", context.seed)
     };
     let own = Kept::default();
     let kept = context.kept.unwrap_or(&own);
@@ -302,16 +304,12 @@ pub(super) fn tracks(
         missing.iter().map(one).collect()
     };
     if !missing.is_empty() {
-        let new = context.trials(experiment, settings.trials, every)?;
+        let new = context.trials(CHAINS, settings.trials, every)?;
         for (i, scheme) in missing.iter().enumerate() {
             kept.put(name(scheme), new.iter().map(|tracks| tracks[i].clone()).collect::<Vec<_>>());
         }
     }
-    let all: Vec<Vec<Track>> = schemes.iter().filter_map(|s| kept.get(&name(s))).collect();
-    let count = all.first().map_or(0, Vec::len);
-    Ok((0..count)
-        .map(|trial| all.iter().map(|tracks| tracks[trial].clone()).collect())
-        .collect())
+    Ok(schemes.iter().filter_map(|scheme| kept.get(&name(scheme))).collect())
 }
 
 /// The quantile of unsorted values; none of none.

@@ -1,6 +1,6 @@
 //! The area above a threshold, with credible bands.
 
-use super::common::{ALARM, B, DIFFUSIVITY, RATE, Scheme, Settings, fraction, median};
+use super::common::{ALARM, B, CHAINS, DIFFUSIVITY, RATE, Scheme, Settings, fraction, median};
 use crate::prelude::*;
 use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
 use fewbits_models::diffusion::contour_radius;
@@ -55,8 +55,7 @@ pub struct Envelope;
 impl Parameters {
     fn area(&self, trial: Trial) -> Result<Option<Area>, Error> {
         let settings = Settings::default();
-        let endless = super::common::Example { threshold: 1e-300, ..B };
-        let outcome = Scheme::new("exact", endless).up_to(self.nodes).run(&settings, trial)?;
+        let outcome = Scheme::exact(self.nodes).run(&settings, trial)?;
         let Some(posterior) = outcome.posterior else {
             return Ok(None);
         };
@@ -88,7 +87,7 @@ impl Figure for Envelope {
         let radius = contour_radius(RATE, p.threshold, p.time, DIFFUSIVITY)?;
         let source = B.source();
         let edges = [("east", 0.0), ("north", 90.0_f64)];
-        let all = context.trials("diffusive-chains", p.trials, |trial| {
+        let all = context.trials(CHAINS, p.trials, |trial| {
             let Some(area) = p.area(trial)? else { return Ok(None) };
             let quantile = |angle: f64, level| p.reach(&area, &Vector2::zeros(), angle.to_radians(), level);
             let bands = edges.map(|(_, angle)| Ok((quantile(angle, 0.05)?, quantile(angle, 0.95)?)));
@@ -108,7 +107,7 @@ impl Figure for Envelope {
             })
         });
         let coverage = coverage.collect();
-        let first = p.area(context.monte_carlo(context.stream("diffusive-chains"), 1).trial(0))?;
+        let first = p.area(context.monte_carlo(context.stream(CHAINS), 1).trial(0))?;
         let (mut band, mut exceedance) = (Vec::new(), Vec::new());
         if let Some(area) = first {
             let origin = Vector2::from(ALARM);

@@ -6,15 +6,12 @@ mod bytes;
 mod chain_claims;
 mod chains;
 mod common;
-mod divergences;
 mod envelope;
 mod plan_belief;
 mod rooms;
 mod route;
-mod selection;
 mod summary;
 mod table1;
-mod two_phase;
 mod unknowns;
 
 use crate::AnyFigure;
@@ -33,10 +30,8 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &chains::FIG9,
         &chains::FIG10,
         &table1::Table1,
-        &divergences::Divergences,
         &bytes::Bytes,
         &envelope::Envelope,
-        &selection::Selection,
         &unknowns::Unknowns,
         &rooms::Rooms,
     ]

@@ -1,10 +1,10 @@
 //! Figures 1 and 2: one search, event by event and on the map.
 
-use super::common::{A, ALARM, Network, Scheme, Settings};
+use super::common::{A, ALARM, CHAINS, Network, Scheme, Settings};
 use crate::prelude::*;
 use crate::schema::label;
 use fewbits_densities::ellipse;
-use fewbits_diffusive::{Form, Outcome, Rule};
+use fewbits_diffusive::{Outcome, Rule};
 
 parameters! {
     /// Which deployment is shown.
@@ -25,9 +25,7 @@ impl Parameters {
     }
 
     fn trial(&self, context: &Context<'_>) -> Trial {
-        context
-            .monte_carlo(context.stream("diffusive-chains"), 1)
-            .trial(self.deployment)
+        context.monte_carlo(context.stream(CHAINS), 1).trial(self.deployment)
     }
 
     fn search(&self, scheme: &Scheme, context: &Context<'_>) -> Result<Outcome, Error> {
@@ -77,10 +75,10 @@ impl Figure for Trace {
          select, send. A mixture of four Gaussians over position and rate travels.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<TraceRow>, Error> {
-        let scheme = Scheme::new("gmm-4", A)
-            .at(p.range)
-            .of(Form::Mixture(4))
-            .by(Rule::MutualInformation);
+        let scheme = Scheme {
+            rule: Rule::MutualInformation,
+            ..Scheme::new("gmm-4", A, p.range)
+        };
         let outcome = p.search(&scheme, context)?;
         let mut rows = Vec::new();
         for (i, step) in outcome.steps.iter().enumerate() {
@@ -170,7 +168,7 @@ impl Figure for Route {
          node. The belief is exact; the next node is the one nearest to the estimate in Mahalanobis distance.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<RouteRows, Error> {
-        let outcome = p.search(&Scheme::new("exact", A).at(p.range), context)?;
+        let outcome = p.search(&Scheme::new("exact", A, p.range), context)?;
         let network = p.network(context)?;
         let positions = network.deployment.positions();
         let route = outcome.steps.iter().enumerate().map(|(i, step)| {

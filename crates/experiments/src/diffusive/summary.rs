@@ -47,7 +47,7 @@ rows! {
 }
 
 /// Medians and bands of a scheme's searches, node by node; searches that have ended keep their last values.
-pub(super) fn curve(scheme: &Scheme, tracks: &[&Track]) -> Vec<Curve> {
+pub(super) fn curve(scheme: &Scheme, tracks: &[Track]) -> Vec<Curve> {
     let longest = tracks.iter().map(|t| t.nodes()).max().unwrap_or(0);
     (1..=longest)
         .filter_map(|step| {
@@ -73,15 +73,9 @@ pub(super) fn curve(scheme: &Scheme, tracks: &[&Track]) -> Vec<Curve> {
         .collect()
 }
 
-/// How the searches of every scheme ended: `all[trial][scheme]`.
-pub(super) fn summaries(schemes: &[Scheme], settings: &Settings, all: &[Vec<Track>]) -> Result<Vec<Summary>, Error> {
-    let own = |i: usize| all.iter().map(move |tracks| &tracks[i]).collect::<Vec<_>>();
-    let summary = |(i, scheme)| summarise(scheme, settings, &own(i));
-    schemes.iter().enumerate().map(summary).collect()
-}
-
-fn summarise(scheme: &Scheme, settings: &Settings, tracks: &[&Track]) -> Result<Summary, Error> {
-    let reached: Vec<&&Track> = tracks.iter().filter(|t| t.converged()).collect();
+/// How the searches of a scheme ended.
+pub(super) fn summary(scheme: &Scheme, settings: &Settings, tracks: &[Track]) -> Result<Summary, Error> {
+    let reached: Vec<&Track> = tracks.iter().filter(|t| t.converged()).collect();
     let counts: Vec<f64> = reached.iter().map(|t| t.nodes() as f64).collect();
     let finals: Vec<f64> = tracks.iter().map(|t| t.final_error()).collect();
     let third: Vec<f64> = tracks

@@ -1,16 +1,12 @@
 //! What faults do to the error, and how long a restarted sensor is out of step.
 
-use super::worlds::{self, RADIUS};
+use super::receivers::{each, over_bits};
+use super::worlds::{self, COEFFICIENT, PROCESS, RADIUS, SENSORS};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Gaussian, Link, SchemeNode, Sensing, SensorNode};
+use fewbits_core::Link;
 use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant};
-use fewbits_models::{Ar1, LinearSensor};
 use fewbits_network::{BitStar, Channel, Fault, FaultKind, Loss, Seconds, SensorId, Setup};
-use fewbits_protocol::{Feedback, OverBits, ReportLength};
-use nalgebra::Vector1;
-
-const SENSORS: usize = 4;
-const WARM_UP: usize = 20;
+use fewbits_protocol::{Feedback, ReportLength};
 
 parameters! {
     pub struct Parameters {
@@ -59,18 +55,8 @@ struct Point {
 
 /// Squared error, slots to recover, disagreements of 100 slots, whether the sensor did not recover.
 fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
-    let (a, q) = (worlds::COEFFICIENT, worlds::PROCESS);
-    let (dynamics, sensor) = (Ar1::new(a, q)?, LinearSensor::<1, 1>::direct(1.0)?);
-    let start = Gaussian::scalar(0.0, dynamics.stationary_variance()?)?;
-    let mut rng = stream.named("world").rng();
-    let mut state = start.sample(&mut rng);
-    let mut truths = Vec::with_capacity(slots);
-    let mut measurements: Vec<Vec<Vector1<f64>>> = Vec::with_capacity(slots);
-    for _ in 0..slots {
-        state = dynamics.propagate(&mut rng, &state);
-        truths.push(state[0]);
-        measurements.push((0..SENSORS).map(|_| sensor.sample(&mut rng, &state)).collect());
-    }
+    let world = worlds::scalar(slots)?;
+    let (truths, measurements) = world.draw(&world.sensors, stream);
     let clock = worlds::clock()?;
     let period = clock.period().value();
     let mut channel = Channel::PERFECT;
@@ -101,13 +87,11 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
         "delay" => 0.5,
         _ => 0.2,
     };
-    let filter = ParallelFilter::new(ScalarPlant::new(a, q, 1.0)?, SENSORS, CountFusion::Exact)?;
+    let filter = ParallelFilter::new(ScalarPlant::new(COEFFICIENT, PROCESS, 1.0)?, SENSORS, CountFusion::Exact)?;
     let filter = filter.with_link(Link::lossy(lost.min(0.99))?);
-    let estimator = ParallelEstimator::new(filter, start)?;
+    let estimator = ParallelEstimator::new(filter, world.start)?;
     let feedback = if point.echoed { Feedback::Echoed } else { Feedback::Told };
-    let scheme = estimator.scheme();
-    let node = move |_| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(scheme)) };
-    let centre = move || Ok(OverBits::new(estimator.clone()));
+    let (node, centre) = (each(vec![estimator.scheme()]), over_bits(estimator));
     let own = stream.named("filter");
     let star = BitStar::new(centre, feedback, ReportLength::Fixed(1), node, measurements, clock, own);
     let setup = Setup {
@@ -124,13 +108,9 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
         answers = network.nodes()[restarted.index()].answered() == Some(middle + recovery);
     }
     network.run_until(clock.end(slots as u32))?;
-    let estimates = network.nodes()[0].means();
-    let squared = truths.iter().zip(&estimates).skip(WARM_UP);
-    let gap = |(truth, estimate): (&f64, &Vec<f64>)| (truth - estimate.first().copied().unwrap_or(0.0)).powi(2);
-    let count = slots.saturating_sub(WARM_UP).max(1) as f64;
     let noted = network.ledger().faults().disagreements as f64;
     Ok([
-        squared.map(gap).sum::<f64>() / count,
+        world.squared(&truths, &network.nodes()[0].means()),
         f64::from(recovery),
         100.0 * noted / slots as f64,
         f64::from(u8::from(!answers)),

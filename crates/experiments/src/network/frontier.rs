@@ -1,7 +1,7 @@
 //! Error against bits, transmitted bits and joules: every scheme on the same worlds.
 
-use super::schemes::{self, Scheme};
-use super::worlds::{self, COEFFICIENT};
+use super::schemes;
+use super::worlds::{self, COEFFICIENT, Entry};
 use crate::prelude::*;
 
 parameters! {
@@ -63,15 +63,15 @@ fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<&'static str> {
     rows.iter().map(|row| if beaten(row) { "no" } else { "yes" }).collect()
 }
 
-fn rows_of(world: &'static str, schemes: &[Scheme], runs: &Comparison<5>, floor: impl Fn(f64) -> f64) -> Vec<Row> {
-    let row = |(i, scheme): (usize, &Scheme)| {
+fn rows_of(world: &'static str, entries: &[Entry], runs: &Comparison<4>, floor: impl Fn(f64) -> f64) -> Vec<Row> {
+    let row = |(i, entry): (usize, &Entry)| {
         let mean = |of: usize| Measured::mean(&runs.moments(i, of));
         let payload = mean(1);
         Row {
             world,
-            scheme: scheme.family(),
-            setting: scheme.setting(),
-            feedback: scheme.talk(),
+            scheme: entry.family,
+            setting: entry.setting.clone(),
+            feedback: entry.feedback,
             rmse: Measured::root_mean(&runs.moments(i, 0)),
             payload,
             air: mean(2),
@@ -82,7 +82,7 @@ fn rows_of(world: &'static str, schemes: &[Scheme], runs: &Comparison<5>, floor:
             best_by_energy: "",
         }
     };
-    schemes.iter().enumerate().map(row).collect()
+    entries.iter().enumerate().map(row).collect()
 }
 
 impl Figure for Frontier {
@@ -97,28 +97,19 @@ impl Figure for Frontier {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
-        let (scalar, plane) = (worlds::scalar()?, worlds::plane()?);
-        let (of_scalar, of_plane) = (schemes::scalar_schemes(), schemes::plane_schemes());
-        let one = |name: &str,
-                   schemes: &[Scheme],
-                   run: &(dyn Fn(Scheme, Stream) -> Result<super::bill::Bill, Error> + Sync)| {
-            let all = context.compare(
-                "network-frontier",
-                p.trials,
-                &[name],
-                |name| (*name).to_owned(),
-                schemes,
-                |_, scheme, it| run(*scheme, it.stream).map(|bill| bill.numbers()),
-            )?;
-            all.into_iter()
-                .next()
-                .ok_or_else(|| Error::Table("no world".to_owned()))
-        };
-        let in_scalar = one("scalar", &of_scalar, &|scheme, stream| scalar.run(scheme, stream, p.slots))?;
-        let in_plane = one("plane", &of_plane, &|scheme, stream| plane.run(scheme, stream, p.slots))?;
+        let (scalar, plane) = (worlds::scalar(p.slots)?, worlds::plane(p.slots)?);
         let (least, everything) = (scalar.everything()?, plane.everything()?[1].sqrt());
-        let mut rows = rows_of("scalar", &of_scalar, &in_scalar, |rate| floor_at(rate, least));
-        rows.extend(rows_of("plane", &of_plane, &in_plane, |_| everything));
+        let rows_of = |world, entries: Vec<Entry>, floor: &dyn Fn(f64) -> f64| -> Result<Vec<Row>, Error> {
+            let one = |_: &_, entry: &Entry, it: Trial| {
+                let bill = entry.run(it.stream)?;
+                Ok::<_, Error>([bill.squared, bill.reports, bill.air, bill.joules])
+            };
+            let name = |world: &&str| (*world).to_owned();
+            let runs = context.compare("network-frontier", p.trials, &[world], name, &entries, one)?;
+            Ok(rows_of(world, &entries, &runs[0], floor))
+        };
+        let mut rows = rows_of("scalar", schemes::of_scalar(&scalar)?, &|rate| floor_at(rate, least))?;
+        rows.extend(rows_of("plane", schemes::of_plane(&plane)?, &|_| everything)?);
         let by = [
             marks(&rows, |r| r.payload.value),
             marks(&rows, |r| r.air.value),
@@ -230,13 +221,36 @@ impl Figure for Frontier {
 
 #[cfg(test)]
 mod tests {
-    use super::floor_at;
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use fewbits_network::{Radio, TWO_AA_CELLS};
 
     #[test]
     fn without_bits_the_floor_is_the_stationary_variance_and_with_many_the_kalman_filter() {
-        let stationary = super::worlds::PROCESS / (1.0 - super::COEFFICIENT * super::COEFFICIENT);
-        let both = super::worlds::scalar().unwrap().everything().unwrap();
+        let stationary = worlds::PROCESS / (1.0 - COEFFICIENT * COEFFICIENT);
+        let both = worlds::scalar(1).unwrap().everything().unwrap();
         assert!((floor_at(0.0, both).powi(2) / stationary - 1.0).abs() < 1e-9);
         assert!((floor_at(60.0, both).powi(2) / both[1] - 1.0).abs() < 1e-9);
+    }
+
+    /// Days on two AA cells of the busiest sensor (CC2420), whose rest takes `watts`: at a slot a second and 6 mW the scheme hardly matters, at
+    /// fifty a second and 0.1 mW it decides.
+    #[test]
+    fn the_scheme_decides_the_life_of_nodes_that_sleep() {
+        let entries = schemes::of_scalar(&worlds::scalar(200).unwrap()).unwrap();
+        let asleep = Radio::cc2420(0.0).unwrap().sleep.value();
+        let days = |family: &str, setting: &str, period: f64, watts: f64| {
+            let same = |e: &&Entry| (e.family, e.setting.as_str()) == (family, setting) && e.feedback != "told";
+            let energy = entries.iter().find(same).unwrap().run(Stream::new(1)).unwrap().busiest;
+            assert!(energy > 0.0);
+            TWO_AA_CELLS.value() / (watts + asleep + energy / period) / 86_400.0
+        };
+        let slow = days("CFwMD", "n=0.25", 1.0, 6e-3) / days("all-send", "32 bit", 1.0, 6e-3);
+        assert!((slow - 1.0).abs() < 0.05, "{slow}");
+        let fast = |family, setting| days(family, setting, 0.02, 1e-4);
+        // Who must listen before it sends one bit dies before one that sends 32 unasked, who sends one bit unasked after it.
+        let (asked, unasked, whole) =
+            (fast("Dymbo", "K=4"), fast("Lloyd-Max-table", "L=2"), fast("all-send", "32 bit"));
+        assert!(asked < whole && whole < unasked, "{asked} {whole} {unasked}");
     }
 }

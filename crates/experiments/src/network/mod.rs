@@ -1,17 +1,14 @@
 //! All schemes over one simulated network: figures.
 
-mod bill;
 mod faults;
 mod frontier;
-mod lifetime;
-mod receivers;
-mod scale;
-mod schemes;
-mod worlds;
+pub mod receivers;
+pub mod schemes;
+pub mod worlds;
 
 use crate::AnyFigure;
 
 /// The figures of this system.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
-    vec![&frontier::Frontier, &faults::Faulty, &lifetime::Lifetime, &scale::Scale]
+    vec![&frontier::Frontier, &faults::Faulty]
 }

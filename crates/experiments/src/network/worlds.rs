@@ -1,40 +1,30 @@
-//! The two worlds of the comparison, and every scheme over them.
+//! The two worlds of the comparison, and what a scheme costs over them.
 //!
-//! A scheme that is added is in all figures: give it a [`Scheme`], its label, and an arm of [`World::run`].
+//! A scheme of your own needs its two halves: [`World::of_scheme`] or [`World::star`] makes an [`Entry`] of them, which runs on the same
+//! truths, noise and radio as those of [`schemes`](super::schemes).
 
-use super::bill::Bill;
-use super::receivers::{Followers, Halves, LookUp, Patterns, SendAll, bits, each, mixed, over_bits};
-use super::schemes::{Scheme, Talk};
+use super::receivers::{each, mixed, over_bits};
 use crate::prelude::*;
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
-use fewbits_cfwmd::centre::CensoringEstimator;
-use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::factor::Value;
-use fewbits_core::{Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observed, SchemeNode, Sensing, SensorNode};
-use fewbits_densities::Mixture;
-use fewbits_dymbo::{
-    CountFusion, InnovationWord, MultibitFilter, ParallelEstimator, ParallelFilter, Prediction, ScalarEstimator,
-    ScalarFilter, ScalarPlant,
+use fewbits_core::{
+    Belief, Gaussian, LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, Sensing, SensorNode,
 };
+use fewbits_densities::Mixture;
 use fewbits_filters::kalman;
 use fewbits_handoff::{Coded, HandoffFilter, Leaders};
 use fewbits_mixture_codec::Reduction;
 use fewbits_mixture_codec::wire::WireFormat;
-use fewbits_models::{Ar1, LinearGaussian, LinearSensor, PLANE_POSITION, constant_velocity_2d};
-use fewbits_network::{BitStar, Clock, Field, Radio, Seconds, SensorId, Setup, Walk};
-use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
-use fewbits_protocol::{BoxError, Feedback, Receiver, ReportLength};
-use fewbits_quantizer_design::{Criterion, Newton, ObservationModel, System, design};
-use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
+use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
+use fewbits_network::{Account, BitStar, Clock, Field, Ledger, Radio, Seconds, SensorId, Setup, Walk};
+use fewbits_protocol::{BoxError, Estimator, Feedback, Member, Receiver, ReportLength};
 use nalgebra::{Matrix4, SVector, Vector1, Vector4};
 
 /// Sensors of either world; their noise has unit variance.
-pub(super) const SENSORS: usize = 4;
+pub const SENSORS: usize = 4;
 /// Coefficient of the scalar world.
-pub(super) const COEFFICIENT: f64 = 0.95;
+pub const COEFFICIENT: f64 = 0.95;
 /// Process variance of the scalar world.
-pub(super) const PROCESS: f64 = 0.2;
+pub const PROCESS: f64 = 0.2;
 /// Acceleration variance of the target in the plane.
 const ACCELERATION: f64 = 0.05;
 /// Slots before errors count.
@@ -44,29 +34,31 @@ const PERIOD: f64 = 0.1;
 /// Distance of the sensors from the centre, metres.
 pub(super) const RADIUS: f64 = 20.0;
 
-/// Distance of the range sensors from where the target starts; it covers some 300 in the standard run.
-const FAR: f64 = 10_000.0;
-
 /// A world: how it moves, who senses it, and what is known of it beforehand.
 #[derive(Debug, Clone)]
-pub(super) struct World<const D: usize, G> {
-    dynamics: G,
-    sensors: Vec<LinearSensor<D, 1>>,
-    start: Gaussian<D>,
+pub struct World<const D: usize, G> {
+    pub(super) dynamics: G,
+    pub(super) sensors: Vec<LinearSensor<D, 1>>,
+    pub(super) start: Gaussian<D>,
     /// What all-send and the censoring sensors send in.
-    fine: NumberFormat,
-    coarse: NumberFormat,
+    pub(super) fine: NumberFormat,
+    pub(super) coarse: NumberFormat,
     /// How far from its start the state may get, for codes of where it is.
     reach: f64,
     /// Coordinates that count.
     counted: &'static [usize],
+    /// Slots of a run.
+    pub(super) slots: usize,
 }
 
 type Truths<const D: usize> = Vec<SVector<f64, D>>;
 type Measurements = Vec<Vec<Vector1<f64>>>;
 
 /// The scalar world, in its stationary state.
-pub(super) fn scalar() -> Result<World<1, Ar1>, Error> {
+///
+/// # Errors
+/// Never for the constants here.
+pub fn scalar(slots: usize) -> Result<World<1, Ar1>, Error> {
     let dynamics = Ar1::new(COEFFICIENT, PROCESS)?;
     let variance = dynamics.stationary_variance()?;
     Ok(World {
@@ -77,11 +69,15 @@ pub(super) fn scalar() -> Result<World<1, Ar1>, Error> {
         coarse: NumberFormat::fixed(-8.0, 8.0, 8)?,
         reach: 16.0,
         counted: &[0],
+        slots,
     })
 }
 
 /// A target in the plane at about constant velocity; two sensors of either coordinate.
-pub(super) fn plane() -> Result<World<4, LinearGaussian<4, 2>>, Error> {
+///
+/// # Errors
+/// Never for the constants here.
+pub fn plane(slots: usize) -> Result<World<4, LinearGaussian<4, 2>>, Error> {
     let along = [Vector4::new(1.0, 0.0, 0.0, 0.0), Vector4::new(0.0, 0.0, 1.0, 0.0)];
     let sensor = |i: usize| LinearSensor::scalar(along[i % 2], 1.0).map_err(Error::failed);
     Ok(World {
@@ -93,18 +89,67 @@ pub(super) fn plane() -> Result<World<4, LinearGaussian<4, 2>>, Error> {
         // The acceleration takes it 700 away in 300 slots, one standard deviation.
         reach: 1e4,
         counted: &[0, 2],
+        slots,
     })
 }
 
-/// What a word of the innovation is told.
-fn asked(measured: &Gaussian<1>) -> Prediction {
-    Prediction {
-        mean: measured.mean()[0],
-        deviation: measured.covariance()[0].sqrt(),
+/// What one run came to, a slot on average.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bill {
+    /// Squared error.
+    pub squared: f64,
+    /// Payload bits of reports, or of beliefs that travel.
+    pub reports: f64,
+    /// Bits on air with everything.
+    pub air: f64,
+    /// Energy of all radios, J.
+    pub joules: f64,
+    /// Energy of the busiest sensor's radio beyond what it takes asleep, J.
+    pub busiest: f64,
+}
+
+impl Bill {
+    /// `first` is the first node that is a sensor.
+    fn of(ledger: &Ledger, first: usize, squared: f64, slots: usize) -> Self {
+        let (n, all) = (slots as f64, ledger.messages());
+        let sensors = &ledger.accounts()[first..];
+        let asleep = Radio::cc2420(0.0).map_or(0.0, |radio| radio.sleep.value());
+        let spent = |a: &Account| a.sending.value() + a.receiving.value() - asleep * a.awake.value();
+        Self {
+            squared,
+            reports: sensors.iter().map(|account| account.payload.0 as f64).sum::<f64>() / n,
+            air: all.air.0 as f64 / n,
+            joules: (all.sending.value() + all.receiving.value()) / n,
+            busiest: sensors.iter().map(spent).fold(0.0, f64::max) / n,
+        }
     }
 }
 
-fn nothing(_: &Gaussian<1>) {}
+type Run = dyn Fn(Stream) -> Result<Bill, Error> + Send + Sync;
+
+/// A scheme at one setting in one world.
+pub struct Entry {
+    /// The scheme without its setting.
+    pub family: &'static str,
+    /// Its setting.
+    pub setting: String,
+    /// How sensors learn the question.
+    pub feedback: &'static str,
+    run: Box<Run>,
+}
+
+impl Entry {
+    /// One run on the truth, noise and radio of a trial's stream.
+    ///
+    /// # Errors
+    /// If an estimator or a sensor fails.
+    pub fn run(&self, stream: Stream) -> Result<Bill, Error> {
+        (self.run)(stream)
+    }
+}
+
+/// A scheme and its setting.
+pub(super) type Name = (&'static str, String);
 
 impl<const D: usize, G: LinearDynamics<D> + Clone + Send + Sync + 'static> World<D, G> {
     /// The least squared error of all measurements, by the Kalman filter that has them all: before and after those of a slot.
@@ -123,7 +168,8 @@ impl<const D: usize, G: LinearDynamics<D> + Clone + Send + Sync + 'static> World
         Ok(last)
     }
 
-    fn draw(&self, sensors: &[impl Sensing<D, 1>], stream: Stream, slots: usize) -> (Truths<D>, Measurements) {
+    /// Truth and measurements of a trial.
+    pub(super) fn draw(&self, sensors: &[impl Sensing<D, 1>], stream: Stream) -> (Truths<D>, Measurements) {
         let mut rng = stream.named("world").rng();
         let mut state = self.start.sample(&mut rng);
         let slot = |_| {
@@ -131,10 +177,11 @@ impl<const D: usize, G: LinearDynamics<D> + Clone + Send + Sync + 'static> World
             let measured = sensors.iter().map(|sensor| sensor.sample(&mut rng, &state));
             (state, measured.collect())
         };
-        (0..slots).map(slot).unzip()
+        (0..self.slots).map(slot).unzip()
     }
 
-    fn squared(&self, truths: &Truths<D>, estimates: &[Vec<f64>]) -> f64 {
+    /// Mean squared error after the first slots.
+    pub(super) fn squared(&self, truths: &Truths<D>, estimates: &[Vec<f64>]) -> f64 {
         let pairs = truths.iter().zip(estimates).skip(WARM_UP);
         let count = pairs.len().max(1) as f64;
         let error = |(truth, estimate): (&SVector<f64, D>, &Vec<f64>)| {
@@ -144,61 +191,87 @@ impl<const D: usize, G: LinearDynamics<D> + Clone + Send + Sync + 'static> World
         pairs.map(error).sum::<f64>() / count
     }
 
-    fn over_star<R, C, N>(&self, halves: Halves<R, C, N>, stream: Stream, slots: usize) -> Result<Bill, Error>
+    /// Both halves of a scheme over a star: `centre` makes the receiver before its first slot, `node` the half of a sensor (the first is 0).
+    /// The receiver says how many of the `sensors` report.
+    pub fn star<R, S, C, N>(&self, (family, setting): Name, sensors: &[S], member: Member, centre: C, node: N) -> Entry
     where
-        R: Receiver,
-        C: Fn() -> Result<R, BoxError> + Send + Sync + 'static,
-        N: Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static,
+        R: Receiver + 'static,
+        S: Sensing<D, 1> + Clone + Send + Sync + 'static,
+        C: Fn() -> Result<R, BoxError> + Clone + Send + Sync + 'static,
+        N: Fn(usize) -> Box<dyn SensorNode<1>> + Clone + Send + Sync + 'static,
     {
-        self.over_star_of(&self.sensors, halves, stream, slots)
-    }
-
-    /// The same with measurements of other sensors.
-    fn over_star_of<R, C, N>(
-        &self,
-        sensors: &[impl Sensing<D, 1>],
-        halves: Halves<R, C, N>,
-        stream: Stream,
-        slots: usize,
-    ) -> Result<Bill, Error>
-    where
-        R: Receiver,
-        C: Fn() -> Result<R, BoxError> + Send + Sync + 'static,
-        N: Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static,
-    {
-        let (truths, mut measurements) = self.draw(sensors, stream, slots);
-        let reporting = (halves.centre)().map_err(Error::Failed)?.sensors();
-        measurements.iter_mut().for_each(|slot| slot.truncate(reporting));
-        let (clock, own) = (clock()?, stream.named("filter"));
-        let Halves {
-            centre,
-            feedback,
-            report,
-            node,
-            ..
-        } = halves;
-        let star = BitStar::new(centre, feedback, report, node, measurements, clock, own);
-        let mut network = star.and_then(|star| star.simulate(RADIUS, setup(stream)?))?;
-        network.run_until(clock.end(slots as u32))?;
-        let squared = self.squared(&truths, &network.nodes()[0].means());
-        Ok(Bill::of(network.ledger(), 1, squared, slots))
-    }
-
-    fn censors(
-        &self,
-        threshold: f64,
-        shared: bool,
-        slots: usize,
-    ) -> Result<CensoringEstimator<G, LinearSensor<D, 1>, D, 1>, Error> {
-        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT)?.with_format(self.fine);
-        if shared {
-            return Ok(CensoringEstimator::told(network, self.dynamics.clone(), self.start));
+        let (world, sensors) = (self.clone(), sensors.to_vec());
+        let run = move |stream: Stream| {
+            let (truths, mut measurements) = world.draw(&sensors, stream);
+            let reporting = centre().map_err(Error::Failed)?.sensors();
+            measurements.iter_mut().for_each(|slot| slot.truncate(reporting));
+            let (clock, own) = (clock()?, stream.named("filter"));
+            let Member { feedback, report } = member;
+            let star = BitStar::new(centre.clone(), feedback, report, node.clone(), measurements, clock, own)?;
+            let mut network = star.simulate(RADIUS, setup(stream)?)?;
+            network.run_until(clock.end(world.slots as u32))?;
+            let squared = world.squared(&truths, &network.nodes()[0].means());
+            Ok(Bill::of(network.ledger(), 1, squared, world.slots))
+        };
+        Entry {
+            family,
+            setting,
+            feedback: match member.feedback {
+                Feedback::Told => "told",
+                Feedback::Echoed => "echoed",
+                _ => "none",
+            },
+            run: Box::new(run),
         }
-        Ok(CensoringEstimator::own(network, self.dynamics.clone(), self.start, slots)?)
     }
 
-    fn handed(&self, components: usize, resolution: f64, stream: Stream, slots: usize) -> Result<Bill, Error> {
-        let (truths, measurements) = self.draw(&self.sensors, stream, slots);
+    /// Sensors that all report by one scheme without memory, under the fusion centre of `fewbits-filters`. `ask` makes of a predicted
+    /// measurement what its sensor is told.
+    pub fn of_scheme<S, C>(
+        &self,
+        name: Name,
+        sensors: &[S],
+        member: Member,
+        scheme: C,
+        ask: impl Fn(&Gaussian<1>) -> C::Feedback + Clone + Send + Sync + 'static,
+    ) -> Entry
+    where
+        S: Sensing<D, 1> + Clone + Send + Sync + 'static,
+        C: Scheme<1> + MeasurementNoise<1> + Clone + Send + Sync + 'static,
+        C::State: 'static,
+        C::Factor: 'static,
+    {
+        let centre = mixed(self.dynamics.clone(), self.start, sensors.to_vec(), scheme.clone(), ask);
+        self.star(name, sensors, member, centre, each(vec![scheme]))
+    }
+
+    /// The world's sensors under an estimator of their own.
+    pub fn of_estimator<E>(
+        &self,
+        name: Name,
+        member: Member,
+        estimator: E,
+        node: impl Fn(usize) -> Box<dyn SensorNode<1>> + Clone + Send + Sync + 'static,
+    ) -> Entry
+    where
+        E: Estimator + Clone + Send + Sync + 'static,
+    {
+        self.star(name, &self.sensors, member, over_bits(estimator), node)
+    }
+
+    /// A coded mixture that travels from leader to leader.
+    pub(super) fn hand_off(&self, components: usize, resolution: f64) -> Entry {
+        let world = self.clone();
+        Entry {
+            family: "hand-off",
+            setting: format!("M={components} r={resolution}"),
+            feedback: "travels",
+            run: Box::new(move |stream| world.handed(components, resolution, stream)),
+        }
+    }
+
+    fn handed(&self, components: usize, resolution: f64, stream: Stream) -> Result<Bill, Error> {
+        let (truths, measurements) = self.draw(&self.sensors, stream);
         let reading =
             |(i, z): (usize, &Vector1<f64>)| Ok(Observed::new(self.sensors[i], Value::new(*z, [[1.0]].into())?));
         let readings = measurements
@@ -211,164 +284,32 @@ impl<const D: usize, G: LinearDynamics<D> + Clone + Send + Sync + 'static> World
             format,
             resolution: 0,
         };
-        let leaders: Vec<_> = (0..slots).map(|k| (k % SENSORS) as u32).collect();
         let walker = Leaders {
             filter: HandoffFilter::new(300, reducer)?,
             dynamics: self.dynamics.clone(),
             start: Mixture::single(&self.start)?,
             readings: readings.collect::<Result<Vec<Vec<_>>, Error>>()?,
-            leaders,
+            leaders: (0..self.slots).map(|k| (k % SENSORS) as u32).collect(),
         };
         let clock = clock()?;
-        let walk = Walk::new(walker, clock, slots as u32, stream.named("filter"))?;
-        let field = Field::ring(SENSORS, RADIUS)?;
-        let run = || -> Result<_, fewbits_network::Error> {
-            let mut network = walk.simulate(field, SensorId(0), setup(stream)?)?;
-            network.run_until(clock.end(slots as u32))?;
-            Ok(network)
-        };
-        let network = run()?;
-        let mut estimates = vec![Vec::new(); slots];
+        let walk = Walk::new(walker, clock, self.slots as u32, stream.named("filter"))?;
+        let mut network = walk.simulate(Field::ring(SENSORS, RADIUS)?, SensorId(0), setup(stream)?)?;
+        network.run_until(clock.end(self.slots as u32))?;
+        let mut estimates = vec![Vec::new(); self.slots];
         for (slot, mean) in network.nodes().iter().flat_map(|node| node.estimates()) {
             if let Some(place) = estimates.get_mut(*slot as usize - 1) {
                 place.clone_from(mean);
             }
         }
-        Ok(Bill::of(network.ledger(), 0, self.squared(&truths, &estimates), slots))
-    }
-
-    /// A scheme that both worlds have; none if only the scalar one does.
-    fn shared(&self, scheme: Scheme, stream: Stream, slots: usize) -> Result<Option<Bill>, Error> {
-        Ok(Some(match scheme {
-            Scheme::Words { bits: m, talk } => {
-                let scheme = InnovationWord::new(1.0, m)?;
-                let centre = mixed(self.dynamics.clone(), self.start, self.sensors.clone(), scheme, asked);
-                self.over_star(Halves::new(centre, talk.feedback(), bits(m), each(scheme)), stream, slots)?
-            }
-            Scheme::Censored { messages, shared, talk } => {
-                let threshold = Budget::new(messages, SENSORS).and_then(|b| b.threshold(1))?;
-                let censors = self.censors(threshold, shared, slots)?;
-                let nodes = censors.clone();
-                let node = move |i| -> Box<dyn SensorNode<1>> { Box::new(nodes.node(i)) };
-                let length = bits(self.fine.bits() as usize);
-                self.over_star(Halves::new(over_bits(censors), talk.feedback(), length, node), stream, slots)?
-            }
-            Scheme::AllSend { coarse } => {
-                let format = if coarse { self.coarse } else { self.fine };
-                let scheme = SendAll::new(1.0, format)?;
-                let centre = mixed(self.dynamics.clone(), self.start, self.sensors.clone(), scheme.clone(), nothing);
-                let length = bits(format.bits() as usize);
-                self.over_star(Halves::new(centre, Feedback::Clock, length, each(scheme)), stream, slots)?
-            }
-            Scheme::Handoff { components, resolution } => self.handed(components, resolution, stream, slots)?,
-            Scheme::Followed { delta } => {
-                let followers = Followers {
-                    dynamics: self.dynamics.clone(),
-                    sensors: self.sensors.clone(),
-                    noise_variance: 1.0,
-                    config: fewbits_adaptive::Config::new(delta)?,
-                    start: self.start,
-                };
-                let node = followers.nodes();
-                let centre = over_bits(followers);
-                self.over_star(Halves::new(centre, Feedback::Clock, ReportLength::Varying, node), stream, slots)?
-            }
-            _ => return Ok(None),
-        }))
+        Ok(Bill::of(network.ledger(), 0, self.squared(&truths, &estimates), self.slots))
     }
 }
 
-impl World<4, LinearGaussian<4, 2>> {
-    pub(super) fn run(&self, scheme: Scheme, stream: Stream, slots: usize) -> Result<Bill, Error> {
-        if let Scheme::Ranges { bits, talk } = scheme {
-            return self.ranges(bits, talk, stream, slots);
-        }
-        let only = || fewbits_numerics::ArgumentError::new("scheme", scheme.family(), "one of the plane");
-        Ok(self.shared(scheme, stream, slots)?.ok_or_else(only)?)
-    }
-
-    /// Range sensors of unit noise at [`FAR`] on the axes: to first order each has the coordinate that the world's own sensors have.
-    fn ranges(&self, m: usize, talk: Talk, stream: Stream, slots: usize) -> Result<Bill, Error> {
-        let noise = RangeNoise::constant(1.0)?;
-        let places = [[-FAR, 0.0], [0.0, -FAR], [FAR, 0.0], [0.0, FAR]];
-        let sensor = |place: [f64; 2]| {
-            RangeSensor::new(place.into(), noise)
-                .and_then(|sensor| sensor.on_axes::<4>(PLANE_POSITION))
-                .map_err(Error::failed)
-        };
-        let sensors = places.map(sensor).into_iter().collect::<Result<Vec<_>, _>>()?;
-        let loading = optimal_loading(1 << m)?;
-        let scheme = QuantizedRange::new(1 << m, noise)?;
-        // In single precision, as it travels.
-        let asked = move |measured: &Gaussian<1>| RangeReference {
-            centre: f64::from(measured.mean()[0] as f32),
-            half_width: f64::from((loading * measured.covariance()[0].sqrt()) as f32),
-        };
-        let centre = mixed(self.dynamics, self.start, sensors.clone(), scheme.clone(), asked);
-        self.over_star_of(&sensors, Halves::new(centre, talk.feedback(), bits(m), each(scheme)), stream, slots)
-    }
-}
-
-impl World<1, Ar1> {
-    pub(super) fn run(&self, scheme: Scheme, stream: Stream, slots: usize) -> Result<Bill, Error> {
-        if let Some(bill) = self.shared(scheme, stream, slots)? {
-            return Ok(bill);
-        }
-        let plant = ScalarPlant::new(COEFFICIENT, PROCESS, 1.0)?;
-        let (start, deviation) = (self.start, self.start.standard_deviations()[0]);
-        let scene = || ObservationModel::gaussian_with_deviations(deviation, &[1.0; SENSORS]).map_err(Error::failed);
-        let table = |system: &System, levels: usize| {
-            let look_up = LookUp::new(system, 10_000)?;
-            let schemes = look_up.schemes().to_vec();
-            let node = move |i: usize| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(schemes[i].clone())) };
-            let length = bits(levels.next_power_of_two().trailing_zeros() as usize);
-            self.over_star(Halves::new(over_bits(look_up), Feedback::Clock, length, node), stream, slots)
-        };
-        match scheme {
-            Scheme::SignBits { sensors, talk } => {
-                let counted = ParallelEstimator::new(ParallelFilter::new(plant, sensors, CountFusion::Exact)?, start)?;
-                let node = each(counted.scheme());
-                self.over_star(Halves::new(over_bits(counted), talk.feedback(), bits(1), node), stream, slots)
-            }
-            Scheme::Word { bits: m, talk } => {
-                let filter = MultibitFilter::new(plant, m)?;
-                let node = each(filter.scheme());
-                let single = over_bits(ScalarEstimator { filter, start });
-                self.over_star(Halves::new(single, talk.feedback(), bits(m), node), stream, slots)
-            }
-            Scheme::Information { levels } => {
-                let from = System::lloyd_max(scene()?, levels)?;
-                let best = design::joint(&from, Criterion::MutualInformation, &Newton::default());
-                table(&best?.system, levels)
-            }
-            Scheme::LloydMax { levels } => table(&System::lloyd_max(scene()?, levels)?, levels),
-            Scheme::Patterned => {
-                let edges = [vec![0.0], vec![-1.0, 1.0], vec![0.0], vec![-1.5, 0.0, 1.5]];
-                let sensor = |edges: Vec<f64>| {
-                    let cells = BinaryQuantizer::new(edges.iter().map(|e| e * deviation).collect())?;
-                    PatternSensor::with_deviation(cells, 1.0)
-                };
-                let sensors: Vec<_> = edges.into_iter().map(sensor).collect::<Result<_, _>>()?;
-                let source = Source::gaussian_with_deviation(deviation)?;
-                let table = Bank::new(source, sensors.clone()).and_then(|bank| bank.table(Decoder::Mmse));
-                let patterns = over_bits(Patterns::new(sensors.len(), table?, deviation * deviation)?);
-                let node = move |i: usize| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(sensors[i].clone())) };
-                self.over_star(Halves::new(patterns, Feedback::Clock, bits(1), node), stream, slots)
-            }
-            Scheme::Filtered { levels } => {
-                let spread = (deviation * deviation + 1.0).sqrt();
-                let design = lloyd_max::gaussian(levels).and_then(|design| design.affine(0.0, spread));
-                let quantizer = Quantizer::from(&design?);
-                let labels = Labelling::gray(levels)?;
-                let scheme = QuantizingSensor::with_variance(quantizer, labels, 1.0)?;
-                let centre = mixed(self.dynamics, start, self.sensors.clone(), scheme.clone(), nothing);
-                let length = bits(levels.trailing_zeros() as usize);
-                self.over_star(Halves::new(centre, Feedback::Clock, length, each(scheme)), stream, slots)
-            }
-            other => {
-                Err(fewbits_numerics::ArgumentError::new("scheme", other.family(), "one of the scalar world").into())
-            }
-        }
+/// Sensors whose reports have so many bits.
+pub fn member(feedback: Feedback, bits: u32) -> Member {
+    Member {
+        feedback,
+        report: ReportLength::Fixed(bits),
     }
 }
 

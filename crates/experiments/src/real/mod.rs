@@ -2,9 +2,7 @@
 
 mod baselines;
 mod bits;
-mod codecs;
 mod loss;
-mod models;
 mod packets;
 mod recordings;
 mod tracking;
@@ -13,11 +11,5 @@ use crate::AnyFigure;
 
 /// The figures of this system.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
-    vec![
-        &bits::Bits,
-        &packets::Packets,
-        &models::Models,
-        &loss::Loss,
-        &codecs::Codecs,
-    ]
+    vec![&bits::Bits, &packets::Packets, &loss::Loss]
 }

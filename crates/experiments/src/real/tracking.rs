@@ -53,3 +53,53 @@ pub(super) fn words(recording: &Recording, bits: u32) -> Result<Played, Error> {
         values,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::recordings::Source;
+    use super::*;
+    use fewbits_adaptive::SCALES;
+
+    /// Mean of a number of the models' weights over the slots of a signal that are chosen, at half a bit a sample.
+    fn mean(column: &str, chosen: fn(f64) -> bool, of: fn(&[f64]) -> f64) -> f64 {
+        let source = Source {
+            columns: vec![column.into()],
+            samples: 1500,
+            ..Source::default()
+        };
+        let recording = source.load("demo", &Context::new(1)).unwrap().remove(0);
+        let (config, _) = best_for(&recording, 0.5, &Context::new(1), Replay::rate).unwrap();
+        let (mut sensor, mut values) = (Sensor::new(config), Vec::new());
+        for (slot, sample) in recording.samples.iter().enumerate() {
+            sensor.encode(*sample).unwrap();
+            let weights = sensor.model_weights();
+            // Twenty-four weights in single precision.
+            assert!((weights.iter().sum::<f64>() - 1.0).abs() < 2e-6);
+            if slot > 300 && chosen(*sample) {
+                values.push(of(&weights));
+            }
+        }
+        values.iter().sum::<f64>() / values.len() as f64
+    }
+
+    #[test]
+    fn smooth_drifts_are_given_to_the_velocities() {
+        let velocities = mean("drift", |_| true, |weights| weights[SCALES..].iter().sum());
+        assert!(velocities > 0.5, "{velocities}");
+    }
+
+    /// By a factor of at least four: two in the logarithm to base 2.
+    #[test]
+    fn gusts_raise_the_scale_over_a_calm() {
+        let scale = |weights: &[f64]| {
+            let scales = weights
+                .iter()
+                .enumerate()
+                .map(|(m, w)| w * (2.0 * (m % SCALES) as f64 - 6.0));
+            scales.sum()
+        };
+        let (moving, calm) = (mean("gusts", |x| x > 0.3, scale), mean("gusts", |x| x == 0.0, scale));
+        assert!(moving - calm > 2.0, "{moving} {calm}");
+    }
+}

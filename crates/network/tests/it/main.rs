@@ -15,6 +15,7 @@ mod contention;
 mod defects;
 mod faults;
 mod lossless;
+mod scale;
 mod stored;
 mod wild;
 mod worlds;

@@ -8,7 +8,7 @@ mod scale;
 mod style;
 mod typeset;
 
-use super::Error;
+use crate::Error;
 use fewbits_experiments::plot::{Panel, Plot, Shape};
 use frame::Frame;
 use names::{GAP, Names};

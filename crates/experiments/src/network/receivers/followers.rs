@@ -3,44 +3,45 @@
 use fewbits_adaptive::{Config, Packet, Receiver, Sensor};
 use fewbits_core::factor::InCell;
 use fewbits_core::{
-    BitReader, BitString, BitWriter, Cell, CodecError, Gaussian, LinearDynamics, Message, NumberFormat, Observation,
-    Observed, Sensing, SensorNode,
+    BitReader, BitString, BitWriter, Cell, CodecError, Gaussian, LinearDynamics, Message, Observation, Observed,
+    Sensing, SensorNode,
 };
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_numerics::ArgumentError;
 use fewbits_protocol::{BoxError, Estimator, moments};
 use nalgebra::Vector1;
 use rand::Rng;
+use serde::{Deserialize, Serialize};
 
 /// Sensors that each follow their own measurements by `fewbits_adaptive`, knowing no model and told nothing, and a centre that
 /// knows one: the reconstruction `v` says that the measurement lies in `[v - delta, v + delta)`, silence included.
 ///
 /// While a receiver is out of step with its sensor, its reconstructions say nothing.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Followers<G, S, const D: usize> {
+pub struct Followers<G, S, const D: usize> {
     /// How the world moves.
-    pub(crate) dynamics: G,
+    pub dynamics: G,
     /// How each sensor senses it.
-    pub(crate) sensors: Vec<S>,
+    pub sensors: Vec<S>,
     /// Variance of their noise.
-    pub(crate) noise_variance: f64,
+    pub noise_variance: f64,
     /// What all sensors and receivers agree on.
-    pub(crate) config: Config,
+    pub config: Config,
     /// What is known before the first slot.
-    pub(crate) start: Gaussian<D>,
+    pub start: Gaussian<D>,
 }
 
 impl<G, S, const D: usize> Followers<G, S, D> {
     /// Makes the half of a sensor.
-    pub(crate) fn nodes(&self) -> impl Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + use<G, S, D> {
+    pub fn nodes(&self) -> impl Fn(usize) -> Box<dyn SensorNode<1>> + Clone + Send + Sync + use<G, S, D> {
         let config = self.config;
         move |_| Box::new(FollowedNode(Sensor::new(config)))
     }
 }
 
 /// What the centre of [`Followers`] knows.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Followed<const D: usize> {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Followed<const D: usize> {
     pub(super) receivers: Vec<Receiver>,
     state: Gaussian<D>,
 }
@@ -53,29 +54,27 @@ fn invalid(error: impl std::fmt::Display) -> CodecError {
     }
 }
 
-/// All bits to the end: state in double precision, receivers as CBOR.
+/// CBOR to the end of the bits.
 impl<const D: usize> Message for Followed<D> {
     /// Number of sensors, and what they agree on.
     type Format = (usize, Config);
 
     fn encode(&self, _: &Self::Format, writer: &mut BitWriter) -> Result<(), CodecError> {
-        self.state.encode(&NumberFormat::Double, writer)?;
         let mut stored = Vec::new();
-        ciborium::into_writer(&self.receivers, &mut stored).map_err(invalid)?;
+        ciborium::into_writer(self, &mut stored).map_err(invalid)?;
         stored.iter().try_for_each(|byte| writer.write(u64::from(*byte), 8))
     }
 
     fn decode((sensors, config): &Self::Format, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        let state = Gaussian::decode(&NumberFormat::Double, reader)?;
         let mut stored = Vec::new();
         while reader.remaining() > 0 {
             stored.push(reader.read(8)? as u8);
         }
-        let receivers: Vec<Receiver> = ciborium::from_reader(stored.as_slice()).map_err(invalid)?;
-        if receivers.len() != *sensors || receivers.iter().any(|receiver| receiver.config() != config) {
-            return Err(invalid(receivers.len()));
+        let belief: Self = ciborium::from_reader(stored.as_slice()).map_err(invalid)?;
+        if belief.receivers.len() != *sensors || belief.receivers.iter().any(|receiver| receiver.config() != config) {
+            return Err(invalid(belief.receivers.len()));
         }
-        Ok(Self { receivers, state })
+        Ok(belief)
     }
 }
 

@@ -22,13 +22,13 @@ impl<const D: usize, G: GaussianDynamics<D> + Clone + 'static> Evolving<D> for S
 }
 
 /// Makes the receiver of sensors that all report by one scheme over perfect links, before its first slot.
-pub(crate) fn mixed<const D: usize, G, S, C>(
+pub fn mixed<const D: usize, G, S, C>(
     dynamics: G,
     start: Gaussian<D>,
     sensors: Vec<S>,
     scheme: C,
     ask: impl Fn(&Gaussian<1>) -> C::Feedback + Clone + Send + Sync + 'static,
-) -> impl Fn() -> Result<FusionReceiver<D, MomentFilter>, BoxError> + Send + Sync + 'static
+) -> impl Fn() -> Result<FusionReceiver<D, MomentFilter>, BoxError> + Clone + Send + Sync + 'static
 where
     G: GaussianDynamics<D> + Clone + Send + Sync + 'static,
     S: Sensing<D, 1> + Clone + Send + Sync + 'static,

@@ -2,16 +2,15 @@
 
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::rule::CensoringRule;
-use fewbits_core::{Error, Link, MeasurementNoise, NumberFormat, Observation, Scheme};
+use fewbits_core::{AlwaysReporting, Error, Link, MeasurementNoise, NumberFormat, Observation};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, within};
 use nalgebra::{Matrix1, Vector1};
-use rand::Rng;
 
 /// Every measurement, rounded to the format: what all other schemes save on. Without feedback; a value wants a checksum, so no bit
 /// may arrive inverted.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SendAll {
+pub struct SendAll {
     noise_variance: f64,
     format: NumberFormat,
     always: CensoringRule<1>,
@@ -22,7 +21,7 @@ impl SendAll {
     ///
     /// # Errors
     /// If the variance is not a positive number.
-    pub(crate) fn new(noise_variance: f64, format: NumberFormat) -> Result<Self, ArgumentError> {
+    pub fn new(noise_variance: f64, format: NumberFormat) -> Result<Self, ArgumentError> {
         positive("noise_variance", noise_variance)?;
         let always = CensoringRule::scalar(1.0, 0.0)
             .map_err(|error| ArgumentError::new("noise_variance", noise_variance, error.to_string()))?;
@@ -40,13 +39,10 @@ impl MeasurementNoise<1> for SendAll {
     }
 }
 
-impl Scheme<1> for SendAll {
-    type State = ();
+impl AlwaysReporting<1> for SendAll {
     type Feedback = ();
     type Report = f64;
     type Factor = Censored<1>;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) {}
 
@@ -54,17 +50,11 @@ impl Scheme<1> for SendAll {
         self.format
     }
 
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        (): &(),
-    ) -> Result<Option<f64>, Error> {
-        Ok(Some(self.format.rounded(measurement[0])?))
+    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<f64, Error> {
+        Ok(self.format.rounded(measurement[0])?)
     }
 
-    fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<Censored<1>, Error> {
+    fn meaning_of(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<Censored<1>, Error> {
         within("crossover", link.crossover(), 0.0, 0.0)?;
         Ok(match (observation, &self.format) {
             (Observation::Received(value), NumberFormat::Fixed(levels)) => {
@@ -83,7 +73,7 @@ impl Scheme<1> for SendAll {
 mod tests {
     use super::*;
     use fewbits_core::laws;
-    use fewbits_core::{Factor, Gaussian};
+    use fewbits_core::{Factor, Gaussian, Scheme};
 
     #[test]
     fn all_levels_are_a_distribution_and_a_value_is_the_kalman_update() {

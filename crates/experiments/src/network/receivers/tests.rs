@@ -1,10 +1,10 @@
 //! Receivers of the comparison over networks: against themselves without one, and under losses.
 
-use super::{Followers, LookUp, Patterns};
+use super::{Followers, LookUp, each};
 use fewbits_adaptive::{Config, Receiver as Following, Sensor};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
 use fewbits_core::factor::InCell;
-use fewbits_core::{Cell, Dynamics, Gaussian, Observation, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{Cell, Dynamics, Gaussian, Observation, Sensing, SensorNode};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -81,10 +81,8 @@ fn tables_give_what_they_give_alone() {
         let symbol = |z: &Vector1<f64>| Observation::Received(Symbol(quantizer.encode(z[0]).unwrap()));
         decoder.decode(&z.iter().map(symbol).collect::<Vec<_>>()).unwrap().mean
     });
-    let look_up = LookUp::new(&system, 1000).unwrap();
-    let schemes = look_up.schemes().to_vec();
-    let node = move |i: usize| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(schemes[i].clone())) };
-    let (over, up) = means(star(look_up, Feedback::Clock, ReportLength::Fixed(2), node));
+    let (look_up, schemes) = LookUp::of_system(&system, 1000).unwrap();
+    let (over, up) = means(star(look_up, Feedback::Clock, ReportLength::Fixed(2), each(schemes)));
     assert_eq!((over, up), (alone.collect(), 3 * 2 * SLOTS as u64));
 }
 
@@ -95,7 +93,7 @@ fn patterns_have_the_variance_given_the_bits() {
     let sensor = PatternSensor::with_deviation(BinaryQuantizer::new(vec![0.0]).unwrap(), 1.0).unwrap();
     let source = Source::gaussian_with_deviation(f64::sqrt(variance)).unwrap();
     let table = Bank::new(source, vec![sensor]).unwrap().table(Decoder::Mmse).unwrap();
-    let patterns = Patterns::new(1, table, variance).unwrap();
+    let patterns = LookUp::of_patterns(1, table, variance).unwrap();
     let predicted = patterns.predict(1, &patterns.start()).unwrap();
     assert!((predicted.covariance()[0] - variance).abs() < 1e-12);
     let after = patterns
