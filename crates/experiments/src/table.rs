@@ -181,4 +181,16 @@ mod tests {
             assert!(message.contains("`time`, row 1"), "{message}");
         }
     }
+
+    #[test]
+    fn arrays_are_columns_numbered_from_one() {
+        rows! {
+            struct Pair {
+                f: [f64; 2] ["V"] => "Both.",
+            }
+        }
+        let tables = Tables::of(&vec![Pair { f: [1.0, 2.0] }]).unwrap();
+        let names: Vec<_> = tables.main.columns().iter().map(|c| c.name.as_ref()).collect();
+        assert_eq!(names, ["f1", "f2"]);
+    }
 }
