@@ -1,4 +1,4 @@
-"""Tracking from quantized ranges: Movaghati, thesis, chapter 3. What is exact: rings, products of mixtures, kernels, weights, bits
+"""Tracking from quantized ranges: Movaghati, thesis, chapter 3. What is exact: rings, products of mixtures, kernels, weights
 (docs/pf-mpa.md; errata `mpa-1` ... of docs/errata.md). Trackers are in mpa_tracking.py, the two targets in mpa_association.py.
 """
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import ndtr
 
-from common import Recipes, numbers
+from common import Recipes
 
 RECIPES = Recipes()
 
@@ -123,19 +123,3 @@ def gibbs_tv(row):
 
 
 RECIPES.of("mpa-gibbs/eigenvalue")(lambda row: np.sort(np.abs(np.linalg.eigvals(sweep(row[0]))))[-2])
-
-
-# Bits a step: S sensors of L levels, 14 numbers of 32 bits from leader to leader
-
-def sizes(row):
-    return (int(w[1:]) for w in row.split("-"))
-
-
-@RECIPES.of("mpa-bits/reports")
-def reports(row):
-    sensors, levels = sizes(row)
-    return sensors * np.ceil(np.log2(levels))
-
-
-RECIPES.of("mpa-bits/handover")(lambda row: (4 + 10) * 32)
-RECIPES.of("mpa-bits/raw")(lambda row: list(sizes(row))[0] * 32)

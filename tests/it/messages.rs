@@ -2,7 +2,6 @@
 //! `mpa-ring/...`, `mpa-gibbs/...`.
 
 use crate::references::{agree, numbers};
-use fewbits::core::Belief;
 use fewbits::densities::{Component, Mixture};
 use fewbits::monte_carlo::{Moments, Stream};
 use fewbits::pf_mpa::product;

@@ -171,6 +171,13 @@ fn free_thresholds_gain_little_with_as_many_sensors_as_bits() {
     assert!((-1.0..0.0).contains(&percent(before, after)));
 }
 
+/// How the source is estimated at the end.
+enum Estimate {
+    Likeliest,
+    PosteriorMean,
+}
+use Estimate::{Likeliest, PosteriorMean};
+
 /// The change in per cent from one adaptive rule of ten sensors to another, by the error that each is judged by.
 fn rules(snr: f64, before: (AdaptiveRule, Estimate), after: (AdaptiveRule, Estimate)) -> f64 {
     let source = Source::uniform(1.0).unwrap();
@@ -178,19 +185,12 @@ fn rules(snr: f64, before: (AdaptiveRule, Estimate), after: (AdaptiveRule, Estim
     let error = |(rule, by): (AdaptiveRule, Estimate)| {
         let errors = adaptive(&source, noise, 10, rule).unwrap();
         match by {
-            Estimate::Likeliest => errors.mle,
-            Estimate::PosteriorMean => errors.mmse,
+            Likeliest => errors.mle,
+            PosteriorMean => errors.mmse,
         }
     };
     percent(error(before), error(after))
 }
-
-/// How the source is estimated at the end.
-enum Estimate {
-    Likeliest,
-    PosteriorMean,
-}
-use Estimate::{Likeliest, PosteriorMean};
 
 #[test]
 fn thresholds_at_the_posterior_mean_beat_maximum_likelihood() {

@@ -360,4 +360,16 @@ mod tests {
             assert!(message.contains("`time`, row 1"), "{message}");
         }
     }
+
+    #[test]
+    fn arrays_are_columns_numbered_from_one() {
+        rows! {
+            struct Pair {
+                f: [f64; 2] ["V"] => "Both.",
+            }
+        }
+        let table = Table::of(&vec![Pair { f: [1.0, 2.0] }]).unwrap().remove(0);
+        let names: Vec<_> = table.columns.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["f1", "f2"]);
+    }
 }

@@ -14,7 +14,7 @@ mod table5_2;
 use crate::AnyFigure;
 use crate::prelude::*;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, Grid, Mask, Pattern, Source, linear_pattern, rank};
+use fewbits_binary_patterns::{Bank, Grid, Mask, Pattern, Source, linear_pattern, rank};
 use fewbits_monte_carlo::parallel;
 
 /// The figures of this system, in the order of the publication.
@@ -140,18 +140,6 @@ fn crossing(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, Error>) 
     Ok(0.5 * (low + high))
 }
 
-/// The quantizers of masks on a scene's grid.
-fn quantizers(
-    scene: &Scene,
-    masks: impl IntoIterator<Item = Mask>,
-    bits: usize,
-) -> Result<Vec<BinaryQuantizer>, Error> {
-    masks
-        .into_iter()
-        .map(|m| Ok(pattern(m, bits)?.on(&scene.grid)?))
-        .collect()
-}
-
 /// The best masks of full rank that a descent from these and `extra` scattered starts finds, and their error.
 fn descent_from(
     scene: &Scene,
@@ -160,7 +148,8 @@ fn descent_from(
     starts: &[Vec<Mask>],
     extra: usize,
 ) -> Result<(Vec<Mask>, f64), Error> {
-    let candidates = quantizers(scene, 1..1 << bits, bits)?;
+    let on_grid = |mask| Ok::<_, Error>(pattern(mask, bits)?.on(&scene.grid)?);
+    let candidates = (1..1 << bits).map(on_grid).collect::<Result<_, _>>()?;
     let descent = Descent::with_deviations(scene.source, vec![scene.noise; sensors], candidates)?;
     let places = |masks: &Vec<Mask>| masks.iter().map(|&m| m as usize - 1).collect::<Vec<_>>();
     let masks = |choice: &[usize]| choice.iter().map(|&c| c as Mask + 1).collect::<Vec<_>>();
@@ -184,33 +173,29 @@ fn pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
 /// A picture of patterns: a row each, dark where the bit is 1, light where it is 0, over the cells of the unit grid.
 fn pattern_panel(title: impl Into<String>, rows: &[(String, Pattern)]) -> Panel {
     let cells = rows.iter().map(|r| r.1.cells()).max().unwrap_or(1);
-    let mut ones = Vec::new();
-    let mut zeros = Vec::new();
-    let mut texts = Vec::new();
-    for (at, (_, pattern)) in rows.iter().enumerate() {
-        let middle = (rows.len() - at) as f64;
-        for (cell, &bit) in pattern.bits().iter().enumerate() {
-            let left = cell as f64 + 0.5;
-            let cell_box = (left + 0.03, left + 0.97, middle - 0.36, middle + 0.36);
-            if bit {
-                ones.push(cell_box)
-            } else {
-                zeros.push(cell_box)
-            }
-            texts.push((left + 0.5, middle, if bit { "1" } else { "0" }.to_owned()));
-        }
-    }
+    let middle = |row: usize| (rows.len() - row) as f64;
+    // Left edge and middle of each cell, and its bit.
+    let bits = || {
+        let places = rows.iter().enumerate();
+        places.flat_map(|(row, (_, pattern))| {
+            let cells = (0..).map(f64::from).zip(pattern.bits());
+            cells.map(move |(cell, &bit)| (cell + 0.5, middle(row), bit))
+        })
+    };
+    let boxes = |value: bool| {
+        let own = bits().filter(|(.., bit)| *bit == value);
+        own.map(|(left, middle, _)| (left + 0.03, left + 0.97, middle - 0.36, middle + 0.36))
+            .collect()
+    };
+    let digits = bits().map(|(left, middle, bit)| (left + 0.5, middle, u8::from(bit).to_string()));
     let names = rows
         .iter()
         .enumerate()
-        .map(|(at, (name, _))| ((rows.len() - at) as f64, name.clone()));
-    Panel::new(
-        title,
-        Axis::linear("cell of the measurement").between(0.4, cells as f64 + 0.6),
-        Axis::linear("").between(0.4, rows.len() as f64 + 0.6).named(names),
-    )
-    .with(Layer::boxes("", zeros).coloured(5))
-    .with(Layer::boxes("", ones).coloured(4))
-    .with(Layer::texts(texts).coloured(6))
-    .without_legend()
+        .map(|(row, (name, _))| (middle(row), name.clone()));
+    let x = Axis::linear("cell of the measurement").between(0.4, cells as f64 + 0.6);
+    Panel::new(title, x, Axis::linear("").between(0.4, rows.len() as f64 + 0.6).named(names))
+        .with(Layer::boxes("", boxes(false)).coloured(5))
+        .with(Layer::boxes("", boxes(true)).coloured(4))
+        .with(Layer::texts(digits.collect()).coloured(6))
+        .without_legend()
 }

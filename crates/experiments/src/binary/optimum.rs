@@ -110,15 +110,10 @@ impl Figure for Optimum {
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
-        let of = |n: &usize| each(&ratios, |snr| row(p.bits, *n, snr));
-        let errors = p
-            .sensors
-            .iter()
-            .map(of)
-            .collect::<Result<Vec<_>, _>>()?
-            .into_iter()
-            .flatten()
-            .collect();
+        let mut errors = Vec::new();
+        for &sensors in &p.sensors {
+            errors.extend(each(&ratios, |snr| row(p.bits, sensors, snr))?);
+        }
         let at = |masks: &[Mask], snr: f64| Scene::uniform(3, snr)?.mmse(masks);
         let eight = [2, 2, 3, 3, 3, 3, 4, 6];
         let meet = crossing(6.0, 10.0, |snr| Ok(at(&[4, 5, 6], snr)? - at(&[4, 6, 3], snr)?))?;

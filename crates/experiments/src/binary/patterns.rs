@@ -68,22 +68,13 @@ impl Figure for Clipping {
         let all = scene.search(p.masks.len())?.ranking()?;
         let own = scene.mmse(&p.masks)?;
         // The swapped rule is a pattern over a grid with two more cells, which carry the opposite end's bit.
-        let edges = [-1.0]
-            .into_iter()
-            .chain(grid.breakpoints().iter().copied())
-            .chain([1.0])
-            .collect();
-        let wide = Scene {
-            grid: Grid::from_breakpoints(edges)?,
-            ..scene
-        };
+        let grid = Grid::from_breakpoints([&[-1.0], grid.breakpoints(), &[1.0]].concat())?;
+        let wide = Scene { grid, ..scene };
         let swapped = |masks: &[Mask]| -> Result<f64, Error> {
             let turned = |&mask: &Mask| {
                 let inner = pattern(mask, p.bits)?;
-                let mut bits = vec![inner.bits()[count - 1]];
-                bits.extend(inner.bits());
-                bits.push(inner.bits()[0]);
-                Ok::<_, Error>(Pattern::new(bits)?)
+                let (first, last) = (inner.bits()[0], inner.bits()[count - 1]);
+                Ok::<_, Error>(Pattern::new([&[last], inner.bits(), &[first]].concat())?)
             };
             let patterns = masks.iter().map(turned).collect::<Result<Vec<_>, _>>()?;
             Ok(wide.pattern_bank(&patterns)?.mmse()?)
@@ -108,12 +99,10 @@ impl Figure for Clipping {
 
     fn plot(&self, _: &ClippingParameters, tables: &Clipped) -> Plot {
         let curve = |cell: fn(&Cell) -> usize| points(&tables.cells, |c| (c.y, cell(c) as f64));
-        let panel = Panel::linear("Cell of a measurement", "measurement y / V", "cell");
-        Plot::of(
-            panel
-                .with(Layer::dashed("sides as printed", curve(|c| c.cell_swapped)).coloured(1))
-                .with(Layer::line("nearest outer cell", curve(|c| c.cell)).coloured(0)),
-        )
+        let panel = Panel::linear("Cell of a measurement", "measurement y / V", "cell")
+            .with(Layer::dashed("sides as printed", curve(|c| c.cell_swapped)).coloured(1))
+            .with(Layer::line("nearest outer cell", curve(|c| c.cell)).coloured(0));
+        Plot::of(panel)
     }
 }
 

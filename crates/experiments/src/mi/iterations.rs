@@ -76,7 +76,8 @@ pub struct Iterations {
     crossovers: Option<&'static [f64]>,
     axis: &'static str,
     columns: &'static [Column],
-    judge: fn(&Parameters, &Rows, &Claims),
+    /// Claims that hold everywhere, and those about the publication's setting.
+    judge: fn(&Parameters, &Rows, &Claims, &Claims),
 }
 
 const INFORMATION: &str = "mutual information / bits";
@@ -91,7 +92,7 @@ pub static FIGURE42: Iterations = Iterations {
     crossovers: None,
     axis: INFORMATION,
     columns: &[(|r| r.mi_x_z1_bits, "sensor 1"), (|r| r.mi_x_z1z2_bits, "both sensors")],
-    judge: |p, rows, claims| {
+    judge: |p, rows, claims, here| {
         information_rises(rows, claims);
         claims.keyed("mi_x_z1_nats", "information of sensor 1", rows.clean(p), |r| r.mi_x_z1_nats);
         claims.keyed("mi_x_z1z2_nats", "information of both", rows.clean(p), |r| r.mi_x_z1z2_nats);
@@ -99,9 +100,7 @@ pub static FIGURE42: Iterations = Iterations {
         let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E).ln();
         let objective = rows.chain.last().map(|r| r.mi_x_z1z2_nats - entropy);
         let what = "the printed objective E ln p(x given z) is negative (erratum mi-1)";
-        claims
-            .at_defaults()
-            .near("printed-objective", what, objective, -0.944, 5e-4);
+        here.near("printed-objective", what, objective, -0.944, 5e-4);
     },
 };
 
@@ -112,8 +111,8 @@ pub static FIGURE43: Iterations = Iterations {
     crossovers: None,
     axis: ERROR,
     columns: &[(|r| r.mse, "both sensors")],
-    judge: |p, rows, claims| {
-        error_falls(rows, claims);
+    judge: |p, rows, claims, here| {
+        error_falls(rows, here);
         claims.keyed("mse", "squared error", rows.clean(p), |r| r.mse);
     },
 };
@@ -126,9 +125,8 @@ pub static FIGURE44: Iterations = Iterations {
     crossovers: CHANNELS,
     axis: INFORMATION,
     columns: &[(|r| r.mi_x_z1z2_bits, "")],
-    judge: |p, rows, claims| {
+    judge: |p, rows, claims, here| {
         information_rises(rows, claims);
-        let here = claims.at_defaults();
         let what = "the smaller the crossover, the higher the information, at every step";
         here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mi_x_z1z2_nats > b.mi_x_z1z2_nats);
         let worst: Vec<&Step> = select(&rows.chain, |r| r.crossover == 0.05).collect();
@@ -147,12 +145,10 @@ pub static FIGURE45: Iterations = Iterations {
     crossovers: CHANNELS,
     axis: ERROR,
     columns: &[(|r| r.mse, "")],
-    judge: |_, rows, claims| {
-        error_falls(rows, claims);
+    judge: |_, rows, _, here| {
+        error_falls(rows, here);
         let what = "the smaller the crossover, the lower the error, at every step";
-        claims
-            .at_defaults()
-            .all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse);
+        here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse);
     },
 };
 
@@ -188,11 +184,9 @@ fn information_rises(rows: &Rows, claims: &Claims) {
     claims.all("cyclic", what, neighbours(&rows.cyclic), |(a, b)| b.mi_x_z1z2_nats >= a.mi_x_z1z2_nats - ROUNDING);
 }
 
-fn error_falls(rows: &Rows, claims: &Claims) {
+fn error_falls(rows: &Rows, here: &Claims) {
     let what = "the squared error never rises";
-    claims
-        .at_defaults()
-        .all("error-falls", what, neighbours(&rows.chain), |(a, b)| b.mse <= a.mse + ROUNDING);
+    here.all("error-falls", what, neighbours(&rows.chain), |(a, b)| b.mse <= a.mse + ROUNDING);
 }
 
 impl Figure for Iterations {
@@ -241,7 +235,7 @@ impl Figure for Iterations {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
-        (self.judge)(p, rows, claims);
+        (self.judge)(p, rows, claims, &claims.at_defaults());
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {

@@ -67,7 +67,7 @@ impl Figure for Ablation {
 
     fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let paper = claims.at_defaults().at_full_trials();
-        agree(claims, t, "", true);
+        agree(claims, t, "");
         let ratio = |name: &str| Some(mse(t, "50dB", name)? / mse(t, "50dB", "improved")?);
         let what = "transferring velocities costs half as much again (erratum mpa-7)";
         paper.above("transfer", what, ratio("transfer"), 1.25);

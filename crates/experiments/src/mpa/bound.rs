@@ -49,7 +49,7 @@ impl Figure for Bounds {
             for levels in LEVELS {
                 let network = Point::published(snr_db, levels, SPEED)?.network()?;
                 let one = |trial: Trial| -> Result<([f64; 3], Sums), Error> {
-                    let world = World::draw(trial.stream, &target, Field::Free, 5)?;
+                    let world = World::draw(trial.stream, &target, Field::Free)?;
                     let run = |method: Method| method.run(&world, &network, &target, trial.stream);
                     let runs = [run(Method::Grid(25))?, run(Method::GMPA)?, run(Method::EKF_U)?];
                     let mut previous = prior()?;

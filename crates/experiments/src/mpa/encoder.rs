@@ -68,8 +68,8 @@ impl Figure for Encoders {
 
     fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, &t.encoders, "", true);
-        agree(claims, &t.loadings, "loading-", true);
+        agree(claims, &t.encoders, "");
+        agree(claims, &t.loadings, "loading-");
         let grid = |name: &str, point: &str| mse(&t.encoders, &format!("{name} {point}"), "grid-15");
         for (point, factor) in [("50dB-L4", 20.0), ("40dB-L4", 8.0), ("30dB-L4", 2.4)] {
             let gain = over(grid("published", point), grid("adaptive", point));

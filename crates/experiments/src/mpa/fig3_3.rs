@@ -46,7 +46,7 @@ impl Figure for Fig33 {
         let (target, point) = (Target::printed()?, Point::published(p.snr_db, p.levels, SPEED)?);
         let network = point.network()?;
         let stream = context.stream("mpa-trajectories").indexed(p.trajectory);
-        let world = World::draw(stream, &target, Field::Confined, network.sensors().len())?;
+        let world = World::draw(stream, &target, Field::Confined)?;
         let (mut track, mut errors) = (Vec::new(), Vec::new());
         let mut add = |method: &str, places: &mut dyn Iterator<Item = &Vector4<f64>>| {
             track.extend(places.enumerate().map(|(k, state)| Row {

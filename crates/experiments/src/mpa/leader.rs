@@ -44,7 +44,7 @@ impl Figure for Leaders {
             let network = Point::published(snr_db, 4, SPEED)?.network()?;
             let tracker = MessagePassing::improved(particles)?;
             let one = |sums: &mut [Moments; 6], trial: Trial| -> Result<(), Error> {
-                let world = World::draw(trial.stream, &target, Field::Confined, sensors.len())?;
+                let world = World::draw(trial.stream, &target, Field::Confined)?;
                 let name = Method::Messages(tracker).name();
                 let own = |i: usize| trial.stream.named(&name).indexed(i as u64);
                 let mut streams: Vec<_> = (0..sensors.len()).map(|i| own(i).fast_rng()).collect();

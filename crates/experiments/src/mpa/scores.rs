@@ -1,8 +1,8 @@
 //! Rows that hold a tracker's score, and what is claimed of all of them.
 
-use super::world::{Field, Method, Point, Score, compare};
+use super::world::{Field, Method, Point, Score, World};
 use crate::prelude::*;
-use fewbits_pf_mpa::Reports;
+use fewbits_pf_mpa::{Reports, Target};
 
 parameters! {
     /// How many trajectories.
@@ -41,39 +41,46 @@ rows! {
     }
 }
 
-/// Every method at a point.
+/// Every method at a point, on the trajectories that all figures share: the first ones, as many as its count says.
 pub(super) fn rows(
     context: &Context<'_>,
     name: &str,
     point: &Point,
     methods: &[(Method, u64)],
 ) -> Result<Vec<Row>, Error> {
-    let scores = compare(context, point, Field::Confined, methods)?;
-    let row = |((method, _), score): (&(Method, u64), Score)| Row {
+    let (network, target) = (point.network()?, Target::printed()?);
+    let most = methods.iter().map(|m| m.1).max().unwrap_or(0);
+    let all = context.trials("mpa-trajectories", most, |trial| {
+        let world = World::draw(trial.stream, &target, Field::Confined)?;
+        let error = |(method, count): &(Method, u64)| {
+            let counts = trial.index < *count;
+            let run = || Ok(world.mse(&method.run(&world, &network, &target, trial.stream)?));
+            counts.then(run).transpose()
+        };
+        methods.iter().map(error).collect::<Result<Vec<Option<f64>>, Error>>()
+    })?;
+    let row = |(m, (method, _)): (usize, &(Method, u64))| Row {
         point: name.to_owned(),
         snr_db: point.snr_db,
         levels: point.levels,
         method: method.name(),
         family: method.family(),
         size: method.size(),
-        score,
+        score: Score::of(all.iter().filter_map(|errors| errors[m]).collect()),
     };
-    Ok(methods.iter().zip(scores).map(row).collect())
+    Ok(methods.iter().enumerate().map(row).collect())
 }
 
-/// The references of means, medians and lost shares that a figure has. Those of heavy-tailed methods have no mean.
-pub(super) fn agree(claims: &mut Claims, rows: &[Row], prefix: &str, heavy_tailed: bool) {
+/// The references of means, medians and lost shares that a figure has.
+pub(super) fn agree(claims: &Claims, rows: &[Row], prefix: &str) {
     let full = claims.at_full_trials();
-    let quantity = |what: &str| format!("{prefix}{what}");
-    full.keyed(&quantity("mse"), "mean squared position error", rows, |r| r.score.mse);
-    if heavy_tailed {
-        full.keyed(&quantity("median"), "median of the squared position error", rows, |r| r.score.median);
-        full.keyed(&quantity("lost"), "share of lost tracks", rows, |r| r.score.lost);
-    }
+    full.keyed(&format!("{prefix}mse"), "mean squared position error", rows, |r| r.score.mse);
+    full.keyed(&format!("{prefix}median"), "median of the squared position error", rows, |r| r.score.median);
+    full.keyed(&format!("{prefix}lost"), "share of lost tracks", rows, |r| r.score.lost);
 }
 
 /// The references of shares that ours stay below, of three particles: where the other program loses more tracks.
-pub(super) fn loses_no_more(claims: &mut Claims, rows: &[Row]) {
+pub(super) fn loses_no_more(claims: &Claims, rows: &[Row]) {
     let full = claims.at_full_trials();
     full.keyed_at_most("lost-most", "share of lost tracks", rows, |r| r.score.lost);
 }

@@ -79,10 +79,10 @@ impl Figure for Mse {
 
     fn claims(&self, _: &Effort, t: &Mses, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, &t.trackers, "", true);
-        agree(claims, &t.speeds, "speed-", true);
-        agree(claims, &t.layouts, "layout-", true);
-        agree(claims, &t.floor, "floor-", false);
+        agree(claims, &t.trackers, "");
+        agree(claims, &t.speeds, "speed-");
+        agree(claims, &t.layouts, "layout-");
+        full.keyed("floor-mse", "mean squared position error", &t.floor, |r| r.score.mse);
         let value = |method: &str| mse(&t.trackers, "50dB-L4", method);
         let order = ["grid-15", "guided-40", "GMPA", "GMPA-transfer"].map(value);
         let what =
@@ -166,7 +166,7 @@ impl Figure for Fig34 {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, t, "", true);
+        agree(claims, t, "");
         loses_no_more(claims, t);
         let value = |method: String| mse(t, "40dB-L4", &method);
         let improved = [10, 20, 40, 100].map(|n| value(format!("improved-{n}")));
@@ -234,7 +234,7 @@ impl Figure for Fig35 {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, t, "", true);
+        agree(claims, t, "");
         for (method, what) in [
             ("improved-40", "improved message passing"),
             ("GMPA", "Gaussian message passing"),
@@ -294,7 +294,7 @@ impl Figure for Low {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, t, "", true);
+        agree(claims, t, "");
         loses_no_more(claims, t);
         let gmpa = |snr: u32, levels: usize| mse(t, &format!("{snr}dB-L{levels}"), "GMPA");
         full.decreasing("30dB", "at 30 dB more levels help (erratum mpa-15)", [4, 8, 16, 64].map(|l| gmpa(30, l)));

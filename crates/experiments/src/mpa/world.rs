@@ -14,6 +14,8 @@ use rand_distr::StandardNormal;
 
 /// Steps of a trajectory.
 pub(super) const STEPS: usize = 25;
+/// Sensors of every layout.
+pub(super) const SENSORS: usize = 5;
 /// A trajectory with a larger mean squared error is lost.
 pub(super) const LOST: f64 = 4.0;
 /// Side of the field.
@@ -27,7 +29,7 @@ pub(super) fn canonical() -> Vec<Vector2<f64>> {
 }
 
 /// Four further layouts, drawn once uniformly over the field by the program that made the references.
-pub(super) const LAYOUTS: [[[f64; 2]; 5]; 4] = [
+pub(super) const LAYOUTS: [[[f64; 2]; SENSORS]; 4] = [
     [
         [3.314263649845593, 9.98700152392207],
         [11.82697043722044, 1.516402150695002],
@@ -75,11 +77,11 @@ pub(super) enum Field {
 /// The world of one trial: a track and a standard normal for every sensor and step. The same for all methods and ratios.
 pub(super) struct World {
     pub(super) track: Vec<Vector4<f64>>,
-    pub(super) normals: Vec<Vec<f64>>,
+    normals: Vec<[f64; SENSORS]>,
 }
 
 impl World {
-    pub(super) fn draw(stream: Stream, target: &Target, field: Field, sensors: usize) -> Result<Self, Error> {
+    pub(super) fn draw(stream: Stream, target: &Target, field: Field) -> Result<Self, Error> {
         let mut rng = stream.named("truth").rng();
         let prior = prior()?;
         let inside = |x: &Vector4<f64>| (0.0..=SIDE).contains(&x[0]) && (0.0..=SIDE).contains(&x[1]);
@@ -91,8 +93,8 @@ impl World {
             }
         };
         let mut noise = stream.named("noise").rng();
-        let mut step = |_| (0..sensors).map(|_| noise.sample(StandardNormal)).collect();
-        let normals = (0..STEPS).map(&mut step).collect();
+        let step = |_| std::array::from_fn(|_| noise.sample(StandardNormal));
+        let normals = (0..STEPS).map(step).collect();
         Ok(Self { track, normals })
     }
 
@@ -306,56 +308,23 @@ rows! {
 impl Score {
     /// From each trajectory's error.
     pub(super) fn of(mut errors: Vec<f64>) -> Self {
-        let moments: Moments = errors.iter().copied().collect();
+        let mse = errors.iter().copied().collect();
         errors.sort_by(f64::total_cmp);
-        let n = errors.len();
-        let at = |rank: f64| {
-            errors
-                .get(rank.max(0.0) as usize)
-                .or(errors.last())
-                .copied()
-                .unwrap_or(f64::NAN)
-        };
+        let n = errors.len() as f64;
+        // Ranks beyond an end count as that end.
+        let last = errors.len().saturating_sub(1);
+        let at = |rank: f64| errors.get((rank as usize).min(last)).copied().unwrap_or(f64::NAN);
         // Ranks: half the trajectories are below the median, give or take sqrt(n) / 2.
-        let (middle, give) = (0.5 * n as f64 - 0.5, 0.5 * (n as f64).sqrt());
-        let error = || 0.5 * (at((middle + give).ceil()) - at((middle - give).floor()));
-        let median = Measured {
-            value: 0.5 * (at(middle.floor()) + at(middle.ceil())),
-            standard_error: (n > 1).then(error),
-        };
+        let (middle, give) = (0.5 * n - 0.5, 0.5 * n.sqrt());
+        let error = 0.5 * (at((middle + give).ceil()) - at((middle - give).floor()));
         Self {
-            mse: (&moments).into(),
-            median,
-            lost: errors.iter().filter(|e| **e > LOST).count() as f64 / n.max(1) as f64,
-            trajectories: n as u64,
+            mse,
+            median: Measured {
+                value: 0.5 * (at(middle.floor()) + at(middle.ceil())),
+                standard_error: (n > 1.0).then_some(error),
+            },
+            lost: errors.iter().filter(|e| **e > LOST).count() as f64 / n,
+            trajectories: errors.len() as u64,
         }
     }
-}
-
-/// Runs every method on the same trajectories; those after `trials` are for it alone left out: each method has its own count.
-/// The trajectories are the same in all figures of the same field.
-pub(super) fn compare(
-    context: &Context<'_>,
-    point: &Point,
-    field: Field,
-    methods: &[(Method, u64)],
-) -> Result<Vec<Score>, Error> {
-    let (network, target) = (point.network()?, Target::printed()?);
-    let most = methods.iter().map(|m| m.1).max().unwrap_or(0);
-    let one = |trial: Trial| -> Result<Vec<f64>, Error> {
-        let world = World::draw(trial.stream, &target, field, network.sensors().len())?;
-        methods
-            .iter()
-            .filter(|(_, count)| trial.index < *count)
-            .map(|(method, _)| Ok(world.mse(&method.run(&world, &network, &target, trial.stream)?)))
-            .collect()
-    };
-    let all = context.trials("mpa-trajectories", most, one)?;
-    // A trial has the errors of the methods whose count is not reached, in their order.
-    let errors = |m: usize| {
-        let place = |index: usize| methods[..m].iter().filter(|method| (index as u64) < method.1).count();
-        let own = all.iter().take(methods[m].1 as usize).enumerate();
-        own.map(|(index, trial)| trial[place(index)]).collect()
-    };
-    Ok((0..methods.len()).map(|m| Score::of(errors(m))).collect())
 }
