@@ -4,7 +4,7 @@ use crate::factor::RangeFactor;
 use crate::quantized::{RangeReference, reported};
 use crate::sensor::RangeNoise;
 use fewbits_core::factor::Robust;
-use fewbits_core::{AlwaysReporting, Link, MeasurementNoise, Message, NumberFormat, Observation};
+use fewbits_core::{Link, MeasurementNoise, Memoryless, Message, NumberFormat, Observation};
 use fewbits_numerics::error::finite;
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix1, Vector1};
@@ -20,7 +20,7 @@ impl MeasurementNoise<1> for FullRange {
     }
 }
 
-impl AlwaysReporting<1> for FullRange {
+impl Memoryless<1> for FullRange {
     type Feedback = ();
     type Report = f64;
     type Factor = RangeFactor;
@@ -31,8 +31,8 @@ impl AlwaysReporting<1> for FullRange {
         NumberFormat::Single
     }
 
-    fn report_of(&self, range: &Vector1<f64>, (): &()) -> Result<f64, fewbits_core::Error> {
-        Ok(self.report_format().rounded(finite("range", range[0])?)?)
+    fn report_of(&self, range: &Vector1<f64>, (): &()) -> Result<Option<f64>, fewbits_core::Error> {
+        Ok(Some(self.report_format().rounded(finite("range", range[0])?)?))
     }
 
     fn meaning_of(
@@ -75,7 +75,7 @@ impl<C: MeasurementNoise<1>, S> MeasurementNoise<1> for Tolerant<C, S> {
     }
 }
 
-impl<C: AlwaysReporting<1>, S: Fn(&C::Feedback, &C::Report) -> f64> AlwaysReporting<1> for Tolerant<C, S> {
+impl<C: Memoryless<1>, S: Fn(&C::Feedback, &C::Report) -> f64> Memoryless<1> for Tolerant<C, S> {
     type Feedback = C::Feedback;
     type Report = C::Report;
     type Factor = Robust<C::Factor>;
@@ -88,7 +88,7 @@ impl<C: AlwaysReporting<1>, S: Fn(&C::Feedback, &C::Report) -> f64> AlwaysReport
         self.scheme.report_format()
     }
 
-    fn report_of(&self, range: &Vector1<f64>, feedback: &C::Feedback) -> Result<C::Report, fewbits_core::Error> {
+    fn report_of(&self, range: &Vector1<f64>, feedback: &C::Feedback) -> Result<Option<C::Report>, fewbits_core::Error> {
         self.scheme.report_of(range, feedback)
     }
 

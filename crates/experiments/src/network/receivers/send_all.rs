@@ -2,7 +2,7 @@
 
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::rule::CensoringRule;
-use fewbits_core::{AlwaysReporting, Error, Link, MeasurementNoise, NumberFormat, Observation};
+use fewbits_core::{Error, Link, MeasurementNoise, Memoryless, NumberFormat, Observation};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, within};
 use nalgebra::{Matrix1, Vector1};
@@ -39,7 +39,7 @@ impl MeasurementNoise<1> for SendAll {
     }
 }
 
-impl AlwaysReporting<1> for SendAll {
+impl Memoryless<1> for SendAll {
     type Feedback = ();
     type Report = f64;
     type Factor = Censored<1>;
@@ -50,8 +50,8 @@ impl AlwaysReporting<1> for SendAll {
         self.format
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<f64, Error> {
-        Ok(self.format.rounded(measurement[0])?)
+    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<f64>, Error> {
+        Ok(Some(self.format.rounded(measurement[0])?))
     }
 
     fn meaning_of(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<Censored<1>, Error> {
