@@ -141,7 +141,8 @@ pub(crate) fn climb(
     newton.check()?;
     let blocks = objective.blocks();
     let mut b = start.to_vec();
-    let mut evaluations = 0;
+    // Evaluations without derivatives; those with them are as many as iterations.
+    let mut values = 0;
     let mut last_step = f64::INFINITY;
     let mut escapes = 0;
     for iteration in 1..=newton.max_iterations {
@@ -149,7 +150,6 @@ pub(crate) fn climb(
             return Err(not_converged(iteration - 1, last_step));
         }
         let here = objective.derivatives(&b);
-        evaluations += 1;
         let unit = objective.unit(here.value);
         let eigen = SymmetricEigen::new(here.hessian);
         let along = eigen.eigenvectors.transpose() * &here.gradient;
@@ -184,13 +184,13 @@ pub(crate) fn climb(
                 largest_curvature,
                 certificate,
                 iterations: iteration,
-                evaluations,
+                evaluations: iteration + values,
             });
         }
         last_step = longest;
         let floor = here.value - SLACK * unit;
         let accepted = moved(&b, &step, &blocks, |trial| {
-            evaluations += usize::from(!trusted);
+            values += usize::from(!trusted);
             trusted || objective.value(trial) >= floor
         });
         b = accepted.ok_or_else(|| not_converged(iteration, longest))?;

@@ -23,6 +23,7 @@ use crate::error::{Error, refuse};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
 use nodes::PRIOR_STEP;
+use resolution::{NODE_LIMIT, grid, too_fine};
 use serde::{Deserialize, Serialize};
 
 /// Half-width of the shared factor's rule.
@@ -32,8 +33,6 @@ const FACTOR_REACH: f64 = 8.5;
 const ENTROPY_STEP: f64 = 0.2;
 /// The same for products of cell probabilities of two sensors, which are entire functions; more sensors make them sharper.
 const PRODUCT_STEP: f64 = 0.4;
-/// Most nodes a rule may take; less noise than this resolves asks for another method.
-const NODE_LIMIT: usize = 1 << 20;
 
 /// A weighted range of nodes: a linear functional of functions on the nodes.
 #[derive(Debug, Clone, PartialEq)]
@@ -299,24 +298,6 @@ fn on_two_axes(noise: &Noise, values: &[f64], crowd: f64, resolution: Resolution
         weights: weights.clone(),
     });
     Ok((pairs.collect(), given.collect()))
-}
-
-/// `0, +-step, +-2 step, ...` as far as `reach`.
-fn grid(reach: f64, step: f64) -> Result<Vec<f64>, Error> {
-    let half = (reach / step).floor();
-    if !(half.is_finite() && half < NODE_LIMIT as f64 / 2.0) {
-        return too_fine(2.0 * half);
-    }
-    let half = half as i64;
-    Ok((-half..=half).map(|i| i as f64 * step).collect())
-}
-
-fn too_fine<T>(needed: f64) -> Result<T, Error> {
-    Err(Error::TooLarge {
-        table: "quadrature rule",
-        needed: needed.min(1e18) as u64,
-        limit: NODE_LIMIT as u64,
-    })
 }
 
 fn normalised(mut weights: Vec<f64>) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! Quadrature nodes and weights of a prior.
 
-use super::prior::{Prior, Shape};
-use super::{NODE_LIMIT, Resolution, grid, too_fine};
+use super::prior::{Prior, Shape, TABLE_NODES, TABLE_PANELS};
+use super::resolution::{NODE_LIMIT, Resolution, grid, too_fine};
 use crate::error::Error;
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
@@ -14,9 +14,6 @@ pub(super) const PRIOR_STEP: f64 = 0.25;
 const BELL_STEP: f64 = 0.5;
 /// Nodes of a Gauss-Legendre panel on a bounded support.
 const PANEL_NODES: usize = 8;
-/// Panels and nodes per panel by which a function is stored.
-pub(super) const TABLE_PANELS: usize = 64;
-pub(super) const TABLE_NODES: usize = 12;
 
 impl Prior {
     /// Nodes of which neighbours are about `step` apart at most, and weights, not normalised.

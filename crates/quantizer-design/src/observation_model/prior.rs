@@ -1,6 +1,5 @@
 //! The unknown before anything is received.
 
-use super::nodes::{TABLE_NODES, TABLE_PANELS};
 use super::sample::{SampleFit, drawn_together, fitted};
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::{all_finite, at_least_one, entries, finite, positive, probabilities, within};
@@ -8,6 +7,9 @@ use fewbits_numerics::quadrature::gauss_legendre;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
+/// Panels and nodes per panel by which a function is stored.
+pub(super) const TABLE_PANELS: usize = 64;
+pub(super) const TABLE_NODES: usize = 12;
 /// Largest relative difference of the integrals by half the panels and by all: a rougher function is refused.
 const ROUGHNESS: f64 = 1e-6;
 
