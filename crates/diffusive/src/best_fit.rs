@@ -5,7 +5,6 @@ use crate::belief::SearchBox;
 use crate::density::CellTarget;
 use crate::fit::Fit;
 use crate::target::Target;
-use fewbits_models::SourceModel;
 use nalgebra::Vector2;
 
 /// Cells along the longer side of the box to begin with.
@@ -18,9 +17,9 @@ const LEVELS: usize = 44;
 /// The best fit that any position of the box allows, up to the prior: the cells of best score are split again and again, without
 /// regard to how many others are as good. Finds one point of a ring that is too thin to be covered. `None` if no position has any
 /// likelihood.
-pub(crate) fn best_fit<M: SourceModel>(
-    target: &Target<'_, M>,
-    likelihood: &SourceLikelihood<M>,
+pub(crate) fn best_fit(
+    target: &Target<'_>,
+    likelihood: &SourceLikelihood,
     search: &SearchBox,
 ) -> Option<Fit> {
     let sides: [f64; 2] = std::array::from_fn(|d| search.upper[d] - search.lower[d]);

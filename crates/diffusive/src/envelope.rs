@@ -2,8 +2,7 @@
 
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
-use fewbits_models::diffusion::Air;
-use fewbits_models::{Homogeneous, Receptor, SourceModel};
+use fewbits_models::{Homogeneous, Receptor};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, finite, positive, refuse, within};
 use fewbits_numerics::golden::maximum;
@@ -22,8 +21,8 @@ const PEAK_TOLERANCE: f64 = 1e-8;
 
 /// A posterior over position and rate, asked about concentrations at the height of the sensors, in their medium.
 #[derive(Debug, Clone)]
-pub struct Envelope<M = Air> {
-    sensor: SourceSensor<M>,
+pub struct Envelope {
+    sensor: SourceSensor,
     points: Vec<Point>,
 }
 
@@ -72,12 +71,12 @@ impl Rate {
     }
 }
 
-impl<M: SourceModel + Clone> Envelope<M> {
+impl Envelope {
     /// The envelope of a posterior; `likelihood` holds the records that it was formed from, and what was assumed of the rate.
     ///
     /// # Errors
     /// If the rate was redrawn for each node or sample: it then has no posterior.
-    pub fn new(posterior: &Posterior, likelihood: &SourceLikelihood<M>) -> Result<Self, Error> {
+    pub fn new(posterior: &Posterior, likelihood: &SourceLikelihood) -> Result<Self, Error> {
         let sensor = likelihood.records().first().map(|r| r.sensor().clone());
         let Some(sensor) = sensor else {
             return refuse("records", "empty", "at least one");
@@ -229,8 +228,8 @@ impl Point {
 }
 
 /// Concentration per unit rate along a horizontal ray from the source.
-struct AlongRay<'a, M> {
-    sensor: &'a SourceSensor<M>,
+struct AlongRay<'a> {
+    sensor: &'a SourceSensor,
     receptor: Receptor,
     ray: &'a Vector2<f64>,
     age: f64,
@@ -238,8 +237,8 @@ struct AlongRay<'a, M> {
     peak: (f64, f64),
 }
 
-impl<'a, M: SourceModel> AlongRay<'a, M> {
-    fn new(sensor: &'a SourceSensor<M>, ray: &'a Vector2<f64>, age: f64, widest: f64) -> Result<Self, Error> {
+impl<'a> AlongRay<'a> {
+    fn new(sensor: &'a SourceSensor, ray: &'a Vector2<f64>, age: f64, widest: f64) -> Result<Self, Error> {
         let mut along = Self {
             receptor: sensor.receptor(&Vector2::zeros())?,
             sensor,

@@ -3,15 +3,29 @@
 fewbits_numerics::errors! {
     /// Errors of the search for a source.
     pub enum Error wraps {
+        /// An error of the core: [`fewbits_core::Error::Impossible`] where no probability is left.
+        Core(#[from] fewbits_core::Error),
         /// The physics.
         Model(#[from] fewbits_models::Error),
         /// A belief could not be formed.
-        Density(#[from] crate::density::Error),
+        Density(fewbits_densities::Error),
         /// The network.
         Topology(#[from] fewbits_topology::Error),
         /// A message could not be written or read.
         Codec(#[from] fewbits_core::CodecError),
     } and {
+        /// The density is too thin for the cells allowed.
+        #[error("the density needs {cells} cells or more: expected a density that fewer resolve")]
+        Unresolved {
+            /// Cells that the next refinement would take.
+            cells: usize,
+        },
+        /// The density has no peak of the shape that an approximation needs.
+        #[error("no Gaussian peak: {reason}")]
+        NoPeak {
+            /// Reason.
+            reason: &'static str,
+        },
         /// No instant of sampling lies after the start of the release.
         #[error("no instant of sampling lies after the release began at {start}: expected at least one")]
         NothingReleased {
@@ -27,8 +41,4 @@ fewbits_numerics::errors! {
     }
 }
 
-impl From<fewbits_densities::Error> for Error {
-    fn from(error: fewbits_densities::Error) -> Self {
-        Self::Density(error.into())
-    }
-}
+fewbits_numerics::lift!(fewbits_densities with Core => Density);

@@ -1,7 +1,7 @@
 //! How much the samples of a node would tell: mutual information, bounds of it, and Fisher information.
 
 use crate::{Error, SourceSensor};
-use fewbits_models::{Receptor, SourceModel};
+use fewbits_models::Receptor;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, probabilities};
 use fewbits_numerics::kernels;
@@ -186,8 +186,8 @@ pub(crate) fn half_log_det_plus_one(m: DMatrix<f64>) -> f64 {
 ///
 /// # Errors
 /// If the model has no concentrations at `node`.
-pub fn fisher_information<M: SourceModel>(
-    sensor: &SourceSensor<M>,
+pub fn fisher_information(
+    sensor: &SourceSensor,
     node: &Vector2<f64>,
     source: &Vector2<f64>,
     rate: f64,
@@ -195,8 +195,8 @@ pub fn fisher_information<M: SourceModel>(
     Ok(information_at(sensor, &sensor.receptor(node)?, source, rate))
 }
 
-pub(crate) fn information_at<M: SourceModel>(
-    sensor: &SourceSensor<M>,
+pub(crate) fn information_at(
+    sensor: &SourceSensor,
     receptor: &Receptor,
     source: &Vector2<f64>,
     rate: f64,
@@ -232,9 +232,9 @@ pub enum Unknown {
 ///
 /// # Errors
 /// If the model has no concentrations at a node, or [`Error::NoDiffusivity`].
-pub fn fisher_information_of<M: SourceModel + Clone>(
+pub fn fisher_information_of(
     unknowns: &[Unknown],
-    sensor: &SourceSensor<M>,
+    sensor: &SourceSensor,
     nodes: &[Vector2<f64>],
     source: &Vector2<f64>,
     rate: f64,

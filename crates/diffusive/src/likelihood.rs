@@ -3,24 +3,22 @@
 use crate::rate::{Intervals, RateModel, RateSums};
 use crate::{Error, Record};
 use fewbits_core::{Columns, Likelihood};
-use fewbits_models::SourceModel;
-use fewbits_models::diffusion::Air;
 use fewbits_numerics::error::refuse;
 use nalgebra::{SVector, Vector2};
 
 /// `ln p(samples of all nodes | position)` under a model of the release rate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SourceLikelihood<M = Air> {
-    records: Vec<Record<M>>,
+#[derive(Debug, Clone)]
+pub struct SourceLikelihood {
+    records: Vec<Record>,
     rate: RateModel,
 }
 
-impl<M: SourceModel> SourceLikelihood<M> {
+impl SourceLikelihood {
     /// The likelihood of the given records.
     ///
     /// # Errors
     /// If there is none, or a known rate is not positive.
-    pub fn new(records: Vec<Record<M>>, rate: RateModel) -> Result<Self, Error> {
+    pub fn new(records: Vec<Record>, rate: RateModel) -> Result<Self, Error> {
         rate.check()?;
         if records.is_empty() {
             return refuse("records", "empty", "at least one");
@@ -29,7 +27,7 @@ impl<M: SourceModel> SourceLikelihood<M> {
     }
 
     /// The records.
-    pub fn records(&self) -> &[Record<M>] {
+    pub fn records(&self) -> &[Record] {
         &self.records
     }
 
@@ -169,7 +167,7 @@ impl<M: SourceModel> SourceLikelihood<M> {
     }
 }
 
-impl<M: SourceModel> Likelihood<2> for SourceLikelihood<M> {
+impl Likelihood<2> for SourceLikelihood {
     fn log_likelihood(&self, position: &SVector<f64, 2>) -> f64 {
         if !self.admits(position, 0.0) {
             return f64::NEG_INFINITY;
@@ -184,19 +182,19 @@ impl<M: SourceModel> Likelihood<2> for SourceLikelihood<M> {
 }
 
 /// `ln p(samples | position, rate)`: the state is (x, y, rate).
-#[derive(Debug, Clone, PartialEq)]
-pub struct RateLikelihood<M = Air> {
-    records: Vec<Record<M>>,
+#[derive(Debug, Clone)]
+pub struct RateLikelihood {
+    records: Vec<Record>,
 }
 
-impl<M: SourceModel> RateLikelihood<M> {
+impl RateLikelihood {
     /// The likelihood of the given records.
-    pub fn new(records: Vec<Record<M>>) -> Self {
+    pub fn new(records: Vec<Record>) -> Self {
         Self { records }
     }
 }
 
-impl<M: SourceModel> Likelihood<3> for RateLikelihood<M> {
+impl Likelihood<3> for RateLikelihood {
     fn log_likelihood(&self, state: &SVector<f64, 3>) -> f64 {
         let position = Vector2::new(state[0], state[1]);
         if !self.records.iter().all(|record| record.sensor().admits(&position, 0.0)) {

@@ -7,7 +7,6 @@ use crate::project::{Travelling, lpg_scalars};
 use crate::{Error, Record};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_densities::{Component, Mixture};
-use fewbits_models::SourceModel;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{non_negative, within};
 use nalgebra::{SMatrix, SVector};
@@ -69,7 +68,7 @@ impl Wire {
     ///
     /// # Errors
     /// As [`Wire::sample_format`].
-    pub fn quantised<M: SourceModel + Clone>(&self, record: Record<M>) -> Result<Record<M>, Error> {
+    pub fn quantised(&self, record: Record) -> Result<Record, Error> {
         let Some(code) = self.samples else { return Ok(record) };
         let format = self.sample_format(record.noise())?;
         let samples = record
@@ -118,7 +117,7 @@ const SAMPLE_COUNT_BITS: u32 = 16;
 
 impl Packet {
     /// The message of raw records: the nodes' indices and samples.
-    pub fn raw<M: SourceModel>(records: &[Record<M>], nodes: &[usize]) -> Self {
+    pub fn raw(records: &[Record], nodes: &[usize]) -> Self {
         Self::Raw {
             records: nodes
                 .iter()

@@ -5,8 +5,6 @@ use crate::density::CellOptions;
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
 use fewbits_core::Gaussian;
-use fewbits_models::SourceModel;
-use fewbits_models::diffusion::Air;
 use fewbits_numerics::error::{entries, probabilities, refuse};
 use nalgebra::Vector2;
 
@@ -26,9 +24,9 @@ use nalgebra::Vector2;
 /// assert_eq!(grid.len(), 8);
 /// # Ok::<(), fewbits_diffusive::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct ModelGrid<M = Air> {
-    sensors: Vec<SourceSensor<M>>,
+#[derive(Debug, Clone)]
+pub struct ModelGrid {
+    sensors: Vec<SourceSensor>,
     weights: Vec<f64>,
 }
 
@@ -43,13 +41,13 @@ pub struct ModelPosterior {
     pub posterior: Option<Posterior>,
 }
 
-impl<M: SourceModel> ModelGrid<M> {
+impl ModelGrid {
     /// The models of the given prior probabilities. The sensors differ in the model of the medium (and what follows from it), and
     /// sample at the same instants.
     ///
     /// # Errors
     /// If there is none, the weights are no probabilities or not one for each, or the sensors sample at different instants.
-    pub fn new(sensors: Vec<SourceSensor<M>>, weights: &[f64]) -> Result<Self, Error> {
+    pub fn new(sensors: Vec<SourceSensor>, weights: &[f64]) -> Result<Self, Error> {
         probabilities("weights", weights)?;
         entries("weights", weights.len(), sensors.len())?;
         if let Some(other) = sensors.iter().find(|s| s.instants() != sensors[0].instants()) {
@@ -66,13 +64,13 @@ impl<M: SourceModel> ModelGrid<M> {
     ///
     /// # Errors
     /// As [`ModelGrid::new`].
-    pub fn uniform(sensors: Vec<SourceSensor<M>>) -> Result<Self, Error> {
+    pub fn uniform(sensors: Vec<SourceSensor>) -> Result<Self, Error> {
         let weights = vec![(sensors.len().max(1) as f64).recip(); sensors.len()];
         Self::new(sensors, &weights)
     }
 
     /// One model alone.
-    pub fn single(sensor: SourceSensor<M>) -> Self {
+    pub fn single(sensor: SourceSensor) -> Self {
         Self {
             sensors: vec![sensor],
             weights: vec![1.0],
@@ -90,7 +88,7 @@ impl<M: SourceModel> ModelGrid<M> {
     }
 
     /// The models with their prior probabilities.
-    pub fn iter(&self) -> impl Iterator<Item = (&SourceSensor<M>, f64)> {
+    pub fn iter(&self) -> impl Iterator<Item = (&SourceSensor, f64)> {
         self.sensors.iter().zip(self.weights.iter().copied())
     }
 
@@ -107,17 +105,14 @@ impl<M: SourceModel> ModelGrid<M> {
         rate: RateModel,
         search: &SearchBox,
         options: &CellOptions,
-    ) -> Result<Vec<ModelPosterior>, Error>
-    where
-        M: Clone,
-    {
+    ) -> Result<Vec<ModelPosterior>, Error> {
         let mut all = Vec::with_capacity(self.len());
         for sensor in &self.sensors {
             let records = taken.iter().map(|(node, samples)| sensor.record(node, samples));
             let likelihood = SourceLikelihood::new(records.collect::<Result<_, _>>()?, rate)?;
             let posterior = match Posterior::new(&Prior::Exact(*prior), &likelihood, search, None, options) {
                 Ok(posterior) => Some(posterior),
-                Err(Error::Density(crate::density::Error::Core(fewbits_core::Error::Impossible))) => None,
+                Err(Error::Core(fewbits_core::Error::Impossible)) => None,
                 Err(other) => return Err(other),
             };
             all.push(ModelPosterior {
@@ -133,7 +128,7 @@ impl<M: SourceModel> ModelGrid<M> {
         };
         let largest = logs().fold(f64::NEG_INFINITY, f64::max);
         if largest == f64::NEG_INFINITY {
-            return Err(crate::density::Error::from(fewbits_core::Error::Impossible).into());
+            return Err(fewbits_core::Error::Impossible.into());
         }
         let weights: Vec<f64> = logs().map(|log| (log - largest).exp()).collect();
         let total: f64 = weights.iter().sum();

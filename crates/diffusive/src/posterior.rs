@@ -6,7 +6,6 @@ use crate::fit::Fit;
 use crate::target::Target;
 use crate::{Error, SourceLikelihood};
 use fewbits_core::{Belief, Gaussian};
-use fewbits_models::SourceModel;
 use nalgebra::{Vector2, Vector3};
 
 /// Posterior over cells, with the rate given each cell where it is unknown and carried.
@@ -30,9 +29,9 @@ impl Posterior {
     ///
     /// # Errors
     /// As [`Cells::cover`]; a belief that excludes the records is [`fewbits_core::Error::Impossible`].
-    pub fn new<M: SourceModel>(
+    pub fn new(
         prior: &Prior,
-        likelihood: &SourceLikelihood<M>,
+        likelihood: &SourceLikelihood,
         search: &SearchBox,
         near: Option<SearchBox>,
         options: &CellOptions,

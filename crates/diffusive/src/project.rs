@@ -148,7 +148,7 @@ fn lpg(posterior: &Posterior, components: usize, degree: usize, rate: &RateModel
 fn about_components<const D: usize>(
     clumps: &Clumps<D>,
     components: usize,
-    fit: impl Fn(&[Component<D>]) -> Result<LpgFit<D>, crate::density::Error>,
+    fit: impl Fn(&[Component<D>]) -> Result<LpgFit<D>, Error>,
 ) -> Result<LpgFit<D>, Error> {
     let about = |count: usize| {
         let mixture = clumps.fit(&MixtureFit::new(count)?)?;

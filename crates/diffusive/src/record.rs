@@ -2,8 +2,8 @@
 
 use crate::rate::{Intervals, RateRange, RateSums, log_sample_marginal, log_sample_uncut};
 use crate::{Error, SourceSensor};
-use fewbits_models::diffusion::{Air, Profile};
-use fewbits_models::{Homogeneous, Receptor, SourceModel};
+use fewbits_models::diffusion::Profile;
+use fewbits_models::{Homogeneous, Receptor};
 use fewbits_numerics::error::{all_finite, entries, positive};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::Vector2;
@@ -23,9 +23,9 @@ const TOGETHER: usize = 16;
 /// Where nothing changes along the ground, the responses depend on the horizontal distance alone, times
 /// `exp((v . d - V rho) / 2 kappa)` with wind. The sums over the instants are then tabulated over the distance once: every look-up
 /// costs two polynomials however many samples there are. Other models are asked for every position.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Record<M = Air> {
-    sensor: SourceSensor<M>,
+#[derive(Debug, Clone)]
+pub struct Record {
+    sensor: SourceSensor,
     /// The receptor that the model is asked about, and where its coordinates begin. Where nothing changes along the ground the
     /// sensor is at the origin: offsets keep their digits.
     receptor: Receptor,
@@ -56,31 +56,25 @@ struct Along {
     drift: f64,
 }
 
-impl<M: SourceModel> SourceSensor<M> {
+impl SourceSensor {
     /// A record of the samples of a node, from which likelihoods are computed.
     ///
     /// # Errors
     /// If the number of samples is not that of the instants, one is not finite, or the model has no concentrations at `node`.
-    pub fn record(&self, node: &Vector2<f64>, samples: &[f64]) -> Result<Record<M>, Error>
-    where
-        M: Clone,
-    {
+    pub fn record(&self, node: &Vector2<f64>, samples: &[f64]) -> Result<Record, Error> {
         entries("samples", samples.len(), self.instants().len())?;
         all_finite("samples", samples)?;
         Record::new(self, node, samples.iter().map(|y| y - self.bias()).collect(), self.noise())
     }
 }
 
-impl<M: SourceModel> Record<M> {
+impl Record {
     pub(crate) fn new(
-        sensor: &SourceSensor<M>,
+        sensor: &SourceSensor,
         node: &Vector2<f64>,
         samples: Vec<f64>,
         noise: f64,
-    ) -> Result<Self, Error>
-    where
-        M: Clone,
-    {
+    ) -> Result<Self, Error> {
         positive("noise", noise)?;
         let homogeneous = sensor.homogeneous();
         let receptor = sensor.receptor(node)?;
@@ -179,7 +173,7 @@ impl<M: SourceModel> Record<M> {
     }
 
     /// The sensor that sampled.
-    pub fn sensor(&self) -> &SourceSensor<M> {
+    pub fn sensor(&self) -> &SourceSensor {
         &self.sensor
     }
 

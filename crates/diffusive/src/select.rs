@@ -5,7 +5,7 @@ use crate::information::{Predictions, half_log_det_plus_one, information_at};
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceSensor};
 use fewbits_core::Gaussian;
-use fewbits_models::{Receptor, SourceModel};
+use fewbits_models::Receptor;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -65,9 +65,9 @@ impl Selector {
     }
 
     /// The best of the candidates, the first among equals; `None` of none.
-    pub fn best<M: SourceModel>(
+    pub fn best(
         &self,
-        sensor: &SourceSensor<M>,
+        sensor: &SourceSensor,
         candidates: &[(usize, Vector2<f64>)],
     ) -> Option<usize> {
         let mut best: Option<(f64, usize)> = None;
@@ -81,7 +81,7 @@ impl Selector {
     }
 
     /// How good a node is: the larger the better. `-inf` where the model has no concentrations.
-    pub fn score<M: SourceModel>(&self, sensor: &SourceSensor<M>, node: &Vector2<f64>) -> f64 {
+    pub fn score(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
         let Ok(receptor) = sensor.receptor(node) else {
             return f64::NEG_INFINITY;
         };
@@ -98,7 +98,7 @@ impl Selector {
         }
     }
 
-    fn information<M: SourceModel>(&self, sensor: &SourceSensor<M>, receptor: &Receptor) -> f64 {
+    fn information(&self, sensor: &SourceSensor, receptor: &Receptor) -> f64 {
         let samples = sensor.instants().len();
         let mut mean = DVector::zeros(samples);
         let mut second = DMatrix::zeros(samples, samples);
@@ -113,7 +113,7 @@ impl Selector {
     }
 
     /// The samples that clumps predict; a clump of uncertain rate is two points, one deviation on either side.
-    fn predictions<M: SourceModel>(&self, sensor: &SourceSensor<M>, receptor: &Receptor) -> Predictions {
+    fn predictions(&self, sensor: &SourceSensor, receptor: &Receptor) -> Predictions {
         let (mut means, mut weights) = (Vec::new(), Vec::new());
         for clump in self.clumps.clumps() {
             let a = self.predicted(sensor, receptor, &place(clump));
@@ -132,16 +132,16 @@ impl Selector {
     }
 
     /// Responses in units of the noise.
-    fn predicted<M: SourceModel>(
+    fn predicted(
         &self,
-        sensor: &SourceSensor<M>,
+        sensor: &SourceSensor,
         receptor: &Receptor,
         source: &Vector2<f64>,
     ) -> DVector<f64> {
         DVector::from_vec(sensor.responses_at(receptor, source)) / sensor.noise()
     }
 
-    fn cramer_rao<M: SourceModel>(&self, sensor: &SourceSensor<M>, receptor: &Receptor) -> f64 {
+    fn cramer_rao(&self, sensor: &SourceSensor, receptor: &Receptor) -> f64 {
         let mut information = Matrix3::zeros();
         for clump in self.clumps.clumps() {
             information += information_at(sensor, receptor, &place(clump), clump.mean[2]) * clump.weight;
@@ -163,7 +163,7 @@ impl Selector {
     }
 
     /// Determinant of the covariance of the position after the samples that the estimate predicts.
-    fn covariance<M: SourceModel>(&self, sensor: &SourceSensor<M>, receptor: &Receptor) -> f64 {
+    fn covariance(&self, sensor: &SourceSensor, receptor: &Receptor) -> f64 {
         let predicted = self.predicted(sensor, receptor, self.estimate.mean()) * self.clumps.mean()[2];
         let mut logs = Vec::with_capacity(self.clumps.clumps().len());
         for clump in self.clumps.clumps() {

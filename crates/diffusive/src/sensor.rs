@@ -1,22 +1,22 @@
 //! Sensors: samples of the concentration at a node at a few instants, with bias and noise.
 
 use crate::Error;
-use fewbits_models::diffusion::Air;
 use fewbits_models::{Homogeneous, Receptor, SourceGradient, SourceModel};
 use fewbits_numerics::error::{all_finite, at_least_one, finite, non_negative, positive};
 use nalgebra::{Vector2, Vector3};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
+use std::fmt::{Debug, Formatter};
+use std::sync::Arc;
 
 /// The sensors of a network, all of one kind, and the medium between them and the source:
 /// `y_j = mu a_j(theta) + bias + e_j`, `e_j ~ N(0, sigma^2)`, with `a_j` the concentration per unit rate at instant `t_j`.
 ///
-/// Sensors and source stand at known heights; the position searched for is horizontal. `M` says how the substance spreads: [`Air`]
-/// has closed forms, any other [`SourceModel`] serves as well. Every record holds a copy of its sensor, so wrap a large model in an
-/// [`std::sync::Arc`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct SourceSensor<M = Air> {
-    model: M,
+/// Sensors and source stand at known heights; the position searched for is horizontal. The model says how the substance spreads:
+/// [`Air`](fewbits_models::diffusion::Air) has closed forms, any other [`SourceModel`] serves as well. Clones share it.
+#[derive(Clone)]
+pub struct SourceSensor {
+    model: Arc<dyn SourceModel + Send + Sync>,
     instants: Vec<f64>,
     /// `instants` less `start`.
     ages: Vec<f64>,
@@ -28,18 +28,30 @@ pub struct SourceSensor<M = Air> {
     reach: f64,
 }
 
-impl<M: SourceModel> SourceSensor<M> {
+impl Debug for SourceSensor {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let mut shown = f.debug_struct("SourceSensor");
+        shown.field("instants", &self.instants).field("noise", &self.noise);
+        shown.finish_non_exhaustive()
+    }
+}
+
+impl SourceSensor {
     /// Sensors on the ground that sample at the given instants (s) with noise of the given standard deviation (kg/m^3); a source
     /// on the ground that began at time 0, no bias.
     ///
     /// # Errors
     /// If there is no instant, one is not finite or none is after 0, or `noise` is not a positive number.
-    pub fn new(model: M, instants: Vec<f64>, noise: f64) -> Result<Self, Error> {
+    pub fn new(
+        model: impl SourceModel + Send + Sync + 'static,
+        instants: Vec<f64>,
+        noise: f64,
+    ) -> Result<Self, Error> {
         at_least_one("instants", instants.len())?;
         all_finite("instants", &instants)?;
         positive("noise", noise)?;
         let sensor = Self {
-            model,
+            model: Arc::new(model),
             ages: instants.clone(),
             instants,
             start: 0.0,
@@ -99,8 +111,8 @@ impl<M: SourceModel> SourceSensor<M> {
     }
 
     /// Model of the medium.
-    pub fn model(&self) -> &M {
-        &self.model
+    pub fn model(&self) -> &dyn SourceModel {
+        &*self.model
     }
 
     /// Instants of sampling, s.
@@ -177,7 +189,7 @@ impl<M: SourceModel> SourceSensor<M> {
     }
 
     /// Concentrations per unit rate at a receptor, one for each instant: kg/m^3 per kg/s.
-    pub fn responses_at(&self, receptor: &Receptor, source: &Vector2<f64>) -> Vec<f64> {
+    pub(crate) fn responses_at(&self, receptor: &Receptor, source: &Vector2<f64>) -> Vec<f64> {
         let mut out = vec![0.0; self.ages.len()];
         self.model
             .concentrations(receptor, &self.source_at(source), &self.ages, &mut out);
@@ -185,55 +197,34 @@ impl<M: SourceModel> SourceSensor<M> {
     }
 
     /// The response at instant `j` and its gradient with respect to the position of the source; at no instant zero.
-    pub fn response_gradient_at(&self, j: usize, receptor: &Receptor, source: &Vector2<f64>) -> SourceGradient {
+    pub(crate) fn response_gradient_at(&self, j: usize, receptor: &Receptor, source: &Vector2<f64>) -> SourceGradient {
         let age = self.ages.get(j).copied().unwrap_or(0.0);
         self.model.source_gradient(receptor, &self.source_at(source), age)
     }
 
-    /// Draws what a sensor at a receptor samples of a source that releases at `rate`, kg/s.
-    pub fn sample_at<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        receptor: &Receptor,
-        source: &Vector2<f64>,
-        rate: f64,
-    ) -> Vec<f64> {
-        let clean = self.responses_at(receptor, source);
-        clean
-            .into_iter()
-            .map(|a| rate * a + self.bias + self.noise * rng.sample::<f64, _>(StandardNormal))
-            .collect()
-    }
-}
-
-/// Air has concentrations everywhere: no receptor is needed.
-impl SourceSensor<Air> {
-    fn anywhere(&self, node: &Vector2<f64>) -> Receptor {
-        Receptor {
-            place: Vector3::new(node.x, node.y, self.sensor_height),
-            index: 0,
-        }
-    }
-
     /// Concentrations per unit rate at a node, one for each instant: kg/m^3 per kg/s.
-    pub fn responses(&self, node: &Vector2<f64>, source: &Vector2<f64>) -> Vec<f64> {
-        self.responses_at(&self.anywhere(node), source)
-    }
-
-    /// The response at instant `j` and its gradient with respect to the horizontal position of the source.
-    pub fn response_gradient(&self, j: usize, node: &Vector2<f64>, source: &Vector2<f64>) -> (f64, Vector2<f64>) {
-        let g = self.response_gradient_at(j, &self.anywhere(node), source);
-        (g.value, g.gradient.xy())
+    ///
+    /// # Errors
+    /// As [`receptor`](Self::receptor).
+    pub fn responses(&self, node: &Vector2<f64>, source: &Vector2<f64>) -> Result<Vec<f64>, Error> {
+        Ok(self.responses_at(&self.receptor(node)?, source))
     }
 
     /// Draws what a node samples of a source that releases at `rate`, kg/s.
+    ///
+    /// # Errors
+    /// As [`receptor`](Self::receptor).
     pub fn sample<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
         node: &Vector2<f64>,
         source: &Vector2<f64>,
         rate: f64,
-    ) -> Vec<f64> {
-        self.sample_at(rng, &self.anywhere(node), source, rate)
+    ) -> Result<Vec<f64>, Error> {
+        let clean = self.responses(node, source)?;
+        Ok(clean
+            .into_iter()
+            .map(|a| rate * a + self.bias + self.noise * rng.sample::<f64, _>(StandardNormal))
+            .collect())
     }
 }

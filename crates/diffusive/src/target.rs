@@ -5,7 +5,6 @@ use crate::density::{CellTarget, Cells, Slice};
 use crate::rate::{Intervals, RateModel, RateRange, RateSums, cut_normal, ends_about};
 use crate::{Error, SourceLikelihood};
 use fewbits_core::Columns;
-use fewbits_models::SourceModel;
 use fewbits_numerics::{LogSum, kernels::largest, normal::log_interval};
 use nalgebra::{Matrix2, Vector2};
 
@@ -48,9 +47,9 @@ struct Conditional {
     variance: f64,
 }
 
-pub(crate) struct Target<'a, M> {
+pub(crate) struct Target<'a> {
     prior: &'a Prior,
-    likelihood: &'a SourceLikelihood<M>,
+    likelihood: &'a SourceLikelihood,
     lobes: Vec<Lobe>,
     conditionals: Vec<Conditional>,
 }
@@ -58,8 +57,8 @@ pub(crate) struct Target<'a, M> {
 /// Means and variances of the rate, one of each per cell.
 type RateMoments = (Vec<f64>, Vec<f64>);
 
-impl<'a, M: SourceModel> Target<'a, M> {
-    pub(crate) fn new(prior: &'a Prior, likelihood: &'a SourceLikelihood<M>) -> Result<Self, Error> {
+impl<'a> Target<'a> {
+    pub(crate) fn new(prior: &'a Prior, likelihood: &'a SourceLikelihood) -> Result<Self, Error> {
         let (mut lobes, mut conditionals) = (Vec::new(), Vec::new());
         match prior {
             Prior::Exact(gaussian) => lobes.push(Lobe::new(1.0, *gaussian.mean(), *gaussian.covariance())),
@@ -218,7 +217,7 @@ fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3]) -> (f64, 
 /// Cells of a run: their numbers stay in the nearest caches.
 const RUN: usize = 1024;
 
-impl<M: SourceModel> CellTarget<2> for Target<'_, M> {
+impl CellTarget<2> for Target<'_> {
     fn evaluate(&self, centres: &Columns<'_, 2>, half_width: f64, logs: &mut [f64], scores: &mut [f64]) {
         let extra = half_width * half_width;
         let precisions: Vec<[[f64; 3]; 2]> = self
@@ -271,7 +270,7 @@ const DROPPED: f64 = 26.0;
 /// Lobes this far below another, in nats, do not count.
 const FAINT: f64 = 30.0;
 
-impl<M: SourceModel> Target<'_, M> {
+impl Target<'_> {
     /// Excludes cells in which no source can be, and centres at which none can be.
     fn exclude_walls(&self, centres: &[&[f64]; 2], half: f64, logs: &mut [f64], scores: &mut [f64]) {
         for (i, (log, score)) in logs.iter_mut().zip(scores).enumerate() {

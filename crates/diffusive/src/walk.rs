@@ -56,14 +56,14 @@ impl SourceChain {
             let mut search = self.search.clone();
             search.most_nodes = most.min(self.search.most_nodes);
             search.run(&self.sensor, &self.deployment, &self.graph, first, |node| {
-                match known.iter().find(|(at, _)| *at == node) {
+                Ok(match known.iter().find(|(at, _)| *at == node) {
                     Some((_, samples)) => samples.clone(),
                     None => {
                         asked.set(Some(node));
                         // Whoever it is will sample itself; here it only matters that it was asked.
                         self.samples.get(first).cloned().unwrap_or_default()
                     }
-                }
+                })
             })
         };
         let nobody = Cell::new(None);

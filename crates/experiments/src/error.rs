@@ -119,7 +119,6 @@ failed!(
     fewbits_cfwmd::Error,
     fewbits_core::CodecError,
     fewbits_diffusive::Error,
-    fewbits_diffusive::density::Error,
     fewbits_dymbo::Error,
     fewbits_filters::Error,
     fewbits_network::Error,

@@ -11,18 +11,18 @@ use nalgebra::Vector2;
 pub(super) const EXCLUDED: f64 = 30.0;
 
 /// One model of the medium along a search.
-pub(super) struct Alternative<M> {
-    pub(super) sensor: SourceSensor<M>,
+pub(super) struct Alternative {
+    pub(super) sensor: SourceSensor,
     /// Logarithm of the prior probability; `-inf` once the model is excluded.
     pub(super) log_weight: f64,
     pub(super) log_evidence: f64,
     pub(super) probability: f64,
-    pub(super) records: Vec<Record<M>>,
+    pub(super) records: Vec<Record>,
     pub(super) posterior: Option<Posterior>,
 }
 
-impl<M: Clone> Alternative<M> {
-    pub(super) fn new((sensor, prior): (&SourceSensor<M>, f64)) -> Self {
+impl Alternative {
+    pub(super) fn new((sensor, prior): (&SourceSensor, f64)) -> Self {
         Self {
             sensor: sensor.clone(),
             log_weight: prior.ln(),
@@ -34,14 +34,14 @@ impl<M: Clone> Alternative<M> {
     }
 }
 
-impl<M> Alternative<M> {
+impl Alternative {
     pub(super) fn log_posterior(&self) -> f64 {
         self.log_weight + self.log_evidence
     }
 }
 
 /// The first of the most probable.
-pub(super) fn most_probable<M>(alternatives: &[Alternative<M>]) -> usize {
+pub(super) fn most_probable(alternatives: &[Alternative]) -> usize {
     (1..alternatives.len()).fold(0, |best, i| {
         if alternatives[i].probability > alternatives[best].probability {
             i
@@ -52,7 +52,7 @@ pub(super) fn most_probable<M>(alternatives: &[Alternative<M>]) -> usize {
 }
 
 /// Mean and covariance of the position under all models.
-pub(super) fn mixed<M>(alternatives: &[Alternative<M>]) -> Gaussian<2> {
+pub(super) fn mixed(alternatives: &[Alternative]) -> Gaussian<2> {
     let parts = || {
         let held = alternatives.iter().filter(|a| a.probability > 0.0);
         held.filter_map(|a| Some((a.probability, &a.posterior.as_ref()?.cells)))
@@ -66,7 +66,7 @@ pub(super) fn mixed<M>(alternatives: &[Alternative<M>]) -> Gaussian<2> {
 }
 
 /// How the samples fit under all models.
-pub(super) fn mixed_fit<M>(alternatives: &[Alternative<M>], samples: usize) -> Fit {
+pub(super) fn mixed_fit(alternatives: &[Alternative], samples: usize) -> Fit {
     let held = alternatives.iter().filter(|a| a.probability > 0.0);
     let parts = held.filter_map(|a| Some(a.probability * a.posterior.as_ref()?.fit.chi_squared));
     Fit {
@@ -76,7 +76,7 @@ pub(super) fn mixed_fit<M>(alternatives: &[Alternative<M>], samples: usize) -> F
 }
 
 /// Logarithm of the evidence under all models.
-pub(super) fn log_evidence<M>(alternatives: &[Alternative<M>]) -> f64 {
+pub(super) fn log_evidence(alternatives: &[Alternative]) -> f64 {
     alternatives
         .iter()
         .map(Alternative::log_posterior)

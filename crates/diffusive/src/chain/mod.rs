@@ -19,7 +19,6 @@ use crate::{Error, RateModel, Record, SourceLikelihood, SourceSensor};
 use alternatives::{Alternative, log_evidence, mixed, mixed_fit, most_probable};
 use fewbits_core::{Gaussian, Message};
 use fewbits_densities::Mixture;
-use fewbits_models::SourceModel;
 use fewbits_numerics::error::{at_least_one, positive, refuse, within};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::Vector2;
@@ -106,16 +105,16 @@ impl Search {
     /// A search that fails on the way ends with a [`Status`]. Errors are for invalid arguments.
     ///
     /// # Errors
-    /// If `start` does not exist, graph and deployment differ in size, the model has no concentrations at a node, a sample is not
-    /// finite, or the form cannot carry the rate.
-    pub fn run<M: SourceModel + Clone>(
+    /// If `start` does not exist, graph and deployment differ in size, the model has no concentrations at a node, `samples` fails, a
+    /// sample is not finite, or the form cannot carry the rate.
+    pub fn run(
         &self,
-        sensor: &SourceSensor<M>,
+        sensor: &SourceSensor,
         deployment: &Deployment,
         graph: &Graph,
         start: usize,
-        samples: impl FnMut(usize) -> Vec<f64>,
-    ) -> Result<Outcome<M>, Error> {
+        samples: impl FnMut(usize) -> Result<Vec<f64>, Error>,
+    ) -> Result<Outcome, Error> {
         self.run_models(&ModelGrid::single(sensor.clone()), deployment, graph, start, samples)
     }
 
@@ -125,16 +124,16 @@ impl Search {
     ///
     /// # Errors
     /// As [`run`](Self::run), or if there are several models and anything but raw records travels.
-    pub fn run_models<M: SourceModel + Clone>(
+    pub fn run_models(
         &self,
-        models: &ModelGrid<M>,
+        models: &ModelGrid,
         deployment: &Deployment,
         graph: &Graph,
         start: usize,
-        mut samples: impl FnMut(usize) -> Vec<f64>,
-    ) -> Result<Outcome<M>, Error> {
+        mut samples: impl FnMut(usize) -> Result<Vec<f64>, Error>,
+    ) -> Result<Outcome, Error> {
         self.check(models, deployment, graph, start)?;
-        let mut alternatives: Vec<Alternative<M>> = models.iter().map(Alternative::new).collect();
+        let mut alternatives: Vec<Alternative> = models.iter().map(Alternative::new).collect();
         let mut outcome = Outcome {
             status: Status::NodeLimit,
             steps: Vec::new(),
@@ -149,7 +148,7 @@ impl Search {
         loop {
             // Sample and update.
             visited[node] = true;
-            let taken = samples(node);
+            let taken = samples(node)?;
             for alternative in &mut alternatives {
                 let record = alternative.sensor.record(&deployment.positions()[node], &taken)?;
                 alternative.records.push(match self.form {
@@ -254,9 +253,9 @@ impl Search {
         }
     }
 
-    fn check<M: SourceModel>(
+    fn check(
         &self,
-        models: &ModelGrid<M>,
+        models: &ModelGrid,
         deployment: &Deployment,
         graph: &Graph,
         start: usize,
@@ -293,11 +292,11 @@ impl Search {
     }
 
     /// For the Laplace form: replaces the moments by mode and curvature where there is a peak.
-    fn peak<M: SourceModel + Clone>(
+    fn peak(
         &self,
         moments: Travelling,
         posterior: &Posterior,
-        last: &Record<M>,
+        last: &Record,
         before: Option<&Travelling>,
     ) -> Result<Travelling, Error> {
         let (Form::Laplace, Travelling::Position(_)) = (self.form, &moments) else {

@@ -4,7 +4,6 @@ use crate::fit::Fit;
 use crate::posterior::Posterior;
 use crate::{Error, Record};
 use fewbits_core::Gaussian;
-use fewbits_models::diffusion::Air;
 
 /// Why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +52,7 @@ pub struct Step {
 
 /// Outcome of a search.
 #[derive(Debug, Clone)]
-pub struct Outcome<M = Air> {
+pub struct Outcome {
     /// Why it ended.
     pub status: Status,
     /// Every node that sampled, in order.
@@ -61,12 +60,12 @@ pub struct Outcome<M = Air> {
     /// The last posterior, before projection. With several models that of the most probable one.
     pub posterior: Option<Posterior>,
     /// The records that were used. With several models those of the most probable one.
-    pub records: Vec<Record<M>>,
+    pub records: Vec<Record>,
     /// Probabilities of the models, in their order.
     pub models: Vec<f64>,
 }
 
-impl<M> Outcome<M> {
+impl Outcome {
     /// The last estimate.
     pub fn estimate(&self) -> Option<&Gaussian<2>> {
         self.steps.last().map(|step| &step.estimate)
@@ -86,9 +85,9 @@ impl<M> Outcome<M> {
 /// Failures of a belief that end a search; others are errors.
 pub(super) fn failure(error: &Error) -> Option<Status> {
     match error {
-        Error::Density(crate::density::Error::Core(fewbits_core::Error::Impossible)) => Some(Status::BeliefMiss),
-        Error::Density(crate::density::Error::Unresolved { .. }) => Some(Status::Unresolved),
-        Error::Density(crate::density::Error::Argument(_)) => Some(Status::BeliefMiss),
+        Error::Core(fewbits_core::Error::Impossible) => Some(Status::BeliefMiss),
+        Error::Unresolved { .. } => Some(Status::Unresolved),
+        Error::Argument(_) => Some(Status::BeliefMiss),
         _ => None,
     }
 }

@@ -10,13 +10,12 @@ use crate::project::Travelling;
 use crate::target::Target;
 use crate::{Error, RateModel, SourceLikelihood};
 use fewbits_densities::Mixture;
-use fewbits_models::SourceModel;
 
 impl Search {
     /// Updates the posterior of every model that is left, and the models' probabilities. A status if the search ends here.
-    pub(super) fn update<M: SourceModel + Clone>(
+    pub(super) fn update(
         &self,
-        alternatives: &mut [Alternative<M>],
+        alternatives: &mut [Alternative],
         received: Option<&Travelling>,
     ) -> Result<Option<Status>, Error> {
         let mut end = None;
@@ -60,11 +59,11 @@ impl Search {
     }
 
     /// Prior and likelihood of one model's update, and a box that holds the posterior.
-    fn terms<M: SourceModel + Clone>(
+    fn terms(
         &self,
-        alternative: &Alternative<M>,
+        alternative: &Alternative,
         received: Option<&Travelling>,
-    ) -> Result<(Prior, SourceLikelihood<M>, Option<SearchBox>), Error> {
+    ) -> Result<(Prior, SourceLikelihood, Option<SearchBox>), Error> {
         let all = alternative.records.as_slice();
         let last = &all[all.len() - 1..];
         let (prior, records) = match (received, &self.rate) {
@@ -86,11 +85,11 @@ impl Search {
     }
 
     /// The status of an update that failed. If not even the best position explains the samples, that is the reason.
-    pub(super) fn explained<M: SourceModel>(
+    pub(super) fn explained(
         &self,
         status: Status,
         prior: &Prior,
-        likelihood: &SourceLikelihood<M>,
+        likelihood: &SourceLikelihood,
         carried: bool,
     ) -> Result<Status, Error> {
         let Some(level) = self.refusal else {

@@ -1,6 +1,6 @@
 //! Equal cells that cover where a density is: the exact belief in few dimensions.
 
-use super::Error;
+use crate::Error;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Categorical;
 use fewbits_numerics::eigen::symmetric_eigen;

@@ -1,6 +1,6 @@
 //! A weighted cloud summed up by a few clumps.
 
-use super::Error;
+use crate::Error;
 use fewbits_core::Columns;
 use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use nalgebra::{SMatrix, SVector};

@@ -1,6 +1,6 @@
 //! Gaussians from the peak of a density: mode and Hessian, Tierney and Kadane's ratios, and cumulants.
 
-use super::Error;
+use crate::Error;
 use fewbits_core::Gaussian;
 use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::error::{all_finite, positive};

@@ -1,6 +1,6 @@
 //! Gaussian mixtures fitted to clumps by expectation-maximisation.
 
-use super::Error;
+use crate::Error;
 use super::clumps::{Clump, Clumps};
 use fewbits_core::Columns;
 use fewbits_densities::{Component, Mixture};

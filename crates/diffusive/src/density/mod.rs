@@ -11,13 +11,11 @@
 
 mod cells;
 mod clumps;
-mod error;
 pub mod laplace;
 mod mixture_fit;
 mod series;
 
 pub use cells::{CellOptions, CellTarget, Cells};
 pub use clumps::{Clump, Clumps};
-pub use error::Error;
 pub use mixture_fit::MixtureFit;
 pub use series::{Lpg, LpgFit, Slice, SliceMoments, polynomials};

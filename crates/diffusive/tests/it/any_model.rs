@@ -9,7 +9,6 @@ use fewbits_models::{Receptor, SourceGradient, SourceModel};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Matrix2, Vector2, Vector3};
-use std::sync::Arc;
 
 /// Air that does not say that nothing changes along the ground, with a block in which no source can be, and receptors within 200 m.
 #[derive(Debug)]
@@ -57,34 +56,29 @@ impl SourceModel for Opaque {
     }
 }
 
-fn opaque(windy: bool, block: Option<[f64; 4]>) -> SourceSensor<Arc<dyn SourceModel>> {
+fn opaque(windy: bool, block: Option<[f64; 4]>) -> SourceSensor {
     let plain = sensor(1.0, windy);
-    let model: Arc<dyn SourceModel> = Arc::new(Opaque {
-        air: *plain.model(),
+    let model = Opaque {
+        air: super::air(1.0, windy),
         block,
-    });
+    };
     SourceSensor::new(model, plain.instants().to_vec(), plain.noise()).unwrap()
 }
 
 const NODES: [[f64; 2]; 3] = [[50.0, 54.0], [52.0, 44.0], [58.0, 60.0]];
 
-fn likelihood<M: SourceModel + Clone>(
-    sensor: &SourceSensor<M>,
-    windy: bool,
-    nodes: usize,
-    rate: RateModel,
-) -> SourceLikelihood<M> {
+fn likelihood(sensor: &SourceSensor, windy: bool, nodes: usize, rate: RateModel) -> SourceLikelihood {
     let world = super::sensor(1.0, windy);
     let mut rng = Stream::new(5).rng();
     let records = NODES[..nodes].iter().map(|n| {
         let node = Vector2::from(*n);
-        let samples = world.sample(&mut rng, &node, &Vector2::new(62.0, 50.0), 1.0);
+        let samples = world.sample(&mut rng, &node, &Vector2::new(62.0, 50.0), 1.0).unwrap();
         sensor.record(&node, &samples).unwrap()
     });
     SourceLikelihood::new(records.collect(), rate).unwrap()
 }
 
-fn posterior<M: SourceModel>(likelihood: &SourceLikelihood<M>) -> Posterior {
+fn posterior(likelihood: &SourceLikelihood) -> Posterior {
     let prior = Prior::Exact(Gaussian::new(Vector2::from(NODES[0]), Matrix2::identity() * 2500.0).unwrap());
     Posterior::new(&prior, likelihood, &field(1.0), None, &CellOptions::default()).unwrap()
 }
@@ -134,7 +128,7 @@ fn posterior_within_a_wall_is_zero() {
     assert!(at(60.0) == f64::NEG_INFINITY && at(50.0).is_finite());
 }
 
-fn search(sensor: &SourceSensor<Arc<dyn SourceModel>>, form: Form) -> Result<Status, fewbits_diffusive::Error> {
+fn search(sensor: &SourceSensor, form: Form) -> Result<Status, fewbits_diffusive::Error> {
     let mut rng = Stream::new(3).rng();
     let alarm = Vector2::new(44.396, 52.042);
     let deployed = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], 150).unwrap();
@@ -144,8 +138,7 @@ fn search(sensor: &SourceSensor<Arc<dyn SourceModel>>, form: Form) -> Result<Sta
     search.form = form;
     let source = Vector2::new(62.0, 50.0);
     let outcome = search.run(sensor, &deployed, &graph, start, |node| {
-        let receptor = sensor.receptor(&deployed.positions()[node]).unwrap();
-        sensor.sample_at(&mut rng, &receptor, &source, 1.0)
+        sensor.sample(&mut rng, &deployed.positions()[node], &source, 1.0)
     })?;
     let error = (outcome.estimate().unwrap().mean() - source).norm();
     assert!(error < 0.5, "{form:?}: {error}");

@@ -45,7 +45,7 @@ fn arguments_are_refused() {
     }
     assert!(RateSums::of(&[1.0], &[1.0, 2.0], 1.0).is_err() && RateSums::of(&[], &[], 1.0).is_err());
     assert!(RateSums::of(&[1.0], &[1.0], 0.0).is_err() && RateSums::of(&[f64::NAN], &[1.0], 1.0).is_err());
-    assert!(SourceLikelihood::<Air>::new(vec![], joint()).is_err());
+    assert!(SourceLikelihood::new(vec![], joint()).is_err());
     let record = ok.record(&node, &[0.0; 5]).unwrap();
     assert!(SourceLikelihood::new(vec![record], RateModel::Known(-1.0)).is_err());
     assert!(Search::new(&node, 0.0, field(1.0), joint(), 1e-5).is_err());
@@ -112,7 +112,7 @@ fn runs_refuse_what_they_cannot_do() {
         search
     };
     let run =
-        |search: Search, start, samples: Vec<f64>| search.run(&sensor, &field_of, &graph, start, |_| samples.clone());
+        |search: Search, start, samples: Vec<f64>| search.run(&sensor, &field_of, &graph, start, |_| Ok(samples.clone()));
     assert!(run(search(|_| ()), 2, vec![0.0; 5]).is_err());
     assert!(run(search(|_| ()), 0, vec![0.0; 3]).is_err());
     assert!(run(search(|_| ()), 0, vec![f64::NAN; 5]).is_err());
@@ -137,7 +137,7 @@ fn runs_refuse_what_they_cannot_do() {
     let other = Graph::within(&[Vector2::zeros()], 1.0).unwrap();
     assert!(
         search(|_| ())
-            .run(&sensor, &field_of, &other, 0, |_| vec![0.0; 5])
+            .run(&sensor, &field_of, &other, 0, |_| Ok(vec![0.0; 5]))
             .is_err()
     );
 }
@@ -162,7 +162,7 @@ fn absurd_samples() {
         for &level in levels {
             let mut search = Search::new(&Vector2::new(44.0, 52.0), 50.0, field(1.0), joint(), 1e-5).unwrap();
             (search.form, search.most_nodes) = (form, 4);
-            let outcome = search.run(&sensor, &field_of, &graph, 0, |_| vec![level; 5]).unwrap();
+            let outcome = search.run(&sensor, &field_of, &graph, 0, |_| Ok(vec![level; 5])).unwrap();
             for step in &outcome.steps {
                 assert!(step.estimate.mean().iter().all(|x| x.is_finite()), "{form:?} {level} {:?}", outcome.status);
                 assert!(step.log10_determinant.is_finite() && !step.log_evidence.is_nan());
@@ -179,7 +179,7 @@ fn two_densities_that_exclude_each_other() {
     let sensor = sensor(1.0, false);
     let node = Vector2::new(50.0, 54.0);
     let record = sensor
-        .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)))
+        .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)).unwrap())
         .unwrap();
     let far = Gaussian::new(Vector2::new(1e6, 1e6), Matrix2::identity() * 1e-6).unwrap();
     let result = Posterior::new(
@@ -209,7 +209,7 @@ fn polynomial_gaussians_refuse_bad_parts() {
     let sensor = sensor(1.0, false);
     let node = Vector2::new(50.0, 54.0);
     let record = sensor
-        .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)))
+        .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)).unwrap())
         .unwrap();
     let prior = Prior::Exact(Gaussian::new(node, Matrix2::identity() * 2500.0).unwrap());
     let cells: Cells<2> = Posterior::new(

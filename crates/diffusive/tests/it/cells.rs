@@ -1,7 +1,8 @@
 //! Cells against closed forms.
 
 use fewbits_core::{Belief, Columns, Density};
-use fewbits_diffusive::density::{CellOptions, CellTarget, Cells, Error};
+use fewbits_diffusive::Error;
+use fewbits_diffusive::density::{CellOptions, CellTarget, Cells};
 use nalgebra::Vector2;
 
 /// A thin ring: radius 20, half a centimetre wide.

@@ -5,6 +5,7 @@ use fewbits_core::Gaussian;
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information_of};
 use fewbits_diffusive::{Envelope, Posterior, Prior, RateModel, SourceLikelihood, SourceSensor};
+use fewbits_models::Receptor;
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -33,7 +34,7 @@ fn sharp(sensor: &SourceSensor, rate: RateModel) -> Envelope {
     let records = (0..12).map(|i| {
         let angle = f64::from(i);
         let node = source + Vector2::new(angle.cos(), angle.sin()) * (6.0 + f64::from(i));
-        sensor.record(&node, &sensor.responses(&node, &source)).unwrap()
+        sensor.record(&node, &sensor.responses(&node, &source).unwrap()).unwrap()
     });
     let likelihood = SourceLikelihood::new(records.collect(), rate).unwrap();
     let prior = Prior::Exact(Gaussian::new(source, Matrix2::identity() * 100.0).unwrap());
@@ -53,7 +54,7 @@ fn exceedance_is_of_the_sensors_own_medium() {
             }
             let sensor = sensor(ground, heights);
             let area = sharp(&sensor, RateModel::Known(1.0));
-            let field = Vector3::new(place.x, place.y, heights.1);
+            let field = sensor.receptor(&place).unwrap();
             let truth = sensor
                 .model()
                 .concentration(&field, &Vector3::new(SOURCE[0], SOURCE[1], heights.0), 40.0);
@@ -128,11 +129,15 @@ fn information_on_the_diffusivity_keeps_ground_and_heights() {
 fn envelope_at_another_height_is_the_concentration_there() {
     let sensor = sensor(Ground::Impermeable, (10.0, 0.0));
     let area = sharp(&sensor, joint()).at_height(10.0).unwrap();
-    let place = Vector3::new(70.0, 44.0, 10.0);
+    let place = Vector2::new(70.0, 44.0);
+    let receptor = Receptor {
+        place: Vector3::new(place.x, place.y, 10.0),
+        index: 0,
+    };
     let truth = sensor
         .model()
-        .concentration(&place, &Vector3::new(SOURCE[0], SOURCE[1], 10.0), 40.0);
-    let above = |share: f64| area.exceedance(&place.xy(), 40.0, share * truth).unwrap();
+        .concentration(&receptor, &Vector3::new(SOURCE[0], SOURCE[1], 10.0), 40.0);
+    let above = |share: f64| area.exceedance(&place, 40.0, share * truth).unwrap();
     assert!(above(0.95) > 0.99 && above(1.05) < 0.01, "{} {}", above(0.95), above(1.05));
     assert!(area.at_height(-1.0).is_err());
 }

@@ -186,16 +186,16 @@ fn samples_that_nothing_explains_are_a_misfit() {
     for samples in [[1.0; 5], [1.0, 0.1, 1.0, 0.1, 1.0], [1e6; 5], [1e150; 5], [-1.0; 5]] {
         let search = Search::new(&Vector2::new(50.0, 50.0), 50.0, field(1.0), joint(), 1e-5).unwrap();
         let outcome = search
-            .run(&sensor(1.0, false), &field_of, &graph, 0, |_| samples.to_vec())
+            .run(&sensor(1.0, false), &field_of, &graph, 0, |_| Ok(samples.to_vec()))
             .unwrap();
         assert_eq!(outcome.status, Status::Misfit, "{samples:?}");
     }
     // A source two centimetres from the node fits, though its ring is too thin for the cells.
     let node = field_of.positions()[0];
-    let near = sensor(1.0, false).responses(&node, &(node + Vector2::new(0.02, 0.0)));
+    let near = sensor(1.0, false).responses(&node, &(node + Vector2::new(0.02, 0.0))).unwrap();
     let search = Search::new(&node, 50.0, field(1.0), joint(), 1e-5).unwrap();
     let outcome = search
-        .run(&sensor(1.0, false), &field_of, &graph, 0, |_| near.clone())
+        .run(&sensor(1.0, false), &field_of, &graph, 0, |_| Ok(near.clone()))
         .unwrap();
     assert_ne!(outcome.status, Status::Misfit);
 }

@@ -118,6 +118,7 @@ fn posterior_case(e: &Value) -> Case {
         let node = point(node);
         let clean: Vec<f64> = sensor
             .responses(&node, &source)
+            .unwrap()
             .iter()
             .map(|a| a * number(e, "mu_true"))
             .collect();

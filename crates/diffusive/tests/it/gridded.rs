@@ -8,7 +8,7 @@ use fewbits_diffusive::{
     Envelope, Error, Form, Outcome, Posterior, Prior, Rule, Search, SearchBox, SourceLikelihood, SourceSensor, Status,
 };
 use fewbits_models::diffusion::{Air, Ground};
-use fewbits_models::{Receptor, SourceModel};
+use fewbits_models::SourceModel;
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -52,22 +52,22 @@ fn field(split: usize) -> Arc<SensorField> {
 }
 
 /// Five readings of the steady field; the median concentration is about 3.
-fn sensor<M: SourceModel>(model: M) -> SourceSensor<M> {
+fn sensor(model: impl SourceModel + Send + Sync + 'static) -> SourceSensor {
     SourceSensor::new(model, vec![1.0, 2.0, 3.0, 4.0, 5.0], 0.1).unwrap()
 }
 
 /// What a node reads of the true field.
-fn reading(truth: &SourceSensor<Arc<SensorField>>, seed: u64, node: usize, place: &Vector2<f64>) -> Vec<f64> {
+fn reading(truth: &SourceSensor, seed: u64, node: usize, place: &Vector2<f64>) -> Result<Vec<f64>, Error> {
     let mut rng = Stream::new(seed).indexed(node as u64).rng();
-    truth.sample_at(&mut rng, &truth.receptor(place).unwrap(), &Vector2::from(SOURCE), 1.0)
+    truth.sample(&mut rng, place, &Vector2::from(SOURCE), 1.0)
 }
 
-fn run<M: SourceModel + Clone>(
+fn run(
     seed: u64,
-    model: &SourceSensor<M>,
-    truth: &SourceSensor<Arc<SensorField>>,
+    model: &SourceSensor,
+    truth: &SourceSensor,
     change: impl FnOnce(&mut Search),
-) -> Outcome<M> {
+) -> Outcome {
     let deployed = Deployment::given(places()).unwrap();
     let graph = Graph::within(deployed.positions(), 1.2).unwrap();
     let alarm = Vector2::new(5.3, 2.7);
@@ -123,18 +123,17 @@ fn exceedance_follows_the_field_of_the_rooms() {
     let model = sensor(field(2));
     let source = Vector2::from(SOURCE);
     let all = places();
-    let records = all.iter().step_by(5).map(|place| {
-        let receptor = model.receptor(place).unwrap();
-        model.record(place, &model.responses_at(&receptor, &source)).unwrap()
-    });
+    let records = all
+        .iter()
+        .step_by(5)
+        .map(|place| model.record(place, &model.responses(place, &source).unwrap()).unwrap());
     let likelihood = SourceLikelihood::new(records.collect(), joint()).unwrap();
     let prior = Prior::Exact(Gaussian::new(source, Matrix2::identity() * 4.0).unwrap());
     let posterior = Posterior::new(&prior, &likelihood, &ROOMS, None, &CellOptions::default()).unwrap();
     assert!((posterior.cells.mean() - source).norm() < 0.1);
     let area = Envelope::new(&posterior, &likelihood).unwrap();
     for place in all.iter().skip(2).step_by(7) {
-        let receptor: Receptor = model.receptor(place).unwrap();
-        let truth = model.responses_at(&receptor, &source)[0];
+        let truth = model.responses(place, &source).unwrap()[0];
         let above = |share: f64| area.exceedance(place, 5.0, share * truth).unwrap();
         assert!(above(0.8) > 0.95 && above(1.25) < 0.05, "{place}: {} {}", above(0.8), above(1.25));
     }

@@ -1,6 +1,6 @@
 //! Gaussians from a peak against closed forms, in every unit.
 
-use fewbits_diffusive::density::Error;
+use fewbits_diffusive::Error;
 use fewbits_diffusive::density::laplace::{Peak, cumulant_laplace, tierney_kadane};
 use nalgebra::{Matrix2, Vector1, Vector2};
 use std::f64::consts::TAU;

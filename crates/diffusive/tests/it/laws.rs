@@ -24,7 +24,7 @@ fn likelihood(rate: RateModel, unit: f64, windy: bool, nodes: usize) -> SourceLi
     let records = NODES[..nodes].iter().map(|n| {
         let node = Vector2::from(*n) * unit;
         sensor
-            .record(&node, &sensor.sample(&mut rng, &node, &source, 1.0))
+            .record(&node, &sensor.sample(&mut rng, &node, &source, 1.0).unwrap())
             .unwrap()
     });
     SourceLikelihood::new(records.collect(), rate).unwrap()
@@ -73,11 +73,13 @@ fn likelihoods_are_numbers_everywhere() {
 }
 
 fn open_air(sensor: &SourceSensor, node: &Vector2<f64>, position: &Vector2<f64>) -> Vec<f64> {
-    let air = Air::new(40.0, *sensor.model().wind(), Ground::None).unwrap();
+    let wind = sensor.model().homogeneous().unwrap().wind;
+    let air = Air::new(40.0, Vector3::new(wind.x, wind.y, 0.0), Ground::None).unwrap();
     let open = SourceSensor::new(air, sensor.instants().to_vec(), sensor.noise()).unwrap();
     open.with_heights(sensor.source_height(), sensor.sensor_height())
         .unwrap()
         .responses(node, position)
+        .unwrap()
 }
 
 proptest! {
@@ -90,7 +92,7 @@ proptest! {
         let all = likelihood(RateModel::Known(1.0), 1.0, windy, 3);
         let position = Vector2::new(x, y);
         for record in all.records() {
-            let a = record.sensor().responses(record.node(), &position);
+            let a = record.sensor().responses(record.node(), &position).unwrap();
             let direct = RateSums::of(record.samples(), &a, record.noise()).unwrap();
             let table = record.sums(&position);
             prop_assert!((table.response - direct.response).abs() <= 1e-9 * direct.response + 1e-12);
@@ -110,7 +112,7 @@ proptest! {
         let sensor = sensor.with_heights(20.0 * scale * scale, 20.0 * scale * scale * ratio).unwrap();
         let node = Vector2::new(50.0, 54.0);
         let position = node + Vector2::new(angle.cos(), angle.sin()) * 10.0_f64.powf(rho);
-        let a = sensor.responses(&node, &position);
+        let a = sensor.responses(&node, &position).unwrap();
         let record = sensor.record(&node, &[3e-5, 2e-5]).unwrap();
         let direct = RateSums::of(record.samples(), &a, record.noise()).unwrap();
         let table = record.sums(&position);
@@ -259,7 +261,7 @@ fn polynomial_gaussians_over_position_and_rate() {
     let sensor = sensor(1.0, false);
     let node = Vector2::new(66.0, 54.0);
     let record = sensor
-        .record(&node, &sensor.sample(&mut rng, &node, &Vector2::new(62.0, 50.0), 1.0))
+        .record(&node, &sensor.sample(&mut rng, &node, &Vector2::new(62.0, 50.0), 1.0).unwrap())
         .unwrap();
     let next = SourceLikelihood::new(vec![record], joint()).unwrap();
     let updated =

@@ -39,19 +39,23 @@ const RULES: [Rule; 5] = [
     Rule::Covariance,
 ];
 
-/// Example B of the paper, in other units of length if asked for.
-fn sensor(unit: f64, windy: bool) -> SourceSensor {
+/// The air of example B of the paper, in other units of length if asked for.
+fn air(unit: f64, windy: bool) -> Air {
     let wind = if windy {
         Vector3::new(-20.0 * unit, -10.0 * unit, 0.0)
     } else {
         Vector3::zeros()
     };
-    let air = Air::new(40.0 * unit * unit, wind, Ground::Impermeable)
+    Air::new(40.0 * unit * unit, wind, Ground::Impermeable)
         .unwrap()
         .with_closest(1e-3 * unit)
-        .unwrap();
+        .unwrap()
+}
+
+/// Example B.
+fn sensor(unit: f64, windy: bool) -> SourceSensor {
     let noise = 8e-6 / unit.powi(3);
-    SourceSensor::new(air, vec![5.0, 10.0, 15.0, 20.0, 25.0], noise)
+    SourceSensor::new(air(unit, windy), vec![5.0, 10.0, 15.0, 20.0, 25.0], noise)
         .unwrap()
         .with_reach(250.0 * unit)
         .unwrap()

@@ -27,7 +27,7 @@ fn posterior(rate: RateModel) -> (Posterior, SourceLikelihood) {
     let record = |n: [f64; 2]| {
         let node = Vector2::from(n);
         sensor
-            .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)))
+            .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)).unwrap())
             .unwrap()
     };
     let likelihood = SourceLikelihood::new(vec![record([50.0, 54.0]), record([58.0, 60.0])], rate).unwrap();

@@ -11,9 +11,12 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 const SOURCE: [f64; 2] = [62.0, 50.0];
 
+fn air(diffusivity: f64, wind: f64) -> Air {
+    Air::new(diffusivity, Vector3::new(wind, 0.0, 0.0), Ground::Impermeable).unwrap()
+}
+
 fn with(diffusivity: f64, wind: f64) -> SourceSensor {
-    let air = Air::new(diffusivity, Vector3::new(wind, 0.0, 0.0), Ground::Impermeable).unwrap();
-    SourceSensor::new(air, vec![5.0, 10.0, 15.0, 20.0, 25.0], 8e-6).unwrap()
+    SourceSensor::new(air(diffusivity, wind), vec![5.0, 10.0, 15.0, 20.0, 25.0], 8e-6).unwrap()
 }
 
 fn candidates() -> ModelGrid {
@@ -28,7 +31,7 @@ fn evidence_of_the_grid_is_bayes() {
     let taken: Vec<(Vector2<f64>, Vec<f64>)> = [[50.0, 54.0], [40.0, 40.0]]
         .map(|node| {
             let node = Vector2::from(node);
-            (node, with(40.0, 3.0).sample(&mut rng, &node, &Vector2::from(SOURCE), 1.0))
+            (node, with(40.0, 3.0).sample(&mut rng, &node, &Vector2::from(SOURCE), 1.0).unwrap())
         })
         .to_vec();
     let weights = [0.1, 0.2, 0.3, 0.2, 0.2];
@@ -104,10 +107,10 @@ fn grid_of_one_model_is_the_plain_search() {
 
 #[test]
 fn grids_refuse_bad_parts() {
-    assert!(ModelGrid::<Air>::uniform(Vec::new()).is_err());
+    assert!(ModelGrid::uniform(Vec::new()).is_err());
     assert!(ModelGrid::new(vec![sensor(1.0, false)], &[0.5, 0.5]).is_err());
     assert!(ModelGrid::new(vec![sensor(1.0, false)], &[0.7]).is_err());
-    let later = SourceSensor::new(*with(40.0, 0.0).model(), vec![9.0], 8e-6).unwrap();
+    let later = SourceSensor::new(air(40.0, 0.0), vec![9.0], 8e-6).unwrap();
     assert!(ModelGrid::uniform(vec![with(40.0, 0.0), later]).is_err());
     let refusal = search(&with(40.0, 0.0), &candidates(), Form::Mixture(4))
         .unwrap_err()

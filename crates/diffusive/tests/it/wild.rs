@@ -4,6 +4,7 @@ use fewbits_core::NumberFormat;
 use fewbits_core::laws::wild;
 use fewbits_diffusive::message::{SampleCode, Wire};
 use fewbits_diffusive::{RateModel, RateRange, RateSums, Search, SearchBox, SourceSensor, log_sample_marginal};
+use fewbits_models::SourceGradient;
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Vector2, Vector3};
@@ -28,9 +29,12 @@ proptest! {
         if let Some(sensor) = sensor(&x) {
             let (node, source) = (Vector2::new(x[10], x[11]), Vector2::new(x[12], x[13]));
             if node.iter().chain(source.iter()).all(|x| x.is_finite()) {
-                let responses = sensor.responses(&node, &source);
+                let responses = sensor.responses(&node, &source).unwrap();
                 prop_assert!(responses.iter().all(|r| !r.is_nan() && *r >= 0.0), "{:?} {:?} {:?}: {:?}", sensor, node, source, responses);
-                let (response, slope) = sensor.response_gradient(1, &node, &source);
+                let at = Vector3::new(source.x, source.y, sensor.source_height());
+                let age = sensor.instants()[1] - sensor.start();
+                let SourceGradient { value: response, gradient: slope } =
+                    sensor.model().source_gradient(&sensor.receptor(&node).unwrap(), &at, age);
                 prop_assert!(!response.is_nan() && slope.iter().all(|x| !x.is_nan()), "{:?} {:?} {:?}: {} {}", sensor, node, source, response, slope);
             }
             let _ = sensor.record(&node, &[x[0], x[1]]);
@@ -63,7 +67,7 @@ proptest! {
             let Ok(mut search) = Search::new(&Vector2::new(50.0, 50.0), x[4], within, rate, x[5]) else { continue };
             search.wire = Wire { numbers: NumberFormat::Single, samples: Some(SampleCode { bits, step: x[6] }), ..Wire::default() };
             search.most_nodes = 3;
-            if let Ok(outcome) = search.run(&super::sensor(1.0, false), &deployment, &graph, 0, |_| vec![x[7], x[8], x[9], 1e-4, 1e-4]) {
+            if let Ok(outcome) = search.run(&super::sensor(1.0, false), &deployment, &graph, 0, |_| Ok(vec![x[7], x[8], x[9], 1e-4, 1e-4])) {
                 prop_assert!(outcome.estimate().is_none_or(|estimate| estimate.is_finite()), "{:?}", outcome.estimate());
                 prop_assert!(outcome.steps.iter().all(|step| step.estimate.is_finite()));
             }

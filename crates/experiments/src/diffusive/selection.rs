@@ -219,16 +219,13 @@ fn rank(p: &Parameters, settings: &Settings, trial: Trial) -> Result<Option<Vec<
             .clumps()
             .iter()
             .map(|c| {
-                sensor
-                    .responses(place, &Vector2::new(c.mean[0], c.mean[1]))
-                    .iter()
-                    .map(|a| a * c.mean[2])
-                    .collect()
+                let responses = sensor.responses(place, &Vector2::new(c.mean[0], c.mean[1]))?;
+                Ok(responses.iter().map(|a| a * c.mean[2]).collect())
             })
-            .collect();
+            .collect::<Result<_, Error>>()?;
         let predictions = Predictions::new(&means, &weights, sensor.noise())?;
         let bounds = predictions.pairwise_bounds();
-        exact.push(reference.information(&sensor, place));
+        exact.push(reference.information(&sensor, place)?);
         scores[0].push(predictions.gaussian_bound());
         scores[1].push(bounds.lower);
         scores[2].push(bounds.upper);
@@ -312,15 +309,16 @@ impl<'a> Reference<'a> {
 
     /// Mutual information of (position, rate) and the samples of a node, nats: the mean of `ln p(y | position, rate) - ln p(y)`, with
     /// `p(y)` the sum over all cells, the rate in each integrated out as a normal of its mean and variance.
-    fn information(&self, sensor: &SourceSensor, place: &Vector2<f64>) -> f64 {
+    fn information(&self, sensor: &SourceSensor, place: &Vector2<f64>) -> Result<f64, Error> {
         let [x, y] = self.posterior.cells.columns();
         let weights = self.posterior.cells.weights();
-        let in_noise = |at: Vector2<f64>| -> Vec<f64> {
-            let responses = sensor.responses(place, &at);
-            responses.iter().map(|a| a / sensor.noise()).collect()
+        let in_noise = |at: Vector2<f64>| -> Result<Vec<f64>, Error> {
+            let responses = sensor.responses(place, &at)?;
+            Ok(responses.iter().map(|a| a / sensor.noise()).collect())
         };
         // What all draws share: responses at every cell, and the moments of its rate.
-        let predicted: Vec<Vec<f64>> = x.iter().zip(y).map(|(x, y)| in_noise(Vector2::new(*x, *y))).collect();
+        let places = x.iter().zip(y).map(|(x, y)| Vector2::new(*x, *y));
+        let predicted: Vec<Vec<f64>> = places.map(in_noise).collect::<Result<_, _>>()?;
         let rate = |i: usize| self.posterior.rates.as_ref().map_or((1.0, 0.0), |(m, v)| (m[i], v[i]));
         let (mut logs, mut terms) = (vec![0.0; weights.len()], vec![0.0; weights.len()]);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -328,7 +326,7 @@ impl<'a> Reference<'a> {
         let log = |rate: f64, response: f64, correlation: f64| rate * (correlation - 0.5 * rate * response);
         let mut total = 0.0;
         for draw in &self.draws {
-            let clean = in_noise(draw.position);
+            let clean = in_noise(draw.position)?;
             let samples: Vec<f64> = clean.iter().zip(&draw.noise).map(|(a, e)| draw.rate * a + e).collect();
             let own = log(draw.rate, dot(&clean, &clean), dot(&clean, &samples));
             for (i, (sum, predicted)) in logs.iter_mut().zip(&predicted).enumerate() {
@@ -342,6 +340,6 @@ impl<'a> Reference<'a> {
             exp_minus(&logs, own, &mut terms);
             total -= dot(weights, &terms).ln();
         }
-        total / self.draws.len() as f64
+        Ok(total / self.draws.len() as f64)
     }
 }

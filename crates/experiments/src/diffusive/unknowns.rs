@@ -112,7 +112,7 @@ impl Figure for Unknowns {
                     let rho = p.radius * rng.random::<f64>().sqrt();
                     let node = source + Vector2::new(angle.cos(), angle.sin()) * rho.max(3.0);
                     let clean: Vec<f64> = sensor
-                        .responses(&node, &source)
+                        .responses(&node, &source)?
                         .iter()
                         .map(|a| a + sensor.bias())
                         .collect();

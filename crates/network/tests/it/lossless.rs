@@ -276,7 +276,7 @@ fn a_source_found_by_a_chain() {
     let samples: Vec<Vec<f64>> = deployed
         .positions()
         .iter()
-        .map(|p| sensor.sample(&mut rng, p, &source, 1.0))
+        .map(|p| sensor.sample(&mut rng, p, &source, 1.0).unwrap())
         .collect();
     let square = SearchBox {
         lower: [-20.0; 2],
@@ -286,7 +286,7 @@ fn a_source_found_by_a_chain() {
     let mut search = Search::new(&alarm, 50.0, square, rate, 1e-5).unwrap();
     search.most_nodes = 4;
     let alone = search
-        .run(&sensor, &deployed, &graph, first, |node| samples[node].clone())
+        .run(&sensor, &deployed, &graph, first, |node| Ok(samples[node].clone()))
         .unwrap();
     assert!(alone.steps.len() > 2 || alone.status == Status::Converged);
     let field = Field::new(&deployed, 15.0).unwrap();

@@ -2,7 +2,8 @@
 
 use super::Lpg;
 use super::basis::hermite_products;
-use crate::density::{Cells, Error};
+use crate::Error;
+use crate::density::Cells;
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
 use fewbits_numerics::error::refuse;

@@ -8,7 +8,7 @@ mod three_dimensions;
 pub use fit::LpgFit;
 pub use three_dimensions::{Slice, SliceMoments};
 
-use super::Error;
+use crate::Error;
 use basis::{gauss_hermite, hermite_products};
 use fewbits_core::columns::state_at;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};

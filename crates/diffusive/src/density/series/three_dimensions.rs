@@ -4,7 +4,8 @@ use super::basis::{LANES, gauss_hermite, row_of_polynomials, sums_of_polynomials
 use super::fit::LpgFit;
 use super::polynomials::HIGHEST_DEGREE;
 use super::{Lpg, Term};
-use crate::density::{Cells, Error};
+use crate::Error;
+use crate::density::Cells;
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
 use fewbits_numerics::error::refuse;
