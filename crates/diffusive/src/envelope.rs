@@ -33,40 +33,31 @@ struct Point {
     rate: Rate,
 }
 
+/// Normal of this mean and deviation, cut to an interval; a known rate is both ends.
 #[derive(Debug, Clone, Copy)]
-enum Rate {
-    Known(f64),
-    /// Normal of this mean and deviation, cut to an interval.
-    Cut {
-        mean: f64,
-        deviation: f64,
-        low: f64,
-        high: f64,
-    },
+struct Rate {
+    mean: f64,
+    deviation: f64,
+    low: f64,
+    high: f64,
 }
 
 impl Rate {
     /// `P(rate > level)`.
     fn exceeds(&self, level: f64) -> f64 {
-        match *self {
-            Self::Known(rate) => f64::from(u8::from(rate > level)),
-            Self::Cut { low, .. } if level <= low => 1.0,
-            Self::Cut { high, .. } if level >= high => 0.0,
-            Self::Cut {
-                mean,
-                deviation,
-                low,
-                high,
-            } => {
-                let z = |x: f64| (x - mean) / deviation;
-                let (above, below) = (interval(z(level), z(high)), interval(z(low), z(level)));
-                let total = above + below;
-                if total > 0.0 {
-                    above / total
-                } else {
-                    f64::from(u8::from(mean > level))
-                }
-            }
+        if level >= self.high {
+            return 0.0;
+        }
+        if level <= self.low {
+            return 1.0;
+        }
+        let z = |x: f64| (x - self.mean) / self.deviation;
+        let (above, below) = (interval(z(level), z(self.high)), interval(z(self.low), z(level)));
+        let total = above + below;
+        if total > 0.0 {
+            above / total
+        } else {
+            f64::from(u8::from(self.mean > level))
         }
     }
 }
@@ -98,12 +89,17 @@ impl Envelope {
         for i in order {
             let position = Vector2::new(x[i], y[i]);
             let rate = match likelihood.rate() {
-                RateModel::Known(rate) => Rate::Known(*rate),
+                RateModel::Known(rate) => Rate {
+                    mean: *rate,
+                    deviation: 0.0,
+                    low: *rate,
+                    high: *rate,
+                },
                 RateModel::Joint(range) => {
                     let sums = likelihood.sums(&position);
                     // No response at all leaves the uniform prior: a normal far wider than the range.
                     let a = sums.response.max(1e-12 / (range.high() * range.high()));
-                    Rate::Cut {
+                    Rate {
                         mean: if sums.response > 0.0 {
                             sums.correlation / a
                         } else {
@@ -208,10 +204,7 @@ impl Envelope {
     /// No concentration exceeds the threshold farther from the source: in the steady state over impermeable ground it is
     /// `mu / (2 pi kappa R)`.
     fn widest(&self, medium: &Homogeneous, threshold: f64) -> f64 {
-        let largest = self.points.iter().map(|p| match p.rate {
-            Rate::Known(rate) => rate,
-            Rate::Cut { high, .. } => high,
-        });
+        let largest = self.points.iter().map(|p| p.rate.high);
         largest.fold(0.0, f64::max) / (std::f64::consts::TAU * medium.diffusivity * threshold)
     }
 }

@@ -88,7 +88,7 @@ pub use likelihood::{RateLikelihood, SourceLikelihood};
 pub use model_grid::{ModelGrid, ModelPosterior};
 pub use posterior::Posterior;
 pub use project::{Form, Travelling, project};
-pub use rate::{RateModel, RateRange, RateSums, log_sample_marginal};
+pub use rate::{RateModel, RateRange, RateSums};
 pub use record::Record;
 pub use select::{Rule, Selector};
 pub use sensor::SourceSensor;

@@ -4,6 +4,7 @@ use crate::rate::{Intervals, RateModel, RateSums};
 use crate::{Error, Record};
 use fewbits_core::{Columns, Likelihood};
 use fewbits_numerics::error::refuse;
+use fewbits_numerics::normal::log_interval;
 use nalgebra::{SVector, Vector2};
 
 /// `ln p(samples of all nodes | position)` under a model of the release rate.
@@ -58,27 +59,44 @@ impl SourceLikelihood {
             .any(|record| record.sensor().homogeneous().is_none())
     }
 
+    /// Calls `visit` with the sums of samples that share one rate, first with the information that a cell of the given half width
+    /// leaves, then in full: once for all samples, for each node, or for each sample.
+    ///
+    /// The normalisation of the noise is not discounted: it would favour cells where the response is steep.
+    #[inline]
+    fn each_group(
+        &self,
+        position: &Vector2<f64>,
+        half_width: Option<f64>,
+        mut visit: impl FnMut(&RateSums, &RateSums),
+    ) {
+        let (mut blurred, mut all) = (RateSums::default(), RateSums::default());
+        for record in &self.records {
+            let (sums, share) = match half_width {
+                Some(half_width) => record.blurred_sums(position, half_width, self.rate.largest()),
+                None => (record.sums(position), 1.0),
+            };
+            match self.rate {
+                RateModel::Known(_) | RateModel::Joint(_) => {
+                    (blurred, all) = (blurred.plus(&sums.discounted(share)), all.plus(&sums));
+                }
+                RateModel::NodeWise(_) => visit(&sums.discounted(share), &sums),
+                RateModel::SampleWise(_) => {
+                    record.each_sample(position, |sums| visit(&sums.discounted(share), &sums));
+                }
+            }
+        }
+        if matches!(self.rate, RateModel::Known(_) | RateModel::Joint(_)) {
+            visit(&blurred, &all);
+        }
+    }
+
     /// Expected sum over all samples of the squared residual over the noise variance, with the source at `position`, over the rate
     /// given the position and these records.
     pub fn chi_squared(&self, position: &Vector2<f64>) -> f64 {
-        let sums = || self.records.iter().map(|record| record.sums(position));
-        match &self.rate {
-            RateModel::Known(rate) => sums().map(|sums| sums.chi_squared((*rate, 0.0))).sum(),
-            RateModel::Joint(range) => {
-                let sums = self.sums(position);
-                sums.chi_squared(sums.rate_given_position(range))
-            }
-            RateModel::NodeWise(range) => sums()
-                .map(|sums| sums.chi_squared(sums.rate_given_position(range)))
-                .sum(),
-            RateModel::SampleWise(range) => {
-                let each = self
-                    .records
-                    .iter()
-                    .map(|record| record.chi_squared_sample_wise(position, range));
-                each.sum()
-            }
-        }
+        let mut total = 0.0;
+        self.each_group(position, None, |_, sums| total += sums.chi_squared(self.rate.given_position(sums)));
+        total
     }
 
     /// Number of samples of all records.
@@ -98,72 +116,36 @@ impl SourceLikelihood {
         [logs, blurred]: [&mut [f64]; 2],
     ) {
         let at = |i: usize| Vector2::new(centres[0][i], centres[1][i]);
-        let mut intervals = [Intervals::default(), Intervals::default()];
-        let largest = self.rate.largest();
+        let (mut intervals, mut groups) = (Intervals::default(), Vec::with_capacity(logs.len()));
         logs.fill(0.0);
         blurred.fill(0.0);
-        if let RateModel::Joint(range) = &self.rate {
-            let mut all = vec![RateSums::default(); logs.len()];
-            for i in 0..logs.len() {
-                let mut less = RateSums::default();
-                for record in &self.records {
-                    let (sums, share) = record.blurred_sums(&at(i), half_width, largest);
-                    // The normalisation of the noise is not discounted: it would favour cells where the response is steep.
-                    less = less.plus(&sums.discounted(share));
-                    all[i] = all[i].plus(&sums);
-                }
-                let (log, cut) = less.log_uncut(range);
-                blurred[i] = log;
-                intervals[0].push(i, cut);
-            }
-            intervals[0].add_to(blurred);
-            let best = blurred
-                .iter()
-                .zip(priors)
-                .fold(f64::NEG_INFINITY, |best, (b, p)| best.max(b + p));
-            let floor = floor.max(best - dropped);
-            for (i, (log, sums)) in logs.iter_mut().zip(&all).enumerate() {
-                if blurred[i] + priors[i] < floor {
-                    *log = blurred[i];
-                    continue;
-                }
-                let (own, cut) = sums.log_uncut(range);
-                *log = own;
-                intervals[1].push(i, cut);
-            }
-            intervals[1].add_to(logs);
-            return;
+        for i in 0..logs.len() {
+            self.each_group(&at(i), Some(half_width), |less, sums| {
+                let (log, cut) = self.rate.log_uncut(less);
+                blurred[i] += log;
+                intervals.push(i, cut);
+                groups.push(*sums);
+            });
         }
-        for record in &self.records {
-            let [plain_cuts, blurred_cuts] = &mut intervals;
-            for i in 0..logs.len() {
-                let position = at(i);
-                let (sums, share) = record.blurred_sums(&position, half_width, largest);
-                let less = sums.discounted(share);
-                match &self.rate {
-                    RateModel::Known(rate) => {
-                        logs[i] += sums.log_given_rate(*rate);
-                        blurred[i] += less.log_given_rate(*rate);
-                    }
-                    RateModel::Joint(range) | RateModel::NodeWise(range) => {
-                        for (sums, numbers, cuts) in [
-                            (sums, &mut *logs, &mut *plain_cuts),
-                            (less, &mut *blurred, &mut *blurred_cuts),
-                        ] {
-                            let (log, cut) = sums.log_uncut(range);
-                            numbers[i] += log;
-                            cuts.push(i, cut);
-                        }
-                    }
-                    RateModel::SampleWise(range) => {
-                        let targets = [(&mut logs[i], &mut *plain_cuts), (&mut blurred[i], &mut *blurred_cuts)];
-                        record.add_sample_wise(&position, range, share, i, targets);
-                    }
-                }
+        intervals.add_to(blurred);
+        let best = blurred
+            .iter()
+            .zip(priors)
+            .fold(f64::NEG_INFINITY, |best, (b, p)| best.max(b + p));
+        let floor = floor.max(best - dropped);
+        let each = groups.len().div_ceil(logs.len().max(1));
+        for (i, groups) in groups.chunks(each.max(1)).enumerate() {
+            if blurred[i] + priors[i] < floor {
+                logs[i] = blurred[i];
+                continue;
             }
-            plain_cuts.add_to(logs);
-            blurred_cuts.add_to(blurred);
+            for sums in groups {
+                let (log, cut) = self.rate.log_uncut(sums);
+                logs[i] += log;
+                intervals.push(i, cut);
+            }
         }
+        intervals.add_to(logs);
     }
 }
 
@@ -172,12 +154,12 @@ impl Likelihood<2> for SourceLikelihood {
         if !self.admits(position, 0.0) {
             return f64::NEG_INFINITY;
         }
-        match &self.rate {
-            RateModel::Known(rate) => self.sums(position).log_given_rate(*rate),
-            RateModel::Joint(range) => self.sums(position).log_marginal(range),
-            RateModel::NodeWise(range) => self.records.iter().map(|r| r.sums(position).log_marginal(range)).sum(),
-            RateModel::SampleWise(range) => self.records.iter().map(|r| r.log_sample_wise(position, range)).sum(),
-        }
+        let mut total = 0.0;
+        self.each_group(position, None, |_, sums| {
+            let (log, cut) = self.rate.log_uncut(sums);
+            total += log + cut.map_or(0.0, |(from, to)| log_interval(from, to));
+        });
+        total
     }
 }
 

@@ -1,6 +1,6 @@
 //! Messages between nodes: raw records or a belief, as bits.
 
-use crate::belief::{JointBelief, PositionBelief};
+use crate::belief::SentBelief;
 use crate::density::Lpg;
 use crate::fit::Fit;
 use crate::project::{Travelling, lpg_scalars};
@@ -8,7 +8,7 @@ use crate::{Error, Record};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{non_negative, within};
+use fewbits_numerics::error::{entries, non_negative, within};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -85,12 +85,7 @@ impl Wire {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Packet {
     /// Indices and samples of all nodes so far.
-    Raw {
-        /// One entry a node: index and samples.
-        records: Vec<(usize, Vec<f64>)>,
-        /// Standard deviation of the noise, known everywhere.
-        noise: f64,
-    },
+    Raw(Vec<(usize, Vec<f64>)>),
     /// A belief of numbers in the order: weights (all but the last), means, lower Cholesky factors, coefficients.
     Belief {
         /// Number of components.
@@ -118,14 +113,8 @@ const SAMPLE_COUNT_BITS: u32 = 16;
 impl Packet {
     /// The message of raw records: the nodes' indices and samples.
     pub fn raw(records: &[Record], nodes: &[usize]) -> Self {
-        Self::Raw {
-            records: nodes
-                .iter()
-                .zip(records)
-                .map(|(node, r)| (*node, r.samples().to_vec()))
-                .collect(),
-            noise: records.first().map_or(1.0, |r| r.sensor().noise()),
-        }
+        let samples = records.iter().map(|r| r.samples().to_vec());
+        Self::Raw(nodes.iter().copied().zip(samples).collect())
     }
 
     /// The message that carries a belief and how the samples fitted so far.
@@ -137,10 +126,8 @@ impl Packet {
             numbers.into_iter().map(|x| wire.numbers.rounded(x)).collect()
         };
         let (components, degree, numbers) = match belief {
-            Travelling::Position(PositionBelief::Mixture(mixture)) => numbers_of(mixture.components()),
-            Travelling::Position(PositionBelief::Lpg(lpg)) => numbers_of_lpg(lpg),
-            Travelling::WithRate(JointBelief::Mixture(mixture)) => numbers_of(mixture.components()),
-            Travelling::WithRate(JointBelief::Lpg(lpg)) => numbers_of_lpg(lpg),
+            Travelling::Position(belief) => numbers_of(belief),
+            Travelling::WithRate(belief) => numbers_of(belief),
         };
         Ok(Self::Belief {
             components,
@@ -169,45 +156,16 @@ impl Packet {
         else {
             return Ok(None);
         };
-        let belief = match (*with_rate, *degree) {
-            (false, None) => Travelling::Position(PositionBelief::Mixture(mixture_of(*components, numbers)?)),
-            (false, Some(degree)) => Travelling::Position(PositionBelief::Lpg(lpg_of(*components, degree, numbers)?)),
-            (true, None) => Travelling::WithRate(JointBelief::Mixture(mixture_of(*components, numbers)?)),
-            (true, Some(degree)) => Travelling::WithRate(JointBelief::Lpg(lpg_of(*components, degree, numbers)?)),
+        let belief = if *with_rate {
+            Travelling::WithRate(belief_of(*components, *degree, numbers)?)
+        } else {
+            Travelling::Position(belief_of(*components, *degree, numbers)?)
         };
         let fit = Fit {
             chi_squared: non_negative("chi_squared", *chi_squared)?,
             samples: *samples,
         };
         Ok(Some((belief, fit)))
-    }
-
-    /// Length of the message in bits.
-    ///
-    /// # Errors
-    /// If it cannot be encoded.
-    pub fn bits(&self, wire: &Wire) -> Result<usize, Error> {
-        Ok(self
-            .to_bits(&Contract {
-                wire: *wire,
-                noise: self.noise(),
-                samples: self.samples(),
-            })?
-            .bits())
-    }
-
-    fn noise(&self) -> f64 {
-        match self {
-            Self::Raw { noise, .. } => *noise,
-            Self::Belief { .. } => 1.0,
-        }
-    }
-
-    fn samples(&self) -> usize {
-        match self {
-            Self::Raw { records, .. } => records.first().map_or(0, |r| r.1.len()),
-            Self::Belief { .. } => 0,
-        }
     }
 }
 
@@ -229,7 +187,7 @@ impl Message for Packet {
     /// (5 bits each, 31 for none), one bit for the rate, the numbers, and the fit so far (32 bits for the sum, 16 for the samples).
     fn encode(&self, format: &Contract, writer: &mut BitWriter) -> Result<(), CodecError> {
         match self {
-            Self::Raw { records, .. } => {
+            Self::Raw(records) => {
                 writer.write_bit(false);
                 writer.write(records.len() as u64, RECORD_COUNT_BITS)?;
                 let code = format.wire.sample_format(format.noise).map_err(invalid)?;
@@ -274,10 +232,7 @@ impl Message for Packet {
                     .collect::<Result<_, _>>()?;
                 records.push((node, samples));
             }
-            return Ok(Self::Raw {
-                records,
-                noise: format.noise,
-            });
+            return Ok(Self::Raw(records));
         }
         let components = reader.read(COUNT_BITS)? as usize;
         let degree = Some(reader.read(COUNT_BITS)? as usize).filter(|d| *d != 31);
@@ -309,67 +264,68 @@ fn invalid(error: Error) -> CodecError {
     }
 }
 
-fn numbers_of<const D: usize>(components: &[Component<D>]) -> (usize, Option<usize>, Vec<f64>) {
-    let mut numbers: Vec<f64> = components.iter().skip(1).map(Component::weight).collect();
-    components.iter().for_each(|c| push_gaussian(c, &mut numbers));
-    (components.len(), None, numbers)
+/// The numbers of one Gaussian of `D` coordinates: its mean and the lower triangle of its Cholesky factor.
+const fn gaussian_scalars(dimension: usize) -> usize {
+    dimension + dimension * (dimension + 1) / 2
 }
 
-fn numbers_of_lpg<const D: usize>(lpg: &Lpg<D>) -> (usize, Option<usize>, Vec<f64>) {
+/// Number of components, degree and numbers of a belief.
+fn numbers_of<const D: usize>(belief: &SentBelief<D>) -> (usize, Option<usize>, Vec<f64>) {
     let mut numbers = Vec::new();
-    lpg.gaussians().for_each(|c| push_gaussian(c, &mut numbers));
-    lpg.coefficients().for_each(|list| numbers.extend_from_slice(list));
-    (lpg.gaussians().count(), Some(lpg.degree()), numbers)
+    match belief {
+        SentBelief::Mixture(mixture) => {
+            numbers.extend(mixture.components().iter().skip(1).map(Component::weight));
+            mixture.components().iter().for_each(|c| push_gaussian(c, &mut numbers));
+            (mixture.len(), None, numbers)
+        }
+        SentBelief::Lpg(lpg) => {
+            lpg.gaussians().for_each(|c| push_gaussian(c, &mut numbers));
+            lpg.coefficients().for_each(|list| numbers.extend_from_slice(list));
+            (lpg.gaussians().count(), Some(lpg.degree()), numbers)
+        }
+    }
 }
 
-fn lpg_of<const D: usize>(count: usize, degree: usize, numbers: &[f64]) -> Result<Lpg<D>, Error> {
-    let (gaussian, all) = (D + D * (D + 1) / 2, lpg_scalars(degree, D == 3));
-    let gaussians: Vec<_> = numbers
-        .chunks(gaussian)
-        .take(count)
-        .map(|chunk| read_gaussian::<D>(1.0, chunk))
+fn belief_of<const D: usize>(
+    count: usize,
+    degree: Option<usize>,
+    numbers: &[f64],
+) -> Result<SentBelief<D>, Error> {
+    // A mixture sends all weights but the first; a series has none.
+    let weights = degree.map_or(count.saturating_sub(1), |_| 0).min(numbers.len());
+    let (weights, rest) = numbers.split_at(weights);
+    let size = gaussian_scalars(D);
+    let (gaussians, coefficients) = rest.split_at(size.saturating_mul(count).min(rest.len()));
+    let first = (1.0 - weights.iter().sum::<f64>()).max(0.0);
+    let weights = std::iter::once(first).chain(weights.iter().copied()).chain(std::iter::repeat(1.0));
+    let gaussians = gaussians.chunks(size).zip(weights);
+    let gaussians: Vec<Component<D>> = gaussians
+        .map(|(chunk, weight)| read_gaussian(weight, chunk))
         .collect::<Result<_, _>>()?;
-    let coefficients = numbers
-        .get(gaussian * count..)
-        .unwrap_or_default()
-        .chunks(all - gaussian);
-    let lists: Vec<Vec<f64>> = coefficients.map(<[f64]>::to_vec).collect();
-    Ok(Lpg::new(&gaussians, degree, &lists)?)
+    Ok(match degree {
+        None => SentBelief::Mixture(Mixture::new(gaussians)?),
+        Some(degree) => {
+            let lists = coefficients.chunks(lpg_scalars(degree, D == 3) - size).map(<[f64]>::to_vec);
+            SentBelief::Lpg(Lpg::new(&gaussians, degree, &lists.collect::<Vec<_>>())?)
+        }
+    })
 }
 
 fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {
     numbers.extend(c.mean().iter());
-    let lower = c.cholesky_factor();
     for i in 0..D {
-        numbers.extend((0..=i).map(|j| lower[(i, j)]));
+        numbers.extend((0..=i).map(|j| c.factor().lower[(i, j)]));
     }
 }
 
 fn read_gaussian<const D: usize>(weight: f64, numbers: &[f64]) -> Result<Component<D>, Error> {
-    let missing = || ArgumentError::new("numbers", numbers.len(), "more numbers");
-    let mut rest = numbers.iter().copied();
-    let mut next = || rest.next().ok_or_else(missing);
-    let mut mean = SVector::<f64, D>::zeros();
-    for m in mean.iter_mut() {
-        *m = next()?;
-    }
+    entries("numbers", numbers.len(), gaussian_scalars(D))?;
+    let (mean, mut rest) = numbers.split_at(D);
     let mut lower = SMatrix::<f64, D, D>::zeros();
     for i in 0..D {
-        for j in 0..=i {
-            lower[(i, j)] = next()?;
-        }
+        let (row, others) = rest.split_at(i + 1);
+        (0..=i).for_each(|j| lower[(i, j)] = row[j]);
+        rest = others;
     }
-    Ok(Component::new(weight, mean, lower * lower.transpose())?)
-}
-
-fn mixture_of<const D: usize>(count: usize, numbers: &[f64]) -> Result<Mixture<D>, Error> {
-    let size = D + D * (D + 1) / 2;
-    let (weights, gaussians) = numbers.split_at(count.saturating_sub(1).min(numbers.len()));
-    let first = 1.0 - weights.iter().sum::<f64>();
-    let all = std::iter::once(first.max(0.0)).chain(weights.iter().copied());
-    let parts = all
-        .take(count)
-        .zip(gaussians.chunks(size))
-        .map(|(w, chunk)| read_gaussian::<D>(w, chunk));
-    Ok(Mixture::new(parts.collect::<Result<_, _>>()?)?)
+    Ok(Component::new(weight, SVector::from_column_slice(mean), lower * lower.transpose())?)
 }

@@ -85,19 +85,42 @@ impl RateModel {
         }
     }
 
+    /// The rates that are possible; both ends are the known one.
+    fn range(&self) -> RateRange {
+        match self {
+            Self::Known(rate) => RateRange {
+                low: *rate,
+                high: *rate,
+            },
+            Self::Joint(range) | Self::NodeWise(range) | Self::SampleWise(range) => *range,
+        }
+    }
+
     /// The largest rate that is possible, kg/s.
     pub(crate) fn largest(&self) -> f64 {
-        match self {
-            Self::Known(rate) => *rate,
-            Self::Joint(range) | Self::NodeWise(range) | Self::SampleWise(range) => range.high,
-        }
+        self.range().high
     }
 
     /// A rate to start from.
     pub(crate) fn typical(&self) -> f64 {
+        self.range().middle()
+    }
+
+    /// `ln p(samples | position)` of samples that share one rate, less the logarithm of the standard normal's share between the two
+    /// numbers, if they cut anything off.
+    #[inline]
+    pub(crate) fn log_uncut(&self, sums: &RateSums) -> (f64, Option<(f64, f64)>) {
         match self {
-            Self::Known(rate) => *rate,
-            Self::Joint(range) | Self::NodeWise(range) | Self::SampleWise(range) => range.middle(),
+            Self::Known(rate) => (sums.log_given_rate(*rate), None),
+            Self::Joint(range) | Self::NodeWise(range) | Self::SampleWise(range) => sums.log_uncut(range),
+        }
+    }
+
+    /// Mean and variance of the rate that samples share, given the position.
+    pub(crate) fn given_position(&self, sums: &RateSums) -> (f64, f64) {
+        match self {
+            Self::Known(rate) => (*rate, 0.0),
+            Self::Joint(range) | Self::NodeWise(range) | Self::SampleWise(range) => sums.rate_given_position(range),
         }
     }
 }
@@ -178,7 +201,8 @@ impl RateSums {
     }
 
     /// `ln p(samples | position)` with one rate, uniform over the range, integrated out:
-    /// `-(C - B^2/A)/2 + ln sqrt(2 pi / A) - ln(high - low) + ln[Phi((high - B/A) sqrt A) - Phi((low - B/A) sqrt A)]`.
+    /// `-(C - B^2/A)/2 + ln sqrt(2 pi / A) - ln(high - low) + ln[Phi((high - B/A) sqrt A) - Phi((low - B/A) sqrt A)]`. Of a single
+    /// sample it is equation (13) of the paper with its distribution functions in the right order.
     #[inline]
     pub fn log_marginal(&self, range: &RateRange) -> f64 {
         let (log, cut) = self.log_uncut(range);
@@ -188,7 +212,7 @@ impl RateSums {
     /// [`log_marginal`](Self::log_marginal) less the logarithm of the standard normal's share between the two numbers, if they
     /// cut anything off.
     #[inline]
-    pub(crate) fn log_uncut(&self, range: &RateRange) -> (f64, Option<(f64, f64)>) {
+    fn log_uncut(&self, range: &RateRange) -> (f64, Option<(f64, f64)>) {
         let (a, b) = (self.response, self.correlation);
         if a * range.high * range.high < SILENT {
             return (self.log_given_rate(range.middle()), None);
@@ -275,26 +299,4 @@ impl Intervals {
         self.from.clear();
         self.to.clear();
     }
-}
-
-/// `ln p(y | position)` of a single sample with its own rate: equation (13), its distribution functions in the right order.
-pub fn log_sample_marginal(sample: f64, response: f64, noise: f64, range: &RateRange) -> f64 {
-    let (log, cut) = log_sample_uncut(sample, response, noise, range);
-    log + cut.map_or(0.0, |(from, to)| log_interval(from, to))
-}
-
-/// [`log_sample_marginal`] less the logarithm of the standard normal's share between the two numbers.
-#[inline]
-pub(crate) fn log_sample_uncut(sample: f64, response: f64, noise: f64, range: &RateRange) -> (f64, Option<(f64, f64)>) {
-    let width = range.high - range.low;
-    let reach = response * width / noise;
-    // Differences before quotients: the quotients may be infinite.
-    let residual = |rate: f64| (sample - rate * response) / noise;
-    if reach < 1e-10 {
-        // A response far below the noise: the sample is noise about the mean response.
-        let d = residual(range.middle());
-        return (-0.5 * d * d - LN_SQRT_2PI - noise.ln(), None);
-    }
-    let ends = (residual(range.high), residual(range.low));
-    (-(response * width).ln(), Some(ends))
 }

@@ -1,6 +1,6 @@
 //! The samples of one node, with tabulated responses for quick likelihoods.
 
-use crate::rate::{Intervals, RateRange, RateSums, log_sample_marginal, log_sample_uncut};
+use crate::rate::RateSums;
 use crate::{Error, SourceSensor};
 use fewbits_models::diffusion::Profile;
 use fewbits_models::{Homogeneous, Receptor};
@@ -261,49 +261,16 @@ impl Record {
         (self.with_constants(response, correlation), (1.0 + change * change).recip())
     }
 
-    /// The log likelihood with a new rate for every sample.
-    pub(crate) fn log_sample_wise(&self, position: &Vector2<f64>, range: &RateRange) -> f64 {
-        let mut log = 0.0;
-        self.each_response(&(position - self.origin), |y, response| {
-            log += log_sample_marginal(y, response, self.noise, range)
-        });
-        log
-    }
-
-    /// Expected squares of the residuals over the noise variance, summed, with a new rate for every sample.
-    pub(crate) fn chi_squared_sample_wise(&self, position: &Vector2<f64>, range: &RateRange) -> f64 {
-        let mut total = 0.0;
+    /// Calls `visit` with the sums of every single sample, for a source at `position`.
+    pub(crate) fn each_sample(&self, position: &Vector2<f64>, mut visit: impl FnMut(RateSums)) {
         self.each_response(&(position - self.origin), |y, response| {
             let (y, a) = (y / self.noise, response / self.noise);
-            let sums = RateSums {
+            visit(RateSums {
                 response: a * a,
                 correlation: a * y,
                 energy: y * y,
-                log_noise: 0.0,
-            };
-            total += sums.chi_squared(sums.rate_given_position(range));
-        });
-        total
-    }
-
-    /// Adds the same to the numbers at `place` of two lists, to the second with the noise variance raised by `1 / share` but not
-    /// its normalisation; the intervals are noted for later.
-    pub(crate) fn add_sample_wise(
-        &self,
-        position: &Vector2<f64>,
-        range: &RateRange,
-        share: f64,
-        place: usize,
-        [plain, blurred]: [(&mut f64, &mut Intervals); 2],
-    ) {
-        let wider = self.noise / share.sqrt();
-        self.each_response(&(position - self.origin), |y, response| {
-            let (log, cut) = log_sample_uncut(y, response, self.noise, range);
-            *plain.0 += log;
-            plain.1.push(place, cut);
-            let (log, cut) = log_sample_uncut(y, response, wider, range);
-            *blurred.0 += log - 0.5 * share.ln();
-            blurred.1.push(place, cut);
+                log_noise: self.noise.ln() + LN_SQRT_2PI,
+            });
         });
     }
 }

@@ -176,17 +176,8 @@ impl Selector {
         }
         let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = logs.iter().map(|log| (log - best).exp()).collect();
-        let total: f64 = weights.iter().sum();
-        let position = |clump: &Clump<3>| place(clump) - self.estimate.mean();
-        let parts = || self.clumps.clumps().iter().zip(&weights);
-        let mean: Vector2<f64> = parts().map(|(c, w)| position(c) * (*w / total)).sum();
-        let covariance: Matrix2<f64> = parts()
-            .map(|(c, w)| {
-                let d = position(c) - mean;
-                (d * d.transpose() + c.covariance.fixed_view::<2, 2>(0, 0)) * (*w / total)
-            })
-            .sum();
-        covariance.determinant().max(f64::MIN_POSITIVE)
+        let covariance = self.clumps.reweighted(&weights).covariance();
+        covariance.fixed_view::<2, 2>(0, 0).determinant().max(f64::MIN_POSITIVE)
     }
 }
 

@@ -89,7 +89,7 @@ impl Leader for SourceChain {
         let mut known = match message {
             None => Vec::new(),
             Some(bits) => match Packet::from_bits(&contract, bits)? {
-                Packet::Raw { records, .. } => records,
+                Packet::Raw(records) => records,
                 Packet::Belief { .. } => return Err("the handover is a belief: expected raw records".into()),
             },
         };
@@ -98,12 +98,8 @@ impl Leader for SourceChain {
         known.push((node as usize, own.clone()));
         let (outcome, next) = self.repeat(&known)?;
         let estimate = outcome.estimate().ok_or("the step gave no estimate")?;
-        let packet = Packet::Raw {
-            records: known,
-            noise: contract.noise,
-        };
         Ok(Lead {
-            message: packet.to_bits(&contract)?,
+            message: Packet::Raw(known).to_bits(&contract)?,
             next: next.map(u32::try_from).transpose()?,
             estimate: estimate.mean().as_slice().to_vec(),
         })

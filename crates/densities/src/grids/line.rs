@@ -38,9 +38,9 @@ pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Resul
     Ok(())
 }
 
-/// Multiplies the values of a density with the exponentials of `logs` and scales them to sum to one; returns the logarithm
-/// of the sum before. On failure nothing is changed.
-pub(crate) fn absorb(density: &mut [f64], logs: &[f64]) -> Result<f64, Error> {
+/// Multiplies the values of a density at nodes of the given volume with the exponentials of `logs` and scales them to integrate to
+/// one; returns the logarithm of the integral before. On failure nothing is changed.
+pub(crate) fn absorb(density: &mut [f64], logs: &[f64], volume: f64) -> Result<f64, Error> {
     let reachable = logs.iter().zip(&*density).filter(|(_, p)| **p > 0.0);
     let peak = reachable.map(|(l, _)| *l).fold(f64::NEG_INFINITY, f64::max);
     // Where the density is zero the likelihood may be anything.
@@ -55,9 +55,19 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64]) -> Result<f64, Error> {
         return Err(fewbits_core::Error::Impossible.into());
     }
     for (p, l) in density.iter_mut().zip(logs) {
-        *p = product((l, p)) / sum;
+        *p = product((l, p)) / sum / volume;
     }
-    Ok(sum.ln() + peak)
+    Ok(sum.ln() + peak + volume.ln())
+}
+
+/// Scales a density at nodes of the given volume to integrate to one.
+pub(crate) fn normalise(density: &mut [f64], volume: f64) -> Result<(), Error> {
+    let total = density.iter().sum::<f64>() * volume;
+    if !(total > 0.0 && total.is_finite()) {
+        return Err(fewbits_core::Error::Impossible.into());
+    }
+    density.iter_mut().for_each(|p| *p /= total);
+    Ok(())
 }
 
 impl PointMass {
@@ -119,7 +129,7 @@ impl PointMass {
         let nodes: Vec<f64> = self.grid.nodes().collect();
         let mut logs = vec![0.0; nodes.len()];
         observed.add_log_likelihoods([&nodes], &mut logs);
-        self.absorb(&logs)
+        absorb(&mut self.density, &logs, self.grid.spacing())
     }
 
     /// The same with the log likelihood as a function of the state.
@@ -128,13 +138,7 @@ impl PointMass {
     /// As [`PointMass::update`].
     pub fn update_with(&mut self, log_likelihood: impl Fn(f64) -> f64) -> Result<f64, Error> {
         let logs: Vec<f64> = self.grid.nodes().map(log_likelihood).collect();
-        self.absorb(&logs)
-    }
-
-    fn absorb(&mut self, logs: &[f64]) -> Result<f64, Error> {
-        let log_evidence = absorb(&mut self.density, logs)? + self.grid.spacing().ln();
-        self.density.iter_mut().for_each(|p| *p /= self.grid.spacing());
-        Ok(log_evidence)
+        absorb(&mut self.density, &logs, self.grid.spacing())
     }
 
     /// The same with the likelihood tabulated at the nodes, up to a factor, and without allocation; returns the evidence in
@@ -164,22 +168,10 @@ impl PointMass {
     /// [`fewbits_core::Error::Impossible`] if nothing is left; the density is then uniform.
     pub fn refill(&mut self, fill: impl FnOnce(&mut [f64])) -> Result<(), Error> {
         fill(&mut self.density);
-        self.normalise().inspect_err(|_| {
+        normalise(&mut self.density, self.grid.spacing()).inspect_err(|_| {
             let uniform = 1.0 / (self.grid.points() as f64 * self.grid.spacing());
             self.density.fill(uniform);
         })
-    }
-
-    /// Scales the density to integrate to one.
-    fn normalise(&mut self) -> Result<(), Error> {
-        let total = self.density.iter().sum::<f64>() * self.grid.spacing();
-        if !(total > 0.0 && total.is_finite()) {
-            return Err(fewbits_core::Error::Impossible.into());
-        }
-        for p in &mut self.density {
-            *p /= total;
-        }
-        Ok(())
     }
 }
 

@@ -1,7 +1,7 @@
 //! A density over the plane.
 
 use super::axis::WIDEST;
-use super::line::{TRIANGULAR_VARIANCE, absorb, check_density, triangular};
+use super::line::{TRIANGULAR_VARIANCE, absorb, check_density, normalise, triangular};
 use crate::Error;
 use crate::particles::weights::Categorical;
 use fewbits_core::columns::{count, set_state};
@@ -95,8 +95,8 @@ impl PlaneMass {
         let mut mass = Self::empty(basis, first, size)?;
         let mut density = std::mem::take(&mut mass.density);
         fill(&mass, &mut density);
+        normalise(&mut density, mass.area())?;
         mass.density = density;
-        mass.normalise()?;
         Ok(mass)
     }
 
@@ -158,7 +158,8 @@ impl PlaneMass {
         let columns: [Vec<f64>; 2] = std::array::from_fn(|d| states.iter().map(|x| x[d]).collect());
         let mut logs = vec![0.0; states.len()];
         observed.add_log_likelihoods(columns.each_ref().map(Vec::as_slice), &mut logs);
-        self.absorb(&logs)
+        let area = self.area();
+        absorb(&mut self.density, &logs, area)
     }
 
     /// The same with the log likelihood as a function of the state.
@@ -167,23 +168,8 @@ impl PlaneMass {
     /// As [`PlaneMass::update`].
     pub fn update_with(&mut self, log_likelihood: impl Fn(&Vector2<f64>) -> f64) -> Result<f64, Error> {
         let logs: Vec<f64> = self.nodes().map(|n| log_likelihood(&(self.basis * n))).collect();
-        self.absorb(&logs)
-    }
-
-    fn absorb(&mut self, logs: &[f64]) -> Result<f64, Error> {
         let area = self.area();
-        let log_evidence = absorb(&mut self.density, logs)? + area.ln();
-        self.density.iter_mut().for_each(|p| *p /= area);
-        Ok(log_evidence)
-    }
-
-    fn normalise(&mut self) -> Result<(), Error> {
-        let total = self.density.iter().sum::<f64>() * self.area();
-        if !(total > 0.0 && total.is_finite()) {
-            return Err(fewbits_core::Error::Impossible.into());
-        }
-        self.density.iter_mut().for_each(|p| *p /= total);
-        Ok(())
+        absorb(&mut self.density, &logs, area)
     }
 
     /// Mean and covariance in state units.

@@ -11,7 +11,7 @@ use crate::mixture::{Component, Mixture};
 use crate::particles::Particles;
 use crate::particles::weights::systematic;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
-use fewbits_numerics::error::{at_least_one, refuse};
+use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::normal::LN_SQRT_2PI;
@@ -256,11 +256,6 @@ impl<const D: usize> Density<D> for KernelEstimate<D> {
 
 stored! { [const D: usize] KernelEstimate as Stored |estimate| {
     #[serde(with = "fewbits_numerics::stored")]
-    kernel: Vec<Vec<f64>> = (0..D).map(|i| estimate.kernel.row(i).iter().copied().collect()).collect(),
+    kernel: [[f64; D]; D] = estimate.kernel.into(),
     particles: Particles<D> = estimate.particles,
-} => {
-    if kernel.len() != D || kernel.iter().any(|row| row.len() != D) {
-        return refuse("kernel", "of another shape", format!("{D} by {D} numbers"));
-    }
-    KernelEstimate::new(particles, SMatrix::from_fn(|i, j| kernel[i][j]))
-}, Error }
+} => KernelEstimate::new(particles, kernel.into()), Error }

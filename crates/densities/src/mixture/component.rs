@@ -53,16 +53,6 @@ impl<const D: usize> Component<D> {
         &self.covariance
     }
 
-    /// Lower Cholesky factor of the covariance.
-    pub fn cholesky_factor(&self) -> &SMatrix<f64, D, D> {
-        &self.factor.lower
-    }
-
-    /// `ln det covariance`.
-    pub fn log_determinant(&self) -> f64 {
-        2.0 * self.factor.half_log_det
-    }
-
     /// The component as a Gaussian belief, without its weight.
     pub fn gaussian(&self) -> Gaussian<D> {
         Gaussian::from_trusted_parts(self.mean, self.covariance)

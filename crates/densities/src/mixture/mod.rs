@@ -11,9 +11,9 @@ use crate::particles::Particles;
 use crate::particles::weights::systematic;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density, Gaussian};
 use fewbits_numerics::LogSum;
-use fewbits_numerics::error::{at_least_one, refuse};
+use fewbits_numerics::error::{at_least_one, entries, refuse};
 use fewbits_numerics::kernels::{scalar, vectorised};
-use fewbits_numerics::normal;
+use fewbits_numerics::{normal, stored};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 /// # Ok::<(), fewbits_densities::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "Stored<D>", into = "Stored<D>")]
 pub struct Mixture<const D: usize> {
     components: Vec<Component<D>>,
 }
@@ -239,62 +239,23 @@ impl Mixture<1> {
     }
 }
 
-/// The plain form in which a mixture is stored.
-#[derive(Serialize, Deserialize)]
-struct Stored {
+stored! { [const D: usize] Mixture as Stored |mixture| {
     #[serde(with = "fewbits_numerics::stored")]
-    weights: Vec<f64>,
+    weights: Vec<f64> = mixture.components.iter().map(Component::weight).collect(),
     #[serde(with = "fewbits_numerics::stored")]
-    means: Vec<Vec<f64>>,
+    means: Vec<[f64; D]> = mixture.components.iter().map(|c| (*c.mean()).into()).collect(),
     #[serde(with = "fewbits_numerics::stored")]
-    covariances: Vec<Vec<Vec<f64>>>,
-}
-
-impl<const D: usize> From<Mixture<D>> for Stored {
-    fn from(mixture: Mixture<D>) -> Self {
-        let rows = |c: &Component<D>| {
-            (0..D)
-                .map(|i| (0..D).map(|j| c.covariance()[(i, j)]).collect())
-                .collect()
-        };
-        Self {
-            weights: mixture.components.iter().map(Component::weight).collect(),
-            means: mixture
-                .components
-                .iter()
-                .map(|c| c.mean().as_slice().to_vec())
-                .collect(),
-            covariances: mixture.components.iter().map(rows).collect(),
-        }
+    covariances: Vec<[[f64; D]; D]> = mixture.components.iter().map(|c| (*c.covariance()).into()).collect(),
+} => {
+    entries("means", means.len(), weights.len())?;
+    entries("covariances", covariances.len(), weights.len())?;
+    let parts = weights.iter().zip(means).zip(covariances);
+    let components = parts.map(|((weight, mean), covariance)| Component::new(*weight, mean.into(), covariance.into()));
+    let mut mixture = Mixture::new(components.collect::<Result<_, _>>()?)?;
+    // Weights that already summed to one are kept to the last bit.
+    if (weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 {
+        let kept = mixture.components.iter_mut().zip(weights);
+        kept.for_each(|(component, weight)| component.weight = weight);
     }
-}
-
-impl<const D: usize> TryFrom<Stored> for Mixture<D> {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        let n = stored.weights.len();
-        let square = |c: &Vec<Vec<f64>>| c.len() == D && c.iter().all(|row| row.len() == D);
-        if stored.means.len() != n
-            || stored.covariances.len() != n
-            || stored.means.iter().any(|m| m.len() != D)
-            || !stored.covariances.iter().all(square)
-        {
-            let expected = format!("{n} means of {D} and {n} covariances of {D} by {D} numbers");
-            return refuse("means", "of another shape", expected);
-        }
-        let components = (0..n).map(|k| {
-            let mean = SVector::from_fn(|i, _| stored.means[k][i]);
-            let covariance = SMatrix::from_fn(|i, j| stored.covariances[k][i][j]);
-            Component::new(stored.weights[k], mean, covariance)
-        });
-        let mut mixture = Self::new(components.collect::<Result<_, _>>()?)?;
-        // Weights that already summed to one are kept to the last bit.
-        let total: f64 = stored.weights.iter().sum();
-        if (total - 1.0).abs() < 1e-12 {
-            let kept = mixture.components.iter_mut().zip(stored.weights);
-            kept.for_each(|(component, weight)| component.weight = weight);
-        }
-        Ok(mixture)
-    }
-}
+    Ok(mixture)
+}, Error }

@@ -9,7 +9,6 @@ pub use weights::Categorical;
 
 use crate::Error;
 use fewbits_core::{Belief, Columns, ColumnsMut};
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, entries, refuse};
 use fewbits_numerics::kernels::{dot, weighted_covariance};
 use nalgebra::{SMatrix, SVector};
@@ -248,7 +247,7 @@ impl<const D: usize> Particles<D> {
         Ok(())
     }
 
-    pub(crate) fn equalise(&mut self, count: usize) {
+    fn equalise(&mut self, count: usize) {
         let weight = 1.0 / count as f64;
         self.weights.clear();
         self.weights.resize(count, weight);
@@ -327,37 +326,5 @@ impl<const D: usize> Belief<D> for Particles<D> {
                 *x = column[*i];
             }
         }
-    }
-}
-
-impl<const D: usize> From<Particles<D>> for StoredParticles {
-    fn from(belief: Particles<D>) -> Self {
-        Self::new(
-            belief.columns.into(),
-            belief.weights,
-            &belief.log_weights,
-            belief.effective_sample_size,
-            belief.auxiliary,
-        )
-    }
-}
-
-impl<const D: usize> TryFrom<StoredParticles> for Particles<D> {
-    type Error = Error;
-
-    fn try_from(stored: StoredParticles) -> Result<Self, Error> {
-        let (columns, weights, log_weights, effective, auxiliary) = stored.parts()?;
-        let columns = columns.try_into().map_err(|columns: Vec<Vec<f64>>| {
-            ArgumentError::new("columns", format!("{} columns", columns.len()), format!("{D} columns"))
-        })?;
-        let mut belief = Self::new(columns, &log_weights)?.with_auxiliary(auxiliary)?;
-        // As it was stored, to the last bit.
-        if weights.windows(2).all(|pair| pair[0] == pair[1]) {
-            belief.equalise(weights.len());
-        } else {
-            belief.effective_sample_size = effective.unwrap_or(belief.effective_sample_size);
-            (belief.weights, belief.log_weights) = (weights, log_weights);
-        }
-        Ok(belief)
     }
 }

@@ -171,8 +171,8 @@ fn components_give_back_what_they_were_made_of() {
     let c = Component::new(1.7, Vector2::new(0.4, -2.0), covariance).unwrap();
     assert_eq!((c.weight(), *c.mean(), *c.covariance()), (1.7, Vector2::new(0.4, -2.0), covariance));
     assert_eq!((c.gaussian().mean(), c.gaussian().covariance()), (c.mean(), c.covariance()));
-    assert!((c.cholesky_factor() * c.cholesky_factor().transpose() - covariance).amax() < 1e-15);
-    assert!((c.log_determinant() - (1.4_f64 - 0.09).ln()).abs() < 1e-14);
+    assert!((c.factor().lower * c.factor().lower.transpose() - covariance).amax() < 1e-15);
+    assert!((2.0 * c.factor().half_log_det - (1.4_f64 - 0.09).ln()).abs() < 1e-14);
     let x = Vector2::new(1.1, -0.8);
     let exact = Gaussian::new(*c.mean(), covariance)
         .unwrap()
@@ -295,7 +295,7 @@ fn storage_keeps_every_bit_and_checks() {
     ] {
         let text = format!(r#"{{"weights":[1.0],"means":{means},"covariances":{covariances}}}"#);
         let error = serde_json::from_str::<Mixture<2>>(&text).unwrap_err().to_string();
-        assert!(error.contains("2 by 2"), "{error}");
+        assert!(error.contains("of another length") || error.contains("`means`"), "{error}");
     }
     let text = serde_json::to_string(&estimate).unwrap();
     let restored: KernelEstimate<2> = serde_json::from_str(&text).unwrap();

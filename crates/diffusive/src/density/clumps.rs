@@ -97,6 +97,14 @@ impl<const D: usize> Clumps<D> {
         &self.clumps
     }
 
+    /// The same clumps with other weights of any sum above zero, one for each.
+    pub(crate) fn reweighted(&self, weights: &[f64]) -> Self {
+        let (mut other, total) = (self.clone(), weights.iter().sum::<f64>());
+        let pairs = other.clumps.iter_mut().zip(weights);
+        pairs.for_each(|(clump, weight)| clump.weight = weight / total);
+        other
+    }
+
     /// Mean of the whole.
     pub fn mean(&self) -> SVector<f64, D> {
         self.clumps.iter().map(|c| c.mean * c.weight).sum()

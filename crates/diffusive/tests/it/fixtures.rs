@@ -7,7 +7,7 @@ use fewbits_diffusive::density::laplace::{Peak, cumulant_laplace};
 use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite, multi_indices};
 use fewbits_diffusive::information::{Predictions, fisher_information};
 use fewbits_diffusive::{
-    Posterior, Prior, RateModel, RateRange, RateSums, SearchBox, SourceLikelihood, SourceSensor, log_sample_marginal,
+    Posterior, Prior, RateModel, RateRange, RateSums, SearchBox, SourceLikelihood, SourceSensor,
 };
 use fewbits_models::diffusion::{Air, Ground};
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -53,15 +53,8 @@ fn range(e: &Value) -> RateRange {
 #[test]
 fn likelihoods() {
     for e in entries("loglik_sample") {
-        check(
-            &e,
-            &[log_sample_marginal(
-                number(&e, "ytilde"),
-                number(&e, "a"),
-                number(&e, "sigma"),
-                &range(&e),
-            )],
-        );
+        let sums = RateSums::of(&[number(&e, "ytilde")], &[number(&e, "a")], number(&e, "sigma"));
+        check(&e, &[sums.unwrap().log_marginal(&range(&e))]);
     }
     for e in entries("loglik_joint") {
         let sums = RateSums::of(&list(&e["inputs"]["ytilde"]), &list(&e["inputs"]["a"]), number(&e, "sigma")).unwrap();

@@ -72,7 +72,7 @@ fn he(n: usize, x: f64) -> f64 {
 fn basis<const D: usize>(about: &[Component<D>], degree: usize, x: &SVector<f64, D>) -> Vec<f64> {
     let mut all = Vec::new();
     for c in about {
-        let u = c.cholesky_factor().solve_lower_triangular(&(x - c.mean())).unwrap();
+        let u = c.factor().lower.solve_lower_triangular(&(x - c.mean())).unwrap();
         let root = (0.5 * c.log_pdf(x)).exp();
         for nu in multi_indices::<D>(degree).unwrap() {
             all.push(root * (0..D).map(|d| he(nu[d], u[d])).product::<f64>());

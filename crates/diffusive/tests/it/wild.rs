@@ -3,7 +3,7 @@
 use fewbits_core::NumberFormat;
 use fewbits_core::laws::wild;
 use fewbits_diffusive::message::{SampleCode, Wire};
-use fewbits_diffusive::{RateModel, RateRange, RateSums, Search, SearchBox, SourceSensor, log_sample_marginal};
+use fewbits_diffusive::{RateModel, RateRange, RateSums, Search, SearchBox, SourceSensor};
 use fewbits_models::SourceGradient;
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
@@ -47,8 +47,8 @@ proptest! {
             prop_assert!((range.low()..=range.high()).contains(&mean) && variance >= 0.0, "{:?} {:?}: {} {}", sums, range, mean, variance);
             prop_assert!(!sums.chi_squared((mean, variance)).is_nan());
         }
-        if x[2..5].iter().all(|x| x.is_finite()) && x[4] > 0.0 {
-            let log = log_sample_marginal(x[2], x[3].abs(), x[4], &range);
+        if let Ok(sums) = RateSums::of(&x[2..3], &[x[3].abs()], x[4]) {
+            let log = sums.log_marginal(&range);
             prop_assert!(!log.is_nan() && log < f64::INFINITY, "{:?} {:?}: {}", &x[2..5], range, log);
         }
     }

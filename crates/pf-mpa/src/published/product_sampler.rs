@@ -296,7 +296,7 @@ fn exact<R: Rng + ?Sized>(rng: &mut R, messages: &[KernelMessage], out: &mut Dra
         let k = cumulative.partition_point(|c| *c <= u).min(product.len() - 1);
         let component = &product.components()[k];
         let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
-        let place = component.mean() + component.cholesky_factor() * z;
+        let place = component.mean() + component.factor().lower * z;
         let label = kept.get(k / others.max(1)).copied().unwrap_or(0);
         (out.x[n], out.y[n], out.labels[n]) = (place[0], place[1], label);
     }

@@ -1,6 +1,6 @@
 //! The best series for a belief over cells: the Galerkin projection of the root of its density.
 
-use super::Lpg;
+use super::{Lpg, Term};
 use super::basis::hermite_products;
 use crate::Error;
 use crate::density::Cells;
@@ -11,6 +11,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Pivots of the Gram matrix below this mean that its Gaussians are too much alike.
 const DEPENDENT: f64 = 1e-6;
+
+/// Logarithms of roots below this are negligible.
+pub(super) const NEGLIGIBLE: f64 = -80.0;
 
 /// A fit and its quality.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,26 +30,38 @@ impl<const D: usize> Lpg<D> {
     /// # Errors
     /// If there is no Gaussian, `degree` exceeds 20, or the basis is singular (two equal Gaussians).
     pub fn fit(cells: &Cells<D>, gaussians: &[Component<D>], degree: usize) -> Result<LpgFit<D>, Error> {
-        let belief = Self::skeleton(gaussians, degree)?;
-        let gram = belief.gram()?;
-        let size = belief.indices.len();
-        let mut b = DVector::zeros(gram.nrows());
         let columns = cells.columns();
         let scale = cells.width().powi(D as i32).sqrt();
-        let mut basis = vec![0.0; size];
-        for (i, weight) in cells.weights().iter().enumerate() {
-            let root = weight.sqrt() * scale;
-            let x = state_at(&columns, i);
-            for (l, term) in belief.terms.iter().enumerate() {
-                let u = term.whitened(&x);
-                let log = term.half_log_peak - 0.25 * u.norm_squared();
-                if log < -80.0 {
-                    continue;
-                }
-                let factor = root * log.exp();
-                hermite_products(&belief.indices, degree, &u, &mut basis);
-                for (nu, value) in basis.iter().enumerate() {
-                    b[l * size + nu] += factor * value;
+        Self::galerkin(gaussians, degree, cells.weights(), |belief, term, i, weight, out| {
+            let u = term.whitened(&state_at(&columns, i));
+            let log = term.half_log_peak - 0.25 * u.norm_squared();
+            if log < NEGLIGIBLE {
+                return false;
+            }
+            let factor = weight.sqrt() * scale * log.exp();
+            hermite_products(&belief.indices, degree, &u, out);
+            out.iter_mut().for_each(|value| *value *= factor);
+            true
+        })
+    }
+
+    /// The projection of a root that is a sum of parts, one for each weight. `inner` writes the inner products of a part and a term's
+    /// polynomials, or returns false if they are negligible.
+    pub(super) fn galerkin(
+        gaussians: &[Component<D>],
+        degree: usize,
+        weights: &[f64],
+        mut inner: impl FnMut(&Self, &Term<D>, usize, f64, &mut [f64]) -> bool,
+    ) -> Result<LpgFit<D>, Error> {
+        let belief = Self::skeleton(gaussians, degree)?;
+        let gram = belief.gram()?;
+        let mut b = DVector::zeros(gram.nrows());
+        let mut products = vec![0.0; belief.indices.len()];
+        for (i, weight) in weights.iter().enumerate() {
+            let parts = b.as_mut_slice().chunks_mut(belief.indices.len());
+            for (term, part) in belief.terms.iter().zip(parts) {
+                if inner(&belief, term, i, *weight, &mut products) {
+                    part.iter_mut().zip(&products).for_each(|(sum, product)| *sum += product);
                 }
             }
         }
@@ -54,7 +69,7 @@ impl<const D: usize> Lpg<D> {
     }
 
     /// The belief whose coefficients are the projection `G^-1 b`, normalised.
-    pub(super) fn project(mut self, gram: &DMatrix<f64>, b: &DVector<f64>) -> Result<LpgFit<D>, Error> {
+    fn project(mut self, gram: &DMatrix<f64>, b: &DVector<f64>) -> Result<LpgFit<D>, Error> {
         // The basis of each Gaussian is orthonormal: the diagonal is one, and a tiny pivot is rounding.
         let independent = |factor: &Cholesky<f64, Dyn>| factor.l_dirty().diagonal().min() > DEPENDENT;
         let Some(factor) = gram.clone().cholesky().filter(independent) else {
@@ -72,7 +87,7 @@ impl<const D: usize> Lpg<D> {
         })
     }
 
-    pub(super) fn gram(&self) -> Result<DMatrix<f64>, Error> {
+    fn gram(&self) -> Result<DMatrix<f64>, Error> {
         let size = self.indices.len();
         let mut gram = DMatrix::identity(size * self.terms.len(), size * self.terms.len());
         let (mut of_l, mut of_m) = (vec![0.0; size], vec![0.0; size]);

@@ -78,7 +78,7 @@ impl<const D: usize> Lpg<D> {
         for gaussian in gaussians {
             terms.push(Term {
                 gaussian: *gaussian,
-                half_log_peak: -0.25 * gaussian.log_determinant() - 0.5 * D as f64 * LN_SQRT_2PI,
+                half_log_peak: -0.5 * gaussian.factor().half_log_det - 0.5 * D as f64 * LN_SQRT_2PI,
                 steepness: gaussian.factor().whitener.norm(),
                 coefficients: vec![0.0; indices.len()],
             });
@@ -235,29 +235,6 @@ impl<const D: usize> Lpg<D> {
         Ok(())
     }
 
-    /// `s(x)` as sign and logarithm.
-    #[inline]
-    fn log_root(&self, x: &SVector<f64, D>, values: &mut [f64]) -> f64 {
-        let mut largest = f64::NEG_INFINITY;
-        let mut sum = 0.0;
-        for term in &self.terms {
-            let u = term.whitened(x);
-            let log = term.half_log_peak - 0.25 * u.norm_squared();
-            hermite_products(&self.indices, self.degree, &u, values);
-            let polynomial: f64 = values.iter().zip(&term.coefficients).map(|(v, c)| v * c).sum();
-            if log > largest {
-                sum *= (largest - log).exp();
-                largest = log;
-            }
-            sum += polynomial * (log - largest).exp();
-        }
-        let size = sum.abs();
-        if size > 0.0 && size.is_finite() {
-            largest + size.ln()
-        } else {
-            f64::NEG_INFINITY
-        }
-    }
 }
 
 impl<const D: usize> Term<D> {
@@ -286,9 +263,9 @@ impl<const D: usize> Belief<D> for Lpg<D> {
         let widened = |rng: &mut R| {
             let term = &self.terms[rng.random_range(0..self.terms.len())];
             let g = SVector::<f64, D>::from_fn(|_, _| rng.sample(rand_distr::StandardNormal));
-            term.gaussian.mean() + term.gaussian.cholesky_factor() * g * WIDER
+            term.gaussian.mean() + term.gaussian.factor().lower * g * WIDER
         };
-        let mut values = vec![0.0; self.indices.len()];
+        let mut values = Vec::new();
         // Up to a constant, which the bound has too.
         let log_proposal = |x: &SVector<f64, D>| {
             let parts = self
@@ -300,13 +277,13 @@ impl<const D: usize> Belief<D> for Lpg<D> {
         let mut bound = f64::NEG_INFINITY;
         for _ in 0..1000 {
             let x = widened(rng);
-            bound = bound.max(2.0 * self.log_root(&x, &mut values) - log_proposal(&x));
+            bound = bound.max(self.log_density_and_bound(&x, 0.0, &mut values).0 - log_proposal(&x));
         }
         bound += 3.0_f64.ln();
         for i in 0..count {
             let mut x = widened(rng);
             for _ in 0..100_000 {
-                let ratio = 2.0 * self.log_root(&x, &mut values) - log_proposal(&x) - bound;
+                let ratio = self.log_density_and_bound(&x, 0.0, &mut values).0 - log_proposal(&x) - bound;
                 if rng.random::<f64>().ln() < ratio {
                     break;
                 }
@@ -323,16 +300,16 @@ impl<const D: usize> Belief<D> for Lpg<D> {
 const WIDER: f64 = 1.6;
 impl<const D: usize> Density<D> for Lpg<D> {
     fn log_density(&self, state: &SVector<f64, D>) -> f64 {
-        2.0 * self.log_root(state, &mut vec![0.0; self.indices.len()])
+        self.log_density_and_bound(state, 0.0, &mut Vec::new()).0
     }
 
     fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
         if !fewbits_core::columns::lengths_agree(states, logs) {
             return;
         }
-        let mut values = vec![0.0; self.indices.len()];
+        let mut values = Vec::new();
         for (i, log) in logs.iter_mut().enumerate() {
-            *log += 2.0 * self.log_root(&state_at(states, i), &mut values);
+            *log += self.log_density_and_bound(&state_at(states, i), 0.0, &mut values).0;
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Polynomial Gaussians over a plane and one more coordinate, beside beliefs that are cells over the plane.
 
 use super::basis::{LANES, gauss_hermite, row_of_polynomials, sums_of_polynomials};
-use super::fit::LpgFit;
-use super::polynomials::HIGHEST_DEGREE;
+use super::fit::{LpgFit, NEGLIGIBLE};
+use super::polynomials::{HIGHEST_DEGREE, check_degree};
 use super::{Lpg, Term};
 use crate::Error;
 use crate::density::Cells;
@@ -11,7 +11,7 @@ use fewbits_densities::Component;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::quadrature::gauss_legendre;
-use nalgebra::{DVector, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
 /// A belief over three coordinates at one place of the first two: `s(t)^2` along the third, with
 /// `s(t) = sum_l exp(height_l - u_l^2 / 4) sum_k d_lk h_k(u_l)`, `u_l = (t - centre_l) / deviation_l`.
@@ -66,52 +66,46 @@ impl Lpg<3> {
         gaussians: &[Component<3>],
         degree: usize,
     ) -> Result<LpgFit<3>, Error> {
-        let belief = Self::skeleton(gaussians, degree)?;
         if means.len() != cells.len() || variances.len() != cells.len() {
             return refuse("means", means.len(), format!("{}, one for each cell", cells.len()));
         }
-        let gram = belief.gram()?;
-        let size = belief.indices.len();
-        let mut b = DVector::zeros(gram.nrows());
+        check_degree(degree)?;
         // Exact for polynomials of this degree.
         let rule = gauss_hermite(degree / 2 + 1);
         let columns = cells.columns();
         let (mut first, mut second, mut third, mut row) =
             (vec![0.0; degree + 1], vec![0.0; degree + 1], vec![0.0; degree + 1], vec![0.0; degree + 1]);
-        for (i, weight) in cells.weights().iter().enumerate() {
+        Self::galerkin(gaussians, degree, cells.weights(), |belief, term, i, weight, out| {
             let (mean, variance) = (means[i], variances[i]);
             if variance.is_nan() || variance <= 0.0 {
                 // No width: no overlap.
-                continue;
+                return false;
             }
-            let place = state_at(&columns, i);
-            for (l, term) in belief.terms.iter().enumerate() {
-                let (u, centre, deviation) = term.at_place(&place);
-                // The product of the two roots along the third coordinate: a Gaussian of variance 2 / precision.
-                let precision = 1.0 / variance + 1.0 / (deviation * deviation);
-                let gap = mean - centre;
-                let log = term.half_log_peak
-                    - 0.25 * (u.norm_squared() + gap * gap / (variance + deviation * deviation))
-                    - 0.25 * (std::f64::consts::TAU * variance).ln()
-                    + 0.5 * (2.0 * std::f64::consts::TAU / precision).ln();
-                if log < -80.0 {
-                    continue;
-                }
-                let factor = weight.sqrt() * cells.width() * log.exp();
-                let middle = gap / (variance * precision);
-                third.fill(0.0);
-                for (node, share) in &rule {
-                    row_of_polynomials((middle + node * (2.0 / precision).sqrt()) / deviation, &mut row);
-                    third.iter_mut().zip(&row).for_each(|(sum, h)| *sum += share * h);
-                }
-                row_of_polynomials(u.x, &mut first);
-                row_of_polynomials(u.y, &mut second);
-                for (nu, [i, j, k]) in belief.indices.iter().enumerate() {
-                    b[l * size + nu] += factor * first[*i] * second[*j] * third[*k];
-                }
+            let (u, centre, deviation) = term.at_place(&state_at(&columns, i));
+            // The product of the two roots along the third coordinate: a Gaussian of variance 2 / precision.
+            let precision = 1.0 / variance + 1.0 / (deviation * deviation);
+            let gap = mean - centre;
+            let log = term.half_log_peak
+                - 0.25 * (u.norm_squared() + gap * gap / (variance + deviation * deviation))
+                - 0.25 * (std::f64::consts::TAU * variance).ln()
+                + 0.5 * (2.0 * std::f64::consts::TAU / precision).ln();
+            if log < NEGLIGIBLE {
+                return false;
             }
-        }
-        belief.project(&gram, &b)
+            let factor = weight.sqrt() * cells.width() * log.exp();
+            let middle = gap / (variance * precision);
+            third.fill(0.0);
+            for (node, share) in &rule {
+                row_of_polynomials((middle + node * (2.0 / precision).sqrt()) / deviation, &mut row);
+                third.iter_mut().zip(&row).for_each(|(sum, h)| *sum += share * h);
+            }
+            row_of_polynomials(u.x, &mut first);
+            row_of_polynomials(u.y, &mut second);
+            for (value, [i, j, k]) in out.iter_mut().zip(&belief.indices) {
+                *value = factor * first[*i] * second[*j] * third[*k];
+            }
+            true
+        })
     }
 
     /// Writes the belief along the third coordinate at a place of the other two to `slice`. With a `half_width` above zero, about the
