@@ -56,7 +56,9 @@ fn field() -> SearchBox {
 fn exact_update(bencher: Bencher) {
     let sensor = sensor();
     let node = Vector2::new(50.0, 54.0);
-    let samples = sensor.sample(&mut Stream::new(1).rng(), &node, &Vector2::new(62.0, 50.0), 1.0).unwrap();
+    let samples = sensor
+        .sample(&mut Stream::new(1).rng(), &node, &Vector2::new(62.0, 50.0), 1.0)
+        .unwrap();
     let prior = Prior::Exact(Gaussian::new(node, Matrix2::identity() * 2500.0).unwrap());
     bencher.bench_local(|| {
         let record = sensor.record(black_box(&node), &samples).unwrap();

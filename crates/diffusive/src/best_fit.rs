@@ -17,11 +17,7 @@ const LEVELS: usize = 44;
 /// The best fit that any position of the box allows, up to the prior: the cells of best score are split again and again, without
 /// regard to how many others are as good. Finds one point of a ring that is too thin to be covered. `None` if no position has any
 /// likelihood.
-pub(crate) fn best_fit(
-    target: &Target<'_>,
-    likelihood: &SourceLikelihood,
-    search: &SearchBox,
-) -> Option<Fit> {
+pub(crate) fn best_fit(target: &Target<'_>, likelihood: &SourceLikelihood, search: &SearchBox) -> Option<Fit> {
     let sides: [f64; 2] = std::array::from_fn(|d| search.upper[d] - search.lower[d]);
     let mut width = sides[0].max(sides[1]) / PER_AXIS as f64;
     let counts = sides.map(|side| ((side / width - 1e-9).ceil() as usize).max(1));

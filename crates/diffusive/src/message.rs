@@ -286,18 +286,16 @@ fn numbers_of<const D: usize>(belief: &SentBelief<D>) -> (usize, Option<usize>, 
     }
 }
 
-fn belief_of<const D: usize>(
-    count: usize,
-    degree: Option<usize>,
-    numbers: &[f64],
-) -> Result<SentBelief<D>, Error> {
+fn belief_of<const D: usize>(count: usize, degree: Option<usize>, numbers: &[f64]) -> Result<SentBelief<D>, Error> {
     // A mixture sends all weights but the first; a series has none.
     let weights = degree.map_or(count.saturating_sub(1), |_| 0).min(numbers.len());
     let (weights, rest) = numbers.split_at(weights);
     let size = gaussian_scalars(D);
     let (gaussians, coefficients) = rest.split_at(size.saturating_mul(count).min(rest.len()));
     let first = (1.0 - weights.iter().sum::<f64>()).max(0.0);
-    let weights = std::iter::once(first).chain(weights.iter().copied()).chain(std::iter::repeat(1.0));
+    let weights = std::iter::once(first)
+        .chain(weights.iter().copied())
+        .chain(std::iter::repeat(1.0));
     let gaussians = gaussians.chunks(size).zip(weights);
     let gaussians: Vec<Component<D>> = gaussians
         .map(|(chunk, weight)| read_gaussian(weight, chunk))
@@ -305,7 +303,9 @@ fn belief_of<const D: usize>(
     Ok(match degree {
         None => SentBelief::Mixture(Mixture::new(gaussians)?),
         Some(degree) => {
-            let lists = coefficients.chunks(lpg_scalars(degree, D == 3) - size).map(<[f64]>::to_vec);
+            let lists = coefficients
+                .chunks(lpg_scalars(degree, D == 3) - size)
+                .map(<[f64]>::to_vec);
             SentBelief::Lpg(Lpg::new(&gaussians, degree, &lists.collect::<Vec<_>>())?)
         }
     })

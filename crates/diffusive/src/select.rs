@@ -65,11 +65,7 @@ impl Selector {
     }
 
     /// The best of the candidates, the first among equals; `None` of none.
-    pub fn best(
-        &self,
-        sensor: &SourceSensor,
-        candidates: &[(usize, Vector2<f64>)],
-    ) -> Option<usize> {
+    pub fn best(&self, sensor: &SourceSensor, candidates: &[(usize, Vector2<f64>)]) -> Option<usize> {
         let mut best: Option<(f64, usize)> = None;
         for (index, node) in candidates {
             let score = self.score(sensor, node);
@@ -132,12 +128,7 @@ impl Selector {
     }
 
     /// Responses in units of the noise.
-    fn predicted(
-        &self,
-        sensor: &SourceSensor,
-        receptor: &Receptor,
-        source: &Vector2<f64>,
-    ) -> DVector<f64> {
+    fn predicted(&self, sensor: &SourceSensor, receptor: &Receptor, source: &Vector2<f64>) -> DVector<f64> {
         DVector::from_vec(sensor.responses_at(receptor, source)) / sensor.noise()
     }
 

@@ -42,11 +42,7 @@ impl SourceSensor {
     ///
     /// # Errors
     /// If there is no instant, one is not finite or none is after 0, or `noise` is not a positive number.
-    pub fn new(
-        model: impl SourceModel + Send + Sync + 'static,
-        instants: Vec<f64>,
-        noise: f64,
-    ) -> Result<Self, Error> {
+    pub fn new(model: impl SourceModel + Send + Sync + 'static, instants: Vec<f64>, noise: f64) -> Result<Self, Error> {
         at_least_one("instants", instants.len())?;
         all_finite("instants", &instants)?;
         positive("noise", noise)?;

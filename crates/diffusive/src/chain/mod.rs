@@ -253,13 +253,7 @@ impl Search {
         }
     }
 
-    fn check(
-        &self,
-        models: &ModelGrid,
-        deployment: &Deployment,
-        graph: &Graph,
-        start: usize,
-    ) -> Result<(), Error> {
+    fn check(&self, models: &ModelGrid, deployment: &Deployment, graph: &Graph, start: usize) -> Result<(), Error> {
         self.form.check(&self.rate)?;
         at_least_one("most_nodes", self.most_nodes)?;
         if let Some(level) = self.refusal {

@@ -1,7 +1,7 @@
 //! Gaussian mixtures fitted to clumps by expectation-maximisation.
 
-use crate::Error;
 use super::clumps::{Clump, Clumps};
+use crate::Error;
 use fewbits_core::Columns;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::eigen::symmetric_eigen;

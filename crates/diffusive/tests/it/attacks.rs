@@ -111,8 +111,9 @@ fn runs_refuse_what_they_cannot_do() {
         change(&mut search);
         search
     };
-    let run =
-        |search: Search, start, samples: Vec<f64>| search.run(&sensor, &field_of, &graph, start, |_| Ok(samples.clone()));
+    let run = |search: Search, start, samples: Vec<f64>| {
+        search.run(&sensor, &field_of, &graph, start, |_| Ok(samples.clone()))
+    };
     assert!(run(search(|_| ()), 2, vec![0.0; 5]).is_err());
     assert!(run(search(|_| ()), 0, vec![0.0; 3]).is_err());
     assert!(run(search(|_| ()), 0, vec![f64::NAN; 5]).is_err());
@@ -162,7 +163,9 @@ fn absurd_samples() {
         for &level in levels {
             let mut search = Search::new(&Vector2::new(44.0, 52.0), 50.0, field(1.0), joint(), 1e-5).unwrap();
             (search.form, search.most_nodes) = (form, 4);
-            let outcome = search.run(&sensor, &field_of, &graph, 0, |_| Ok(vec![level; 5])).unwrap();
+            let outcome = search
+                .run(&sensor, &field_of, &graph, 0, |_| Ok(vec![level; 5]))
+                .unwrap();
             for step in &outcome.steps {
                 assert!(step.estimate.mean().iter().all(|x| x.is_finite()), "{form:?} {level} {:?}", outcome.status);
                 assert!(step.log10_determinant.is_finite() && !step.log_evidence.is_nan());

@@ -34,7 +34,9 @@ fn sharp(sensor: &SourceSensor, rate: RateModel) -> Envelope {
     let records = (0..12).map(|i| {
         let angle = f64::from(i);
         let node = source + Vector2::new(angle.cos(), angle.sin()) * (6.0 + f64::from(i));
-        sensor.record(&node, &sensor.responses(&node, &source).unwrap()).unwrap()
+        sensor
+            .record(&node, &sensor.responses(&node, &source).unwrap())
+            .unwrap()
     });
     let likelihood = SourceLikelihood::new(records.collect(), rate).unwrap();
     let prior = Prior::Exact(Gaussian::new(source, Matrix2::identity() * 100.0).unwrap());

@@ -192,7 +192,9 @@ fn samples_that_nothing_explains_are_a_misfit() {
     }
     // A source two centimetres from the node fits, though its ring is too thin for the cells.
     let node = field_of.positions()[0];
-    let near = sensor(1.0, false).responses(&node, &(node + Vector2::new(0.02, 0.0))).unwrap();
+    let near = sensor(1.0, false)
+        .responses(&node, &(node + Vector2::new(0.02, 0.0)))
+        .unwrap();
     let search = Search::new(&node, 50.0, field(1.0), joint(), 1e-5).unwrap();
     let outcome = search
         .run(&sensor(1.0, false), &field_of, &graph, 0, |_| Ok(near.clone()))

@@ -6,9 +6,7 @@ use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::density::laplace::{Peak, cumulant_laplace};
 use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite, multi_indices};
 use fewbits_diffusive::information::{Predictions, fisher_information};
-use fewbits_diffusive::{
-    Posterior, Prior, RateModel, RateRange, RateSums, SearchBox, SourceLikelihood, SourceSensor,
-};
+use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, RateSums, SearchBox, SourceLikelihood, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
 use nalgebra::{Matrix2, Vector2, Vector3};
 use serde_json::Value;

@@ -7,8 +7,8 @@ use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
     Envelope, Error, Form, Outcome, Posterior, Prior, Rule, Search, SearchBox, SourceLikelihood, SourceSensor, Status,
 };
-use fewbits_models::diffusion::{Air, Ground};
 use fewbits_models::SourceModel;
+use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -62,12 +62,7 @@ fn reading(truth: &SourceSensor, seed: u64, node: usize, place: &Vector2<f64>) -
     truth.sample(&mut rng, place, &Vector2::from(SOURCE), 1.0)
 }
 
-fn run(
-    seed: u64,
-    model: &SourceSensor,
-    truth: &SourceSensor,
-    change: impl FnOnce(&mut Search),
-) -> Outcome {
+fn run(seed: u64, model: &SourceSensor, truth: &SourceSensor, change: impl FnOnce(&mut Search)) -> Outcome {
     let deployed = Deployment::given(places()).unwrap();
     let graph = Graph::within(deployed.positions(), 1.2).unwrap();
     let alarm = Vector2::new(5.3, 2.7);

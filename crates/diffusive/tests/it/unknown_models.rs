@@ -31,7 +31,12 @@ fn evidence_of_the_grid_is_bayes() {
     let taken: Vec<(Vector2<f64>, Vec<f64>)> = [[50.0, 54.0], [40.0, 40.0]]
         .map(|node| {
             let node = Vector2::from(node);
-            (node, with(40.0, 3.0).sample(&mut rng, &node, &Vector2::from(SOURCE), 1.0).unwrap())
+            (
+                node,
+                with(40.0, 3.0)
+                    .sample(&mut rng, &node, &Vector2::from(SOURCE), 1.0)
+                    .unwrap(),
+            )
         })
         .to_vec();
     let weights = [0.1, 0.2, 0.3, 0.2, 0.2];

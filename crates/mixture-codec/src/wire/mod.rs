@@ -37,8 +37,8 @@ use crate::Error;
 use fewbits_core::{BitReader, BitWriter, CodecError, Message};
 use fewbits_densities::Mixture;
 use fewbits_numerics::error::refuse;
-use range::{Reader, Writer};
-use walk::{Quantiser, Replay, walk};
+use range::{Coder, Law, Reader, Writer};
+use walk::{Decoder, Quantiser, walk};
 
 /// Number of the format. A changed byte is a new number and a line in the changelog.
 pub const FORMAT: u32 = 1;
@@ -64,7 +64,7 @@ pub const MOST_COMPONENTS: usize = 63;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct CodedMixture<const D: usize> {
-    symbols: Vec<i64>,
+    symbols: Vec<(Law, i64)>,
     mixture: Mixture<D>,
 }
 
@@ -86,7 +86,7 @@ impl<const D: usize> CodedMixture<D> {
         let mut symbols = Quantiser::default();
         let coded = walk(&mut symbols, format, Some((mixture, resolution)))?;
         Ok(Self {
-            symbols: symbols.chosen,
+            symbols: symbols.symbols,
             mixture: coded,
         })
     }
@@ -105,30 +105,28 @@ impl<const D: usize> CodedMixture<D> {
 impl<const D: usize> Message for CodedMixture<D> {
     type Format = WireFormat<D>;
 
-    fn encode(&self, format: &WireFormat<D>, writer: &mut BitWriter) -> Result<(), CodecError> {
-        let mut code = Replay {
-            symbols: self.symbols.iter(),
-            writer: Writer::new(),
-        };
-        walk(&mut code, format, None)?;
-        code.writer.finish(writer)
+    /// Under the format that the message was made for.
+    fn encode(&self, _: &WireFormat<D>, writer: &mut BitWriter) -> Result<(), CodecError> {
+        let mut code = Writer::new();
+        for (law, n) in &self.symbols {
+            code.integer(law, Some(*n))?;
+        }
+        code.finish(writer)
     }
 
     fn decode(format: &WireFormat<D>, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
         // No number takes over 60 bits.
         let most = 60 * (MOST_COMPONENTS + 1) * (D * D + D + 2);
-        let mut source = walk::Source {
+        let mut source = Decoder {
             reader: Reader::new(reader, most)?,
-            read: Vec::new(),
+            symbols: Vec::new(),
         };
         let mixture = walk(&mut source, format, None)?;
         let message = Self {
-            symbols: source.read,
+            symbols: source.symbols,
             mixture,
         };
-        let mut writer = BitWriter::new();
-        source.reader.canonical.finish(&mut writer)?;
-        let canonical = writer.finish();
+        let canonical = message.to_bits(format)?;
         let mut expected = BitReader::new(&canonical);
         if reader.remaining() < canonical.bits() {
             return Err(CodecError::EndOfMessage {

@@ -45,63 +45,80 @@ fn out_of_range(what: &'static str, value: impl std::fmt::Display) -> CodecError
     }
 }
 
+/// One half of the coder, which writes symbols of tables or reads them.
+pub(super) trait Coder {
+    /// Codes one symbol. A writer needs the one that is `wanted`, a reader finds it out.
+    fn digit(&mut self, table: Table, wanted: Option<u32>) -> Result<u32, CodecError>;
+
+    /// The lowest `bits` of a number.
+    fn uniform(&mut self, bits: u32, wanted: Option<u64>) -> Result<u64, CodecError> {
+        let (mut value, mut left) = (0, bits);
+        while left > 0 {
+            let width = left.min(DIGIT);
+            left -= width;
+            let digit = wanted.map(|value| (value >> left & ((1 << width) - 1)) as u32);
+            value = (value << width) + u64::from(self.digit(Table::Uniform { count: 1 << width }, digit)?);
+        }
+        Ok(value)
+    }
+
+    /// One integer under a law.
+    fn integer(&mut self, law: &Law, wanted: Option<i64>) -> Result<i64, CodecError> {
+        match *law {
+            Law::Uniform { count } => {
+                let (top, low) = digits(count);
+                let check = |n| {
+                    let value = u64::try_from(n).ok().filter(|value| *value < count);
+                    value.ok_or_else(|| out_of_range("symbol", n))
+                };
+                let wanted = wanted.map(check).transpose()?;
+                let head = if top > 1 {
+                    self.digit(Table::Uniform { count: top }, wanted.map(|value| (value >> low) as u32))?
+                } else {
+                    0
+                };
+                let value = (u64::from(head) << low) + self.uniform(low, wanted)?;
+                check(value as i64).map(|value| value as i64)
+            }
+            Law::Logistic { location, scale } => {
+                let refuse = || out_of_range("scale", scale);
+                let (table, low) = Law::table(location, scale).ok_or_else(refuse)?;
+                let (Table::Logistic { centre, half, .. }, Some(escape)) = (table, table.escape()) else {
+                    return Err(refuse());
+                };
+                let first = centre - i64::from(half);
+                let index = wanted.map(|n| u32::try_from((n >> low) - first).map_or(escape, |index| index.min(escape)));
+                let index = self.digit(table, index)?;
+                if index < escape {
+                    return Ok(
+                        ((first + i64::from(index)) << low) + self.uniform(low, wanted.map(|n| n as u64))? as i64
+                    );
+                }
+                let raw = |n| u32::try_from(n + (LARGEST as i64)).map_err(|_| out_of_range("symbol", n));
+                let raw = wanted.map(raw).transpose()?;
+                Ok(self.uniform(32, raw.map(u64::from))? as i64 - LARGEST as i64)
+            }
+        }
+    }
+}
+
 /// Writes integers.
 pub(super) struct Writer {
     encoder: RangeEncoder<u32, u64>,
+}
+
+impl Coder for Writer {
+    fn digit(&mut self, table: Table, wanted: Option<u32>) -> Result<u32, CodecError> {
+        let index = wanted.ok_or_else(|| out_of_range("symbol", "missing"))?;
+        let coded = self.encoder.encode_symbol(index, table);
+        coded.map(|()| index).map_err(|_| out_of_range("symbol", index))
+    }
 }
 
 impl Writer {
     pub(super) fn new() -> Self {
         Self {
             encoder: RangeEncoder::new(),
-        }
-    }
-
-    fn put(&mut self, table: Table, index: u32) -> Result<(), CodecError> {
-        self.encoder
-            .encode_symbol(index, table)
-            .map_err(|_| out_of_range("symbol", index))
-    }
-
-    fn uniform(&mut self, value: u64, bits: u32) -> Result<(), CodecError> {
-        let mut left = bits;
-        while left > 0 {
-            let width = left.min(DIGIT);
-            left -= width;
-            let digit = (value >> left & ((1 << width) - 1)) as u32;
-            self.put(Table::Uniform { count: 1 << width }, digit)?;
-        }
-        Ok(())
-    }
-
-    pub(super) fn write(&mut self, law: &Law, n: i64) -> Result<(), CodecError> {
-        match *law {
-            Law::Uniform { count } => {
-                let (top, low) = digits(count);
-                let value = u64::try_from(n)
-                    .ok()
-                    .filter(|v| *v < count)
-                    .ok_or_else(|| out_of_range("symbol", n))?;
-                if top > 1 {
-                    self.put(Table::Uniform { count: top }, (value >> low) as u32)?;
-                }
-                self.uniform(value & ((1 << low) - 1), low)
-            }
-            Law::Logistic { location, scale } => {
-                let (table, low) = Law::table(location, scale).ok_or_else(|| out_of_range("scale", scale))?;
-                let (Table::Logistic { centre, half, .. }, Some(escape)) = (table, table.escape()) else {
-                    return Err(out_of_range("scale", scale));
-                };
-                let index = (n >> low) - centre + i64::from(half);
-                if (0..i64::from(escape)).contains(&index) {
-                    self.put(table, index as u32)?;
-                    self.uniform((n & ((1 << low) - 1)) as u64, low)
-                } else {
-                    let raw = u32::try_from(n + (LARGEST as i64)).map_err(|_| out_of_range("symbol", n))?;
-                    self.put(table, escape)?;
-                    self.uniform(u64::from(raw), 32)
-                }
-            }
         }
     }
 
@@ -155,8 +172,26 @@ pub(super) struct Reader {
     available: usize,
     /// Bits that the symbols so far took at least.
     spent: usize,
-    /// The code of the symbols so far.
-    pub(super) canonical: Writer,
+}
+
+impl Coder for Reader {
+    fn digit(&mut self, table: Table, _: Option<u32>) -> Result<u32, CodecError> {
+        let found = Found::of(&table);
+        let index = self
+            .decoder
+            .decode_symbol(&found)
+            .map_err(|_| out_of_range("code word", "past the last symbol"))?;
+        // A symbol of frequency 2^k to 2^(k+1) takes over 15 - k bits. Beyond the end there is nothing left to decode.
+        self.spent += 15_usize.saturating_sub(found.frequency.get().ilog2() as usize);
+        if self.spent > self.available {
+            let requested = (self.spent - self.available) as u32;
+            return Err(CodecError::EndOfMessage {
+                requested,
+                available: 0,
+            });
+        }
+        Ok(index)
+    }
 }
 
 impl Reader {
@@ -173,77 +208,7 @@ impl Reader {
             decoder: RangeDecoder::from_compressed(words).unwrap_infallible(),
             available: bits,
             spent: 0,
-            canonical: Writer::new(),
         })
-    }
-
-    fn get(&mut self, table: Table) -> Result<u32, CodecError> {
-        let found = Found {
-            table: Some(&table),
-            ..Found::default()
-        };
-        let index = self
-            .decoder
-            .decode_symbol(&found)
-            .map_err(|_| out_of_range("code word", "past the last symbol"))?;
-        let (_, _, frequency) = found.place.get().ok_or_else(|| out_of_range("symbol", index))?;
-        // What the encoder would write for the same symbols.
-        self.canonical
-            .encoder
-            .encode_symbol(index, &found)
-            .map_err(|_| out_of_range("symbol", index))?;
-        // A symbol of frequency 2^k to 2^(k+1) takes over 15 - k bits. Beyond the end there is nothing left to decode.
-        self.spent += 15_usize.saturating_sub(frequency.ilog2() as usize);
-        if self.spent > self.available {
-            let requested = (self.spent - self.available) as u32;
-            return Err(CodecError::EndOfMessage {
-                requested,
-                available: 0,
-            });
-        }
-        Ok(index)
-    }
-
-    fn uniform(&mut self, bits: u32) -> Result<u64, CodecError> {
-        let mut value = 0;
-        let mut left = bits;
-        while left > 0 {
-            let width = left.min(DIGIT);
-            left -= width;
-            value = (value << width) + u64::from(self.get(Table::Uniform { count: 1 << width })?);
-        }
-        Ok(value)
-    }
-
-    pub(super) fn read(&mut self, law: &Law) -> Result<i64, CodecError> {
-        match *law {
-            Law::Uniform { count } => {
-                let (top, low) = digits(count);
-                let head = if top > 1 {
-                    u64::from(self.get(Table::Uniform { count: top })?)
-                } else {
-                    0
-                };
-                let value = (head << low) + self.uniform(low)?;
-                if value < count {
-                    Ok(value as i64)
-                } else {
-                    Err(out_of_range("symbol", value))
-                }
-            }
-            Law::Logistic { location, scale } => {
-                let (table, low) = Law::table(location, scale).ok_or_else(|| out_of_range("scale", scale))?;
-                let Table::Logistic { centre, half, .. } = table else {
-                    return Err(out_of_range("scale", scale));
-                };
-                let index = self.get(table)?;
-                if Some(index) == table.escape() {
-                    return Ok(self.uniform(32)? as i64 - LARGEST as i64);
-                }
-                let head = centre - i64::from(half) + i64::from(index);
-                Ok((head << low) + self.uniform(low)? as i64)
-            }
-        }
     }
 }
 
@@ -258,12 +223,12 @@ mod tests {
     fn laws_and_symbols_out_of_range_are_refused_and_the_last_within_are_not() {
         let write = |law: Law, n: i64| {
             let mut writer = Writer::new();
-            writer.write(&law, n)?;
+            writer.integer(&law, Some(n))?;
             let mut bits = BitWriter::new();
             writer.finish(&mut bits)?;
             let message = bits.finish();
             let mut reader = Reader::new(&BitReader::new(&message), 1 << 10)?;
-            assert_eq!(reader.read(&law)?, n, "{law:?}");
+            assert_eq!(reader.integer(&law, None)?, n, "{law:?}");
             Ok::<usize, CodecError>(message.bits())
         };
         let law = |location, scale| Law::Logistic { location, scale };
@@ -280,7 +245,13 @@ mod tests {
         ] {
             assert!(write(bad, 0).is_err(), "{bad:?}");
             let empty = fewbits_core::BitString::default();
-            assert!(Reader::new(&BitReader::new(&empty), 99).unwrap().read(&bad).is_err(), "{bad:?}");
+            assert!(
+                Reader::new(&BitReader::new(&empty), 99)
+                    .unwrap()
+                    .integer(&bad, None)
+                    .is_err(),
+                "{bad:?}"
+            );
         }
         for good in [
             law(LARGEST - 1.0, 1e-9),
@@ -330,11 +301,11 @@ mod tests {
         for bytes in [0, 1, 3, 8, 9] {
             let message = fewbits_core::BitString::from_bytes(vec![0; bytes], 8 * bytes).unwrap();
             let mut reader = Reader::new(&BitReader::new(&message), 1 << 10).unwrap();
-            let read = (0..1000).take_while(|_| reader.read(&law).is_ok()).count();
+            let read = (0..1000).take_while(|_| reader.integer(&law, None).is_ok()).count();
             // A symbol of ten bits counts for nine at least.
             assert_eq!(read, 8 * bytes / 9);
             let mut few = Reader::new(&BitReader::new(&message), 10).unwrap();
-            assert_eq!((0..1000).take_while(|_| few.read(&law).is_ok()).count(), (8 * bytes).min(10) / 9);
+            assert_eq!((0..1000).take_while(|_| few.integer(&law, None).is_ok()).count(), (8 * bytes).min(10) / 9);
         }
     }
 
@@ -378,7 +349,7 @@ mod tests {
             }
             let mut writer = Writer::new();
             for (law, n) in &symbols {
-                writer.write(law, *n).unwrap();
+                writer.integer(law, Some(*n)).unwrap();
             }
             let mut bits = BitWriter::new();
             writer.finish(&mut bits).unwrap();
@@ -393,7 +364,7 @@ mod tests {
             let message = bits.finish();
             let mut reader = Reader::new(&BitReader::new(&message), 1 << 20).unwrap();
             for (law, n) in &symbols {
-                assert_eq!(reader.read(law).unwrap(), *n, "{law:?}");
+                assert_eq!(reader.integer(law, None).unwrap(), *n, "{law:?}");
             }
         }
     }

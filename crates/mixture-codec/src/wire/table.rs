@@ -2,6 +2,7 @@
 
 use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
 use std::borrow::Borrow;
+use std::cell::Cell;
 use std::num::NonZeroU32;
 
 /// Bits of a frequency.
@@ -161,11 +162,19 @@ impl Table {
     }
 }
 
-/// A symbol whose place in its table is known: encodes without looking it up, and tells what was decoded.
-#[derive(Debug, Default)]
+/// A table that notes the frequency of the symbol that was found in it.
 pub(super) struct Found<'a> {
-    pub(super) table: Option<&'a Table>,
-    pub(super) place: std::cell::Cell<Option<(u32, u32, NonZeroU32)>>,
+    table: &'a Table,
+    pub(super) frequency: Cell<NonZeroU32>,
+}
+
+impl<'a> Found<'a> {
+    pub(super) fn of(table: &'a Table) -> Self {
+        Self {
+            table,
+            frequency: Cell::new(NonZeroU32::MIN),
+        }
+    }
 }
 
 impl EntropyModel<PRECISION> for &Found<'_> {
@@ -173,17 +182,11 @@ impl EntropyModel<PRECISION> for &Found<'_> {
     type Probability = u32;
 }
 
-impl EncoderModel<PRECISION> for &Found<'_> {
-    fn left_cumulative_and_probability(&self, _: impl Borrow<u32>) -> Option<(u32, NonZeroU32)> {
-        self.place.get().map(|(_, left, frequency)| (left, frequency))
-    }
-}
-
 impl DecoderModel<PRECISION> for &Found<'_> {
     fn quantile_function(&self, quantile: u32) -> (u32, u32, NonZeroU32) {
-        let place = self.table.map_or((0, 0, NonZeroU32::MIN), |table| table.find(quantile));
-        self.place.set(Some(place));
-        place
+        let found = self.table.find(quantile);
+        self.frequency.set(found.2);
+        found
     }
 }
 

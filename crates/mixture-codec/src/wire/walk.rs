@@ -1,14 +1,14 @@
-//! The order and the laws of a message's numbers, walked alike by quantiser, encoder and decoder.
+//! The order and the laws of a message's numbers, walked alike by quantiser and decoder.
 
 use super::format::WireFormat;
-use super::range::{LARGEST, Law, Reader, Writer};
+use super::range::{Coder, LARGEST, Law, Reader};
 use fewbits_core::CodecError;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::factored::Factored;
 use nalgebra::{SMatrix, SVector};
 
-/// Where the integers of a message come from.
-pub(super) trait Symbols {
+/// Where the integers of a message come from. They are noted with their laws.
+pub(super) trait Source {
     /// The next integer under a law; `wanted` is the number to quantise, in steps, where there is one.
     fn next(&mut self, law: &Law, wanted: Option<f64>) -> Result<i64, CodecError>;
 }
@@ -16,10 +16,10 @@ pub(super) trait Symbols {
 /// Rounds wanted numbers.
 #[derive(Default)]
 pub(super) struct Quantiser {
-    pub(super) chosen: Vec<i64>,
+    pub(super) symbols: Vec<(Law, i64)>,
 }
 
-impl Symbols for Quantiser {
+impl Source for Quantiser {
     fn next(&mut self, law: &Law, wanted: Option<f64>) -> Result<i64, CodecError> {
         let rounded = wanted.map_or(f64::NAN, f64::round);
         let fits = match *law {
@@ -29,38 +29,21 @@ impl Symbols for Quantiser {
         if !fits {
             return Err(invalid("parameter in steps", rounded));
         }
-        self.chosen.push(rounded as i64);
+        self.symbols.push((*law, rounded as i64));
         Ok(rounded as i64)
     }
 }
 
-/// Encodes integers chosen before.
-pub(super) struct Replay<'a> {
-    pub(super) symbols: std::slice::Iter<'a, i64>,
-    pub(super) writer: Writer,
-}
-
-impl Symbols for Replay<'_> {
-    fn next(&mut self, law: &Law, _: Option<f64>) -> Result<i64, CodecError> {
-        let n = *self
-            .symbols
-            .next()
-            .ok_or_else(|| invalid("format", "another than the message's"))?;
-        self.writer.write(law, n)?;
-        Ok(n)
-    }
-}
-
 /// Decodes integers.
-pub(super) struct Source {
+pub(super) struct Decoder {
     pub(super) reader: Reader,
-    pub(super) read: Vec<i64>,
+    pub(super) symbols: Vec<(Law, i64)>,
 }
 
-impl Symbols for Source {
+impl Source for Decoder {
     fn next(&mut self, law: &Law, _: Option<f64>) -> Result<i64, CodecError> {
-        let n = self.reader.read(law)?;
-        self.read.push(n);
+        let n = self.reader.integer(law, None)?;
+        self.symbols.push((*law, n));
         Ok(n)
     }
 }
@@ -87,7 +70,7 @@ fn exp(x: f64) -> f64 {
 
 /// Walks through a message. With a target its numbers are offered for quantisation; without, they come from `symbols`.
 pub(super) fn walk<const D: usize>(
-    symbols: &mut impl Symbols,
+    symbols: &mut impl Source,
     format: &WireFormat<D>,
     target: Option<(&Mixture<D>, usize)>,
 ) -> Result<Mixture<D>, CodecError> {
@@ -218,7 +201,7 @@ impl Scales {
 
 /// A lower triangular factor: logarithms of its diagonal, then each row over its diagonal entry.
 fn cholesky<const D: usize>(
-    symbols: &mut impl Symbols,
+    symbols: &mut impl Source,
     wanted: Option<&SMatrix<f64, D, D>>,
     scales: &Scales,
 ) -> Result<SMatrix<f64, D, D>, CodecError> {
@@ -247,7 +230,7 @@ fn cholesky<const D: usize>(
 
 /// Weights in decreasing order by stick breaking.
 fn weights<const D: usize>(
-    symbols: &mut impl Symbols,
+    symbols: &mut impl Source,
     r: f64,
     k: usize,
     order: &[&Component<D>],

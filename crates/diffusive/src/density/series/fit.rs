@@ -1,7 +1,7 @@
 //! The best series for a belief over cells: the Galerkin projection of the root of its density.
 
-use super::{Lpg, Term};
 use super::basis::hermite_products;
+use super::{Lpg, Term};
 use crate::Error;
 use crate::density::Cells;
 use fewbits_core::columns::state_at;
@@ -61,7 +61,9 @@ impl<const D: usize> Lpg<D> {
             let parts = b.as_mut_slice().chunks_mut(belief.indices.len());
             for (term, part) in belief.terms.iter().zip(parts) {
                 if inner(&belief, term, i, *weight, &mut products) {
-                    part.iter_mut().zip(&products).for_each(|(sum, product)| *sum += product);
+                    part.iter_mut()
+                        .zip(&products)
+                        .for_each(|(sum, product)| *sum += product);
                 }
             }
         }

@@ -234,7 +234,6 @@ impl<const D: usize> Lpg<D> {
         self.covariance = second / mass - mean * mean.transpose();
         Ok(())
     }
-
 }
 
 impl<const D: usize> Term<D> {
