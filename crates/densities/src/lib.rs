@@ -70,5 +70,5 @@ pub use error::Error;
 pub use grids::{Grid, PlaneMass, PointMass};
 pub use kernel_estimate::{Bandwidth, KernelEstimate, Rule, SampleSize, Shape, add_cross_sums};
 pub use mixture::{Component, Mixture, ellipse};
-pub use particles::{Categorical, GaussianCloud, Particles};
+pub use particles::{Categorical, GaussianCloud, Particles, systematic};
 pub use {nalgebra, rand};

@@ -2,7 +2,7 @@
 
 use crate::SourceLikelihood;
 use crate::belief::SearchBox;
-use crate::density::CellTarget;
+use crate::density::{CellTarget, lattice, split};
 use crate::fit::Fit;
 use crate::target::Target;
 use nalgebra::Vector2;
@@ -20,42 +20,27 @@ const LEVELS: usize = 44;
 pub(crate) fn best_fit(target: &Target<'_>, likelihood: &SourceLikelihood, search: &SearchBox) -> Option<Fit> {
     let sides: [f64; 2] = std::array::from_fn(|d| search.upper[d] - search.lower[d]);
     let mut width = sides[0].max(sides[1]) / PER_AXIS as f64;
-    let counts = sides.map(|side| ((side / width - 1e-9).ceil() as usize).max(1));
-    let mut centres: Vec<[f64; 2]> = (0..counts[0] * counts[1])
-        .map(|i| {
-            let at = [i % counts[0], i / counts[0]];
-            std::array::from_fn(|d| search.lower[d] + width * (at[d] as f64 + 0.5))
-        })
-        .collect();
-    let mut best: Option<(f64, Vector2<f64>)> = None;
+    let most = PER_AXIS * PER_AXIS;
+    let mut centres = lattice(&search.lower, &search.upper, width, most).ok()?;
+    let mut best: Option<f64> = None;
     for _ in 0..LEVELS {
-        let columns = [0, 1].map(|d| centres.iter().map(|c| c[d]).collect::<Vec<f64>>());
-        let (mut logs, mut scores) = (vec![0.0; centres.len()], vec![0.0; centres.len()]);
-        target.evaluate(&columns.each_ref().map(Vec::as_slice), 0.5 * width, &mut logs, &mut scores);
-        let mut order: Vec<usize> = (0..centres.len()).filter(|i| scores[*i] > f64::NEG_INFINITY).collect();
+        let count = centres[0].len();
+        let (mut logs, mut scores) = (vec![0.0; count], vec![0.0; count]);
+        target.evaluate(&centres.each_ref().map(Vec::as_slice), 0.5 * width, &mut logs, &mut scores);
+        let mut order: Vec<usize> = (0..count).filter(|i| scores[*i] > f64::NEG_INFINITY).collect();
         order.sort_by(|a, b| scores[*b].total_cmp(&scores[*a]));
         order.truncate(KEPT);
         for i in &order {
-            let at = Vector2::from(centres[*i]);
+            let at = Vector2::new(centres[0][*i], centres[1][*i]);
             let sum = likelihood.chi_squared(&at);
-            if likelihood.admits(&at, 0.0) && best.is_none_or(|(least, _)| sum < least) {
-                best = Some((sum, at));
+            if likelihood.admits(&at, 0.0) && best.is_none_or(|least| sum < least) {
+                best = Some(sum);
             }
         }
-        let step = 0.25 * width;
-        let split = |i: &usize| {
-            let [x, y] = centres[*i];
-            [
-                [x - step, y - step],
-                [x + step, y - step],
-                [x - step, y + step],
-                [x + step, y + step],
-            ]
-        };
-        centres = order.iter().flat_map(split).collect();
+        centres = split(&centres, order.iter().copied(), 0.25 * width);
         width *= 0.5;
     }
-    best.map(|(chi_squared, _)| Fit {
+    best.map(|chi_squared| Fit {
         chi_squared,
         samples: likelihood.samples(),
     })

@@ -2,6 +2,7 @@
 
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
+use fewbits_densities::systematic;
 use fewbits_models::{Homogeneous, Receptor};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, finite, positive, refuse, within};
@@ -75,15 +76,7 @@ impl Envelope {
         let [x, y] = posterior.cells.columns();
         let weights = posterior.cells.weights();
         // Cells at equal steps of the cumulative weight, along the order in which the cells were split: near ones stand together.
-        let total: f64 = weights.iter().sum();
-        let count = weights.len().min(MOST);
-        let (mut order, mut cumulative) = (Vec::with_capacity(count), 0.0);
-        for (i, weight) in weights.iter().enumerate() {
-            cumulative += weight / total;
-            while order.len() < count && (order.len() as f64 + 0.5) / count as f64 <= cumulative {
-                order.push(i);
-            }
-        }
+        let order = systematic(weights, weights.len().min(MOST), 0.5);
         let mut points = Vec::with_capacity(order.len());
         let share = 1.0 / order.len().max(1) as f64;
         for i in order {
@@ -121,17 +114,6 @@ impl Envelope {
             });
         }
         Ok(Self { sensor, points })
-    }
-
-    /// The envelope at another height above the ground, m.
-    ///
-    /// # Errors
-    /// If it is negative or not finite.
-    pub fn at_height(self, height: f64) -> Result<Self, Error> {
-        Ok(Self {
-            sensor: self.sensor.clone().with_heights(self.sensor.source_height(), height)?,
-            ..self
-        })
     }
 
     /// `P(c > threshold)` (kg/m^3) at a place, `age` seconds after the release began: the posterior average of the probability that

@@ -181,20 +181,8 @@ pub(crate) fn half_log_det_plus_one(m: DMatrix<f64>) -> f64 {
     }
 }
 
-/// Fisher information that the samples of a node hold about (x, y, rate) of a source at `source` with release rate `rate`:
+/// Fisher information that the samples of a receptor hold about (x, y, rate) of a source at `source` with release rate `rate`:
 /// `sum_j grad(mu a_j) grad(mu a_j)' / sigma^2`.
-///
-/// # Errors
-/// If the model has no concentrations at `node`.
-pub fn fisher_information(
-    sensor: &SourceSensor,
-    node: &Vector2<f64>,
-    source: &Vector2<f64>,
-    rate: f64,
-) -> Result<Matrix3<f64>, Error> {
-    Ok(information_at(sensor, &sensor.receptor(node)?, source, rate))
-}
-
 pub(crate) fn information_at(
     sensor: &SourceSensor,
     receptor: &Receptor,
@@ -210,7 +198,7 @@ pub(crate) fn information_at(
     information
 }
 
-/// Parameters besides position and rate that [`fisher_information_of`] can treat as unknown.
+/// Parameters that [`fisher_information`] can treat as unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Unknown {
     /// Horizontal position, x.
@@ -232,7 +220,7 @@ pub enum Unknown {
 ///
 /// # Errors
 /// If the model has no concentrations at a node, or [`Error::NoDiffusivity`].
-pub fn fisher_information_of(
+pub fn fisher_information(
     unknowns: &[Unknown],
     sensor: &SourceSensor,
     nodes: &[Vector2<f64>],

@@ -162,29 +162,3 @@ impl Likelihood<2> for SourceLikelihood {
         total
     }
 }
-
-/// `ln p(samples | position, rate)`: the state is (x, y, rate).
-#[derive(Debug, Clone)]
-pub struct RateLikelihood {
-    records: Vec<Record>,
-}
-
-impl RateLikelihood {
-    /// The likelihood of the given records.
-    pub fn new(records: Vec<Record>) -> Self {
-        Self { records }
-    }
-}
-
-impl Likelihood<3> for RateLikelihood {
-    fn log_likelihood(&self, state: &SVector<f64, 3>) -> f64 {
-        let position = Vector2::new(state[0], state[1]);
-        if !self.records.iter().all(|record| record.sensor().admits(&position, 0.0)) {
-            return f64::NEG_INFINITY;
-        }
-        self.records
-            .iter()
-            .map(|record| record.sums(&position).log_given_rate(state[2]))
-            .sum()
-    }
-}

@@ -1,12 +1,7 @@
 //! Several models of the medium, of which one is right: winds or diffusivities on a small grid.
 
-use crate::belief::{Prior, SearchBox};
-use crate::density::CellOptions;
-use crate::posterior::Posterior;
-use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
-use fewbits_core::Gaussian;
+use crate::{Error, SourceSensor};
 use fewbits_numerics::error::{entries, probabilities, refuse};
-use nalgebra::Vector2;
 
 /// Sensors in several models of the medium, with the models' prior probabilities.
 ///
@@ -28,17 +23,6 @@ use nalgebra::Vector2;
 pub struct ModelGrid {
     sensors: Vec<SourceSensor>,
     weights: Vec<f64>,
-}
-
-/// Posterior of one model of the medium.
-#[derive(Debug, Clone)]
-pub struct ModelPosterior {
-    /// Posterior probability of the model.
-    pub probability: f64,
-    /// Logarithm of the integral of prior times likelihood; `-inf` if the model excludes the samples.
-    pub log_evidence: f64,
-    /// The position under this model; `None` if it excludes the samples.
-    pub posterior: Option<Posterior>,
 }
 
 impl ModelGrid {
@@ -90,51 +74,5 @@ impl ModelGrid {
     /// The models with their prior probabilities.
     pub fn iter(&self) -> impl Iterator<Item = (&SourceSensor, f64)> {
         self.sensors.iter().zip(self.weights.iter().copied())
-    }
-
-    /// Posterior of every model, and of the position under it, from the samples of several nodes.
-    ///
-    /// * `taken`: the place of each node and its samples, kg/m^3.
-    ///
-    /// # Errors
-    /// As [`SourceSensor::record`] and [`Posterior::new`]; [`fewbits_core::Error::Impossible`] if every model excludes the samples.
-    pub fn posterior(
-        &self,
-        prior: &Gaussian<2>,
-        taken: &[(Vector2<f64>, Vec<f64>)],
-        rate: RateModel,
-        search: &SearchBox,
-        options: &CellOptions,
-    ) -> Result<Vec<ModelPosterior>, Error> {
-        let mut all = Vec::with_capacity(self.len());
-        for sensor in &self.sensors {
-            let records = taken.iter().map(|(node, samples)| sensor.record(node, samples));
-            let likelihood = SourceLikelihood::new(records.collect::<Result<_, _>>()?, rate)?;
-            let posterior = match Posterior::new(&Prior::Exact(*prior), &likelihood, search, None, options) {
-                Ok(posterior) => Some(posterior),
-                Err(Error::Core(fewbits_core::Error::Impossible)) => None,
-                Err(other) => return Err(other),
-            };
-            all.push(ModelPosterior {
-                probability: 0.0,
-                log_evidence: posterior.as_ref().map_or(f64::NEG_INFINITY, |p| p.cells.log_evidence()),
-                posterior,
-            });
-        }
-        let logs = || {
-            all.iter()
-                .zip(&self.weights)
-                .map(|(model, prior)| prior.ln() + model.log_evidence)
-        };
-        let largest = logs().fold(f64::NEG_INFINITY, f64::max);
-        if largest == f64::NEG_INFINITY {
-            return Err(fewbits_core::Error::Impossible.into());
-        }
-        let weights: Vec<f64> = logs().map(|log| (log - largest).exp()).collect();
-        let total: f64 = weights.iter().sum();
-        all.iter_mut()
-            .zip(weights)
-            .for_each(|(model, weight)| model.probability = weight / total);
-        Ok(all)
     }
 }

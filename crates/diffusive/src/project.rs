@@ -6,7 +6,7 @@ use crate::density::{Clumps, Lpg, MixtureFit};
 use crate::posterior::Posterior;
 use crate::{Error, RateModel};
 use fewbits_core::Gaussian;
-use fewbits_densities::{Component, Mixture};
+use fewbits_densities::{Component, Mixture, systematic};
 use fewbits_numerics::error::{at_least_one, refuse};
 use serde::{Deserialize, Serialize};
 
@@ -172,18 +172,10 @@ fn particles(posterior: &Posterior, count: usize) -> Result<Travelling, Error> {
     // The normal-reference width in the plane.
     let h2 = (count as f64).powf(-1.0 / 3.0);
     let shrink = (1.0 - h2).max(0.0).sqrt();
-    let mut chosen = Vec::with_capacity(count);
-    let mut level = 0.5 / count as f64;
-    let mut total = 0.0;
-    for clump in clumps.clumps() {
-        total += clump.weight;
-        while level < total && chosen.len() < count {
-            chosen.push(clump.mean);
-            level += 1.0 / count as f64;
-        }
-    }
-    let parts = chosen
-        .into_iter()
-        .map(|x| Component::new(1.0, g.mean() + (x - g.mean()) * shrink, g.covariance() * h2));
+    let weights: Vec<f64> = clumps.clumps().iter().map(|c| c.weight).collect();
+    let parts = systematic(&weights, count, 0.5).into_iter().map(|i| {
+        let x = clumps.clumps()[i].mean;
+        Component::new(1.0, g.mean() + (x - g.mean()) * shrink, g.covariance() * h2)
+    });
     Ok(position(Mixture::new(parts.collect::<Result<_, _>>()?)?))
 }

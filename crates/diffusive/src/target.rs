@@ -14,6 +14,8 @@ struct Lobe {
     log_scale: f64,
     mean: Vector2<f64>,
     covariance: Matrix2<f64>,
+    /// Inverse covariance, as (xx, xy, yy).
+    precision: [f64; 3],
 }
 
 impl Lobe {
@@ -22,16 +24,22 @@ impl Lobe {
             log_scale: weight.ln() - 0.5 * covariance.determinant().ln() - std::f64::consts::TAU.ln(),
             mean,
             covariance,
+            precision: precision(&covariance, 0.0),
         }
     }
 
-    /// Inverse covariance with `extra` on the diagonal, as (xx, xy, yy).
-    fn precision(&self, extra: f64) -> [f64; 3] {
-        let c = &self.covariance;
-        let (a, b, d) = (c[(0, 0)] + extra, c[(0, 1)], c[(1, 1)] + extra);
-        let determinant = a * d - b * b;
-        [d / determinant, -b / determinant, a / determinant]
+    /// Log density, the variances raised if another precision than its own is given.
+    #[inline]
+    fn log_at(&self, precision: &[f64; 3], offset: &Vector2<f64>) -> f64 {
+        self.log_scale - 0.5 * quadratic(precision, offset)
     }
+}
+
+/// Inverse of a covariance with `extra` on the diagonal, as (xx, xy, yy).
+fn precision(c: &Matrix2<f64>, extra: f64) -> [f64; 3] {
+    let (a, b, d) = (c[(0, 0)] + extra, c[(0, 1)], c[(1, 1)] + extra);
+    let determinant = a * d - b * b;
+    [d / determinant, -b / determinant, a / determinant]
 }
 
 #[inline]
@@ -77,7 +85,7 @@ impl<'a> Target<'a> {
                     let position = s.fixed_view::<2, 2>(0, 0).into_owned();
                     let cross = Vector2::new(s[(2, 0)], s[(2, 1)]);
                     let lobe = Lobe::new(c.weight(), Vector2::new(c.mean()[0], c.mean()[1]), position);
-                    let p = lobe.precision(0.0);
+                    let p = lobe.precision;
                     let gain = Vector2::new(p[0] * cross.x + p[1] * cross.y, p[1] * cross.x + p[2] * cross.y);
                     // A Cholesky factor exists, so that the Schur complement is positive; rounding may bring it to zero.
                     let variance = (s[(2, 2)] - gain.dot(&cross)).max(1e-14 * s[(2, 2)]);
@@ -107,12 +115,10 @@ impl<'a> Target<'a> {
         if matches!(self.prior, Prior::Exact(_)) || self.lobes.is_empty() {
             return (0.0, 0);
         }
-        let precisions: Vec<[f64; 3]> = self.lobes.iter().map(|lobe| lobe.precision(0.0)).collect();
         let [x, y] = cells.columns();
         let at = |i: usize| {
-            let distances = self.lobes.iter().zip(&precisions);
-            let distances = distances.map(|(lobe, p)| quadratic(p, &(Vector2::new(x[i], y[i]) - lobe.mean)));
-            distances.fold(f64::INFINITY, f64::min)
+            let distance = |lobe: &Lobe| quadratic(&lobe.precision, &(Vector2::new(x[i], y[i]) - lobe.mean));
+            self.lobes.iter().map(distance).fold(f64::INFINITY, f64::min)
         };
         let sum = cells
             .weights()
@@ -167,7 +173,7 @@ impl<'a> Target<'a> {
         let middle = range.middle();
         for (lobe, given) in self.lobes.iter().zip(&self.conditionals) {
             let d = at - lobe.mean;
-            let log = lobe.log_scale - 0.5 * quadratic(&lobe.precision(0.0), &d);
+            let log = lobe.log_at(&lobe.precision, &d);
             let (evidence, mean, variance) = updated(given, &d, [sums.response, sums.correlation, sums.energy]);
             // The evidence is at most zero, and the cut takes more off.
             if log + evidence < best - FAINT {
@@ -223,7 +229,7 @@ impl CellTarget<2> for Target<'_> {
         let precisions: Vec<[[f64; 3]; 2]> = self
             .lobes
             .iter()
-            .map(|l| [l.precision(0.0), l.precision(extra)])
+            .map(|l| [l.precision, precision(&l.covariance, extra)])
             .collect();
         // Cells that score far below the best so far will be dropped: their log density need not be exact.
         let mut floor = f64::NEG_INFINITY;
@@ -340,7 +346,7 @@ impl Target<'_> {
         out: &mut [f64],
     ) {
         let mut intervals = Intervals::default();
-        let own = |k: usize, d: &Vector2<f64>| self.lobes[k].log_scale - 0.5 * quadratic(&precisions[k][which], d);
+        let own = |k: usize, d: &Vector2<f64>| self.lobes[k].log_at(&precisions[k][which], d);
         let term = |k: usize, d: &Vector2<f64>, cell: usize, place: usize, intervals: &mut Intervals| {
             let (log, mean, variance) = updated(&self.conditionals[k], d, sums[cell]);
             intervals.push(place, ends_about(mean, variance, range));
@@ -392,7 +398,7 @@ fn log_mixture(lobes: &[Lobe], precisions: &[[[f64; 3]; 2]], at: &Vector2<f64>) 
     for (lobe, precision) in lobes.iter().zip(precisions) {
         let d = at - lobe.mean;
         for (result, p) in results.iter_mut().zip(precision) {
-            result.add(lobe.log_scale - 0.5 * quadratic(p, &d));
+            result.add(lobe.log_at(p, &d));
         }
     }
     (results[0].value(), results[1].value())

@@ -8,8 +8,7 @@ pub use sums::add_cross_sums;
 
 use crate::Error;
 use crate::mixture::{Component, Mixture};
-use crate::particles::Particles;
-use crate::particles::weights::systematic;
+use crate::particles::{Particles, systematic};
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::factored::Factored;
@@ -203,7 +202,7 @@ impl<const D: usize> KernelEstimate<D> {
     /// If `count` is 0.
     pub fn sample_systematic<R: Rng + ?Sized>(&self, rng: &mut R, count: usize) -> Result<Particles<D>, Error> {
         at_least_one("count", count)?;
-        let mut chosen = systematic(rng, self.particles.weights(), count).into_iter();
+        let mut chosen = systematic(self.particles.weights(), count, rng.random()).into_iter();
         let columns = self.particles.columns();
         Particles::from_draws(count, || {
             let i = chosen.next().unwrap_or(0);

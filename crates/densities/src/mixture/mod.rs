@@ -7,8 +7,7 @@ pub use component::Component;
 pub use ellipse::ellipse;
 
 use crate::Error;
-use crate::particles::Particles;
-use crate::particles::weights::systematic;
+use crate::particles::{Particles, systematic};
 use fewbits_core::{Belief, Columns, ColumnsMut, Density, Gaussian};
 use fewbits_numerics::LogSum;
 use fewbits_numerics::error::{at_least_one, entries, refuse};
@@ -146,7 +145,7 @@ impl<const D: usize> Mixture<D> {
     pub fn sample_systematic<R: Rng + ?Sized>(&self, rng: &mut R, count: usize) -> Result<Particles<D>, Error> {
         at_least_one("count", count)?;
         let weights: Vec<f64> = self.components.iter().map(Component::weight).collect();
-        let mut chosen = systematic(rng, &weights, count).into_iter();
+        let mut chosen = systematic(&weights, count, rng.random()).into_iter();
         Particles::from_draws(count, || self.components[chosen.next().unwrap_or(0)].draw(rng))
     }
 

@@ -5,7 +5,7 @@ mod stored;
 pub(crate) mod weights;
 
 pub use gaussian_cloud::GaussianCloud;
-pub use weights::Categorical;
+pub use weights::{Categorical, systematic};
 
 use crate::Error;
 use fewbits_core::{Belief, Columns, ColumnsMut};

@@ -39,9 +39,9 @@ impl Categorical {
     }
 }
 
-/// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i / sum w` times, rounded up or down.
-pub(crate) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<usize> {
-    let offset: f64 = rng.random();
+/// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i / sum w` times, rounded up or down. The first
+/// draw is at `offset` steps of the cumulative weight: uniform between 0 and 1 for a draw, 1/2 for a selection.
+pub fn systematic(weights: &[f64], count: usize, offset: f64) -> Vec<usize> {
     let total: f64 = sum(weights);
     let (mut i, mut cumulative) = (0, weights.first().copied().unwrap_or(0.0));
     let next = |k: usize| {

@@ -143,7 +143,8 @@ impl<const D: usize> Cells<D> {
             if kept << D > options.most_cells {
                 return Err(Error::Unresolved { cells: kept << D });
             }
-            centres = split(&centres, &scores, threshold, 0.25 * width, kept);
+            let kept = (0..scores.len()).filter(|i| scores[*i] > threshold);
+            centres = split(&centres, kept, 0.25 * width);
             width *= 0.5;
         }
         Err(Error::Unresolved {
@@ -280,7 +281,8 @@ impl<const D: usize> Density<D> for Cells<D> {
     }
 }
 
-fn lattice<const D: usize>(
+/// The centres of cells of the given width that cover a box.
+pub(crate) fn lattice<const D: usize>(
     lower: &[f64; D],
     upper: &[f64; D],
     width: f64,
@@ -306,21 +308,18 @@ fn lattice<const D: usize>(
     Ok(columns)
 }
 
-fn split<const D: usize>(
+/// The centres of the `2^D` parts of each of the given cells, a step from its own.
+pub(crate) fn split<const D: usize>(
     centres: &[Vec<f64>; D],
-    scores: &[f64],
-    threshold: f64,
+    cells: impl Iterator<Item = usize> + Clone,
     step: f64,
-    kept: usize,
 ) -> [Vec<f64>; D] {
     std::array::from_fn(|d| {
-        let mut column = Vec::with_capacity(kept << D);
-        for (x, score) in centres[d].iter().zip(scores) {
-            if *score > threshold {
-                column.extend((0..1_usize << D).map(|child| if child >> d & 1 == 0 { x - step } else { x + step }));
-            }
-        }
-        column
+        let parts = |i: usize| {
+            let x = centres[d][i];
+            (0..1_usize << D).map(move |part| if part >> d & 1 == 0 { x - step } else { x + step })
+        };
+        cells.clone().flat_map(parts).collect()
     })
 }
 

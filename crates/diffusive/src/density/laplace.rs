@@ -13,6 +13,10 @@ const STEPS: usize = 100;
 /// The search ends when the predicted gain of a step falls below this, in nats.
 const SETTLED: f64 = 1e-13;
 
+fn no_peak<T>(reason: &'static str) -> Result<T, Error> {
+    Err(Error::NoPeak { reason })
+}
+
 /// The peak of a log density and the curvature there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak<const D: usize> {
@@ -51,9 +55,7 @@ impl<const D: usize> Peak<D> {
         for _ in 0..STEPS {
             let (gradient, hessian) = derivatives(log_density, &x, height, &(extent * STEP));
             let Some((step, definite)) = ascent(&gradient, &hessian, &extent) else {
-                return Err(Error::NoPeak {
-                    reason: "a derivative is not finite",
-                });
+                return no_peak("a derivative is not finite");
             };
             let gain = 0.5 * gradient.dot(&step);
             if definite && gain < SETTLED.max(1e-15 * height.abs()) {
@@ -69,19 +71,13 @@ impl<const D: usize> Peak<D> {
             match climbed {
                 Some((next, level)) => (x, height) = (next, level),
                 None if definite && gain < 1e-6 => return Self::at(log_density, x, height, extent),
-                None => {
-                    return Err(Error::NoPeak {
-                        reason: "no step leads upwards",
-                    });
-                }
+                None => return no_peak("no step leads upwards"),
             }
             if definite && let Some(inverse) = (-hessian).cholesky() {
                 extent = inverse.inverse().diagonal().map(f64::sqrt);
             }
         }
-        Err(Error::NoPeak {
-            reason: "the search did not settle",
-        })
+        no_peak("the search did not settle")
     }
 
     fn at(
@@ -98,9 +94,7 @@ impl<const D: usize> Peak<D> {
                 covariance: factor.inverse(),
                 half_log_curvature: factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum(),
             }),
-            None => Err(Error::NoPeak {
-                reason: "the Hessian is not negative definite",
-            }),
+            None => no_peak("the Hessian is not negative definite"),
         }
     }
 
@@ -131,9 +125,7 @@ pub fn cumulant_laplace<const D: usize>(
 ) -> Result<Gaussian<D>, Error> {
     let centre = Peak::climb(log_density, start, scale)?;
     let Some(factor) = centre.covariance.cholesky() else {
-        return Err(Error::NoPeak {
-            reason: "the curvature is singular",
-        });
+        return no_peak("the curvature is singular");
     };
     // In coordinates y with x = mode + L y the posterior is near a standard normal and tilts of size STEP are alike everywhere.
     let lower = factor.l();
@@ -161,9 +153,7 @@ pub fn cumulant_laplace<const D: usize>(
         }
     }
     if covariance.cholesky().is_none() {
-        return Err(Error::NoPeak {
-            reason: "the cumulants are no covariance",
-        });
+        return no_peak("the cumulants are no covariance");
     }
     Ok(Gaussian::from_trusted_parts(centre.mode + lower * mean, lower * covariance * lower.transpose()))
 }

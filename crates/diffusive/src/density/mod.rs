@@ -16,6 +16,7 @@ mod mixture_fit;
 mod series;
 
 pub use cells::{CellOptions, CellTarget, Cells};
+pub(crate) use cells::{lattice, split};
 pub use clumps::{Clump, Clumps};
 pub use mixture_fit::MixtureFit;
 pub use series::{Lpg, LpgFit, Slice, SliceMoments, polynomials};

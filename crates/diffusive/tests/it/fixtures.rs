@@ -5,7 +5,7 @@ use fewbits_core::{Belief, Gaussian, Likelihood};
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::density::laplace::{Peak, cumulant_laplace};
 use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite, multi_indices};
-use fewbits_diffusive::information::{Predictions, fisher_information};
+use fewbits_diffusive::information::{Predictions, Unknown, fisher_information};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, RateSums, SearchBox, SourceLikelihood, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -189,9 +189,9 @@ fn fisher() {
     for e in entries("fim") {
         let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Impermeable).unwrap();
         let sensor = SourceSensor::new(air, list(&e["inputs"]["t"]), number(&e, "sigma")).unwrap();
-        let got =
-            fisher_information(&sensor, &point(&e["inputs"]["node"]), &point(&e["inputs"]["source"]), number(&e, "mu"))
-                .unwrap();
+        let (node, source) = (point(&e["inputs"]["node"]), point(&e["inputs"]["source"]));
+        let unknowns = [Unknown::X, Unknown::Y, Unknown::Rate];
+        let got = fisher_information(&unknowns, &sensor, &[node], &source, number(&e, "mu")).unwrap();
         check(&e, got.as_slice());
     }
 }

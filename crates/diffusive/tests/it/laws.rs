@@ -5,8 +5,8 @@ use fewbits_core::laws::likelihood::sweep_is_scalar;
 use fewbits_core::{Belief, Density, Gaussian, Likelihood, laws};
 use fewbits_diffusive::density::{CellOptions, Lpg};
 use fewbits_diffusive::{
-    Form, JointBelief, PositionBelief, Posterior, Prior, RateLikelihood, RateModel, RateRange, RateSums,
-    SourceLikelihood, SourceSensor, Travelling, project,
+    Form, JointBelief, PositionBelief, Posterior, Prior, RateModel, RateRange, RateSums, SourceLikelihood,
+    SourceSensor, Travelling, project,
 };
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_numerics::quadrature::Rule;
@@ -63,12 +63,6 @@ fn likelihoods_are_numbers_everywhere() {
                 .collect();
             sweep_is_scalar(&likelihood(rate, 1.0, windy, 3), &states).unwrap();
         }
-        let with_rate = RateLikelihood::new(likelihood(joint(), 1.0, windy, 3).records().to_vec());
-        let states: Vec<Vector3<f64>> = places
-            .iter()
-            .flat_map(|x| [0.0, 1.0, 1e6].map(|mu| Vector3::new(*x, 50.0, mu)))
-            .collect();
-        sweep_is_scalar(&with_rate, &states).unwrap();
     }
 }
 

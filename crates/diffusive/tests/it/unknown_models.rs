@@ -1,13 +1,11 @@
 //! Wind and diffusivity known up to a few models.
 
 use super::{field, joint, sensor};
-use fewbits_core::Gaussian;
-use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{Form, ModelGrid, Posterior, Prior, Search, SourceLikelihood, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
-use nalgebra::{Matrix2, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
 const SOURCE: [f64; 2] = [62.0, 50.0];
 
@@ -25,44 +23,41 @@ fn candidates() -> ModelGrid {
 }
 
 #[test]
-fn evidence_of_the_grid_is_bayes() {
+fn probabilities_of_models_are_bayes() {
     let mut rng = Stream::new(7).rng();
-    let prior = Gaussian::new(Vector2::new(50.0, 54.0), Matrix2::identity() * 2500.0).unwrap();
-    let taken: Vec<(Vector2<f64>, Vec<f64>)> = [[50.0, 54.0], [40.0, 40.0]]
-        .map(|node| {
-            let node = Vector2::from(node);
-            (
-                node,
-                with(40.0, 3.0)
-                    .sample(&mut rng, &node, &Vector2::from(SOURCE), 1.0)
-                    .unwrap(),
-            )
-        })
-        .to_vec();
+    let nodes = [[50.0, 54.0], [40.0, 40.0]].map(Vector2::from);
+    let taken = nodes.map(|node| {
+        let samples = with(40.0, 3.0).sample(&mut rng, &node, &Vector2::from(SOURCE), 1.0);
+        samples.unwrap()
+    });
     let weights = [0.1, 0.2, 0.3, 0.2, 0.2];
     let sensors: Vec<SourceSensor> = candidates().iter().map(|(s, _)| s.clone()).collect();
     let grid = ModelGrid::new(sensors.clone(), &weights).unwrap();
-    let options = CellOptions::default();
-    let found = grid.posterior(&prior, &taken, joint(), &field(1.0), &options).unwrap();
+    let mut search = Search::new(&nodes[0], 50.0, field(1.0), joint(), 1e-300).unwrap();
+    search.most_nodes = 2;
+    let deployed = Deployment::given(nodes.to_vec()).unwrap();
+    let graph = Graph::within(deployed.positions(), 30.0).unwrap();
+    let found = search.run_models(&grid, &deployed, &graph, 0, |node| Ok(taken[node].clone()));
+    let found = found.unwrap().models;
     let evidences: Vec<f64> = sensors
         .iter()
         .map(|sensor| {
-            let records = taken
-                .iter()
-                .map(|(node, samples)| sensor.record(node, samples).unwrap());
-            let likelihood = SourceLikelihood::new(records.collect(), joint()).unwrap();
-            Posterior::new(&Prior::Exact(prior), &likelihood, &field(1.0), None, &options)
-                .unwrap()
-                .cells
-                .log_evidence()
+            let records: Vec<_> = (0..2).map(|i| sensor.record(&nodes[i], &taken[i]).unwrap()).collect();
+            let posterior = |count: usize, near| {
+                let likelihood = SourceLikelihood::new(records[..count].to_vec(), joint()).unwrap();
+                let prior = Prior::Exact(search.prior);
+                Posterior::new(&prior, &likelihood, &field(1.0), near, &search.cells).unwrap()
+            };
+            let near = posterior(1, None).around(&field(1.0));
+            posterior(2, Some(near)).cells.log_evidence()
         })
         .collect();
     let total: f64 = (0..5).map(|i| weights[i] * (evidences[i] - evidences[1]).exp()).sum();
     for i in 0..5 {
         let expected = weights[i] * (evidences[i] - evidences[1]).exp() / total;
-        assert!((found[i].probability - expected).abs() < 1e-9, "{i}: {} {expected}", found[i].probability);
+        assert!((found[i] - expected).abs() < 1e-9, "{i}: {} {expected}", found[i]);
     }
-    assert!((found.iter().map(|m| m.probability).sum::<f64>() - 1.0).abs() < 1e-12);
+    assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12);
 }
 
 fn search(

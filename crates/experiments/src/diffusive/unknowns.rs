@@ -4,7 +4,7 @@ use super::common::{B, Settings, search_box};
 use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian};
 use fewbits_diffusive::density::CellOptions;
-use fewbits_diffusive::information::{Unknown, fisher_information_of};
+use fewbits_diffusive::information::{Unknown, fisher_information};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
 use nalgebra::{Matrix2, Vector2};
 use rand::RngExt;
@@ -86,7 +86,7 @@ impl Figure for Unknowns {
             ("+ bias", Some(Unknown::Bias)),
         ] {
             unknowns.extend(next);
-            let information = fisher_information_of(&unknowns, &sensor, &nodes, &source, 1.0)?;
+            let information = fisher_information(&unknowns, &sensor, &nodes, &source, 1.0)?;
             // Rows of very different units: factor with the diagonal scaled to one.
             let scale = information.diagonal().map(|d| d.sqrt().recip());
             let scaled = nalgebra::DMatrix::from_fn(unknowns.len(), unknowns.len(), |i, j| {
