@@ -69,6 +69,6 @@ mod particles;
 pub use error::Error;
 pub use grids::{Grid, PlaneMass, PointMass};
 pub use kernel_estimate::{Bandwidth, KernelEstimate, Rule, SampleSize, Shape, add_cross_sums};
-pub use mixture::{Component, Mixture, ellipse};
+pub use mixture::{Component, Mixture, ellipse, moment_matched};
 pub use particles::{Categorical, GaussianCloud, Particles, systematic};
 pub use {nalgebra, rand};

@@ -106,7 +106,7 @@ impl SourceLikelihood {
 
     /// Over a run of cells of the given half width: writes the log likelihood blurred over each cell to `blurred`. Where that plus
     /// `priors` exceeds `floor`, or the largest of them less `dropped`, writes the log likelihood itself to `logs`; elsewhere the
-    /// blurred one stands for both.
+    /// blurred one stands for both if one rate is shared by all samples.
     pub(crate) fn blurred(
         &self,
         centres: &Columns<'_, 2>,
@@ -132,7 +132,11 @@ impl SourceLikelihood {
             .iter()
             .zip(priors)
             .fold(f64::NEG_INFINITY, |best, (b, p)| best.max(b + p));
-        let floor = floor.max(best - dropped);
+        // Where the rate is known or redrawn, the log likelihood is written everywhere.
+        let floor = match self.rate {
+            RateModel::Joint(_) => floor.max(best - dropped),
+            _ => f64::NEG_INFINITY,
+        };
         let each = groups.len().div_ceil(logs.len().max(1));
         for (i, groups) in groups.chunks(each.max(1)).enumerate() {
             if blurred[i] + priors[i] < floor {

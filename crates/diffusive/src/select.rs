@@ -137,7 +137,7 @@ impl Selector {
         for clump in self.clumps.clumps() {
             information += information_at(sensor, receptor, &place(clump), clump.mean[2]) * clump.weight;
         }
-        let covariance = self.clumps.covariance();
+        let covariance = *self.clumps.gaussian().covariance();
         if covariance[(2, 2)] > 0.0 {
             let Some(prior) = covariance.cholesky() else {
                 return f64::NEG_INFINITY;
@@ -155,7 +155,7 @@ impl Selector {
 
     /// Determinant of the covariance of the position after the samples that the estimate predicts.
     fn covariance(&self, sensor: &SourceSensor, receptor: &Receptor) -> f64 {
-        let predicted = self.predicted(sensor, receptor, self.estimate.mean()) * self.clumps.mean()[2];
+        let predicted = self.predicted(sensor, receptor, self.estimate.mean()) * self.clumps.gaussian().mean()[2];
         let mut logs = Vec::with_capacity(self.clumps.clumps().len());
         for clump in self.clumps.clumps() {
             let a = self.predicted(sensor, receptor, &place(clump));
@@ -167,8 +167,9 @@ impl Selector {
         }
         let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = logs.iter().map(|log| (log - best).exp()).collect();
-        let covariance = self.clumps.reweighted(&weights).covariance();
-        covariance.fixed_view::<2, 2>(0, 0).determinant().max(f64::MIN_POSITIVE)
+        let after = self.clumps.reweighted(&weights).gaussian();
+        let position = after.covariance().fixed_view::<2, 2>(0, 0);
+        position.determinant().max(f64::MIN_POSITIVE)
     }
 }
 

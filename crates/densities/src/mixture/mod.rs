@@ -85,19 +85,12 @@ impl<const D: usize> Mixture<D> {
 
     /// Covariance: within the components plus between their means.
     pub fn covariance(&self) -> SMatrix<f64, D, D> {
-        let mean = self.mean();
-        self.components
-            .iter()
-            .map(|c| {
-                let d = c.mean() - mean;
-                (c.covariance() + d * d.transpose()) * c.weight
-            })
-            .sum()
+        *self.moment_matched().covariance()
     }
 
     /// The Gaussian of the same mean and covariance.
     pub fn moment_matched(&self) -> Gaussian<D> {
-        Gaussian::from_trusted_parts(self.mean(), self.covariance())
+        moment_matched(self.components.iter().map(|c| (c.weight, *c.mean(), *c.covariance())))
     }
 
     /// `ln p(x)`; finite wherever `x` is finite and not astronomically far away, never NaN.
@@ -182,6 +175,19 @@ impl<const D: usize> Mixture<D> {
             .map(|c| Component::new(c.weight, matrix * c.mean() + shift, matrix * c.covariance() * matrix.transpose()));
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
+}
+
+/// The Gaussian of the mean and covariance of a mixture, whose parts are given by weight, mean and covariance. The weights sum to one;
+/// covariances may be singular.
+pub fn moment_matched<const D: usize>(
+    parts: impl Iterator<Item = (f64, SVector<f64, D>, SMatrix<f64, D, D>)> + Clone,
+) -> Gaussian<D> {
+    let mean: SVector<f64, D> = parts.clone().map(|(weight, mean, _)| mean * weight).sum();
+    let covariance = parts.map(|(weight, own, covariance)| {
+        let d = own - mean;
+        (covariance + d * d.transpose()) * weight
+    });
+    Gaussian::from_trusted_parts(mean, covariance.sum())
 }
 
 /// Writes `ln sum exp` over the rows of `terms` (each [`BLOCK`] long) to `out`; `-inf` where every row is.

@@ -4,8 +4,8 @@ use crate::fit::Fit;
 use crate::posterior::Posterior;
 use crate::{Record, SourceSensor};
 use fewbits_core::{Belief, Gaussian};
+use fewbits_densities::moment_matched;
 use fewbits_numerics::LogSum;
-use nalgebra::Vector2;
 
 /// Models this many nats below the best are not looked at again.
 pub(super) const EXCLUDED: f64 = 30.0;
@@ -53,16 +53,11 @@ pub(super) fn most_probable(alternatives: &[Alternative]) -> usize {
 
 /// Mean and covariance of the position under all models.
 pub(super) fn mixed(alternatives: &[Alternative]) -> Gaussian<2> {
-    let parts = || {
-        let held = alternatives.iter().filter(|a| a.probability > 0.0);
-        held.filter_map(|a| Some((a.probability, &a.posterior.as_ref()?.cells)))
-    };
-    let mean: Vector2<f64> = parts().map(|(p, cells)| cells.mean() * p).sum();
-    let covariance = parts().map(|(p, cells)| {
-        let d = cells.mean() - mean;
-        (cells.covariance() + d * d.transpose()) * p
-    });
-    Gaussian::from_trusted_parts(mean, covariance.sum())
+    let held = alternatives.iter().filter(|a| a.probability > 0.0);
+    moment_matched(held.filter_map(|a| {
+        let cells = &a.posterior.as_ref()?.cells;
+        Some((a.probability, cells.mean(), cells.covariance()))
+    }))
 }
 
 /// How the samples fit under all models.

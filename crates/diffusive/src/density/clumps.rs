@@ -1,7 +1,8 @@
 //! A weighted cloud summed up by a few clumps.
 
 use crate::Error;
-use fewbits_core::Columns;
+use fewbits_core::{Columns, Gaussian};
+use fewbits_densities::moment_matched;
 use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use nalgebra::{SMatrix, SVector};
 
@@ -105,21 +106,9 @@ impl<const D: usize> Clumps<D> {
         other
     }
 
-    /// Mean of the whole.
-    pub fn mean(&self) -> SVector<f64, D> {
-        self.clumps.iter().map(|c| c.mean * c.weight).sum()
-    }
-
-    /// Covariance of the whole.
-    pub fn covariance(&self) -> SMatrix<f64, D, D> {
-        let mean = self.mean();
-        self.clumps
-            .iter()
-            .map(|c| {
-                let d = c.mean - mean;
-                (c.covariance + d * d.transpose()) * c.weight
-            })
-            .sum()
+    /// Mean and covariance of the whole.
+    pub fn gaussian(&self) -> Gaussian<D> {
+        moment_matched(self.clumps.iter().map(|c| (c.weight, c.mean, c.covariance)))
     }
 
     /// Sets the least variance of fitted components along each coordinate: what the points resolve. Zero sets none.

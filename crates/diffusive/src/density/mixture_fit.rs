@@ -58,7 +58,7 @@ impl<const D: usize> Clumps<D> {
     /// # Errors
     /// If the whole has no spread in some direction.
     pub fn fit(&self, options: &MixtureFit) -> Result<Mixture<D>, Error> {
-        let whole = self.covariance();
+        let whole = *self.gaussian().covariance();
         let mut components = self.start(options.components);
         loop {
             let fitted = self.improve(components, &whole, options);
@@ -330,7 +330,7 @@ mod tests {
         let one = fitted(1.0);
         assert!(
             one.len() == 1
-                && (one.mean() - clumps.mean())
+                && (one.mean() - clumps.gaussian().mean())
                     .component_div(&SVector::from([1.0, 1e3]))
                     .amax()
                     < 1e-12

@@ -229,14 +229,6 @@ mod tests {
         assert_eq!((phi(0.0), phi(f64::INFINITY)), (0.0, f64::INFINITY));
     }
 
-    #[test]
-    fn the_printed_chain_fails_on_a_coin_and_the_corrected_one_holds() {
-        let (p0, p1, p2) = ([0.6, 0.4], [0.5, 0.5], [0.49, 0.51]);
-        let truth = discrete(&p0, &p2).unwrap().kl;
-        assert!(kl_chain_printed(&p0, &p1, &p2).unwrap() < truth);
-        assert!(kl_chain_corrected(&p0, &p1, &p2).unwrap() >= truth);
-    }
-
     /// Erratum `handoff-10`.
     #[test]
     fn missing_mass_is_infinite_and_common_zeros_are_nothing() {

@@ -263,9 +263,5 @@ fn leaves<const D: usize>(tree: &Tree<D>) -> Cut {
 }
 
 fn check<const D: usize>(tree: &Tree<D>, errors: &NodeErrors) -> Result<(), Error> {
-    if errors.values.len() == tree.nodes().len() {
-        return Ok(());
-    }
-    let expected = format!("errors of {} nodes", tree.nodes().len());
-    refuse("errors", format!("errors of {} nodes", errors.values.len()), expected)
+    Ok(entries("errors", errors.values.len(), tree.nodes().len())?)
 }

@@ -1,7 +1,7 @@
 //! The format that both ends of a link agree on beforehand.
 
 use crate::Error;
-use fewbits_numerics::error::{all_finite, entries, positive, refuse};
+use fewbits_numerics::error::{all_finite, positive, refuse, within};
 use fewbits_numerics::stored;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -31,7 +31,7 @@ impl<const D: usize> WireFormat<D> {
             return refuse("resolutions", format!("{} numbers", resolutions.len()), "1 to 16");
         }
         for r in resolutions {
-            fewbits_numerics::error::within("resolutions", *r, 1e-4, 4.0)?;
+            within("resolutions", *r, 1e-4, 4.0)?;
         }
         Ok(Self {
             centre,
@@ -57,14 +57,11 @@ impl<const D: usize> WireFormat<D> {
 
 stored! { [const D: usize] WireFormat as StoredFormat |format| {
     #[serde(with = "fewbits_numerics::stored")]
-    centre: Vec<f64> = format.centre.as_slice().to_vec(),
+    centre: SVector<f64, D> = format.centre,
     #[serde(with = "fewbits_numerics::stored")]
     half_width: f64 = format.half_width,
     #[serde(with = "fewbits_numerics::stored")]
     unit: f64 = format.unit,
     #[serde(with = "fewbits_numerics::stored")]
     resolutions: Vec<f64> = format.resolutions,
-} => {
-    entries("centre", centre.len(), D)?;
-    WireFormat::new(SVector::from_fn(|i, _| centre[i]), half_width, unit, &resolutions)
-}, Error }
+} => WireFormat::new(centre, half_width, unit, &resolutions), Error }
