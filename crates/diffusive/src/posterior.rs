@@ -68,7 +68,7 @@ impl Posterior {
     pub fn clumps(&self, count: usize) -> Result<Clumps<2>, Error> {
         let clumps = Clumps::new(&self.cells.columns(), &[&[], &[]], self.cells.weights(), count)?;
         let least = self.least_variance();
-        Ok(clumps.with_least_variances(Vector2::new(least, least))?)
+        clumps.with_least_variances(Vector2::new(least, least))
     }
 
     /// Position and rate as clumps; a known rate has no spread.
@@ -87,7 +87,7 @@ impl Posterior {
         };
         let clumps = Clumps::new(&[x, y, mean], &[&[], &[], spread], self.cells.weights(), count)?;
         let least = self.least_variance();
-        Ok(clumps.with_least_variances(Vector3::new(least, least, 0.0))?)
+        clumps.with_least_variances(Vector3::new(least, least, 0.0))
     }
 
     /// The square of half a cell: the evidence of a narrower ridge would not have settled, and under no Gaussian this wide are sums

@@ -2,6 +2,7 @@
 
 use crate::belief::{JointBelief, PositionBelief};
 use crate::density::LpgFit;
+use crate::density::polynomials::check_degree;
 use crate::density::{Clumps, Lpg, MixtureFit};
 use crate::posterior::Posterior;
 use crate::{Error, RateModel};
@@ -45,9 +46,7 @@ impl Form {
             Self::Mixture(n) | Self::Particles(n) => at_least_one("components", n).map(|_| ())?,
             Self::Lpg { components, degree } => {
                 at_least_one("components", components)?;
-                if degree > crate::density::polynomials::HIGHEST_DEGREE {
-                    return refuse("degree", degree, "at most 20");
-                }
+                check_degree(degree)?;
             }
             Self::Raw | Self::Gaussian | Self::Laplace => {}
         }

@@ -133,39 +133,30 @@ impl<'a> Target<'a> {
     /// the noise variance.
     pub(crate) fn rates_and_fit(&self, cells: &Cells<2>) -> (Option<RateMoments>, f64) {
         let [x, y] = cells.columns();
-        let mut chi_squared = 0.0;
-        let positions = x.iter().zip(y).map(|(x, y)| Vector2::new(*x, *y)).zip(cells.weights());
+        let (mut means, mut variances, mut chi_squared) = (Vec::new(), Vec::new(), 0.0);
         let mut slice = Slice::default();
-        let mut rate_at = |at: &Vector2<f64>, sums: &RateSums| match (self.prior, self.likelihood.rate()) {
-            (Prior::WithRate(JointBelief::Lpg(lpg), range), _) => {
-                lpg.slice(at, 0.0, &mut slice);
-                let sums = [sums.response, sums.correlation, sums.energy];
-                let moments = slice.tilted(sums, [range.low(), range.high()]);
-                Some((moments.mean, moments.variance))
-            }
-            (Prior::WithRate(_, range), _) => Some(self.rate_of_mixture(at, sums, range)),
-            (Prior::Exact(_), RateModel::Joint(range)) => Some(sums.rate_given_position(range)),
-            _ => None,
-        };
-        let carried = matches!(
-            (self.prior, self.likelihood.rate()),
-            (Prior::WithRate(..), _) | (Prior::Exact(_), RateModel::Joint(_))
-        );
-        let (mut means, mut variances) = (Vec::new(), Vec::new());
-        for (at, weight) in positions {
-            let own = if carried {
-                let sums = self.likelihood.sums(&at);
-                rate_at(&at, &sums).map(|rate| {
-                    means.push(rate.0);
-                    variances.push(rate.1);
-                    sums.chi_squared(rate)
-                })
-            } else {
-                None
+        for ((x, y), weight) in x.iter().zip(y).zip(cells.weights()) {
+            let at = Vector2::new(*x, *y);
+            let sums = self.likelihood.sums(&at);
+            let rate = match (self.prior, self.likelihood.rate()) {
+                (Prior::WithRate(JointBelief::Lpg(lpg), range), _) => {
+                    lpg.slice(&at, 0.0, &mut slice);
+                    let sums = [sums.response, sums.correlation, sums.energy];
+                    let moments = slice.tilted(sums, [range.low(), range.high()]);
+                    (moments.mean, moments.variance)
+                }
+                (Prior::WithRate(_, range), _) => self.rate_of_mixture(&at, &sums, range),
+                (Prior::Exact(_), RateModel::Joint(range)) => sums.rate_given_position(range),
+                _ => {
+                    chi_squared += weight * self.likelihood.chi_squared(&at);
+                    continue;
+                }
             };
-            chi_squared += weight * own.unwrap_or_else(|| self.likelihood.chi_squared(&at));
+            means.push(rate.0);
+            variances.push(rate.1);
+            chi_squared += weight * sums.chi_squared(rate);
         }
-        (carried.then_some((means, variances)), chi_squared)
+        ((!means.is_empty()).then_some((means, variances)), chi_squared)
     }
 
     fn rate_of_mixture(&self, at: &Vector2<f64>, sums: &RateSums, range: &RateRange) -> (f64, f64) {

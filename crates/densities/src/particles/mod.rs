@@ -9,7 +9,8 @@ pub use weights::{Categorical, systematic};
 
 use crate::Error;
 use fewbits_core::{Belief, Columns, ColumnsMut};
-use fewbits_numerics::error::{all_finite, at_least_one, entries, refuse};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, at_least_one, entries, probabilities, refuse};
 use fewbits_numerics::kernels::{dot, weighted_covariance};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
@@ -326,5 +327,60 @@ impl<const D: usize> Belief<D> for Particles<D> {
                 *x = column[*i];
             }
         }
+    }
+}
+
+impl<const D: usize> From<Particles<D>> for StoredParticles {
+    fn from(belief: Particles<D>) -> Self {
+        let equal = belief.log_weights.windows(2).all(|pair| pair[0] == pair[1]);
+        let stored = |w: &f64| w.is_finite().then_some(*w);
+        Self {
+            columns: belief.columns.into(),
+            weights: belief.weights,
+            log_weights: if equal {
+                Vec::new()
+            } else {
+                belief.log_weights.iter().map(stored).collect()
+            },
+            effective_sample_size: (!equal).then_some(belief.effective_sample_size),
+            auxiliary: belief.auxiliary,
+        }
+    }
+}
+
+impl<const D: usize> TryFrom<StoredParticles> for Particles<D> {
+    type Error = Error;
+
+    fn try_from(stored: StoredParticles) -> Result<Self, Error> {
+        let weights = stored.weights;
+        probabilities("weights", &weights)?;
+        let log_weights: Vec<f64> = if stored.log_weights.is_empty() {
+            weights.iter().map(|w| w.ln()).collect()
+        } else {
+            let logs = stored.log_weights.iter();
+            logs.map(|log| log.unwrap_or(f64::NEG_INFINITY)).collect()
+        };
+        let agree = |(log, w): (&f64, &f64)| (log.exp() - w).abs() <= 1e-9;
+        if log_weights.len() != weights.len() || !log_weights.iter().zip(&weights).all(agree) {
+            let text = format!("{} numbers", log_weights.len());
+            return refuse("log_weights", text, "the logarithms of the weights");
+        }
+        let effective = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+        let given = stored.effective_sample_size;
+        if let Some(bad) = given.filter(|n| (n / effective - 1.0).abs() > 1e-9 || n.is_nan()) {
+            return refuse("effective_sample_size", bad, format!("{effective}"));
+        }
+        let columns = stored.columns.try_into().map_err(|columns: Vec<Vec<f64>>| {
+            ArgumentError::new("columns", format!("{} columns", columns.len()), format!("{D} columns"))
+        })?;
+        let mut belief = Self::new(columns, &log_weights)?.with_auxiliary(stored.auxiliary)?;
+        // As it was stored, to the last bit.
+        if weights.windows(2).all(|pair| pair[0] == pair[1]) {
+            belief.equalise(weights.len());
+        } else {
+            belief.effective_sample_size = given.unwrap_or(belief.effective_sample_size);
+            (belief.weights, belief.log_weights) = (weights, log_weights);
+        }
+        Ok(belief)
     }
 }

@@ -128,13 +128,24 @@ impl<const D: usize> Cells<D> {
                         && (determinant / size - 1.0).abs() < options.determinant_tolerance
                 });
                 if settled && width < options.width * narrowest {
-                    return Ok(Self::finished(
-                        centres,
+                    let keep = |values: &[f64], scale: f64| -> Vec<f64> {
+                        let paired = values.iter().zip(&weights);
+                        let kept = paired.filter(|(_, w)| **w > NEGLIGIBLE);
+                        kept.map(|(v, _)| v * scale).collect()
+                    };
+                    let columns = centres.each_ref().map(|column| keep(column, 1.0));
+                    let weights = keep(&weights, total.recip());
+                    return Ok(Self {
+                        columns,
+                        log_weights: weights.iter().map(|w| w.ln()).collect(),
                         weights,
-                        total,
-                        (width, log_evidence, evaluations),
-                        (mean, covariance),
-                    ));
+                        width,
+                        log_evidence,
+                        evaluations,
+                        mean,
+                        covariance,
+                        places: OnceLock::new(),
+                    });
                 }
                 before = Some((log_evidence, determinant));
             }
@@ -150,35 +161,6 @@ impl<const D: usize> Cells<D> {
         Err(Error::Unresolved {
             cells: centres[0].len(),
         })
-    }
-
-    fn finished(
-        centres: [Vec<f64>; D],
-        weights: Vec<f64>,
-        total: f64,
-        (width, log_evidence, evaluations): (f64, f64, usize),
-        (mean, covariance): (SVector<f64, D>, SMatrix<f64, D, D>),
-    ) -> Self {
-        let keep = |values: &[f64], scale: f64| -> Vec<f64> {
-            let paired = values.iter().zip(&weights);
-            paired
-                .filter(|(_, w)| **w > NEGLIGIBLE)
-                .map(|(v, _)| v * scale)
-                .collect()
-        };
-        let columns = centres.each_ref().map(|column| keep(column, 1.0));
-        let weights = keep(&weights, total.recip());
-        Self {
-            columns,
-            log_weights: weights.iter().map(|w| w.ln()).collect(),
-            weights,
-            width,
-            log_evidence,
-            evaluations,
-            mean,
-            covariance,
-            places: OnceLock::new(),
-        }
     }
 
     /// Centres, one column a coordinate.
