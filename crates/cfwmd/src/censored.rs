@@ -281,6 +281,7 @@ impl<const M: usize> Censored<M> {
     ///
     /// # Errors
     /// If a number is not finite, `R` not a covariance, no report is missing, or more than one of a vector measurement.
+    #[inline]
     pub fn missing(
         rule: &CensoringRule<M>,
         prediction: &SVector<f64, M>,
@@ -303,19 +304,23 @@ impl<const M: usize> Censored<M> {
         }
         fewbits_numerics::error::finite("prediction", prediction[0])?;
         let (low, high) = rule.interval(prediction[0]);
-        let (loss, scale) = (link.loss(), link.lost_given_sent());
-        let (nothing, lost): (Scalar, Scalar) = match Cell::new(low, high) {
-            Ok(cell) => {
-                (InCell::silence(cell, noise[(0, 0)], link)?.into(), Scalar::outside(&cell, noise[(0, 0)], scale)?)
-            }
-            // Everything is sent: only the link can be to blame.
-            Err(_) => (Constant::new(loss)?.into(), Constant::new(scale)?.into()),
-        };
+        // No cell: everything is sent, and only the link can be to blame.
+        let cell = Cell::new(low, high).ok();
         let mut product = Product::new();
-        for (factor, count) in [(nothing, reports.nothing), (lost, reports.lost)] {
-            if count > 0 {
-                product.push_repeated(Repeated::new(factor, count)?);
-            }
+        if reports.nothing > 0 {
+            let factor = match cell {
+                Some(cell) => InCell::silence(cell, noise[(0, 0)], link)?.into(),
+                None => Constant::new(link.loss())?.into(),
+            };
+            product.push_repeated(Repeated::new(factor, reports.nothing)?);
+        }
+        if reports.lost > 0 {
+            let scale = link.lost_given_sent();
+            let factor = match cell {
+                Some(cell) => Scalar::outside(&cell, noise[(0, 0)], scale)?,
+                None => Constant::new(scale)?.into(),
+            };
+            product.push_repeated(Repeated::new(factor, reports.lost)?);
         }
         Ok(Self {
             kind: Kind::Scalar(product),

@@ -152,7 +152,6 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         observations: &[Observation<SVector<f64, M>>],
     ) -> Result<Vec<Observed<S, Censored<M>, M>>, Error> {
         self.count(rules.len(), observations.len())?;
-        let asked: Vec<_> = observations.iter().copied().map(Some).collect();
         let plain = !matches!(self.format, NumberFormat::Fixed(_));
         let mut all = Vec::new();
         for (i, observation) in observations.iter().enumerate() {
@@ -172,7 +171,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
                     push(Censored::values(&values, &noise, self.link.of_received()?)?);
                 }
             }
-            if let Some(missing) = self.missing_together(rules, &asked, i) {
+            if let Some(missing) = self.missing_together(rules, |j| Some(observations[j]), i) {
                 push(self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?);
             }
         }
@@ -184,20 +183,16 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     fn missing_together(
         &self,
         rules: &[CensoringRule<M>],
-        observations: &[Option<Observation<SVector<f64, M>>>],
+        observed: impl Fn(usize) -> Option<Observation<SVector<f64, M>>>,
         i: usize,
     ) -> Option<MissingReports> {
-        let missing = |j: usize| observations[j].is_some_and(|observed| observed.received().is_none());
+        let missing = |j: usize| observed(j).is_some_and(|observed| observed.received().is_none());
         let alike = |j: usize| missing(j) && self.identical[j] == self.identical[i] && rules[j] == rules[i];
         if !missing(i) || (M == 1 && (0..i).any(alike)) {
             return None;
         }
         let last = if M == 1 { self.sensors.len() } else { i + 1 };
-        let of = |kind| {
-            (i..last)
-                .filter(|j| alike(*j) && observations[*j] == Some(kind))
-                .count()
-        };
+        let of = |kind| (i..last).filter(|j| alike(*j) && observed(*j) == Some(kind)).count();
         Some(MissingReports {
             nothing: of(Observation::Nothing),
             lost: of(Observation::Lost),
@@ -220,8 +215,8 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         broadcast: &SVector<f64, D>,
         observations: &[Observation<SVector<f64, M>>],
     ) -> Result<(Gaussian<D>, FusionInfo), Error> {
-        let asked: Vec<_> = observations.iter().copied().map(Some).collect();
-        self.fuse_asked(predicted, rules, broadcast, &asked)
+        self.count(rules.len(), observations.len())?;
+        self.fuse_observed(predicted, rules, broadcast, |i| Some(observations[i]))
     }
 
     /// As [`fuse`](Self::fuse), where `None` is a sensor without observation: it was not asked, or what it did cannot be used. Neither its
@@ -237,41 +232,50 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         observations: &[Option<Observation<SVector<f64, M>>>],
     ) -> Result<(Gaussian<D>, FusionInfo), Error> {
         self.count(rules.len(), observations.len())?;
-        let (mut belief, mut log_likelihood) = (*predicted, 0.0);
-        let update = |belief: &mut Gaussian<D>, i: usize, factor: Censored<M>| -> Result<f64, Error> {
-            let (next, step) = assumed_density::update(belief, self.sensors[i].matrix(), &factor)?;
+        self.fuse_observed(predicted, rules, broadcast, |i| observations[i])
+    }
+
+    /// `observed(i)` is what was observed of sensor `i`.
+    #[inline]
+    fn fuse_observed(
+        &self,
+        predicted: &Gaussian<D>,
+        rules: &[CensoringRule<M>],
+        broadcast: &SVector<f64, D>,
+        observed: impl Fn(usize) -> Option<Observation<SVector<f64, M>>>,
+    ) -> Result<(Gaussian<D>, FusionInfo), Error> {
+        let (mut belief, mut info, mut plain) = (*predicted, FusionInfo::default(), 0_usize);
+        let update = |belief: &mut Gaussian<D>, i: usize, factor: &Censored<M>| -> Result<f64, Error> {
+            let (next, step) = assumed_density::update(belief, self.sensors[i].matrix(), factor)?;
             *belief = next;
             Ok(step.log_likelihood)
         };
-        for (i, observation) in observations.iter().enumerate() {
-            let Some(Observation::Received(value)) = observation else {
+        for (i, sensor) in self.sensors.iter().enumerate() {
+            let Some(Observation::Received(value)) = observed(i) else {
                 continue;
             };
+            info.received += 1;
             let scheme = self.scheme(i, &rules[i])?;
             if matches!(self.format, NumberFormat::Fixed(_)) {
-                log_likelihood += update(&mut belief, i, scheme.received(i, broadcast, value, &self.link)?)?;
+                info.log_likelihood += update(&mut belief, i, &scheme.received(i, broadcast, &value, &self.link)?)?;
             } else {
                 // The factor of a value: the closed form of its update.
-                let sensor = &self.sensors[i];
-                scheme.check_value(i, &sensor.mean(broadcast), value, &self.link)?;
-                let (next, step) = kalman::update(sensor, &belief, value)?;
+                scheme.check_value(i, &sensor.mean(broadcast), &value, &self.link)?;
+                let (next, step) = kalman::update(sensor, &belief, &value)?;
                 belief = next;
-                log_likelihood += step.log_likelihood + self.link.of_received()?.ln();
+                info.log_likelihood += step.log_likelihood;
+                plain += 1;
             }
+        }
+        if plain > 0 {
+            info.log_likelihood += plain as f64 * self.link.of_received()?.ln();
         }
         for i in 0..self.sensors.len() {
-            if let Some(missing) = self.missing_together(rules, observations, i) {
+            if let Some(missing) = self.missing_together(rules, &observed, i) {
                 let factor = self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?;
-                log_likelihood += update(&mut belief, i, factor)?;
+                info.log_likelihood += update(&mut belief, i, &factor)?;
             }
         }
-        let received = observations.iter().flatten().filter(|o| o.received().is_some()).count();
-        Ok((
-            belief,
-            FusionInfo {
-                log_likelihood,
-                received,
-            },
-        ))
+        Ok((belief, info))
     }
 }

@@ -31,16 +31,6 @@ impl Budget {
         }
     }
 
-    /// Messages per step.
-    pub fn messages(&self) -> f64 {
-        self.messages
-    }
-
-    /// Number of sensors.
-    pub fn sensors(&self) -> usize {
-        self.sensors
-    }
-
     /// Probability `l/N` that one sensor reports.
     pub fn rate(&self) -> f64 {
         self.messages / self.sensors as f64
@@ -133,7 +123,7 @@ mod tests {
     #[test]
     fn budgets_outside_the_range_are_refused() {
         let budget = Budget::new(1.5, 4).unwrap();
-        assert_eq!((budget.messages(), budget.sensors(), budget.rate()), (1.5, 4, 0.375));
+        assert_eq!(budget.rate(), 0.375);
         for messages in [0.0, -1.0, 4.01, f64::NAN, f64::INFINITY] {
             assert!(Budget::new(messages, 4).is_err());
         }

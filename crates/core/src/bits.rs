@@ -195,11 +195,6 @@ impl BitWriter {
         self.message.bits = 0;
     }
 
-    /// The bits so far.
-    pub fn as_bit_string(&self) -> &BitString {
-        &self.message
-    }
-
     /// The finished message.
     pub fn finish(self) -> BitString {
         self.message

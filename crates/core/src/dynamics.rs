@@ -4,8 +4,6 @@
 //! and linear Gaussian. An estimator asks for the least that it needs.
 
 use crate::columns::{ColumnsMut, columns_agree, count, set_state};
-use crate::error::Error;
-use crate::gaussian::Gaussian;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
@@ -39,19 +37,6 @@ pub trait GaussianDynamics<const D: usize>: Dynamics<D> {
 
     /// Covariance of the process noise out of `state`, possibly singular.
     fn noise_covariance_at(&self, state: &SVector<f64, D>) -> SMatrix<f64, D, D>;
-
-    /// `p(x_k | x_{k-1} = state)` as a belief.
-    fn transition_from(&self, state: &SVector<f64, D>) -> Gaussian<D> {
-        Gaussian::from_trusted_parts(self.mean(state), self.noise_covariance_at(state))
-    }
-
-    /// `ln p(next | state)`.
-    ///
-    /// # Errors
-    /// If the noise out of `state` is singular: the transition has no density.
-    fn log_transition(&self, next: &SVector<f64, D>, state: &SVector<f64, D>) -> Result<f64, Error> {
-        Ok(self.transition_from(state).log_pdf(next)?)
-    }
 }
 
 /// Linear Gaussian dynamics `x_k = F x_{k-1} + u_k`, `u ~ N(0, Q)`: what a Kalman filter needs.

@@ -5,6 +5,8 @@ use crate::columns::{Columns, ColumnsMut, columns_agree, count, lengths_agree, s
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
+#[cfg(feature = "serde")]
+use fewbits_numerics::stored;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -170,25 +172,13 @@ impl Gaussian<1> {
     }
 }
 
-/// The stored form, checked when it is read.
 #[cfg(feature = "serde")]
-#[derive(Deserialize)]
-#[serde(rename = "Gaussian", deny_unknown_fields)]
-struct Moments<const D: usize> {
+stored! { #[serde(rename = "Gaussian")] [const D: usize] Gaussian as Moments {
     #[serde(with = "fewbits_numerics::stored")]
     mean: SVector<f64, D>,
     #[serde(with = "fewbits_numerics::stored")]
     covariance: SMatrix<f64, D, D>,
-}
-
-#[cfg(feature = "serde")]
-impl<const D: usize> TryFrom<Moments<D>> for Gaussian<D> {
-    type Error = ArgumentError;
-
-    fn try_from(moments: Moments<D>) -> Result<Self, ArgumentError> {
-        Self::new(moments.mean, moments.covariance)
-    }
-}
+} => Gaussian::new(mean, covariance), ArgumentError }
 
 impl<const D: usize> Belief<D> for Gaussian<D> {
     fn mean(&self) -> SVector<f64, D> {

@@ -13,9 +13,7 @@
 
 use crate::{Error, assumed_density};
 use fewbits_core::factor::Scalar;
-use fewbits_core::{
-    Belief, Columns, ColumnsMut, Evolution, Factor, Gaussian, GaussianDynamics, Likelihood, Observed, Sensing,
-};
+use fewbits_core::{Belief, ColumnsMut, Evolution, Factor, Gaussian, GaussianDynamics, Likelihood, Observed, Sensing};
 use fewbits_models::LinearSensor;
 use fewbits_numerics::linalg::congruence;
 use nalgebra::{SMatrix, SVector};
@@ -168,19 +166,6 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
 /// `h(x) - h'(x) x`, relative to `h(x)` and the noise's deviation, that counts as rounding of a linear sensor.
 const OFFSET: f64 = 1e-9;
 
-/// Observations of one instant: their log likelihoods add.
-pub(crate) struct All<'a, const D: usize>(pub &'a [&'a dyn StateLikelihood<D>]);
-
-impl<const D: usize> Likelihood<D> for All<'_, D> {
-    fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
-        self.0.iter().map(|one| one.log_likelihood(state)).sum()
-    }
-
-    fn add_log_likelihoods(&self, states: Columns<'_, D>, logs: &mut [f64]) {
-        self.0.iter().for_each(|one| one.add_log_likelihoods(states, logs));
-    }
-}
-
 /// What an update reveals besides the new belief.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
@@ -189,6 +174,15 @@ pub struct Info {
     pub log_likelihood: f64,
     /// Effective sample size, of particles.
     pub effective_sample_size: Option<f64>,
+}
+
+impl Info {
+    pub(crate) fn new(log_likelihood: f64) -> Self {
+        Self {
+            log_likelihood,
+            effective_sample_size: None,
+        }
+    }
 }
 
 /// A filter as a receiver needs it. Both updates work in place; one that fails leaves the belief as it was.
@@ -292,10 +286,7 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
             log_likelihood += one.condition(&mut next)?.log_likelihood;
         }
         *belief = next;
-        Ok(Info {
-            log_likelihood,
-            effective_sample_size: None,
-        })
+        Ok(Info::new(log_likelihood))
     }
 
     fn of_moments(&self, moments: &Gaussian<D>) -> Option<Gaussian<D>> {

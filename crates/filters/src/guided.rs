@@ -1,12 +1,11 @@
 //! Particles that move towards what was observed.
 
 use crate::Error;
-use crate::contract::{All, Info, Motion, StateFilter, StateLikelihood};
-use crate::particle::{ParticleFilter, Workspace, weigh};
+use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
+use crate::particle::{BootstrapFilter, ParticleFilter, weigh};
 use fewbits_core::columns::{set_state, state_at};
 use fewbits_core::{Gaussian, Likelihood};
 use fewbits_densities::Particles;
-use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::linalg::{congruence, semidefinite_factor, solve_semidefinite, symmetrised};
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -28,9 +27,7 @@ const DEFENCE: f64 = 0.1;
 /// sensor: linearisation shapes the proposal only. `Q` may be singular. An update must follow its own predict; a second one weighs only.
 #[derive(Debug, Clone)]
 pub struct GuidedFilter<const D: usize> {
-    filter: ParticleFilter,
-    count: usize,
-    workspace: Workspace<D>,
+    bootstrap: BootstrapFilter<D>,
     /// `N(f, Q)` of each particle since the last predict.
     moves: Vec<Gaussian<D>>,
 }
@@ -42,9 +39,7 @@ impl<const D: usize> GuidedFilter<D> {
     /// If there is none.
     pub fn new(filter: ParticleFilter, count: usize) -> Result<Self, Error> {
         Ok(Self {
-            filter,
-            count: at_least_one("count", count)?,
-            workspace: Workspace::default(),
+            bootstrap: BootstrapFilter::new(filter, count)?,
             moves: Vec::new(),
         })
     }
@@ -83,9 +78,9 @@ fn propose<const D: usize>(
 impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
     type Belief = Particles<D>;
 
-    fn start(&mut self, mut rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
+    fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
         self.moves.clear();
-        Ok(Particles::from_belief(&mut rng, prior, self.count)?)
+        self.bootstrap.start(rng, prior)
     }
 
     fn predict(
@@ -95,7 +90,8 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
         noise_scale: f64,
         belief: &mut Particles<D>,
     ) -> Result<(), Error> {
-        self.filter.resample(&mut rng, belief, &mut self.workspace)?;
+        let BootstrapFilter { filter, workspace, .. } = &mut self.bootstrap;
+        filter.resample(&mut rng, belief, workspace)?;
         let columns = belief.columns();
         let known = |i| Gaussian::from_trusted_parts(state_at(&columns, i), SMatrix::zeros());
         self.moves.clear();
@@ -125,13 +121,10 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
         }
         let info = weigh(&mut next, |states, logs| {
             logs.iter_mut().zip(&ratios).for_each(|(log, ratio)| *log += ratio);
-            All(observed).add_log_likelihoods(states, logs);
+            observed.add_log_likelihoods(states, logs);
         })?;
         *belief = next;
         self.moves.clear();
-        Ok(Info {
-            log_likelihood: info.log_likelihood,
-            effective_sample_size: Some(info.effective_sample_size),
-        })
+        Ok(info.into())
     }
 }

@@ -3,6 +3,7 @@
 use crate::{Error, assumed_density};
 use fewbits_core::{Belief, ColumnsMut, Factor, Gaussian, GaussianDynamics, Observed, Sensing};
 use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities, within};
+use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -37,21 +38,11 @@ pub struct ImmBelief<const D: usize> {
     modes: Vec<Gaussian<D>>,
 }
 
-#[derive(Deserialize)]
-#[serde(rename = "ImmBelief", deny_unknown_fields)]
-struct Stored<const D: usize> {
+stored! { #[serde(rename = "ImmBelief")] [const D: usize] ImmBelief as Stored {
     #[serde(with = "fewbits_numerics::stored")]
     probabilities: Vec<f64>,
     modes: Vec<Gaussian<D>>,
-}
-
-impl<const D: usize> TryFrom<Stored<D>> for ImmBelief<D> {
-    type Error = ArgumentError;
-
-    fn try_from(stored: Stored<D>) -> Result<Self, ArgumentError> {
-        Self::new(stored.probabilities, stored.modes)
-    }
-}
+} => ImmBelief::new(probabilities, modes), ArgumentError }
 
 impl<const D: usize> ImmBelief<D> {
     /// A belief with a probability and a Gaussian for each model.

@@ -50,7 +50,6 @@ pub fn update<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     measurement: &SVector<f64, M>,
 ) -> Result<(Gaussian<D>, KalmanInfo<D, M>), Error> {
-    all_finite("measurement", measurement.as_slice())?;
     let matrix = sensing.matrix();
     let noise = sensing.noise_covariance();
     let cross = times_transposed(belief.covariance(), matrix);
@@ -67,9 +66,15 @@ pub fn update<const D: usize, const M: usize>(
         let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
         congruence(&keep, belief.covariance()) + congruence(&gain, noise)
     };
-    let posterior = Gaussian::from_symmetric_parts(belief.mean() + gain * innovation, covariance);
-    let log_root_determinant = log_product(roots.as_slice());
     let squared = innovation.dot(&over(&innovation.transpose(), &lower).transpose());
+    // Zero times a number is zero: the range of the root, which its logarithm asks for anyway, is one test of all that must be a number.
+    let root: f64 = roots.iter().product();
+    let numbers = 0.0 * (squared + belief.mean().sum() + belief.covariance().trace());
+    let log_root_determinant = if (root + numbers).is_normal() {
+        root.ln()
+    } else {
+        log_product(roots.as_slice(), numbers, measurement.as_slice())?
+    };
     let info = KalmanInfo {
         innovation,
         innovation_covariance,
@@ -77,13 +82,19 @@ pub fn update<const D: usize, const M: usize>(
         log_likelihood: -0.5 * squared - log_root_determinant - M as f64 * LN_SQRT_2PI,
         normalised_innovation_squared: squared / M as f64,
     };
-    if !(posterior.is_finite() && info.log_likelihood.is_finite()) {
-        return Err(fewbits_core::Error::NotANumber {
-            what: "the posterior (from the belief, the sensing model or the measurement)",
-        }
-        .into());
+    Ok((Gaussian::from_symmetric_parts(belief.mean() + gain * innovation, covariance), info))
+}
+
+/// `ln` of a product of positive numbers that is out of range, or what else was: `numbers` is zero, or no number.
+#[cold]
+fn log_product(factors: &[f64], numbers: f64, measurement: &[f64]) -> Result<f64, Error> {
+    all_finite("measurement", measurement)?;
+    let log: f64 = factors.iter().map(|x| x.ln()).sum();
+    if (log + numbers).is_finite() {
+        return Ok(log);
     }
-    Ok((posterior, info))
+    let what = "the posterior (from the belief, the sensing model or the measurement)";
+    Err(fewbits_core::Error::NotANumber { what }.into())
 }
 
 /// `a (l l')^-1` of a lower triangular `l`, with one division for each of its columns.
@@ -140,16 +151,6 @@ fn less_product<const D: usize, const M: usize>(
         }
     }
     out
-}
-
-/// `ln` of a product of positive numbers: one logarithm where the product is within range.
-fn log_product(factors: &[f64]) -> f64 {
-    let product: f64 = factors.iter().product();
-    if product.is_normal() {
-        product.ln()
-    } else {
-        factors.iter().map(|x| x.ln()).sum()
-    }
 }
 
 /// One cycle of the Kalman filter: [`predict`], then [`update`].

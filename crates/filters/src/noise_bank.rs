@@ -123,9 +123,6 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
             let info = filter.update(rng, &mut next, observed)?;
             Ok((next, info.log_likelihood))
         })?;
-        Ok(Info {
-            log_likelihood,
-            effective_sample_size: None,
-        })
+        Ok(Info::new(log_likelihood))
     }
 }

@@ -1,6 +1,6 @@
 //! The bootstrap particle filter.
 
-use crate::contract::{All, Info, Motion, StateFilter, StateLikelihood};
+use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
 use crate::{Error, Resampling, Schedule};
 use fewbits_core::{Columns, Dynamics, Gaussian, Likelihood};
 use fewbits_densities::Particles;
@@ -50,6 +50,15 @@ pub struct ParticleInfo {
     pub log_likelihood: f64,
     /// Effective sample size of the updated belief.
     pub effective_sample_size: f64,
+}
+
+impl From<ParticleInfo> for Info {
+    fn from(info: ParticleInfo) -> Self {
+        Self {
+            log_likelihood: info.log_likelihood,
+            effective_sample_size: Some(info.effective_sample_size),
+        }
+    }
 }
 
 impl ParticleFilter {
@@ -172,9 +181,9 @@ pub(crate) fn weigh<const D: usize>(
 /// [`ParticleFilter`] (bootstrap) with a number of particles.
 #[derive(Debug, Clone)]
 pub struct BootstrapFilter<const D: usize> {
-    filter: ParticleFilter,
+    pub(crate) filter: ParticleFilter,
     count: usize,
-    workspace: Workspace<D>,
+    pub(crate) workspace: Workspace<D>,
 }
 
 impl<const D: usize> BootstrapFilter<D> {
@@ -216,10 +225,6 @@ impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
         belief: &mut Particles<D>,
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error> {
-        let info = self.filter.update(belief, &All(observed))?;
-        Ok(Info {
-            log_likelihood: info.log_likelihood,
-            effective_sample_size: Some(info.effective_sample_size),
-        })
+        Ok(self.filter.update(belief, observed)?.into())
     }
 }

@@ -1,7 +1,7 @@
 //! The exact scalar filter on a grid: the referee of every approximate one.
 
 use crate::Error;
-use crate::contract::{All, Info, Motion, StateFilter, StateLikelihood};
+use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
 use fewbits_core::{Gaussian, GaussianDynamics, Likelihood, LinearDynamics};
 use fewbits_densities::{Grid, PointMass};
 use fewbits_numerics::error::ArgumentError;
@@ -300,10 +300,7 @@ impl StateFilter<1> for PointMasses {
         belief: &mut PointMass,
         observed: &[&dyn StateLikelihood<1>],
     ) -> Result<Info, Error> {
-        Ok(Info {
-            log_likelihood: belief.update(&All(observed))?,
-            effective_sample_size: None,
-        })
+        Ok(Info::new(belief.update(observed)?))
     }
 }
 

@@ -226,10 +226,8 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         }
         let scalars = scalars.iter().map(|one| (&one.sensing, one.factor.clone()));
         let info = self.filter.update_all(rng, belief, scalars, &mut self.workspace)?;
-        Ok(Info {
-            log_likelihood: info.log_likelihood + log_scale,
-            effective_sample_size: Some(info.effective_sample_size),
-        })
+        let log_likelihood = info.log_likelihood + log_scale;
+        Ok(ParticleInfo { log_likelihood, ..info }.into())
     }
 }
 

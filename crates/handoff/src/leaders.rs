@@ -34,13 +34,10 @@ impl<const D: usize, G: Dynamics<D>, L: Likelihood<D>> Leader for Leaders<D, G, 
         let at = usize::try_from(slot.saturating_sub(1))?;
         let reading = self.readings.get(at).and_then(|slot| slot.get(node as usize));
         let reading = reading.ok_or_else(|| format!("node {node} has no reading in slot {slot}"))?;
-        let (particles, _) = self.filter.posterior(rng, &received, &self.dynamics, reading)?;
-        let estimate = self.filter.estimate(&particles)?;
-        let mixture = coded.reduction.reduce(&estimate, coded.components)?;
-        let message = CodedMixture::new(&mixture, &coded.format, coded.resolution)?;
+        let (handover, _) = self.filter.step(rng, &received, &self.dynamics, reading)?;
         Ok(Lead {
-            estimate: message.mixture().mean().as_slice().to_vec(),
-            message: message.to_bits(&coded.format)?,
+            estimate: handover.mixture().mean().as_slice().to_vec(),
+            message: handover.message().cloned().ok_or("a coded belief has bits")?,
             next: self.leaders.get(at + 1).copied(),
         })
     }

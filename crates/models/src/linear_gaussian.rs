@@ -83,26 +83,9 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
         &self.noise_variances
     }
 
-    /// `G diag(sqrt q)`: multiplied with `U` standard normals it is a draw of the process noise.
-    pub fn noise_factor(&self) -> &SMatrix<f64, D, U> {
-        &self.noise_factor
-    }
-
     /// `Q = G diag(q) G'`, possibly singular.
     pub fn noise_covariance(&self) -> &SMatrix<f64, D, D> {
         &self.noise_covariance
-    }
-
-    /// Covariance of the next state, `F P F' + Q`.
-    #[inline]
-    pub fn predict_covariance(&self, covariance: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-        self.transition * covariance * self.transition.transpose() + self.noise_covariance
-    }
-
-    /// A draw of the process noise `G u`.
-    #[inline]
-    pub fn sample_noise<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, D> {
-        self.noise_factor * SVector::<f64, U>::from_fn(|_, _| StandardNormal.sample(rng))
     }
 
     /// Covariance of the stationary distribution: the root of `P = F P F' + Q`.
@@ -162,7 +145,8 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
 
     #[inline]
     fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, D> {
-        self.transition * state + self.sample_noise(rng)
+        let normals = SVector::<f64, U>::from_fn(|_, _| StandardNormal.sample(rng));
+        self.transition * state + self.noise_factor * normals
     }
 
     /// Blocks of particles: first their normal draws, then one sweep a coordinate, which vectorises.
@@ -247,7 +231,7 @@ mod tests {
         let q = Matrix2::new(0.3, 0.1, 0.1, 0.2);
         let model = LinearGaussian::with_covariance(rotation(0.99), q).unwrap();
         let covariance = model.stationary_covariance().unwrap();
-        let again = model.predict_covariance(&covariance);
+        let again = model.transition() * covariance * model.transition().transpose() + model.noise_covariance();
         assert!((again - covariance).amax() < 1e-12 * covariance.amax());
         for scale in [1.0, 1.5] {
             let model = LinearGaussian::with_covariance(rotation(scale), q).unwrap();

@@ -23,14 +23,20 @@ impl Default for LogSum {
 }
 
 impl LogSum {
-    /// Adds `exp(term)`. Minus infinity adds nothing; NaN is taken as minus infinity; infinity makes the sum infinite.
+    /// Adds `exp(term)` and returns its share of the sum so far. Minus infinity adds nothing; NaN is taken as minus infinity; infinity makes
+    /// the sum infinite.
     #[inline]
-    pub fn add(&mut self, term: f64) {
+    pub fn add(&mut self, term: f64) -> f64 {
         if term > self.largest {
             self.scaled = self.scaled * (self.largest - term).exp() + 1.0;
             self.largest = term;
+            1.0 / self.scaled
         } else if term > f64::NEG_INFINITY && self.largest < f64::INFINITY {
-            self.scaled += (term - self.largest).exp();
+            let added = (term - self.largest).exp();
+            self.scaled += added;
+            added / self.scaled
+        } else {
+            0.0
         }
     }
 
@@ -48,7 +54,9 @@ impl LogSum {
 impl FromIterator<f64> for LogSum {
     fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Self {
         let mut sum = Self::default();
-        terms.into_iter().for_each(|term| sum.add(term));
+        for term in terms {
+            sum.add(term);
+        }
         sum
     }
 }
@@ -56,6 +64,21 @@ impl FromIterator<f64> for LogSum {
 #[cfg(test)]
 mod tests {
     use super::LogSum;
+
+    /// Terms whose exponentials are no numbers, in either order.
+    #[test]
+    fn terms_of_any_size_are_summed_with_their_shares() {
+        for (terms, last) in [
+            ([1000.0, 999.0, -1000.0], 0.0),
+            ([-1000.0, 999.0, 1000.0], 1.0 / (1.0 + (-1.0_f64).exp())),
+            ([999.0, 1000.0, f64::NEG_INFINITY], 0.0),
+        ] {
+            let mut sum = LogSum::default();
+            let shares = terms.map(|term| sum.add(term));
+            assert!((sum.value() - 1000.0 - (-1.0_f64).exp().ln_1p()).abs() < 1e-12);
+            assert!((shares[2] - last).abs() < 1e-12 && shares[0] == 1.0);
+        }
+    }
 
     #[test]
     fn infinities_and_nan_do_not_spread() {

@@ -1,7 +1,6 @@
 //! A Gaussian inside an ellipsoid: probability, mean and covariance.
 
-use super::outside;
-use super::quadrature::{Moments, log_mass, moments};
+use super::quadrature::{Moments, Side, log_mass, moments};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::error::all_finite;
@@ -78,13 +77,13 @@ impl<const M: usize> GaussianInEllipsoid<M> {
         if let Some(x) = b.iter().find(|x| !x.is_finite()) {
             return if x.is_nan() { f64::NAN } else { f64::NEG_INFINITY };
         }
-        log_mass(self.variances.as_slice(), b.as_slice(), self.threshold)
+        log_mass(Side::Inside, self.variances.as_slice(), b.as_slice(), self.threshold)
     }
 
     /// Mass, mean and covariance of `nu ~ N(mu, V)` inside; `None` if the mass is zero or `mu` is not finite.
     pub fn moments(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
         let b = self.finite(mu)?;
-        self.back(moments(self.variances.as_slice(), &b, 0, self.threshold))
+        self.back(moments(Side::Inside, self.variances.as_slice(), &b, 0, self.threshold))
     }
 
     /// `ln P(nu outside)`, with digits however small it is.
@@ -93,17 +92,17 @@ impl<const M: usize> GaussianInEllipsoid<M> {
         if let Some(x) = b.iter().find(|x| !x.is_finite()) {
             return if x.is_nan() { f64::NAN } else { 0.0 };
         }
-        let inside = log_mass(self.variances.as_slice(), b.as_slice(), self.threshold);
+        let inside = log_mass(Side::Inside, self.variances.as_slice(), b.as_slice(), self.threshold);
         if inside < MOSTLY_INSIDE.ln() {
             return (-inside.exp()).ln_1p();
         }
-        outside::log_mass(self.variances.as_slice(), b.as_slice(), self.threshold)
+        log_mass(Side::Outside, self.variances.as_slice(), b.as_slice(), self.threshold)
     }
 
     /// Mass, mean and covariance of `nu ~ N(mu, V)` outside; `None` if the mass is zero or `mu` is not finite.
     pub fn moments_outside(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
         let b = self.finite(mu)?;
-        self.back(outside::moments(self.variances.as_slice(), &b, 0, self.threshold))
+        self.back(moments(Side::Outside, self.variances.as_slice(), &b, 0, self.threshold))
     }
 
     /// Whitened coordinates, if they are numbers.

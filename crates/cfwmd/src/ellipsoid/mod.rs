@@ -1,7 +1,7 @@
 //! The region of silence of a vector sensor: an ellipsoid, and a Gaussian inside it.
 
 mod inside;
-mod outside;
+mod integrate;
 mod quadrature;
 
 pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
@@ -9,6 +9,7 @@ pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::non_negative;
 use fewbits_numerics::linalg::definite_factor;
+use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -22,31 +23,12 @@ pub struct Ellipsoid<const M: usize> {
     threshold: f64,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers<const M: usize> {
+stored! { #[serde(rename = "Ellipsoid")] [const M: usize] Ellipsoid as Numbers |region| {
     #[serde(with = "fewbits_numerics::stored")]
-    innovation_covariance: SMatrix<f64, M, M>,
+    innovation_covariance: SMatrix<f64, M, M> = region.innovation_covariance,
     #[serde(with = "fewbits_numerics::stored")]
-    threshold: f64,
-}
-
-impl<const M: usize> From<Ellipsoid<M>> for Numbers<M> {
-    fn from(region: Ellipsoid<M>) -> Self {
-        Self {
-            innovation_covariance: region.innovation_covariance,
-            threshold: region.threshold,
-        }
-    }
-}
-
-impl<const M: usize> TryFrom<Numbers<M>> for Ellipsoid<M> {
-    type Error = ArgumentError;
-
-    fn try_from(numbers: Numbers<M>) -> Result<Self, ArgumentError> {
-        Self::new(&numbers.innovation_covariance, numbers.threshold)
-    }
-}
+    threshold: f64 = region.threshold,
+} => Ellipsoid::new(&innovation_covariance, threshold), ArgumentError }
 
 impl<const M: usize> Ellipsoid<M> {
     /// The region for innovation covariance `S` (positive definite) and threshold `eta >= 0`.

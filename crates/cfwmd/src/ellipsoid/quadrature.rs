@@ -1,114 +1,56 @@
-//! Mass and moments of independent normal variables in a ball, one dimension at a time.
+//! Mass and moments of independent normal variables inside or outside a ball, one dimension at a time.
+//!
+//! Along the leading axis `q_1 = radius sin(theta)` what is left is the same problem with one dimension less and a ball of squared radius
+//! `eta cos^2(theta)`. Outside has another part: `|q_1| >= radius`, whatever the other components are. The last component is inside an
+//! interval, or in its two tails. Both are sums of positive terms: `1 - P(inside)` would lose all digits where almost everything is
+//! inside.
 
-use fewbits_numerics::quadrature::gauss_legendre;
-use fewbits_numerics::{kernels, normal};
+use super::integrate::{NEAR, cuts, over_angles, panel, tame, with_one_mode};
+use fewbits_numerics::normal::{self, TruncatedMoments};
+use fewbits_numerics::{LogSum, kernels};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::OnceLock;
 
 /// A variance below this share of the ball's squared radius is a known number.
-pub(super) const KNOWN: f64 = 1e-16;
-/// Means up to this many deviations need 24 nodes, up to the next 40; beyond them the quadrature is adaptive ...
-const NEAR: f64 = 4.0;
-const FAR: f64 = 8.0;
-/// ... and so it is for radii beyond this many deviations.
-const RADIUS: f64 = 5.0;
-/// Fall of the log integrand at which the bulk ends.
-const FALL: f64 = 40.0;
-/// Panels are halved until two rules agree to this share of the whole, or to what rounding leaves of a far tail ...
-const TOLERANCE: f64 = 1e-10;
-/// ... per unit of the logarithm of the integrand, or this often.
-const ROUNDING: f64 = 4e-15;
-const HALVINGS: u32 = 40;
+const KNOWN: f64 = 1e-16;
 
-/// Nodes of a panel.
-pub(super) fn panel(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
-    gauss_legendre::<24>().on(a, b)
+/// Which side of the ball's surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    Inside,
+    Outside,
 }
 
-/// Whether all means and the radius are within so many deviations.
-fn tame(variances: &[f64], means: &[f64], eta: f64, reach: f64) -> bool {
-    let tame = |(w, b): (&f64, &f64)| b * b <= reach * reach * w && eta <= RADIUS * RADIUS * w;
-    variances.iter().zip(means).all(tame)
-}
-
-/// Visits nodes and weights of a quadrature over `theta` in `[-pi/2, pi/2]` that integrates `exp(f)`, a function with one mode,
-/// for independent components `q_j ~ N(b_j, w_j)` in a ball of squared radius `eta`.
-fn integrate(variances: &[f64], means: &[f64], eta: f64, f: impl Fn(f64) -> f64, mut visit: impl FnMut(f64, f64)) {
-    let mut node = |(theta, w): (f64, f64)| visit(theta, w);
-    if tame(variances, means, eta, NEAR) {
-        return panel(-FRAC_PI_2, FRAC_PI_2).for_each(node);
-    }
-    if tame(variances, means, eta, FAR) {
-        return gauss_legendre::<40>().on(-FRAC_PI_2, FRAC_PI_2).for_each(node);
-    }
-    let (cuts, peak) = bulk(&f);
-    let mass = |a: f64, b: f64| panel(a, b).map(|(theta, w)| w * (f(theta) - peak).exp()).sum::<f64>();
-    let tolerance = TOLERANCE.max(ROUNDING * peak.abs());
-    let whole = mass(cuts[0], cuts[1]) + mass(cuts[1], cuts[2]);
-    // Halving a panel that is no number would never end.
-    if !whole.is_finite() {
-        return;
-    }
-    // Depth first, left to right: at most one waiting panel for each halving.
-    let mut waiting = [(0.0, 0.0, 0.0, 0_u32); HALVINGS as usize + 4];
-    waiting[0] = (cuts[1], cuts[2], mass(cuts[1], cuts[2]), 0);
-    waiting[1] = (cuts[0], cuts[1], mass(cuts[0], cuts[1]), 0);
-    let mut count = 2;
-    while count > 0 {
-        count -= 1;
-        let (a, b, coarse, depth) = waiting[count];
-        let middle = 0.5 * (a + b);
-        let (left, right) = (mass(a, middle), mass(middle, b));
-        if (left + right - coarse).abs() <= tolerance * whole || depth == HALVINGS {
-            panel(a, middle).chain(panel(middle, b)).for_each(&mut node);
+impl Side {
+    /// `ln P` of a known point, inside the ball or not.
+    fn of_point(self, inside: bool) -> f64 {
+        if inside == (self == Self::Inside) {
+            0.0
         } else {
-            waiting[count] = (middle, b, right, depth + 1);
-            waiting[count + 1] = (a, middle, left, depth + 1);
-            count += 2;
+            f64::NEG_INFINITY
         }
     }
-}
 
-/// Where a function of `theta` with one mode has its bulk, with the mode in the middle, and its value there.
-fn bulk(f: impl Fn(f64) -> f64) -> ([f64; 3], f64) {
-    const RATIO: f64 = 0.618_033_988_749_894_8;
-    let (mut low, mut high) = (-FRAC_PI_2, FRAC_PI_2);
-    let (mut left, mut right) = (high - RATIO * (high - low), low + RATIO * (high - low));
-    let (mut at_left, mut at_right) = (f(left), f(right));
-    for _ in 0..60 {
-        if at_left < at_right {
-            low = left;
-            (left, at_left) = (right, at_right);
-            right = low + RATIO * (high - low);
-            at_right = f(right);
-        } else {
-            high = right;
-            (right, at_right) = (left, at_left);
-            left = high - RATIO * (high - low);
-            at_left = f(left);
+    /// Visits nodes and weights of a quadrature over the angle that integrates `exp(f)`.
+    fn integrate(
+        self,
+        variances: &[f64],
+        means: &[f64],
+        eta: f64,
+        f: impl Fn(f64) -> f64,
+        visit: impl FnMut(f64, f64),
+    ) {
+        match self {
+            Self::Inside => with_one_mode(variances, means, eta, f, visit),
+            Self::Outside => over_angles(&cuts(variances, means, eta.sqrt()), f, visit),
         }
     }
-    let mode = 0.5 * (low + high);
-    let peak = at_left.max(at_right);
-    let end = |outer: f64| {
-        let (mut inside, mut outside) = (mode, outer);
-        for _ in 0..30 {
-            let middle = 0.5 * (inside + outside);
-            if f(middle) > peak - FALL {
-                inside = middle
-            } else {
-                outside = middle
-            }
-        }
-        outside
-    };
-    ([end(-FRAC_PI_2), mode, end(FRAC_PI_2)], peak)
 }
 
 /// The leading component along its axis, `q_1 = sqrt(eta) sin(theta)`: its value, the squared radius that is left, and the
 /// logarithm of its density times `dq_1/dtheta`.
-pub(super) fn leading(variance: f64, mean: f64, eta: f64) -> impl Fn(f64) -> (f64, f64, f64) {
+fn leading(variance: f64, mean: f64, eta: f64) -> impl Fn(f64) -> (f64, f64, f64) {
     let (radius, deviation) = (eta.sqrt(), variance.sqrt());
     let log_scale = (radius / deviation).ln();
     move |theta: f64| {
@@ -118,41 +60,46 @@ pub(super) fn leading(variance: f64, mean: f64, eta: f64) -> impl Fn(f64) -> (f6
     }
 }
 
-/// `ln P(|q|^2 < eta)` for independent `q_j ~ N(means_j, variances_j)`, the variances in decreasing order.
-pub(super) fn log_mass(variances: &[f64], means: &[f64], eta: f64) -> f64 {
+/// `ln P(|q|^2 < eta)`, or of the contrary, for independent `q_j ~ N(means_j, variances_j)`, the variances in decreasing order.
+pub(super) fn log_mass(side: Side, variances: &[f64], means: &[f64], eta: f64) -> f64 {
     if eta <= 0.0 {
-        return f64::NEG_INFINITY;
+        return side.of_point(false);
     }
-    let (Some((w, inner_variances)), Some((b, inner_means))) = (variances.split_first(), means.split_first()) else {
-        return 0.0;
+    let (Some((w, inner)), Some((b, inner_means))) = (variances.split_first(), means.split_first()) else {
+        return side.of_point(true);
     };
-    if let (Some((last_w, rest_w)), Some((last_b, rest_b))) = (variances.split_last(), means.split_last())
+    if let (Some((last_w, rest)), Some((last_b, rest_means))) = (variances.split_last(), means.split_last())
         && *last_w <= KNOWN * eta
     {
-        return log_mass(rest_w, rest_b, eta - last_b * last_b);
+        return log_mass(side, rest, rest_means, eta - last_b * last_b);
     }
-    if inner_variances.is_empty() {
-        let (radius, deviation) = (eta.sqrt(), w.sqrt());
-        return normal::log_interval((-radius - b) / deviation, (radius - b) / deviation);
-    }
-    if let ([inner_w], [inner_b]) = (inner_variances, inner_means)
-        && tame(variances, means, eta, NEAR)
-    {
-        return tame_plane([*w, *inner_w], [*b, *inner_b], eta);
-    }
-    let leading = leading(*w, *b, eta);
-    let integrand = |theta: f64| {
-        let (_, left, log_density) = leading(theta);
-        log_density + log_mass(inner_variances, inner_means, left)
-    };
+    let (radius, deviation) = (eta.sqrt(), w.sqrt());
     let mut sum = LogSum::default();
-    integrate(variances, means, eta, integrand, |theta, weight| {
-        sum.add(integrand(theta) + weight.ln());
-    });
+    match (side, inner, inner_means) {
+        (Side::Inside, [], _) => return normal::log_interval((-radius - b) / deviation, (radius - b) / deviation),
+        (Side::Inside, [inner_w], [inner_b]) if tame(variances, means, eta, NEAR) => {
+            return tame_plane([*w, *inner_w], [*b, *inner_b], eta);
+        }
+        (Side::Inside, ..) => {}
+        (Side::Outside, ..) => {
+            sum.add(normal::log_cdf((-radius - b) / deviation));
+            sum.add(normal::log_cdf((b - radius) / deviation));
+        }
+    }
+    if !inner.is_empty() {
+        let leading = leading(*w, *b, eta);
+        let integrand = |theta: f64| {
+            let (_, left, log_density) = leading(theta);
+            log_density + log_mass(side, inner, inner_means, left)
+        };
+        side.integrate(variances, means, eta, integrand, |theta, weight| {
+            sum.add(integrand(theta) + weight.ln());
+        });
+    }
     sum.value()
 }
 
-/// [`log_mass`] in two dimensions on 24 nodes: all chords at once, in vector registers.
+/// [`log_mass`] inside in two dimensions on 24 nodes: all chords at once, in vector registers.
 fn tame_plane(variances: [f64; 2], means: [f64; 2], eta: f64) -> f64 {
     /// Sines and cosines of the nodes, and the logarithms of weights times cosines.
     static NODES: OnceLock<[[f64; 24]; 3]> = OnceLock::new();
@@ -177,34 +124,6 @@ fn tame_plane(variances: [f64; 2], means: [f64; 2], eta: f64) -> f64 {
     kernels::log_sum_exp(&logs) + (radius / deviations[0]).ln() - normal::LN_SQRT_2PI
 }
 
-/// `ln sum exp` of terms that arrive one after the other.
-#[derive(Default)]
-pub(super) struct LogSum {
-    /// Largest term and the sum of all relative to it.
-    terms: Option<(f64, f64)>,
-}
-
-impl LogSum {
-    /// Adds `exp(term)` and returns its share of the sum so far.
-    pub(super) fn add(&mut self, term: f64) -> f64 {
-        if term == f64::NEG_INFINITY {
-            return 0.0;
-        }
-        let (largest, sum) = match self.terms {
-            None => (term, 1.0),
-            Some((largest, sum)) if term <= largest => (largest, sum + (term - largest).exp()),
-            Some((largest, sum)) => (term, sum * (largest - term).exp() + 1.0),
-        };
-        self.terms = Some((largest, sum));
-        (term - largest).exp() / sum
-    }
-
-    pub(super) fn value(&self) -> f64 {
-        self.terms
-            .map_or(f64::NEG_INFINITY, |(largest, sum)| largest + sum.ln())
-    }
-}
-
 /// Mass, mean and covariance, in the coordinates from `first` on; zero in those before.
 pub(super) struct Moments<const M: usize> {
     pub(super) log_mass: f64,
@@ -213,93 +132,193 @@ pub(super) struct Moments<const M: usize> {
 }
 
 impl<const M: usize> Moments<M> {
-    pub(super) fn with_mass(log_mass: f64) -> Self {
+    fn with_mass(log_mass: f64) -> Self {
         Self {
             log_mass,
             mean: SVector::zeros(),
             covariance: SMatrix::zeros(),
         }
     }
+
+    /// The components as they are.
+    fn free(variances: &[f64], means: &[f64], first: usize) -> Self {
+        let mut free = Self::with_mass(0.0);
+        for (i, (w, b)) in variances.iter().zip(means).enumerate() {
+            free.mean[first + i] = *b;
+            free.covariance[(first + i, first + i)] = *w;
+        }
+        free
+    }
+
+    /// The same with the first component, of this variance and mean, cut.
+    fn with_cut(mut self, first: usize, variance: f64, mean: f64, cut: &TruncatedMoments) -> Self {
+        self.log_mass = cut.log_probability;
+        self.mean[first] = mean + variance.sqrt() * cut.mean;
+        self.covariance[(first, first)] = variance * cut.variance;
+        self
+    }
 }
 
-/// As [`log_mass`], with the moments.
+/// As [`log_mass`], with the moments; the variances are those of the coordinates from `first` on.
 pub(super) fn moments<const M: usize>(
+    side: Side,
     variances: &[f64],
     means: &SVector<f64, M>,
     first: usize,
     eta: f64,
 ) -> Moments<M> {
     let tail = &means.as_slice()[first..first + variances.len()];
-    let (Some((w, inner)), Some(b)) = (variances.split_first(), tail.first()) else {
-        return Moments::with_mass(if eta > 0.0 { 0.0 } else { f64::NEG_INFINITY });
-    };
-    if eta <= 0.0 {
-        return Moments::with_mass(f64::NEG_INFINITY);
+    if eta <= 0.0 && side == Side::Outside {
+        return Moments::free(variances, tail, first);
     }
+    let (Some((w, inner)), Some(b)) = (variances.split_first().filter(|_| eta > 0.0), tail.first()) else {
+        return Moments::with_mass(side.of_point(eta > 0.0));
+    };
     if let (Some((last_w, rest)), Some(last_b)) = (variances.split_last(), tail.last())
         && *last_w <= KNOWN * eta
     {
-        let mut known = moments(rest, means, first, eta - last_b * last_b);
+        let mut known = moments(side, rest, means, first, eta - last_b * last_b);
         known.mean[first + rest.len()] = *last_b;
         return known;
     }
-    if inner.is_empty() {
-        let (radius, deviation) = (eta.sqrt(), w.sqrt());
-        let (low, high) = ((-radius - b) / deviation, (radius - b) / deviation);
-        let Ok(cut) = normal::truncated_moments(low, high) else {
-            return Moments::with_mass(f64::NEG_INFINITY);
-        };
-        let mut interval = Moments::with_mass(cut.log_probability);
-        interval.mean[first] = b + deviation * cut.mean;
-        interval.covariance[(first, first)] = w * cut.variance;
-        return interval;
-    }
-    let leading = leading(*w, *b, eta);
-    let integrand = |theta: f64| {
-        let (_, left, log_density) = leading(theta);
-        log_density + log_mass(inner, &tail[1..], left)
+    let (radius, deviation) = (eta.sqrt(), w.sqrt());
+    let (low, high) = ((-radius - b) / deviation, (radius - b) / deviation);
+    let cuts: &[(f64, f64)] = match (side, inner) {
+        (Side::Inside, []) => &[(low, high)],
+        (Side::Inside, _) => &[],
+        // The two tails of the leading component, the others free.
+        (Side::Outside, _) => &[(f64::NEG_INFINITY, low), (high, f64::INFINITY)],
     };
-    let mut sum = LogSum::default();
-    let mut total = Moments::with_mass(0.0);
-    integrate(variances, tail, eta, integrand, |theta, weight| {
-        let (q, left, log_density) = leading(theta);
-        let mut slice: Moments<M> = moments(inner, means, first + 1, left);
-        let share = sum.add(slice.log_mass + log_density + weight.ln());
+    let (mut sum, mut total) = (LogSum::default(), Moments::with_mass(0.0));
+    let mut add = |part: Moments<M>, log_weight: f64| {
+        let share = sum.add(part.log_mass + log_weight);
         if share > 0.0 {
-            slice.mean[first] = q;
-            // The mixture of what was there and the slice, free of the cancellation of raw moments.
-            let step = slice.mean - total.mean;
+            // The mixture of what was there and the part, free of the cancellation of raw moments.
+            let step = part.mean - total.mean;
             total.mean += step * share;
             total.covariance =
-                (total.covariance + step * step.transpose() * share) * (1.0 - share) + slice.covariance * share;
+                (total.covariance + step * step.transpose() * share) * (1.0 - share) + part.covariance * share;
         }
-    });
+    };
+    for cut in cuts
+        .iter()
+        .filter_map(|(from, to)| normal::truncated_moments(*from, *to).ok())
+    {
+        add(Moments::free(inner, &tail[1..], first + 1).with_cut(first, *w, *b, &cut), 0.0);
+    }
+    if !inner.is_empty() {
+        let leading = leading(*w, *b, eta);
+        let integrand = |theta: f64| {
+            let (_, left, log_density) = leading(theta);
+            log_density + log_mass(side, inner, &tail[1..], left)
+        };
+        side.integrate(variances, tail, eta, integrand, |theta, weight| {
+            let (q, left, log_density) = leading(theta);
+            let mut slice: Moments<M> = moments(side, inner, means, first + 1, left);
+            slice.mean[first] = q;
+            slice.log_mass += log_density;
+            add(slice, weight.ln());
+        });
+    }
     total.log_mass = sum.value();
     total
 }
 
 #[cfg(test)]
 mod tests {
-    use super::LogSum;
+    use super::super::Ellipsoid;
+    use fewbits_core::{Belief, Gaussian};
+    use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+    use rand::SeedableRng;
 
-    /// Terms whose exponentials are no numbers, in either order.
-    #[test]
-    fn logarithms_are_summed_whatever_their_size() {
-        for terms in [
-            [1000.0, 999.0, -1000.0],
-            [-1000.0, 999.0, 1000.0],
-            [999.0, 1000.0, f64::NEG_INFINITY],
-        ] {
-            let mut sum = LogSum::default();
-            let shares = terms.map(|term| sum.add(term));
-            assert!((sum.value() - 1000.0 - (-1.0_f64).exp().ln_1p()).abs() < 1e-12);
-            let last = if terms[2] == 1000.0 {
-                1.0 / (1.0 + (-1.0_f64).exp())
-            } else {
-                0.0
-            };
-            assert!((shares[2] - last).abs() < 1e-12 && shares[0] == 1.0);
+    /// Mass, mean and covariance outside by weighing draws: within 4.5 standard errors.
+    fn check<const M: usize>(
+        s: SMatrix<f64, M, M>,
+        eta: f64,
+        v: SMatrix<f64, M, M>,
+        mu: SVector<f64, M>,
+        draws: usize,
+    ) {
+        let region = Ellipsoid::new(&s, eta).unwrap();
+        let ours = region.under(&v).unwrap().moments_outside(&mu).unwrap();
+        let law = Gaussian::new(mu, v).unwrap();
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+        let kept: Vec<SVector<f64, M>> = (0..draws)
+            .map(|_| law.sample(&mut rng))
+            .filter(|nu| region.statistic(nu) >= eta)
+            .collect();
+        let (count, all) = (kept.len() as f64, draws as f64);
+        let p = count / all;
+        assert!((ours.log_mass.exp() - p).abs() < 4.5 * (p * (1.0 - p) / all).sqrt(), "{} {p}", ours.log_mass.exp());
+        let mean = kept.iter().sum::<SVector<f64, M>>() / count;
+        for i in 0..M {
+            assert!((mean[i] - ours.mean[i]).abs() < 4.5 * (ours.covariance[(i, i)] / count).sqrt());
+            for j in 0..=i {
+                let products = kept.iter().map(|nu| (nu[i] - mean[i]) * (nu[j] - mean[j]));
+                let found = products.clone().sum::<f64>() / count;
+                let square = products.map(|x| x * x).sum::<f64>() / count - found * found;
+                let error = (square / count).sqrt();
+                assert!(
+                    (found - ours.covariance[(i, j)]).abs() < 4.5 * error,
+                    "{i} {j}: {found} {:?}",
+                    ours.covariance
+                );
+            }
         }
-        assert_eq!(LogSum::default().value(), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn moments_outside_agree_with_sampling() {
+        let (s, v) = (Matrix2::new(3.5, 1.0, 1.0, 5.5), Matrix2::new(2.8, 0.7, 0.7, 4.9));
+        check(s, 1.4, v, Vector2::new(1.5, -2.0), 100_000);
+        check(s, 6.0, v, Vector2::zeros(), 200_000);
+        check(s, 0.3, Matrix2::new(1.0, 0.999, 0.999, 1.0), Vector2::new(0.5, 0.2), 100_000);
+        check(
+            Matrix3::identity(),
+            2.0,
+            Matrix3::new(0.9, 0.2, 0.0, 0.2, 0.6, 0.1, 0.0, 0.1, 0.3),
+            Vector3::new(0.3, -0.5, 0.2),
+            100_000,
+        );
+    }
+
+    /// In two dimensions of equal variance about the centre the law is Rayleigh's: `P(outside) = exp(-eta / 2 w)`.
+    #[test]
+    fn small_mass_outside_keeps_its_digits() {
+        for (w, eta) in [(1.0, 3.0), (0.1, 2.0), (0.01, 4.0), (1e-3, 1.0), (1e-4, 0.5)] {
+            let region = Ellipsoid::new(&Matrix2::identity(), eta).unwrap();
+            let under = region.under(&(Matrix2::identity() * w)).unwrap();
+            let outside = under.moments_outside(&Vector2::zeros()).unwrap();
+            let expected = -0.5 * eta / w;
+            assert!((outside.log_mass / expected - 1.0).abs() < 1e-8, "{w}: {} {expected}", outside.log_mass);
+            assert!((under.log_probability_outside(&Vector2::zeros()) / expected - 1.0).abs() < 1e-7);
+            // E |q|^2 = eta + 2 w, half on each axis.
+            let variance = 0.5 * eta + w;
+            assert!(outside.mean.amax() < 1e-6 * variance.sqrt());
+            assert!((outside.covariance[(0, 0)] / variance - 1.0).abs() < 1e-6, "{w}: {}", outside.covariance);
+            assert!((outside.covariance[(1, 1)] / variance - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn inside_and_outside_make_the_whole() {
+        let (s, v) = (Matrix2::new(3.5, 1.0, 1.0, 5.5), Matrix2::new(2.8, 0.7, 0.7, 4.9));
+        for (eta, mu) in [
+            (1.4, [0.4, 0.1]),
+            (0.0, [1.0, 1.0]),
+            (4.0, [6.0, -3.0]),
+            (9.0, [0.0, 0.0]),
+        ] {
+            let (region, mu) = (Ellipsoid::new(&s, eta).unwrap(), Vector2::from(mu));
+            let under = region.under(&v).unwrap();
+            let outside = under.moments_outside(&mu).unwrap();
+            let Some(inside) = under.moments(&mu) else {
+                assert!(eta == 0.0 && outside.log_mass == 0.0 && (outside.covariance - v).amax() < 1e-12);
+                continue;
+            };
+            let (p, q) = (inside.log_mass.exp(), outside.log_mass.exp());
+            assert!((p + q - 1.0).abs() < 1e-7, "{p} {q}");
+            assert!((inside.mean * p + outside.mean * q - mu).amax() < 1e-6);
+        }
     }
 }

@@ -9,6 +9,7 @@ use fewbits_numerics::error::{ArgumentError, at_least_one};
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 
 /// The same observation `count` times, by sensors that share the noise-free measurement: `p(observation | m)^count`. Silences
 /// and sign bits of identical sensors are fused exactly and together, at a cost that does not grow with their number.
@@ -76,7 +77,8 @@ impl Factor<1> for Repeated {
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Product {
-    factors: Vec<Repeated>,
+    /// One kind needs no memory of the heap.
+    factors: SmallVec<[Repeated; 1]>,
 }
 
 impl Product {

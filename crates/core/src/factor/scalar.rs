@@ -175,26 +175,14 @@ impl Factor<1> for Scalar {
     }
 }
 
-impl From<Value<1>> for Scalar {
-    fn from(factor: Value<1>) -> Self {
-        Self::Value(factor)
-    }
+macro_rules! from {
+    ($($factor:ty => $kind:ident),+) => {$(
+        impl From<$factor> for Scalar {
+            fn from(factor: $factor) -> Self {
+                Self::$kind(factor)
+            }
+        }
+    )+};
 }
 
-impl From<InCell> for Scalar {
-    fn from(factor: InCell) -> Self {
-        Self::InCell(factor)
-    }
-}
-
-impl From<Partition> for Scalar {
-    fn from(factor: Partition) -> Self {
-        Self::Partition(factor)
-    }
-}
-
-impl From<Constant> for Scalar {
-    fn from(factor: Constant) -> Self {
-        Self::Constant(factor)
-    }
-}
+from!(Value<1> => Value, InCell => InCell, Partition => Partition, Constant => Constant);

@@ -1,9 +1,9 @@
 //! The laws of [`Belief`] and [`Density`].
 
-use super::{Average, Violation, agree};
+use super::{Violation, agree, average_is, have_moments};
 use crate::belief::{Belief, Density};
+use crate::columns::state_at;
 use crate::gaussian::FactoredGaussian;
-use nalgebra::SVector;
 use rand::Rng;
 
 /// Draws have the belief's mean and covariance, entry by entry within four standard errors; draws into columns of unequal lengths are NaN.
@@ -15,24 +15,15 @@ pub fn samples_have_the_moments<const D: usize, R: Rng + ?Sized>(
     rng: &mut R,
     draws: usize,
 ) -> Result<(), Violation> {
-    let (mean, covariance) = (belief.mean(), belief.covariance());
+    const LAWS: [&str; 2] = [
+        "samples have the mean of their belief",
+        "samples have the covariance of their belief",
+    ];
     let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| vec![0.0; draws]);
     belief.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
-    for i in 0..D {
-        let slack = 1e-12 * (mean[i].abs() + covariance[(i, i)].sqrt());
-        let mut average = Average::new();
-        columns[i].iter().for_each(|x| average.add(*x));
-        average.check("samples have the mean of their belief", format!("coordinate {i}"), mean[i], slack)?;
-        for j in 0..=i {
-            let mut product = Average::new();
-            for (a, b) in columns[i].iter().zip(&columns[j]) {
-                product.add((a - mean[i]) * (b - mean[j]));
-            }
-            let slack = 1e-12 * (covariance[(i, i)] * covariance[(j, j)]).sqrt() + f64::MIN_POSITIVE;
-            let at = format!("entry ({i}, {j})");
-            product.check("samples have the covariance of their belief", at, covariance[(i, j)], slack)?;
-        }
-    }
+    let columns = columns.each_ref().map(Vec::as_slice);
+    let states: Vec<_> = (0..draws).map(|i| state_at(&columns, i)).collect();
+    have_moments(LAWS, &states, &belief.mean(), &belief.covariance())?;
     if D > 1 {
         let mut columns: [Vec<f64>; D] = std::array::from_fn(|d| vec![0.25; 3 + d % 2]);
         belief.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
@@ -63,17 +54,17 @@ pub fn density_integrates_to_one<const D: usize, R: Rng + ?Sized>(
     proposal.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
     let mut logs = vec![0.25; draws];
     belief.add_log_densities(&columns.each_ref().map(Vec::as_slice), &mut logs);
-    let mut total = Average::new();
-    for i in 0..draws {
-        let x = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
+    let mut ratios = Vec::with_capacity(draws);
+    for (i, log) in logs.iter().enumerate() {
+        let x = state_at(&columns.each_ref().map(Vec::as_slice), i);
         let alone = belief.log_density(&x);
-        agree("a sweep is the scalar", format!("{x:?}"), logs[i], 0.25 + alone, 1e-12, 1.0)?;
-        total.add((alone - proposal.log_pdf(&x)).exp());
+        agree("a sweep is the scalar", format!("{x:?}"), *log, 0.25 + alone, 1e-12, 1.0)?;
+        ratios.push((alone - proposal.log_pdf(&x)).exp());
     }
     for length in [draws + 1, draws.saturating_sub(1)] {
         let mut logs = vec![0.25; length];
         belief.add_log_densities(&columns.each_ref().map(Vec::as_slice), &mut logs);
         not_a_number("a sweep over slices of unequal lengths writes NaN", logs.iter())?;
     }
-    total.check("a density integrates to one", "the whole space", 1.0, 1e-12)
+    average_is("a density integrates to one", "the whole space", ratios.into_iter(), 1.0, 1e-12)
 }

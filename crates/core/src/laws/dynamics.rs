@@ -1,6 +1,7 @@
 //! The laws of [`Dynamics`] and its refinements.
 
-use super::{Average, Violation, agree};
+use super::{Violation, agree, have_moments};
+use crate::columns::state_at;
 use crate::dynamics::{Dynamics, GaussianDynamics, LinearDynamics};
 use nalgebra::SVector;
 use rand::Rng;
@@ -16,27 +17,17 @@ pub fn draws_have_the_law<const D: usize, R: Rng + ?Sized>(
     state: &SVector<f64, D>,
     draws: usize,
 ) -> Result<(), Violation> {
-    let (mean, covariance) = (dynamics.mean(state), dynamics.noise_covariance_at(state));
+    const LAWS: [&str; 2] = [
+        "draws have the mean of the dynamics",
+        "draws have the noise of the dynamics",
+    ];
     let mut columns: [Vec<f64>; D] = std::array::from_fn(|d| vec![state[d]; draws]);
     dynamics.propagate_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
-    let swept: Vec<SVector<f64, D>> = (0..draws).map(|i| SVector::from_fn(|d, _| columns[d][i])).collect();
-    let single: Vec<SVector<f64, D>> = (0..draws).map(|_| dynamics.propagate(rng, state)).collect();
+    let columns = columns.each_ref().map(Vec::as_slice);
+    let swept: Vec<_> = (0..draws).map(|i| state_at(&columns, i)).collect();
+    let single: Vec<_> = (0..draws).map(|_| dynamics.propagate(rng, state)).collect();
     for points in [single, swept] {
-        for i in 0..D {
-            let scale = mean[i].abs() + covariance[(i, i)].sqrt();
-            let mut average = Average::new();
-            points.iter().for_each(|x| average.add(x[i]));
-            average.check("draws have the mean of the dynamics", format!("coordinate {i}"), mean[i], 1e-12 * scale)?;
-            for j in 0..=i {
-                let mut product = Average::new();
-                points
-                    .iter()
-                    .for_each(|x| product.add((x[i] - mean[i]) * (x[j] - mean[j])));
-                let slack = 1e-12 * (covariance[(i, i)] * covariance[(j, j)]).sqrt() + f64::MIN_POSITIVE;
-                let at = format!("entry ({i}, {j})");
-                product.check("draws have the noise of the dynamics", at, covariance[(i, j)], slack)?;
-            }
-        }
+        have_moments(LAWS, &points, &dynamics.mean(state), &dynamics.noise_covariance_at(state))?;
     }
     Ok(())
 }

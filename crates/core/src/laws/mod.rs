@@ -15,7 +15,7 @@ pub mod sensing;
 pub use fewbits_numerics::wild;
 
 use crate::columns::Columns;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 /// A law that an implementation breaks.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -102,36 +102,44 @@ fn sweep<const D: usize>(
     Ok(())
 }
 
-/// Mean and standard error of draws.
-struct Average {
-    count: f64,
-    mean: f64,
-    squares: f64,
+/// The average of the draws is within [`STANDARD_ERRORS`] of `expected`; `slack` forgives rounding.
+fn average_is(
+    law: &'static str,
+    at: impl std::fmt::Display,
+    draws: impl Iterator<Item = f64>,
+    expected: f64,
+    slack: f64,
+) -> Result<(), Violation> {
+    let (mut count, mut mean, mut squares) = (0.0, 0.0, 0.0);
+    for x in draws {
+        count += 1.0;
+        let delta = x - mean;
+        mean += delta / count;
+        squares += delta * (x - mean);
+    }
+    let error = (squares / f64::max(count - 1.0, 1.0) / count).sqrt();
+    if (mean - expected).abs() <= STANDARD_ERRORS * error + slack {
+        Ok(())
+    } else {
+        Err(Violation::new(law, format!("{mean} +- {error} at {at}"), expected))
+    }
 }
 
-impl Average {
-    fn new() -> Self {
-        Self {
-            count: 0.0,
-            mean: 0.0,
-            squares: 0.0,
+/// Draws have the mean and the covariance, entry by entry.
+fn have_moments<const D: usize>(
+    [mean_law, covariance_law]: [&'static str; 2],
+    draws: &[SVector<f64, D>],
+    mean: &SVector<f64, D>,
+    covariance: &SMatrix<f64, D, D>,
+) -> Result<(), Violation> {
+    for i in 0..D {
+        let slack = 1e-12 * (mean[i].abs() + covariance[(i, i)].sqrt());
+        average_is(mean_law, format!("coordinate {i}"), draws.iter().map(|x| x[i]), mean[i], slack)?;
+        for j in 0..=i {
+            let products = draws.iter().map(|x| (x[i] - mean[i]) * (x[j] - mean[j]));
+            let slack = 1e-12 * (covariance[(i, i)] * covariance[(j, j)]).sqrt() + f64::MIN_POSITIVE;
+            average_is(covariance_law, format!("entry ({i}, {j})"), products, covariance[(i, j)], slack)?;
         }
     }
-
-    fn add(&mut self, x: f64) {
-        self.count += 1.0;
-        let delta = x - self.mean;
-        self.mean += delta / self.count;
-        self.squares += delta * (x - self.mean);
-    }
-
-    /// Whether the average is within [`STANDARD_ERRORS`] of `expected`; `slack` forgives rounding.
-    fn check(&self, law: &'static str, at: impl std::fmt::Display, expected: f64, slack: f64) -> Result<(), Violation> {
-        let error = (self.squares / (self.count - 1.0).max(1.0) / self.count).sqrt();
-        if (self.mean - expected).abs() <= STANDARD_ERRORS * error + slack {
-            Ok(())
-        } else {
-            Err(Violation::new(law, format!("{} +- {error} at {at}", self.mean), expected))
-        }
-    }
+    Ok(())
 }

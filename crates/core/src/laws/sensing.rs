@@ -1,6 +1,6 @@
 //! The laws of [`Sensing`].
 
-use super::{Average, Violation, agree};
+use super::{Violation, agree, have_moments};
 use crate::sensing::Sensing;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
@@ -37,21 +37,9 @@ pub fn draws_have_the_law<const D: usize, const M: usize, R: Rng + ?Sized>(
     state: &SVector<f64, D>,
     draws: usize,
 ) -> Result<(), Violation> {
-    let (mean, covariance) = (sensing.mean(state), sensing.noise_covariance_at(state));
+    const LAWS: [&str; 2] = ["measurements have their mean", "measurements have their noise"];
     let points: Vec<SVector<f64, M>> = (0..draws).map(|_| sensing.sample(rng, state)).collect();
-    for i in 0..M {
-        let mut average = Average::new();
-        points.iter().for_each(|z| average.add(z[i]));
-        average.check("measurements have their mean", format!("component {i}"), mean[i], 1e-12 * mean[i].abs())?;
-        for j in 0..=i {
-            let mut product = Average::new();
-            points
-                .iter()
-                .for_each(|z| product.add((z[i] - mean[i]) * (z[j] - mean[j])));
-            product.check("measurements have their noise", format!("entry ({i}, {j})"), covariance[(i, j)], 0.0)?;
-        }
-    }
-    Ok(())
+    have_moments(LAWS, &points, &sensing.mean(state), &sensing.noise_covariance_at(state))
 }
 
 /// Compares a Jacobian with central differences; steps are `1e-5` of the state's largest coordinate.

@@ -132,12 +132,12 @@ fn a_link_loses_and_inverts_as_it_says() {
 fn an_empty_field_leaves_no_byte_and_a_cleared_writer_begins_again() {
     let mut writer = BitWriter::with_capacity(20);
     writer.write(0, 0).unwrap();
-    assert_eq!((writer.bits(), writer.as_bit_string().bytes()), (0, &[][..]));
+    assert_eq!((writer.bits(), writer.clone().finish().bytes()), (0, &[][..]));
     writer.write(0xab, 8).unwrap();
     writer.write(0, 0).unwrap();
     writer.write(0x5, 3).unwrap();
     writer.write(0x1f3, 9).unwrap();
-    assert_eq!(writer.as_bit_string().bytes(), [0xab, 0b1011_1111, 0b0011_0000]);
+    assert_eq!(writer.clone().finish().bytes(), [0xab, 0b1011_1111, 0b0011_0000]);
     assert_eq!(writer.bits(), 20);
     writer.clear();
     writer.write(0x3, 2).unwrap();
@@ -153,6 +153,6 @@ fn padding_is_no_part_of_a_message() {
     let mut writer = BitWriter::new();
     writer.append(&padded);
     writer.write(0, 4).unwrap();
-    assert_eq!(writer.finish().bytes(), [0b1010_0000]);
+    assert_eq!(writer.clone().finish().bytes(), [0b1010_0000]);
     assert_eq!(BitString::from_bytes(vec![0xff], 0).unwrap(), BitString::default());
 }

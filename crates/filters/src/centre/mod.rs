@@ -44,7 +44,7 @@ pub use state::CentreState;
 use crate::Error;
 use crate::contract::{Evolving, StateFilter};
 use fewbits_core::{Belief, BitString, Gaussian, Observation};
-use fewbits_numerics::error::{finite, non_negative, positive, refuse};
+use fewbits_numerics::error::{finite, non_negative, refuse};
 use rand::Rng;
 use state::{Checkpoint, MemberState};
 
@@ -149,15 +149,6 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             learning: Some(learning),
             ..self
         })
-    }
-
-    /// The same with another factor of the stated process noise to begin with: one that was learnt before.
-    ///
-    /// # Errors
-    /// If it is not above 0.
-    pub fn with_noise_scale(self, noise_scale: f64) -> Result<Self, Error> {
-        positive("noise_scale", noise_scale)?;
-        Ok(Self { noise_scale, ..self })
     }
 
     /// The same, starting anew from `prior` whenever the track is lost: what is known of the state without any report.

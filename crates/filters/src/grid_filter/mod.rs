@@ -13,8 +13,8 @@ mod region;
 pub use on_axes::GridOnAxes;
 
 use crate::Error;
-use fewbits_core::{Gaussian, Likelihood};
-use fewbits_numerics::error::{refuse, within};
+use fewbits_core::{Gaussian, Likelihood, OnAxes};
+use fewbits_numerics::error::{at_least_one, refuse, within};
 use fewbits_numerics::linalg::{congruence, symmetrised};
 use fewbits_numerics::stored;
 use nalgebra::{Cholesky, SMatrix, SVector};
@@ -287,12 +287,7 @@ struct Moments<const K: usize> {
 
 /// Refuses axes that are not `K` different coordinates of a state of `D`.
 fn check_axes<const D: usize, const K: usize>(axes: &[usize; K]) -> Result<(), Error> {
-    if K == 0 || K > D {
-        return refuse("axes", format!("{K} coordinates"), format!("1 to {D} coordinates"));
-    }
-    let twice = (0..K).any(|k| axes[..k].contains(&axes[k]));
-    if twice || axes.iter().any(|axis| *axis >= D) {
-        return refuse("axes", format!("{axes:?}"), format!("different coordinates below {D}"));
-    }
+    at_least_one("axes", K)?;
+    OnAxes::<(), D, K>::new((), *axes)?;
     Ok(())
 }

@@ -45,7 +45,7 @@ impl<const D: usize, const K: usize> Likelihood<K> for OnPlane<'_, D, K> {
             .iter()
             .zip(place.iter())
             .for_each(|(axis, x)| state[*axis] = *x);
-        self.observed.iter().map(|one| one.log_likelihood(&state)).sum()
+        self.observed.log_likelihood(&state)
     }
 
     fn add_log_likelihoods(&self, places: Columns<'_, K>, logs: &mut [f64]) {
@@ -62,9 +62,7 @@ impl<const D: usize, const K: usize> Likelihood<K> for OnPlane<'_, D, K> {
                 None => &constant[d][..count],
             };
             let states: Columns<'_, D> = std::array::from_fn(column);
-            self.observed
-                .iter()
-                .for_each(|one| one.add_log_likelihoods(states, logs));
+            self.observed.add_log_likelihoods(states, logs);
         }
     }
 }
@@ -111,9 +109,6 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
         };
         let (next, info) = self.grid.update(belief, self.axes, &joint, &mut self.workspace)?;
         *belief = next;
-        Ok(Info {
-            log_likelihood: info.log_likelihood,
-            effective_sample_size: None,
-        })
+        Ok(Info::new(info.log_likelihood))
     }
 }

@@ -105,11 +105,6 @@ impl Air {
         Self::new(diffusivity, self.wind, self.ground)?.with_closest(self.closest)
     }
 
-    /// Lower boundary of the air.
-    pub fn ground(&self) -> Ground {
-        self.ground
-    }
-
     /// Wind, m/s.
     pub fn wind(&self) -> &Vector3<f64> {
         &self.wind

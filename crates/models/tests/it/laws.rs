@@ -1,6 +1,6 @@
 //! The laws of `core`, run on every dynamics and every sensing of this crate.
 
-use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics, Sensing, laws};
+use fewbits_core::{Dynamics, LinearDynamics, Sensing, laws};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
 use nalgebra::{Matrix2, Matrix2x4, SVector, Vector2, Vector4};
 use rand::SeedableRng;
@@ -53,14 +53,8 @@ fn sensing() {
 }
 
 #[test]
-fn the_density_of_a_transition_is_that_of_its_noise() {
+fn with_all_traits_in_scope_no_method_is_ambiguous() {
     let model = Ar1::new(0.9, 2.0).unwrap();
-    let found = model.log_transition(&[1.5].into(), &[1.0].into()).unwrap();
-    let expected = fewbits_numerics::normal::log_pdf_with(1.5, 0.9, 2.0);
-    assert!((found - expected).abs() < 1e-14);
-    let singular = constant_velocity_1d(1.0, 1.0).unwrap();
-    assert!(singular.log_transition(&Vector2::zeros(), &Vector2::zeros()).is_err());
-    // With all traits in scope no method is ambiguous.
     assert_eq!((model.noise_covariance()[0], model.mean(&[2.0].into())[0]), (2.0, 1.8));
     assert_eq!(LinearSensor::direct(0.5).unwrap().mean(&[2.0].into())[0], 2.0);
 }

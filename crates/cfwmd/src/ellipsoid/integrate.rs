@@ -1,0 +1,133 @@
+//! Quadrature over the angle of the leading component.
+
+use fewbits_numerics::golden;
+use fewbits_numerics::quadrature::gauss_legendre;
+use std::f64::consts::FRAC_PI_2;
+
+/// Means up to this many deviations need 24 nodes, up to the next 40; beyond them the quadrature is adaptive ...
+pub(super) const NEAR: f64 = 4.0;
+const FAR: f64 = 8.0;
+/// ... and so it is for radii beyond this many deviations.
+const RADIUS: f64 = 5.0;
+/// Fall of the log integrand at which the bulk ends.
+const FALL: f64 = 40.0;
+/// Panels are halved until two rules agree to this share of the whole, or to what rounding leaves of a far tail ...
+const TOLERANCE: f64 = 1e-10;
+/// ... per unit of the logarithm of the integrand, or this often.
+const ROUNDING: f64 = 4e-15;
+const HALVINGS: u32 = 40;
+/// The same where the integrand has steps: enough to find one to `pi / 2^24`.
+const STEP_HALVINGS: u32 = 24;
+/// The bulk of a component, in deviations: beyond the last the density has fallen by `exp(-32)`.
+const CUTS: [f64; 3] = [0.0, 2.0, 8.0];
+
+/// Nodes of a panel.
+pub(super) fn panel(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
+    gauss_legendre::<24>().on(a, b)
+}
+
+/// Whether all means and the radius are within so many deviations.
+pub(super) fn tame(variances: &[f64], means: &[f64], eta: f64, reach: f64) -> bool {
+    let tame = |(w, b): (&f64, &f64)| b * b <= reach * reach * w && eta <= RADIUS * RADIUS * w;
+    variances.iter().zip(means).all(tame)
+}
+
+/// Visits nodes and weights of a quadrature over `theta` in `[-pi/2, pi/2]` that integrates `exp(f)`, a function with one mode,
+/// for independent components `q_j ~ N(b_j, w_j)` in a ball of squared radius `eta`.
+pub(super) fn with_one_mode(
+    variances: &[f64],
+    means: &[f64],
+    eta: f64,
+    f: impl Fn(f64) -> f64,
+    mut visit: impl FnMut(f64, f64),
+) {
+    let node = |(theta, w): (f64, f64)| visit(theta, w);
+    if tame(variances, means, eta, NEAR) {
+        return panel(-FRAC_PI_2, FRAC_PI_2).for_each(node);
+    }
+    if tame(variances, means, eta, FAR) {
+        return gauss_legendre::<40>().on(-FRAC_PI_2, FRAC_PI_2).for_each(node);
+    }
+    let (mode, peak) = golden::maximum(&f, -FRAC_PI_2, FRAC_PI_2, 1e-12);
+    let end = |outer: f64| {
+        let (mut inside, mut outside) = (mode, outer);
+        for _ in 0..30 {
+            let middle = 0.5 * (inside + outside);
+            if f(middle) > peak - FALL {
+                inside = middle
+            } else {
+                outside = middle
+            }
+        }
+        outside
+    };
+    let bulk = [end(-FRAC_PI_2), mode, end(FRAC_PI_2)];
+    adaptive(&bulk, peak, TOLERANCE.max(ROUNDING * peak.abs()), HALVINGS, &f, &mut visit);
+}
+
+/// The same for any function, between increasing cuts at which it may change its course.
+pub(super) fn over_angles(cuts: &[f64], f: impl Fn(f64) -> f64, mut visit: impl FnMut(f64, f64)) {
+    let nodes = cuts.windows(2).flat_map(|pair| panel(pair[0], pair[1]));
+    let peak = nodes.map(|(theta, _)| f(theta)).fold(f64::NEG_INFINITY, f64::max);
+    if peak > f64::NEG_INFINITY {
+        adaptive(cuts, peak, TOLERANCE, STEP_HALVINGS, &f, &mut visit);
+    }
+}
+
+/// Visits nodes and weights of a quadrature of `exp(f)` between the cuts, from left to right: panels are halved until two rules agree to
+/// the share `tolerance` of the whole. `peak` is about the largest `f`.
+fn adaptive(
+    cuts: &[f64],
+    peak: f64,
+    tolerance: f64,
+    halvings: u32,
+    f: &impl Fn(f64) -> f64,
+    visit: &mut impl FnMut(f64, f64),
+) {
+    let mass = |a: f64, b: f64| panel(a, b).map(|(theta, w)| w * (f(theta) - peak).exp()).sum::<f64>();
+    // Depth first: the panel on top of the stack is the leftmost.
+    let panels = cuts
+        .windows(2)
+        .map(|pair| (pair[0], pair[1], mass(pair[0], pair[1]), 0));
+    let mut waiting: Vec<_> = panels.rev().collect();
+    let whole: f64 = waiting.iter().map(|panel| panel.2).sum();
+    // Halving a panel that is no number would never end.
+    if !whole.is_finite() {
+        return;
+    }
+    while let Some((a, b, coarse, depth)) = waiting.pop() {
+        let middle = 0.5 * (a + b);
+        let (left, right) = (mass(a, middle), mass(middle, b));
+        if (left + right - coarse).abs() <= tolerance * whole || depth == halvings {
+            panel(a, middle)
+                .chain(panel(middle, b))
+                .for_each(|(theta, w)| visit(theta, w));
+        } else {
+            waiting.push((middle, b, right, depth + 1));
+            waiting.push((a, middle, left, depth + 1));
+        }
+    }
+}
+
+/// Increasing angles at which the integrand may change its course: the bulk of the leading component, and where the edge of the
+/// ball passes through the bulk of each other one.
+pub(super) fn cuts(variances: &[f64], means: &[f64], radius: f64) -> Vec<f64> {
+    let mut all = vec![-FRAC_PI_2, 0.0, FRAC_PI_2];
+    for (i, (w, b)) in variances.iter().zip(means).enumerate() {
+        for at in CUTS
+            .into_iter()
+            .flat_map(|cut| [b - cut * w.sqrt(), b + cut * w.sqrt()])
+        {
+            let ratio = at / radius;
+            if ratio.abs() < 1.0 {
+                match i {
+                    0 => all.push(ratio.asin()),
+                    _ => all.extend([ratio.abs().acos(), -ratio.abs().acos()]),
+                }
+            }
+        }
+    }
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    all
+}
