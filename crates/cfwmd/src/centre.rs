@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::censored::as_core;
 use crate::network::Network;
+use crate::no_feedback::advance;
 use crate::rule::{CensoringRule, OwnRecursion, Weighing};
 use crate::scheme::{Censoring, Prediction};
 use fewbits_core::{
@@ -74,11 +75,8 @@ where
         let mut own = vec![OwnRecursion::new(&start); network.sensors().len()];
         let mut rules = Vec::with_capacity(slots);
         for _ in 0..slots {
-            let slot = own.iter_mut().zip(network.sensors()).map(|(own, sensor)| {
-                let step = own.advance(&dynamics, sensor, start.mean())?;
-                CensoringRule::new(&step.innovation_covariance, network.threshold())
-            });
-            rules.push(slot.collect::<Result<Vec<_>, Error>>()?);
+            let slot = advance(&mut own, &network, &dynamics)?;
+            rules.push(slot.into_iter().map(|(_, rule)| rule).collect());
         }
         Ok(Self::with_rules(network, dynamics, start, Weighing::OwnFilter, rules))
     }

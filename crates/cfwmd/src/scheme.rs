@@ -4,14 +4,13 @@ use crate::Error;
 use crate::censored::{Censored, MissingReports, as_core};
 use crate::rule::CensoringRule;
 use fewbits_core::{
-    BitReader, BitWriter, CodecError, Deterministic, Gaussian, LinearSensing, Link, MeasurementNoise, Message,
-    NumberFormat, Observation, Scheme, Sensing,
+    BitReader, BitWriter, CodecError, Gaussian, LinearSensing, Link, MeasurementNoise, Memoryless, Message,
+    NumberFormat, Observation, Sensing,
 };
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
-use rand::Rng;
 
 /// A sensor that compares its measurement with the broadcast state prediction, under a rule that both ends know: the rule of
 /// this slot comes from the sensor's own covariance recursion (the paper's CFwMD) or from a schedule.
@@ -113,16 +112,11 @@ fn finite_over<const M: usize>(
     Ok(all_finite("prediction", prediction.as_slice())?)
 }
 
-impl<const D: usize, const M: usize, S: Sensing<D, M>> Deterministic<M> for Censoring<S, D, M> {}
-
-impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S, D, M> {
-    type State = ();
+impl<const D: usize, const M: usize, S: Sensing<D, M>> Memoryless<M> for Censoring<S, D, M> {
     /// The state prediction of the fusion centre.
     type Feedback = SVector<f64, D>;
     type Report = SVector<f64, M>;
     type Factor = Censored<M>;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) -> NumberFormat {
         NumberFormat::Double
@@ -132,10 +126,8 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S
         self.format
     }
 
-    fn encode<R: Rng + ?Sized>(
+    fn report_of(
         &self,
-        _: &mut R,
-        (): &mut (),
         measurement: &SVector<f64, M>,
         broadcast: &SVector<f64, D>,
     ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
@@ -144,7 +136,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S
         send_if(&self.rule, measurement, &prediction, &self.format)
     }
 
-    fn factor(
+    fn meaning_of(
         &self,
         broadcast: &SVector<f64, D>,
         observation: &Observation<SVector<f64, M>>,
@@ -253,15 +245,10 @@ impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M>
     }
 }
 
-impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Deterministic<M> for CovarianceFeedback<S, D, M> {}
-
-impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Scheme<M> for CovarianceFeedback<S, D, M> {
-    type State = ();
+impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for CovarianceFeedback<S, D, M> {
     type Feedback = Prediction<D>;
     type Report = SVector<f64, M>;
     type Factor = Censored<M>;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) -> NumberFormat {
         NumberFormat::Double
@@ -271,24 +258,22 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Scheme<M> for Cov
         self.format
     }
 
-    fn encode<R: Rng + ?Sized>(
+    fn report_of(
         &self,
-        rng: &mut R,
-        (): &mut (),
         measurement: &SVector<f64, M>,
         broadcast: &Prediction<D>,
     ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
         let sensor = self.under(broadcast).map_err(as_core)?;
-        sensor.encode(rng, &mut (), measurement, broadcast.0.mean())
+        sensor.report_of(measurement, broadcast.0.mean())
     }
 
-    fn factor(
+    fn meaning_of(
         &self,
         broadcast: &Prediction<D>,
         observation: &Observation<SVector<f64, M>>,
         link: &Link,
     ) -> Result<Censored<M>, fewbits_core::Error> {
         let sensor = self.under(broadcast).map_err(as_core)?;
-        sensor.factor(broadcast.0.mean(), observation, link)
+        sensor.meaning_of(broadcast.0.mean(), observation, link)
     }
 }

@@ -6,7 +6,7 @@ use crate::gaussian::Gaussian;
 use crate::measurement_noise::MeasurementNoise;
 use crate::number::NumberFormat;
 use crate::observation::{Link, Observation};
-use crate::scheme::AlwaysReporting;
+use crate::scheme::Memoryless;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive, within};
 use nalgebra::{Matrix1, SVector, Vector1};
@@ -65,7 +65,7 @@ impl Factor<1> for SentValue {
     }
 }
 
-impl AlwaysReporting<1> for FullValue {
+impl Memoryless<1> for FullValue {
     type Feedback = ();
     type Report = f64;
     type Factor = SentValue;
@@ -76,8 +76,8 @@ impl AlwaysReporting<1> for FullValue {
         NumberFormat::Double
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<f64, Error> {
-        Ok(finite("measurement", measurement[0])?)
+    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<f64>, Error> {
+        Ok(Some(finite("measurement", measurement[0])?))
     }
 
     fn meaning_of(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {

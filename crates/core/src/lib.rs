@@ -79,7 +79,7 @@ pub use message::Message;
 pub use number::NumberFormat;
 pub use observation::{Link, Observation};
 pub use on_axes::OnAxes;
-pub use scheme::{AlwaysReporting, Deterministic, Scheme};
+pub use scheme::{Deterministic, Memoryless, Scheme};
 pub use sensing::{LinearSensing, Sensing};
 pub use sensor_node::{SchemeNode, SensorNode};
 pub use sign::Sign;

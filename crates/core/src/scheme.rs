@@ -73,10 +73,11 @@ pub trait Scheme<const M: usize> {
 /// Law ([`crate::laws::scheme::deterministic`]): `encode` draws nothing, and says the same again.
 pub trait Deterministic<const M: usize>: Scheme<M> {}
 
-/// A [`Scheme`] whose sensor remembers nothing, draws no random numbers and reports every sample.
+/// A [`Scheme`] whose sensor remembers nothing and draws no random numbers.
 ///
-/// Such a scheme says how a sample becomes a report and what an observation means; it is then a [`Scheme`] and [`Deterministic`].
-pub trait AlwaysReporting<const M: usize> {
+/// Such a scheme says how a sample becomes a report, or silence, and what an observation means; it is then a [`Scheme`] and
+/// [`Deterministic`].
+pub trait Memoryless<const M: usize> {
     /// [`Scheme::Feedback`].
     type Feedback: Message;
     /// [`Scheme::Report`].
@@ -90,11 +91,11 @@ pub trait AlwaysReporting<const M: usize> {
     /// [`Scheme::report_format`].
     fn report_format(&self) -> <Self::Report as Message>::Format;
 
-    /// The report of a sample.
+    /// The report of a sample. `None` is silence.
     ///
     /// # Errors
     /// If the sample or the feedback is not finite.
-    fn report_of(&self, sample: &SVector<f64, M>, feedback: &Self::Feedback) -> Result<Self::Report, Error>;
+    fn report_of(&self, sample: &SVector<f64, M>, feedback: &Self::Feedback) -> Result<Option<Self::Report>, Error>;
 
     /// [`Scheme::factor`].
     ///
@@ -108,7 +109,7 @@ pub trait AlwaysReporting<const M: usize> {
     ) -> Result<Self::Factor, Error>;
 }
 
-impl<S: AlwaysReporting<M>, const M: usize> Scheme<M> for S {
+impl<S: Memoryless<M>, const M: usize> Scheme<M> for S {
     type State = ();
     type Feedback = S::Feedback;
     type Report = S::Report;
@@ -117,11 +118,11 @@ impl<S: AlwaysReporting<M>, const M: usize> Scheme<M> for S {
     fn start(&self) {}
 
     fn feedback_format(&self) -> <S::Feedback as Message>::Format {
-        AlwaysReporting::feedback_format(self)
+        Memoryless::feedback_format(self)
     }
 
     fn report_format(&self) -> <S::Report as Message>::Format {
-        AlwaysReporting::report_format(self)
+        Memoryless::report_format(self)
     }
 
     #[inline]
@@ -132,7 +133,7 @@ impl<S: AlwaysReporting<M>, const M: usize> Scheme<M> for S {
         sample: &SVector<f64, M>,
         feedback: &S::Feedback,
     ) -> Result<Option<S::Report>, Error> {
-        self.report_of(sample, feedback).map(Some)
+        self.report_of(sample, feedback)
     }
 
     #[inline]
@@ -146,4 +147,4 @@ impl<S: AlwaysReporting<M>, const M: usize> Scheme<M> for S {
     }
 }
 
-impl<S: AlwaysReporting<M>, const M: usize> Deterministic<M> for S {}
+impl<S: Memoryless<M>, const M: usize> Deterministic<M> for S {}

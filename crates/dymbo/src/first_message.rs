@@ -3,9 +3,7 @@
 use crate::Error;
 use crate::plant::scalar;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::{
-    AlwaysReporting, BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Message, Observation,
-};
+use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Memoryless, Message, Observation};
 use fewbits_numerics::error::{ArgumentError, finite, positive, within};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
@@ -142,7 +140,7 @@ impl RoundedSample {
     }
 }
 
-impl AlwaysReporting<1> for RoundedSample {
+impl Memoryless<1> for RoundedSample {
     type Feedback = ();
     type Report = Multiple;
     type Factor = Scalar;
@@ -153,8 +151,8 @@ impl AlwaysReporting<1> for RoundedSample {
         self.bits
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Multiple, fewbits_core::Error> {
-        Ok(self.round(measurement[0])?)
+    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, fewbits_core::Error> {
+        Ok(Some(self.round(measurement[0])?))
     }
 
     /// Over a link that inverts bits, words of up to 12 bits.

@@ -3,7 +3,7 @@
 use crate::Error;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{
-    AlwaysReporting, BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Memoryless, Message, NumberFormat,
     Observation,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
@@ -156,7 +156,7 @@ impl MeasurementNoise<1> for InnovationWord {
     }
 }
 
-impl AlwaysReporting<1> for InnovationWord {
+impl Memoryless<1> for InnovationWord {
     type Feedback = Prediction;
     type Report = CellIndex;
     type Factor = Scalar;
@@ -170,8 +170,12 @@ impl AlwaysReporting<1> for InnovationWord {
     }
 
     #[inline]
-    fn report_of(&self, measurement: &Vector1<f64>, prediction: &Prediction) -> Result<CellIndex, fewbits_core::Error> {
-        Ok(self.word(measurement[0], prediction)?)
+    fn report_of(
+        &self,
+        measurement: &Vector1<f64>,
+        prediction: &Prediction,
+    ) -> Result<Option<CellIndex>, fewbits_core::Error> {
+        Ok(Some(self.word(measurement[0], prediction)?))
     }
 
     fn meaning_of(

@@ -2,7 +2,7 @@
 
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::{Constant, InCell, Scalar};
-use fewbits_core::{AlwaysReporting, Link, MeasurementNoise, NumberFormat, Observation, Sign};
+use fewbits_core::{Link, MeasurementNoise, Memoryless, NumberFormat, Observation, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
@@ -64,7 +64,7 @@ impl MeasurementNoise<1> for SignBit {
     }
 }
 
-impl AlwaysReporting<1> for SignBit {
+impl Memoryless<1> for SignBit {
     type Feedback = f64;
     type Report = Sign;
     type Factor = Scalar;
@@ -76,9 +76,9 @@ impl AlwaysReporting<1> for SignBit {
     fn report_format(&self) {}
 
     #[inline]
-    fn report_of(&self, measurement: &Vector1<f64>, threshold: &f64) -> Result<Sign, fewbits_core::Error> {
+    fn report_of(&self, measurement: &Vector1<f64>, threshold: &f64) -> Result<Option<Sign>, fewbits_core::Error> {
         let reached = fewbits_node::sign_bit(measurement[0], *threshold).map_err(ArgumentError::from)?;
-        Ok(if reached { Sign::Above } else { Sign::Below })
+        Ok(Some(if reached { Sign::Above } else { Sign::Below }))
     }
 
     #[inline]

@@ -1,15 +1,7 @@
 //! The contract of filters at a receiver: a time update, and one measurement update for all that was observed at one instant.
 //!
 //! Models, sensors and observations are object-safe, so that any kinds stand in one list.
-//!
-//! | filter | belief | for |
-//! |---|---|---|
-//! | [`MomentFilter`] | Gaussian | any sensor, linearised; with values the (extended) Kalman filter |
-//! | [`GridOnAxes`](crate::GridOnAxes) | Gaussian | any likelihood of two or three coordinates |
-//! | [`BootstrapFilter`](crate::BootstrapFilter), [`GuidedFilter`](crate::GuidedFilter) | particles | any likelihood; sharp ones |
-//! | [`CloudFilter`](crate::CloudFilter) | Gaussians of one covariance | linear motion, scalar sensors |
-//! | [`PointMasses`](crate::PointMasses) | values on a grid | a scalar state: the exact answer |
-//! | [`NoiseBank`](crate::NoiseBank) | Gaussians with weights | unknown process noise, [`Switching`](crate::Switching) motion |
+//! The table of the [crate] says which filter is for what.
 
 use crate::{Error, assumed_density};
 use fewbits_core::factor::Scalar;

@@ -142,6 +142,20 @@ pub struct ImmWorkspace<const D: usize> {
     probabilities: Vec<f64>,
 }
 
+/// Transition probabilities, row by row, of a model that is drawn anew, evenly, with probability `switching`.
+pub(crate) fn evenly(models: usize, switching: f64) -> Result<Vec<f64>, ArgumentError> {
+    within("switching", switching, 0.0, 1.0)?;
+    let entry = |at: usize| {
+        let stays = if at / models == at % models {
+            1.0 - switching
+        } else {
+            0.0
+        };
+        stays + switching / models as f64
+    };
+    Ok((0..models * models).map(entry).collect())
+}
+
 impl<G> Imm<G> {
     /// The filter with transition probabilities `transition[i][j] = p(next model j | model i)`.
     ///
@@ -168,13 +182,11 @@ impl<G> Imm<G> {
     /// # Errors
     /// If there is no model, or `switching` is outside `[0, 1]`.
     pub fn switching(models: Vec<G>, switching: f64) -> Result<Self, ArgumentError> {
-        within("switching", switching, 0.0, 1.0)?;
-        let n = models.len();
-        let row = |i| {
-            let at = |j| if i == j { 1.0 - switching } else { 0.0 };
-            (0..n).map(|j| at(j) + switching / n as f64).collect()
-        };
-        Self::new(models, &(0..n).map(row).collect::<Vec<Vec<f64>>>())
+        at_least_one("models", models.len())?;
+        Ok(Self {
+            transition: evenly(models.len(), switching)?,
+            models,
+        })
     }
 
     /// The models.

@@ -1,10 +1,10 @@
 //! Filters that differ in the scale of the process noise or in the model, weighed by evidence.
 
 use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
-use crate::imm::{ImmWorkspace, mix, weigh};
+use crate::imm::{ImmWorkspace, evenly, mix, weigh};
 use crate::{Error, ImmBelief};
 use fewbits_core::Gaussian;
-use fewbits_numerics::error::{at_least_one, positive, refuse, within};
+use fewbits_numerics::error::{at_least_one, positive, refuse};
 use rand::Rng;
 
 /// A bank of filters whose models differ in the scale of their process noise, weighed by evidence and mixed as in
@@ -48,15 +48,9 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> NoiseBank<D, F> {
         for scale in &scales {
             positive("scales", *scale)?;
         }
-        within("switching", switching, 0.0, 1.0)?;
-        let n = scales.len();
-        let entry = |at: usize| {
-            let stays = if at / n == at % n { 1.0 - switching } else { 0.0 };
-            stays + switching / n as f64
-        };
         Ok(Self {
             filter,
-            transition: (0..n * n).map(entry).collect(),
+            transition: evenly(scales.len(), switching)?,
             scales,
             workspace: ImmWorkspace::default(),
         })

@@ -5,7 +5,7 @@ use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::sensor::RangeNoise;
 use fewbits_core::{
-    AlwaysReporting, BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Memoryless, Message, NumberFormat,
     Observation,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
@@ -212,7 +212,7 @@ impl MeasurementNoise<1> for QuantizedRange {
     }
 }
 
-impl AlwaysReporting<1> for QuantizedRange {
+impl Memoryless<1> for QuantizedRange {
     type Feedback = RangeReference;
     type Report = Symbol;
     type Factor = RangeFactor;
@@ -225,8 +225,12 @@ impl AlwaysReporting<1> for QuantizedRange {
         self.labelling.clone()
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, reference: &RangeReference) -> Result<Symbol, fewbits_core::Error> {
-        Ok(self.level(measurement[0], reference)?)
+    fn report_of(
+        &self,
+        measurement: &Vector1<f64>,
+        reference: &RangeReference,
+    ) -> Result<Option<Symbol>, fewbits_core::Error> {
+        Ok(Some(self.level(measurement[0], reference)?))
     }
 
     fn meaning_of(

@@ -6,7 +6,7 @@ use crate::quantizer::Quantizer;
 use crate::refuse;
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::{SMatrix, SVector};
-use fewbits_core::{AlwaysReporting, Link, MeasurementNoise, Observation};
+use fewbits_core::{Link, MeasurementNoise, Memoryless, Observation};
 use fewbits_numerics::error::positive;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
@@ -82,7 +82,7 @@ impl MeasurementNoise<1> for QuantizingSensor {
     }
 }
 
-impl AlwaysReporting<1> for QuantizingSensor {
+impl Memoryless<1> for QuantizingSensor {
     type Feedback = ();
     type Report = Symbol;
     type Factor = Scalar;
@@ -93,8 +93,8 @@ impl AlwaysReporting<1> for QuantizingSensor {
         self.labelling.clone()
     }
 
-    fn report_of(&self, measurement: &SVector<f64, 1>, (): &()) -> Result<Symbol, fewbits_core::Error> {
-        Ok(Symbol(self.quantizer.encode(measurement[0])?))
+    fn report_of(&self, measurement: &SVector<f64, 1>, (): &()) -> Result<Option<Symbol>, fewbits_core::Error> {
+        Ok(Some(Symbol(self.quantizer.encode(measurement[0])?)))
     }
 
     fn meaning_of(

@@ -4,7 +4,7 @@ use crate::observation::source::noise_in_range;
 use crate::{BinaryQuantizer, Error};
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::SVector;
-use fewbits_core::{AlwaysReporting, Link, Observation};
+use fewbits_core::{Link, Memoryless, Observation};
 use fewbits_numerics::stored;
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
@@ -62,7 +62,7 @@ impl PatternSensor {
 }
 
 /// The report is the bit of the cell that holds the measurement. A missing report says nothing about the measurement.
-impl AlwaysReporting<1> for PatternSensor {
+impl Memoryless<1> for PatternSensor {
     type Feedback = ();
     type Report = bool;
     type Factor = Scalar;
@@ -71,8 +71,8 @@ impl AlwaysReporting<1> for PatternSensor {
 
     fn report_format(&self) {}
 
-    fn report_of(&self, measurement: &SVector<f64, 1>, (): &()) -> Result<bool, fewbits_core::Error> {
-        Ok(self.quantizer().encode(measurement[0])?)
+    fn report_of(&self, measurement: &SVector<f64, 1>, (): &()) -> Result<Option<bool>, fewbits_core::Error> {
+        Ok(Some(self.quantizer().encode(measurement[0])?))
     }
 
     fn meaning_of(&self, (): &(), observation: &Observation<bool>, link: &Link) -> Result<Scalar, fewbits_core::Error> {

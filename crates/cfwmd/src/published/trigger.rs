@@ -254,20 +254,6 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_a_gaussian_measurement() {
-        // p(silent | mu) = E exp(-(mu + n)^2 Y/2) is proportional to N(mu; 0, r + 1/Y).
-        let (trigger, r) = (StochasticTrigger::new(0.7).unwrap(), 1.3);
-        let silent = |mu: f64| {
-            gauss_legendre::<24>()
-                .composite(-14.0, 14.0, 40, |n| log_pdf_with(n, 0.0, r).exp() * (1.0 - trigger.probability(mu + n)))
-        };
-        for mu in [0.5, 2.0, -3.0] {
-            let expected = (log_pdf_with(mu, 0.0, r + 1.0 / 0.7) - log_pdf_with(0.0, 0.0, r + 1.0 / 0.7)).exp();
-            assert!((silent(mu) / silent(0.0) / expected - 1.0).abs() < 1e-10);
-        }
-    }
-
-    #[test]
     fn bad_rates_are_refused() {
         for rate in [0.0, 1.0, -0.1, f64::NAN] {
             assert!(StochasticTrigger::for_rate(rate, 1.0).is_err());
