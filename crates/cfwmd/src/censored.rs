@@ -4,7 +4,7 @@ use crate::Error;
 use crate::ellipsoid::{EllipsoidMoments, GaussianInEllipsoid};
 use crate::rule::CensoringRule;
 use fewbits_core::columns::{lengths_agree, state_at};
-use fewbits_core::factor::{Constant, InCell, Partition, Product, Repeated, Scalar, Value};
+use fewbits_core::factor::{Constant, InCell, Partition, Product, Repeated, Scalar, Value, add_mapped};
 use fewbits_core::number::Levels;
 use fewbits_core::{Cell, Columns, Factor, Gaussian, Link, Tilted};
 use fewbits_numerics::ArgumentError;
@@ -120,23 +120,21 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
-        if !lengths_agree(means, log_weights) {
-            return;
-        }
         let (floor, log_share, outside) = match self.missing {
             Missing::Nothing { loss } => (loss, (1.0 - loss).ln(), false),
             Missing::Lost { scale } => (0.0, scale.ln(), true),
         };
-        add_mixed(floor, log_share, log_weights, |from, logs| {
+        let add = |means: &Columns<'_, M>, logs: &mut [f64]| {
             for (i, log) in logs.iter_mut().enumerate() {
-                let mu = state_at(means, from + i) - self.prediction;
+                let mu = state_at(means, i) - self.prediction;
                 *log += if outside {
                     self.inside.log_probability_outside(&mu)
                 } else {
                     self.inside.log_probability(&mu)
                 };
             }
-        });
+        };
+        add_mapped(means, log_weights, add, |logs| mix(floor, log_share, logs));
     }
 
     /// With `nu = m + n - prediction` of covariance `S = V + R` and moments `E`, `C` given that the report is missing, `K = V S^-1`:
@@ -163,24 +161,13 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
     }
 }
 
-/// Adds `ln(floor + exp(log_share + log_p))` to the log weights, block by block: `add(from, logs)` adds `log_p` of the elements
-/// that begin at `from`.
-pub(crate) fn add_mixed(floor: f64, log_share: f64, log_weights: &mut [f64], add: impl Fn(usize, &mut [f64])) {
-    const BLOCK: usize = 128;
-    let mut logs = [0.0; BLOCK];
-    for (from, log_weights) in (0..).step_by(BLOCK).zip(log_weights.chunks_mut(BLOCK)) {
-        let logs = &mut logs[..log_weights.len()];
-        logs.fill(log_share);
-        add(from, logs);
-        if floor > 0.0 {
-            kernels::exp(logs);
-            logs.iter_mut().for_each(|p| *p += floor);
-            kernels::ln(logs);
-        }
-        log_weights
-            .iter_mut()
-            .zip(logs)
-            .for_each(|(weight, log)| *weight += *log);
+/// `log_p` becomes `ln(floor + exp(log_share + log_p))`.
+pub(crate) fn mix(floor: f64, log_share: f64, logs: &mut [f64]) {
+    logs.iter_mut().for_each(|log| *log += log_share);
+    if floor > 0.0 {
+        kernels::exp(logs);
+        logs.iter_mut().for_each(|p| *p += floor);
+        kernels::ln(logs);
     }
 }
 
@@ -281,7 +268,6 @@ impl<const M: usize> Censored<M> {
     ///
     /// # Errors
     /// If a number is not finite, `R` not a covariance, no report is missing, or more than one of a vector measurement.
-    #[inline]
     pub fn missing(
         rule: &CensoringRule<M>,
         prediction: &SVector<f64, M>,

@@ -46,7 +46,6 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
     ///
     /// # Errors
     /// If the broadcast is not finite; as [`Censored::missing`].
-    #[inline]
     pub fn missing(
         &self,
         broadcast: &SVector<f64, D>,

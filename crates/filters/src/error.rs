@@ -40,13 +40,5 @@ impl Error {
     pub(crate) const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
 }
 
-/// One name for one thing, whichever floor finds it.
-impl From<fewbits_densities::Error> for Error {
-    fn from(error: fewbits_densities::Error) -> Self {
-        match error {
-            fewbits_densities::Error::Argument(error) => Self::Argument(error),
-            fewbits_densities::Error::Core(error) => Self::Core(error),
-            other => Self::Density(other),
-        }
-    }
-}
+// One name for one thing, whichever floor finds it.
+fewbits_numerics::lift!(fewbits_densities with Core => Density);

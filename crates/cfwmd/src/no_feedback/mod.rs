@@ -179,13 +179,7 @@ pub(crate) fn check<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const 
     network: &Network<S, D, M>,
     observations: &[Observation<SVector<f64, M>>],
 ) -> Result<(), Error> {
-    let (observed, sensors) = (observations.len(), network.sensors().len());
-    if observed != sensors {
-        return Err(Error::ObservationCount {
-            observations: observed,
-            sensors,
-        });
-    }
+    network.count(network.sensors().len(), observations.len())?;
     for value in observations.iter().filter_map(|o| o.received()) {
         all_finite("report", value.as_slice())?;
     }

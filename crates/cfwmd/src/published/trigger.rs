@@ -1,9 +1,8 @@
 //! A random trigger that keeps the belief Gaussian.
 
 use crate::Error;
-use crate::censored::add_mixed;
-use fewbits_core::columns::lengths_agree;
-use fewbits_core::factor::{Tilted, Value};
+use crate::censored::mix;
+use fewbits_core::factor::{Tilted, Value, add_mapped};
 use fewbits_core::{Columns, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
@@ -106,20 +105,11 @@ impl Factor<1> for Bump {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
-        if !lengths_agree(means, log_weights) {
-            return;
-        }
-        let add = |from: usize, logs: &mut [f64]| {
-            self.value
-                .add_log_likelihoods(&[&means[0][from..from + logs.len()]], logs);
-        };
-        match self.kind {
-            Kind::Above { floor } => add_mixed(floor, self.log_share, log_weights, add),
-            Kind::Below { .. } => add_mixed(0.0, self.log_share, log_weights, |from, logs| {
-                add(from, logs);
-                logs.iter_mut().for_each(|log| *log = self.mixed(*log));
-            }),
-        }
+        let add = |means: &Columns<'_, 1>, logs: &mut [f64]| self.value.add_log_likelihoods(means, logs);
+        add_mapped(means, log_weights, add, |logs| match self.kind {
+            Kind::Above { floor } => mix(floor, self.log_share, logs),
+            Kind::Below { .. } => logs.iter_mut().for_each(|log| *log = self.mixed(self.log_share + *log)),
+        });
     }
 
     /// Silence: the mixture of the prior, by the weight of the floor, and of the Kalman update. A known loss: what that update

@@ -71,6 +71,29 @@ pub trait Factor<const M: usize> {
     }
 }
 
+/// Adds mapped log likelihoods to `log_weights`, block by block: `add(means, logs)` adds those of a block of means to zeros, `map` changes
+/// them. Where lengths differ all of `log_weights` becomes NaN.
+pub fn add_mapped<const M: usize>(
+    means: &Columns<'_, M>,
+    log_weights: &mut [f64],
+    add: impl Fn(&Columns<'_, M>, &mut [f64]),
+    map: impl Fn(&mut [f64]),
+) {
+    const BLOCK: usize = 128;
+    if !lengths_agree(means, log_weights) {
+        return;
+    }
+    let mut logs = [0.0; BLOCK];
+    for (start, log_weights) in (0..).step_by(BLOCK).zip(log_weights.chunks_mut(BLOCK)) {
+        let logs = &mut logs[..log_weights.len()];
+        logs.fill(0.0);
+        add(&means.map(|column| &column[start..start + logs.len()]), logs);
+        map(logs);
+        let pairs = log_weights.iter_mut().zip(logs);
+        pairs.for_each(|(log_weight, log)| *log_weight += *log);
+    }
+}
+
 /// The posterior of a noise-free measurement: `N(m; prior) p(observation | m) / evidence`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tilted<const M: usize> {

@@ -1,7 +1,7 @@
 //! Several observations of one measurement.
 
 use super::moments::{Feature, tilted_by_quadrature};
-use super::{Factor, Scalar, Tilted};
+use super::{Factor, Scalar, Tilted, add_mapped};
 use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
@@ -20,9 +20,6 @@ pub struct Repeated {
     factor: Scalar,
     count: usize,
 }
-
-/// Measurements swept at once.
-const BLOCK: usize = 128;
 
 impl Repeated {
     /// `factor` to the power `count`.
@@ -51,18 +48,8 @@ impl Factor<1> for Repeated {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
-        if !lengths_agree(means, log_weights) {
-            return;
-        }
-        let mut logs = [0.0; BLOCK];
-        for (means, log_weights) in means[0].chunks(BLOCK).zip(log_weights.chunks_mut(BLOCK)) {
-            let logs = &mut logs[..means.len()];
-            logs.fill(0.0);
-            self.factor.add_log_likelihoods(&[means], logs);
-            for (log_weight, log) in log_weights.iter_mut().zip(&*logs) {
-                *log_weight += self.count as f64 * log;
-            }
-        }
+        let add = |means: &Columns<'_, 1>, logs: &mut [f64]| self.factor.add_log_likelihoods(means, logs);
+        add_mapped(means, log_weights, add, |logs| logs.iter_mut().for_each(|log| *log *= self.count as f64));
     }
 
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {

@@ -1,7 +1,7 @@
 //! Reports that may have nothing to do with the measurement.
 
-use super::{Factor, Tilted};
-use crate::columns::{Columns, lengths_agree};
+use super::{Factor, Tilted, add_mapped};
+use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::ArgumentError;
@@ -61,20 +61,8 @@ impl<const M: usize, F: Factor<M>> Factor<M> for Robust<F> {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
-        const BLOCK: usize = 256;
-        if !lengths_agree(means, log_weights) {
-            return;
-        }
-        let mut own = [0.0; BLOCK];
-        for (block, log_weights) in log_weights.chunks_mut(BLOCK).enumerate() {
-            let (start, own) = (block * BLOCK, &mut own[..log_weights.len()]);
-            own.fill(0.0);
-            let here: Columns<'_, M> = means.map(|column| &column[start..start + own.len()]);
-            self.factor.add_log_likelihoods(&here, own);
-            for (log_weight, own) in log_weights.iter_mut().zip(&*own) {
-                *log_weight += self.mixed(*own);
-            }
-        }
+        let add = |means: &Columns<'_, M>, logs: &mut [f64]| self.factor.add_log_likelihoods(means, logs);
+        add_mapped(means, log_weights, add, |logs| logs.iter_mut().for_each(|log| *log = self.mixed(*log)));
     }
 
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
