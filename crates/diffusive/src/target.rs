@@ -371,15 +371,11 @@ impl Target<'_> {
         results
             .iter_mut()
             .zip(&first)
-            .for_each(|(result, log)| {
-                result.add(*log);
-            });
+            .for_each(|(result, log)| result.add(*log));
         others
             .iter()
             .zip(&terms)
-            .for_each(|(place, log)| {
-                results[*place].add(*log);
-            });
+            .for_each(|(place, log)| results[*place].add(*log));
         for (cell, result) in cells.iter().zip(&results) {
             out[*cell] = result.value();
         }

@@ -67,9 +67,10 @@ pub fn update<const D: usize, const M: usize>(
         congruence(&keep, belief.covariance()) + congruence(&gain, noise)
     };
     let squared = innovation.dot(&over(&innovation.transpose(), &lower).transpose());
-    // Zero times a number is zero: the range of the root, which its logarithm asks for anyway, is one test of all that must be a number.
+    // No entry of the posterior is above this sum (Cauchy and Schwarz). Zero times a number is zero, so that the range of the root, which its
+    // logarithm asks for anyway, is one test of them all.
     let root: f64 = roots.iter().product();
-    let numbers = 0.0 * (squared + belief.mean().sum() + belief.covariance().trace());
+    let numbers = 0.0 * (squared + belief.mean().abs().sum() + belief.covariance().trace());
     let log_root_determinant = if (root + numbers).is_normal() {
         root.ln()
     } else {

@@ -23,10 +23,15 @@ impl Default for LogSum {
 }
 
 impl LogSum {
-    /// Adds `exp(term)` and returns its share of the sum so far. Minus infinity adds nothing; NaN is taken as minus infinity; infinity makes
-    /// the sum infinite.
+    /// Adds `exp(term)`. Minus infinity adds nothing; NaN is taken as minus infinity; infinity makes the sum infinite.
     #[inline]
-    pub fn add(&mut self, term: f64) -> f64 {
+    pub fn add(&mut self, term: f64) {
+        self.add_with_share(term);
+    }
+
+    /// As [`add`](Self::add); returns the share of the term in the sum so far.
+    #[inline]
+    pub fn add_with_share(&mut self, term: f64) -> f64 {
         if term > self.largest {
             self.scaled = self.scaled * (self.largest - term).exp() + 1.0;
             self.largest = term;
@@ -54,9 +59,7 @@ impl LogSum {
 impl FromIterator<f64> for LogSum {
     fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Self {
         let mut sum = Self::default();
-        for term in terms {
-            sum.add(term);
-        }
+        terms.into_iter().for_each(|term| sum.add(term));
         sum
     }
 }
@@ -74,7 +77,7 @@ mod tests {
             ([999.0, 1000.0, f64::NEG_INFINITY], 0.0),
         ] {
             let mut sum = LogSum::default();
-            let shares = terms.map(|term| sum.add(term));
+            let shares = terms.map(|term| sum.add_with_share(term));
             assert!((sum.value() - 1000.0 - (-1.0_f64).exp().ln_1p()).abs() < 1e-12);
             assert!((shares[2] - last).abs() < 1e-12 && shares[0] == 1.0);
         }

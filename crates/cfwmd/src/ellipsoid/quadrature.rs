@@ -191,7 +191,7 @@ pub(super) fn moments<const M: usize>(
     };
     let (mut sum, mut total) = (LogSum::default(), Moments::with_mass(0.0));
     let mut add = |part: Moments<M>, log_weight: f64| {
-        let share = sum.add(part.log_mass + log_weight);
+        let share = sum.add_with_share(part.log_mass + log_weight);
         if share > 0.0 {
             // The mixture of what was there and the part, free of the cancellation of raw moments.
             let step = part.mean - total.mean;
