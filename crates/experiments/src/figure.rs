@@ -166,11 +166,6 @@ pub trait Figure: Sync {
         Cost::default()
     }
 
-    /// Whether the figure measures time and must not share the machine with others.
-    fn measures_time(&self) -> bool {
-        false
-    }
-
     /// The world that the figure shares with others: these are run one after the other, and results in [`Context::kept`] serve all.
     fn world(&self) -> Option<&'static str> {
         None
@@ -206,9 +201,6 @@ pub struct Outcome {
 pub trait AnyFigure: Sync {
     /// What stands above the figure.
     fn about(&self) -> About;
-
-    /// Whether the figure measures time and must not share the machine with others.
-    fn measures_time(&self) -> bool;
 
     /// The world that the figure shares with others, which are best run one after the other.
     fn world(&self) -> Option<&'static str>;
@@ -258,10 +250,6 @@ fn typed<F: Figure>(figure: &F, map: &Map<String, Json>) -> Result<F::Parameters
 impl<F: Figure> AnyFigure for F {
     fn about(&self) -> About {
         Figure::about(self)
-    }
-
-    fn measures_time(&self) -> bool {
-        Figure::measures_time(self)
     }
 
     fn world(&self) -> Option<&'static str> {

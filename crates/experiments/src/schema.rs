@@ -72,8 +72,6 @@ pub struct Table {
     pub name: String,
     /// What it holds.
     pub meaning: String,
-    /// Whether it holds measured times, and so differs from run to run.
-    pub volatile: bool,
     /// The columns.
     pub columns: Vec<Column>,
     /// A cell for each column.
@@ -225,7 +223,7 @@ impl<T: Field, const N: usize> Field for [T; N] {
 
     fn describe(about: Column, to: &mut Described) {
         for number in 1..=N {
-            let name = format!("{}{number}", about.name).into();
+            let name = format!("{}{number}", about.name);
             T::describe(Column { name, ..about.clone() }, to);
         }
     }
@@ -235,7 +233,7 @@ impl<T: Field, const N: usize> Field for [T; N] {
     }
 }
 
-/// The main table has no name. One of measured times has the unit `"time"`.
+/// The main table has no name.
 impl<T: Field> Field for Vec<T> {
     fn describe(about: Column, to: &mut Described) {
         let mut row = Described::default();
@@ -248,7 +246,6 @@ impl<T: Field> Field for Vec<T> {
                 further
             },
             meaning: about.meaning,
-            volatile: about.unit == "time",
             columns: row.columns,
             rows: Vec::new(),
         });
@@ -298,7 +295,7 @@ mod tests {
 
         struct Two {
             rows: Vec<Row> => "Main.",
-            run_times: Vec<Count> ["time"] => "Counts.",
+            run_times: Vec<Count> => "Counts.",
         }
 
         struct Count {
@@ -350,7 +347,7 @@ mod tests {
         };
         let tables = Table::of(&two).unwrap();
         assert_eq!((tables[0].rows.len(), tables[0].columns.len()), (0, 7));
-        assert_eq!((tables[1].name.as_str(), tables[1].rows.len(), tables[1].volatile), ("run-times", 1, true));
+        assert_eq!((tables[1].name.as_str(), tables[1].rows.len()), ("run-times", 1));
     }
 
     #[test]

@@ -41,8 +41,7 @@ pub(super) fn one(figure: &dyn AnyFigure) -> String {
         }
     }
     for table in figure.tables() {
-        let volatile = if table.volatile { " (measured times)" } else { "" };
-        let _ = writeln!(page, "\n{}{volatile}", table.file(about.id));
+        let _ = writeln!(page, "\n{}", table.file(about.id));
         wrap(&mut page, "  ", &table.meaning);
         for Column { name, unit, meaning } in &table.columns {
             let unit = if unit.is_empty() {

@@ -106,9 +106,6 @@ mod tests {
         fn about(&self) -> About {
             About::of("demo-fig1", "", "")
         }
-        fn measures_time(&self) -> bool {
-            false
-        }
         fn world(&self) -> Option<&'static str> {
             None
         }

@@ -105,8 +105,6 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options, ranks: &Rank
     let server = options.serve.then(|| serve::Server::start(out.path())).transpose()?;
     run.write("In progress: this page shows what is finished.")?;
 
-    // Figures that measure time run alone, after all others.
-    let (alone, shared): (Vec<_>, Vec<_>) = planned.iter().partition(|p| p.job.figure.measures_time());
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -115,8 +113,7 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options, ranks: &Rank
                 run.progress.heartbeat();
             }
         });
-        run.side_by_side(&shared, ranks);
-        alone.iter().for_each(|planned| run.make(planned));
+        run.side_by_side(&planned, ranks);
         done.store(true, Ordering::Relaxed);
     });
     run.progress.clear();
@@ -159,7 +156,7 @@ impl Run<'_> {
     }
 
     /// Runs figures on all threads of all ranks. Figures of one world follow one another, from the place of the longest.
-    fn side_by_side(&self, planned: &[&Planned<'_>], ranks: &Ranks) {
+    fn side_by_side(&self, planned: &[Planned<'_>], ranks: &Ranks) {
         let mut worlds: Vec<Vec<&Planned<'_>>> = Vec::new();
         for figure in planned {
             let world = figure.job.figure.world();

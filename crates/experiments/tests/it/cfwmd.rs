@@ -27,16 +27,11 @@ fn fig1(particles: u64, trials: u64) -> [[Measured; 3]; 2] {
     let outcome = figure
         .produce(&figure.configure(&settings, false).unwrap(), &Context::new(1))
         .unwrap();
-    let (_, summary) = outcome
-        .tables
-        .further
-        .iter()
-        .find(|(name, _)| name == "summary")
-        .unwrap();
+    let summary = outcome.tables.iter().find(|table| table.name == "summary").unwrap();
     let number = |scheme: &str, name: &str| {
-        let column = summary.columns().iter().position(|column| column.name == name).unwrap();
+        let column = summary.columns.iter().position(|column| column.name == name).unwrap();
         let row = summary
-            .rows()
+            .rows
             .iter()
             .find(|row| row[0] == Value::Text(scheme.to_owned()))
             .unwrap();
