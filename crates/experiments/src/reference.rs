@@ -74,9 +74,14 @@ pub(crate) fn group(figure: &str, quantity: &str) -> Result<Vec<(&'static str, &
     Ok(of(figure)?.iter().filter_map(rest).collect())
 }
 
+/// What is known under `key`.
+pub fn find(key: &str) -> Option<&'static Reference> {
+    of(key).ok()?.iter().find(|r| r.key == key)
+}
+
 /// The value under `key`, such as one printed for just this row's setting; `None` beside any other setting.
 pub fn value(key: &str) -> Option<f64> {
-    of(key).ok()?.iter().find(|r| r.key == key).map(|r| r.value)
+    find(key).map(|r| r.value)
 }
 
 #[cfg(test)]

@@ -119,7 +119,7 @@ fn the_bytes_do_not_depend_on_the_number_of_threads() {
         let out = tempfile::tempdir().unwrap();
         let arguments = [
             "dymbo-fig5",
-            "dymbo-erasure",
+            "dymbo-threshold",
             "cfwmd-fig1",
             "--quick",
             "--trials",

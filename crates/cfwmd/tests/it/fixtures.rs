@@ -26,7 +26,7 @@ const BY_FIGURES: [(&str, &str); 13] = [
     ("tab3/", "cfwmd-fig10"),
     ("tab3_1e4/", "cfwmd-table3"),
     ("cal/", "cfwmd-scheduled"),
-    ("cost/", "cfwmd-cost"),
+    ("cost/", "tests of fewbits-experiments"),
     ("loss/", "cfwmd-lossy"),
 ];
 

@@ -20,14 +20,14 @@ use nalgebra::{Matrix2, Vector2};
 use serde_json::Value;
 use std::f64::consts::FRAC_2_PI;
 
-/// Monte-Carlo families, and the figures that reproduce them.
+/// Monte-Carlo families, and the figures, or tests of `fewbits-experiments`, that reproduce them.
 const HANDLED_BY_FIGURES: [(&str, &str); 6] = [
     ("thr.", "dymbo-threshold"),
-    ("unstable.", "dymbo-threshold"),
+    ("unstable.", "one_bit_cannot_hold_an_unstable_plant"),
     ("fig5mc.", "dymbo-fig5"),
-    ("erasure.", "dymbo-erasure"),
-    ("rb.", "dymbo-gap, dymbo-smoother"),
-    ("vec.", "dymbo-vector"),
+    ("erasure.", "lost_bits_cost_what_the_bound_says"),
+    ("rb.", "dymbo-gap, a_lag_of_four_beats_the_unquantized_filter_of_a_slow_plant"),
+    ("vec.", "vectors_lose_little_to_the_exact_posterior"),
 ];
 
 struct Entry<'a> {

@@ -1,7 +1,7 @@
-//! Beyond the paper: lossy links, scheduled thresholds, and what each filter costs.
+//! Beyond the paper: lossy links and scheduled thresholds.
 
 use super::case::Simulated;
-use super::linear::{Scheme, time_of_steps};
+use super::linear::Scheme;
 use super::pictures::by_budget;
 use super::rows::{Part, Step, Summary};
 use super::scalar::{BUDGETS, CENSORED};
@@ -43,8 +43,7 @@ pub(super) static LOSSY: Simulated<Linear, Step> = Simulated {
             rows.beats(claims, (MODELLED, IGNORED), (loss, 1.0), &[Part::Position]);
         }
         let what = "gain in squared position error by modelling the loss (m^2)";
-        claims
-            .references("gain", what, &rows.paired, |p| (p.world.clone().unwrap_or_default(), p.position.scaled(-1.0)));
+        claims.references("gain", what, &rows.paired, |p| (p.world.clone(), p.position.scaled(-1.0)));
         let nees = |name: &str| Some(rows.at(name, 1.0)?.nees?.value);
         let what = "modelling the loss keeps the belief honest: squared error over variance";
         claims.below("honest", what, nees("loss modelled, loss 0.3"), 1.4);
@@ -104,7 +103,7 @@ fn world(sensors: u64) -> String {
 
 /// Thresholds computed before deployment.
 pub(super) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
-    further: |setting, _| bounds(setting),
+    further: bounds,
     about: About::of("cfwmd-scheduled", "The rate of covariance feedback without the feedback", ""),
     caption: "A schedule of innovation variances, simulated once before deployment, meets the message budget and the \
               error of covariance feedback (CFwMD2) without sending a covariance. Thin: optimistic bounds for any \
@@ -152,7 +151,7 @@ pub(super) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
     },
     plot: |setting, rows| {
         let own = world(setting.sensors);
-        let all: Vec<&Summary> = select(&rows.summary, |r| r.run.world.as_ref() == Some(&own)).collect();
+        let all: Vec<&Summary> = select(&rows.summary, |r| r.run.world == own).collect();
         let bounds = || {
             rows.further
                 .bound
@@ -199,83 +198,3 @@ fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Res
     }
     Ok((total / setting.steps as f64).sqrt())
 }
-
-const SCHEMES: [(&str, Scheme); 7] = [
-    ("ADF", CENSORED[0].1),
-    ("PF 100", Scheme::Particles(100, Weighing::OwnFilter)),
-    ("PF 300", Scheme::Particles(300, Weighing::OwnFilter)),
-    ("PF 1000", Scheme::Particles(1000, Weighing::OwnFilter)),
-    ("RBPF 10", Scheme::RaoBlackwell(10)),
-    ("RBPF 30", Scheme::RaoBlackwell(30)),
-    ("RBPF 100", Scheme::RaoBlackwell(100)),
-];
-
-rows! {
-    /// Times beside the runs.
-    #[derive(Debug, Default)]
-    pub struct Times {
-        /// Time of a fusion step.
-        time: Vec<Time> ["time"],
-    }
-
-    #[derive(Debug)]
-    struct Time {
-        scheme: &'static str => "Filter.",
-        time_us: f64 ["us"] => "Time of one fusion step, best of the repetitions.",
-        relative: f64 => "Time over that of the Gaussian belief.",
-    }
-}
-
-fn times(p: &Linear, context: &Context<'_>) -> Result<Times, Error> {
-    let times = time_of_steps(context, p, p.messages[0], &SCHEMES)?;
-    let base = times[0].1;
-    let row = |(scheme, seconds): (_, f64)| Time {
-        scheme,
-        time_us: seconds * 1e6,
-        relative: seconds / base,
-    };
-    let time = times.into_iter().map(row).collect();
-    Ok(Times { time })
-}
-
-/// Error against cost.
-pub(super) static COST: Simulated<Linear, Step, Times> = Simulated {
-    further: times,
-    about: About::of("cfwmd-cost", "Error against cost", ""),
-    caption: "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles (PF) at a small \
-              fraction of the time; thirty Rao-Blackwellised particles (RBPF) are on a par. Times are per step of \
-              fusion, draws of the experiment excluded.",
-    pairs: &[("PF 1000", "ADF"), ("RBPF 30", "ADF"), ("ADF", "PF 100")],
-    measures_time: true,
-    setting: || Linear::scalar(2, &[1.0]),
-    simulate: |setting, context| setting.at_budgets(context, "", &SCHEMES),
-    claims: |rows, claims| {
-        let ratio = |scheme: &str| rows.ratio(scheme, "ADF", 1.0);
-        let what = "1000 particles are not better than the Gaussian belief (RMSE over that of the Gaussian belief)";
-        claims.at_least("not-worse", what, ratio("PF 1000"), 0.995);
-        let what = "30 Rao-Blackwellised particles are within 1.5% of it";
-        claims.near("rao-blackwell", what, ratio("RBPF 30"), 1.0, 0.015);
-        claims.above("too-few", "100 plain particles are not enough", ratio("PF 100"), 1.03);
-        let nees = rows.at("ADF", 1.0).and_then(|r| r.nees);
-        claims.within("consistent", "squared position error over its variance averages to one", nees, 1.0, 4.0);
-    },
-    always: |_, rows, claims| {
-        let relative = rows
-            .further
-            .time
-            .iter()
-            .find(|t| t.scheme == "PF 1000")
-            .map(|t| t.relative);
-        let what = "the Gaussian belief is at least 15 times cheaper than 1000 particles";
-        claims.at_least("cheaper", what, relative, 15.0);
-    },
-    plot: |setting, rows| {
-        let axes = (Axis::log("time a step / µs"), Axis::linear("time-averaged RMSE / m"));
-        let marks = rows.further.time.iter().enumerate().filter_map(|(colour, time)| {
-            let at = rows.at(time.scheme, setting.messages[0])?;
-            Some(Layer::measured(time.scheme, [at], |r| (time.time_us, r.position_rmse)).coloured(colour))
-        });
-        Plot::of(Panel::new("Position error against time", axes.0, axes.1).with_all(marks))
-    },
-    ..Simulated::BASE
-};

@@ -1,7 +1,7 @@
 //! A simulated figure in few words: a setting, the runs, what is claimed of them, a picture.
 
 use super::pictures::Main;
-use super::rows::{Ensemble, Nothing, Rows};
+use super::rows::{Ensemble, Nothing, Rows, Run, Summary, paired};
 use super::setting::Setting;
 use crate::parameters;
 use crate::prelude::*;
@@ -14,19 +14,16 @@ pub(super) struct Simulated<S, M, X = Nothing> {
     pub(super) pairs: &'static [(&'static str, &'static str)],
     /// Quantities with independent references.
     pub(super) references: &'static [&'static str],
-    pub(super) measures_time: bool,
     /// The publication's setting.
     pub(super) setting: fn() -> S,
     /// All runs.
     pub(super) simulate: fn(&S, &Context<'_>) -> Result<Vec<Ensemble>, Error>,
     /// Further tables.
-    pub(super) further: fn(&S, &Context<'_>) -> Result<X, Error>,
+    pub(super) further: fn(&S) -> Result<X, Error>,
     /// Whether the main table shows this run.
-    pub(super) shown: fn(&S, &Ensemble) -> bool,
+    pub(super) shown: fn(&S, &Run) -> bool,
     /// Claims about the publication's setting at its full number of trials.
     pub(super) claims: fn(&Rows<M, X>, &mut Claims),
-    /// Claims about any setting and number of trials.
-    pub(super) always: fn(&S, &Rows<M, X>, &mut Claims),
     pub(super) plot: fn(&S, &Rows<M, X>) -> Plot,
 }
 
@@ -37,13 +34,11 @@ impl<S: Setting, M: Main, X: Default> Simulated<S, M, X> {
         caption: "",
         pairs: &[],
         references: &["position", "velocity", "rate"],
-        measures_time: false,
         setting: S::default,
         simulate: |_, _| Ok(Vec::new()),
-        further: |_, _| Ok(X::default()),
+        further: |_| Ok(X::default()),
         shown: |_, _| true,
         claims: |_, _| {},
-        always: |_, _, _| {},
         plot: |_, rows| M::plot(&rows.main),
     };
 
@@ -72,22 +67,24 @@ impl<S: Setting, M: Main, X: Default + Field> Figure for Simulated<S, M, X> {
         setting.cost()
     }
 
-    fn measures_time(&self) -> bool {
-        self.measures_time
-    }
-
     fn run(&self, setting: &S, context: &Context<'_>) -> Result<Rows<M, X>, Error> {
         let ensembles = (self.simulate)(setting, context)?;
-        let shown: Vec<_> = ensembles.iter().filter(|e| (self.shown)(setting, e)).collect();
-        let main = M::of(self.about.id, &shown, self.is_printed(setting));
-        Ok(Rows::of(&ensembles, self.pairs, main, (self.further)(setting, context)?))
+        let printed = self.is_printed(setting);
+        let shown = ensembles.iter().filter(|e| (self.shown)(setting, &e.run));
+        Ok(Rows {
+            main: shown
+                .flat_map(|e| M::of(self.about.id, e, &ensembles, printed))
+                .collect(),
+            summary: ensembles.iter().map(Summary::of).collect(),
+            paired: paired(&ensembles, self.pairs),
+            further: (self.further)(setting)?,
+        })
     }
 
-    fn claims(&self, setting: &S, rows: &Rows<M, X>, claims: &mut Claims) {
+    fn claims(&self, _: &S, rows: &Rows<M, X>, claims: &mut Claims) {
         let mut limited = claims.at_defaults().at_full_trials();
         rows.agree(&mut limited, self.references);
         (self.claims)(rows, &mut limited);
-        (self.always)(setting, rows, claims);
     }
 
     fn plot(&self, setting: &S, rows: &Rows<M, X>) -> Plot {

@@ -14,6 +14,7 @@ mod rows;
 mod scalar;
 mod setting;
 mod vector;
+mod world;
 
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
@@ -33,7 +34,6 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &field::TABLE3,
         &beyond::LOSSY,
         &beyond::SCHEDULED,
-        &beyond::COST,
         &no_feedback::NO_FEEDBACK,
     ]
 }

@@ -1,22 +1,31 @@
 //! The main tables of the simulated figures, and their pictures.
 
-use super::rows::{Ensemble, Part, Step, Summary, steps_of, summary};
+use super::rows::{Ensemble, Part, Step, Summary, in_world};
 use crate::prelude::*;
 
 pub(super) const BOTH: [Part; 2] = [Part::Position, Part::Velocity];
 
 /// A kind of main table.
 pub trait Main: Field + Sized {
-    /// The rows of these runs. `printed`: whether printed numbers may stand beside ours.
-    fn of(figure: &str, runs: &[&Ensemble], printed: bool) -> Vec<Self>;
+    /// The rows of a run among all. `printed`: whether printed numbers may stand beside ours.
+    fn of(figure: &str, run: &Ensemble, all: &[Ensemble], printed: bool) -> Vec<Self>;
 
     /// Their picture.
     fn plot(rows: &[Self]) -> Plot;
 }
 
 impl Main for Step {
-    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
-        runs.iter().flat_map(|run| steps_of(run)).collect()
+    fn of(_: &str, run: &Ensemble, _: &[Ensemble], _: bool) -> Vec<Self> {
+        let steps = run.records.first().map_or(0, |r| r.position.len());
+        let row = |k: usize| Self {
+            run: run.run.clone(),
+            k: k + 1,
+            position_rmse: Measured::root_mean(&run.at(k, |r| &r.position)),
+            velocity_rmse: Measured::root_mean(&run.at(k, |r| &r.velocity)),
+            messages: (&run.at(k, |r| &r.sent)).into(),
+            trials: run.records.len(),
+        };
+        (0..steps).map(row).collect()
     }
 
     fn plot(rows: &[Self]) -> Plot {
@@ -25,8 +34,8 @@ impl Main for Step {
 }
 
 impl Main for Summary {
-    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
-        runs.iter().map(|run| summary(run)).collect()
+    fn of(_: &str, run: &Ensemble, _: &[Ensemble], _: bool) -> Vec<Self> {
+        vec![Summary::of(run)]
     }
 
     fn plot(rows: &[Self]) -> Plot {
@@ -59,7 +68,6 @@ pub(super) fn by_step(steps: &[Step]) -> Plot {
     let schemes = distinct(steps, |r| r.run.scheme);
     let mut panels = Vec::new();
     for (world, l) in &places {
-        let world_name = world.as_ref().map_or_else(String::new, |w| format!(", {w}"));
         for part in BOTH {
             let (axis, title) = match part {
                 Part::Position => ("RMSE / m", "Position"),
@@ -74,7 +82,7 @@ pub(super) fn by_step(steps: &[Step]) -> Plot {
             // One scale for all budgets, so that heights can be compared.
             let top = steps.iter().map(|r| r.rmse(part).value).fold(0.0, f64::max);
             let axes = (Axis::linear("time step k"), Axis::linear(axis).between(0.0, 1.05 * top));
-            let title = format!("{title}, l = {l}{world_name}");
+            let title = format!("{title}, l = {l}{}", in_world(world));
             panels.push(Panel::new(title, axes.0, axes.1).with_all(layers.flatten()));
         }
     }

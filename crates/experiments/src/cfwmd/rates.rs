@@ -1,7 +1,7 @@
 //! Tables of rates: printed ones beside ours.
 
 use super::pictures::Main;
-use super::rows::{Ensemble, rate};
+use super::rows::Ensemble;
 use crate::prelude::*;
 use crate::reference;
 
@@ -21,27 +21,28 @@ rows! {
 
 /// Rates of all budgets and worlds. The print does not say which world is its own: it stands beside all of them.
 impl Main for Rates {
-    fn of(figure: &str, runs: &[&Ensemble], printed: bool) -> Vec<Self> {
-        let of = |scheme: &'static str| runs.iter().copied().filter(move |e| e.scheme == scheme);
-        let row = |a: &Ensemble| {
-            let same = |e: &&Ensemble| e.world == a.world && e.messages == a.messages;
-            let b = of("CFwMD2").find(same)?;
-            // Those of the second kind are printed too, and not met.
-            let print = |column: &str| {
-                let value = |kind| reference::value(&format!("{figure}/{kind}-{column}/l = {}", a.messages));
-                printed.then(|| value("printed").or_else(|| value("unmet"))).flatten()
-            };
-            Some(Self {
-                l: a.messages,
-                setting: a.world.clone(),
-                state: rate(a),
-                covariance: rate(b),
-                printed_state: print("state"),
-                printed_covariance: print("covariance"),
-                trials: a.records.len(),
-            })
+    fn of(figure: &str, run: &Ensemble, all: &[Ensemble], printed: bool) -> Vec<Self> {
+        // Those of the second kind are printed too, and not met.
+        let print = |column: &str| {
+            let value = |kind| reference::value(&format!("{figure}/{kind}-{column}/l = {}", run.run.l));
+            printed.then(|| value("printed").or_else(|| value("unmet"))).flatten()
         };
-        of("CFwMD").filter_map(row).collect()
+        let row = |covariance: &Ensemble| Self {
+            l: run.run.l,
+            setting: run.run.world.clone(),
+            state: run.rate(),
+            covariance: covariance.rate(),
+            printed_state: print("state"),
+            printed_covariance: print("covariance"),
+            trials: run.records.len(),
+        };
+        let state = run.run.scheme == "CFwMD";
+        run.run
+            .of("CFwMD2", all)
+            .filter(|_| state)
+            .map(row)
+            .into_iter()
+            .collect()
     }
 
     /// Rates of both schemes against the budget, with the printed ones.

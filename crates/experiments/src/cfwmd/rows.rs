@@ -20,45 +20,38 @@ pub(super) struct Record {
 /// All trials of one scheme at one message budget in one world.
 #[derive(Debug, Clone)]
 pub struct Ensemble {
-    pub(super) scheme: &'static str,
-    pub(super) world: String,
-    pub(super) messages: f64,
+    pub(super) run: Run,
     pub(super) records: Vec<Record>,
 }
 
-/// Every scheme on every trial: `trial(scheme's place, drawn, stream)` on the common `draw` of each.
-pub(super) fn simulate<D, S>(
-    context: &Context<'_>,
-    stream: Stream,
-    trials: u64,
-    (world, messages): (&str, f64),
-    schemes: &[(&'static str, S)],
-    draw: impl Fn(Stream) -> Result<D, Error> + Sync,
-    trial: impl Fn(&S, &D, Stream) -> Result<Record, Error> + Sync,
-) -> Result<Vec<Ensemble>, Error>
-where
-    S: Sync,
-{
-    let every = |it: Trial| -> Result<Vec<Record>, Error> {
-        let draws = draw(it.stream)?;
-        schemes.iter().map(|(_, s)| trial(s, &draws, it.stream)).collect()
-    };
-    let mut trials = context.monte_carlo(stream, trials).run(every)?;
-    let of = |(place, (scheme, _)): (usize, &(&'static str, S))| Ensemble {
-        scheme,
-        world: world.to_owned(),
-        messages,
-        records: trials.iter_mut().map(|t| std::mem::take(&mut t[place])).collect(),
-    };
-    Ok(schemes.iter().enumerate().map(of).collect())
-}
+/// One number of a record for each step.
+type Of = fn(&Record) -> &[f64];
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-fn moments(records: &[Record], of: impl Fn(&Record) -> f64) -> Moments {
-    records.iter().map(of).collect()
+impl Ensemble {
+    /// Over all trials at a step.
+    pub(super) fn at(&self, k: usize, of: Of) -> Moments {
+        self.records.iter().map(|record| of(record)[k]).collect()
+    }
+
+    /// Over all trials, averaged over the steps of each.
+    fn averaged(&self, of: Of) -> Moments {
+        self.records.iter().map(|record| mean(of(record))).collect()
+    }
+
+    /// The same of the difference from another scheme on the same trials.
+    fn less(&self, other: &Self, of: Of) -> Moments {
+        let both = self.records.iter().zip(&other.records);
+        both.map(|(a, b)| mean(of(a)) - mean(of(b))).collect()
+    }
+
+    /// Mean number of messages a step.
+    pub(super) fn rate(&self) -> Measured {
+        (&self.averaged(|r| &r.sent)).into()
+    }
 }
 
 /// A component of the error.
@@ -73,31 +66,34 @@ rows! {
     #[derive(Debug, Clone, PartialEq)]
     pub struct Run {
         pub(super) scheme: &'static str => "What is sent, and what is made of silence.",
-        pub(super) world: Option<String> => "Where it ran, in figures of several settings.",
+        pub(super) world: String => "Where it ran, in figures of several settings.",
         pub(super) l: f64 ["messages/step"] => "Message budget.",
     }
 }
 
 impl Run {
-    fn of(e: &Ensemble) -> Self {
-        Self {
-            scheme: e.scheme,
-            world: (!e.world.is_empty()).then(|| e.world.clone()),
-            l: e.messages,
-        }
-    }
-
     /// Scheme and world.
     pub(super) fn name(&self) -> String {
-        match &self.world {
-            Some(world) => format!("{}, {world}", self.scheme),
-            None => self.scheme.to_owned(),
-        }
+        format!("{}{}", self.scheme, in_world(&self.world))
     }
 
     /// The key of its references.
     fn key(&self) -> String {
         format!("{}, l = {}", self.name(), self.l)
+    }
+
+    /// The run of another scheme in the same place.
+    pub(super) fn of<'a>(&self, scheme: &str, all: &'a [Ensemble]) -> Option<&'a Ensemble> {
+        first(all, |e| (e.run.scheme, &e.run.world, e.run.l) == (scheme, &self.world, self.l))
+    }
+}
+
+/// A world behind a comma, if it has a name.
+pub(super) fn in_world(world: &str) -> String {
+    if world.is_empty() {
+        String::new()
+    } else {
+        format!(", {world}")
     }
 }
 
@@ -110,7 +106,7 @@ rows! {
         pub(super) position_rmse: Measured ["m"] => "Root mean squared position error.",
         pub(super) velocity_rmse: Measured ["m/s"] => "Root mean squared velocity error.",
         pub(super) messages: Measured => "Mean number of messages in this step.",
-        trials: usize => "Trials.",
+        pub(super) trials: usize => "Trials.",
     }
 
     /// One run, averaged over its steps.
@@ -130,7 +126,7 @@ rows! {
     pub struct Paired {
         pub(super) first: &'static str => "Scheme.",
         pub(super) second: &'static str => "Scheme it is compared with.",
-        pub(super) world: Option<String> => "Where both ran, in figures of several settings.",
+        pub(super) world: String => "Where both ran, in figures of several settings.",
         pub(super) l: f64 ["messages/step"] => "Message budget.",
         pub(super) position: Measured ["m^2"] => "Mean squared position error of the first minus that of the second.",
         pub(super) velocity: Measured ["m^2/s^2"] => "The same of the velocity.",
@@ -147,58 +143,39 @@ impl Step {
     }
 }
 
-/// A row for each step of a run.
-pub(super) fn steps_of(e: &Ensemble) -> impl Iterator<Item = Step> {
-    let steps = e.records.first().map_or(0, |r| r.position.len());
-    (0..steps).map(move |k| Step {
-        run: Run::of(e),
-        k: k + 1,
-        position_rmse: Measured::root_mean(&moments(&e.records, |r| r.position[k])),
-        velocity_rmse: Measured::root_mean(&moments(&e.records, |r| r.velocity[k])),
-        messages: Measured::mean(&moments(&e.records, |r| r.sent[k])),
-        trials: e.records.len(),
-    })
-}
-
-/// Mean number of messages a step.
-pub(super) fn rate(e: &Ensemble) -> Measured {
-    Measured::mean(&moments(&e.records, |r| mean(&r.sent)))
-}
-
-pub(super) fn summary(e: &Ensemble) -> Summary {
-    let consistent = e.records.iter().all(|r| !r.consistency.is_empty());
-    Summary {
-        run: Run::of(e),
-        position_rmse: Measured::root_mean(&moments(&e.records, |r| mean(&r.position))),
-        velocity_rmse: Measured::root_mean(&moments(&e.records, |r| mean(&r.velocity))),
-        rate: rate(e),
-        nees: consistent.then(|| Measured::mean(&moments(&e.records, |r| mean(&r.consistency)))),
-        trials: e.records.len(),
+impl Summary {
+    pub(super) fn of(e: &Ensemble) -> Self {
+        let consistent = e.records.iter().all(|r| !r.consistency.is_empty());
+        Self {
+            run: e.run.clone(),
+            position_rmse: Measured::root_mean(&e.averaged(|r| &r.position)),
+            velocity_rmse: Measured::root_mean(&e.averaged(|r| &r.velocity)),
+            rate: e.rate(),
+            nees: consistent.then(|| (&e.averaged(|r| &r.consistency)).into()),
+            trials: e.records.len(),
+        }
     }
 }
 
 /// The first schemes minus the second ones, trial by trial, in every world and at every budget where both ran.
-fn paired(ensembles: &[Ensemble], pairs: &[(&str, &str)]) -> Vec<Paired> {
-    let mut rows = Vec::new();
-    for (first, second) in pairs {
-        for a in ensembles.iter().filter(|e| e.scheme == *first) {
-            let same = |e: &&Ensemble| e.scheme == *second && e.world == a.world && e.messages == a.messages;
-            let Some(b) = ensembles.iter().find(same) else { continue };
-            let both = || a.records.iter().zip(&b.records);
-            let position: Moments = both().map(|(a, b)| mean(&a.position) - mean(&b.position)).collect();
-            let velocity: Moments = both().map(|(a, b)| mean(&a.velocity) - mean(&b.velocity)).collect();
-            rows.push(Paired {
-                first: a.scheme,
-                second: b.scheme,
-                world: Run::of(a).world,
-                l: a.messages,
+pub(super) fn paired(ensembles: &[Ensemble], pairs: &[(&'static str, &'static str)]) -> Vec<Paired> {
+    let of = |(first, second)| {
+        let firsts = select(ensembles, move |e| e.run.scheme == first);
+        firsts.filter_map(move |a| {
+            let b = a.run.of(second, ensembles)?;
+            let position = a.less(b, |r| &r.position);
+            Some(Paired {
+                first,
+                second,
+                world: a.run.world.clone(),
+                l: a.run.l,
                 position: (&position).into(),
-                velocity: (&velocity).into(),
+                velocity: (&a.less(b, |r| &r.velocity)).into(),
                 trials: position.count(),
-            });
-        }
-    }
-    rows
+            })
+        })
+    };
+    pairs.iter().copied().flat_map(of).collect()
 }
 
 /// No further tables.
@@ -240,15 +217,6 @@ impl<M: Field, X: Field> Field for Rows<M, X> {
 }
 
 impl<M, X> Rows<M, X> {
-    pub(super) fn of(ensembles: &[Ensemble], pairs: &[(&str, &str)], main: Vec<M>, further: X) -> Self {
-        Self {
-            main,
-            summary: ensembles.iter().map(summary).collect(),
-            paired: paired(ensembles, pairs),
-            further,
-        }
-    }
-
     /// The averages of a scheme (`CFwMD`, or `CFwMD, world`).
     pub(super) fn at(&self, name: &str, l: f64) -> Option<&Summary> {
         self.summary.iter().find(|r| r.run.l == l && r.run.name() == name)
@@ -259,11 +227,8 @@ impl<M, X> Rows<M, X> {
         Some(self.at(a, l)?.position_rmse.value / self.at(b, l)?.position_rmse.value)
     }
 
-    pub(super) fn pair(&self, first: &str, second: &str, world: &str, l: f64) -> Option<&Paired> {
-        let matches = |p: &&Paired| {
-            p.first == first && p.second == second && p.world.as_deref().unwrap_or("") == world && p.l == l
-        };
-        self.paired.iter().find(matches)
+    pub(super) fn pair(&self, (a, b): (&str, &str), world: &str, l: f64) -> Option<&Paired> {
+        first(&self.paired, |p| (p.first, p.second, p.world.as_str(), p.l) == (a, b, world, l))
     }
 
     /// Claims that, in squared error, `first` beats `second` by at least three paired standard errors.
@@ -274,16 +239,13 @@ impl<M, X> Rows<M, X> {
         (world, l): (&str, f64),
         parts: &[Part],
     ) {
+        let pair = self.pair((first, second), world, l);
         for part in parts {
             let (what, difference) = match part {
-                Part::Position => ("position", self.pair(first, second, world, l).map(|p| p.position)),
-                Part::Velocity => ("velocity", self.pair(first, second, world, l).map(|p| p.velocity)),
+                Part::Position => ("position", pair.map(|p| p.position)),
+                Part::Velocity => ("velocity", pair.map(|p| p.velocity)),
             };
-            let place = if world.is_empty() {
-                String::new()
-            } else {
-                format!(", {world}")
-            };
+            let place = in_world(world);
             let id = format!("{first}-beats-{second}-{what}-l{l}{place}").replace([' ', ','], "-");
             let what = format!("{first} has the smaller {what} error than {second} at l = {l}{place}");
             claims.less(id, what, difference, 3.0);
@@ -314,19 +276,15 @@ impl<X> Rows<Step, X> {
 
     /// Claims that at every step the schemes are in this order, smallest error first, but for two standard errors.
     pub(super) fn in_order(&self, claims: &mut Claims, schemes: &[&str], (world, l): (&str, f64), parts: &[Part]) {
-        let curve = |scheme: &str| {
-            let own =
-                |r: &&Step| r.run.scheme == scheme && r.run.world.as_deref().unwrap_or("") == world && r.run.l == l;
-            self.main.iter().filter(own).collect::<Vec<_>>()
+        let curve = |scheme: &str| -> Vec<&Step> {
+            select(&self.main, |r| (r.run.scheme, r.run.world.as_str(), r.run.l) == (scheme, world, l)).collect()
         };
         for part in parts {
-            let neighbours = schemes.windows(2).flat_map(|pair| {
-                let (low, high) = (curve(pair[0]), curve(pair[1]));
-                low.into_iter()
-                    .zip(high)
-                    .map(|(a, b)| (a.rmse(*part), b.rmse(*part)))
-                    .collect::<Vec<_>>()
-            });
+            let both = |pair: &[&str]| curve(pair[0]).into_iter().zip(curve(pair[1]));
+            let neighbours = schemes
+                .windows(2)
+                .flat_map(both)
+                .map(|(a, b)| (a.rmse(*part), b.rmse(*part)));
             let id = format!("order-{part:?}{world}-l{l}").to_lowercase().replace(' ', "-");
             let order = schemes.join(" < ");
             let what = format!("at every step {order} in {part:?} error, but for two standard errors {world}");

@@ -56,30 +56,21 @@ parameters! {
     /// A target on a line among identical linear sensors.
     #[derive(Debug, Clone)]
     pub point struct Linear {
-        /// Monte-Carlo trials.
-        pub(super) trials: u64 [2..=1_000_000],
-        /// Time steps of a trial.
-        pub(super) steps: u64 [1..=1000],
-        /// Sensors.
-        pub(super) sensors: u64 [1..=100],
-        /// Message budgets, each at most the number of sensors.
-        pub(super) messages: Vec<f64> [1e-3..=100.0; 1..=20],
-        /// Variance of the acceleration (m²/s⁴).
-        pub(super) acceleration_variance: f64 [1e-12..=1e6],
+        pub(super) trials: u64 [2..=1_000_000] => "Monte-Carlo trials.",
+        pub(super) steps: u64 [1..=1000] => "Time steps of a trial.",
+        pub(super) sensors: u64 [1..=100] => "Sensors.",
+        pub(super) messages: Vec<f64> [1e-3..=100.0; 1..=20] => "Message budgets, each at most the number of sensors.",
+        pub(super) acceleration_variance: f64 [1e-12..=1e6] => "Variance of the acceleration (m²/s⁴).",
         /// Noise variances of what a sensor measures: the position (m²), or position and velocity (m², m²/s²).
         pub(super) noise_variances: Vec<f64> [1e-6..=1e6; 1..=2],
-        /// Mean position (m) and velocity (m/s) at the start.
-        pub(super) start: Vec<f64> [-1e6..=1e6; 2..=2],
+        pub(super) start: Vec<f64> [-1e6..=1e6; 2..=2] => "Mean position (m) and velocity (m/s) at the start.",
         /// Variances of position and velocity at the start, from which the truth is drawn; 0 is known.
         pub(super) start_variances: Vec<f64> [0.0..=1e6; 2..=2],
-        /// Correlation of position and velocity at the start.
-        pub(super) start_correlation: f64 [-1.0..=1.0],
-        /// Particles of the particle filters.
+        pub(super) start_correlation: f64 [-1.0..=1.0] => "Correlation of position and velocity at the start.",
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub(super) particles: Option<u64> [1..=1_000_000],
-        /// Probabilities that the link loses a message.
+        pub(super) particles: Option<u64> [1..=1_000_000] => "Particles of the particle filters.",
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub(super) losses: Option<Vec<f64>> [0.0..=0.99; 1..=20],
+        pub(super) losses: Option<Vec<f64>> [0.0..=0.99; 1..=20] => "Probabilities that the link loses a message.",
     }
 }
 
@@ -162,24 +153,15 @@ parameters! {
     /// A target in a plane among nine sensors of received power.
     #[derive(Debug, Clone)]
     pub point struct Field {
-        /// Monte-Carlo trials.
-        pub(super) trials: u64 [2..=1_000_000],
-        /// Time steps of a trial.
-        pub(super) steps: u64 [1..=1000],
-        /// Message budgets, each at most nine.
-        pub(super) messages: Vec<f64> [1e-3..=9.0; 1..=20],
-        /// Particles of every filter.
-        pub(super) particles: u64 [2..=1_000_000],
-        /// Distance of neighbouring sensors of the 3 by 3 grid (m).
-        pub(super) spacing_m: f64 [1e-3..=1e6],
-        /// Variance of the acceleration of each axis (m²/s⁴).
-        pub(super) acceleration_variance: f64 [1e-12..=1e6],
-        /// Variance of the measurement noise.
-        pub(super) noise_variance: f64 [1e-6..=1e6],
-        /// Prior mean of x (m), its velocity (m/s), y and its velocity.
-        pub(super) start: Vec<f64> [-1e6..=1e6; 4..=4],
-        /// Prior variances of the same.
-        pub(super) start_variances: Vec<f64> [1e-9..=1e6; 4..=4],
+        pub(super) trials: u64 [2..=1_000_000] => "Monte-Carlo trials.",
+        pub(super) steps: u64 [1..=1000] => "Time steps of a trial.",
+        pub(super) messages: Vec<f64> [1e-3..=9.0; 1..=20] => "Message budgets, each at most nine.",
+        pub(super) particles: u64 [2..=1_000_000] => "Particles of every filter.",
+        pub(super) spacing_m: f64 [1e-3..=1e6] => "Distance of neighbouring sensors of the 3 by 3 grid (m).",
+        pub(super) acceleration_variance: f64 [1e-12..=1e6] => "Variance of the acceleration of each axis (m²/s⁴).",
+        pub(super) noise_variance: f64 [1e-6..=1e6] => "Variance of the measurement noise.",
+        pub(super) start: Vec<f64> [-1e6..=1e6; 4..=4] => "Prior mean of x (m), its velocity (m/s), y and its velocity.",
+        pub(super) start_variances: Vec<f64> [1e-9..=1e6; 4..=4] => "Prior variances of the same.",
         /// Whether the truth is drawn from the prior; the publication's starts at its mean.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub(super) drawn_start: Option<bool>,

@@ -2,10 +2,11 @@
 
 use super::case::Simulated;
 use super::linear::{Method, Scheme};
+use super::no_feedback::FOUR_ALONE;
 use super::pictures::BOTH;
 use super::rates::{Rates, as_printed};
-use super::rows::{Ensemble, Part, Step};
-use super::scalar::CENSORED;
+use super::rows::{Ensemble, Part, Run, Step};
+use super::scalar::{CENSORED, FOUR};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
 use fewbits_cfwmd::rule::Weighing;
@@ -48,13 +49,7 @@ pub(super) static FIG4: Simulated<Linear, Step> = Simulated {
     pairs: &[("CFwMD", "CFoMD"), ("CFoMD", "random")],
     setting: || Linear::vector(2, &[1.0]).with_particles(1000),
     simulate: |setting, context| {
-        let schemes = [
-            ("all", Scheme::All),
-            ("random", Scheme::Random),
-            ("CFoMD", Scheme::Ignored),
-            CENSORED[0],
-        ];
-        let mut all = both(context, setting, &schemes, &schemes)?;
+        let mut all = both(context, setting, &FOUR, &FOUR)?;
         let cloud = [("CFwMD particles", Scheme::Particles(setting.cloud(), Weighing::OwnFilter))];
         let own = world(setting.acceleration_variance);
         all.extend(setting.of_trials(150).run(context, &own, setting.messages[0], &cloud)?);
@@ -88,7 +83,7 @@ pub(super) static FIG5: Simulated<Linear, Step> = Simulated {
         for l in [1.0, 2.0, 3.0] {
             rows.beats(claims, ("CFwMD2", "CFwMD"), (&world(1.0), l), &[Part::Position]);
         }
-        let stated = rows.pair("CFwMD2", "CFwMD", &world(STATED), 1.0);
+        let stated = rows.pair(("CFwMD2", "CFwMD"), &world(STATED), 1.0);
         let z = stated.and_then(|p| p.position.z_score(0.0));
         let what =
             "at the stated acceleration variance CFwMD2 is not better at l = 1 (paired difference in standard errors)";
@@ -110,21 +105,17 @@ pub(super) static FIG6: Simulated<Linear, Step> = Simulated {
     pairs: &[("CFwMD", "CFoMD"), ("exact", SAME_TRIALS)],
     setting: || Linear::vector(2, &[1.0]).with_particles(500),
     simulate: |setting, context| {
-        let schemes = [
-            ("all", Scheme::All),
-            ("CFwMD", Scheme::NoFeedback(Method::Joint)),
-            ("CFoMD", Scheme::NoFeedback(Method::Ignored)),
-            ("random", Scheme::Random),
-        ];
-        let mut all = both(context, setting, &schemes, &schemes[1..3])?;
+        let mut all = both(context, setting, &FOUR_ALONE, &FOUR_ALONE[1..3])?;
         let few = setting.of_trials(PARTICLE_TRIALS);
         let exact = [("exact", Scheme::NoFeedback(Method::Imputed(setting.cloud())))];
         let first = |e: &Ensemble| Ensemble {
-            scheme: SAME_TRIALS,
+            run: Run {
+                scheme: SAME_TRIALS,
+                ..e.run.clone()
+            },
             records: e.records.iter().take(few.trials as usize).cloned().collect(),
-            ..e.clone()
         };
-        let same: Vec<_> = all.iter().filter(|e| e.scheme == "CFwMD").map(first).collect();
+        let same: Vec<_> = all.iter().filter(|e| e.run.scheme == "CFwMD").map(first).collect();
         all.extend(both(context, &few, &exact, &exact)?);
         all.extend(same);
         Ok(all)

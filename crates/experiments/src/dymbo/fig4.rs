@@ -83,21 +83,16 @@ impl Figure for Loss {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        claims.all("at-least-one", "the loss is never below 1 (erratum dymbo-3)", &rows.plane, |r| {
-            r.loss_riccati >= 1.0
-        });
+        let what = "the loss is never below 1 (erratum dymbo-3)";
+        claims.all("at-least-one", what, &rows.plane, |r| r.loss_riccati >= 1.0);
         shapes(claims);
         limits(claims);
         let what = "largest loss over |a| <= 1, gamma <= 1, at the corner";
         let corner = (PI / 4.0 * (1.0 + (1.0 + 8.0 / PI).sqrt()) - 1.0) / ((5.0_f64.sqrt() - 1.0) / 2.0);
         claims.near("corner", what, loss(1.0, 1.0), corner, 1e-12);
-        for (kind, what) in [
-            ("riccati", "noise ratio of loss 2 at a"),
-            ("exact", "noise ratio of exact loss 2 at a"),
-        ] {
-            let double = rows.contours.iter().filter(|c| c.kind == kind && c.level == 2.0);
-            claims.keyed(&format!("double-{kind}"), what, double, |c| c.gamma);
-        }
+        let double = |kind: &'static str| select(&rows.contours, move |c| c.kind == kind && c.level == 2.0);
+        claims.keyed("double-riccati", "noise ratio of loss 2 at a", double("riccati"), |c| c.gamma);
+        claims.keyed("double-exact", "noise ratio of exact loss 2 at a", double("exact"), |c| c.gamma);
         let root = steady::coefficient_at_loss(2.0, 1.0).ok().flatten();
         let what = "at gamma = 1 the loss exceeds 2 beyond this |a| (the paper: nowhere) (erratum dymbo-4)";
         claims.near("double-gamma-1", what, root, 0.979320618683, 1e-10);
@@ -136,25 +131,17 @@ impl Figure for Loss {
 /// Monotone and even, on a grid finer than the table's.
 fn shapes(claims: &mut Claims) {
     let gammas = log_spaced(-3.0, 1.0, 400);
-    let line = |a: f64| {
-        gammas
-            .iter()
-            .map(|g| loss(a, *g).unwrap_or(f64::NAN))
-            .collect::<Vec<_>>()
-    };
+    let line = |a: f64| -> Vec<f64> { gammas.iter().map(|g| loss(a, *g).unwrap_or(f64::NAN)).collect() };
     let a = |i: usize| i as f64 / 200.0;
     let (plane, mirrored): (Vec<_>, Vec<_>) = (0..=200).map(|i| (line(a(i)), line(-a(i)))).unzip();
     let pairs = plane.windows(2).flat_map(|w| w[0].iter().zip(&w[1]));
     claims.all("rises-with-a", "the loss increases strictly with |a| (201 x 400 plants)", pairs, |(b, l)| b < l);
     let pairs = plane.iter().flat_map(|line| line.windows(2));
-    claims.all("rises-with-gamma", "the loss increases strictly with gamma (201 x 400 plants)", pairs, |w| {
-        w[0] < w[1]
-    });
+    let what = "the loss increases strictly with gamma (201 x 400 plants)";
+    claims.all("rises-with-gamma", what, pairs, |w| w[0] < w[1]);
     claims.all("even", "the loss is even in a", plane.iter().zip(&mirrored), |(l, m)| l == m);
-    let cells = plane
-        .iter()
-        .enumerate()
-        .flat_map(|(i, line)| gammas.iter().zip(line).map(move |(g, l)| (a(i), *g, *l)));
+    let cells = plane.iter().enumerate();
+    let cells = cells.flat_map(|(i, line)| gammas.iter().zip(line).map(move |(g, l)| (a(i), *g, *l)));
     let low = cells.filter(|(a, gamma, _)| *a <= 0.979 && *gamma <= 1.0 || *gamma <= 0.926);
     let what = "the loss is below 2 for |a| <= 0.979 and gamma <= 1, or gamma <= 0.926 (erratum dymbo-4)";
     claims.all("below-two", what, low, |(.., loss)| loss < 2.0);
@@ -166,13 +153,8 @@ fn limits(claims: &mut Claims) {
         let what = format!("a = {a}, gamma to 0: loss - 1 over (1 - 2/pi) gamma/(1 - a^2)^2");
         claims.near(format!("slow-{a}"), what, slope, 1.0, 1e-4);
     }
-    claims.near(
-        "slow-1",
-        "a = 1, gamma to 0: sqrt(pi/2), not pi/2 (erratum dymbo-5)",
-        loss(1.0, 1e-20),
-        (PI / 2.0).sqrt(),
-        1e-9,
-    );
+    let what = "a = 1, gamma to 0: sqrt(pi/2), not pi/2 (erratum dymbo-5)";
+    claims.near("slow-1", what, loss(1.0, 1e-20), (PI / 2.0).sqrt(), 1e-9);
     for a in [0.0, 0.5, 1.0] {
         let expected = (1.0 - FRAC_2_PI) / (1.0 - a * a * (1.0 - FRAC_2_PI));
         let slope = loss(a, 1e9).map(|loss| loss / 1e9 / expected);

@@ -71,15 +71,14 @@ fn simulate(
     prior: &Gaussian<1>,
     p: &Parameters,
     stream: Stream,
-    mut see: impl FnMut(usize, &Step),
-) -> Result<(), fewbits_dymbo::Error> {
+) -> Result<Vec<Step>, fewbits_dymbo::Error> {
     let mut rng = stream.fast_rng();
     let filter = DymboFilter::new(*plant);
     let scheme = RoundedSample::new(plant.measurement_variance(), p.tau)?;
     let mut state = prior.sample(&mut rng);
     let sample = plant.sensor().sample(&mut rng, &state)[0];
     let message = scheme.round(sample)?;
-    let mut step = Step {
+    let mut run = vec![Step {
         truth: state[0],
         kalman: Gaussian::scalar(sample, plant.measurement_variance())?,
         dymbo: Initialisation::Fine { scheme, message }.belief()?,
@@ -90,23 +89,23 @@ fn simulate(
         }
         .belief()?,
         bit: None,
-    };
-    see(0, &step);
-    for n in 1..=p.steps {
+    }];
+    for n in 0..p.steps {
+        let last = &run[n];
         state = plant.dynamics().propagate(&mut rng, &state);
         let sample = plant.sensor().sample(&mut rng, &state)[0];
         let ask = |belief: &Gaussian<1>| Sign::of(sample, filter.threshold(belief));
-        let (bit, informed) = (ask(&step.dymbo)?, ask(&step.informed)?);
-        step = Step {
+        let (bit, informed) = (ask(&last.dymbo)?, ask(&last.informed)?);
+        let step = Step {
             truth: state[0],
-            kalman: kalman::step(plant.dynamics(), plant.sensor(), &step.kalman, &Vector1::new(sample))?.0,
-            dymbo: filter.step(&step.dymbo, &Observation::Received(bit))?.0,
-            informed: filter.step(&step.informed, &Observation::Received(informed))?.0,
+            kalman: kalman::step(plant.dynamics(), plant.sensor(), &last.kalman, &Vector1::new(sample))?.0,
+            dymbo: filter.step(&last.dymbo, &Observation::Received(bit))?.0,
+            informed: filter.step(&last.informed, &Observation::Received(informed))?.0,
             bit: Some(bit.value()),
         };
-        see(n, &step);
+        run.push(step);
     }
-    Ok(())
+    Ok(run)
 }
 
 /// Exact and predicted curves, and the first run.
@@ -128,13 +127,13 @@ impl Figure for Convergence {
         let name = |at: &(Plant, _, _)| at.0.gamma.to_string();
         let empty = |_: &_| vec![[Moments::default(); 4]; p.steps + 1];
         let sums = context.sweep(ID, p.trials, &models, name, empty, |(_, model, prior), sums, trial| {
-            simulate(model, prior, p, trial.stream, |n, step| {
+            for (sums, step) in sums.iter_mut().zip(simulate(model, prior, p, trial.stream)?) {
                 let squared = |belief: &Gaussian<1>| (belief.mean()[0] - step.truth).powi(2);
-                sums[n][0].add(squared(&step.kalman));
-                sums[n][1].add(squared(&step.dymbo));
-                sums[n][2].add(squared(&step.informed));
-                sums[n][3].add(squared(&step.informed) / step.informed.covariance()[0]);
-            })
+                let [kalman, dymbo, informed] = [&step.kalman, &step.dymbo, &step.informed].map(squared);
+                let numbers = [kalman, dymbo, informed, informed / step.informed.covariance()[0]];
+                sums.iter_mut().zip(numbers).for_each(|(sum, number)| sum.add(number));
+            }
+            Ok::<_, fewbits_dymbo::Error>(())
         })?;
         let (mut errors, mut path) = (Vec::new(), Vec::new());
         for ((plant, model, prior), sums) in models.iter().zip(&sums) {
@@ -165,18 +164,15 @@ impl Figure for Convergence {
                 });
             }
             let run = context.monte_carlo(context.stream(ID).named(&plant.gamma.to_string()), p.trials);
-            run.single(0, |trial| {
-                simulate(model, prior, p, trial.stream, |n, step| {
-                    path.push(Point {
-                        plant: *plant,
-                        n,
-                        theta: step.truth,
-                        kf: step.kalman.mean()[0],
-                        dymbo: step.dymbo.mean()[0],
-                        bit: step.bit,
-                    });
-                })
-            })?;
+            let steps = run.single(0, |trial| simulate(model, prior, p, trial.stream))?;
+            path.extend(steps.into_iter().enumerate().map(|(n, step)| Point {
+                plant: *plant,
+                n,
+                theta: step.truth,
+                kf: step.kalman.mean()[0],
+                dymbo: step.dymbo.mean()[0],
+                bit: step.bit,
+            }));
         }
         Ok(Rows { errors, path })
     }
@@ -213,21 +209,18 @@ impl Figure for Convergence {
 
         let curves = || rows.chunks(p.steps + 1);
         // The Kalman filter settles on its own variance, the sign-bit filter on its own exact error.
-        let settled = |curve: &[Row], value: fn(&Row) -> f64, limit: Option<f64>| {
-            let limit = limit?;
-            curve.iter().position(|r| value(r) <= 1.05 * limit).map(|n| n as f64)
-        };
-        let what = "steps of the sign-bit filter to within 5 % of its level, a, gamma (erratum dymbo-12)";
-        claims.references("steps-dymbo", what, curves(), |c| {
-            let level = c.last().map(|r| r.dymbo_exact);
-            (c[0].plant.to_string(), settled(c, |r| r.dymbo_exact, level))
-        });
-        let what = "steps of the Kalman filter to within 5 % of its level, a, gamma (erratum dymbo-12)";
-        claims.references("steps-kf", what, curves(), |c| {
-            let level = c.last().map(|r| r.kf_minf);
-            (c[0].plant.to_string(), settled(c, |r| r.kf_pred, level))
-        });
         type Of = fn(&Row) -> f64;
+        let settling: [(&str, &str, Of, Of); 2] = [
+            ("dymbo", "sign-bit", |r| r.dymbo_exact, |r| r.dymbo_exact),
+            ("kf", "Kalman", |r| r.kf_pred, |r| r.kf_minf),
+        ];
+        for (id, who, value, level) in settling {
+            let what = format!("steps of the {who} filter to within 5 % of its level, a, gamma (erratum dymbo-12)");
+            claims.references(&format!("steps-{id}"), &what, curves(), |c| {
+                let level = c.last().map_or(f64::NAN, level);
+                (c[0].plant.to_string(), c.iter().position(|r| value(r) <= 1.05 * level).map(|n| n as f64))
+            });
+        }
         let ratios: [(&str, &str, Of); 2] = [
             ("exact", "exact errors", |r| r.dymbo_exact / r.kf_pred),
             ("computed", "computed variances", |r| r.dymbo_pred / r.kf_pred),

@@ -47,12 +47,12 @@ rows! {
 }
 
 /// Steps before the exact posterior has forgotten that it started normal.
-pub(super) const BURN: usize = 40;
+const BURN: usize = 40;
 /// Steps that are measured afterwards.
 const MEASURED: usize = 60;
 
 /// Steady mean squared distance of a filter's estimate from the exact posterior mean.
-pub(super) fn steady_excess<F: ScalarFilter + Clone + Sync>(
+fn steady_excess<F: ScalarFilter + Clone + Sync>(
     filter: &F,
     context: &Context<'_>,
     stream: Stream,

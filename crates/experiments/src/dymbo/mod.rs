@@ -1,20 +1,14 @@
 //! The Dymbo filter: figures and tables.
 
 mod bits;
-mod bsc;
 mod common;
-mod erasure;
 mod fig3;
 mod fig4;
 mod fig5;
 mod gap;
 mod prop1b;
 mod prop2;
-mod selftuning;
-mod sensors;
-mod smoother;
 mod threshold;
-mod vector;
 
 use crate::AnyFigure;
 
@@ -29,11 +23,5 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &threshold::ThresholdPlace,
         &gap::GapToExact,
         &bits::WordLength,
-        &bsc::NoisyBits,
-        &erasure::LostBits,
-        &sensors::SeveralSensors,
-        &smoother::Smoothing,
-        &vector::VectorState,
-        &selftuning::SelfTuning,
     ]
 }

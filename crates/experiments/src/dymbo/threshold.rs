@@ -1,12 +1,11 @@
-//! Where the threshold belongs, and what an unstable plant does.
+//! Where the threshold belongs.
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Scheme, Sensing, Sign};
-use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
+use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
-use fewbits_monte_carlo::Estimate;
-use nalgebra::{Matrix1, Vector1};
+use nalgebra::Matrix1;
 
 const ID: &str = "dymbo-threshold";
 
@@ -17,9 +16,6 @@ parameters! {
         steps: u64 [1..=10_000] = 1000 => "Steps of a run that are measured.",
         burn: u64 [..=10_000] = 100 => "Steps before them.",
         trials: u64 [2..=100_000_000] = 6_000 => quick 200 => "Simulated runs.",
-        unstable_a: f64 [-3.0..=3.0] = 1.2 => "Coefficient of the unstable plant.",
-        unstable_gamma: f64 [1e-6..=1e3] = 0.5 => "Its process variance over measurement variance.",
-        unstable_trials: u64 [2..=100_000_000] = 20_000 => quick 2_000 => "Simulated runs of it.",
     }
     check |p| {
         let stable = p.plants.iter().all(|plant| plant.a.abs() < 1.0);
@@ -28,26 +24,13 @@ parameters! {
 }
 
 rows! {
-    pub struct Rows {
-        rules: Vec<Row> => "Errors of the three rules.",
-        unstable: Vec<Unstable> => "Runs of an unstable plant that escape.",
-    }
-
-    struct Row by "{plant} {rule}" {
+    pub struct Row by "{plant} {rule}" {
         plant: Plant,
         rule: &'static str => "Place of the threshold.",
         trials: u64 => "Simulated runs.",
         mse: Measured ["sigma^2"] => "Mean squared error.",
         excess: Measured => "Relative excess over the prediction rule, same noise.",
         nees: Measured => "Squared error over computed variance.",
-    }
-
-    struct Unstable by "{a} {gamma}" {
-        a: f64 => "Plant coefficient.",
-        gamma: f64 => "Process variance over measurement variance.",
-        trials: u64 => "Simulated runs.",
-        escaped: Measured => "Fraction of runs whose error exceeds 50 within 500 steps.",
-        riccati: Option<f64> ["sigma^2"] => "Steady variance that the filter computes meanwhile.",
     }
 }
 
@@ -92,106 +75,58 @@ fn one_run(
 }
 
 /// Excess of `b` over `a` relative to `a`, from paired runs.
-fn relative(a: &[f64], b: &[f64]) -> Estimate {
+fn relative(a: &[f64], b: &[f64]) -> Measured {
     let ratio = b.iter().sum::<f64>() / a.iter().sum::<f64>();
     let mean = a.iter().sum::<f64>() / a.len() as f64;
     let residuals: Moments = a.iter().zip(b).map(|(a, b)| (b - ratio * a) / mean).collect();
-    Estimate {
+    Measured {
         value: ratio - 1.0,
-        standard_error: residuals.standard_error(),
+        ..(&residuals).into()
     }
-}
-
-/// Largest error that counts as held.
-const LOST: f64 = 50.0;
-/// Steps of an unstable run.
-const UNSTABLE_STEPS: usize = 500;
-
-/// Whether the error of an unstable plant passes [`LOST`].
-///
-/// The state itself grows beyond what a double resolves, so the origin follows the estimate: filter and plant are linear, and
-/// only the error counts.
-fn escapes(plant: &ScalarPlant, stream: Stream) -> Result<bool, fewbits_dymbo::Error> {
-    let mut rng = stream.fast_rng();
-    let filter = DymboFilter::new(*plant);
-    let scheme = RoundedSample::new(plant.measurement_variance(), 1.0)?;
-    let mut error = Vector1::new(0.0);
-    let message = scheme.round(plant.sensor().sample(&mut rng, &error)[0])?;
-    let mut belief = Initialisation::Fine { scheme, message }.belief()?;
-    for _ in 0..UNSTABLE_STEPS {
-        error -= belief.mean();
-        belief = Gaussian::from_trusted_parts(Vector1::zeros(), *belief.covariance());
-        if error[0].abs() > LOST {
-            return Ok(true);
-        }
-        error = plant.dynamics().propagate(&mut rng, &error);
-        let sample = plant.sensor().sample(&mut rng, &error)[0];
-        belief = filter.exchange(&mut rng, &belief, sample)?.0;
-    }
-    Ok((error - belief.mean())[0].abs() > LOST)
 }
 
 /// Errors of the three rules.
 pub struct ThresholdPlace;
 
 impl Figure for ThresholdPlace {
-    figure!(Parameters => Rows, ID, "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
+    figure!(Parameters => Vec<Row>, ID, "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
         "Steady mean squared error with the threshold at the prediction a theta_hat(n-1), at theta_hat(n-1) as equation \
          (14) prints it with the update unchanged, and the same with the exact update (erratum dymbo-1). For a > 0 the mistake \
-         hides within the width of a line; for a < 0 it is a catastrophe. A second table counts the runs of an \
-         unstable plant that escape although the computed variance stays finite.");
+         hides within the width of a line; for a < 0 it is a catastrophe.");
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let mut rules = Vec::new();
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let mut rows = Vec::new();
         for &plant in &p.plants {
             let (model, start) = (plant.model()?, plant.stationary()?);
             let run = context.monte_carlo(context.stream(ID).named(&plant.to_string()), p.trials);
             let runs = run.run(|trial| one_run(&model, &start, p, trial.stream))?;
             let of = |what: usize, rule: usize| runs.iter().map(|run| run[what][rule]).collect::<Vec<f64>>();
-            rules.extend(RULES.iter().enumerate().map(|(i, (rule, _))| Row {
+            rows.extend(RULES.iter().enumerate().map(|(i, (rule, _))| Row {
                 plant,
                 rule,
                 trials: p.trials,
-                mse: Measured::mean(&of(0, i).into_iter().collect()),
-                excess: relative(&of(0, 0), &of(0, i)).into(),
-                nees: Measured::mean(&of(1, i).into_iter().collect()),
+                mse: of(0, i).into_iter().collect(),
+                excess: relative(&of(0, 0), &of(0, i)),
+                nees: of(1, i).into_iter().collect(),
             }));
         }
-        let wild = ScalarPlant::new_unstable(p.unstable_a, p.unstable_gamma, 1.0)?;
-        let stream = context.stream(ID).named("unstable");
-        let escaped = context.tally(stream, p.unstable_trials, Moments::default, |sum, trial| {
-            sum.add(f64::from(escapes(&wild, trial.stream)?));
-            Ok::<_, fewbits_dymbo::Error>(())
-        })?;
-        let steady = wild.steady_state(DymboFilter::new(wild).information());
-        let unstable = vec![Unstable {
-            a: p.unstable_a,
-            gamma: p.unstable_gamma,
-            trials: p.unstable_trials,
-            escaped: Measured::mean(&escaped),
-            riccati: steady.map(|steady| steady.filtered_variance).ok(),
-        }];
-        Ok(Rows { rules, unstable })
+        Ok(rows)
     }
 
-    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims.keyed("mse", "mean squared error at a, gamma, rule", &rows.rules, |r| r.mse);
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        claims.keyed("mse", "mean squared error at a, gamma, rule", rows, |r| r.mse);
         let what = "relative excess over the prediction rule at a, gamma, rule (erratum dymbo-1)";
-        claims.keyed("excess", what, &rows.rules, |r| r.excess);
-        let right = rows.rules.iter().filter(|r| r.rule == "prediction");
+        claims.keyed("excess", what, rows, |r| r.excess);
+        let right = rows.iter().filter(|r| r.rule == "prediction");
         let what = "normalised error with the prediction rule at a, gamma";
         claims.references("nees", what, right, |r| (r.plant.to_string(), r.nees));
-        let what = "share of the runs that escape within 500 steps at a, gamma";
-        claims.keyed("escaped", what, &rows.unstable, |r| r.escaped);
-        claims.keyed("riccati", "while the computed variance stays finite, at a, gamma", &rows.unstable, |r| r.riccati);
     }
 
-    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let names = p.plants.iter().map(|plant| plant.title());
-        let x = Axis::categories("plant", names);
+    fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
+        let x = Axis::categories("plant", p.plants.iter().map(Plant::title));
         let mut panel = Panel::new("Place of the threshold", x, Axis::log("mean squared error / sigma^2"));
         for (i, (rule, label)) in RULES.into_iter().enumerate() {
-            let (those, shift) = (rows.rules.iter().filter(|r| r.rule == rule).enumerate(), 0.2 * (i as f64 - 1.0));
+            let (those, shift) = (select(rows, |r| r.rule == rule).enumerate(), 0.2 * (i as f64 - 1.0));
             panel = panel.with(Layer::measured(label, those, |(at, r)| (at as f64 + shift, r.mse)).coloured(i));
         }
         Plot::of(panel)

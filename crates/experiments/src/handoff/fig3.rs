@@ -51,16 +51,12 @@ impl Figure for Fig3 {
         let lobe = |w: f64, m: f64, s: f64| Component::new(w, Vector1::new(m), Matrix1::new(s * s));
         let with = |m| Mixture::new(vec![lobe(1.0 - p.mass, 0.25, 0.05)?, lobe(p.mass, m, 0.025)?]);
         let (p0, p1) = (with(p.lobe)?, with(p.moved_lobe)?);
-        let mut densities = Vec::new();
-        for i in 0..=400 {
+        let density = |i: i32| {
             let x = 0.0025 * f64::from(i);
-            let value = |m: &Mixture<1>| m.log_pdf(&Vector1::new(x)).exp();
-            densities.push(Density {
-                x,
-                p0: value(&p0),
-                p1: value(&p1),
-            });
-        }
+            let [p0, p1] = [&p0, &p1].map(|m| m.log_pdf(&Vector1::new(x)).exp());
+            Density { x, p0, p1 }
+        };
+        let densities = (0..=400).map(density).collect();
         // L1 over an interval of the densities divided by their masses there.
         let distance = |from: f64, to: f64, mass: [f64; 2]| -> Result<f64, Error> {
             let over = |m: &Mixture<1>, mass: f64, x: Columns<'_, 1>, out: &mut [f64]| {
@@ -76,15 +72,18 @@ impl Figure for Fig3 {
         let above = below.map(|b| 1.0 - b);
         let prior = distance(-0.5, 1.5, [1.0; 2])?;
         let (y0, y1) = (distance(-0.5, p.threshold, below)?, distance(p.threshold, 1.5, above)?);
-        let row = |when, probability, l1| Distance { when, probability, l1 };
+        let row = |(when, probability, l1)| Distance { when, probability, l1 };
         let expected = below[0] * y0 + above[0] * y1;
-        let l1 = vec![
-            row("prior", 1.0, prior),
-            row("y0", below[0], y0),
-            row("y1", above[0], y1),
-            row("expected", 1.0, expected),
+        let l1 = [
+            ("prior", 1.0, prior),
+            ("y0", below[0], y0),
+            ("y1", above[0], y1),
+            ("expected", 1.0, expected),
         ];
-        Ok(Rows { densities, l1 })
+        Ok(Rows {
+            densities,
+            l1: l1.map(row).into(),
+        })
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {

@@ -1,6 +1,6 @@
 //! Figure 4: the field, the target's way, the leaders.
 
-use super::world::{STAND_OFF, STEP, World};
+use super::world::{STAND_OFF, World};
 use crate::prelude::*;
 
 parameters! {
@@ -58,14 +58,10 @@ impl Figure for Fig4 {
                 reading: t.checked_sub(1).map(|k| world.readings[k].value),
             }
         };
-        let place = |(sensor, s): (usize, &super::world::Point)| Sensor {
-            sensor,
-            x: s[0],
-            y: s[1],
-        };
+        let sensors = world.sensors.iter().map(|s| (s[0], s[1])).enumerate();
         Ok(Rows {
             track: (0..=p.steps).map(step).collect(),
-            sensors: world.sensors.iter().enumerate().map(place).collect(),
+            sensors: sensors.map(|(sensor, (x, y))| Sensor { sensor, x, y }).collect(),
         })
     }
 
@@ -74,7 +70,7 @@ impl Figure for Fig4 {
             w[0].leader != w[1].leader
         });
         let what = "no leader is nearer than 0.7 steps";
-        claims.all("stand-off", what, rows.track.iter().filter_map(|s| s.distance), |d| d >= STAND_OFF * STEP);
+        claims.all("stand-off", what, rows.track.iter().filter_map(|s| s.distance), |d| d >= STAND_OFF);
         let what = "every step goes forward by 0.7 to 1.1 lengths";
         claims.all("forward", what, rows.track.windows(2), |w| (0.7..=1.1).contains(&(w[1].x - w[0].x)));
     }

@@ -1,6 +1,6 @@
 //! Figure 5: beliefs along the way, and what would travel.
 
-use super::filters::{PARTICLES, STEPS, Smoothing, Truth, posteriors, prior, single};
+use super::filters::{PARTICLES, SENSORS, STEPS, Smoothing, Truth, VARIANCE, posteriors, single, uncompressed};
 use super::world::World;
 use crate::prelude::*;
 use fewbits_densities::ellipse;
@@ -50,46 +50,28 @@ impl Figure for Fig5 {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let stream = context.stream("handoff-fig4");
-        let world = World::draw(&mut stream.rng(), super::filters::SENSORS, STEPS, super::filters::VARIANCE)?;
+        let world = World::draw(&mut stream.rng(), SENSORS, STEPS, VARIANCE)?;
         let filter = Smoothing::Silverman.filter(PARTICLES)?;
-        let mut rng = stream.named("filter").fast_rng();
-        let mut cloud = prior()?.sample_systematic(&mut rng, PARTICLES)?;
+        let clouds = uncompressed(&world, stream)?;
         let (mut particles, mut ellipses) = (Vec::new(), Vec::new());
-        for (k, reading) in world.readings.iter().enumerate() {
-            super::filters::plain_step(&mut rng, &mut cloud, reading)?;
-            let t = k + 1;
-            if !p.time.contains(&t) {
-                continue;
-            }
-            for (i, weight) in cloud.weights().iter().enumerate() {
-                let [x, y] = cloud.columns().map(|c| c[i]);
-                particles.push(Particle {
-                    t,
-                    i,
-                    x,
-                    y,
-                    weight: *weight,
-                });
-            }
-            let sent = Reduction::default().reduce(&filter.estimate(&cloud)?, p.components)?;
+        for (t, cloud) in (1..).zip(&clouds).filter(|(t, _)| p.time.contains(t)) {
+            let [x, y] = cloud.columns();
+            let points = x.iter().zip(y).zip(cloud.weights()).enumerate();
+            particles.extend(points.map(|(i, ((&x, &y), &weight))| Particle { t, i, x, y, weight }));
+            let sent = Reduction::default().reduce(&filter.estimate(cloud)?, p.components)?;
             for (component, c) in sent.components().iter().enumerate() {
                 let outline = ellipse(&c.gaussian(), 0.5, 40)?;
-                let first = outline.first().copied();
-                ellipses.extend(
-                    outline
-                        .into_iter()
-                        .chain(first)
-                        .map(|[x, y]| Outline { t, component, x, y }),
-                );
+                let closed = outline.iter().chain(outline.first());
+                ellipses.extend(closed.map(|&[x, y]| Outline { t, component, x, y }));
             }
         }
-        let distance =
-            context.tally(stream.named("worlds"), p.trials, Moments::default, |sum: &mut Moments, trial| {
-                for estimate in posteriors(trial.stream, &[2, 5, 8])? {
-                    sum.add(Truth::new(&estimate).kl(&single(&estimate)?));
-                }
-                Ok::<_, Error>(())
-            })?;
+        let far = |sum: &mut Moments, trial: Trial| {
+            for estimate in posteriors(trial.stream)? {
+                sum.add(Truth::new(&estimate).kl(&single(&estimate)?));
+            }
+            Ok::<_, Error>(())
+        };
+        let distance = context.tally(stream.named("worlds"), p.trials, Moments::default, far)?;
         Ok(Rows {
             particles,
             ellipses,

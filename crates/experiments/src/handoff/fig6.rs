@@ -1,9 +1,9 @@
 //! Figures 6(a) and 6(b): what the losses of all hand-overs say about the error at the end.
 
-use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, paper_cut, prior, world};
+use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, median, paper_cut, prior, world};
 use super::world::Walk;
 use crate::prelude::*;
-use fewbits_handoff::published::{Accounting, Amplification, StepError};
+use fewbits_handoff::published::{Accounting, Amplification, Bounds, StepError};
 use std::f64::consts::LN_10;
 
 parameters! {
@@ -47,22 +47,27 @@ rows! {
 /// Figure 6(a) or (b).
 pub struct Fig6 {
     id: &'static str,
+    title: &'static str,
     components: usize,
 }
 
 /// Five components.
 pub static FIG6A: Fig6 = Fig6 {
     id: "handoff-fig6a",
+    title: "Bounds with five components",
     components: 5,
 };
 /// Ten components.
 pub static FIG6B: Fig6 = Fig6 {
     id: "handoff-fig6b",
+    title: "Bounds with ten components",
     components: 10,
 };
 
-/// Errors and sizes of every hand-over of one world under every criterion.
-type Run = [Vec<(StepError, usize)>; 3];
+/// Of a hand-over: its ML, DR, KL and L1 errors, and the components sent.
+type Loss = [f64; 5];
+/// All hand-overs of one world under every criterion.
+type Run = [Vec<Loss>; 3];
 
 impl Fig6 {
     fn trial(components: usize, smoothing: Smoothing, trial: Trial) -> Result<Run, Error> {
@@ -70,147 +75,95 @@ impl Fig6 {
         let filter = smoothing.filter(PARTICLES)?;
         let mut run = Run::default();
         for (c, steps) in run.iter_mut().enumerate() {
-            let mut rng = trial.stream.named(CRITERIA[c].0).fast_rng();
+            let mut rng = trial.stream.named(CRITERIA[c]).fast_rng();
             let mut known = prior()?;
             for reading in &world.readings {
                 let (particles, _) = filter.posterior(&mut rng, &known, &Walk, reading)?;
                 let estimate = estimate(&filter, &particles)?;
-                let sent = paper_cut(&estimate, c, components)?;
-                steps.push((StepError::plug_in(&estimate, &sent), sent.len()));
-                known = sent;
+                known = paper_cut(&estimate, c, components)?;
+                let StepError { ml, dr, kl, l1 } = StepError::plug_in(&estimate, &known);
+                steps.push([ml, dr, kl, l1, known.len() as f64]);
             }
         }
         Ok(run)
     }
 
     fn rows(smoothing: Smoothing, runs: &[Run]) -> (Vec<Bound>, Vec<Step>) {
-        let sums = Sums::of(runs);
-        let typical = [0, 1, 2].map(|c| sums.mean(c));
-        let bounds = (1..=STEPS).map(|t| {
-            let [ml, kl] = [0, 1].map(|c| account(&typical[c], t));
-            let jackknifed = |c: usize, log: fn(&fewbits_handoff::published::Bounds) -> f64| Measured {
-                value: log(&account(&typical[c], t)) / LN_10,
-                standard_error: sums.jackknife(runs, c, |steps| log(&account(steps, t)) / LN_10),
-            };
-            let own = |c: usize| -> Vec<_> {
-                let of = |run: &Run| {
-                    run[c][..t]
-                        .iter()
-                        .map(|s| s.0)
-                        .collect::<Accounting>()
-                        .bounds(Amplification::Ml)
+        let smoothing = smoothing.name();
+        let worlds = runs.len() as f64;
+        // Sums over all worlds.
+        let totals = [0, 1, 2].map(|c| {
+            let sum = |t: usize| std::array::from_fn(|k| runs.iter().fold(0.0, |sum, run| sum + run[c][t][k]));
+            (0..STEPS).map(sum).collect::<Vec<Loss>>()
+        });
+        let typical = |c: usize, t: usize| account(totals[c][..t].iter().map(|total| total.map(|x| x / worlds)));
+        // A function of the mean errors, with its standard error by leaving out one world at a time.
+        let jackknifed = |c: usize, t: usize, log: fn(&Bounds) -> f64| {
+            let without = |run: &Run| {
+                let rest = |(total, own): (&Loss, &Loss)| -> Loss {
+                    std::array::from_fn(|k| ((total[k] - own[k]) / (worlds - 1.0)).max(0.0))
                 };
-                runs.iter().map(of).collect()
+                log(&account(totals[c][..t].iter().zip(&run[c]).map(rest))) / LN_10
             };
-            let (own_ml, own_kl) = (own(0), own(1));
-            // An estimate of a KL may be zero, its logarithm -inf: the median does not mind.
-            let mut logs: Vec<f64> = own_kl.iter().map(|b| b.ln_kl_printed / LN_10).collect();
-            logs.sort_by(f64::total_cmp);
+            let error = (worlds - 1.0) * runs.iter().map(without).collect::<Moments>().standard_error();
+            Measured {
+                value: log(&typical(c, t)) / LN_10,
+                standard_error: Some(error).filter(|error| runs.len() > 1 && error.is_finite()),
+            }
+        };
+        let bounds = (1..=STEPS).map(|t| {
+            let own = |c: usize| runs.iter().map(move |run| account(run[c][..t].iter().copied()));
             Bound {
-                smoothing: smoothing.name(),
+                smoothing,
                 t,
-                ml_printed: own_ml.iter().map(|b| b.ml_printed).collect(),
-                ml_from_dr: ml.ml_from_dr,
-                log10_kl_printed: jackknifed(1, |b| b.ln_kl_printed),
-                log10_kl_median: logs[logs.len() / 2],
-                log10_kl_corrected: kl.ln_kl_corrected / LN_10,
-                log10_l1_printed: jackknifed(2, |b| b.ln_l1_printed),
-                l1_from_dr: own_ml.iter().map(|b| b.l1_from_dr).collect(),
-                kl_from_dr: own_ml.iter().map(|b| b.kl_from_dr).collect(),
+                ml_printed: own(0).map(|b| b.ml_printed).collect(),
+                ml_from_dr: typical(0, t).ml_from_dr,
+                log10_kl_printed: jackknifed(1, t, |b| b.ln_kl_printed),
+                // An estimate of a KL may be zero, its logarithm -inf: the median does not mind.
+                log10_kl_median: median(own(1).map(|b| b.ln_kl_printed / LN_10)),
+                log10_kl_corrected: typical(1, t).ln_kl_corrected / LN_10,
+                log10_l1_printed: jackknifed(2, t, |b| b.ln_l1_printed),
+                l1_from_dr: own(0).map(|b| b.l1_from_dr).collect(),
+                kl_from_dr: own(0).map(|b| b.kl_from_dr).collect(),
             }
         });
         // Errors of one world are averaged over time first: the standard error is over worlds.
-        let steps = (0..3).map(|c| {
-            let over = |of: &dyn Fn(&(StepError, usize)) -> f64| -> Measured {
-                let world = |run: &Run| run[c].iter().map(of).collect::<Moments>().mean();
+        let steps = CRITERIA.iter().enumerate().map(|(c, method)| {
+            let over = |k: usize| -> Measured {
+                let world = |run: &Run| run[c].iter().map(|loss| loss[k]).collect::<Moments>().mean();
                 runs.iter().map(world).collect()
             };
             Step {
-                smoothing: smoothing.name(),
-                method: CRITERIA[c].0,
-                ml: over(&|s| s.0.ml),
-                kl: over(&|s| s.0.kl),
-                l1: over(&|s| s.0.l1),
-                dr: over(&|s| s.0.dr),
-                size: over(&|s| s.1 as f64),
+                smoothing,
+                method,
+                ml: over(0),
+                kl: over(2),
+                l1: over(3),
+                dr: over(1),
+                size: over(4),
             }
         });
         (bounds.collect(), steps.collect())
     }
 }
 
-/// Bounds after `t` hand-overs.
-fn account(steps: &[StepError], t: usize) -> fewbits_handoff::published::Bounds {
-    let first = steps[..t].iter().copied();
-    first.collect::<Accounting>().bounds(Amplification::Ml)
-}
-
-/// Sums over all worlds of every hand-over's errors, by criterion: `[ml, dr, kl, l1]` each.
-struct Sums {
-    totals: [Vec<[f64; 4]>; 3],
-    worlds: f64,
-}
-
-fn parts(e: &StepError) -> [f64; 4] {
-    [e.ml, e.dr, e.kl, e.l1]
-}
-
-fn step_error([ml, dr, kl, l1]: [f64; 4]) -> StepError {
-    StepError { ml, dr, kl, l1 }
-}
-
-impl Sums {
-    fn of(runs: &[Run]) -> Self {
-        let mut totals = [0, 1, 2].map(|_| vec![[0.0; 4]; STEPS]);
-        for run in runs {
-            for (totals, steps) in totals.iter_mut().zip(run) {
-                for (total, (error, _)) in totals.iter_mut().zip(steps) {
-                    total.iter_mut().zip(parts(error)).for_each(|(t, x)| *t += x);
-                }
-            }
-        }
-        Self {
-            totals,
-            worlds: runs.len() as f64,
-        }
-    }
-
-    /// Mean errors of every hand-over under a criterion.
-    fn mean(&self, c: usize) -> Vec<StepError> {
-        let mean = |total: &[f64; 4]| step_error(total.map(|x| x / self.worlds));
-        self.totals[c].iter().map(mean).collect()
-    }
-
-    /// Standard error of a function of the mean errors, by leaving out one world at a time.
-    fn jackknife(&self, runs: &[Run], c: usize, of: impl Fn(&[StepError]) -> f64) -> Option<f64> {
-        if runs.len() < 2 {
-            return None;
-        }
-        let without = |run: &Run| {
-            let left = self.totals[c].iter().zip(&run[c]).map(|(total, (error, _))| {
-                let own = parts(error);
-                step_error(std::array::from_fn(|k| ((total[k] - own[k]) / (self.worlds - 1.0)).max(0.0)))
-            });
-            of(&left.collect::<Vec<_>>())
-        };
-        let values: Moments = runs.iter().map(without).collect();
-        let error = (self.worlds - 1.0) * values.standard_error();
-        error.is_finite().then_some(error)
-    }
+/// Bounds after these hand-overs.
+fn account(losses: impl Iterator<Item = Loss>) -> Bounds {
+    let error = |[ml, dr, kl, l1, _]: Loss| StepError { ml, dr, kl, l1 };
+    losses.map(error).collect::<Accounting>().bounds(Amplification::Ml)
 }
 
 impl Rows {
     fn under(&self, smoothing: Smoothing) -> Vec<&Bound> {
-        self.bounds.iter().filter(|b| b.smoothing == smoothing.name()).collect()
+        select(&self.bounds, |b| b.smoothing == smoothing.name()).collect()
     }
 }
 
-/// The last time up to which `log10` stays below the ML bound.
-fn useful(rows: &[&Bound], log10: fn(&Bound) -> f64) -> f64 {
-    rows.iter()
-        .take_while(|b| log10(b) < b.ml_printed.value.log10())
-        .count() as f64
-}
+/// The bounds that grow exponentially, by decimal logarithm.
+const EXPONENTIAL: [(&str, fn(&Bound) -> f64); 2] = [
+    ("kl", |b| b.log10_kl_printed.value),
+    ("l1", |b| b.log10_l1_printed.value),
+];
 
 impl Figure for Fig6 {
     type Parameters = Parameters;
@@ -219,11 +172,7 @@ impl Figure for Fig6 {
     fn about(&self) -> About {
         About {
             id: self.id,
-            title: if self.components == 5 {
-                "Bounds with five components"
-            } else {
-                "Bounds with ten components"
-            },
+            title: self.title,
             caption: "Bounds on the error after t lossy hand-overs. The ML bound grows in proportion to time, those of KL and L1 \
                       exponentially; the DR bounds (ours) hold for every data sequence and stay below what is trivial.",
             source: "compressed particle filter, Section 6, Figure 6",
@@ -255,51 +204,43 @@ impl Figure for Fig6 {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        full.keyed(
-            "ml",
-            "largest log-ratio at the centres (erratum handoff-11), mean over hand-overs",
-            &rows.steps,
-            |s| s.ml,
-        );
-        full.keyed(
-            "kl",
-            "mean KL of a hand-over, bandwidth by the particles kept (erratum handoff-13)",
-            &rows.steps,
-            |s| s.kl,
-        );
-        full.keyed("l1", "mean L1 of a hand-over, noise of variance 0.05 (erratum handoff-12)", &rows.steps, |s| s.l1);
-        full.keyed("dr", "mean DR of a hand-over", &rows.steps, |s| s.dr);
-        full.keyed("size", "components sent", &rows.steps, |s| s.size);
+        let steps: [(&str, &str, fn(&Step) -> Measured); 5] = [
+            ("ml", "largest log-ratio at the centres (erratum handoff-11), mean over hand-overs", |s| s.ml),
+            ("kl", "mean KL of a hand-over, bandwidth by the particles kept (erratum handoff-13)", |s| s.kl),
+            ("l1", "mean L1 of a hand-over, noise of variance 0.05 (erratum handoff-12)", |s| s.l1),
+            ("dr", "mean DR of a hand-over", |s| s.dr),
+            ("size", "components sent", |s| s.size),
+        ];
+        for (quantity, what, of) in steps {
+            full.keyed(quantity, what, &rows.steps, of);
+        }
         full.keyed("ml-bound", "printed ML bound", &rows.bounds, |b| b.ml_printed);
         full.keyed("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| b.log10_kl_printed);
         full.keyed("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| b.log10_l1_printed);
         full.keyed("l1-from-dr", "L1 bound from DR", &rows.bounds, |b| b.l1_from_dr);
         full.keyed("kl-from-dr", "KL bound from DR", &rows.bounds, |b| b.kl_from_dr);
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
-            let under = rows.under(smoothing);
-            let name = smoothing.name();
-            let increments: Vec<f64> = under
-                .windows(2)
-                .map(|w| w[1].ml_printed.value - w[0].ml_printed.value)
-                .collect();
-            let mean = increments.iter().copied().collect::<Moments>().mean();
+            let (under, name) = (rows.under(smoothing), smoothing.name());
+            let increments =
+                |of: fn(&Bound) -> f64| under.windows(2).map(move |w| of(w[1]) - of(w[0])).collect::<Vec<_>>();
+            let ml = increments(|b| b.ml_printed.value);
+            let mean = ml.iter().copied().collect::<Moments>().mean();
             let what = "the ML bound grows by the same amount at every step, within 25 %";
-            full.all(format!("{name}-linear"), what, &increments, |d| (d / mean - 1.0).abs() < 0.25);
+            full.all(format!("{name}-linear"), what, &ml, |d| (d / mean - 1.0).abs() < 0.25);
             let what = "at time 1 the KL bound is the smallest and the ML bound the largest";
             claims.all(format!("{name}-first"), what, under.first(), |b| {
-                b.log10_kl_printed.value < b.log10_l1_printed.value
-                    && b.log10_l1_printed.value < b.ml_printed.value.log10()
+                let [kl, l1] = EXPONENTIAL.map(|(_, log)| log(b));
+                kl < l1 && l1 < b.ml_printed.value.log10()
             });
-            let logarithms: [fn(&Bound) -> f64; 2] = [|b| b.log10_kl_printed.value, |b| b.log10_l1_printed.value];
-            for (measure, log) in ["kl", "l1"].into_iter().zip(logarithms) {
-                let increments: Vec<f64> = under.windows(2).map(|w| log(w[1]) - log(w[0])).collect();
+            for (measure, log) in EXPONENTIAL {
                 let what = format!("the {measure} bound grows by a factor at every step: exponentially");
-                claims.all(format!("{name}-{measure}-exponential"), what, &increments, |d| *d > 0.15);
+                claims.all(format!("{name}-{measure}-exponential"), what, increments(log), |d| d > 0.15);
             }
             let slope =
                 |log: fn(&Bound) -> f64| Some((log(under.last()?) - log(under.first()?)) / (under.len() as f64 - 1.0));
-            let gap = minus(slope(|b| b.log10_kl_printed.value), slope(|b| b.log10_l1_printed.value));
-            full.below(format!("{name}-slopes"), "the KL bound grows more slowly than the L1 bound", gap, 0.0);
+            let [kl, l1] = EXPONENTIAL.map(|(_, log)| slope(log));
+            let what = "the KL bound grows more slowly than the L1 bound";
+            full.below(format!("{name}-slopes"), what, minus(kl, l1), 0.0);
             let what = "the DR bound of the ML is never above the printed one, and the corrected KL bound never below";
             claims.all(format!("{name}-tight"), what, &under, |b| {
                 b.ml_from_dr <= b.ml_printed.value
@@ -309,21 +250,30 @@ impl Figure for Fig6 {
         }
         if !rows.five.is_empty() {
             let what = "in the same worlds every bound is smaller with ten components than with five, at every time";
+            let bounds = |b: &Bound| {
+                let measured = [
+                    b.ml_printed,
+                    b.log10_kl_printed,
+                    b.log10_l1_printed,
+                    b.kl_from_dr,
+                    b.l1_from_dr,
+                ];
+                measured.map(|m| m.value).into_iter().chain([b.log10_kl_corrected])
+            };
             full.all("ten-below-five", what, rows.bounds.iter().zip(&rows.five), |(ten, five)| {
-                ten.ml_printed.value < five.ml_printed.value
-                    && ten.log10_kl_printed.value < five.log10_kl_printed.value
-                    && ten.log10_kl_corrected < five.log10_kl_corrected
-                    && ten.log10_l1_printed.value < five.log10_l1_printed.value
-                    && ten.kl_from_dr.value < five.kl_from_dr.value
-                    && ten.l1_from_dr.value < five.l1_from_dr.value
+                bounds(ten).zip(bounds(five)).all(|(ten, five)| ten < five)
             });
         }
-        let preset = rows.under(Smoothing::Preset);
-        let (kl, l1) = if self.components == 5 { (4.0, 2.0) } else { (7.0, 3.0) };
-        let what = "the KL bound is below the ML bound up to this time";
-        full.near("kl-useful", what, useful(&preset, |b| b.log10_kl_printed.value), kl, 1.0);
-        let what = "the L1 bound is below the ML bound up to this time";
-        full.near("l1-useful", what, useful(&preset, |b| b.log10_l1_printed.value), l1, 1.0);
+        let times = if self.components == 5 { [4.0, 2.0] } else { [7.0, 3.0] };
+        for ((measure, log), time) in EXPONENTIAL.into_iter().zip(times) {
+            let preset = rows.under(Smoothing::Preset);
+            let useful = preset
+                .iter()
+                .take_while(|b| log(b) < b.ml_printed.value.log10())
+                .count();
+            let what = format!("the {} bound is below the ML bound up to this time", measure.to_uppercase());
+            full.near(format!("{measure}-useful"), what, useful as f64, time, 1.0);
+        }
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {

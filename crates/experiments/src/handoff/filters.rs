@@ -1,19 +1,17 @@
 //! What the figures share: settings, filters, references.
 
-use super::world::{Point, START, Walk, World};
-use crate::Error;
-use fewbits_core::Gaussian;
+use super::world::{Point, Reading, START, Walk, World};
+use crate::prelude::*;
+use fewbits_core::{Dynamics, Gaussian, Likelihood};
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles, SampleSize};
 use fewbits_handoff::{HandoffFilter, Whole, trimmed};
 use fewbits_mixture_codec::published::PaperReductions;
-use fewbits_mixture_codec::{Criterion, Reduction, cut};
-use fewbits_monte_carlo::Stream;
+use fewbits_mixture_codec::{Reduction, cut};
 use nalgebra::SMatrix;
-use rand::Rng;
-use rand::RngExt;
+use rand::{Rng, RngExt};
 
 /// Particles of a filter.
-pub(super) const PARTICLES: usize = 500;
+pub const PARTICLES: usize = 500;
 /// Particles of a reference filter.
 pub(super) const REFERENCE: usize = 2000;
 /// Sensors in the field.
@@ -65,13 +63,13 @@ pub(super) fn estimate(filter: &HandoffFilter<Whole>, particles: &Particles<2>) 
 }
 
 /// What all filters know at time 0.
-pub(super) fn prior() -> Result<Mixture<2>, Error> {
+pub fn prior() -> Result<Mixture<2>, Error> {
     let gaussian = Gaussian::new(Point::zeros(), SMatrix::identity() * (START * START))?;
     Ok(Mixture::single(&gaussian)?)
 }
 
 /// The world of one trial.
-pub(super) fn world(stream: Stream) -> Result<World, Error> {
+pub fn world(stream: Stream) -> Result<World, Error> {
     World::draw(&mut stream.named("world").rng(), SENSORS, STEPS, VARIANCE)
 }
 
@@ -86,51 +84,86 @@ pub(super) fn paper_cut(
 }
 
 /// The paper's criteria in the order of [`paper_cut`].
-pub(super) const CRITERIA: [(&str, Criterion); 3] =
-    [("ml", Criterion::Ml), ("kl", Criterion::Kl), ("l1", Criterion::L1)];
+pub(super) const CRITERIA: [&str; 3] = ["ml", "kl", "l1"];
 
 /// The Gaussian of the same moments.
 pub(super) fn single(estimate: &KernelEstimate<2>) -> Result<Mixture<2>, Error> {
     Ok(Reduction::SingleGaussian.reduce(estimate, 1)?)
 }
 
-/// A plain particle filter: systematic resampling, propagation, weights.
-pub(super) fn plain_step<R: Rng + ?Sized>(
-    rng: &mut R,
-    particles: &mut Particles<2>,
-    reading: &super::world::Reading,
-) -> Result<(), Error> {
-    use fewbits_core::{Dynamics, Likelihood};
-    let count = particles.len();
+/// A systematic choice of `count` among weighted particles.
+pub(super) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<u32> {
     let offset: f64 = rng.random();
-    let (mut ancestors, mut cumulative, mut i) = (Vec::with_capacity(count), particles.weights()[0], 0);
-    for k in 0..count {
-        while (k as f64 + offset) / count as f64 >= cumulative && i + 1 < count {
+    let (mut i, mut cumulative) = (0, weights[0]);
+    let ancestor = |k: usize| {
+        while (k as f64 + offset) / count as f64 >= cumulative && i + 1 < weights.len() {
             i += 1;
-            cumulative += particles.weights()[i];
+            cumulative += weights[i];
         }
-        ancestors.push(i as u32);
-    }
-    particles.select(&ancestors)?;
+        i as u32
+    };
+    (0..count).map(ancestor).collect()
+}
+
+/// A plain particle filter: systematic resampling, propagation, weights.
+pub fn plain_step<R: Rng + ?Sized>(rng: &mut R, particles: &mut Particles<2>, reading: &Reading) -> Result<(), Error> {
+    particles.select(&systematic(rng, particles.weights(), particles.len()))?;
     Walk.propagate_columns(rng, particles.columns_mut());
     particles.reweigh(|states, logs| reading.add_log_likelihoods(states, logs))?;
     Ok(())
 }
 
-/// Posteriors of an uncompressed filter at the given times of a world.
-pub(super) fn posteriors(stream: Stream, times: &[usize]) -> Result<Vec<KernelEstimate<2>>, Error> {
-    let world = world(stream)?;
-    let filter = Smoothing::Silverman.filter(PARTICLES)?;
+/// The middle of these numbers, the upper one of two.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+/// Times at which the beliefs of a world are looked at.
+pub(super) const TIMES: [usize; 3] = [2, 5, 8];
+
+/// The particles of an uncompressed filter after every reading of a world.
+pub(super) fn uncompressed(world: &World, stream: Stream) -> Result<Vec<Particles<2>>, Error> {
     let mut rng = stream.named("filter").fast_rng();
     let mut particles = prior()?.sample_systematic(&mut rng, PARTICLES)?;
-    let mut kept = Vec::new();
-    for (k, reading) in world.readings.iter().enumerate() {
+    let after = |reading| {
         plain_step(&mut rng, &mut particles, reading)?;
-        if times.contains(&(k + 1)) {
-            kept.push(filter.estimate(&particles)?);
+        Ok(particles.clone())
+    };
+    world.readings.iter().map(after).collect()
+}
+
+/// Estimates of that filter at [`TIMES`] of a world.
+pub(super) fn posteriors(stream: Stream) -> Result<Vec<KernelEstimate<2>>, Error> {
+    let filter = Smoothing::Silverman.filter(PARTICLES)?;
+    let clouds = uncompressed(&world(stream)?, stream)?;
+    TIMES.iter().map(|t| Ok(filter.estimate(&clouds[t - 1])?)).collect()
+}
+
+/// What `cells` gives of each belief, added up over those of a world: a mean over the worlds for each cell and number.
+pub(super) fn over_beliefs<K: Copy + Send, const N: usize>(
+    context: &Context<'_>,
+    experiment: &str,
+    trials: u64,
+    cells: impl Fn(&KernelEstimate<2>, Stream) -> Result<Vec<(K, [f64; N])>, Error> + Sync,
+) -> Result<Vec<(K, [Measured; N])>, Error> {
+    let one = |it: Trial| {
+        let mut sums: Vec<(K, [f64; N])> = Vec::new();
+        for estimate in posteriors(it.stream)? {
+            let cells = cells(&estimate, it.stream)?;
+            sums.extend(cells.iter().skip(sums.len()).map(|(key, _)| (*key, [0.0; N])));
+            for (sum, cell) in sums.iter_mut().zip(&cells) {
+                (0..N).for_each(|k| sum.1[k] += cell.1[k]);
+            }
         }
-    }
-    Ok(kept)
+        Ok(sums)
+    };
+    let runs = context.trials(experiment, trials, one)?;
+    let mean = |(i, (key, _)): (usize, &(K, [f64; N]))| {
+        (*key, std::array::from_fn(|k| runs.iter().map(|run| run[i].1[k]).collect()))
+    };
+    Ok(runs.first().into_iter().flatten().enumerate().map(mean).collect())
 }
 
 /// A mixture whose every number was sent as a 32-bit float.
@@ -162,13 +195,8 @@ impl Truth {
             (low, (high - low) / count, count as usize + 1)
         };
         let ((x0, dx, nx), (y0, dy, ny)) = (axis(0), axis(1));
-        let mut grid = [Vec::with_capacity(nx * ny), Vec::with_capacity(nx * ny)];
-        for i in 0..nx {
-            for j in 0..ny {
-                grid[0].push(x0 + i as f64 * dx);
-                grid[1].push(y0 + j as f64 * dy);
-            }
-        }
+        let places = (0..nx).flat_map(|i| (0..ny).map(move |j| (x0 + i as f64 * dx, y0 + j as f64 * dy)));
+        let grid: [Vec<f64>; 2] = places.unzip().into();
         let mut log_p = vec![0.0; nx * ny];
         p.log_pdf_columns([&grid[0], &grid[1]], &mut log_p);
         Self {

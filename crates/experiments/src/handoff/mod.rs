@@ -1,17 +1,15 @@
 //! A belief that travels from leader to leader in a few bytes: figures.
 
-mod bandwidth;
-mod exact;
 mod fig2;
 mod fig3;
 mod fig4;
 mod fig5;
 mod fig6;
 mod fig6c;
-mod filters;
+pub mod filters;
 mod rate;
 mod reduction;
-mod world;
+pub mod world;
 
 use crate::AnyFigure;
 
@@ -27,31 +25,5 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &fig6c::Fig6c,
         &reduction::Reductions,
         &rate::Rate,
-        &bandwidth::Widths,
     ]
-}
-
-/// The words for a method in pictures.
-fn title(method: &str) -> &str {
-    match method {
-        "ml" | "kd ml" => "KD-tree, ML",
-        "l1" | "kd l1" => "KD-tree, L1",
-        "kl" | "kd kl" => "KD-tree, KL",
-        "kd kl optimal" => "KD-tree, KL, optimal",
-        "closed" | "kd closed form" => "KD-tree, closed form",
-        "principal kl" => "principal axes, KL",
-        "principal closed form" => "principal axes, closed form",
-        "alternating kl" => "alternating axes, KL",
-        "runnalls" => "Runnalls",
-        "salmond" => "Salmond",
-        "williams from 30" => "Williams from 30",
-        "pipeline 0" => "cut, Runnalls",
-        "pipeline" | "pipeline 15" => "cut, Runnalls, 15 EM",
-        "pipeline 40" => "cut, Runnalls, 40 EM",
-        "gauss" => "one Gaussian",
-        "kde" => "all kernels",
-        "plain-500" => "500 particles",
-        "plain-2000" => "2000 particles",
-        other => other,
-    }
 }

@@ -1,6 +1,6 @@
 //! KL against bits.
 
-use super::filters::{Truth, as_f32, posteriors};
+use super::filters::{TIMES, Truth, as_f32, over_beliefs};
 use crate::prelude::*;
 use fewbits_core::Message;
 use fewbits_densities::{Bandwidth, KernelEstimate, Mixture};
@@ -50,63 +50,41 @@ impl Figure for Rate {
             .iter()
             .map(|r| WireFormat::new(Vector2::zeros(), 20.0, 1.0, &[*r]))
             .collect::<Result<_, _>>()?;
-        let coded = |mixture: &Mixture<2>, format: &WireFormat<2>, truth: &Truth| -> Result<[f64; 2], Error> {
-            let message = CodedMixture::new(mixture, format, 0)?;
-            let bits = message.to_bits(format)?.bits();
-            Ok([bits as f64, truth.kl(message.mixture())])
-        };
-        let one = |it: Trial| -> Result<Vec<[f64; 2]>, Error> {
-            let mut sums: Vec<[f64; 2]> = Vec::new();
-            let estimates = posteriors(it.stream, &[2, 5, 8])?;
-            for estimate in &estimates {
-                let truth = Truth::new(estimate);
-                let mut all = Vec::new();
-                for m in &p.components {
-                    let best = Reduction::default().reduce(estimate, *m)?;
-                    let cut = Reduction::paper(Criterion::Kl).reduce(estimate, *m)?;
-                    all.push([32.0 * (6.0 * best.len() as f64 - 1.0), truth.kl(&as_f32(&best)?)]);
-                    for format in &single {
-                        all.push(coded(&best, format, &truth)?);
-                        all.push(coded(&cut, format, &truth)?);
+        let all = over_beliefs(context, "handoff-rate", p.trials, |estimate, stream| {
+            let truth = Truth::new(estimate);
+            let mut cells = Vec::new();
+            let mut push = |message, size, step, bits: usize, received: &Mixture<2>| {
+                let share = 1.0 / TIMES.len() as f64;
+                cells.push(((message, size, step), [bits as f64 * share, truth.kl(received) * share]));
+            };
+            for &m in &p.components {
+                let best = Reduction::default().reduce(estimate, m)?;
+                let cut = Reduction::paper(Criterion::Kl).reduce(estimate, m)?;
+                push("f32", m, None, 32 * (6 * best.len() - 1), &as_f32(&best)?);
+                for (format, step) in single.iter().zip(&p.resolution) {
+                    for (message, mixture) in [("coded", &best), ("coded-kd", &cut)] {
+                        let coded = CodedMixture::new(mixture, format, 0)?;
+                        push(message, m, Some(*step), coded.to_bits(format)?.bits(), coded.mixture());
                     }
                 }
-                for n in [100, 500] {
-                    let mut rng = it.stream.named("particles").indexed(n).fast_rng();
-                    let sample = estimate.sample_systematic(&mut rng, n as usize)?;
-                    let received = Bandwidth::default().kernel(&sample)?;
-                    let shrunk = Bandwidth::default().shrunk(&sample, &received)?;
-                    let received = KernelEstimate::new(shrunk, received)?.to_mixture()?;
-                    all.push([64.0 * n as f64, truth.kl(&received)]);
-                }
-                sums.resize(all.len(), [0.0; 2]);
-                let share = 1.0 / estimates.len() as f64;
-                sums.iter_mut()
-                    .zip(&all)
-                    .for_each(|(s, a)| (0..2).for_each(|k| s[k] += a[k] * share));
             }
-            Ok(sums)
+            for n in [100, 500] {
+                let mut rng = stream.named("particles").indexed(n as u64).fast_rng();
+                let sample = estimate.sample_systematic(&mut rng, n)?;
+                let received = Bandwidth::default().kernel(&sample)?;
+                let shrunk = Bandwidth::default().shrunk(&sample, &received)?;
+                push("particles", n, None, 64 * n, &KernelEstimate::new(shrunk, received)?.to_mixture()?);
+            }
+            Ok(cells)
+        })?;
+        let row = |((message, size, resolution), [bits, kl]): (_, [Measured; 2])| Row {
+            message,
+            size,
+            resolution,
+            bits,
+            kl,
         };
-        let runs = context.trials("handoff-rate", p.trials, one)?;
-        let mut keys = Vec::new();
-        for m in &p.components {
-            keys.push(("f32", *m, None));
-            for r in &p.resolution {
-                keys.push(("coded", *m, Some(*r)));
-                keys.push(("coded-kd", *m, Some(*r)));
-            }
-        }
-        keys.extend([("particles", 100, None), ("particles", 500, None)]);
-        let rows = keys.into_iter().enumerate().map(|(i, (message, size, resolution))| {
-            let of = |k: usize| runs.iter().map(|run| run[i][k]).collect();
-            Row {
-                message,
-                size,
-                resolution,
-                bits: of(0),
-                kl: of(1),
-            }
-        });
-        Ok(rows.collect())
+        Ok(all.into_iter().map(row).collect())
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {

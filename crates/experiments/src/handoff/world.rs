@@ -1,52 +1,42 @@
-//! The world of the figures: a target that turns a little at every step, sensors that hear how near it is.
+//! The world of the figures: a target that turns a little at every step, sensors that measure how near it is. The unit of length is a step.
 
 use crate::Error;
-use fewbits_core::{ArgumentError, Columns, ColumnsMut, Dynamics, Likelihood};
+use fewbits_core::{Columns, Dynamics, Likelihood};
+use fewbits_numerics::error::refuse;
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use std::f64::consts::FRAC_PI_4;
 
 /// A point of the plane.
-pub(super) type Point = SVector<f64, 2>;
+pub type Point = SVector<f64, 2>;
 
-/// Unit of length: the length of a step.
-pub(super) const STEP: f64 = 1.0;
 /// Largest disturbance of a step along each axis, in steps.
-pub(super) const DISTURBANCE: f64 = 0.1;
+pub const DISTURBANCE: f64 = 0.1;
 /// A sensor nearer than this does not lead: its reading would be too sharp for any particle filter.
 pub(super) const STAND_OFF: f64 = 0.7;
 /// Standard deviation of the start along each axis.
-pub(super) const START: f64 = 0.25;
+pub const START: f64 = 0.25;
 
 /// `x' = x + r0 ([cos th; sin th] + u)`, `th ~ U[-pi/4, pi/4]`, both components of `u ~ U[0, 0.1]`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Walk;
+pub struct Walk;
 
 impl Dynamics<2> for Walk {
     fn mean(&self, state: &Point) -> Point {
-        state + Point::new(FRAC_PI_4.sin() / FRAC_PI_4 + 0.5 * DISTURBANCE, 0.5 * DISTURBANCE) * STEP
+        state + Point::new(FRAC_PI_4.sin() / FRAC_PI_4 + 0.5 * DISTURBANCE, 0.5 * DISTURBANCE)
     }
 
     fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Point) -> Point {
         let (sin, cos) = rng.random_range(-FRAC_PI_4..FRAC_PI_4).sin_cos();
         let u: [f64; 2] = [rng.random_range(0.0..DISTURBANCE), rng.random_range(0.0..DISTURBANCE)];
-        state + Point::new(cos + u[0], sin + u[1]) * STEP
-    }
-
-    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, 2>) {
-        let [x, y] = states;
-        for (x, y) in x.iter_mut().zip(y) {
-            let (sin, cos) = rng.random_range(-FRAC_PI_4..FRAC_PI_4).sin_cos();
-            *x += STEP * (cos + rng.random_range(0.0..DISTURBANCE));
-            *y += STEP * (sin + rng.random_range(0.0..DISTURBANCE));
-        }
+        state + Point::new(cos + u[0], sin + u[1])
     }
 }
 
 /// What the leader measured: `y = 1/(|s - x| + 0.05) + v`, `v ~ N(0, variance)`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Reading {
+pub struct Reading {
     pub(super) sensor: Point,
     pub(super) value: f64,
     pub(super) variance: f64,
@@ -73,14 +63,14 @@ impl Likelihood<2> for Reading {
 
 /// One world: sensors, the target's way, who led and what was read.
 #[derive(Debug, Clone)]
-pub(super) struct World {
+pub struct World {
     pub(super) sensors: Vec<Point>,
     /// Positions from time 0 on.
     pub(super) track: Vec<Point>,
     /// Index of the leader at times 1, 2, ...
     pub(super) leaders: Vec<usize>,
     /// What the leaders read.
-    pub(super) readings: Vec<Reading>,
+    pub readings: Vec<Reading>,
 }
 
 impl World {
@@ -92,13 +82,12 @@ impl World {
         steps: usize,
         variance: f64,
     ) -> Result<Self, Error> {
-        let length = STEP * (steps as f64 + 1.0);
-        let sensors: Vec<Point> = (0..sensors)
-            .map(|_| Point::new(rng.random_range(-STEP..length), rng.random_range(-4.0 * STEP..4.0 * STEP)))
-            .collect();
+        let length = steps as f64 + 1.0;
+        let mut place = || Point::new(rng.random_range(-1.0..length), rng.random_range(-4.0..4.0));
+        let places = (0..sensors).map(|_| place()).collect();
         let start = Point::from_fn(|_, _| START * rng.sample::<f64, _>(StandardNormal));
         let mut world = Self {
-            sensors,
+            sensors: places,
             track: vec![start],
             leaders: Vec::new(),
             readings: Vec::new(),
@@ -107,17 +96,10 @@ impl World {
         for _ in 0..steps {
             position = Walk.propagate(rng, &position);
             let distance = |i: usize| (world.sensors[i] - position).norm();
-            let able = (0..world.sensors.len())
-                .filter(|i| world.leaders.last() != Some(i) && distance(*i) >= STAND_OFF * STEP);
-            let leader = able
-                .min_by(|a, b| distance(*a).total_cmp(&distance(*b)))
-                .ok_or_else(|| {
-                    ArgumentError::new(
-                        "sensors",
-                        world.sensors.len(),
-                        "enough for a leader beyond the stand-off at every step",
-                    )
-                })?;
+            let able = (0..sensors).filter(|i| world.leaders.last() != Some(i) && distance(*i) >= STAND_OFF);
+            let Some(leader) = able.min_by(|a, b| distance(*a).total_cmp(&distance(*b))) else {
+                return refuse("sensors", sensors, "enough for a leader beyond the stand-off at every step");
+            };
             let noise = variance.sqrt() * rng.sample::<f64, _>(StandardNormal);
             let value = 1.0 / (distance(leader) + 0.05) + noise;
             let sensor = world.sensors[leader];
