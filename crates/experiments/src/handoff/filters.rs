@@ -106,7 +106,11 @@ pub(super) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: u
 }
 
 /// A plain particle filter: systematic resampling, propagation, weights.
-pub fn plain_step<R: Rng + ?Sized>(rng: &mut R, particles: &mut Particles<2>, reading: &Reading) -> Result<(), Error> {
+pub(super) fn plain_step<R: Rng + ?Sized>(
+    rng: &mut R,
+    particles: &mut Particles<2>,
+    reading: &Reading,
+) -> Result<(), Error> {
     particles.select(&systematic(rng, particles.weights(), particles.len()))?;
     Walk.propagate_columns(rng, particles.columns_mut());
     particles.reweigh(|states, logs| reading.add_log_likelihoods(states, logs))?;
