@@ -159,8 +159,11 @@ impl Rows {
     }
 }
 
+/// A number of a row.
+type Of<R, N> = fn(&R) -> N;
+
 /// The bounds that grow exponentially, by decimal logarithm.
-const EXPONENTIAL: [(&str, fn(&Bound) -> f64); 2] = [
+const EXPONENTIAL: [(&str, Of<Bound, f64>); 2] = [
     ("kl", |b| b.log10_kl_printed.value),
     ("l1", |b| b.log10_l1_printed.value),
 ];
@@ -204,7 +207,7 @@ impl Figure for Fig6 {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        let steps: [(&str, &str, fn(&Step) -> Measured); 5] = [
+        let steps: [(&str, &str, Of<Step, Measured>); 5] = [
             ("ml", "largest log-ratio at the centres (erratum handoff-11), mean over hand-overs", |s| s.ml),
             ("kl", "mean KL of a hand-over, bandwidth by the particles kept (erratum handoff-13)", |s| s.kl),
             ("l1", "mean L1 of a hand-over, noise of variance 0.05 (erratum handoff-12)", |s| s.l1),

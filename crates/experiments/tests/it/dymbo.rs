@@ -108,7 +108,7 @@ fn knowing_that_bits_are_inverted_pays_where_many_are() {
             let exact = exact_filter(&plant, 100).unwrap();
             let run = |it: Trial| {
                 let mut rng = it.stream.fast_rng();
-                Twin::new(&mut rng, aware.clone(), &exact)?.steady_excess(&mut rng, 40, 60)
+                Twin::new(&mut rng, aware, &exact)?.steady_excess(&mut rng, 40, 60)
             };
             let stream = Stream::new(1).named(&format!("{gamma} {crossover}"));
             let runs = MonteCarlo::new(stream, 200).run(run).unwrap();
