@@ -1,6 +1,6 @@
 //! Tests that cross crates.
 
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 mod messages;
 mod patterns;

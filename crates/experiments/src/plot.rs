@@ -125,6 +125,9 @@ impl Axis {
     }
 }
 
+/// A column of rows as a curve: its entry in the legend, and its value in a row.
+pub type Curve<'a, R, Y> = (&'a str, fn(&R) -> Y);
+
 /// A pair of axes with layers on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
@@ -187,10 +190,10 @@ impl Panel {
         self,
         rows: impl IntoIterator<Item = &'r R>,
         x: impl Fn(&R) -> f64,
-        columns: &[(&str, fn(&R) -> Y)],
+        columns: &[Curve<'_, R, Y>],
     ) -> Self {
         let rows: Vec<&R> = rows.into_iter().collect();
-        let line = |(colour, (label, y)): (usize, &(&str, fn(&R) -> Y))| {
+        let line = |(colour, (label, y)): (usize, &Curve<'_, R, Y>)| {
             Layer::line(*label, points(&rows, |r| (x(r), y(r)))).coloured(colour)
         };
         let lines = columns.iter().enumerate().map(line);

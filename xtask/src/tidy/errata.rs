@@ -11,8 +11,10 @@ use std::path::Path;
 /// The tests that show errata, by erratum.
 pub(crate) fn tests(root: &Path) -> Result<BTreeMap<String, BTreeSet<String>>, Error> {
     let mut tests = BTreeMap::new();
-    for file in rust_files(&root.join("crates"))? {
-        add_tests(&read(&file)?, &mut tests);
+    for folder in ["crates", "tests"] {
+        for file in rust_files(&root.join(folder))? {
+            add_tests(&read(&file)?, &mut tests);
+        }
     }
     Ok(tests)
 }

@@ -116,6 +116,9 @@ rows! {
     }
 }
 
+/// A mask and its name.
+type Named = (String, Mask);
+
 /// Some patterns of a figure, with the printed ones.
 pub struct Patterns {
     about: About,
@@ -123,7 +126,7 @@ pub struct Patterns {
     printed: &'static [&'static str],
     /// Masks beyond the Gray basis; without them the figure has no such parameter.
     extra: Option<&'static [Mask]>,
-    masks: fn(&PatternParameters) -> Result<Vec<(String, Mask)>, Error>,
+    masks: fn(&PatternParameters) -> Result<Vec<Named>, Error>,
     /// What is claimed besides.
     claims: fn(&PatternParameters, &Claims),
 }
@@ -144,7 +147,7 @@ impl PatternParameters {
 }
 
 /// Numbers patterns after their kind.
-fn numbered(kind: &str, masks: Vec<Mask>) -> Vec<(String, Mask)> {
+fn numbered(kind: &str, masks: Vec<Mask>) -> Vec<Named> {
     let numbers = (1..).map(|b| format!("{kind}{b}"));
     numbers.zip(masks).collect()
 }

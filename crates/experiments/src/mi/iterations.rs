@@ -70,6 +70,9 @@ fn step(crossover: f64, [iteration, stage, iter_in_stage]: [usize; 3], both: &Sy
 /// A column as a figure draws it, and its name there.
 type Column = (fn(&Step) -> f64, &'static str);
 
+/// Label and points of a curve.
+type Curve = (String, Vec<(f64, f64)>);
+
 /// One of Figures 4.2 to 4.5: its columns, and what it claims of them.
 pub struct Iterations {
     about: About,
@@ -253,7 +256,7 @@ impl Figure for Iterations {
             })
         });
         let all: Vec<_> = all.enumerate().collect();
-        let panel = |title: String, drawn: &[(usize, (String, Vec<(f64, f64)>))]| {
+        let panel = |title: String, drawn: &[(usize, Curve)]| {
             let heights = drawn.iter().flat_map(|(_, (_, curve))| curve).map(|p| p.1);
             let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
             let divider = Layer::dashed("stage 2 begins", vec![(edge, low), (edge, high)]).coloured(6);
