@@ -121,18 +121,6 @@ impl Error {
     }
 }
 
-/// The message of an error with those of all sources.
-pub(crate) fn in_full(error: &(dyn std::error::Error + 'static)) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(error) = source {
-        text.push_str(": ");
-        text.push_str(&error.to_string());
-        source = error.source();
-    }
-    text
-}
-
 impl From<fewbits_topology::Error> for Error {
     fn from(error: fewbits_topology::Error) -> Self {
         match error {

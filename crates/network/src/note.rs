@@ -1,6 +1,5 @@
 //! Notes of nodes in the log: damaged frames, disagreements, failed steps and the like.
 
-use crate::error::in_full;
 use crate::units::SensorId;
 use fewbits_protocol::BoxError;
 use serde::{Deserialize, Serialize};
@@ -50,6 +49,18 @@ impl Note {
         let reason = in_full(&**error);
         Self::Failed { stage, slot, reason }
     }
+}
+
+/// The message of an error with those of all sources.
+fn in_full(error: &(dyn std::error::Error + 'static)) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(error) = source {
+        text.push_str(": ");
+        text.push_str(&error.to_string());
+        source = error.source();
+    }
+    text
 }
 
 /// A step of a slot that can fail.
