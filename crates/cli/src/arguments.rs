@@ -99,7 +99,7 @@ pub(crate) struct PackOptions {
     /// The recording. Without it standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-    /// Some fifteen times as fast, at 1.02 to 1.09 times the bits (without other columns: more where they help).
+    /// Some ten times as fast, at 1.03 to 1.09 times the bits (without other columns: more where they help).
     #[arg(long)]
     pub(crate) fast: bool,
     /// Go on with the recording in `--output`, with its columns and bounds.

@@ -7,10 +7,10 @@
 //! zero?   sign   at least 2, 3, .. 13 ?   the rest by an Elias gamma code   k low bits
 //! ```
 //!
-//! The probability of a decision is the mean of two counts: given the last two differences, and given the last index.
+//! The probability of a decision is the mean of two counts: given the last difference, and given the last index.
 
 use super::coder::Coder;
-use super::model::{LARGEST, damaged};
+use super::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
 use fewbits_core::CodecError;
 
 /// Decisions of a context: zero, sign, and whether the size is at least 2 to 15.
@@ -19,10 +19,10 @@ const NODES: usize = 16;
 const SIZES: u64 = NODES as u64 - 2;
 /// Differences are told apart up to this size.
 const STEPS: i64 = 4;
-/// Contexts of the last two differences, and of the last index.
-const PAIRS: usize = 128;
-const _: () = assert!((2 * STEPS + 1) * (2 * STEPS + 1) <= PAIRS as i64);
-const VALUES: usize = 256;
+/// Contexts of the last difference (more than there are: a power of two), and of the last index.
+const DIFFERENCES: usize = 16;
+const _: () = assert!(2 * STEPS < DIFFERENCES as i64);
+const VALUES: usize = 64;
 /// Occurrences after which a count forgets.
 const MOST_SEEN: u16 = 40;
 
@@ -33,9 +33,9 @@ struct Count {
     seen: u16,
 }
 
-/// `2^15 / (n + 1.6)`.
-const SHARES: [i32; MOST_SEEN as usize + 1] = {
-    let mut shares = [0; MOST_SEEN as usize + 1];
+/// `2^15 / (n + 1.6)`. A power of two of them, so that no index is out of reach.
+const SHARES: [i32; 64] = {
+    let mut shares = [0; 64];
     let mut seen = 0;
     while seen < shares.len() {
         shares[seen] = 327_680 / (10 * seen as i32 + 16);
@@ -44,19 +44,19 @@ const SHARES: [i32; MOST_SEEN as usize + 1] = {
     shares
 };
 
-/// Probabilities stay this far from certainty.
-const LEAST: u16 = 32;
+/// Probabilities move towards these, so that they stay this far from certainty.
+const LEAST: i32 = 32;
+const MOST: i32 = 65_535 - LEAST;
 
 impl Count {
     const NEW: Self = Self { one: 1 << 15, seen: 0 };
 
     #[inline(always)]
     fn learn(&mut self, bit: bool) {
-        let (one, seen) = (i32::from(self.one), self.seen.min(MOST_SEEN));
-        let target = if bit { i32::from(u16::MAX) } else { 0 };
-        let moved = one + (((target - one) * SHARES[usize::from(seen)]) >> 15);
-        self.one = (moved as u16).clamp(LEAST, u16::MAX - LEAST);
-        self.seen = (seen + 1).min(MOST_SEEN);
+        let (one, share) = (i32::from(self.one), SHARES[usize::from(self.seen) % SHARES.len()]);
+        let target = if bit { MOST } else { LEAST };
+        self.one = (one + (((target - one) * share) >> 15)) as u16;
+        self.seen += u16::from(self.seen < MOST_SEEN);
     }
 }
 
@@ -72,14 +72,14 @@ fn decide<C: Coder>(coder: &mut C, a: &mut Count, b: &mut Count, bit: bool) -> b
 /// The state that both ends hold.
 #[derive(Debug, Clone)]
 pub(super) struct Counts {
-    pairs: Box<[[Count; NODES]; PAIRS]>,
+    differences: Box<[[Count; NODES]; DIFFERENCES]>,
     values: Box<[[Count; NODES]; VALUES]>,
     /// Whether differences of differences are told.
     second: bool,
     last: i64,
-    /// The last difference of the index, and the last two that were told.
+    /// The last difference of the index, and the one that was told.
     slope: i64,
-    told: [i64; 2],
+    told: i64,
     /// Sixteen times the mean size of what was told.
     size: u64,
 }
@@ -88,12 +88,12 @@ impl Counts {
     /// After the first index.
     pub(super) fn new(first: i64, second: bool) -> Self {
         Self {
-            pairs: Box::new([[Count::NEW; NODES]; PAIRS]),
+            differences: Box::new([[Count::NEW; NODES]; DIFFERENCES]),
             values: Box::new([[Count::NEW; NODES]; VALUES]),
             second,
             last: first,
             slope: 0,
-            told: [0; 2],
+            told: 0,
             size: 16,
         }
     }
@@ -110,32 +110,37 @@ impl Counts {
         }
         second < first
     }
+}
 
-    pub(super) fn last(&self) -> i64 {
+impl State for Counts {
+    fn last(&self) -> i64 {
         self.last
     }
 
-    /// Codes the next index: `wanted` at the writer, `None` at the reader.
     #[inline(always)]
-    pub(super) fn code<C: Coder>(&mut self, coder: &mut C, wanted: Option<i64>) -> Result<i64, CodecError> {
+    fn code<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        wanted: Option<i64>,
+        _: [f64; JOINT_COLUMNS],
+    ) -> Result<i64, CodecError> {
         let expected = self.last + if self.second { self.slope } else { 0 };
         // Of differences of mean size 3 and more the lowest bits are noise.
         let k = (64 - (self.size / 48).leading_zeros()).min(40);
-        let context = |d: i64| ((d >> k).clamp(-STEPS, STEPS) + STEPS) as usize;
-        let pair = context(self.told[0]) * (2 * STEPS + 1) as usize + context(self.told[1]);
+        let difference = ((self.told >> k).clamp(-STEPS, STEPS) + STEPS) as usize % DIFFERENCES;
         let value = (self.last >> k) as usize % VALUES;
-        let (pair, value) = (&mut self.pairs[pair % PAIRS], &mut self.values[value]);
+        let (told, value) = (&mut self.differences[difference], &mut self.values[value]);
         let d = wanted.map_or(0, |index| index - expected);
         let cell = d >> k;
-        let difference = if decide(coder, &mut pair[0], &mut value[0], cell == 0) {
+        let difference = if decide(coder, &mut told[0], &mut value[0], cell == 0) {
             0
         } else {
-            let up = decide(coder, &mut pair[1], &mut value[1], cell > 0);
+            let up = decide(coder, &mut told[1], &mut value[1], cell > 0);
             let wanted = cell.unsigned_abs();
             let mut size = 1;
             while size <= SIZES {
                 let node = (1 + size as usize) % NODES;
-                if !decide(coder, &mut pair[node], &mut value[node], wanted > size) {
+                if !decide(coder, &mut told[node], &mut value[node], wanted > size) {
                     break;
                 }
                 size += 1;
@@ -157,7 +162,7 @@ impl Counts {
             return Err(damaged(index));
         }
         self.size = self.size - self.size / 16 + d.unsigned_abs().min(1 << 44);
-        self.told = [d, self.told[0]];
+        self.told = d;
         self.slope = index - self.last;
         self.last = index;
         Ok(index)

@@ -1,71 +1,81 @@
 //! Laws of the next index: what each expert says about the probability below and above an edge.
 //!
-//! Positions are relative to the last index. All laws are logistic, as those of [`Filters`](super::filters::Filters).
+//! Positions are relative to the last index. Predictions have logistic laws as wide as their errors were.
 
+use super::mixer::EXPERTS;
 use fewbits_node::elementary::power;
 
-/// Probability below and above an edge, each accurate relative to itself.
+/// What the experts say about an edge: probability below and above, each accurate relative to itself.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tails {
-    pub(super) below: f32,
-    pub(super) above: f32,
+    pub(super) below: [f32; EXPERTS],
+    pub(super) above: [f32; EXPERTS],
 }
 
 /// `log2 e`: logistic laws are written in powers of two.
 const LOG2_E: f32 = std::f32::consts::LOG2_E;
 /// Beyond this many doublings a tail is flat.
-pub(super) const FLAT: f32 = 60.0;
-/// Mean absolute error of a prediction, fading with the past.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Track {
-    pub(super) at: f32,
-    pub(super) error: f32,
-    sharpness: f32,
+const FLAT: f32 = 60.0;
+/// Weight of the newest error once many were seen.
+const FADING: f32 = 0.02;
+/// The expert of [`Frequencies`]; those before it are predictions.
+pub(super) const PREDICTED: usize = 1;
+pub(super) const COUNTED: usize = EXPERTS - 1;
+/// Predictions, and one place that is not used.
+const TRACKS: usize = EXPERTS;
+
+/// Predictions with their mean absolute errors, fading with the past.
+#[derive(Debug, Clone)]
+pub(super) struct Tracks {
+    pub(super) at: [f32; TRACKS],
+    pub(super) errors: [f32; TRACKS],
+    sharpness: [f32; TRACKS],
 }
 
-/// Weight of the newest error once many were seen.
-const FADING: f32 = 0.025;
-
-impl Track {
+impl Tracks {
     pub(super) fn new() -> Self {
-        Self {
-            at: 0.0,
-            error: 1.0,
-            sharpness: Self::sharpness(1.0),
+        let mut tracks = Self {
+            at: [0.0; TRACKS],
+            errors: [1.0; TRACKS],
+            sharpness: [0.0; TRACKS],
+        };
+        tracks.sharpen();
+        tracks
+    }
+
+    /// Of the logistic laws with these mean absolute errors.
+    #[inline(always)]
+    fn sharpen(&mut self) {
+        for i in 0..TRACKS {
+            self.sharpness[i] = LOG2_E / (0.72 * self.errors[i] + 0.06);
         }
     }
 
-    /// Of the logistic law with a mean absolute error.
+    /// Learns the step after so many others.
     #[inline(always)]
-    fn sharpness(error: f32) -> f32 {
-        LOG2_E / (0.72 * error + 0.06)
+    pub(super) fn update(&mut self, step: f32, seen: f32) {
+        let rate = (1.0 / (seen + 1.5)).max(FADING);
+        for i in 0..TRACKS {
+            self.errors[i] += ((step - self.at[i]).abs() - self.errors[i]) * rate;
+        }
+        self.sharpen();
     }
 
-    /// Weight of the newest of so many errors.
-    #[inline(always)]
-    pub(super) fn rate(seen: f32) -> f32 {
-        (1.0 / (seen + 0.5)).max(FADING)
-    }
-
-    #[inline(always)]
-    pub(super) fn update(&mut self, step: f32, rate: f32) {
-        self.error += ((step - self.at).abs() - self.error) * rate;
-        self.sharpness = Self::sharpness(self.error);
-    }
-
-    /// A logistic law about the prediction with the mean absolute error of the past.
+    /// The laws at an edge.
     #[inline(always)]
     pub(super) fn tails(&self, edge: f32) -> Tails {
-        let e = power(((self.at - edge) * self.sharpness).clamp(-FLAT, FLAT));
-        let below = 1.0 / (1.0 + e);
-        Tails {
-            below,
-            above: e * below,
+        let mut tails = Tails::default();
+        for i in 0..TRACKS {
+            let odds = (self.at[i] - edge) * self.sharpness[i];
+            let e = power(odds.clamp(-FLAT, FLAT));
+            tails.below[i] = 1.0 / (1.0 + e);
+            tails.above[i] = e * tails.below[i];
         }
+        tails
     }
 }
 
-/// Least squares of the next difference on `N` regressors, with fading memory.
+/// Least squares of the next difference on `N` regressors (a power of two), with fading memory.
 #[derive(Debug, Clone)]
 pub(super) struct LeastSquares<const N: usize> {
     pub(super) regressors: [f64; N],
@@ -75,10 +85,29 @@ pub(super) struct LeastSquares<const N: usize> {
 
 /// Weight of the past in each slot.
 const MEMORY: f64 = 0.998;
+/// Variance of coefficients before the first row.
+const VARIANCE: f64 = 0.15;
 /// Variances beyond this are no longer trusted: the memory is then emptied.
 const LARGEST_VARIANCE: f64 = 1e9;
 /// Predictions are no larger: `f32` keeps whole numbers up to there.
 const FARTHEST: f64 = 4e6;
+
+/// The sum of products, in halves: an order that vectorises.
+#[inline(always)]
+fn product<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    let mut terms = [0.0; N];
+    for i in 0..N {
+        terms[i] = a[i] * b[i];
+    }
+    let mut half = N / 2;
+    while half > 0 {
+        for i in 0..half {
+            terms[i] += terms[i + half];
+        }
+        half /= 2;
+    }
+    terms[0]
+}
 
 impl<const N: usize> LeastSquares<N> {
     pub(super) fn new() -> Self {
@@ -90,43 +119,38 @@ impl<const N: usize> LeastSquares<N> {
     }
 
     fn ignorant() -> [[f64; N]; N] {
-        std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }))
+        std::array::from_fn(|i| std::array::from_fn(|j| if i == j { VARIANCE } else { 0.0 }))
     }
 
     #[inline(always)]
     pub(super) fn predict(&self) -> f32 {
-        let mut sum = 0.0;
-        for i in 0..N {
-            sum += self.coefficients[i] * self.regressors[i];
-        }
-        sum.clamp(-FARTHEST, FARTHEST) as f32
+        product(&self.coefficients, &self.regressors).clamp(-FARTHEST, FARTHEST) as f32
     }
 
     /// Learns that the regressors led to `step`.
     #[inline(always)]
     pub(super) fn update(&mut self, step: f64) {
-        let mut error = step;
         let mut gain = [0.0; N];
-        let mut scale = MEMORY;
-        for i in 0..N {
-            error -= self.coefficients[i] * self.regressors[i];
-            for j in 0..N {
-                gain[i] += self.covariance[i][j] * self.regressors[j];
+        for (row, regressor) in self.covariance.iter().zip(&self.regressors) {
+            for i in 0..N {
+                gain[i] += row[i] * regressor;
             }
-            scale += gain[i] * self.regressors[i];
         }
-        let inverse = 1.0 / scale;
-        let mut trusted = true;
+        let error = step - product(&self.coefficients, &self.regressors);
+        let inverse = 1.0 / (MEMORY + product(&gain, &self.regressors));
+        let (mut largest, mut least) = (0.0_f64, f64::INFINITY);
         for i in 0..N {
+            self.coefficients[i] += gain[i] * inverse * error;
+            largest = largest.max(self.coefficients[i].abs());
+        }
+        for (i, row) in self.covariance.iter_mut().enumerate() {
             let k = gain[i] * inverse;
-            self.coefficients[i] += k * error;
             for j in 0..N {
-                self.covariance[i][j] = (self.covariance[i][j] - k * gain[j]) * (1.0 / MEMORY);
+                row[j] = (row[j] - k * gain[j]) * (1.0 / MEMORY);
             }
-            trusted &= self.covariance[i][i] > 0.0 && self.covariance[i][i] < LARGEST_VARIANCE;
-            trusted &= self.coefficients[i].abs() < LARGEST_VARIANCE;
+            (largest, least) = (largest.max(row[i]), least.min(row[i]));
         }
-        if !trusted {
+        if !(largest < LARGEST_VARIANCE && least > 0.0) {
             self.covariance = Self::ignorant();
             if !self.coefficients.iter().all(|c| c.abs() < LARGEST_VARIANCE) {
                 self.coefficients = [0.0; N];
@@ -139,13 +163,13 @@ impl<const N: usize> LeastSquares<N> {
 const WINDOW: usize = 4096;
 /// Weight of an index that differs from the last one; a repeated one counts one.
 const CHANGED: u32 = 8;
-/// Weight of the filters' law among the counts.
+/// Weight of a prediction's law among the counts.
 const PRIOR: f32 = 12.0;
 
 /// Counts in all after which no more are taken.
-const MOST_COUNTED: u32 = 1 << 31;
+const MOST_COUNTED: u32 = 1 << 30;
 /// Indices whose counts are summed one by one.
-const BLOCK: usize = 32;
+const BLOCK: usize = 64;
 
 /// How often each index occurred: for signals whose values return.
 #[derive(Debug, Clone)]
@@ -177,7 +201,7 @@ impl Frequencies {
 
     #[inline(always)]
     pub(super) fn add(&mut self, index: i64, changed: bool) {
-        let offset = self.cells.map_or(index - self.start, |cells| index.rem_euclid(cells));
+        let offset = self.offset(index);
         if !(0..WINDOW as i64).contains(&offset) || self.total >= MOST_COUNTED {
             return;
         }
@@ -223,14 +247,40 @@ impl Frequencies {
         }
     }
 
-    /// The law of the counts, filled up by the filters' law at the same edge (the first index above it).
+    /// Adds the law of the counts, filled up by a prediction's law, to what is said of an edge (the first index above it).
     #[inline(always)]
-    pub(super) fn tails(&self, edge: i64, centre: i64, filters: Tails) -> Tails {
-        let below = self.below(edge, centre);
-        Tails {
-            below: (below as f32 + PRIOR * filters.below) * self.inverse,
-            above: ((self.total - below) as f32 + PRIOR * filters.above) * self.inverse,
-        }
+    pub(super) fn complete(&self, edge: i64, centre: i64, tails: &mut Tails) {
+        self.fill(self.below(edge, centre), tails);
+    }
+
+    #[inline(always)]
+    fn fill(&self, below: u32, tails: &mut Tails) {
+        tails.below[COUNTED] = (below as i32 as f32 + PRIOR * tails.below[PREDICTED]) * self.inverse;
+        tails.above[COUNTED] = ((self.total - below) as i32 as f32 + PRIOR * tails.above[PREDICTED]) * self.inverse;
+    }
+
+    /// The same for both edges of the cell `first..next`.
+    #[inline(always)]
+    pub(super) fn complete_cell(&self, first: i64, next: i64, centre: i64, tails: &mut [Tails; 2]) {
+        let below = self.below(first, centre);
+        let inside = if next - first == 1 {
+            let offset = self.offset(first);
+            let counted = (0..WINDOW as i64).contains(&offset);
+            if counted {
+                self.counts[offset as usize / BLOCK][offset as usize % BLOCK]
+            } else {
+                0
+            }
+        } else {
+            self.below(next, centre) - below
+        };
+        self.fill(below, &mut tails[0]);
+        self.fill(below + inside, &mut tails[1]);
+    }
+
+    #[inline(always)]
+    fn offset(&self, index: i64) -> i64 {
+        self.cells.map_or(index - self.start, |cells| index.rem_euclid(cells))
     }
 }
 

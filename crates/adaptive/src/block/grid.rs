@@ -6,6 +6,8 @@ use fewbits_node::adaptive::TENS;
 
 /// Largest decimal digits of a sample: their sums stay whole doubles.
 const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
+/// Whole numbers of this size are doubles.
+const WHOLE: i64 = 1 << 53;
 /// Steps are this much shorter than `2 delta`, so that rounding never takes a reconstruction out of its bound.
 const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
 /// Cells of a circle, at most.
@@ -134,11 +136,25 @@ impl Grid {
         }
     }
 
+    /// The reconstructions of indices.
+    pub(super) fn values(&self, indices: &[i64]) -> Vec<f64> {
+        // Of any that are a little larger than these, the arithmetic is that of doubles: exact, and in vectors.
+        let exact = |largest: i64| indices.iter().all(|index| index.unsigned_abs() < largest as u64);
+        match *self {
+            Self::Decimal { decimals, width } if exact(WHOLE / (4 * width)) => {
+                let (width, ten) = (width as f64, TENS[usize::from(decimals)]);
+                let twice = indices.iter().map(|index| 2.0 * width * *index as f64 + (width - 1.0));
+                twice.map(|twice| 0.5 * twice / ten).collect()
+            }
+            _ => indices.iter().map(|index| self.value(*index)).collect(),
+        }
+    }
+
     /// The index of a sample, on a circle the name nearest to `near`; `None` if it is out of reach. Whether the reconstruction is
     /// within the bound is for the caller to check.
     #[inline(always)]
     pub(super) fn index(&self, sample: f64, near: i64) -> Option<i64> {
-        let whole = |x: f64| (x.abs() < super::model::LARGEST as f64).then(|| x.round() as i64);
+        let whole = |x: f64| (x.abs() < super::rows::LARGEST as f64).then(|| x.round() as i64);
         match self {
             Self::Decimal { decimals, width } => {
                 let digits = (sample * TENS[usize::from(*decimals)]).round();
@@ -160,7 +176,7 @@ impl Grid {
                 near.checked_add(shortest)
             }
         }
-        .filter(|index| index.abs() <= super::model::LARGEST)
+        .filter(|index| index.abs() <= super::rows::LARGEST)
     }
 
     /// What the reader needs beyond the configuration.

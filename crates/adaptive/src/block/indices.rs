@@ -4,52 +4,18 @@ use super::coder::{Coder, Reader, Writer};
 use super::counts::Counts;
 use super::grid::{Grid, unzigzag, zigzag};
 use super::head::{Coding, invalid, write_head};
-use super::model::{LARGEST, Model};
+use super::model::Model;
+use super::rows::{LARGEST, Others, code_all};
 use fewbits_core::CodecError;
-use fewbits_numerics::kernels::vectorised;
 use pco::data_types::Number;
 use pco::standalone::{DecompressorItem, FileDecompressor, simple_compress};
 use pco::{ChunkConfig, DeltaSpec};
 
-/// Other columns that a joint block uses.
-pub const JOINT_COLUMNS: usize = 3;
 /// Bits of the length of the first index.
 const FIRST_LENGTH: u32 = 6;
 
 fn from_pco(error: impl std::fmt::Display) -> CodecError {
     invalid("pco block", error, "what a writer of as many rows wrote")
-}
-
-/// Differences of other columns from row to row, in units of their mean size: the same numbers at both ends.
-pub(super) struct Others<'a> {
-    columns: Vec<(&'a [f64], f64)>,
-}
-
-impl<'a> Others<'a> {
-    pub(super) fn new(others: &[&'a [f64]]) -> Self {
-        let columns = others.iter().take(JOINT_COLUMNS).map(|column| {
-            let sizes = column.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-            let (mut sum, mut count) = (0.0, 0.0);
-            for size in sizes.filter(|size| *size > 0.0 && *size < 1e100) {
-                sum += size;
-                count += 1.0;
-            }
-            (*column, if sum > 0.0 { count / sum } else { 0.0 })
-        });
-        Self {
-            columns: columns.collect(),
-        }
-    }
-
-    fn at(&self, row: usize) -> [f64; JOINT_COLUMNS] {
-        let mut found = [0.0; JOINT_COLUMNS];
-        for (found, (column, scale)) in found.iter_mut().zip(&self.columns) {
-            let step = (column[row] - column[row - 1]) * scale;
-            // What is not finite says nothing; the clamp bounds what a wild value does to least squares.
-            *found = if step.is_finite() { step.clamp(-1e6, 1e6) } else { 0.0 };
-        }
-        found
-    }
 }
 
 fn write_first(writer: &mut Writer, indices: &[i64]) -> i64 {
@@ -69,53 +35,6 @@ fn read_first(reader: &mut Reader<'_>) -> Result<i64, CodecError> {
     Ok(first)
 }
 
-/// Room is made for so many rows before any is read: a damaged number of rows must not exhaust the memory.
-const EXPECTED_ROWS: usize = 4096;
-
-/// The indices behind the first one: `wanted` at the writer, `None` at the reader, which stops where the bytes end too early. Returns all.
-pub(super) fn code_models<C: Coder>(
-    coder: &mut C,
-    model: &mut Model,
-    wanted: Option<&[i64]>,
-    rows: usize,
-    others: Option<&Others<'_>>,
-) -> Result<Vec<i64>, CodecError> {
-    let mut indices = Vec::with_capacity(rows.min(EXPECTED_ROWS));
-    indices.push(model.last());
-    vectorised(
-        #[inline(always)]
-        || {
-            for row in 1..rows {
-                let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-                indices.push(model.code(coder, wanted.map(|wanted| wanted[row]), steps)?);
-                if coder.overran() {
-                    break;
-                }
-            }
-            Ok::<(), CodecError>(())
-        },
-    )?;
-    Ok(indices)
-}
-
-/// As [`code_models`], by counts.
-pub(super) fn code_counts<C: Coder>(
-    coder: &mut C,
-    counts: &mut Counts,
-    wanted: Option<&[i64]>,
-    rows: usize,
-) -> Result<Vec<i64>, CodecError> {
-    let mut indices = Vec::with_capacity(rows.min(EXPECTED_ROWS));
-    indices.push(counts.last());
-    for row in 1..rows {
-        indices.push(counts.code(coder, wanted.map(|wanted| wanted[row]))?);
-        if coder.overran() {
-            break;
-        }
-    }
-    Ok(indices)
-}
-
 pub(super) fn with_models(
     grid: &Grid,
     indices: &[i64],
@@ -126,8 +45,8 @@ pub(super) fn with_models(
     write_head(grid, Coding::Models, others.is_some(), exceptions, &mut bytes);
     let mut writer = Writer::new(bytes);
     let first = write_first(&mut writer, indices);
-    let mut model = Model::new(indices.len(), first, grid.cells(), others.is_some());
-    code_models(&mut writer, &mut model, Some(indices), indices.len(), others)?;
+    let model = Model::new(indices.len(), first, grid.cells(), others.is_some());
+    code_all(&mut writer, model, Some(indices), indices.len(), others)?;
     Ok(writer.finish())
 }
 
@@ -139,8 +58,8 @@ pub(super) fn read_models(
 ) -> Result<Vec<i64>, CodecError> {
     let mut reader = Reader::new(bytes);
     let first = read_first(&mut reader)?;
-    let mut model = Model::new(rows, first, grid.cells(), others.is_some());
-    let indices = code_models(&mut reader, &mut model, None, rows, others)?;
+    let model = Model::new(rows, first, grid.cells(), others.is_some());
+    let indices = code_all(&mut reader, model, None, rows, others)?;
     reader.finish()?;
     Ok(indices)
 }
@@ -152,15 +71,15 @@ pub(super) fn with_counts(grid: &Grid, indices: &[i64], exceptions: &[(usize, f6
     let first = write_first(&mut writer, indices);
     let second = Counts::prefers_second(indices);
     writer.raw(u64::from(second), 1);
-    code_counts(&mut writer, &mut Counts::new(first, second), Some(indices), indices.len())?;
+    code_all(&mut writer, Counts::new(first, second), Some(indices), indices.len(), None)?;
     Ok(writer.finish())
 }
 
 pub(super) fn read_counts(bytes: &[u8], rows: usize) -> Result<Vec<i64>, CodecError> {
     let mut reader = Reader::new(bytes);
     let first = read_first(&mut reader)?;
-    let mut counts = Counts::new(first, reader.raw(0, 1) == 1);
-    let indices = code_counts(&mut reader, &mut counts, None, rows)?;
+    let counts = Counts::new(first, reader.raw(0, 1) == 1);
+    let indices = code_all(&mut reader, counts, None, rows, None)?;
     reader.finish()?;
     Ok(indices)
 }

@@ -32,13 +32,13 @@
 pub mod coder;
 mod counts;
 mod experts;
-mod filters;
 mod grid;
 mod head;
 mod indices;
 mod mixer;
 mod model;
 mod priors;
+mod rows;
 mod start;
 
 use crate::{Config, Error};
@@ -47,8 +47,9 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::vectorised;
 use grid::{Bytes, DECIMALS, Grid, unzigzag};
 use head::{CIRCLE, Coding, Head, LINE, SAMPLES, invalid, write_head};
-pub use indices::JOINT_COLUMNS;
-use indices::{Others, from_pco_bytes, raw_samples, read_counts, read_models, smallest_pco, with_counts, with_models};
+use indices::{from_pco_bytes, raw_samples, read_counts, read_models, smallest_pco, with_counts, with_models};
+pub use rows::JOINT_COLUMNS;
+use rows::Others;
 pub use start::{Start, StartedBlock};
 
 /// Rows from which an anchor of eight bytes is worth it.
@@ -208,7 +209,7 @@ impl BlockCodec {
             Coding::Counts => read_counts(rest, rows)?,
             _ => from_pco_bytes::<i64>(rest, rows)?,
         };
-        let mut samples: Vec<f64> = indices.into_iter().map(|index| grid.value(index)).collect();
+        let mut samples = grid.values(&indices);
         for (row, sample) in head.exceptions {
             samples[row] = sample;
         }
@@ -267,9 +268,9 @@ impl BlockCodec {
                 for (row, sample) in samples.iter().enumerate() {
                     let near = last.unwrap_or(0);
                     let index = grid.index(*sample, near);
-                    match index.filter(|index| self.is_within(grid.value(*index), *sample)) {
-                        Some(index) => last = Some(index),
-                        None => exceptions.push((row, *sample)),
+                    match index {
+                        Some(index) if self.is_within(grid.value(index), *sample) => last = Some(index),
+                        _ => exceptions.push((row, *sample)),
                     }
                     // Before the first ordinary sample, its index is not known yet.
                     indices.push(last);

@@ -1,25 +1,23 @@
 //! One column of whole numbers, coded decision by decision.
 //!
-//! The index is coded relative to a centre (of the last index, the filters' mean and the least-squares prediction, the one with the
-//! smallest error so far), in cells of `2^k` indices, where `k` follows that error:
+//! The index is coded relative to a centre (of the last index, the least-squares prediction, and that with other columns or else the slow
+//! mean, the one with the smallest error so far), in cells of `2^k` indices, where `k` follows that error:
 //!
 //! ```text
 //! cell 0?   sign   at least 2, 3, 4, 6, 10, .. cells away?   where in the interval?   k low bits, the highest two with a model
 //! ```
 
 use super::coder::Coder;
-use super::experts::{Frequencies, LeastSquares, Tails, Track};
-use super::filters::Filters;
-use super::mixer::{EXPERTS, Mixer, log_odds};
+use super::experts::{Frequencies, LeastSquares, PREDICTED, Tails, Tracks};
+use super::mixer::{EXPERTS, Mixer};
+use super::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
 use fewbits_core::CodecError;
 use fewbits_node::elementary::round;
 
-/// Largest index, either sign: sums of a few stay whole in an `i64` with room.
-pub(super) const LARGEST: i64 = 1 << 46;
 /// Differences remembered.
 const PAST: usize = 4;
 /// Least weight of a new index in the slow mean.
-const SLOW: f64 = 0.005;
+const SLOW: f64 = 0.02;
 /// Low bits that are coded with a model.
 const MODELLED: u32 = 2;
 /// Numbers of decisions, by which contexts tell them apart.
@@ -30,6 +28,33 @@ const LOW: u32 = 44;
 const CLASS_MAGNITUDES: usize = 2;
 const CLASS_INSIDE: usize = 6;
 const CLASS_LOW: usize = 7;
+
+/// Predictions: the last index, least squares, and least squares with other columns or else the slow mean.
+const HOLD: usize = 0;
+const RECURSION: usize = PREDICTED;
+const THIRD: usize = 2;
+
+impl State for Model {
+    fn last(&self) -> i64 {
+        self.last
+    }
+
+    #[inline(always)]
+    fn code<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        wanted: Option<i64>,
+        others: [f64; JOINT_COLUMNS],
+    ) -> Result<i64, CodecError> {
+        let grid = self.expect(others);
+        let index = self.decide(coder, grid, wanted)?;
+        if index.abs() > LARGEST {
+            return Err(damaged(index));
+        }
+        self.learn(index);
+        Ok(index)
+    }
+}
 
 /// Where the next index is expected, and how finely it is told.
 #[derive(Debug, Clone, Copy)]
@@ -56,15 +81,12 @@ impl Grid {
 /// The state that both ends hold.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
-    pub(super) mixer: Mixer,
-    pub(super) filters: Filters,
-    squares: LeastSquares<5>,
-    /// The error of the prediction from other columns, and least squares on them.
-    joint: Option<(Track, LeastSquares<8>)>,
+    mixer: Mixer,
+    squares: LeastSquares<4>,
+    /// Least squares on other columns too.
+    joint: Option<LeastSquares<8>>,
     frequencies: Frequencies,
-    mean: Track,
-    hold: Track,
-    recursion: Track,
+    tracks: Tracks,
     cells: Option<i64>,
     last: i64,
     past: [i64; PAST],
@@ -73,18 +95,12 @@ pub(super) struct Model {
 }
 
 #[inline(always)]
-fn hash(a: u32, b: u32) -> u32 {
-    (a.wrapping_mul(0x2545_F491) ^ b)
-        .wrapping_mul(0x9E37_79B1)
-        .rotate_left(13)
-}
-
-pub(super) fn damaged(value: i64) -> CodecError {
-    CodecError::Invalid {
-        what: "index",
-        value: value.to_string(),
-        expected: "at most 2^46 in size",
+fn less(a: [f32; EXPERTS], b: [f32; EXPERTS]) -> [f32; EXPERTS] {
+    let mut differences = a;
+    for e in 0..EXPERTS {
+        differences[e] -= b[e];
     }
+    differences
 }
 
 impl Model {
@@ -94,13 +110,10 @@ impl Model {
         frequencies.add(first, true);
         Self {
             mixer: Mixer::new(rows),
-            filters: Filters::new(),
             squares: LeastSquares::new(),
-            joint: joint.then(|| (Track::new(), LeastSquares::new())),
+            joint: joint.then(LeastSquares::new),
             frequencies,
-            mean: Track::new(),
-            hold: Track::new(),
-            recursion: Track::new(),
+            tracks: Tracks::new(),
             cells,
             last: first,
             past: [0; PAST],
@@ -109,49 +122,28 @@ impl Model {
         }
     }
 
-    pub(super) fn last(&self) -> i64 {
-        self.last
-    }
-
-    /// Codes the next index: `wanted` at the writer, `None` at the reader. `others`: differences of other columns. For loops under
-    /// [`vectorised`](fewbits_numerics::kernels::vectorised).
-    #[inline(always)]
-    pub(super) fn code<C: Coder>(
-        &mut self,
-        coder: &mut C,
-        wanted: Option<i64>,
-        others: [f64; 3],
-    ) -> Result<i64, CodecError> {
-        let grid = self.expect(others);
-        let index = self.decide(coder, grid, wanted)?;
-        if index.abs() > LARGEST {
-            return Err(damaged(index));
-        }
-        self.learn(index, grid.k == 0 && index == grid.centre);
-        Ok(index)
-    }
-
     /// Predictions, contexts and the centre.
     #[inline(always)]
-    fn expect(&mut self, others: [f64; 3]) -> Grid {
+    fn expect(&mut self, others: [f64; JOINT_COLUMNS]) -> Grid {
         let [d0, d1, d2, d3] = self.past;
         let level = self.last as f64 - self.slow;
-        let lags = [d0 as f64, d1 as f64, d2 as f64, d3 as f64, level];
-        self.squares.regressors = lags;
-        self.mean.at = self.filters.predict();
-        self.recursion.at = self.squares.predict();
-        let mut best = (self.hold.error * 0.98, 0.0);
-        for track in [&self.mean, &self.recursion] {
-            if track.error < best.0 {
-                best = (track.error, track.at);
+        let lags = [d0 as f64, d1 as f64, d2 as f64, d3 as f64];
+        self.squares.regressors = [lags[0], lags[1], lags[2], level];
+        self.tracks.at[RECURSION] = self.squares.predict();
+        self.tracks.at[THIRD] = match &mut self.joint {
+            Some(squares) => {
+                let [a, b, c] = others;
+                squares.regressors = [a, b, c, lags[0], lags[1], lags[2], lags[3], level];
+                squares.predict()
             }
-        }
-        if let Some((track, squares)) = &mut self.joint {
-            let [a, b, c] = others;
-            squares.regressors = [a, b, c, lags[0], lags[1], lags[2], lags[3], level];
-            track.at = squares.predict();
-            if track.error < best.0 {
-                best = (track.error, track.at);
+            None => -level as f32,
+        };
+        // The last index is as good as a prediction that is little better.
+        let (at, errors) = (&self.tracks.at, &self.tracks.errors);
+        let mut best = (errors[HOLD] * 0.96, 0.0);
+        for track in [RECURSION, THIRD] {
+            if errors[track] < best.0 {
+                best = (errors[track], at[track]);
             }
         }
         // Predictions are within 2^22, where rounding is exact.
@@ -163,40 +155,29 @@ impl Model {
         let size = |d: i64| (d.unsigned_abs() >> k).min(3) as u32;
         let point = |j: i64| self.cells.map_or(j, |cells| j.rem_euclid(cells)) as u32;
         let centre = self.last + offset;
-        let here = step(offset) + (k << 8);
-        let (s0, s1, s2) = (step(d0), step(d1), step(d2));
+        let here = step(offset) | k << 6;
+        let steps = step(d0) | step(d1) << 6;
         let sizes = size(d0) << 6 | size(d1) << 4 | size(d2) << 2 | size(d3);
-        let (last, before) = (point(self.last), point(self.last - d0));
-        self.mixer.contexts = [
-            hash(hash(3, s0), hash(s1, here)),
-            hash(hash(hash(4, s0), s1), hash(s2, here)),
-            hash(5, point(centre)),
-            hash(hash(6, last), here),
-            hash(hash(7, last), hash(before, here)),
-            hash(hash(11, sizes), k),
-        ];
+        let last = point(self.last).wrapping_mul(0x2545_F491);
+        let contexts = [steps | here << 12, point(centre), last ^ here, sizes | k << 8];
+        for (context, word) in self.mixer.contexts.iter_mut().zip(contexts) {
+            *context = word.wrapping_mul(0x9E37_79B1).rotate_left(13);
+        }
         Grid { centre, k }
     }
 
     /// What each expert says about an edge: the first index above it.
     #[inline(always)]
-    fn tails(&self, grid: Grid, edge: i64) -> [Tails; EXPERTS] {
-        let filters = self.filters.tails((edge - self.last) as f32 - 0.5);
-        self.tails_beside(grid, edge, filters)
+    fn tails(&self, grid: Grid, edge: i64) -> Tails {
+        let mut tails = self.tracks.tails(self.place(edge));
+        self.frequencies.complete(edge, grid.centre, &mut tails);
+        tails
     }
 
-    /// The same where what the filters say is known.
+    /// Where an edge is, from the last index.
     #[inline(always)]
-    fn tails_beside(&self, grid: Grid, edge: i64, filters: Tails) -> [Tails; EXPERTS] {
-        let at = (edge - self.last) as f32 - 0.5;
-        [
-            filters,
-            self.recursion.tails(at),
-            self.frequencies.tails(edge, grid.centre, filters),
-            self.joint
-                .as_ref()
-                .map_or(Tails::default(), |(track, _)| track.tails(at)),
-        ]
+    fn place(&self, edge: i64) -> f32 {
+        (edge - self.last) as f32 - 0.5
     }
 
     #[inline(always)]
@@ -207,48 +188,39 @@ impl Model {
         bit
     }
 
-    /// Sets the experts' inputs from the shares of the two outcomes.
-    #[inline(always)]
-    fn inputs(&mut self, shares: impl Fn(usize) -> (f32, f32)) {
-        let (mut yes, mut no) = ([0.0; EXPERTS], [0.0; EXPERTS]);
-        for e in 0..EXPERTS {
-            (yes[e], no[e]) = shares(e);
-        }
-        self.mixer.experts = log_odds(yes, no);
-        if self.joint.is_none() {
-            self.mixer.experts[EXPERTS - 1] = 0.0;
-        }
-    }
-
     #[inline(always)]
     fn decide<C: Coder>(&mut self, coder: &mut C, grid: Grid, wanted: Option<i64>) -> Result<i64, CodecError> {
         self.mixer.look_up(0, 0);
         let (first, next) = (grid.first(0), grid.first(1));
-        let [below, above] = self.filters.cell((first - self.last) as f32 - 0.5, grid.k);
-        let (low, high) = (self.tails_beside(grid, first, below), self.tails_beside(grid, next, above));
-        self.inputs(|e| {
-            let outside = low[e].below + high[e].above;
+        let mut tails = [
+            self.tracks.tails(self.place(first)),
+            self.tracks.tails(self.place(next)),
+        ];
+        self.frequencies.complete_cell(first, next, grid.centre, &mut tails);
+        let [low, high] = tails;
+        let (mut inside, mut outside) = ([0.0; EXPERTS], [0.0; EXPERTS]);
+        for e in 0..EXPERTS {
+            outside[e] = low.below[e] + high.above[e];
             // Of the forms of the share inside, the one that cancels least.
-            let inside = if outside < 0.5 {
-                1.0 - outside
-            } else if low[e].below > 0.5 {
-                low[e].above - high[e].above
+            let beside = if low.below[e] > 0.5 {
+                low.above[e] - high.above[e]
             } else {
-                high[e].below - low[e].below
+                high.below[e] - low.below[e]
             };
-            (inside, outside)
-        });
+            inside[e] = if outside[e] < 0.5 { 1.0 - outside[e] } else { beside };
+        }
+        self.mixer.set_experts(inside, outside);
         if self.decide_one(coder, wanted.is_some_and(|j| (first..next).contains(&j))) {
             return Ok(self.low_bits(coder, grid, first, wanted));
         }
         self.mixer.look_up(1, 1);
-        self.inputs(|e| (high[e].above, low[e].below));
+        self.mixer.set_experts(high.above, low.below);
         let up = self.decide_one(coder, wanted.is_some_and(|j| j >= next));
-        let side = |tails: &Tails| if up { tails.above } else { tails.below };
+        let side = |tails: Tails| if up { tails.above } else { tails.below };
         let is_beyond = |edge: i64| wanted.is_some_and(|j| if up { j >= edge } else { j < edge });
 
         // Outwards: is the index at least so many cells away?
-        let mut near: [f32; EXPERTS] = std::array::from_fn(|e| side(if up { &high[e] } else { &low[e] }));
+        let mut near = side(if up { high } else { low });
         let mut far;
         let (mut begin, mut width, mut count) = (1_i64, 1_i64, 0_usize);
         loop {
@@ -258,9 +230,8 @@ impl Model {
             let node = MAGNITUDES + 2 * count.min(18) as u32 + u32::from(up);
             self.mixer.look_up(node, CLASS_MAGNITUDES + count.min(3));
             let edge = grid.edge(begin + width, up);
-            let tails = self.tails(grid, edge);
-            far = tails.each_ref().map(side);
-            self.inputs(|e| (far[e], near[e] - far[e]));
+            far = side(self.tails(grid, edge));
+            self.mixer.set_experts(far, less(near, far));
             if !self.decide_one(coder, is_beyond(edge)) {
                 break;
             }
@@ -277,8 +248,8 @@ impl Model {
             self.mixer.look_up(INSIDE + depth, CLASS_INSIDE);
             let middle = begin + (end - begin) / 2;
             let edge = grid.edge(middle, up);
-            let between = self.tails(grid, edge).each_ref().map(side);
-            self.inputs(|e| (between[e] - far[e], near[e] - between[e]));
+            let between = side(self.tails(grid, edge));
+            self.mixer.set_experts(less(between, far), less(near, between));
             if self.decide_one(coder, is_beyond(edge)) {
                 (begin, near) = (middle, between);
             } else {
@@ -297,14 +268,16 @@ impl Model {
         for level in 0..grid.k.min(MODELLED) {
             self.mixer.look_up(LOW + level, CLASS_LOW);
             let half = 1 << (grid.k - level - 1);
-            let [a, b, c] = [index, index + half, index + 2 * half].map(|edge| self.tails(grid, edge));
-            self.inputs(|e| {
-                if a[e].below < 0.5 {
-                    (c[e].below - b[e].below, b[e].below - a[e].below)
-                } else {
-                    (b[e].above - c[e].above, a[e].above - b[e].above)
+            let (a, b) = (self.tails(grid, index), self.tails(grid, index + half));
+            let c = self.tails(grid, index + 2 * half);
+            let (mut upper, mut lower) = (less(c.below, b.below), less(b.below, a.below));
+            let (above, beneath) = (less(b.above, c.above), less(a.above, b.above));
+            for e in 0..EXPERTS {
+                if a.below[e] >= 0.5 {
+                    (upper[e], lower[e]) = (above[e], beneath[e]);
                 }
-            });
+            }
+            self.mixer.set_experts(upper, lower);
             if self.decide_one(coder, wanted.is_some_and(|j| j >= index + half)) {
                 index += half;
             }
@@ -314,21 +287,14 @@ impl Model {
         index + coder.raw(value, left) as i64
     }
 
-    /// `inside`: the index is the cell of width one that was asked for first.
     #[inline(always)]
-    fn learn(&mut self, index: i64, inside: bool) {
+    fn learn(&mut self, index: i64) {
         let step = index - self.last;
-        let at = step as f32;
-        let rate = Track::rate(self.seen as f32);
-        for track in [&mut self.mean, &mut self.hold, &mut self.recursion] {
-            track.update(at, rate);
-        }
+        self.tracks.update(step as f32, self.seen as f32);
         self.squares.update(step as f64);
-        if let Some((track, squares)) = &mut self.joint {
-            track.update(at, rate);
+        if let Some(squares) = &mut self.joint {
             squares.update(step as f64);
         }
-        self.filters.update(at, inside);
         self.frequencies.add(index, step != 0);
         self.past.rotate_right(1);
         self.past[0] = step;

@@ -15,8 +15,8 @@ use super::coder::{Coder, Reader, Writer};
 use super::counts::{Counts, gamma};
 use super::grid::{Bytes, DECIMALS, Grid, push_varint, unzigzag, zigzag};
 use super::head::{CIRCLE, LINE, invalid};
-use super::indices::{Others, code_counts, code_models};
-use super::model::{LARGEST, Model};
+use super::model::Model;
+use super::rows::{LARGEST, Others, code_all};
 use super::{Accuracy, BlockCodec, Effort, check_rows};
 use crate::Error;
 use fewbits_core::CodecError;
@@ -70,7 +70,7 @@ impl Start {
 
     /// The samples at these points of the grid.
     pub fn values(&self, indices: &[i64]) -> Vec<f64> {
-        indices.iter().map(|index| self.grid.value(*index)).collect()
+        self.grid.values(indices)
     }
 
     fn first_index<C: Coder>(&self, coder: &mut C, wanted: Option<i64>) -> Result<i64, CodecError> {
@@ -212,11 +212,11 @@ impl BlockCodec {
         let by_models = coder.bit(BY_MODELS, self.effort == Effort::Thorough);
         let first = start.first_index(coder, wanted.and_then(|wanted| wanted.first().copied()))?;
         if by_models {
-            let mut model = Model::new(rows, first, start.grid.cells(), others.is_some());
-            return code_models(coder, &mut model, wanted, rows, others);
+            let model = Model::new(rows, first, start.grid.cells(), others.is_some());
+            return code_all(coder, model, wanted, rows, others);
         }
         let second = coder.raw(u64::from(wanted.is_some_and(Counts::prefers_second)), 1) == 1;
-        code_counts(coder, &mut Counts::new(first, second), wanted, rows)
+        code_all(coder, Counts::new(first, second), wanted, rows, None)
     }
 
     fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, CodecError> {

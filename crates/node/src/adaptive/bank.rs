@@ -31,15 +31,6 @@ const LEAST: f32 = 1e-15;
 /// Longer gaps between samples count as this many slots.
 pub(super) const LONGEST_GAP: u32 = 64;
 
-/// Of a model one slot ahead: doublings of the odds of its predictive law in one step, and its gains of position and velocity. Zeros beyond
-/// the last.
-pub fn steady_gains(model: usize) -> [f32; 3] {
-    let scale = model % SCALES;
-    STEADY
-        .get(model / SCALES)
-        .map_or([0.0; 3], |family| [family.sharpness[scale], family.gain_x[scale], family.gain_v[scale]])
-}
-
 /// Positions from the last index, velocities and weights of the models, in steps of the lattice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]

@@ -6,7 +6,7 @@ use crate::math::sqrt_f32;
 /// Number of models.
 pub const MODELS: usize = 24;
 /// Per-slot factors of the velocities; zero is the random walk.
-pub const DECAYS: [f32; 3] = [0.0, 0.6, 0.95];
+pub(super) const DECAYS: [f32; 3] = [0.0, 0.6, 0.95];
 /// Families of models.
 pub(super) const FAMILIES: usize = DECAYS.len();
 /// Models of one family, by increasing scale.

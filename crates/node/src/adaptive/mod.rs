@@ -21,11 +21,11 @@ mod steady;
 mod stored;
 
 pub use crate::packet::{TENS, push_number};
-pub use bank::{Ahead, Bank, steady_gains};
+pub use bank::{Ahead, Bank};
 pub use config::Config;
 pub use counts::{CAPACITY, REPORTED, Residuals, Values};
 pub use encoder::{Encoder, MODEL_BITS, Report, header, is_scheduled, next_sequence};
-pub use family::{DECAYS, MODELS, SCALES};
+pub use family::{MODELS, SCALES};
 pub use lattice::Lattice;
 pub use law::{ESCAPE, Law, PRECISION, Place, REACH};
 pub use replica::{Replica, Slot};
