@@ -8,6 +8,7 @@ mod fig5;
 mod gap;
 mod prop1b;
 mod prop2;
+mod selftuning;
 mod threshold;
 
 use crate::AnyFigure;
@@ -23,5 +24,6 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &threshold::ThresholdPlace,
         &gap::GapToExact,
         &bits::WordLength,
+        &selftuning::SelfTuning,
     ]
 }

@@ -2,6 +2,7 @@
 
 mod baselines;
 mod bits;
+mod codecs;
 mod loss;
 mod packets;
 mod recordings;
@@ -11,5 +12,5 @@ use crate::AnyFigure;
 
 /// The figures of this system.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
-    vec![&bits::Bits, &packets::Packets, &loss::Loss]
+    vec![&bits::Bits, &packets::Packets, &loss::Loss, &codecs::Codecs]
 }

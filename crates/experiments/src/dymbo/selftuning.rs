@@ -1,0 +1,315 @@
+//! Process noise learnt from single bits.
+
+use crate::prelude::*;
+use fewbits_core::{BitString, Dynamics, Gaussian, Link, Observation, SchemeNode, Sensing, SensorNode};
+use fewbits_dymbo::SignBit;
+use fewbits_filters::MomentFilter;
+use fewbits_filters::centre::{FusionCentre, NoiseLearning, Reporting, Slot};
+use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
+use nalgebra::Vector1;
+use rand::{Rng, RngExt};
+
+const ID: &str = "dymbo-selftuning";
+/// Plants of the specification: coefficient, process variance, measurement variance.
+const PLANTS: [[f64; 3]; 5] = [
+    [0.9, 0.5, 1.0],
+    [0.95, 0.2, 1.0],
+    [0.99, 0.01, 1.0],
+    [0.95, 2.0, 0.1],
+    [0.999, 0.001, 0.01],
+];
+/// Error in parts of that of the filter that knows: the specification's, from either side.
+const LEARNT: [f64; 5] = [1.02, 1.03, 1.09, 1.04, 1.03];
+/// Factor of the process variance at the jump, and of a wrong supposition.
+const FACTOR: f64 = 9.0;
+/// Ends of the windows after the jump.
+const WINDOWS: [u64; 5] = [50, 100, 200, 400, 1000];
+/// Factor of the step of adaptive delta modulation on a repeated sign; its inverse on an alternation (Jayant 1970).
+const JAYANT: f64 = 1.5;
+
+parameters! {
+    pub struct Parameters {
+        gain: f64 [0.0..=1.0] = 0.03 => "Step of the logarithm of the process variance per bit.",
+        flips: f64 [0.0..=0.4] = 0.05 => "Probability that a bit is inverted, where bits are.",
+        trials: u64 [2..=100_000] = 100 => quick 8 => "Simulated runs of 2000 steps.",
+    }
+}
+
+/// A plant, and whether its process variance jumps after half of a run.
+#[derive(Clone, Copy)]
+struct Scene {
+    plant: [f64; 3],
+    jumps: bool,
+}
+
+impl Scene {
+    fn name(&self) -> String {
+        let [a, q, r] = self.plant;
+        format!("{a} {q} {r}{}", if self.jumps { " jump" } else { "" })
+    }
+}
+
+/// What receives the bits.
+#[derive(Clone, Copy, PartialEq)]
+enum Receiver {
+    /// A centre whose stated process variance is right times `process` at the beginning, its noise right times `noise`.
+    Centre {
+        process: f64,
+        noise: f64,
+        learns: bool,
+        inverted: bool,
+    },
+    /// The centre that is told of the jump.
+    Informed { inverted: bool },
+    /// Adaptive delta modulation of the samples.
+    Delta,
+}
+
+const RECEIVERS: [(&str, Receiver); 11] = {
+    const fn centre(process: f64, noise: f64, learns: bool, inverted: bool) -> Receiver {
+        Receiver::Centre {
+            process,
+            noise,
+            learns,
+            inverted,
+        }
+    }
+    [
+        ("knows Q", Receiver::Informed { inverted: false }),
+        ("Q / 9", centre(1.0 / FACTOR, 1.0, false, false)),
+        ("9 Q", centre(FACTOR, 1.0, false, false)),
+        ("Q learnt from Q / 9", centre(1.0 / FACTOR, 1.0, true, false)),
+        ("Q learnt from 9 Q", centre(FACTOR, 1.0, true, false)),
+        ("Q right, not learnt", centre(1.0, 1.0, false, false)),
+        ("Q learnt, r / 4", centre(1.0, 0.25, true, false)),
+        ("Q learnt, 4 r", centre(1.0, 4.0, true, false)),
+        ("knows Q, inverted bits", Receiver::Informed { inverted: true }),
+        ("Q learnt from Q / 9, inverted bits", centre(1.0 / FACTOR, 1.0, true, true)),
+        ("adaptive delta modulation", Receiver::Delta),
+    ]
+};
+
+type Centre = FusionCentre<1, MomentFilter>;
+
+/// A centre of one sign-bit sensor over a link that inverts.
+fn seated(rng: &mut dyn Rng, [a, q, r]: [f64; 3], flips: f64, prior: &Gaussian<1>) -> Result<Centre, Error> {
+    let world = ContinuousLinear::ornstein_uhlenbeck(0.0, -1.0 / a.ln(), q / (1.0 - a * a))?;
+    let mut centre = FusionCentre::new(rng, world, MomentFilter, prior)?;
+    let scheme = SignBit::new(r)?;
+    let threshold = |_: &Gaussian<1>, m: &Gaussian<1>| m.mean()[0];
+    centre.join(0, Reporting::new(LinearSensor::direct(r)?, scheme, Link::flipping(flips)?, threshold))?;
+    Ok(centre)
+}
+
+/// Mean squared errors over the second half, over the windows after its beginning, and `ln` of the learnt factor.
+fn one_run(scene: &Scene, receiver: Receiver, p: &Parameters, stream: Stream) -> Result<[f64; 7], Error> {
+    let mut world = stream.named("world").fast_rng();
+    let (mut rng, mut air) = (stream.named("filter").fast_rng(), stream.named("air").fast_rng());
+    let [a, q, r] = scene.plant;
+    let (before, after) = (Ar1::new(a, q)?, Ar1::new(a, if scene.jumps { FACTOR * q } else { q })?);
+    let sensor = LinearSensor::<1, 1>::direct(r)?;
+    let prior = Gaussian::scalar(0.0, before.stationary_variance()?)?;
+    let mut state: Vector1<f64> = fewbits_core::Belief::sample(&prior, &mut world);
+    let (process, noise, inverted) = match receiver {
+        Receiver::Centre {
+            process,
+            noise,
+            inverted,
+            ..
+        } => (process, noise, inverted),
+        Receiver::Informed { inverted } => (1.0, 1.0, inverted),
+        Receiver::Delta => (1.0, 1.0, false),
+    };
+    let flips = if inverted { p.flips } else { 0.0 };
+    let mut centre = seated(&mut rng, [a, process * q, noise * r], flips, &prior)?;
+    if let Receiver::Centre { learns: true, .. } = receiver {
+        centre = centre.learning_noise(NoiseLearning {
+            gain: p.gain,
+            ..NoiseLearning::DEFAULT
+        })?;
+    }
+    let mut node = SchemeNode::new(SignBit::new(r)?);
+    let (mut estimate, mut step, mut last) = (0.0, r.sqrt(), 0.0);
+    let half = WINDOWS[4];
+    let (mut sums, mut window) = ([0.0; 7], 0);
+    for k in 0..2 * half {
+        if k == half && scene.jumps && matches!(receiver, Receiver::Informed { .. }) {
+            centre = seated(&mut rng, [a, FACTOR * q, r], flips, &centre.estimate())?;
+        }
+        state = if k < half { &before } else { &after }.propagate(&mut world, &state);
+        let sample = sensor.sample(&mut world, &state);
+        if receiver == Receiver::Delta {
+            let sign = (sample[0] - a * estimate).signum();
+            step *= if sign == last { JAYANT } else { 1.0 / JAYANT };
+            (estimate, last) = (a * estimate + sign * step, sign);
+        } else {
+            let time = centre.time() + 1.0;
+            let feedback = centre.advance(&mut rng, time)?.feedback(0)?;
+            let flip = air.random_bool(flips);
+            let report = node.report(&mut air, &sample, &feedback)?;
+            let report = report.map(|bits: BitString| if flip { bits.with_flipped(0) } else { bits });
+            centre.receive(&mut rng, &[Slot::new(0, feedback, Observation::from(report))])?;
+            estimate = centre.estimate().mean()[0];
+        }
+        if k >= half {
+            let square = (estimate - state[0]) * (estimate - state[0]);
+            sums[0] += square / half as f64;
+            if k - half == WINDOWS[window] {
+                window += 1;
+            }
+            let start = if window == 0 { 0 } else { WINDOWS[window - 1] };
+            sums[1 + window] += square / (WINDOWS[window] - start) as f64;
+        }
+    }
+    sums[6] = (centre.noise_scale() * process).ln();
+    Ok(sums)
+}
+
+rows! {
+    pub struct Row {
+        /// Coefficient, process variance, measurement variance; "jump" if the process variance becomes nine times as large at step 1000.
+        plant: String,
+        receiver: &'static str => "What is known of the process variance, and what receives.",
+        from: u64 => "First step of the window, counted from step 1000.",
+        to: u64 => "End of the window.",
+        trials: u64 => "Simulated runs.",
+        error: Measured => "Root mean squared error.",
+        /// Error in parts of that of the receiver that knows the process variance, over the same link.
+        ratio: Measured,
+        learnt: f64 => "Process variance at the end in parts of that before the jump, geometric mean.",
+    }
+}
+
+/// Errors of receivers that learn the process variance from bits.
+pub struct SelfTuning;
+
+impl Figure for SelfTuning {
+    figure!(Parameters => Vec<Row>, ID, "Process noise from single bits", "",
+        "Error of one-bit tracking in parts of the filter that knows the process variance Q: with Q nine times too small or large, with Q \
+         learnt from products of neighbouring signs, with a wrong measurement variance, with inverted bits, and of adaptive delta \
+         modulation (left, five plants); after Q has become nine times as large (right).");
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let still = PLANTS.map(|plant| Scene { plant, jumps: false });
+        let jump = Scene {
+            plant: PLANTS[1],
+            jumps: true,
+        };
+        let scenes: Vec<Scene> = still.into_iter().chain([jump]).collect();
+        let trial = |scene: &Scene, of: &(&str, Receiver), it: Trial| one_run(scene, of.1, p, it.stream);
+        let found = context.compare(ID, p.trials, &scenes, Scene::name, &RECEIVERS, trial)?;
+        let mut rows = Vec::new();
+        for (scene, found) in scenes.iter().zip(&found) {
+            for (i, (receiver, kind)) in RECEIVERS.iter().enumerate() {
+                let windows = if scene.jumps { 1..6 } else { 0..1 };
+                let inverted =
+                    matches!(kind, Receiver::Centre { inverted: true, .. } | Receiver::Informed { inverted: true });
+                let knows = if inverted { 8 } else { 0 };
+                for of in windows {
+                    let (own, known) = (found.moments(i, of), found.moments(knows, of).mean());
+                    // Runs are paired: the error of the ratio is that of the difference.
+                    let spread = found.difference(i, knows, of).standard_error();
+                    let ratio = (own.mean() / known).sqrt();
+                    rows.push(Row {
+                        plant: scene.name(),
+                        receiver,
+                        from: if of < 2 { 0 } else { WINDOWS[of - 2] },
+                        to: WINDOWS[of.wrapping_sub(1).min(4)],
+                        trials: p.trials,
+                        error: Measured::root_mean(&own),
+                        ratio: Measured {
+                            value: ratio,
+                            standard_error: Some(spread / (2.0 * known * ratio)),
+                        },
+                        learnt: found.moments(i, 6).mean().exp(),
+                    });
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
+        let at = |plant: &str, receiver: &str, to: u64| {
+            rows.iter()
+                .find(|r| r.plant == plant && r.receiver == receiver && r.to == to)
+        };
+        let less = |r: Option<&Row>, bound: f64| {
+            r.map(|r| r.ratio.value - 4.0 * r.ratio.standard_error.unwrap_or(0.0) - bound)
+        };
+        for (plant, learnt) in PLANTS.iter().zip(LEARNT) {
+            let plant = Scene {
+                plant: *plant,
+                jumps: false,
+            }
+            .name();
+            for from in ["Q / 9", "9 Q"] {
+                let what = format!(
+                    "{plant}: Q learnt from {from} costs at most what the specification found, to .02 and 4 standard errors"
+                );
+                let own = at(&plant, &format!("Q learnt from {from}"), 1000);
+                here.at_most(format!("learnt-{plant}-{from}"), what, less(own, learnt + 0.02), 0.0);
+            }
+            let what = format!("{plant}: learning beats the filter whose Q is nine times too small");
+            let pair = at(&plant, "Q / 9", 1000).zip(at(&plant, "Q learnt from Q / 9", 1000));
+            here.above(
+                format!("pays-{plant}"),
+                what,
+                pair.map(|(fixed, own)| fixed.ratio.value - own.ratio.value),
+                0.0,
+            );
+        }
+        let jump = Scene {
+            plant: PLANTS[1],
+            jumps: true,
+        }
+        .name();
+        let what = "a jump is followed: over the last 600 steps learning is within 10 % of knowing";
+        here.at_most("jump", what, less(at(&jump, "Q learnt from Q / 9", 1000), 1.10), 0.0);
+        let what = "a jump is not followed without learning";
+        here.above("jump-fixed", what, at(&jump, "Q right, not learnt", 1000).map(|r| r.ratio.value), 1.3);
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
+        let shown = [
+            "Q / 9",
+            "9 Q",
+            "Q learnt from Q / 9",
+            "Q learnt from 9 Q",
+            "Q learnt, r / 4",
+            "Q learnt, 4 r",
+            "Q learnt from Q / 9, inverted bits",
+            "adaptive delta modulation",
+        ];
+        let names = PLANTS.map(|plant| Scene { plant, jumps: false }.name());
+        let place = |r: &Row| names.iter().position(|name| *name == r.plant).unwrap_or(0) as f64;
+        let y = || Axis::log("error over that of knowing Q");
+        let mut still = Panel::new("a, Q, r", Axis::categories("", names.clone()), y());
+        for (i, name) in shown.iter().enumerate() {
+            let marks = rows.iter().filter(|r| r.receiver == *name && names.contains(&r.plant));
+            let shift = 0.09 * (i as f64 - 3.5);
+            let marker = if name.contains("learnt") {
+                Marker::Circle
+            } else {
+                Marker::Cross
+            };
+            still = still.with(Layer::measured(*name, marks, |r| (place(r) + shift, r.ratio)).styled(i, marker));
+        }
+        let mut jump = Panel::new("Q jumps to 9 Q", Axis::log("steps since the jump"), y());
+        for (i, name) in [
+            "Q right, not learnt",
+            "Q learnt from Q / 9",
+            "Q learnt from 9 Q",
+            "adaptive delta modulation",
+        ]
+        .iter()
+        .enumerate()
+        {
+            let marks = rows.iter().filter(|r| r.receiver == *name && r.plant.ends_with("jump"));
+            let marks: Vec<_> = marks.map(|r| (r.to as f64, r.ratio)).collect();
+            jump = jump.with_all(Layer::curve(*name, i, marks));
+        }
+        Plot::grid(2, vec![still, jump])
+    }
+}

@@ -1,0 +1,139 @@
+//! Bits against the guaranteed bound, beside codecs that exist as crates.
+
+use super::bits::{geometric_mean, largest};
+use super::recordings::{Recording, Source, each};
+use crate::prelude::*;
+use fewbits_adaptive::{BlockCodec, Config};
+use pco::ChunkConfig;
+use pco::standalone::simple_compress;
+
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
+        /// Bounds in percent of the range.
+        percent: Vec<f64> [1e-4..=10.0; 1..=20] = vec![1e-4, 0.01, 0.25, 0.5, 1.0, 2.0] => quick vec![0.25, 1.0],
+    }
+}
+
+rows! {
+    pub struct Rows {
+        signals: Vec<Row> => "Every signal at every bound.",
+        references: Vec<Reference> => "Means over 73 recorded series, measured elsewhere.",
+    }
+
+    struct Row {
+        column: String => "Signal.",
+        percent: f64 => "Largest error in percent of the range.",
+        adaptive: f64 ["bit"] => "Block of the adaptive codec, without container.",
+        worst: f64 => "Largest error of its restored samples over the bound.",
+        pco: f64 ["bit"] => "pco 1 on the indices of a lattice of twice the bound, its delta order found by itself.",
+        /// zstd, level 19, on those indices as 32-bit numbers; without the feature `zstd` of this crate not run.
+        zstd: Option<f64> ["bit"],
+    }
+
+    struct Reference {
+        percent: f64 => "Largest error in percent of the range.",
+        codec: &'static str => "Program.",
+        bits: f64 ["bit"] => "Mean bits per sample.",
+    }
+}
+
+/// Bits per sample of other programs at equal guaranteed maximum error: means over 73 series of gas, temperature, humidity, wind, ranges,
+/// positions, server metrics and electricity (`docs/record.md`, "Comparison", whose source says how they were run).
+const REFERENCES: [(&str, [(f64, f64); 4]); 3] = [
+    ("SZ3", [(0.25, 4.092), (0.5, 3.295), (1.0, 2.591), (2.0, 1.877)]),
+    ("lattice + PPMd", [(0.25, 3.480), (0.5, 2.743), (1.0, 2.036), (2.0, 1.397)]),
+    ("SerfQT", [(0.25, 4.401), (0.5, 3.409), (1.0, 2.604), (2.0, 1.982)]),
+];
+
+/// Bits against the bound.
+pub struct Codecs;
+
+fn measured(recording: &Recording, percent: f64) -> Result<Row, Error> {
+    let (samples, count) = (&recording.samples, recording.samples.len());
+    // A signal that stands still has no range.
+    let bound = (0.01 * percent * recording.range()).max(f64::MIN_POSITIVE);
+    let per_sample = |bytes: usize| 8.0 * bytes as f64 / count as f64;
+    let codec = BlockCodec::new(Config::new(bound)?);
+    let block = codec.encode(samples)?;
+    let restored = codec.decode(&block, count)?;
+    let errors = samples.iter().zip(&restored).map(|(a, b)| (a - b).abs() / bound);
+    let indices: Vec<i64> = samples.iter().map(|x| (x / (2.0 * bound)).round() as i64).collect();
+    let packed = simple_compress(&indices, &ChunkConfig::default()).map_err(Error::failed)?;
+    Ok(Row {
+        column: recording.name.clone(),
+        percent,
+        adaptive: per_sample(block.len()),
+        worst: largest(errors).unwrap_or(0.0),
+        pco: per_sample(packed.len()),
+        zstd: zstd_bytes(&indices).map(per_sample),
+    })
+}
+
+#[cfg(feature = "zstd")]
+fn zstd_bytes(indices: &[i64]) -> Option<usize> {
+    let bytes: Vec<u8> = indices.iter().flat_map(|index| (*index as i32).to_le_bytes()).collect();
+    zstd::bulk::compress(&bytes, 19).ok().map(|packed| packed.len())
+}
+
+#[cfg(not(feature = "zstd"))]
+fn zstd_bytes(_: &[i64]) -> Option<usize> {
+    None
+}
+
+impl Figure for Codecs {
+    figure!(Parameters => Rows, "real-codecs", "Bits against the bound, beside other codecs", "our own comparison",
+        "Bits per sample against the guaranteed largest error, on signals with the traits of recordings, or on the columns of a \
+         file: a block of the adaptive codec, pco on lattice indices, and with the feature `zstd` zstd on them. Dashed: means of \
+         programs that are no crates over recorded series, from the page of recordings.");
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        Cost::new(2e-5 * (p.source.samples * p.percent.len()) as f64, 1e4 * p.source.samples as f64)
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let recordings = p.source.load("real-codecs", context)?;
+        let references = REFERENCES.iter().flat_map(|(codec, bits)| {
+            bits.iter().map(move |(percent, bits)| Reference {
+                percent: *percent,
+                codec,
+                bits: *bits,
+            })
+        });
+        Ok(Rows {
+            signals: each(&recordings, &p.percent, measured)?,
+            references: references.collect(),
+        })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let worst = largest(rows.signals.iter().map(|row| row.worst));
+        // The quotient of the error is rounded; the bound itself is checked exactly by the tests of the codec.
+        claims.at_most("bounded", "no error exceeds the bound", worst, 1.0 + 1e-9);
+        let ratio = geometric_mean(rows.signals.iter().map(|row| row.adaptive / row.pco));
+        claims.at_most("pco", "fewer bits than pco on lattice indices, in the geometric mean", ratio, 1.0);
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let columns = distinct(&rows.signals, |row| row.column.clone());
+        let panel = |column: &String| {
+            let chosen = || rows.signals.iter().filter(|row| row.column == *column);
+            let zstd = chosen().filter_map(|row| Some((row.percent, row.zstd?)));
+            let zstd: Vec<(f64, f64)> = zstd.collect();
+            let mut layers = vec![
+                Layer::line("adaptive", points(chosen(), |row| (row.percent, row.adaptive))).coloured(0),
+                Layer::line("pco", points(chosen(), |row| (row.percent, row.pco))).coloured(1),
+            ];
+            if !zstd.is_empty() {
+                layers.push(Layer::line("zstd", zstd).coloured(2));
+            }
+            layers.extend(REFERENCES.iter().enumerate().map(|(i, (codec, _))| {
+                let curve = rows.references.iter().filter(|row| row.codec == *codec);
+                Layer::dashed(*codec, points(curve, |row| (row.percent, row.bits))).coloured(3 + i)
+            }));
+            Panel::loglog(column, "largest error, percent of the range", "bits per sample").with_all(layers)
+        };
+        Plot::grid(3, columns.iter().map(panel).collect())
+    }
+}
