@@ -5,33 +5,31 @@ use crate::references::agree;
 use fewbits::binary_patterns::published::{AdaptiveRule, adaptive};
 use fewbits::binary_patterns::search::{Descent, LinearSearch, free_breakpoints};
 use fewbits::binary_patterns::{
-    BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, rank,
+    BinaryQuantizer, CellGrid, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, rank,
 };
-use fewbits::sensor_assignment::{
-    CodedSensors, Estimator, all_errors, exchange, pair_costs,
-};
+use fewbits::sensor_assignment::{CodedSensors, Estimator, all_errors, exchange, pair_costs};
 use fewbits_experiments::reference;
 
 /// A source, its cells and the noise at one signal-to-noise ratio in dB.
 struct Scene {
     source: Source,
-    grid: Grid,
+    grid: CellGrid,
     noise: f64,
 }
 
 impl Scene {
-    fn new(source: Source, grid: Grid, snr: f64) -> Self {
+    fn new(source: Source, grid: CellGrid, snr: f64) -> Self {
         let noise = source.noise_deviation(snr).unwrap();
         Self { source, grid, noise }
     }
 
     fn uniform(bits: usize, snr: f64) -> Self {
-        Self::new(Source::uniform(1.0).unwrap(), Grid::uniform(1.0, bits).unwrap(), snr)
+        Self::new(Source::uniform(1.0).unwrap(), CellGrid::uniform(1.0, bits).unwrap(), snr)
     }
 
     fn gaussian(snr: f64) -> Self {
         let sd = 0.1f64.sqrt();
-        Self::new(Source::gaussian_with_deviation(sd).unwrap(), Grid::printed_gaussian(sd).unwrap(), snr)
+        Self::new(Source::gaussian_with_deviation(sd).unwrap(), CellGrid::printed_gaussian(sd).unwrap(), snr)
     }
 
     fn search(&self, sensors: usize) -> LinearSearch {
@@ -138,7 +136,7 @@ fn free(scene: &Scene, sensors: usize, jitter: f64) -> [f64; 2] {
     let any = search.any_rank().best().unwrap();
     let mut starts = vec![scene.quantizers(linear.masks.clone()), scene.quantizers(any.masks)];
     if sensors > 3 {
-        let grid = Grid::uniform(1.0, 4).unwrap();
+        let grid = CellGrid::uniform(1.0, 4).unwrap();
         let fine = Scene { grid, ..*scene };
         starts.push(fine.quantizers(fine.search(sensors).any_rank().best().unwrap().masks));
         starts.push(any_patterns(scene, &linear.masks).0);

@@ -5,7 +5,7 @@ use crate::references::{agree, numbers};
 use fewbits::core::Link;
 use fewbits::quantizer_design::design::{self, Design};
 use fewbits::quantizer_design::{
-    AllowedCells, Bits, Channel, Criterion, Labelling, Newton, ObservationModel, Quantizer, Request, SensorGroup,
+    AllowedCells, BitBudget, Channel, Criterion, Labelling, Newton, ObservationModel, Quantizer, Request, SensorGroup,
     System, bounds, lloyd_max, published,
 };
 
@@ -58,7 +58,7 @@ fn best(row: &str) -> f64 {
         let start = System::ideal(model.clone(), vec![lloyd(levels, model.sample_deviation(0)); 2]).unwrap();
         design::multi_start(&start, criterion, 20, 1, &Newton::default()).unwrap()
     } else {
-        let request = Request::estimation(model.clone(), Bits::Each(levels.ilog2()), Link::PERFECT);
+        let request = Request::estimation(model.clone(), BitBudget::Each(levels.ilog2()), Link::PERFECT);
         let request = request.with_cells(AllowedCells::Any).with_starts(60);
         let request = if criterion == MI {
             request.by_information()

@@ -1,7 +1,7 @@
 //! One-bit quantizers at many sensors: patterns, exact decoding, search and bounds.
 //!
 //! A scalar `X` is seen by `N` sensors in independent normal noise; each sends one bit. The measurement axis is divided into
-//! `2^B` cells ([`Grid`]) and a sensor's [`Pattern`] says which bit it sends from which cell. Patterns differ between sensors,
+//! `2^B` cells ([`CellGrid`]) and a sensor's [`Pattern`] says which bit it sends from which cell. Patterns differ between sensors,
 //! so that together they tell the cells apart; linear patterns, XORs of the binary digits of the cell's index, are named by
 //! masks ([`linear_pattern`]). A [`Bank`] puts sensors and source together and gives everything about them exactly.
 //!
@@ -12,10 +12,10 @@
 //!
 //! ```
 //! use fewbits_binary_patterns::search::LinearSearch;
-//! use fewbits_binary_patterns::{Decoder, Grid, Source, bounds};
+//! use fewbits_binary_patterns::{Decoder, CellGrid, Source, bounds};
 //! let source = Source::uniform(1.0)?;
 //! let noise = source.noise_deviation(18.2)?;
-//! let search = LinearSearch::with_deviation(source, Grid::uniform(1.0, 3)?, noise, 8)?;
+//! let search = LinearSearch::with_deviation(source, CellGrid::uniform(1.0, 3)?, noise, 8)?;
 //! let best = search.best()?;                                   // of 2702 sets
 //! assert_eq!(best.masks, [2, 2, 3, 3, 3, 3, 4, 6]);
 //! let bank = search.bank(&best.masks)?;
@@ -46,7 +46,7 @@ pub use observation::bank::{Bank, IMPOSSIBLE, MAX_OUTCOMES};
 pub use observation::sensor::PatternSensor;
 pub use observation::source::{Nodes, Source, Threshold};
 pub use patterns::count;
-pub use patterns::grid::{Grid, MAX_BITS, MAX_EIGHT_LEVEL_EDGES};
+pub use patterns::grid::{CellGrid, MAX_BITS, MAX_EIGHT_LEVEL_EDGES};
 pub use patterns::linear::{
     Mask, check_mask, generator_matrix, gray_basis, linear_pattern, mask_of, natural_basis, rank,
 };

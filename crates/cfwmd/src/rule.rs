@@ -219,8 +219,7 @@ impl<const D: usize> OwnRecursion<D> {
         let before = Gaussian::from_trusted_parts(*estimate, self.covariance);
         let predicted = assumed_density::predict(dynamics, &before);
         let at = predicted.mean();
-        let tangent = LinearSensor::new(sensing.jacobian(at), sensing.noise_covariance_at(at))
-            .map_err(fewbits_filters::Error::from)?;
+        let tangent = LinearSensor::new(sensing.jacobian(at), sensing.noise_covariance_at(at))?;
         // Only covariances matter, which no measurement changes.
         let (after, info) = kalman::update(&tangent, &predicted, &(tangent.matrix() * at))?;
         self.covariance = *after.covariance();

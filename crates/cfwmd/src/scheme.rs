@@ -170,9 +170,9 @@ pub(crate) fn send_if<const M: usize>(
 
 /// The fusion centre's prediction with its covariance, as it is broadcast: `D + D (D + 1)/2` numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prediction<const D: usize>(pub Gaussian<D>);
+pub struct PredictedBelief<const D: usize>(pub Gaussian<D>);
 
-impl<const D: usize> Message for Prediction<D> {
+impl<const D: usize> Message for PredictedBelief<D> {
     type Format = NumberFormat;
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
@@ -212,7 +212,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> CovarianceFeedbac
     ///
     /// # Errors
     /// If `R + H P H'` is not positive definite.
-    pub fn under(&self, broadcast: &Prediction<D>) -> Result<Censoring<S, D, M>, Error> {
+    pub fn under(&self, broadcast: &PredictedBelief<D>) -> Result<Censoring<S, D, M>, Error> {
         let rule = rule_under(&self.sensing, &broadcast.0, self.threshold)?;
         Censoring::new(self.sensing.clone(), rule, self.format)
     }
@@ -245,7 +245,7 @@ impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M>
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for CovarianceFeedback<S, D, M> {
-    type Feedback = Prediction<D>;
+    type Feedback = PredictedBelief<D>;
     type Report = SVector<f64, M>;
     type Factor = Censored<M>;
 
@@ -260,7 +260,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for
     fn report_of(
         &self,
         measurement: &SVector<f64, M>,
-        broadcast: &Prediction<D>,
+        broadcast: &PredictedBelief<D>,
     ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
         let sensor = self.under(broadcast).map_err(as_core)?;
         sensor.report_of(measurement, broadcast.0.mean())
@@ -268,7 +268,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for
 
     fn meaning_of(
         &self,
-        broadcast: &Prediction<D>,
+        broadcast: &PredictedBelief<D>,
         observation: &Observation<SVector<f64, M>>,
         link: &Link,
     ) -> Result<Censored<M>, fewbits_core::Error> {

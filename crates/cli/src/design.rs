@@ -11,7 +11,9 @@ use crate::plot::{Layer, Picture};
 use fewbits_core::Link;
 
 use fewbits_quantizer_design::solve::Rounded;
-use fewbits_quantizer_design::{Adc, AllowedCells, Bits, Noise, ObservationModel, Prior, Progress, Request, Solution};
+use fewbits_quantizer_design::{
+    Adc, AllowedCells, BitBudget, Noise, ObservationModel, Prior, Progress, Request, Solution,
+};
 use fewbits_record::TimeBase;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
@@ -97,13 +99,13 @@ fn prior(text: &str) -> Result<Prior, Error> {
     prior.map_err(Error::refused("--prior"))
 }
 
-fn bits(text: &str) -> Result<Bits, Error> {
+fn bits(text: &str) -> Result<BitBudget, Error> {
     let refused = || Error::option("--bits", text, BITS);
     let number = |text: &str| text.trim().parse::<u32>().map_err(|_| refused());
     Ok(match text.strip_prefix("total:") {
-        Some(total) => Bits::Total(number(total)?),
-        None if text.contains(',') => Bits::PerSensor(text.split(',').map(number).collect::<Result<_, _>>()?),
-        None => Bits::Each(number(text)?),
+        Some(total) => BitBudget::Total(number(total)?),
+        None if text.contains(',') => BitBudget::PerSensor(text.split(',').map(number).collect::<Result<_, _>>()?),
+        None => BitBudget::Each(number(text)?),
     })
 }
 

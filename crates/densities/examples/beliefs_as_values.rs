@@ -3,7 +3,7 @@
 //! `cargo run -p fewbits-densities --example beliefs_as_values`
 
 use fewbits_core::{Belief, Gaussian};
-use fewbits_densities::{GaussianCloud, Grid, Particles, PointMass};
+use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let log_likelihood = |x: f64| x * 2.0_f64.ln();
     show("prior", &prior);
 
-    let mut grid = PointMass::normal(Grid::symmetric(8.0, 0.25)?, 0.0, 1.0)?;
+    let mut grid = PointMass::normal(UniformGrid::symmetric(8.0, 0.25)?, 0.0, 1.0)?;
     println!("ln p(observed) = {:.4}", grid.update_with(log_likelihood)?);
     show("grid", &grid);
 

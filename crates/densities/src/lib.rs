@@ -9,7 +9,7 @@
 //! | [`GaussianCloud`] | part of the state is linear: the belief of a Rao-Blackwellised filter | sum of Gaussians of one covariance |
 //! | [`KernelEstimate`] | particles need a value of the density; [`Bandwidth`] chooses the kernel | sum of Gaussians of one covariance |
 //! | [`Mixture`] | a few Gaussians describe it, each with a covariance of its own | sum of Gaussians |
-//! | [`PointMass`] on a [`Grid`] | one dimension, values at the nodes of a grid | linear between nodes |
+//! | [`PointMass`] on a [`UniformGrid`] | one dimension, values at the nodes of a grid | linear between nodes |
 //! | [`PlaneMass`] | two dimensions, values at the nodes of a lattice | bilinear between nodes |
 //!
 //! All of them implement [`Belief`](fewbits_core::Belief): mean, covariance, draws into columns. Those with a value also implement
@@ -67,8 +67,8 @@ mod mixture;
 mod particles;
 
 pub use error::Error;
-pub use grids::{Grid, PlaneMass, PointMass};
-pub use kernel_estimate::{Bandwidth, KernelEstimate, Rule, SampleSize, Shape, add_cross_sums};
+pub use grids::{PlaneMass, PointMass, UniformGrid};
+pub use kernel_estimate::{Bandwidth, BandwidthRule, KernelEstimate, SampleSize, Shape, add_cross_sums};
 pub use mixture::{Component, Mixture, ellipse, moment_matched};
 pub use particles::{Categorical, GaussianCloud, Particles, systematic};
 pub use {nalgebra, rand};

@@ -11,7 +11,7 @@
 //! | where the source is, exactly | [`Posterior`]: small cells, refined until evidence and determinant have settled |
 //! | what travels: samples, a Gaussian, a mixture, polynomial Gaussians | [`Form`], [`project`] |
 //! | as which bits | [`message`]: the next node knows what it decodes and nothing else |
-//! | which node is asked next | [`Rule`], [`Selector`], [`information`] |
+//! | which node is asked next | [`SelectionRule`], [`Selector`], [`information`] |
 //! | whether the model fits the samples at all | [`Fit`], [`Status::Misfit`] |
 //! | wind or diffusivity known up to a few candidates | [`ModelGrid`], [`Search::run_models`] |
 //! | where the concentration exceeds a threshold | [`Envelope`] |
@@ -90,6 +90,6 @@ pub use posterior::Posterior;
 pub use project::{Form, Travelling, project};
 pub use rate::{RateModel, RateRange, RateSums};
 pub use record::Record;
-pub use select::{Rule, Selector};
+pub use select::{SelectionRule, Selector};
 pub use sensor::SourceSensor;
 pub use walk::SourceChain;

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// How the next node is chosen among candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
-pub enum Rule {
+pub enum SelectionRule {
     /// The largest mutual information of samples and (position, rate), by its Gaussian bound `(1/2) ln det(I + Cov / sigma^2)`.
     #[default]
     MutualInformation,
@@ -39,7 +39,7 @@ const SPLIT: f64 = 0.05;
 /// A belief, ready to score candidates.
 #[derive(Debug, Clone)]
 pub struct Selector {
-    rule: Rule,
+    rule: SelectionRule,
     clumps: Clumps<3>,
     estimate: Gaussian<2>,
     precision: Matrix2<f64>,
@@ -50,10 +50,15 @@ impl Selector {
     ///
     /// # Errors
     /// If the covariance of the estimate is singular.
-    pub fn new(rule: Rule, posterior: &Posterior, estimate: &Gaussian<2>, rate: &RateModel) -> Result<Self, Error> {
+    pub fn new(
+        rule: SelectionRule,
+        posterior: &Posterior,
+        estimate: &Gaussian<2>,
+        rate: &RateModel,
+    ) -> Result<Self, Error> {
         let count = match rule {
-            Rule::Mahalanobis => 1,
-            Rule::ExactInformation => FEW_CLUMPS,
+            SelectionRule::Mahalanobis => 1,
+            SelectionRule::ExactInformation => FEW_CLUMPS,
             _ => CLUMPS,
         };
         Ok(Self {
@@ -82,15 +87,15 @@ impl Selector {
             return f64::NEG_INFINITY;
         };
         match self.rule {
-            Rule::Mahalanobis => {
+            SelectionRule::Mahalanobis => {
                 let d = node - self.estimate.mean();
                 -d.dot(&(self.precision * d))
             }
-            Rule::MutualInformation => self.information(sensor, &receptor),
-            Rule::PairwiseInformation => self.predictions(sensor, &receptor).pairwise_bounds().lower,
-            Rule::ExactInformation => self.predictions(sensor, &receptor).exact(),
-            Rule::CramerRao => self.cramer_rao(sensor, &receptor),
-            Rule::Covariance => -self.covariance(sensor, &receptor).ln(),
+            SelectionRule::MutualInformation => self.information(sensor, &receptor),
+            SelectionRule::PairwiseInformation => self.predictions(sensor, &receptor).pairwise_bounds().lower,
+            SelectionRule::ExactInformation => self.predictions(sensor, &receptor).exact(),
+            SelectionRule::CramerRao => self.cramer_rao(sensor, &receptor),
+            SelectionRule::Covariance => -self.covariance(sensor, &receptor).ln(),
         }
     }
 

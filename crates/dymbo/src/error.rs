@@ -1,40 +1,48 @@
 //! What the filters refuse, and what can go wrong with a belief.
 
-fewbits_numerics::errors! {
-    /// Errors of this crate. A failed step leaves the old belief as it was.
-    pub enum Error wraps {
-        /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
-        Core(fewbits_core::Error),
-        /// A report that does not fit its format.
-        Codec(#[from] fewbits_core::CodecError),
-        /// A model refused its parameters.
-        Model(fewbits_models::Error),
-        /// A filter below failed.
-        Filter(fewbits_filters::Error),
-        /// No quantizer table.
-        Quantizer(#[from] fewbits_quantizers::Error),
-        /// No root of a steady-state equation.
-        Root(#[from] fewbits_numerics::roots::RootError),
-    } and {
-        /// A plant that outruns its bits: one bit moves the estimate by a bounded step, so an error beyond `gain / (|a| - 1)`
-        /// grows for ever, although the computed variance stays finite.
-        #[error(
-            "the plant coefficient is {coefficient}: expected one in [-1, 1], because a bounded correction cannot hold an \
+/// Errors of this crate. A failed step leaves the old belief as it was.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument out of range.
+    #[error(transparent)]
+    Argument(#[from] fewbits_numerics::ArgumentError),
+    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
+    #[error(transparent)]
+    Core(fewbits_core::Error),
+    /// A report that does not fit its format.
+    #[error(transparent)]
+    Codec(#[from] fewbits_core::CodecError),
+    /// A model refused its parameters.
+    #[error(transparent)]
+    Model(fewbits_models::Error),
+    /// A filter below failed.
+    #[error(transparent)]
+    Filter(fewbits_filters::Error),
+    /// No quantizer table.
+    #[error(transparent)]
+    Quantizer(#[from] fewbits_quantizers::Error),
+    /// No root of a steady-state equation.
+    #[error(transparent)]
+    Root(#[from] fewbits_numerics::roots::RootError),
+    /// A plant that outruns its bits: one bit moves the estimate by a bounded step, so an error beyond `gain / (|a| - 1)`
+    /// grows for ever, although the computed variance stays finite.
+    #[error(
+        "the plant coefficient is {coefficient}: expected one in [-1, 1], because a bounded correction cannot hold an \
              unstable plant (`new_unstable` accepts the risk)"
-        )]
-        UnstablePlant {
-            /// The offending coefficient.
-            coefficient: f64,
-        },
-        /// An iteration did not settle.
-        #[error("{what} did not settle within {iterations} iterations")]
-        NotConverged {
-            /// What was iterated.
-            what: &'static str,
-            /// Iterations spent.
-            iterations: usize,
-        },
-    }
+    )]
+    UnstablePlant {
+        /// The offending coefficient.
+        coefficient: f64,
+    },
+    /// An iteration did not settle.
+    #[error("{what} did not settle within {iterations} iterations")]
+    NotConverged {
+        /// What was iterated.
+        what: &'static str,
+        /// Iterations spent.
+        iterations: usize,
+    },
 }
 
 impl Error {

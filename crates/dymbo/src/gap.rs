@@ -2,7 +2,7 @@
 
 use crate::{Error, ScalarFilter, ScalarPlant};
 use fewbits_core::{Belief, Dynamics, Factor, Gaussian, Observation, Scheme, Sensing};
-use fewbits_filters::{Grid, PointMass, PointMassFilter, smoother::smooth_step};
+use fewbits_filters::{PointMass, PointMassFilter, UniformGrid, smoother::smooth_step};
 use nalgebra::Vector1;
 use rand::Rng;
 use std::f64::consts::FRAC_2_PI;
@@ -24,7 +24,7 @@ pub fn exact_filter(plant: &ScalarPlant, steps: usize) -> Result<PointMassFilter
         widest = widest.max(variance);
     }
     let spacing = SPACING * plant.process_variance().min(plant.measurement_variance()).sqrt();
-    Ok(PointMassFilter::new(plant.dynamics(), Grid::symmetric(REACH * widest.sqrt(), spacing)?)?)
+    Ok(PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(REACH * widest.sqrt(), spacing)?)?)
 }
 
 /// One simulated run: the state, the filter's belief and the exact density given the same reports.

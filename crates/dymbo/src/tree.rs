@@ -9,7 +9,7 @@ use crate::plant::scalar;
 use crate::{DymboFilter, Error, ScalarFilter, ScalarPlant};
 use fewbits_core::factor::InCell;
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
-use fewbits_filters::{Grid, PointMass, PointMassFilter};
+use fewbits_filters::{PointMass, PointMassFilter, UniformGrid};
 use fewbits_numerics::error::{ArgumentError, positive};
 
 /// Averages over all bit strings of one length.
@@ -57,7 +57,7 @@ pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) ->
     }
     let half_width = 0.5 * tau + REACH * widest.sqrt();
     let finest = plant.process_variance().sqrt().min(sigma);
-    let grid = Grid::symmetric(half_width, SPACING * positive("process_variance", finest)?)?;
+    let grid = UniformGrid::symmetric(half_width, SPACING * positive("process_variance", finest)?)?;
     let walk = Walk {
         filter,
         exact: PointMassFilter::new(plant.dynamics(), grid)?,

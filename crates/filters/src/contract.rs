@@ -3,10 +3,10 @@
 //! Models, sensors and observations are object-safe, so that any kinds stand in one list.
 //! The table of the [crate] says which filter is for what.
 
+use crate::linear_row::LinearRow;
 use crate::{Error, assumed_density};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Belief, ColumnsMut, Evolution, Factor, Gaussian, GaussianDynamics, Likelihood, Observed, Sensing};
-use fewbits_models::LinearSensor;
 use fewbits_numerics::linalg::congruence;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
@@ -116,7 +116,7 @@ pub trait StateLikelihood<const D: usize>: Likelihood<D> {
 
     /// As a scalar factor seen through a linear sensor, times `exp` of a number: what filters need that impute measurements. `None` if
     /// the sensor is not linear about `state`, or the factor is of another kind.
-    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearSensor<D, 1>, Scalar, 1>, f64)>;
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearRow<D>, Scalar, 1>, f64)>;
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikelihood<D> for Observed<S, F, M> {
@@ -144,13 +144,13 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
         jacobian.column(axis).iter().any(|x| *x != 0.0)
     }
 
-    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearSensor<D, 1>, Scalar, 1>, f64)> {
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearRow<D>, Scalar, 1>, f64)> {
         let (factor, log_scale) = self.factor.as_scalar().filter(|_| M == 1)?;
         let jacobian = self.sensing.jacobian(state);
-        let row = SVector::<f64, D>::from_fn(|d, _| jacobian[(0, d)]);
+        let row = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
         let (mean, noise) = (self.sensing.mean(state)[0], self.sensing.noise_covariance_at(state)[(0, 0)]);
-        let offset = (mean - row.dot(state)).abs();
-        let sensor = LinearSensor::scalar(row, noise).ok()?;
+        let offset = (mean - (row * state)[0]).abs();
+        let sensor = LinearRow::new(row, noise)?;
         (offset <= OFFSET * (mean.abs() + noise.sqrt())).then(|| (Observed::new(sensor, factor), log_scale))
     }
 }

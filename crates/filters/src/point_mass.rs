@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
 use fewbits_core::{Gaussian, GaussianDynamics, Likelihood, LinearDynamics};
-use fewbits_densities::{Grid, PointMass};
+use fewbits_densities::{PointMass, UniformGrid};
 use fewbits_numerics::error::ArgumentError;
 use fewbits_numerics::normal::INV_SQRT_2PI;
 use fewbits_numerics::quadrature::gauss_legendre;
@@ -18,7 +18,7 @@ const COARSEST: f64 = 1.0;
 /// Share of negative mass from which on an interpolated density counts as unresolved.
 const UNRESOLVED: f64 = 1e-6;
 
-fn too_coarse(grid: &Grid, deviation: f64) -> Error {
+fn too_coarse(grid: &UniformGrid, deviation: f64) -> Error {
     let expected = format!("a spacing that resolves a deviation of {deviation}");
     ArgumentError::new("grid", format!("spacing {}", grid.spacing()), expected).into()
 }
@@ -42,9 +42,9 @@ fn sinc(t: f64) -> f64 {
 ///
 /// ```
 /// use fewbits_numerics::normal::log_cdf;
-/// use fewbits_filters::{Grid, PointMass, PointMassFilter};
+/// use fewbits_filters::{UniformGrid, PointMass, PointMassFilter};
 /// use fewbits_models::Ar1;
-/// let filter = PointMassFilter::new(&Ar1::new(0.9, 0.5)?, Grid::symmetric(14.0, 0.25)?)?;
+/// let filter = PointMassFilter::new(&Ar1::new(0.9, 0.5)?, UniformGrid::symmetric(14.0, 0.25)?)?;
 /// let mut belief = filter.predict(&PointMass::normal(*filter.grid(), 0.0, 1.0)?)?;
 /// belief.update_with(|x| log_cdf(x - 0.3))?;          // a sign bit at threshold 0.3 in unit noise
 /// assert!(belief.mean() > 0.3);
@@ -52,7 +52,7 @@ fn sinc(t: f64) -> f64 {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointMassFilter {
-    grid: Grid,
+    grid: UniformGrid,
     /// First column of each kernel row that is not negligible, and where the row starts in `weights`.
     rows: Vec<(usize, usize)>,
     weights: Vec<f64>,
@@ -63,13 +63,13 @@ impl PointMassFilter {
     ///
     /// # Errors
     /// If the noise out of some node has a standard deviation below the spacing; see [`PointMassFilter::linear`].
-    pub fn new(dynamics: &impl GaussianDynamics<1>, grid: Grid) -> Result<Self, Error> {
+    pub fn new(dynamics: &impl GaussianDynamics<1>, grid: UniformGrid) -> Result<Self, Error> {
         let moved = moved(&grid, dynamics, 1.0);
         Self::resolving(grid, &moved)
     }
 
     /// The filter that moves node `i` to a normal of mean and deviation `moved[i]`.
-    fn resolving(grid: Grid, moved: &[(f64, f64)]) -> Result<Self, Error> {
+    fn resolving(grid: UniformGrid, moved: &[(f64, f64)]) -> Result<Self, Error> {
         if let Some((_, deviation)) = moved.iter().find(|(_, s)| s.is_nan() || *s < COARSEST * grid.spacing()) {
             return Err(too_coarse(&grid, *deviation));
         }
@@ -77,7 +77,7 @@ impl PointMassFilter {
     }
 
     /// Rows of `h N(x; f(y), Q(y))` from the `(f, sqrt Q)` of each node.
-    fn from_kernel(grid: Grid, moved: &[(f64, f64)]) -> Self {
+    fn from_kernel(grid: UniformGrid, moved: &[(f64, f64)]) -> Self {
         let mut reach = vec![(grid.points(), 0); grid.points()];
         for (j, (mean, deviation)) in moved.iter().enumerate() {
             for i in grid.indices_within(mean - REACH * deviation, mean + REACH * deviation) {
@@ -103,7 +103,7 @@ impl PointMassFilter {
     ///
     /// # Errors
     /// If the next state does not depend on the present one and its noise is narrower than the spacing.
-    pub fn linear(dynamics: &impl LinearDynamics<1>, grid: Grid) -> Result<Self, Error> {
+    pub fn linear(dynamics: &impl LinearDynamics<1>, grid: UniformGrid) -> Result<Self, Error> {
         let (a, deviation) = (dynamics.transition()[0], dynamics.noise_covariance()[0].sqrt());
         let h = grid.spacing();
         if deviation >= COARSEST * h * a.abs().min(1.0) && deviation > 0.0 {
@@ -135,7 +135,7 @@ impl PointMassFilter {
     }
 
     /// The nodes.
-    pub fn grid(&self) -> &Grid {
+    pub fn grid(&self) -> &UniformGrid {
         &self.grid
     }
 
@@ -243,7 +243,7 @@ impl PointMassFilter {
 }
 
 /// Mean and deviation of the next state from each node.
-fn moved(grid: &Grid, motion: &(impl Motion<1> + ?Sized), noise_scale: f64) -> Vec<(f64, f64)> {
+fn moved(grid: &UniformGrid, motion: &(impl Motion<1> + ?Sized), noise_scale: f64) -> Vec<(f64, f64)> {
     let from = |y: f64| motion.predict(&Gaussian::from_trusted_parts(Vector1::new(y), Matrix1::zeros()), noise_scale);
     let moves = grid.nodes().map(from);
     moves
@@ -254,14 +254,14 @@ fn moved(grid: &Grid, motion: &(impl Motion<1> + ?Sized), noise_scale: f64) -> V
 /// [`PointMassFilter`] of any motion that its grid resolves. The kernel is kept while the motion stays the same.
 #[derive(Debug, Clone)]
 pub struct PointMasses {
-    grid: Grid,
+    grid: UniformGrid,
     moved: Vec<(f64, f64)>,
     kernel: Option<PointMassFilter>,
 }
 
 impl PointMasses {
     /// The filter on this grid.
-    pub fn new(grid: Grid) -> Self {
+    pub fn new(grid: UniformGrid) -> Self {
         Self {
             grid,
             moved: Vec::new(),
@@ -309,7 +309,7 @@ mod tests {
     use super::PointMassFilter;
     use crate::{kalman, smoother};
     use fewbits_core::Gaussian;
-    use fewbits_densities::{Grid, PointMass};
+    use fewbits_densities::{PointMass, UniformGrid};
     use fewbits_models::{Ar1, LinearSensor};
     use fewbits_numerics::normal::log_pdf_with;
     use nalgebra::Vector1;
@@ -320,7 +320,7 @@ mod tests {
         for a in [0.9, -0.7, 0.0, 1.0] {
             let dynamics = Ar1::new(a, 0.5).unwrap();
             let sensing = LinearSensor::direct(1.3).unwrap();
-            let filter = PointMassFilter::new(&dynamics, Grid::symmetric(16.0, 0.25).unwrap()).unwrap();
+            let filter = PointMassFilter::new(&dynamics, UniformGrid::symmetric(16.0, 0.25).unwrap()).unwrap();
             let mut grid_belief = PointMass::normal(*filter.grid(), 0.4, 2.0).unwrap();
             let mut belief = Gaussian::scalar(0.4, 2.0).unwrap();
             let data = [1.0, -0.5, 2.5, 0.1, -1.2];
@@ -358,7 +358,8 @@ mod tests {
     /// Only the shapes of likelihoods count, however long the future is.
     #[test]
     fn smoothing_has_no_scale() {
-        let filter = PointMassFilter::new(&Ar1::new(0.9, 0.5).unwrap(), Grid::symmetric(12.0, 0.25).unwrap()).unwrap();
+        let filter =
+            PointMassFilter::new(&Ar1::new(0.9, 0.5).unwrap(), UniformGrid::symmetric(12.0, 0.25).unwrap()).unwrap();
         let belief = PointMass::normal(*filter.grid(), 0.4, 2.0).unwrap();
         let future = |scale: f64| -> Vec<Vec<f64>> {
             (0..200)
@@ -393,7 +394,7 @@ mod tests {
         ] {
             let dynamics = Ar1::new_unstable(a, q).unwrap();
             let sensing = LinearSensor::direct(4.0).unwrap();
-            let filter = PointMassFilter::linear(&dynamics, Grid::symmetric(20.0, 0.12).unwrap()).unwrap();
+            let filter = PointMassFilter::linear(&dynamics, UniformGrid::symmetric(20.0, 0.12).unwrap()).unwrap();
             let mut exact = PointMass::normal(*filter.grid(), 0.4, 2.0).unwrap();
             let mut belief = Gaussian::scalar(0.4, 2.0).unwrap();
             for z in [1.0, -0.5] {
@@ -406,7 +407,7 @@ mod tests {
                 assert!((exact.variance() - belief.covariance()[0]).abs() < 1e-9, "{a} {q}");
             }
         }
-        let grid = Grid::symmetric(5.0, 0.25).unwrap();
+        let grid = UniformGrid::symmetric(5.0, 0.25).unwrap();
         assert!(PointMassFilter::linear(&Ar1::new(0.0, 0.0).unwrap(), grid).is_err());
         let still = PointMassFilter::linear(&Ar1::new(0.9, 0.0).unwrap(), grid).unwrap();
         let narrow = PointMass::normal(grid, 0.1, 0.005).unwrap();
@@ -415,16 +416,16 @@ mod tests {
 
     #[test]
     fn refuses_what_a_grid_cannot_resolve() {
-        assert!(Grid::new(1.0, 0.0, 0.1).is_err());
-        assert!(Grid::new(0.0, 1.0, 1e-9).is_err());
-        assert!(Grid::symmetric(f64::NAN, 1.0).is_err());
+        assert!(UniformGrid::new(1.0, 0.0, 0.1).is_err());
+        assert!(UniformGrid::new(0.0, 1.0, 1e-9).is_err());
+        assert!(UniformGrid::symmetric(f64::NAN, 1.0).is_err());
         // Defect: variances over such nodes, and densities at such nodes, were infinite.
-        assert!(Grid::new(0.0, 1e301, 1e300).is_err() && Grid::new(0.0, 1e-310, 5e-324).is_err());
-        let grid = Grid::symmetric(5.0, 0.25).unwrap();
+        assert!(UniformGrid::new(0.0, 1e301, 1e300).is_err() && UniformGrid::new(0.0, 1e-310, 5e-324).is_err());
+        let grid = UniformGrid::symmetric(5.0, 0.25).unwrap();
         assert_eq!((grid.points(), grid.node(20)), (41, 0.0));
         assert!(PointMassFilter::new(&Ar1::new(0.9, 0.0).unwrap(), grid).is_err());
         let filter = PointMassFilter::new(&Ar1::new(0.9, 1.0).unwrap(), grid).unwrap();
-        let elsewhere = PointMass::normal(Grid::symmetric(6.0, 0.25).unwrap(), 0.0, 1.0).unwrap();
+        let elsewhere = PointMass::normal(UniformGrid::symmetric(6.0, 0.25).unwrap(), 0.0, 1.0).unwrap();
         assert!(filter.predict(&elsewhere).is_err());
         let here = PointMass::normal(grid, 0.0, 1.0).unwrap();
         assert!(filter.smooth(&here, &[vec![1.0; 3]]).is_err());

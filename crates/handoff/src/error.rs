@@ -1,11 +1,16 @@
 //! Errors of this crate.
 
-fewbits_numerics::errors! {
-    /// What a hand-over refuses.
-    pub enum Error wraps {
-        /// No particle agrees with the measurement, or particles could not be formed.
-        Density(#[from] fewbits_densities::Error),
-        /// The belief could not be reduced or coded.
-        Codec(#[from] fewbits_mixture_codec::Error),
-    } and {}
+/// What a hand-over refuses.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument out of range.
+    #[error(transparent)]
+    Argument(#[from] fewbits_numerics::ArgumentError),
+    /// No particle agrees with the measurement, or particles could not be formed.
+    #[error(transparent)]
+    Density(#[from] fewbits_densities::Error),
+    /// The belief could not be reduced or coded.
+    #[error(transparent)]
+    Codec(#[from] fewbits_mixture_codec::Error),
 }

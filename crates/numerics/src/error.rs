@@ -29,49 +29,6 @@ impl ArgumentError {
     }
 }
 
-/// The error enum of a crate: an [`ArgumentError`], the errors of crates below that it `wraps`, and what is its own. Needs
-/// `thiserror` where it stands.
-///
-/// ```
-/// fewbits_numerics::errors! {
-///     /// What this crate refuses.
-///     pub enum Error wraps {
-///         /// A message that is no text.
-///         Text(#[from] std::str::Utf8Error),
-///     } and {
-///         /// Nothing was received.
-///         #[error("nothing was received")]
-///         Silent,
-///     }
-/// }
-/// let refused = Error::from(fewbits_numerics::ArgumentError::new("gain", -1.0, "a number above 0"));
-/// assert_eq!(refused.to_string(), "argument `gain` is -1: expected a number above 0");
-/// ```
-#[macro_export]
-macro_rules! errors {
-    (
-        $(#[$outer:meta])*
-        pub enum Error $(wraps {
-            $($(#[$doc:meta])* $wrapped:ident($(#[$from:meta])? $below:ty),)*
-        } and)? { $($own:tt)* }
-    ) => {
-        $(#[$outer])*
-        #[derive(Debug, Clone, PartialEq, ::thiserror::Error)]
-        #[non_exhaustive]
-        pub enum Error {
-            /// An argument out of range.
-            #[error(transparent)]
-            Argument(#[from] $crate::ArgumentError),
-            $($(
-                $(#[$doc])*
-                #[error(transparent)]
-                $wrapped($(#[$from])? $below),
-            )*)?
-            $($own)*
-        }
-    };
-}
-
 /// Takes the errors of crates below into variants of this crate's `Error`; an argument that they refused stays one. `with Core`: so do
 /// errors of the core.
 #[macro_export]

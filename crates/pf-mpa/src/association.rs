@@ -1,8 +1,8 @@
 //! Two targets on a line and two measurements in unknown order: which is whose?
 //!
 //! `T1`, `T2` are random walks of variance `q` a step; the measurements `zA`, `zB` of variance `R` arrive in random order. `r = 0`
-//! says that `zA` is of the first target. As printed, `P(r = 0)` comes from a rule of thumb ([`Rule::Tanh`]); it has an exact
-//! value ([`Rule::Exact`]).
+//! says that `zA` is of the first target. As printed, `P(r = 0)` comes from a rule of thumb ([`AssociationRule::Tanh`]); it has an exact
+//! value ([`AssociationRule::Exact`]).
 
 use crate::Error;
 use fewbits_core::Gaussian;
@@ -16,7 +16,7 @@ pub const PRINTED_GAIN: f64 = 0.55;
 /// `P(r = 0)` from predictions `t` and measurements `z`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Rule {
+pub enum AssociationRule {
     /// `tanh(K D)`, `D = |t1 - zB| |t2 - zA| / (|t1 - zA| |t2 - zB|)`, as printed (`K = 0.55`). Not symmetric in the labels, blind to
     /// `R` (erratum `mpa-12`).
     Tanh {
@@ -29,7 +29,7 @@ pub enum Rule {
     Exact,
 }
 
-impl Rule {
+impl AssociationRule {
     /// The rule of the thesis.
     pub const PRINTED: Self = Self::Tanh { gain: PRINTED_GAIN };
 
@@ -157,7 +157,7 @@ pub enum PairTracker {
     Genie,
     /// Weighs both orders by a rule and matches the moments of the mixture; with the exact rule, joint probabilistic data
     /// association.
-    Weighted(Rule),
+    Weighted(AssociationRule),
     /// Takes the likelier order: global nearest neighbour.
     Nearest,
 }
@@ -174,7 +174,7 @@ impl PairTracker {
         let p = match self {
             Self::Genie => f64::from(u8::from(straight)),
             Self::Weighted(rule) => rule.probability(&predicted, z, r)?,
-            Self::Nearest => f64::from(u8::from(Rule::Exact.probability(&predicted, z, r)? >= 0.5)),
+            Self::Nearest => f64::from(u8::from(AssociationRule::Exact.probability(&predicted, z, r)? >= 0.5)),
         };
         update(&predicted, z, r, p)
     }
@@ -259,8 +259,17 @@ mod tests {
     #[test]
     fn measurements_out_of_reach_are_errors() {
         let targets = pair([0.0, 1.0], 1.0);
-        assert_eq!(Rule::Exact.probability(&targets, [1e200, 1e200], 1.0).unwrap(), 0.5);
-        assert!(Rule::Exact.probability(&targets, [1e200, -3e200], 1.0).is_err());
+        assert_eq!(
+            AssociationRule::Exact
+                .probability(&targets, [1e200, 1e200], 1.0)
+                .unwrap(),
+            0.5
+        );
+        assert!(
+            AssociationRule::Exact
+                .probability(&targets, [1e200, -3e200], 1.0)
+                .is_err()
+        );
         let mut hypotheses = Hypotheses::new(4, targets).unwrap();
         let before = hypotheses.clone();
         assert!(hypotheses.step([1e200, 1e200], 0.1, 1.0).is_err());
@@ -284,8 +293,8 @@ mod tests {
         for scale in [1e-4, 1.0, 1e4] {
             let targets = pair([1.0 * scale, 1.05 * scale], 2e-4 * scale * scale);
             let (z, r) = ([1.01 * scale, 1.04 * scale], 1e-4 * scale * scale);
-            let p = Rule::Exact.probability(&targets, z, r).unwrap();
-            let q = Rule::Exact.probability(&targets, [z[1], z[0]], r).unwrap();
+            let p = AssociationRule::Exact.probability(&targets, z, r).unwrap();
+            let q = AssociationRule::Exact.probability(&targets, [z[1], z[0]], r).unwrap();
             assert!((p + q - 1.0).abs() < 1e-14);
             let mut all = Hypotheses::new(16, targets).unwrap();
             assert!((all.step(z, 0.0, r).unwrap() - p).abs() < 1e-14);
@@ -293,7 +302,11 @@ mod tests {
             assert!((all.means()[0] - one.targets[0].mean()[0]).abs() < 1e-14 * scale);
         }
         let targets = pair([1.0, 2.0], 0.1);
-        assert!(Rule::Exact.probability(&targets, [f64::NAN, 1.0], 0.1).is_err());
+        assert!(
+            AssociationRule::Exact
+                .probability(&targets, [f64::NAN, 1.0], 0.1)
+                .is_err()
+        );
         assert!(update(&targets, [1.0, 2.0], 0.0, 0.5).is_err() && update(&targets, [1.0, 2.0], 1.0, 1.5).is_err());
         assert!(Hypotheses::new(0, targets).is_err());
     }

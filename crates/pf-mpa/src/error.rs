@@ -1,21 +1,30 @@
 //! What this crate refuses.
 
-fewbits_numerics::errors! {
-    /// Errors of this crate. A failed step leaves the old belief as it was.
-    pub enum Error wraps {
-        /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
-        Core(fewbits_core::Error),
-        /// A message that does not fit its format.
-        Codec(#[from] fewbits_core::CodecError),
-        /// A density that cannot be.
-        Density(fewbits_densities::Error),
-        /// A filter failed.
-        Filter(fewbits_filters::Error),
-        /// A model refused its parameters.
-        Model(fewbits_models::Error),
-        /// A quantizer refused its parameters.
-        Quantizer(fewbits_quantizers::Error),
-    } and {}
+/// Errors of this crate. A failed step leaves the old belief as it was.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument out of range.
+    #[error(transparent)]
+    Argument(#[from] fewbits_numerics::ArgumentError),
+    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
+    #[error(transparent)]
+    Core(fewbits_core::Error),
+    /// A message that does not fit its format.
+    #[error(transparent)]
+    Codec(#[from] fewbits_core::CodecError),
+    /// A density that cannot be.
+    #[error(transparent)]
+    Density(fewbits_densities::Error),
+    /// A filter failed.
+    #[error(transparent)]
+    Filter(fewbits_filters::Error),
+    /// A model refused its parameters.
+    #[error(transparent)]
+    Model(fewbits_models::Error),
+    /// A quantizer refused its parameters.
+    #[error(transparent)]
+    Quantizer(fewbits_quantizers::Error),
 }
 
 impl Error {

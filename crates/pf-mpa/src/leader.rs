@@ -47,12 +47,12 @@ pub fn nearest(positions: &[Vector2<f64>], place: &Vector2<f64>) -> usize {
 /// What a leader hands over: mean and covariance, 14 numbers. The covariance travels as its lower triangular factor, so that what
 /// arrives after rounding is a covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Handover {
+pub struct LeaderMessage {
     mean: Vector4<f64>,
     lower: Matrix4<f64>,
 }
 
-impl Handover {
+impl LeaderMessage {
     /// The belief as it arrives in the given format.
     ///
     /// # Errors
@@ -101,7 +101,7 @@ pub(crate) fn lower_factor<const D: usize>(covariance: &SMatrix<f64, D, D>) -> S
     lower
 }
 
-impl Message for Handover {
+impl Message for LeaderMessage {
     type Format = NumberFormat;
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
@@ -141,7 +141,7 @@ impl StepBits {
     pub fn new(sensors: usize, levels: usize, format: &NumberFormat) -> Result<Self, Error> {
         at_least_one_sensor(sensors)?;
         let word = fewbits_quantizers::Labelling::natural(levels)?.bits();
-        let known = Handover::new(&Gaussian::known(Vector4::zeros())?, format);
+        let known = LeaderMessage::new(&Gaussian::known(Vector4::zeros())?, format);
         let handover = known.and_then(|h| Ok(h.to_bits(format)?.bits()))?;
         Ok(Self {
             reports: sensors as u64 * u64::from(word),
@@ -165,18 +165,18 @@ mod tests {
             thin.column_mut(2).fill(0.0);
             thin.column_mut(3).fill(0.0);
             let belief = Gaussian::new(Vector4::repeat(scale / 3.0), thin * thin.transpose()).unwrap();
-            let sent = Handover::new(&belief, &NumberFormat::Single).unwrap();
+            let sent = LeaderMessage::new(&belief, &NumberFormat::Single).unwrap();
             assert_eq!(round_trip(&sent, &NumberFormat::Single), Ok(448));
             let arrived = sent.belief();
             assert!(Gaussian::new(*arrived.mean(), *arrived.covariance()).is_ok());
             assert!((arrived.covariance() - belief.covariance()).amax() < 1e-5 * scale * scale);
         }
-        let bits = Handover::new(&Gaussian::known(Vector4::zeros()).unwrap(), &NumberFormat::Double).unwrap();
+        let bits = LeaderMessage::new(&Gaussian::known(Vector4::zeros()).unwrap(), &NumberFormat::Double).unwrap();
         let bits = bits.to_bits(&NumberFormat::Double).unwrap();
         assert!(
             (0..bits.bits())
                 .step_by(7)
-                .all(|i| decoding_is_total::<Handover>(&bits.clone().with_flipped(i), &NumberFormat::Double))
+                .all(|i| decoding_is_total::<LeaderMessage>(&bits.clone().with_flipped(i), &NumberFormat::Double))
         );
     }
 

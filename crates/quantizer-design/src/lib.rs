@@ -2,15 +2,15 @@
 //!
 //! Several sensors measure one unknown through noise, and each may report a few bits. Which cells should each sensor use so
 //! that together they say most, and which word stands for which cell? Start with [`Request`]: it takes the prior and the noise
-//! ([`ObservationModel`]), the bits of each sensor ([`Bits`]) and the link, and returns [`Solutions`], best first. A [`Solution`] encodes
+//! ([`ObservationModel`]), the bits of each sensor ([`BitBudget`]) and the link, and returns [`Solutions`], best first. A [`Solution`] encodes
 //! and decodes, and leaves the library as a table, JSON, a C header or Rust constants ([`Export`]).
 //!
 //! ```
 //! use fewbits_core::Link;
-//! use fewbits_quantizer_design::{Bits, Noise, Prior, Request, ObservationModel};
+//! use fewbits_quantizer_design::{BitBudget, Noise, Prior, Request, ObservationModel};
 //!
 //! let model = ObservationModel::new(Prior::normal(20.0, 4.0)?, Noise::independent_with_deviations(&[1.0, 1.5])?)?;
-//! let solutions = Request::estimation(model, Bits::Each(2), Link::flipping(0.02)?).run()?;
+//! let solutions = Request::estimation(model, BitBudget::Each(2), Link::flipping(0.02)?).run()?;
 //! let best = solutions.best();
 //! let words = best.encode(&[21.3, 22.0])?;
 //! let estimate = best.decoder(16)?.decode_symbols(&words)?;
@@ -87,6 +87,6 @@ pub use error::Error;
 pub use fewbits_quantizers::{Channel, Labelling, Quantizer, Symbol, canonical, lloyd_max, quantizer};
 pub use newton::{AtSaddle, Certificate, Newton};
 pub use observation_model::{Noise, ObservationModel, Prior};
-pub use solve::{Adc, Bits, Export, Progress, Request, Solution, Solutions};
+pub use solve::{Adc, BitBudget, Export, Progress, Request, Solution, Solutions};
 pub use system::{SensorGroup, System};
 pub use table::JointTable;

@@ -2,42 +2,45 @@
 
 use fewbits_numerics::ArgumentError;
 
-fewbits_numerics::errors! {
-    /// Why a quantizer, labelling, channel, density or report was refused.
-    pub enum Error {
-        /// An iteration stopped at its limit before its tolerance was met.
-        #[error("{algorithm} did not converge in {iterations} iterations: the last change was {change:e}")]
-        NotConverged {
-            /// Which iteration.
-            algorithm: &'static str,
-            /// Iterations spent.
-            iterations: usize,
-            /// Size of the last change, in the units of the stop rule.
-            change: f64,
-        },
-        /// A design ended where the error is not least: a cell is empty, or some change of the breakpoints still lowers the error.
-        #[error("{algorithm} ended at no optimum: cell {cell} of {levels} has probability {probability:e}")]
-        NotOptimal {
-            /// Which iteration.
-            algorithm: &'static str,
-            /// The least probable cell.
-            cell: usize,
-            /// Number of cells.
-            levels: usize,
-            /// Probability of that cell.
-            probability: f64,
-        },
-        /// A table would be larger than allowed.
-        #[error("{table} would need {needed} entries: at most {limit} are allowed")]
-        TooLarge {
-            /// Which table.
-            table: &'static str,
-            /// Entries needed, saturated at `u64::MAX`.
-            needed: u64,
-            /// Entries allowed.
-            limit: u64,
-        },
-    }
+/// Why a quantizer, labelling, channel, density or report was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument out of range.
+    #[error(transparent)]
+    Argument(#[from] ArgumentError),
+    /// An iteration stopped at its limit before its tolerance was met.
+    #[error("{algorithm} did not converge in {iterations} iterations: the last change was {change:e}")]
+    NotConverged {
+        /// Which iteration.
+        algorithm: &'static str,
+        /// Iterations spent.
+        iterations: usize,
+        /// Size of the last change, in the units of the stop rule.
+        change: f64,
+    },
+    /// A design ended where the error is not least: a cell is empty, or some change of the breakpoints still lowers the error.
+    #[error("{algorithm} ended at no optimum: cell {cell} of {levels} has probability {probability:e}")]
+    NotOptimal {
+        /// Which iteration.
+        algorithm: &'static str,
+        /// The least probable cell.
+        cell: usize,
+        /// Number of cells.
+        levels: usize,
+        /// Probability of that cell.
+        probability: f64,
+    },
+    /// A table would be larger than allowed.
+    #[error("{table} would need {needed} entries: at most {limit} are allowed")]
+    TooLarge {
+        /// Which table.
+        table: &'static str,
+        /// Entries needed, saturated at `u64::MAX`.
+        needed: u64,
+        /// Entries allowed.
+        limit: u64,
+    },
 }
 
 pub(crate) use fewbits_numerics::error::refuse;

@@ -4,7 +4,7 @@ use super::CodedSensors;
 use super::linear::CostMatrix;
 use crate::Error;
 use fewbits_binary_patterns::BinaryQuantizer;
-use fewbits_binary_patterns::Grid;
+use fewbits_binary_patterns::CellGrid;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::quadrature::gauss_legendre;
 
@@ -16,7 +16,7 @@ use fewbits_numerics::quadrature::gauss_legendre;
 /// # Errors
 /// If `bit` is not below `bits`, `bits` is out of range, the half width is not positive, or `x` is NaN.
 pub fn flipped_estimate(x: f64, bit: usize, bits: usize, half_width: f64) -> Result<f64, Error> {
-    let grid = Grid::uniform(half_width, bits)?;
+    let grid = CellGrid::uniform(half_width, bits)?;
     if bit >= bits {
         return refuse("bit", bit, format!("a bit below {bits}"));
     }

@@ -6,7 +6,7 @@
 
 use crate::{CodedSensors, Error, pair_costs};
 use fewbits_core::Link;
-use fewbits_quantizer_design::{AllowedCells, Bits, ObservationModel, Request};
+use fewbits_quantizer_design::{AllowedCells, BitBudget, ObservationModel, Request};
 
 /// Breakpoints of a sensor, and the word of each cell.
 pub type BitCells = (Vec<f64>, Vec<usize>);
@@ -48,7 +48,7 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
 /// As [`bit_cells`].
 pub fn bit_per_sensor(model: ObservationModel, link: Link) -> Result<Request<'static>, Error> {
     let cells = bit_cells(&model)?;
-    Ok(Request::estimation(model, Bits::Each(1), link)
+    Ok(Request::estimation(model, BitBudget::Each(1), link)
         .with_cells(AllowedCells::Any)
         .with_start(cells)?)
 }

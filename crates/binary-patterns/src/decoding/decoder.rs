@@ -4,7 +4,7 @@ use crate::Error;
 use crate::decoding::continuous_map;
 use crate::observation::bank::{Bank, IMPOSSIBLE};
 use crate::observation::source::Nodes;
-use crate::{Grid, LookupTable};
+use crate::{CellGrid, LookupTable};
 use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, finite};
 
@@ -21,12 +21,12 @@ pub enum Decoder<'a> {
     /// Centroid of the cell `l` that maximises `ln P(c_l) + sum_n ln P(z_n|c_l)` (equation 5.10 with the missing division of
     /// `P(z_n, c_l)` by `P(c_l)` put back, erratum `binary-4`). Bits count as independent given the cell, which they are
     /// only given `X` (erratum `binary-5`).
-    DiscreteMap(&'a Grid),
+    DiscreteMap(&'a CellGrid),
     /// Equation 5.10 as printed, with joint in place of conditional probabilities. Equal to [`Self::DiscreteMap`] for
     /// equally likely cells; up to three times its error for a Gaussian source.
-    PrintedDiscreteMap(&'a Grid),
+    PrintedDiscreteMap(&'a CellGrid),
     /// Centroid of the cell of greatest posterior probability `int_cell p(x) prod_n P(z_n|x) dx`.
-    ExactDivisionMap(&'a Grid),
+    ExactDivisionMap(&'a CellGrid),
     /// The `x` on the support that maximises `ln p(x) + sum_n ln P(z_n|x)`; the middle of a plateau, the lowest of equals.
     ContinuousMap,
 }
@@ -176,7 +176,7 @@ impl Bank {
     }
 
     /// Nodes with breaks at the edges of `grid`, cell by cell.
-    fn cells(&self, grid: &Grid) -> Vec<Cell> {
+    fn cells(&self, grid: &CellGrid) -> Vec<Cell> {
         (0..grid.cells())
             .filter_map(|cell| grid.support(cell, self.source()))
             .map(|(low, high)| {
@@ -195,7 +195,7 @@ impl Bank {
             .collect()
     }
 
-    fn division_map(&self, grid: &Grid, outcomes: usize, scaling: Scaling) -> Vec<f64> {
+    fn division_map(&self, grid: &CellGrid, outcomes: usize, scaling: Scaling) -> Vec<f64> {
         let cells = self.cells(grid);
         let log = |p: f64| p.max(FLOOR).ln();
         let logs: Vec<Vec<[f64; 2]>> = self
@@ -235,7 +235,7 @@ impl Bank {
             .collect()
     }
 
-    fn exact_division_map(&self, grid: &Grid, outcomes: usize) -> Vec<f64> {
+    fn exact_division_map(&self, grid: &CellGrid, outcomes: usize) -> Vec<f64> {
         let cells = self.cells(grid);
         let mut nodes = Nodes::default();
         let mut ends = Vec::with_capacity(cells.len());

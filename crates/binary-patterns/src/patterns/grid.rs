@@ -18,11 +18,11 @@ pub const MAX_EIGHT_LEVEL_EDGES: [f64; 7] = [-1.748, -1.05, -0.5006, 0.0, 0.5006
 /// `V` as `V` (the thesis, section 5.2, prints the two sides swapped; erratum `binary-1`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
-pub struct Grid {
+pub struct CellGrid {
     breakpoints: Vec<f64>,
 }
 
-impl TryFrom<Vec<f64>> for Grid {
+impl TryFrom<Vec<f64>> for CellGrid {
     type Error = Error;
 
     fn try_from(breakpoints: Vec<f64>) -> Result<Self, Error> {
@@ -30,13 +30,13 @@ impl TryFrom<Vec<f64>> for Grid {
     }
 }
 
-impl From<Grid> for Vec<f64> {
-    fn from(grid: Grid) -> Self {
+impl From<CellGrid> for Vec<f64> {
+    fn from(grid: CellGrid) -> Self {
         grid.breakpoints
     }
 }
 
-impl Grid {
+impl CellGrid {
     /// `2^bits` cells with edges at multiples of `2 V / 2^bits` from `-V`.
     ///
     /// # Errors
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn uniform_edges_are_symmetric() {
-        let grid = Grid::uniform(0.7, 4).unwrap();
+        let grid = CellGrid::uniform(0.7, 4).unwrap();
         assert_eq!((grid.cells(), grid.bits()), (16, Some(4)));
         assert!((0..15).all(|l| grid.breakpoints()[l] == -grid.breakpoints()[14 - l]));
         assert_relative_eq!(grid.breakpoints()[0], -0.7 + 1.4 / 16.0, max_relative = 1e-14);
@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn measurements_clip_to_the_outer_cells() {
-        let grid = Grid::uniform(1.0, 3).unwrap();
+        let grid = CellGrid::uniform(1.0, 3).unwrap();
         assert_eq!(grid.locate(f64::NEG_INFINITY).unwrap(), 0);
         assert_eq!(grid.locate(-7.0).unwrap(), 0);
         assert_eq!(grid.locate(0.0).unwrap(), 4);
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn noiseless_error_is_the_textbook_one() {
-        let uniform = Grid::uniform(1.0, 3)
+        let uniform = CellGrid::uniform(1.0, 3)
             .unwrap()
             .noiseless_mse(&Source::uniform(1.0).unwrap());
         assert_relative_eq!(uniform, 0.25 * 0.25 / 12.0, max_relative = 1e-12);
@@ -184,20 +184,20 @@ mod tests {
             * fewbits_quantizers::lloyd_max::gaussian_table(3)
                 .unwrap()
                 .mean_squared_error();
-        let optimal = Grid::lloyd_max(0.7, 3).unwrap().noiseless_mse(&source);
+        let optimal = CellGrid::lloyd_max(0.7, 3).unwrap().noiseless_mse(&source);
         assert_relative_eq!(optimal, exact, max_relative = 1e-10);
         // Four printed digits cost next to nothing at a minimum.
-        let printed = Grid::printed_gaussian(0.7).unwrap().noiseless_mse(&source);
+        let printed = CellGrid::printed_gaussian(0.7).unwrap().noiseless_mse(&source);
         assert!(printed > exact && printed < exact * (1.0 + 1e-5));
     }
 
     #[test]
     fn bad_grids_are_refused() {
-        assert!(Grid::uniform(1.0, 0).is_err());
-        assert!(Grid::uniform(1.0, 17).is_err());
-        assert!(Grid::uniform(f64::NAN, 3).is_err());
-        assert!(Grid::from_breakpoints(vec![]).is_err());
-        assert!(Grid::from_breakpoints(vec![0.0, 0.0]).is_err());
-        assert!(Grid::from_breakpoints(vec![f64::NEG_INFINITY, 0.0]).is_err());
+        assert!(CellGrid::uniform(1.0, 0).is_err());
+        assert!(CellGrid::uniform(1.0, 17).is_err());
+        assert!(CellGrid::uniform(f64::NAN, 3).is_err());
+        assert!(CellGrid::from_breakpoints(vec![]).is_err());
+        assert!(CellGrid::from_breakpoints(vec![0.0, 0.0]).is_err());
+        assert!(CellGrid::from_breakpoints(vec![f64::NEG_INFINITY, 0.0]).is_err());
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::patterns::grid::bits_in_range;
-use crate::{Grid, Pattern, PatternSensor};
+use crate::{CellGrid, Pattern, PatternSensor};
 use fewbits_numerics::error::refuse;
 
 /// Selects which natural patterns are XORed: the most significant of the `bits` binary digits selects pattern 1.
@@ -120,14 +120,14 @@ pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
 }
 
 /// Sensors of equal noise with the patterns of these masks.
-pub(crate) fn sensors_of(masks: &[Mask], grid: &Grid, noise_deviation: f64) -> Result<Vec<PatternSensor>, Error> {
+pub(crate) fn sensors_of(masks: &[Mask], grid: &CellGrid, noise_deviation: f64) -> Result<Vec<PatternSensor>, Error> {
     let bits = grid_bits(grid)?;
     let sensor = |mask: &Mask| PatternSensor::with_deviation(linear_pattern(*mask, bits)?.on(grid)?, noise_deviation);
     masks.iter().map(sensor).collect()
 }
 
 /// The grid's number of bits.
-pub(crate) fn grid_bits(grid: &Grid) -> Result<usize, Error> {
+pub(crate) fn grid_bits(grid: &CellGrid) -> Result<usize, Error> {
     match grid.bits() {
         Some(bits) => bits_in_range(bits),
         None => refuse("grid", format!("{} cells", grid.cells()), "a power of two of cells"),
@@ -172,7 +172,7 @@ mod tests {
         // Table 5.2 prints this one, which is no XOR of natural patterns.
         assert_eq!(mask_of(&"10001110".parse().unwrap()), None);
         assert_eq!(mask_of(&"010".parse().unwrap()), None);
-        let grid = Grid::uniform(0.3, 4).unwrap();
+        let grid = CellGrid::uniform(0.3, 4).unwrap();
         for mask in 1..16 {
             let pattern = linear_pattern(mask, 4).unwrap();
             assert_eq!(mask_of(&pattern), Some(mask));

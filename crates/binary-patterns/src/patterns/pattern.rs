@@ -1,7 +1,7 @@
 //! Bit patterns over the cells of a grid.
 
 use crate::Error;
-use crate::{BinaryQuantizer, Grid};
+use crate::{BinaryQuantizer, CellGrid};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::refuse;
 use serde::{Deserialize, Serialize};
@@ -54,7 +54,7 @@ impl Pattern {
     ///
     /// # Errors
     /// If the pattern has not as many bits as the grid has cells.
-    pub fn on(&self, grid: &Grid) -> Result<BinaryQuantizer, Error> {
+    pub fn on(&self, grid: &CellGrid) -> Result<BinaryQuantizer, Error> {
         if self.cells() != grid.cells() {
             return Err(Error::PatternLength {
                 pattern: self.cells(),
@@ -89,7 +89,7 @@ impl Pattern {
 
 impl Pattern {
     /// The pattern over `grid` that makes this quantizer, if all its breakpoints are the grid's (to `1e-9` of its extent).
-    pub fn of(quantizer: &BinaryQuantizer, grid: &Grid) -> Option<Self> {
+    pub fn of(quantizer: &BinaryQuantizer, grid: &CellGrid) -> Option<Self> {
         let edges = grid.breakpoints();
         let slack = 1e-9 * edges.iter().fold(0.0, |m, e| f64::max(m, e.abs()));
         let places = quantizer
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn runs_merge_into_thresholds() {
-        let grid = Grid::uniform(1.0, 2).unwrap();
+        let grid = CellGrid::uniform(1.0, 2).unwrap();
         assert_eq!(pattern("0110").on(&grid).unwrap().breakpoints(), [-0.5, 0.5]);
         assert_eq!(pattern("01100110").on(&grid), Err(Error::PatternLength { pattern: 8, grid: 4 }));
     }

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::observation::bank::CountTable;
 use crate::observation::source::{Kind, Nodes};
 use crate::patterns::grid::bits_in_range;
-use crate::{Bank, BinaryQuantizer, Grid, PatternSensor, Source, linear_pattern, natural_basis};
+use crate::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source, linear_pattern, natural_basis};
 use fewbits_numerics::error::{positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 
@@ -46,7 +46,7 @@ impl Luo {
         if allocation.contains(&0) {
             return refuse("sensors", sensors, format!("at least {} sensors", 1usize << (bits - 1)));
         }
-        let grid = Grid::uniform(half_width, bits)?;
+        let grid = CellGrid::uniform(half_width, bits)?;
         let quantizers = natural_basis(bits)?
             .into_iter()
             .map(|mask| linear_pattern(mask, bits)?.on(&grid))

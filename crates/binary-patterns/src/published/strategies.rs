@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::bounds::mean_information;
 use crate::patterns::linear::{grid_bits, sensors_of};
-use crate::{Bank, Grid, Mask, Source};
+use crate::{Bank, CellGrid, Mask, Source};
 use fewbits_numerics::error::refuse;
 
 /// Strategy 2: repeats the masks of a smaller optimum until there are `sensors` of them, in increasing order.
@@ -32,7 +32,7 @@ pub fn tile(masks: &[Mask], sensors: usize) -> Result<Vec<Mask>, Error> {
 /// are sensors.
 pub fn by_information(
     source: &Source,
-    grid: &Grid,
+    grid: &CellGrid,
     noise_deviation: f64,
     sensors: usize,
     forced: &[Mask],
@@ -69,7 +69,7 @@ mod tests {
     #[test]
     fn information_repeats_one_mask() {
         let source = Source::uniform(1.0).unwrap();
-        let grid = Grid::uniform(1.0, 3).unwrap();
+        let grid = CellGrid::uniform(1.0, 3).unwrap();
         let masks = by_information(&source, &grid, source.noise_deviation(20.0).unwrap(), 5, &[4, 6, 3]).unwrap();
         assert_eq!(masks, [1, 1, 3, 4, 6]);
         assert!(by_information(&source, &grid, 0.1, 2, &[4, 6, 3]).is_err());

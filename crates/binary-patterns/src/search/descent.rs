@@ -4,7 +4,7 @@ use super::outcomes::{Candidates, Outcomes};
 use crate::Error;
 use crate::error::at_most;
 use crate::observation::bank::{CountTable, MAX_OUTCOMES};
-use crate::{Bank, BinaryQuantizer, Grid, Pattern, PatternSensor, Source};
+use crate::{Bank, BinaryQuantizer, CellGrid, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
@@ -39,7 +39,7 @@ pub struct Descent {
 
 impl Descended {
     /// The pattern of each sensor over `grid`, if its breakpoints are the grid's; [`mask_of`](crate::mask_of) names a linear one.
-    pub fn patterns(&self, grid: &Grid) -> Vec<Option<Pattern>> {
+    pub fn patterns(&self, grid: &CellGrid) -> Vec<Option<Pattern>> {
         self.sensors.iter().map(|s| Pattern::of(s.quantizer(), grid)).collect()
     }
 }
@@ -256,7 +256,7 @@ mod tests {
     use crate::{linear_pattern, mask_of, rank};
     use approx::assert_relative_eq;
 
-    fn masks(grid: &Grid) -> Vec<BinaryQuantizer> {
+    fn masks(grid: &CellGrid) -> Vec<BinaryQuantizer> {
         let bits = grid.bits().unwrap();
         (1..1 << bits)
             .map(|m| linear_pattern(m, bits).unwrap().on(grid).unwrap())
@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn it_finds_the_exhaustive_optimum() {
         let source = Source::uniform(1.0).unwrap();
-        let grid = Grid::uniform(1.0, 3).unwrap();
+        let grid = CellGrid::uniform(1.0, 3).unwrap();
         for snr in [5.0, 18.2] {
             let noise = source.noise_deviation(snr).unwrap();
             let exact = LinearSearch::with_deviation(source, grid.clone(), noise, 6)
@@ -290,7 +290,7 @@ mod tests {
     #[test]
     fn unequal_sensors_and_asymmetric_patterns_are_evaluated_exactly() {
         let source = Source::uniform(1.0).unwrap();
-        let grid = Grid::uniform(1.0, 2).unwrap();
+        let grid = CellGrid::uniform(1.0, 2).unwrap();
         let all: Vec<_> = Pattern::all(4).unwrap().iter().map(|p| p.on(&grid).unwrap()).collect();
         let descent = Descent::with_deviations(source, vec![0.1, 0.4, 0.4], all.clone()).unwrap();
         let kernel = Kernel::new(&descent);
@@ -315,7 +315,7 @@ mod tests {
     #[test]
     fn bad_input_is_refused() {
         let source = Source::uniform(1.0).unwrap();
-        let candidates = masks(&Grid::uniform(1.0, 2).unwrap());
+        let candidates = masks(&CellGrid::uniform(1.0, 2).unwrap());
         assert!(Descent::with_deviations(source, vec![], candidates.clone()).is_err());
         assert!(Descent::with_deviations(source, vec![0.1], vec![]).is_err());
         assert!(Descent::with_deviations(source, vec![-0.1], candidates.clone()).is_err());

@@ -7,7 +7,7 @@ use crate::decoding::decoder::moments;
 use crate::observation::bank::IMPOSSIBLE;
 use crate::observation::source::Nodes;
 use crate::patterns::linear::sensors_of;
-use crate::{Bank, BinaryQuantizer, Grid, Mask, PatternSensor, Source};
+use crate::{Bank, BinaryQuantizer, CellGrid, Mask, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::error::{at_least_one, non_negative, refuse};
 use fewbits_numerics::normal::pdf;
@@ -82,7 +82,7 @@ pub fn free_breakpoints(
 /// As [`free_breakpoints`], and if a mask is out of the grid's range.
 pub fn free_breakpoints_of_masks(
     source: &Source,
-    grid: &Grid,
+    grid: &CellGrid,
     masks: &[Mask],
     noise_deviation: f64,
     jitter: f64,
@@ -342,7 +342,7 @@ mod tests {
     fn free_breakpoints_know_no_unit() {
         let run = |v: f64| {
             let source = Source::uniform(v).unwrap();
-            let grid = Grid::uniform(v, 3).unwrap();
+            let grid = CellGrid::uniform(v, 3).unwrap();
             let noise = source.noise_deviation(5.0).unwrap();
             let found = free_breakpoints_of_masks(&source, &grid, &[4, 4, 6], noise, 0.05, 2).unwrap();
             let start = sensors_of(&[4], &grid, noise).unwrap();

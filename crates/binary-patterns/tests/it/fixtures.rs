@@ -10,7 +10,7 @@ use fewbits_binary_patterns::published::{
 };
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet, free_breakpoints};
 use fewbits_binary_patterns::{
-    Bank, Decoder, Grid, Mask, Pattern, PatternSensor, Source, count, gray_basis, linear_pattern, natural_basis,
+    Bank, CellGrid, Decoder, Mask, Pattern, PatternSensor, Source, count, gray_basis, linear_pattern, natural_basis,
 };
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -27,15 +27,15 @@ fn gauss() -> Source {
     Source::gaussian_with_deviation(0.1f64.sqrt()).unwrap()
 }
 
-fn gauss_grid() -> Grid {
-    Grid::printed_gaussian(0.1f64.sqrt()).unwrap()
+fn gauss_grid() -> CellGrid {
+    CellGrid::printed_gaussian(0.1f64.sqrt()).unwrap()
 }
 
-fn grid(bits: usize) -> Grid {
-    Grid::uniform(1.0, bits).unwrap()
+fn grid(bits: usize) -> CellGrid {
+    CellGrid::uniform(1.0, bits).unwrap()
 }
 
-fn bank(source: Source, grid: &Grid, masks: &[Mask], snr: f64) -> Bank {
+fn bank(source: Source, grid: &CellGrid, masks: &[Mask], snr: f64) -> Bank {
     let noise = source.noise_deviation(snr).unwrap();
     let bits = grid.bits().unwrap();
     let quantizers = masks
@@ -45,7 +45,7 @@ fn bank(source: Source, grid: &Grid, masks: &[Mask], snr: f64) -> Bank {
     Bank::homogeneous_with_deviation(source, quantizers, noise).unwrap()
 }
 
-fn mmse(source: Source, grid: &Grid, masks: &[Mask], snr: f64) -> f64 {
+fn mmse(source: Source, grid: &CellGrid, masks: &[Mask], snr: f64) -> f64 {
     bank(source, grid, masks, snr).mmse().unwrap()
 }
 

@@ -2,7 +2,7 @@
 
 use fewbits_binary_patterns::bounds::{centralised_bound, remote_distortion};
 use fewbits_binary_patterns::published::bounded_mle;
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, Grid, PatternSensor, Source};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, Decoder, PatternSensor, Source};
 use fewbits_core::{Link, Observation, Scheme, factor::Factor, laws::wild};
 use proptest::prelude::*;
 
@@ -25,7 +25,7 @@ proptest! {
                 prop_assert!(!number.is_nan() && number >= 0.0, "{:?} {}: {}", source, x[1], number);
             }
         }
-        for grid in [Grid::uniform(x[0], bits), Grid::from_breakpoints(x[..count].to_vec()), Grid::lloyd_max(x[0], bits), Grid::printed_gaussian(x[0])].into_iter().flatten() {
+        for grid in [CellGrid::uniform(x[0], bits), CellGrid::from_breakpoints(x[..count].to_vec()), CellGrid::lloyd_max(x[0], bits), CellGrid::printed_gaussian(x[0])].into_iter().flatten() {
             prop_assert!(grid.breakpoints().iter().all(|b| b.is_finite()), "{:?}", grid);
             let _ = grid.locate(x[1]);
         }

@@ -2,7 +2,7 @@
 
 use fewbits_cfwmd::no_feedback::LocalSensor;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
-use fewbits_cfwmd::scheme::{CovarianceFeedback, Prediction};
+use fewbits_cfwmd::scheme::{CovarianceFeedback, PredictedBelief};
 use fewbits_core::{Gaussian, NumberFormat};
 use fewbits_models::{LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
@@ -45,7 +45,7 @@ fn told_half_width_is_that_of_covariance_feedback_to_the_bit() {
     let mut rng = Stream::new(4).rng();
     for _ in 0..500 {
         let (a, b, d) = (1.0 + rng.random::<f64>(), rng.random::<f64>(), 1.0 + 9.0 * rng.random::<f64>());
-        let told = Prediction(Gaussian::new(Vector2::zeros(), Matrix2::new(a, b, b, d)).unwrap());
+        let told = PredictedBelief(Gaussian::new(Vector2::zeros(), Matrix2::new(a, b, b, d)).unwrap());
         let width = half_width(&[1.0, 0.25], &[[a, b], [b, d]], 0.3, 1.7).unwrap();
         assert_eq!(width, scheme.under(&told).unwrap().rule().half_width());
     }

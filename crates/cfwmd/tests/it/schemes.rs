@@ -4,7 +4,7 @@ use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::LocalSensor;
 use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::rule::CensoringRule;
-use fewbits_cfwmd::scheme::{Censoring, CovarianceFeedback, Prediction};
+use fewbits_cfwmd::scheme::{Censoring, CovarianceFeedback, PredictedBelief};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::laws::factor::tilted_is_quadrature;
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
@@ -99,9 +99,9 @@ fn censoring_with_state_feedback_is_lawful() {
 fn covariance_feedback_and_the_random_trigger_are_lawful() {
     let scheme = CovarianceFeedback::new(position(), 0.45, NumberFormat::Double).unwrap();
     let told = Gaussian::new(Vector2::new(0.5, 2.0), Matrix2::new(2.0, 0.4, 0.4, 1.0)).unwrap();
-    scalar_laws(&scheme, &Prediction(told), 1.3, Vector1::new);
-    draws_nothing(&scheme, &Prediction(told), Vector1::new(0.5));
-    assert_eq!(round_trip(&Prediction(told), &NumberFormat::Double).unwrap(), 5 * 64);
+    scalar_laws(&scheme, &PredictedBelief(told), 1.3, Vector1::new);
+    draws_nothing(&scheme, &PredictedBelief(told), Vector1::new(0.5));
+    assert_eq!(round_trip(&PredictedBelief(told), &NumberFormat::Double).unwrap(), 5 * 64);
     assert!(CovarianceFeedback::new(position(), -1.0, NumberFormat::Double).is_err());
 
     let trigger = StochasticTrigger::for_rate(0.4, 2.4).unwrap();
@@ -239,7 +239,7 @@ proptest! {
     fn broadcasts_decode_totally(bytes in prop::collection::vec(any::<u8>(), 0..48), cut in 0..8usize) {
         let bits = BitString::from_bytes(bytes.clone(), (bytes.len() * 8).saturating_sub(cut)).unwrap();
         for format in [NumberFormat::Double, NumberFormat::Single, NumberFormat::fixed(-5.0, 5.0, 12).unwrap()] {
-            let _ = decoding_is_total::<Prediction<2>>(&bits, &format);
+            let _ = decoding_is_total::<PredictedBelief<2>>(&bits, &format);
         }
     }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Uniform nodes of a trapezoid rule.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
-pub struct Grid {
+pub struct UniformGrid {
     #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
     #[serde(with = "fewbits_numerics::stored")]
@@ -16,7 +16,7 @@ pub struct Grid {
     points: usize,
 }
 
-stored! { #[serde(rename = "Grid")] Grid as Stored {
+stored! { #[serde(rename = "Grid")] UniformGrid as Stored {
     #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
     #[serde(with = "fewbits_numerics::stored")]
@@ -26,7 +26,7 @@ stored! { #[serde(rename = "Grid")] Grid as Stored {
     if !(2..=MOST).contains(&points) {
         return refuse("points", points, format!("2 to {MOST} nodes"));
     }
-    Grid::of_nodes(finite("lower", lower)?, spacing, points)
+    UniformGrid::of_nodes(finite("lower", lower)?, spacing, points)
 }, Error }
 
 /// Most nodes of a grid.
@@ -35,7 +35,7 @@ const MOST: usize = 1_000_000;
 /// Largest width of a grid, and size of a belief over a lattice: squares of distances are still finite.
 pub(super) const WIDEST: f64 = 1e153;
 
-impl Grid {
+impl UniformGrid {
     /// Refuses nodes over which the moments of a density overflow. A density is at most the reciprocal of the spacing.
     fn of_nodes(lower: f64, spacing: f64, points: usize) -> Result<Self, Error> {
         let grid = Self {
@@ -71,7 +71,7 @@ impl Grid {
     /// Nodes symmetric about zero, zero included, out to `half_width` or just beyond.
     ///
     /// # Errors
-    /// As [`Grid::new`].
+    /// As [`UniformGrid::new`].
     pub fn symmetric(half_width: f64, spacing: f64) -> Result<Self, Error> {
         let half = (positive("half_width", half_width)? / positive("spacing", spacing)?).ceil() * spacing;
         let mut grid = Self::new(-half, half, spacing)?;

@@ -1,6 +1,6 @@
 //! A density on a line.
 
-use super::axis::Grid;
+use super::axis::UniformGrid;
 use crate::Error;
 use crate::particles::weights::Categorical;
 use fewbits_core::{Belief, ColumnsMut, Density, Likelihood};
@@ -11,18 +11,18 @@ use nalgebra::{Matrix1, Vector1};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// A density held by its values at the nodes of a [`Grid`].
+/// A density held by its values at the nodes of a [`UniformGrid`].
 /// Between the nodes it is linear.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
 pub struct PointMass {
-    grid: Grid,
+    grid: UniformGrid,
     #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
 }
 
 stored! { #[serde(rename = "PointMass")] PointMass as Stored {
-    grid: Grid,
+    grid: UniformGrid,
     #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
 } => check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density }), Error }
@@ -75,7 +75,7 @@ impl PointMass {
     ///
     /// # Errors
     /// [`fewbits_core::Error::Impossible`] if that is zero at every node.
-    pub fn new(grid: Grid, log_density: impl Fn(f64) -> f64) -> Result<Self, Error> {
+    pub fn new(grid: UniformGrid, log_density: impl Fn(f64) -> f64) -> Result<Self, Error> {
         let mut mass = Self {
             grid,
             density: vec![1.0; grid.points()],
@@ -88,14 +88,14 @@ impl PointMass {
     ///
     /// # Errors
     /// A variance that is not positive; [`fewbits_core::Error::Impossible`] if it lies off the grid.
-    pub fn normal(grid: Grid, mean: f64, variance: f64) -> Result<Self, Error> {
+    pub fn normal(grid: UniformGrid, mean: f64, variance: f64) -> Result<Self, Error> {
         finite("mean", mean)?;
         positive("variance", variance)?;
         Self::new(grid, |x| log_pdf_with(x, mean, variance))
     }
 
     /// The nodes.
-    pub fn grid(&self) -> &Grid {
+    pub fn grid(&self) -> &UniformGrid {
         &self.grid
     }
 

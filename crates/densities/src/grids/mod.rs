@@ -4,6 +4,6 @@ mod axis;
 mod line;
 mod plane;
 
-pub use axis::Grid;
+pub use axis::UniformGrid;
 pub use line::PointMass;
 pub use plane::PlaneMass;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// The kernel's width in standard deviations of the sample, as a function of its size `n` and the dimension `d`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub enum Rule {
+pub enum BandwidthRule {
     /// `(4 / ((d + 2) n))^(1 / (d + 4))`: best in mean integrated squared error if the density is Gaussian (Silverman 1986, 4.14).
     Silverman,
     /// `n^(-1 / (d + 4))` (Scott 1992).
@@ -52,7 +52,7 @@ pub enum Shape {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
     /// The rule.
-    pub rule: Rule,
+    pub rule: BandwidthRule,
     /// Which sample size it is given.
     pub size: SampleSize,
     /// The kernel's shape.
@@ -68,7 +68,7 @@ impl Default for Bandwidth {
     /// Silverman's rule with the number of particles, diagonal, factor 1, no floor.
     fn default() -> Self {
         Self {
-            rule: Rule::Silverman,
+            rule: BandwidthRule::Silverman,
             size: SampleSize::Count,
             shape: Shape::Diagonal,
             factor: 1.0,
@@ -90,9 +90,9 @@ impl Bandwidth {
         positive("n", n)?;
         let d = D as f64;
         let h = match self.rule {
-            Rule::Silverman => (4.0 / ((d + 2.0) * n)).powf(1.0 / (d + 4.0)),
-            Rule::Scott => n.powf(-1.0 / (d + 4.0)),
-            Rule::Power { exponent } => n.powf(-non_negative("exponent", exponent)?),
+            BandwidthRule::Silverman => (4.0 / ((d + 2.0) * n)).powf(1.0 / (d + 4.0)),
+            BandwidthRule::Scott => n.powf(-1.0 / (d + 4.0)),
+            BandwidthRule::Power { exponent } => n.powf(-non_negative("exponent", exponent)?),
         };
         Ok(self.factor * h)
     }
@@ -236,7 +236,7 @@ mod tests {
             ..Bandwidth::default()
         };
         // Silverman's constants: 1.06 in one dimension, 0.97 in three.
-        let silverman = with(Rule::Silverman);
+        let silverman = with(BandwidthRule::Silverman);
         assert!(
             (silverman.width::<1>(200.0).unwrap() / (1.3 * 1.059_223_841_048_812 * 200.0_f64.powf(-0.2)) - 1.0).abs()
                 < 1e-14
@@ -246,10 +246,16 @@ mod tests {
                 .abs()
                 < 1e-12
         );
-        assert!((with(Rule::Scott).width::<3>(128.0).unwrap() - 1.3 * 0.5).abs() < 1e-14);
-        assert!((with(Rule::Power { exponent: 0.25 }).width::<3>(81.0).unwrap() - 1.3 / 3.0).abs() < 1e-14);
-        assert!(with(Rule::Power { exponent: -0.1 }).width::<3>(81.0).is_err() && silverman.width::<1>(0.0).is_err());
-        assert!((with(Rule::Scott).width::<2>(500.0).unwrap() - silverman.width::<2>(500.0).unwrap()).abs() < 1e-15);
+        assert!((with(BandwidthRule::Scott).width::<3>(128.0).unwrap() - 1.3 * 0.5).abs() < 1e-14);
+        assert!((with(BandwidthRule::Power { exponent: 0.25 }).width::<3>(81.0).unwrap() - 1.3 / 3.0).abs() < 1e-14);
+        assert!(
+            with(BandwidthRule::Power { exponent: -0.1 }).width::<3>(81.0).is_err()
+                && silverman.width::<1>(0.0).is_err()
+        );
+        assert!(
+            (with(BandwidthRule::Scott).width::<2>(500.0).unwrap() - silverman.width::<2>(500.0).unwrap()).abs()
+                < 1e-15
+        );
         let none = Bandwidth {
             factor: 0.0,
             ..silverman

@@ -3,7 +3,7 @@
 mod bandwidth;
 mod sums;
 
-pub use bandwidth::{Bandwidth, Rule, SampleSize, Shape};
+pub use bandwidth::{Bandwidth, BandwidthRule, SampleSize, Shape};
 pub use sums::add_cross_sums;
 
 use crate::Error;

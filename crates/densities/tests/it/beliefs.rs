@@ -2,7 +2,7 @@
 
 use crate::common::{crescent, d1, random_mixture};
 use fewbits_core::{Density, Gaussian, laws};
-use fewbits_densities::{Component, Grid, KernelEstimate, Mixture, PointMass, ellipse};
+use fewbits_densities::{Component, KernelEstimate, Mixture, PointMass, UniformGrid, ellipse};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, Matrix2, SVector, Vector1, Vector2};
 
@@ -319,7 +319,7 @@ fn bad_mixtures_are_refused_by_name() {
 
 #[test]
 fn a_grid_holds_the_density_at_its_nodes() {
-    let belief = PointMass::normal(Grid::symmetric(8.0, 0.1).unwrap(), 0.3, 1.5).unwrap();
+    let belief = PointMass::normal(UniformGrid::symmetric(8.0, 0.1).unwrap(), 0.3, 1.5).unwrap();
     assert_eq!(belief.density().len(), belief.grid().nodes().count());
     for (x, density) in belief.grid().nodes().zip(belief.density()) {
         let exact = (-0.5 * (x - 0.3_f64).powi(2) / 1.5).exp() / (std::f64::consts::TAU * 1.5).sqrt();

@@ -1,7 +1,7 @@
 //! Grids on a line and over the plane against closed forms of normals.
 
 use fewbits_core::{Belief, Density, Error as CoreError, Gaussian, Likelihood};
-use fewbits_densities::{Error, Grid, PlaneMass, PointMass};
+use fewbits_densities::{Error, PlaneMass, PointMass, UniformGrid};
 use nalgebra::{Matrix2, SVector, Vector1, Vector2};
 use std::f64::consts::TAU;
 
@@ -34,12 +34,12 @@ impl<const D: usize> Measured<D> {
 
 #[test]
 fn nodes_are_where_they_are_said_to_be() {
-    let grid = Grid::new(-1.3, 2.0, 0.7).unwrap();
+    let grid = UniformGrid::new(-1.3, 2.0, 0.7).unwrap();
     assert_eq!((grid.points(), grid.spacing()), (6, 0.7));
     assert!((grid.node(5) - 2.2).abs() < 1e-15 && grid.nodes().eq((0..6).map(|i| grid.node(i))));
-    assert_eq!(Grid::new(0.0, 3.0, 0.75).unwrap().points(), 5);
+    assert_eq!(UniformGrid::new(0.0, 3.0, 0.75).unwrap().points(), 5);
     for (half, spacing, points) in [(1.0, 0.3, 9), (1.2, 0.4, 7), (0.1, 0.3, 3), (3e4, 1e4, 7)] {
-        let grid = Grid::symmetric(half, spacing).unwrap();
+        let grid = UniformGrid::symmetric(half, spacing).unwrap();
         assert_eq!(grid.points(), points);
         for i in 0..points {
             assert!((grid.node(i) + grid.node(points - 1 - i)).abs() < 1e-12 * half);
@@ -70,15 +70,15 @@ fn nodes_are_where_they_are_said_to_be() {
     assert!(
         refused
             .iter()
-            .all(|(lower, upper, spacing)| Grid::new(*lower, *upper, *spacing).is_err())
+            .all(|(lower, upper, spacing)| UniformGrid::new(*lower, *upper, *spacing).is_err())
     );
     assert!(
-        Grid::new(0.0, 1.0, 1.1e-6).is_ok()
-            && Grid::symmetric(0.0, 1.0).is_err()
-            && Grid::symmetric(1.0, -1.0).is_err()
+        UniformGrid::new(0.0, 1.0, 1.1e-6).is_ok()
+            && UniformGrid::symmetric(0.0, 1.0).is_err()
+            && UniformGrid::symmetric(1.0, -1.0).is_err()
     );
     // Stored ones are checked alike: bounds must be numbers, not their products.
-    let stored = |text: &str| serde_json::from_str::<Grid>(text);
+    let stored = |text: &str| serde_json::from_str::<UniformGrid>(text);
     assert_eq!(stored(r#"{"lower":1e200,"spacing":1e150,"points":3}"#).unwrap().node(0), 1e200);
     assert!(stored(r#"{"lower":1.7e308,"spacing":1e307,"points":3}"#).is_err());
     assert!(stored(r#"{"lower":0.0,"spacing":1e308,"points":3}"#).is_err());
@@ -93,8 +93,9 @@ fn on_a_line_bayes_rule_is_kalmans() {
             value: 2.9 * unit,
             variance: 0.8 * unit * unit,
         };
-        let prior = PointMass::normal(Grid::symmetric(12.0 * unit, 0.2 * unit).unwrap(), 0.3 * unit, 1.6 * unit * unit)
-            .unwrap();
+        let prior =
+            PointMass::normal(UniformGrid::symmetric(12.0 * unit, 0.2 * unit).unwrap(), 0.3 * unit, 1.6 * unit * unit)
+                .unwrap();
         let (exact, log) = measured.posterior(&Vector1::new(0.3 * unit), &nalgebra::Matrix1::new(1.6 * unit * unit));
         let mut belief = prior.clone();
         assert!((belief.update(&measured).unwrap() - log).abs() < 1e-9);
@@ -132,7 +133,7 @@ fn on_a_line_bayes_rule_is_kalmans() {
 #[test]
 fn what_is_impossible_leaves_a_density_behind() {
     let impossible = |result: Result<f64, Error>| matches!(result, Err(Error::Core(CoreError::Impossible)));
-    let grid = Grid::new(0.0, 2.0, 0.5).unwrap();
+    let grid = UniformGrid::new(0.0, 2.0, 0.5).unwrap();
     let mut belief = PointMass::new(grid, |x| -x).unwrap();
     let before = belief.clone();
     let no_number = |result: Result<f64, Error>| matches!(result, Err(Error::Core(CoreError::NotANumber { .. })));
@@ -254,7 +255,7 @@ fn lattices_that_cannot_be_are_refused_by_name() {
 /// Defect: the density at a distance whose quotient by the spacing overflows was NaN.
 #[test]
 fn density_at_the_largest_number_is_zero() {
-    let line = PointMass::normal(Grid::symmetric(6.0, 0.25).unwrap(), 0.0, 1.0).unwrap();
+    let line = PointMass::normal(UniformGrid::symmetric(6.0, 0.25).unwrap(), 0.0, 1.0).unwrap();
     let belief = Gaussian::new(Vector2::zeros(), Matrix2::identity()).unwrap();
     let plane = PlaneMass::normal(&(Matrix2::identity() * 0.5), &belief).unwrap();
     for x in [f64::MAX, f64::MIN] {

@@ -1,7 +1,7 @@
 //! The laws of beliefs, run on particles, clouds and grids, and their way through JSON.
 
 use fewbits_core::{Belief, Gaussian, laws};
-use fewbits_densities::{GaussianCloud, Grid, Particles, PlaneMass, PointMass};
+use fewbits_densities::{GaussianCloud, Particles, PlaneMass, PointMass, UniformGrid};
 use nalgebra::{Matrix2, SMatrix, Vector2};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -26,7 +26,7 @@ fn weighted(scale: f64) -> Particles<2> {
 }
 
 fn bumpy(scale: f64) -> PointMass {
-    let grid = Grid::symmetric(6.0 * scale, 0.2 * scale).unwrap();
+    let grid = UniformGrid::symmetric(6.0 * scale, 0.2 * scale).unwrap();
     let log_density = |x: f64| (x / scale).sin() - 0.5 * (x / scale).powi(2);
     PointMass::new(grid, log_density).unwrap()
 }
@@ -84,7 +84,7 @@ fn densities_integrate_to_one() {
 
 #[test]
 fn grids_hold_the_moments_of_a_normal() {
-    let grid = Grid::symmetric(12.0, 0.4).unwrap();
+    let grid = UniformGrid::symmetric(12.0, 0.4).unwrap();
     let line = PointMass::normal(grid, 0.7, 1.3).unwrap();
     assert!((line.mean() - 0.7).abs() < 1e-12 && (line.variance() - 1.3).abs() < 1e-11);
     let belief = Gaussian::new(Vector2::new(2.0, -1.0), Matrix2::new(2.0, 0.6, 0.6, 1.0)).unwrap();
@@ -126,8 +126,8 @@ fn what_is_no_belief_is_refused() {
     );
     let wrong = r#"{"columns":[[1.0,2.0]],"weights":[0.5,0.5],"log_weights":[0.0,-1.0]}"#;
     refused(&format!(r#"{{"means":{wrong},"covariance":[1.0]}}"#), "log_weights");
-    assert!(serde_json::from_str::<Grid>(r#"{"lower":0.0,"spacing":0.0,"points":3}"#).is_err());
-    assert!(serde_json::from_str::<Grid>(r#"{"lower":0.0,"spacing":1.0,"points":1}"#).is_err());
+    assert!(serde_json::from_str::<UniformGrid>(r#"{"lower":0.0,"spacing":0.0,"points":3}"#).is_err());
+    assert!(serde_json::from_str::<UniformGrid>(r#"{"lower":0.0,"spacing":1.0,"points":1}"#).is_err());
     let grid = r#"{"lower":0.0,"spacing":1.0,"points":3}"#;
     for density in ["[0.5,0.5]", "[1.5,-0.5,0.0]", "[1.0,1.0,1.0]"] {
         assert!(serde_json::from_str::<PointMass>(&format!(r#"{{"grid":{grid},"density":{density}}}"#)).is_err());

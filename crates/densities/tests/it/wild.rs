@@ -3,7 +3,7 @@
 use fewbits_core::laws::wild;
 use fewbits_core::{Density, Gaussian};
 use fewbits_densities::{
-    Bandwidth, Component, GaussianCloud, Grid, KernelEstimate, Mixture, Particles, PlaneMass, PointMass,
+    Bandwidth, Component, GaussianCloud, KernelEstimate, Mixture, Particles, PlaneMass, PointMass, UniformGrid,
 };
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Vector2};
@@ -82,7 +82,7 @@ proptest! {
     fn grids_hold_numbers_and_survive_failed_steps(x in prop::array::uniform8(wild())) {
         // The number of nodes is the width over the spacing; a grid of more than a few thousand is not the point here.
         let modest = (x[1] - x[0]).abs() < 2000.0 * x[2].abs();
-        let grid = if modest { Grid::new(x[0], x[1], x[2]).ok() } else { None }.unwrap_or(Grid::symmetric(6.0, 0.25).unwrap());
+        let grid = if modest { UniformGrid::new(x[0], x[1], x[2]).ok() } else { None }.unwrap_or(UniformGrid::symmetric(6.0, 0.25).unwrap());
         for before in [PointMass::new(grid, |t| -t * t * x[3]), PointMass::normal(grid, x[3], x[4])].into_iter().flatten() {
             prop_assert!(before.mean().is_finite() && before.variance() >= 0.0, "{:?}", before);
             let mut density = before.clone();

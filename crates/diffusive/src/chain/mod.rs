@@ -14,7 +14,7 @@ use crate::message::{Contract, Packet, Wire};
 use crate::model_grid::ModelGrid;
 use crate::posterior::Posterior;
 use crate::project::{Form, Travelling, project};
-use crate::select::{Rule, Selector};
+use crate::select::{SelectionRule, Selector};
 use crate::{Error, RateModel, Record, SourceLikelihood, SourceSensor};
 use alternatives::{Alternative, log_evidence, mixed, mixed_fit, most_probable};
 use fewbits_core::{Gaussian, Message};
@@ -47,7 +47,7 @@ pub struct Search {
     /// Form of the messages.
     pub form: Form,
     /// How the next node is chosen.
-    pub rule: Rule,
+    pub rule: SelectionRule,
     /// The search has converged when the determinant of the position's covariance falls below this, m^4.
     pub threshold: f64,
     /// The most nodes that sample.
@@ -90,7 +90,7 @@ impl Search {
             search,
             rate,
             form: Form::Raw,
-            rule: Rule::default(),
+            rule: SelectionRule::default(),
             threshold,
             most_nodes: 40,
             stall: None,
@@ -235,7 +235,7 @@ impl Search {
                     outcome.status = ending(Status::Exhausted);
                 } else {
                     let rule = if self.stalled(&outcome.steps) {
-                        Rule::MutualInformation
+                        SelectionRule::MutualInformation
                     } else {
                         self.rule
                     };

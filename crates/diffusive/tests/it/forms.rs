@@ -7,7 +7,8 @@ use fewbits_diffusive::density::MixtureFit;
 use fewbits_diffusive::density::laplace::Peak;
 use fewbits_diffusive::density::polynomials::{hermite, multi_indices};
 use fewbits_diffusive::{
-    Form, Outcome, PositionBelief, Posterior, RateModel, Rule, Selector, SourceLikelihood, Status, Travelling, project,
+    Form, Outcome, PositionBelief, Posterior, RateModel, SelectionRule, Selector, SourceLikelihood, Status, Travelling,
+    project,
 };
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Vector2};
 
@@ -16,7 +17,8 @@ const DEPLOYMENTS: u64 = 12;
 /// The exact search until so many nodes have sampled.
 fn exact(seed: u64, nodes: usize) -> Option<(Posterior, Outcome)> {
     let mut outcome = run(seed, 1.0, false, 300, |search| {
-        (search.rule, search.most_nodes, search.threshold, search.refusal) = (Rule::Mahalanobis, nodes, 1e-300, None);
+        (search.rule, search.most_nodes, search.threshold, search.refusal) =
+            (SelectionRule::Mahalanobis, nodes, 1e-300, None);
     });
     Some((outcome.posterior.take()?, outcome))
 }
@@ -225,7 +227,11 @@ fn searches_by_information_stall_less_than_by_distance() {
         };
         (0..DEPLOYMENTS).filter_map(search).collect()
     };
-    let rules = [Rule::MutualInformation, Rule::PairwiseInformation, Rule::Mahalanobis];
+    let rules = [
+        SelectionRule::MutualInformation,
+        SelectionRule::PairwiseInformation,
+        SelectionRule::Mahalanobis,
+    ];
     let [information, pairwise, distance] = rules.map(nodes);
     assert!(information.len() >= distance.len(), "{information:?} {distance:?}");
     let (own, n) = (mean(&information), information.len() as f64);
@@ -251,7 +257,11 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 /// how far the rule overrates (nats). Erratum `diffusive-16`.
 #[test]
 fn the_pairwise_bound_ranks_as_exact_information_does() {
-    let rules = [Rule::PairwiseInformation, Rule::MutualInformation, Rule::Mahalanobis];
+    let rules = [
+        SelectionRule::PairwiseInformation,
+        SelectionRule::MutualInformation,
+        SelectionRule::Mahalanobis,
+    ];
     let one = |seed| {
         let (posterior, outcome) = exact(seed, 3).unwrap();
         let (estimate, last) = (outcome.steps[2].estimate, *outcome.records[2].node());
@@ -263,7 +273,7 @@ fn the_pairwise_bound_ranks_as_exact_information_does() {
                 .map(|place| selector.score(&sensor(1.0, false), &place))
                 .collect()
         };
-        let exact = scores(Rule::ExactInformation);
+        let exact = scores(SelectionRule::ExactInformation);
         let best = exact.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         rules.map(|rule| {
             let own = scores(rule);

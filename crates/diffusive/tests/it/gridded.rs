@@ -5,7 +5,8 @@ use fewbits_core::{Belief, Gaussian};
 use fewbits_diffusion::{Plan, PotentialFlow, Scheme, SensorField, Transport};
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
-    Envelope, Error, Form, Outcome, Posterior, Prior, Rule, Search, SearchBox, SourceLikelihood, SourceSensor, Status,
+    Envelope, Error, Form, Outcome, Posterior, Prior, Search, SearchBox, SelectionRule, SourceLikelihood, SourceSensor,
+    Status,
 };
 use fewbits_models::SourceModel;
 use fewbits_models::diffusion::{Air, Ground};
@@ -77,7 +78,7 @@ fn run(seed: u64, model: &SourceSensor, truth: &SourceSensor, change: impl FnOnc
 #[test]
 fn every_rule_finds_the_source_behind_the_wall() {
     let model = sensor(field(2));
-    for rule in [Rule::MutualInformation, Rule::CramerRao] {
+    for rule in [SelectionRule::MutualInformation, SelectionRule::CramerRao] {
         let outcome = run(1, &model, &model, |search| search.rule = rule);
         let error = (outcome.estimate().unwrap().mean() - Vector2::from(SOURCE)).norm();
         assert!(error < 0.25, "{rule:?}: {:?} {error}", outcome.status);
@@ -88,7 +89,8 @@ fn every_rule_finds_the_source_behind_the_wall() {
 fn every_form_travels_through_rooms() {
     let model = sensor(field(2));
     for form in [Form::Raw, Form::Mixture(4)] {
-        let outcome = run(2, &model, &model, |search| (search.form, search.rule) = (form, Rule::MutualInformation));
+        let outcome =
+            run(2, &model, &model, |search| (search.form, search.rule) = (form, SelectionRule::MutualInformation));
         let error = (outcome.estimate().unwrap().mean() - Vector2::from(SOURCE)).norm();
         assert!(error < 0.5, "{form:?}: {:?} {error}", outcome.status);
     }

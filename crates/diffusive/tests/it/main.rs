@@ -27,17 +27,17 @@ mod slices;
 mod unknown_models;
 mod wild;
 
-use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};
+use fewbits_diffusive::{RateModel, RateRange, SearchBox, SelectionRule, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
 use nalgebra::Vector3;
 
 /// The rules that searches choose by.
-const RULES: [Rule; 5] = [
-    Rule::MutualInformation,
-    Rule::PairwiseInformation,
-    Rule::CramerRao,
-    Rule::Mahalanobis,
-    Rule::Covariance,
+const RULES: [SelectionRule; 5] = [
+    SelectionRule::MutualInformation,
+    SelectionRule::PairwiseInformation,
+    SelectionRule::CramerRao,
+    SelectionRule::Mahalanobis,
+    SelectionRule::Covariance,
 ];
 
 /// The air of example B of the paper, in other units of length if asked for.

@@ -2,7 +2,9 @@
 
 use super::{RULES, field, joint, sensor};
 use fewbits_diffusive::message::{SampleCode, Wire};
-use fewbits_diffusive::{Envelope, Form, Outcome, RateModel, Rule, Search, Selector, SourceLikelihood, Status};
+use fewbits_diffusive::{
+    Envelope, Form, Outcome, RateModel, Search, SelectionRule, Selector, SourceLikelihood, Status,
+};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::Vector2;
@@ -34,17 +36,17 @@ fn error(outcome: &Outcome) -> f64 {
 #[test]
 fn every_form_and_rule_finds_the_source() {
     for (form, rate, rule, windy) in [
-        (Form::Raw, joint(), Rule::MutualInformation, false),
-        (Form::Raw, joint(), Rule::MutualInformation, true),
-        (Form::Mixture(4), joint(), Rule::CramerRao, false),
-        (Form::Mixture(4), joint(), Rule::Covariance, false),
+        (Form::Raw, joint(), SelectionRule::MutualInformation, false),
+        (Form::Raw, joint(), SelectionRule::MutualInformation, true),
+        (Form::Mixture(4), joint(), SelectionRule::CramerRao, false),
+        (Form::Mixture(4), joint(), SelectionRule::Covariance, false),
         (
             Form::Lpg {
                 components: 2,
                 degree: 5,
             },
             RateModel::Known(1.0),
-            Rule::Mahalanobis,
+            SelectionRule::Mahalanobis,
             false,
         ),
         (
@@ -53,10 +55,10 @@ fn every_form_and_rule_finds_the_source() {
                 degree: 5,
             },
             joint(),
-            Rule::PairwiseInformation,
+            SelectionRule::PairwiseInformation,
             false,
         ),
-        (Form::Particles(25), RateModel::Known(1.0), Rule::MutualInformation, false),
+        (Form::Particles(25), RateModel::Known(1.0), SelectionRule::MutualInformation, false),
     ] {
         let outcome = run(3, 1.0, windy, 300, |search| {
             (search.form, search.rate, search.rule) = (form, rate, rule);
@@ -131,7 +133,7 @@ fn a_stalled_search_turns_to_information() {
         let all: Vec<usize> = (0..6)
             .map(|seed| {
                 run(seed, 1.0, true, 300, |search| {
-                    (search.rule, search.stall, search.most_nodes) = (Rule::Mahalanobis, stall, 20);
+                    (search.rule, search.stall, search.most_nodes) = (SelectionRule::Mahalanobis, stall, 20);
                 })
                 .steps
                 .len()
@@ -182,9 +184,9 @@ fn selectors_score_candidates() {
     for x in [48.0, 56.0, 70.0] {
         // Of the same belief, though over fewer points.
         let (lower, exact, upper) = (
-            score(Rule::PairwiseInformation, x),
-            score(Rule::ExactInformation, x),
-            score(Rule::MutualInformation, x),
+            score(SelectionRule::PairwiseInformation, x),
+            score(SelectionRule::ExactInformation, x),
+            score(SelectionRule::MutualInformation, x),
         );
         assert!(lower < exact + 0.1 && exact < upper + 0.1, "{lower} {exact} {upper}");
     }

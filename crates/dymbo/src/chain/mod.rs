@@ -32,7 +32,7 @@ pub use stationary::{
 pub use transient::{TransientStep, first_message_transient};
 
 use crate::{Error, ScalarPlant};
-use fewbits_filters::Grid;
+use fewbits_filters::UniformGrid;
 use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::normal::{self, INV_SQRT_2PI};
 use std::f64::consts::FRAC_2_PI;
@@ -60,12 +60,12 @@ const MOST_KERNELS: f64 = 2e7;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorChain {
     plant: ScalarPlant,
-    grid: Grid,
+    grid: UniformGrid,
     density: Vec<f64>,
 }
 
 impl ErrorChain {
-    fn grid(plant: &ScalarPlant, half_width: f64) -> Result<Grid, Error> {
+    fn grid(plant: &ScalarPlant, half_width: f64) -> Result<UniformGrid, Error> {
         let finest = positive("process_variance", plant.process_variance())?
             .min(plant.measurement_variance())
             .sqrt();
@@ -74,7 +74,7 @@ impl ErrorChain {
             let expected = "enough process noise for a grid of at most 40000 points";
             return Err(ArgumentError::new("process_variance", plant.process_variance(), expected).into());
         }
-        Ok(Grid::symmetric(half_width, spacing)?)
+        Ok(UniformGrid::symmetric(half_width, spacing)?)
     }
 
     /// The chain after one prediction from a normal filtered error of variance `filtered_variance`.

@@ -12,7 +12,7 @@ use fewbits_dymbo::{
     ScalarPlant, SignFilter, filtered_variance, first_message_mse, first_message_value, sign_bit, steady, tree,
 };
 use fewbits_filters::{
-    Grid, PointMass, PointMassFilter, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
+    PointMass, PointMassFilter, UniformGrid, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
 };
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_quantizers::lloyd_max::gaussian_table;
@@ -343,7 +343,7 @@ fn regress_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let first = scheme
         .factor(&(), &Observation::Received(message), &Link::PERFECT)
         .unwrap();
-    let exact = PointMassFilter::new(plant.dynamics(), Grid::symmetric(16.0, 0.05).unwrap()).unwrap();
+    let exact = PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(16.0, 0.05).unwrap()).unwrap();
     let mut density = PointMass::new(*exact.grid(), |theta| first.log_likelihood(&[theta].into())).unwrap();
     let (mut bits, mut means, mut exact_moments) = (vec![], vec![belief.mean()[0]], vec![]);
     for sample in &x[1..] {

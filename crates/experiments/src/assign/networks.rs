@@ -2,8 +2,7 @@
 
 use crate::prelude::*;
 use fewbits_sensor_assignment::{
-    CodedSensors, Estimator, all_errors, by_precision, exchange, pair_costs,
-    variances_with_moments,
+    CodedSensors, Estimator, all_errors, by_precision, exchange, pair_costs, variances_with_moments,
 };
 use rand_distr::{Distribution, StandardNormal};
 

@@ -14,7 +14,7 @@ mod table5_2;
 use crate::AnyFigure;
 use crate::prelude::*;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
-use fewbits_binary_patterns::{Bank, Grid, Mask, Pattern, Source, linear_pattern, rank};
+use fewbits_binary_patterns::{Bank, CellGrid, Mask, Pattern, Source, linear_pattern, rank};
 use fewbits_monte_carlo::parallel;
 
 /// The figures of this system, in the order of the publication.
@@ -46,7 +46,7 @@ const GAUSSIAN_VARIANCE: f64 = 0.1;
 #[derive(Clone)]
 struct Scene {
     source: Source,
-    grid: Grid,
+    grid: CellGrid,
     noise: f64,
 }
 
@@ -54,7 +54,7 @@ impl Scene {
     /// Uniform on `[-1, 1]` over `2^bits` cells.
     fn uniform(bits: usize, snr_db: f64) -> Result<Self, Error> {
         let source = Source::uniform(1.0)?;
-        let grid = Grid::uniform(1.0, bits)?;
+        let grid = CellGrid::uniform(1.0, bits)?;
         Self::new(source, grid, snr_db)
     }
 
@@ -62,11 +62,11 @@ impl Scene {
     fn gaussian(snr_db: f64) -> Result<Self, Error> {
         let std = GAUSSIAN_VARIANCE.sqrt();
         let source = Source::gaussian_with_deviation(std)?;
-        let grid = Grid::printed_gaussian(std)?;
+        let grid = CellGrid::printed_gaussian(std)?;
         Self::new(source, grid, snr_db)
     }
 
-    fn new(source: Source, grid: Grid, snr_db: f64) -> Result<Self, Error> {
+    fn new(source: Source, grid: CellGrid, snr_db: f64) -> Result<Self, Error> {
         let noise = source.noise_deviation(snr_db)?;
         Ok(Self { source, grid, noise })
     }

@@ -3,7 +3,7 @@
 use super::{Scene, pattern, pattern_panel};
 use crate::prelude::*;
 use fewbits_binary_patterns::{
-    BinaryQuantizer, Grid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
+    BinaryQuantizer, CellGrid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
 };
 use fewbits_monte_carlo::parallel;
 
@@ -47,7 +47,7 @@ impl Figure for Clipping {
          the two sides of this rule swapped (dashed); taken literally that ruins the best eight patterns.");
 
     fn run(&self, p: &ClippingParameters, _: &Context<'_>) -> Result<Clipped, Error> {
-        let grid = Grid::uniform(1.0, p.bits)?;
+        let grid = CellGrid::uniform(1.0, p.bits)?;
         let count = grid.cells();
         let place = |i: i32| {
             let y = f64::from(i) / 100.0;
@@ -68,7 +68,7 @@ impl Figure for Clipping {
         let all = scene.search(p.masks.len())?.ranking()?;
         let own = scene.mmse(&p.masks)?;
         // The swapped rule is a pattern over a grid with two more cells, which carry the opposite end's bit.
-        let grid = Grid::from_breakpoints([&[-1.0], grid.breakpoints(), &[1.0]].concat())?;
+        let grid = CellGrid::from_breakpoints([&[-1.0], grid.breakpoints(), &[1.0]].concat())?;
         let wide = Scene { grid, ..scene };
         let swapped = |masks: &[Mask]| -> Result<f64, Error> {
             let turned = |&mask: &Mask| {

@@ -3,7 +3,7 @@
 use crate::kept::Kept;
 use crate::prelude::*;
 use fewbits_diffusive::message::Wire;
-use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Rule, Search, SearchBox, SourceSensor, Status};
+use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Search, SearchBox, SelectionRule, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Vector2, Vector3};
@@ -137,10 +137,10 @@ const FORMS: [(&str, Form, usize); 8] = [
     ("mode and curvature", Form::Laplace, 8),
 ];
 /// Rules that choose nodes in wind, with a mixture of four Gaussians over position and rate.
-const RULES: [(&str, Rule, usize); 3] = [
-    ("information", Rule::MutualInformation, 0),
-    ("covariance", Rule::Covariance, 1),
-    ("mahalanobis", Rule::Mahalanobis, 2),
+const RULES: [(&str, SelectionRule, usize); 3] = [
+    ("information", SelectionRule::MutualInformation, 0),
+    ("covariance", SelectionRule::Covariance, 1),
+    ("mahalanobis", SelectionRule::Mahalanobis, 2),
 ];
 /// Ends the name of a form that travels without the rate.
 const KNOWN: &str = " known rate";
@@ -154,7 +154,7 @@ pub(super) struct Scheme {
     pub range: f64,
     pub form: Form,
     pub known_rate: bool,
-    pub rule: Rule,
+    pub rule: SelectionRule,
     pub most_nodes: usize,
     pub wire: Wire,
 }
@@ -176,7 +176,7 @@ impl Scheme {
             range,
             form,
             known_rate: name.ends_with(KNOWN),
-            rule: rule.map_or(Rule::Mahalanobis, |rule| rule.1),
+            rule: rule.map_or(SelectionRule::Mahalanobis, |rule| rule.1),
             most_nodes: match (rule, form) {
                 (Some(_), _) => 14,
                 (None, Form::Raw) => 30,

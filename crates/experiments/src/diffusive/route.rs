@@ -4,7 +4,7 @@ use super::common::{A, ALARM, CHAINS, Network, Scheme, Settings};
 use crate::prelude::*;
 use crate::schema::label;
 use fewbits_densities::ellipse;
-use fewbits_diffusive::{Outcome, Rule};
+use fewbits_diffusive::{Outcome, SelectionRule};
 
 parameters! {
     /// Which deployment is shown.
@@ -76,7 +76,7 @@ impl Figure for Trace {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<TraceRow>, Error> {
         let scheme = Scheme {
-            rule: Rule::MutualInformation,
+            rule: SelectionRule::MutualInformation,
             ..Scheme::new("gmm-4", A, p.range)
         };
         let outcome = p.search(&scheme, context)?;

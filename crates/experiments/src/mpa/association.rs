@@ -5,7 +5,9 @@ use fewbits_core::Gaussian;
 use fewbits_filters::Resampling;
 use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal;
-use fewbits_pf_mpa::association::{Hypotheses, PRINTED_GAIN, PairTracker, Rule, separation, sigmoid, tanh_rule};
+use fewbits_pf_mpa::association::{
+    AssociationRule, Hypotheses, PRINTED_GAIN, PairTracker, separation, sigmoid, tanh_rule,
+};
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -67,10 +69,10 @@ enum CloudRule {
 const METHODS: [Method; 8] = [
     Method::Pair("genie", PairTracker::Genie),
     Method::Hypotheses,
-    Method::Pair("jpda", PairTracker::Weighted(Rule::Exact)),
+    Method::Pair("jpda", PairTracker::Weighted(AssociationRule::Exact)),
     Method::Cloud("pf-exact", CloudRule::Exact),
-    Method::Pair("logistic", PairTracker::Weighted(Rule::Logistic)),
-    Method::Pair("tanh", PairTracker::Weighted(Rule::PRINTED)),
+    Method::Pair("logistic", PairTracker::Weighted(AssociationRule::Logistic)),
+    Method::Pair("tanh", PairTracker::Weighted(AssociationRule::PRINTED)),
     Method::Cloud("pf-tanh", CloudRule::Tanh),
     Method::Pair("gnn", PairTracker::Nearest),
 ];

@@ -4,7 +4,7 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
 use fewbits_core::{Gaussian, NumberFormat};
-use fewbits_pf_mpa::leader::{Handover, elect, nearest};
+use fewbits_pf_mpa::leader::{LeaderMessage, elect, nearest};
 use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{Reports, Target, Tracker};
 use nalgebra::Vector2;
@@ -67,7 +67,7 @@ impl Figure for Leaders {
                     let mean = places.iter().sum::<Vector2<f64>>() / places.len() as f64;
                     let squares = places.iter().map(|p| (p - mean).norm_squared()).sum::<f64>();
                     let spread = squares / (places.len() - 1) as f64;
-                    shared = Handover::new(&copies[election.leader], &NumberFormat::Single)?.belief();
+                    shared = LeaderMessage::new(&copies[election.leader], &NumberFormat::Single)?.belief();
                     let is = |yes: bool| f64::from(u8::from(yes));
                     let count = election.claimants.len();
                     let error = (places[election.leader] - truth).norm_squared();

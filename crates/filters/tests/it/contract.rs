@@ -7,8 +7,8 @@ use fewbits_core::{
 };
 use fewbits_filters::contract::Evolving;
 use fewbits_filters::{
-    BootstrapFilter, CloudFilter, Error, Grid, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank,
-    ParticleFilter, PointMasses, RaoBlackwellised, StateFilter, StateLikelihood, Switching, assumed_density,
+    BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, ParticleFilter,
+    PointMasses, RaoBlackwellised, StateFilter, StateLikelihood, Switching, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -111,7 +111,7 @@ fn run<F: StateFilter<1>>(mut filter: F) -> [f64; 3] {
 
 #[test]
 fn every_filter_agrees_with_the_grid() {
-    let exact = run(PointMasses::new(Grid::symmetric(12.0, 0.1).unwrap()));
+    let exact = run(PointMasses::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
     let agree = |name: &str, found: [f64; 3], slack: f64| {
         let off: [f64; 3] = std::array::from_fn(|i| found[i] - exact[i]);
         assert!(off.iter().all(|d| d.abs() < slack), "{name}: {off:?}");
@@ -150,7 +150,7 @@ fn what_is_impossible_leaves_every_belief_as_it_was() {
     let filter = ParticleFilter::default();
     refused(MomentFilter);
     refused(GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap());
-    refused(PointMasses::new(Grid::symmetric(12.0, 0.1).unwrap()));
+    refused(PointMasses::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
     refused(BootstrapFilter::new(filter, 50).unwrap());
     refused(GuidedFilter::new(filter, 50).unwrap());
     refused(CloudFilter::new(RaoBlackwellised::new(filter), 50).unwrap());

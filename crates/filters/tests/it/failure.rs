@@ -3,8 +3,8 @@
 use fewbits_core::factor::{Constant, InCell, Scalar};
 use fewbits_core::{Cell, Error as CoreError, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
-    CloudWorkspace, Error, GaussianCloud, Grid, ParticleFilter, Particles, PointMass, PointMassFilter,
-    RaoBlackwellised, Resampling, Schedule, Workspace, assumed_density,
+    CloudWorkspace, Error, GaussianCloud, ParticleFilter, Particles, PointMass, PointMassFilter, RaoBlackwellised,
+    Resampling, Schedule, UniformGrid, Workspace, assumed_density,
 };
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -83,7 +83,7 @@ fn the_rao_blackwellised_filter() {
 
 #[test]
 fn the_grid_filters() {
-    let grid = Grid::symmetric(10.0, 0.25).unwrap();
+    let grid = UniformGrid::symmetric(10.0, 0.25).unwrap();
     let filter = PointMassFilter::new(&Ar1::new(0.9, 1.0).unwrap(), grid).unwrap();
     let before = PointMass::normal(grid, 0.3, 2.0).unwrap();
     let mut belief = before.clone();

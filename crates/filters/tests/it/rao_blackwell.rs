@@ -3,8 +3,8 @@
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Link, Observed, Sign};
 use fewbits_filters::{
-    CloudWorkspace, GaussianCloud, Grid, ParticleFilter, PointMass, PointMassFilter, RaoBlackwellised, Resampling,
-    Schedule, kalman,
+    CloudWorkspace, GaussianCloud, ParticleFilter, PointMass, PointMassFilter, RaoBlackwellised, Resampling, Schedule,
+    UniformGrid, kalman,
 };
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -52,7 +52,7 @@ fn bits_cells_silence_and_loss_agree_with_the_grid() {
         silence(0.1),
     ]
     .map(|factor| Observed::new(sensor, factor));
-    let grid = Grid::new(-12.0, 12.0, 0.02).unwrap();
+    let grid = UniformGrid::new(-12.0, 12.0, 0.02).unwrap();
     let referee = PointMassFilter::new(&dynamics, grid).unwrap();
     let mut exact = PointMass::normal(grid, 0.5, 2.0).unwrap();
     let mut evidence = 0.0;

@@ -3,7 +3,7 @@
 use fewbits_core::factor::{InCell, Partition, Scalar, Value};
 use fewbits_core::number::Levels;
 use fewbits_core::{Cell, Gaussian, Link};
-use fewbits_densities::{GaussianCloud, Grid, KernelEstimate, Mixture, Particles, PlaneMass, PointMass};
+use fewbits_densities::{GaussianCloud, KernelEstimate, Mixture, Particles, PlaneMass, PointMass, UniformGrid};
 use fewbits_filters::ImmBelief;
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor, ReceivedPower, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
@@ -58,7 +58,7 @@ fn beliefs_factors_and_models_are_stored_without_floats() {
         check(&Mixture::single(&belief).unwrap());
         let estimate = KernelEstimate::new(cloud, covariance).unwrap();
         assert!(holds_no_float(&serde_json::to_value(&estimate).unwrap()));
-        check(&PointMass::normal(Grid::symmetric(6.0, 0.3).unwrap(), x[0], 1.0 / 3.0).unwrap());
+        check(&PointMass::normal(UniformGrid::symmetric(6.0, 0.3).unwrap(), x[0], 1.0 / 3.0).unwrap());
         check(&PlaneMass::normal(&(Matrix2::identity() * 0.7), &belief).unwrap());
         check(&ImmBelief::new(vec![0.3, 0.7], vec![belief, belief]).unwrap());
         x[0] = x[0].abs() / 2.0;

@@ -3,8 +3,8 @@
 use fewbits_core::factor::{InCell, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Likelihood, Link, Observed};
 use fewbits_filters::{
-    CloudWorkspace, GaussianCloud, Grid, ParticleFilter, Particles, PointMass, PointMassFilter, RaoBlackwellised,
-    Workspace,
+    CloudWorkspace, GaussianCloud, ParticleFilter, Particles, PointMass, PointMassFilter, RaoBlackwellised,
+    UniformGrid, Workspace,
 };
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor, ReceivedPower};
@@ -73,7 +73,7 @@ proptest! {
         let mut rng = Stream::new(2).rng();
         let before = Particles::from_belief(&mut rng, &start, 20).unwrap();
         let cloud_before = GaussianCloud::agreed(&start, 20).unwrap();
-        let grid = Grid::symmetric(6.0, 0.25).unwrap();
+        let grid = UniformGrid::symmetric(6.0, 0.25).unwrap();
         let grid_before = PointMass::normal(grid, 0.1, 1.3).unwrap();
         let Ok(dynamics) = Ar1::new(x[6], x[7]).or_else(|_| Ar1::new(0.9, 0.5)) else { return Ok(()) };
         let sensor = LinearSensor::<1, 1>::direct(1.0).unwrap();

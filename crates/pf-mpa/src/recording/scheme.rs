@@ -88,7 +88,11 @@ impl<C: Memoryless<1>, S: Fn(&C::Feedback, &C::Report) -> f64> Memoryless<1> for
         self.scheme.report_format()
     }
 
-    fn report_of(&self, range: &Vector1<f64>, feedback: &C::Feedback) -> Result<Option<C::Report>, fewbits_core::Error> {
+    fn report_of(
+        &self,
+        range: &Vector1<f64>,
+        feedback: &C::Feedback,
+    ) -> Result<Option<C::Report>, fewbits_core::Error> {
         self.scheme.report_of(range, feedback)
     }
 

@@ -2,8 +2,8 @@
 
 use fewbits_core::factor::Factor;
 use fewbits_core::{Gaussian, NumberFormat};
-use fewbits_densities::{Bandwidth, Component, Mixture, Rule};
-use fewbits_pf_mpa::association::{self, Rule as Association, tanh_rule};
+use fewbits_densities::{Bandwidth, BandwidthRule, Component, Mixture};
+use fewbits_pf_mpa::association::{self, AssociationRule, tanh_rule};
 use fewbits_pf_mpa::leader::StepBits;
 use fewbits_pf_mpa::product;
 use fewbits_pf_mpa::published::{LabelChain, RingBias, kernel_error, ratio_second_moments};
@@ -232,7 +232,7 @@ fn pair(input: &Value) -> Vec<f64> {
     let target = |m: &str, p: &str| Gaussian::scalar(number(&input[m]), number(&input[p])).unwrap();
     let targets = [target("m1", "P1"), target("m2", "P2")];
     let (z, r) = ([number(&input["zA"]), number(&input["zB"])], number(&input["R"]));
-    let straight = Association::Exact.probability(&targets, z, r).unwrap();
+    let straight = AssociationRule::Exact.probability(&targets, z, r).unwrap();
     let after = association::update(&targets, z, r, straight).unwrap();
     let [a, b] = after.targets;
     vec![
@@ -292,7 +292,7 @@ fn one(entry: &Value) {
         ["gibbs", "C2d", what] => gibbs::<2>(entry, what),
         ["kde", ..] => {
             let (n, d) = (number(&input["n"]), count(&input["d"]));
-            let width = |rule: Rule| {
+            let width = |rule: BandwidthRule| {
                 let bandwidth = Bandwidth {
                     rule,
                     ..Bandwidth::default()
@@ -304,7 +304,8 @@ fn one(entry: &Value) {
                 };
                 width.unwrap().powi(2)
             };
-            let (printed, best) = (width(Rule::Power { exponent: 1.0 / 12.0 }), width(Rule::Silverman));
+            let (printed, best) =
+                (width(BandwidthRule::Power { exponent: 1.0 / 12.0 }), width(BandwidthRule::Silverman));
             let error = |lambda: f64| kernel_error(n, d as u32, lambda);
             check(entry, &[printed, best, error(printed), error(best)]);
         }

@@ -3,8 +3,8 @@
 use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::wild;
-use fewbits_pf_mpa::association::{Rule, separation, update};
-use fewbits_pf_mpa::leader::{Handover, elect};
+use fewbits_pf_mpa::association::{AssociationRule, separation, update};
+use fewbits_pf_mpa::leader::{LeaderMessage, elect};
 use fewbits_pf_mpa::published::{MessagePassing, RingBias, kernel_error};
 use fewbits_pf_mpa::{
     AccelerationChain, Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeFactor,
@@ -86,10 +86,10 @@ proptest! {
     fn associations_are_probabilities_or_errors(x in prop::array::uniform8(wild()), gain in wild()) {
         let (Ok(one), Ok(two)) = (Gaussian::scalar(x[0], x[1]), Gaussian::scalar(x[2], x[3])) else { return Ok(()) };
         let targets = [one, two];
-        for rule in [Rule::PRINTED, Rule::Tanh { gain }, Rule::Logistic, Rule::Exact] {
+        for rule in [AssociationRule::PRINTED, AssociationRule::Tanh { gain }, AssociationRule::Logistic, AssociationRule::Exact] {
             if let Ok(p) = rule.probability(&targets, [x[4], x[5]], x[6]) {
                 prop_assert!(!p.is_nan(), "{:?} {:?}", rule, x);
-                prop_assert!((0.0..=1.0).contains(&p) || matches!(rule, Rule::Tanh { gain } if gain < 0.0), "{:?} {:?}: {}", rule, x, p);
+                prop_assert!((0.0..=1.0).contains(&p) || matches!(rule, AssociationRule::Tanh { gain } if gain < 0.0), "{:?} {:?}: {}", rule, x, p);
             }
         }
         let _ = separation([x[0], x[2]], [x[4], x[5]]);
@@ -150,7 +150,7 @@ proptest! {
         step(&MessagePassing::improved(20).unwrap(), &target, &prior, &observed)?;
         step(&RaoBlackwellGuided::new(20).unwrap(), &target, &prior, &observed)?;
         let format = fewbits_core::NumberFormat::Single;
-        if let Ok(handover) = Handover::new(&prior, &format) {
+        if let Ok(handover) = LeaderMessage::new(&prior, &format) {
             prop_assert!(handover.belief().is_finite(), "{:?}", handover);
         }
         let _ = elect(&places, &[places[1], places[2]]);

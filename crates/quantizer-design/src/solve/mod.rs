@@ -39,6 +39,6 @@ pub use adc::{Adc, Rounded};
 pub use additive::AdditiveDecoder;
 pub use control::{Progress, Stage};
 pub use export::{Export, JSON_SCHEMA};
-pub use request::{Bits, MAX_BITS, Request};
+pub use request::{BitBudget, MAX_BITS, Request};
 pub use robust::{Minimax, Mismatch, Sensitivity, minimax};
 pub use solution::{Bound, BoundKind, SensorDesign, Solution, Solutions};

@@ -3,7 +3,7 @@
 use super::control::{Control, Stage};
 use super::participant::{Participant, WordedCells, gray, plain};
 use super::polish::polish;
-use super::request::{Bits, MAX_BITS, MAX_TOTAL, Request};
+use super::request::{BitBudget, MAX_BITS, MAX_TOTAL, Request};
 use super::share;
 use super::solution::{Solution, Solutions};
 use super::starts::Search;
@@ -34,9 +34,9 @@ impl Request<'_> {
     fn checked_bits(&self, control: &mut Control<'_>) -> Result<Vec<u32>, Error> {
         let sensors = self.model.sensors();
         let bits = match &self.bits {
-            Bits::Each(bits) => vec![*bits; sensors],
-            Bits::PerSensor(bits) => bits.clone(),
-            Bits::Total(total) => {
+            BitBudget::Each(bits) => vec![*bits; sensors],
+            BitBudget::PerSensor(bits) => bits.clone(),
+            BitBudget::Total(total) => {
                 let most = (MAX_BITS * sensors as u32).min(MAX_TOTAL);
                 if !(1..=most).contains(total) {
                     return refuse("bits", total, format!("1 to {most} bits in all"));

@@ -17,7 +17,7 @@ pub(super) const MAX_TOTAL: u32 = 40;
 
 /// How many bits the sensors may send.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Bits {
+pub enum BitBudget {
     /// Every sensor this many.
     Each(u32),
     /// Every sensor its own number, zero for a sensor that is not used.
@@ -30,12 +30,12 @@ pub enum Bits {
 ///
 /// ```
 /// use fewbits_core::Link;
-/// use fewbits_quantizer_design::solve::{Bits, Request};
+/// use fewbits_quantizer_design::solve::{BitBudget, Request};
 /// use fewbits_quantizer_design::{Noise, Prior, ObservationModel};
 ///
 /// let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.5], 0.5)?;
 /// let model = ObservationModel::new(Prior::normal(20.0, 4.0)?, noise)?;
-/// let solutions = Request::estimation(model, Bits::Each(2), Link::flipping(0.02)?).run()?;
+/// let solutions = Request::estimation(model, BitBudget::Each(2), Link::flipping(0.02)?).run()?;
 /// let best = solutions.best();
 /// println!("{}", best.table());
 /// let estimate = best.decoder(100)?.decode_symbols(&best.encode(&[21.3, 22.0])?)?;
@@ -44,7 +44,7 @@ pub enum Bits {
 /// ```
 pub struct Request<'a> {
     pub(super) model: ObservationModel,
-    pub(super) bits: Bits,
+    pub(super) bits: BitBudget,
     pub(super) links: Vec<Link>,
     pub(super) criterion: Criterion,
     pub(super) cells: AllowedCells,
@@ -58,7 +58,7 @@ pub struct Request<'a> {
 impl<'a> Request<'a> {
     /// Quantizers, words and decoder for the estimate of least mean squared error. The prior may be any, discrete ones included:
     /// their values are taken as numbers to be estimated, not as hypotheses.
-    pub fn estimation(model: ObservationModel, bits: Bits, link: Link) -> Self {
+    pub fn estimation(model: ObservationModel, bits: BitBudget, link: Link) -> Self {
         Self {
             links: vec![link; model.sensors()],
             model,
@@ -76,7 +76,7 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// If the prior is not discrete.
-    pub fn detection(model: ObservationModel, bits: Bits, link: Link) -> Result<Self, Error> {
+    pub fn detection(model: ObservationModel, bits: BitBudget, link: Link) -> Result<Self, Error> {
         if !model.prior().is_discrete() {
             return refuse("prior", "a continuous prior", "a discrete prior: the hypotheses");
         }

@@ -2,7 +2,7 @@
 
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
-use fewbits_quantizer_design::solve::{Adc, Bits, Export, Request};
+use fewbits_quantizer_design::solve::{Adc, BitBudget, Export, Request};
 use fewbits_quantizer_design::{Noise, ObservationModel, Prior};
 use rand::RngExt;
 use std::io::Write;
@@ -79,7 +79,7 @@ fn useless_link() -> Export {
     let noise = Noise::independent_with_deviations(&[1.0, 1.0]).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let links = vec![Link::flipping(0.5).unwrap(), Link::PERFECT];
-    let request = Request::estimation(model, Bits::Each(1), Link::PERFECT).with_links(links);
+    let request = Request::estimation(model, BitBudget::Each(1), Link::PERFECT).with_links(links);
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let rounded = request
         .unwrap()
@@ -108,7 +108,7 @@ fn a_sensor_with_one_word_makes_a_valid_header() {
 fn the_rust_constants_are_the_design() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
-    let request = Request::estimation(model, Bits::PerSensor(vec![2, 1]), Link::new(0.05, 0.02).unwrap());
+    let request = Request::estimation(model, BitBudget::PerSensor(vec![2, 1]), Link::new(0.05, 0.02).unwrap());
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let rounded = request
         .with_starts(2)
@@ -175,7 +175,7 @@ fn the_c_header_decodes_as_the_library() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let link = Link::new(0.05, 0.02).unwrap();
-    let request = Request::estimation(model, Bits::PerSensor(vec![3, 2]), link).with_starts(3);
+    let request = Request::estimation(model, BitBudget::PerSensor(vec![3, 2]), link).with_starts(3);
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let rounded = request.run().unwrap().best().rounded(&[adc, adc]).unwrap();
     let mut rng = Stream::new(9).named("words").rng();

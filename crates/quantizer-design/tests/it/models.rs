@@ -3,7 +3,7 @@
 use super::nelder_mead::{Stopwatch, minimise};
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
-use fewbits_quantizer_design::solve::{Bits, Request, Solution, Solutions};
+use fewbits_quantizer_design::solve::{BitBudget, Request, Solution, Solutions};
 use fewbits_quantizer_design::{
     Channel, Criterion, Error, Labelling, Noise, ObservationModel, Prior, Quantizer, System, lloyd_max,
 };
@@ -77,7 +77,7 @@ impl Task {
         let watch = Stopwatch::start();
         let mut request = Request::estimation(
             self.model.clone(),
-            Bits::PerSensor(self.bits.clone()),
+            BitBudget::PerSensor(self.bits.clone()),
             Link::flipping(self.crossover)?,
         );
         if let Some(limit) = limit {

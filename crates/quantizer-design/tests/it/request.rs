@@ -6,7 +6,7 @@ use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
 use fewbits_quantizer_design::AllowedCells;
 use fewbits_quantizer_design::design::Scope;
-use fewbits_quantizer_design::solve::{Adc, Bits, Request, Solution, minimax};
+use fewbits_quantizer_design::solve::{Adc, BitBudget, Request, Solution, minimax};
 use fewbits_quantizer_design::{Certificate, Noise, ObservationModel, Prior};
 use rand::RngExt;
 use std::time::Duration;
@@ -21,7 +21,7 @@ fn unit_pair(rho: f64) -> ObservationModel {
     ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap()
 }
 
-fn best(model: ObservationModel, bits: Bits, link: Link) -> Solution {
+fn best(model: ObservationModel, bits: BitBudget, link: Link) -> Solution {
     Request::estimation(model, bits, link)
         .with_starts(8)
         .run()
@@ -68,7 +68,7 @@ fn two_correlated_sensors_over_a_flipping_link() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let link = Link::flipping(0.02).unwrap();
-    let solutions = Request::estimation(model, Bits::Each(3), link).run().unwrap();
+    let solutions = Request::estimation(model, BitBudget::Each(3), link).run().unwrap();
     let solution = solutions.best();
     let adc = Adc::new(12, 0.0..=40.0).unwrap();
     let header = solution
@@ -93,7 +93,7 @@ fn two_correlated_sensors_over_a_flipping_link() {
 fn two_correlated_sensors_with_folded_cells() {
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let model = ObservationModel::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
-    let request = Request::estimation(model, Bits::Each(3), Link::flipping(0.02).unwrap());
+    let request = Request::estimation(model, BitBudget::Each(3), Link::flipping(0.02).unwrap());
     let solutions = request.with_cells(AllowedCells::Any).run().unwrap();
     assert!(solutions.best().value < 1.354_45, "{}", solutions.best().value);
     assert_eq!(solutions.best().certificate, Certificate::LocalOptimum);
@@ -106,7 +106,7 @@ fn folded_cells_of_one_bit_are_found() {
     let folded = |scale: f64| {
         let noise = Noise::equicorrelated_with_deviations(&[scale; 2], 0.85).unwrap();
         let model = ObservationModel::new(Prior::normal(0.0, scale).unwrap(), noise).unwrap();
-        let request = Request::estimation(model, Bits::Each(1), Link::PERFECT).with_cells(AllowedCells::Any);
+        let request = Request::estimation(model, BitBudget::Each(1), Link::PERFECT).with_cells(AllowedCells::Any);
         request.with_starts(1).run().unwrap().best().clone()
     };
     let one = folded(1.0);
@@ -120,8 +120,8 @@ fn folded_cells_of_one_bit_are_found() {
 
 #[test]
 fn folded_cells_beat_intervals_where_noise_is_small() {
-    let intervals = best(pair(1.0), Bits::Each(2), Link::PERFECT);
-    let folded = Request::estimation(pair(1.0), Bits::Each(2), Link::PERFECT)
+    let intervals = best(pair(1.0), BitBudget::Each(2), Link::PERFECT);
+    let folded = Request::estimation(pair(1.0), BitBudget::Each(2), Link::PERFECT)
         .with_cells(AllowedCells::Any)
         .with_starts(8);
     let folded = folded.run().unwrap().best().clone();
@@ -133,7 +133,7 @@ fn folded_cells_beat_intervals_where_noise_is_small() {
 fn one_sensor_over_a_clear_link_is_lloyd_max() {
     for (bits, distortion) in [(2, 0.117_481_847_829), (3, 0.034_547_760_778)] {
         let model = ObservationModel::gaussian_with_deviations(2.0, &[1.0]).unwrap();
-        let found = best(model, Bits::Each(bits), Link::PERFECT).value;
+        let found = best(model, BitBudget::Each(bits), Link::PERFECT).value;
         let exact = 4.0 - 16.0 / 5.0 * (1.0 - distortion);
         assert!((found - exact).abs() < 1e-7, "{found} {exact}");
     }
@@ -142,10 +142,10 @@ fn one_sensor_over_a_clear_link_is_lloyd_max() {
 #[test]
 fn printed_optima_are_found() {
     for (rho, value) in [(0.0, 0.388_403_07), (0.85, 0.516_272_61)] {
-        let found = best(unit_pair(rho), Bits::Each(2), Link::PERFECT).value;
+        let found = best(unit_pair(rho), BitBudget::Each(2), Link::PERFECT).value;
         assert!((found - value).abs() < 1e-7, "{rho}: {found}");
     }
-    let informed = Request::estimation(unit_pair(0.85), Bits::Each(2), Link::PERFECT)
+    let informed = Request::estimation(unit_pair(0.85), BitBudget::Each(2), Link::PERFECT)
         .by_information()
         .run()
         .unwrap();
@@ -156,21 +156,21 @@ fn printed_optima_are_found() {
 fn detection_reaches_the_printed_error_probability() {
     let noise = Noise::independent_with_deviations(&[1.0; 5]).unwrap();
     let model = ObservationModel::new(Prior::binary(2.0, 0.5).unwrap(), noise).unwrap();
-    let found = Request::detection(model, Bits::Each(2), Link::PERFECT)
+    let found = Request::detection(model, BitBudget::Each(2), Link::PERFECT)
         .unwrap()
         .with_starts(2)
         .run()
         .unwrap();
     assert!(found.best().value < 1.660_803_1e-2, "{}", found.best().value);
-    assert!(Request::detection(unit_pair(0.0), Bits::Each(2), Link::PERFECT).is_err());
+    assert!(Request::detection(unit_pair(0.0), BitBudget::Each(2), Link::PERFECT).is_err());
 }
 
 #[test]
 fn designs_scale_with_the_unit() {
     let link = Link::new(0.05, 0.03).unwrap();
-    let one = best(pair(1.0), Bits::PerSensor(vec![2, 1]), link);
+    let one = best(pair(1.0), BitBudget::PerSensor(vec![2, 1]), link);
     for scale in [1e-4, 1e4] {
-        let other = best(pair(scale), Bits::PerSensor(vec![2, 1]), link);
+        let other = best(pair(scale), BitBudget::PerSensor(vec![2, 1]), link);
         assert!((other.value / (scale * scale) / one.value - 1.0).abs() < 1e-9, "{scale}");
         // Rounding decides between a design and its mirror image about the mean.
         let distance = |mirror: bool| {
@@ -192,14 +192,14 @@ fn designs_scale_with_the_unit() {
 #[test]
 fn losses_of_one_sensor_mix_prior_and_posterior() {
     let model = || ObservationModel::gaussian_with_deviations(1.0, &[0.5]).unwrap();
-    let clear = best(model(), Bits::Each(2), Link::PERFECT).value;
+    let clear = best(model(), BitBudget::Each(2), Link::PERFECT).value;
     // Whether the loss is noticed makes no difference.
     for link in [
         Link::lossy(0.3).unwrap(),
         Link::PERFECT.with_erasure(0.3).unwrap(),
         Link::lossy(0.1).unwrap().with_erasure(0.2).unwrap(),
     ] {
-        let lossy = best(model(), Bits::Each(2), link);
+        let lossy = best(model(), BitBudget::Each(2), link);
         assert!((lossy.value - (0.3 + 0.7 * clear)).abs() < 1e-9, "{link:?}");
         assert_eq!(lossy.sensors()[0].symbols(), 5);
         assert!((lossy.decoder(5).unwrap().decode_symbols(&[4]).unwrap().variance - 1.0).abs() < 1e-9);
@@ -208,7 +208,7 @@ fn losses_of_one_sensor_mix_prior_and_posterior() {
 
 #[test]
 fn a_useless_link_leaves_the_prior() {
-    let found = best(unit_pair(0.3), Bits::Each(3), Link::flipping(0.5).unwrap());
+    let found = best(unit_pair(0.3), BitBudget::Each(3), Link::flipping(0.5).unwrap());
     assert!((found.value - 1.0).abs() < 1e-9);
 }
 
@@ -216,14 +216,14 @@ fn a_useless_link_leaves_the_prior() {
 fn shared_out_bits_are_the_best_of_all_shares() {
     let model = || ObservationModel::gaussian_with_deviations(1.0, &[0.2, 1.5]).unwrap();
     let link = Link::flipping(0.01).unwrap();
-    let shared = best(model(), Bits::Total(3), link);
-    let all = (0..=3).map(|first| best(model(), Bits::PerSensor(vec![first, 3 - first]), link).value);
+    let shared = best(model(), BitBudget::Total(3), link);
+    let all = (0..=3).map(|first| best(model(), BitBudget::PerSensor(vec![first, 3 - first]), link).value);
     let least = all.fold(f64::INFINITY, f64::min);
     assert!((shared.value / least - 1.0).abs() < 1e-6, "{} {least}", shared.value);
-    assert!(Request::estimation(model(), Bits::Total(0), link).run().is_err());
-    assert!(Request::estimation(model(), Bits::Each(7), link).run().is_err());
+    assert!(Request::estimation(model(), BitBudget::Total(0), link).run().is_err());
+    assert!(Request::estimation(model(), BitBudget::Each(7), link).run().is_err());
     assert!(
-        Request::estimation(model(), Bits::PerSensor(vec![1]), link)
+        Request::estimation(model(), BitBudget::PerSensor(vec![1]), link)
             .run()
             .is_err()
     );
@@ -245,7 +245,7 @@ fn random_models_are_no_worse_than_nelder_mead() {
 fn a_time_limit_still_gives_a_design() {
     let mut calls = 0;
     let mut count = |_| calls += 1;
-    let request = Request::estimation(pair(1.0), Bits::Each(3), Link::PERFECT)
+    let request = Request::estimation(pair(1.0), BitBudget::Each(3), Link::PERFECT)
         .with_time_limit(Duration::ZERO)
         .with_progress(&mut count);
     let found = request.run().unwrap();
@@ -259,8 +259,8 @@ fn large_designs_end_soon_after_their_time_limit() {
     let deviations = [0.5, 0.6, 0.7, 0.8, 0.9];
     let noise = Noise::equicorrelated_with_deviations(&deviations, 0.5).unwrap();
     let model = ObservationModel::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap();
-    let alone = best(model.subset(&[0]).unwrap(), Bits::Each(4), Link::flipping(0.05).unwrap()).value;
-    for bits in [Bits::Each(4), Bits::Total(18)] {
+    let alone = best(model.subset(&[0]).unwrap(), BitBudget::Each(4), Link::flipping(0.05).unwrap()).value;
+    for bits in [BitBudget::Each(4), BitBudget::Total(18)] {
         let watch = Stopwatch::start();
         let request = Request::estimation(model.clone(), bits.clone(), Link::flipping(0.05).unwrap());
         let found = request.with_time_limit(Duration::from_millis(500)).run().unwrap();
@@ -274,7 +274,7 @@ fn large_designs_end_soon_after_their_time_limit() {
 
 #[test]
 fn codes_of_a_converter_are_the_cells() {
-    let solution = best(pair(1.0), Bits::Each(2), Link::flipping(0.02).unwrap());
+    let solution = best(pair(1.0), BitBudget::Each(2), Link::flipping(0.02).unwrap());
     let adc = Adc::new(10, 4.0..=36.0).unwrap();
     let rounded = solution.rounded(&[adc, adc]).unwrap();
     for i in 0..4000 {
@@ -292,7 +292,7 @@ fn codes_of_a_converter_are_the_cells() {
 
 #[test]
 fn additive_decoders_have_their_stated_error() {
-    let solution = best(pair(1.0), Bits::Each(2), Link::flipping(0.02).unwrap());
+    let solution = best(pair(1.0), BitBudget::Each(2), Link::flipping(0.02).unwrap());
     let additive = solution.additive_decoder().unwrap();
     assert!(additive.mean_squared_error >= solution.value);
     let export = solution.export("small", 64).unwrap();
@@ -314,7 +314,7 @@ fn additive_decoders_have_their_stated_error() {
 
 #[test]
 fn json_follows_its_schema() {
-    let solution = best(pair(1.0), Bits::PerSensor(vec![2, 1]), Link::new(0.1, 0.02).unwrap());
+    let solution = best(pair(1.0), BitBudget::PerSensor(vec![2, 1]), Link::new(0.1, 0.02).unwrap());
     let export = solution.export("plant", 4096).unwrap();
     let json: serde_json::Value = serde_json::from_str(&export.to_json().unwrap()).unwrap();
     let schema: serde_json::Value = serde_json::from_str(fewbits_quantizer_design::solve::JSON_SCHEMA).unwrap();
@@ -335,7 +335,7 @@ fn json_follows_its_schema() {
 
 #[test]
 fn sensitivity_is_zero_without_a_change() {
-    let solution = best(unit_pair(0.3), Bits::Each(2), Link::flipping(0.02).unwrap());
+    let solution = best(unit_pair(0.3), BitBudget::Each(2), Link::flipping(0.02).unwrap());
     for row in solution.sensitivity(0.0).unwrap() {
         assert!((row.mismatch.mean_squared_error - solution.value).abs() < 1e-12, "{row:?}");
     }
@@ -348,7 +348,7 @@ fn sensitivity_is_zero_without_a_change() {
 
 #[test]
 fn minimax_lowers_the_worst_case() {
-    let request = Request::estimation(unit_pair(0.0), Bits::Each(2), Link::PERFECT).with_starts(4);
+    let request = Request::estimation(unit_pair(0.0), BitBudget::Each(2), Link::PERFECT).with_starts(4);
     let found = minimax(request, 0.5, 0.3, 0.3).unwrap();
     assert!(found.worst_case < found.nominal_worst_case, "{found:?}");
     assert!(found.bound <= found.worst_case && found.bound > 0.9 * found.worst_case, "{found:?}");

@@ -5,8 +5,8 @@ use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::design::{self, Design, Scope};
 use fewbits_quantizer_design::published::{self, Alternating, Separation, Words};
 use fewbits_quantizer_design::{
-    AllowedCells, Bits, Certificate, Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior, Quantizer,
-    Request, System, lloyd_max,
+    AllowedCells, BitBudget, Certificate, Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior,
+    Quantizer, Request, System, lloyd_max,
 };
 
 const MI: Criterion = Criterion::MutualInformation;
@@ -96,7 +96,7 @@ fn searches_know_no_unit() {
         Design { iterations: 0, ..best }
     });
     let folded = |s: f64| {
-        let request = Request::estimation(equal_pair(0.85, s), Bits::Each(1), Link::PERFECT);
+        let request = Request::estimation(equal_pair(0.85, s), BitBudget::Each(1), Link::PERFECT);
         let found = request.with_cells(AllowedCells::Any).with_starts(6).run().unwrap();
         found.best().value / (s * s)
     };
@@ -261,18 +261,18 @@ fn nodes_of_a_density_are_estimated_not_guessed() {
     let nodes = ObservationModel::new(Prior::discrete(values, vec![1.0 / 64.0; 64]).unwrap(), noise()).unwrap();
     let density = ObservationModel::new(Prior::uniform(0.0, 1.0).unwrap(), noise()).unwrap();
     let [estimated, exact] = [&nodes, &density].map(|model| {
-        let found = Request::estimation(model.clone(), Bits::Each(1), Link::PERFECT)
+        let found = Request::estimation(model.clone(), BitBudget::Each(1), Link::PERFECT)
             .run()
             .unwrap();
         found.best().clone()
     });
     assert!((estimated.value / exact.value - 1.0).abs() < 1e-3, "{} {}", estimated.value, exact.value);
-    let request = Request::detection(nodes, Bits::Each(1), Link::PERFECT)
+    let request = Request::detection(nodes, BitBudget::Each(1), Link::PERFECT)
         .unwrap()
         .with_starts(4);
     let guessed = request.run().unwrap().best().clone();
     assert!(estimated.value < guessed.mean_squared_error().unwrap());
     assert!(guessed.value < estimated.system().value(Criterion::BayesError).unwrap());
     let gaussian = ObservationModel::gaussian_with_deviations(1.0, &[1.0]).unwrap();
-    assert!(Request::detection(gaussian, Bits::Each(1), Link::PERFECT).is_err());
+    assert!(Request::detection(gaussian, BitBudget::Each(1), Link::PERFECT).is_err());
 }

@@ -70,13 +70,13 @@ impl LinearSearch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Grid, Source, gray_basis};
+    use crate::{CellGrid, Source, gray_basis};
     use approx::assert_relative_eq;
 
     fn search(bits: usize, sensors: usize, snr: f64) -> LinearSearch {
         let source = Source::uniform(1.0).unwrap();
         let noise = source.noise_deviation(snr).unwrap();
-        LinearSearch::with_deviation(source, Grid::uniform(1.0, bits).unwrap(), noise, sensors).unwrap()
+        LinearSearch::with_deviation(source, CellGrid::uniform(1.0, bits).unwrap(), noise, sensors).unwrap()
     }
 
     #[test]
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn an_asymmetric_grid_gives_the_same_as_direct_evaluation() {
         let source = Source::gaussian_with_deviation(0.4).unwrap();
-        let grid = Grid::from_breakpoints(vec![-0.5, 0.1, 0.3]).unwrap();
+        let grid = CellGrid::from_breakpoints(vec![-0.5, 0.1, 0.3]).unwrap();
         let search = LinearSearch::with_deviation(source, grid, 0.2, 3).unwrap();
         for set in search.ranking().unwrap() {
             assert_relative_eq!(set.mse, search.bank(&set.masks).unwrap().mmse().unwrap(), max_relative = 1e-8);
@@ -122,7 +122,7 @@ mod tests {
         assert_eq!(search(3, 2, 10.0).any_rank().best().unwrap().masks.len(), 2);
         assert!(search(3, 2, 10.0).with_forced(&[1, 2, 3]).is_err());
         assert!(search(3, 2, 10.0).with_forced(&[8]).is_err());
-        let grid = Grid::from_breakpoints(vec![0.0, 1.0]).unwrap();
+        let grid = CellGrid::from_breakpoints(vec![0.0, 1.0]).unwrap();
         assert!(LinearSearch::with_deviation(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
         assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooManyOutcomes { .. })));
         assert!(matches!(

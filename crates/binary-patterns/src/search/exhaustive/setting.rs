@@ -2,7 +2,7 @@
 
 use crate::patterns::count::{full_rank_multisets, multisets};
 use crate::patterns::linear::{check_mask, grid_bits, sensors_of};
-use crate::{Bank, Error, Grid, Mask, Source};
+use crate::{Bank, CellGrid, Error, Mask, Source};
 use fewbits_numerics::error::{at_least_one, positive};
 
 /// A set of masks, one a sensor, in increasing order, with the error it achieves.
@@ -32,7 +32,7 @@ pub struct MaskSet {
 #[derive(Debug, Clone)]
 pub struct LinearSearch {
     pub(super) source: Source,
-    pub(super) grid: Grid,
+    pub(super) grid: CellGrid,
     pub(super) bits: usize,
     pub(super) noise_deviation: f64,
     pub(super) sensors: usize,
@@ -45,7 +45,7 @@ impl LinearSearch {
     ///
     /// # Errors
     /// If the grid has not `2^B` cells, the noise is not positive and finite, or there is no sensor.
-    pub fn with_deviation(source: Source, grid: Grid, noise_deviation: f64, sensors: usize) -> Result<Self, Error> {
+    pub fn with_deviation(source: Source, grid: CellGrid, noise_deviation: f64, sensors: usize) -> Result<Self, Error> {
         let bits = grid_bits(&grid)?;
         at_least_one("sensors", sensors)?;
         Ok(Self {
