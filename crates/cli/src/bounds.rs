@@ -1,6 +1,7 @@
 //! `--bound`: from text to columns with promises.
 
 use crate::error::Error;
+use crate::numbers::exact;
 use fewbits_record::{Bound, Column};
 
 const EXPECTED: &str =
@@ -103,7 +104,7 @@ pub(crate) fn columns(
     ranges: &[Option<(f64, f64)>],
     file: &str,
 ) -> Result<Vec<Column>, Error> {
-    let column = |((name, spec), range): ((&String, &Spec), &Option<(f64, f64)>)| {
+    let column = |name: &String, spec: &Spec, range: &Option<(f64, f64)>| {
         let mut column = Column::new(name, spec.bound)?;
         if let Some(period) = spec.period {
             column = column.with_period(period)?;
@@ -113,15 +114,21 @@ pub(crate) fn columns(
             None => Ok(column),
         }
     };
-    let columns = names.iter().zip(specs).zip(ranges).map(column);
-    columns.collect::<Result<_, _>>().map_err(Error::recording(file))
+    let columns = names.iter().zip(specs).zip(ranges).map(|((name, spec), range)| {
+        column(name, spec, range).map_err(|source| Error::Column {
+            file: file.to_owned(),
+            column: name.clone(),
+            source,
+        })
+    });
+    columns.collect()
 }
 
 /// A bound as `--bound` takes it.
 pub(crate) fn shown(bound: Bound, period: Option<f64>) -> String {
     let bound = match bound {
         Bound::Lossless => "lossless".to_owned(),
-        Bound::Absolute(delta) => format!("±{delta}"),
+        Bound::Absolute(delta) => format!("±{}", exact(delta)),
         Bound::ShareOfRange(share) => format!("{}%", (1e12 * share).round() / 1e10),
         Bound::Decimals(places) => format!("decimals:{places}"),
         _ => "?".to_owned(),

@@ -21,6 +21,14 @@ pub(crate) enum Error {
         #[source]
         source: fewbits_record::Error,
     },
+    /// A column of a recording was refused.
+    #[error("{file}: column `{column}`")]
+    Column {
+        file: String,
+        column: String,
+        #[source]
+        source: fewbits_record::Error,
+    },
     /// A table could not be read.
     #[error("{file}")]
     Table {

@@ -2,6 +2,7 @@
 
 use crate::arguments::InfoOptions;
 use crate::error::Error;
+use crate::numbers::exact;
 use crate::{Ending, bounds, clock, output};
 use fewbits_record::{Playback, TimeBase};
 use serde::Serialize;
@@ -135,7 +136,7 @@ fn print(info: &Info) {
             format!(" {}", column.unit)
         };
         let ends = match (column.min, column.max) {
-            (Some(min), Some(max)) => format!("{min} to {max}{unit}"),
+            (Some(min), Some(max)) => format!("{} to {}{unit}", exact(min), exact(max)),
             _ => "no values".to_owned(),
         };
         println!("  {}: {}, {ends}, {} gaps", column.name, column.bound, column.gaps);

@@ -30,6 +30,15 @@ pub(crate) fn mean_and_deviation(option: &'static str, text: &str) -> Result<(f6
     Ok((number(option, mean, EXPECTED)?, above_zero(option, deviation, EXPECTED)?))
 }
 
+/// All digits of a number, with an exponent where they would be many zeros.
+pub(crate) fn exact(number: f64) -> String {
+    if number == 0.0 || (1e-7..1e16).contains(&number.abs()) {
+        format!("{number}")
+    } else {
+        format!("{number:e}")
+    }
+}
+
 /// A size in as few digits as say it, four at most.
 pub(crate) fn short(number: f64) -> String {
     if number == 0.0 || (1e-4..1e7).contains(&number.abs()) {
@@ -49,7 +58,14 @@ pub(crate) fn short(number: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::short;
+    use super::{exact, short};
+
+    #[test]
+    fn all_digits_without_rows_of_zeros() {
+        for (number, text) in [(0.0, "0"), (-20.125, "-20.125"), (1e308, "1e308"), (2.5e-9, "2.5e-9")] {
+            assert_eq!(exact(number), text);
+        }
+    }
 
     #[test]
     fn sizes_in_few_digits() {

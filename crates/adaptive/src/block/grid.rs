@@ -3,6 +3,7 @@
 use crate::Config;
 use fewbits_core::CodecError;
 use fewbits_node::adaptive::TENS;
+use fewbits_numerics::kernels::vectorised_narrow;
 
 /// Largest decimal digits of a sample: their sums stay whole doubles.
 const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
@@ -12,6 +13,15 @@ const WHOLE: i64 = 1 << 53;
 const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
 /// Cells of a circle, at most.
 const LARGEST_CIRCLE: f64 = (1_u64 << 40) as f64;
+/// Parts of a cell by which grids are moved.
+const PHASE_BITS: u32 = 4;
+pub(super) const PHASES: u8 = 1 << PHASE_BITS;
+/// Samples by which the place of a grid is chosen.
+const FITTED: usize = 1 << 20;
+/// Parts of cells beyond this distance from the first sample are not told apart.
+const FARTHEST_PLACE: f64 = (1 << 28) as f64;
+/// Samples in another cell than the one before, as many as cost a byte or more.
+const CROSSINGS_OF_A_BYTE: u32 = 4;
 /// Decimals that are tried.
 pub(super) const DECIMALS: u8 = 13;
 
@@ -19,11 +29,12 @@ pub(super) const DECIMALS: u8 = 13;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Grid {
     /// Samples are whole multiples of `10^-decimals`. A cell holds `width` neighbours, as many as lie within the bound of its middle.
-    Decimal { decimals: u8, width: i64 },
+    /// The first of them is `phase` sixteenths of the width, rounded up, from a multiple of it.
+    Decimal { decimals: u8, width: i64, phase: u8 },
     /// Samples are `(origin + unit j) / 10^decimals`: exactly.
     Stepped { decimals: u8, unit: i64, origin: i64 },
-    /// `anchor + step j`.
-    Line { anchor: f64, step: f64 },
+    /// `anchor + step (j + phase / 16)`.
+    Line { anchor: f64, step: f64, phase: u8 },
     /// Around a circle.
     Circle { period: f64, cells: i64 },
 }
@@ -52,13 +63,21 @@ impl Grid {
         let ten = TENS[usize::from(decimals)];
         let width = Self::width(delta, ten)?;
         if width > 1 {
-            return Some(Self::Decimal { decimals, width });
+            return Some(Self::Decimal {
+                decimals,
+                width,
+                phase: 0,
+            });
         }
         let mut all = samples.iter().filter_map(|x| digits(*x, ten));
         let origin = all.next()?;
         let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
         if unit <= 1 {
-            return Some(Self::Decimal { decimals, width });
+            return Some(Self::Decimal {
+                decimals,
+                width,
+                phase: 0,
+            });
         }
         Some(Self::Stepped { decimals, unit, origin })
     }
@@ -74,6 +93,63 @@ impl Grid {
         Self::Line {
             anchor,
             step: 2.0 * delta * (1.0 - SLACK),
+            phase: 0,
+        }
+    }
+
+    /// The same grid moved by so many sixteenths of a cell, if it can be.
+    pub(super) fn with_phase(mut self, moved: u8) -> Self {
+        if let Self::Decimal { phase, .. } | Self::Line { phase, .. } = &mut self {
+            *phase = moved;
+        }
+        self
+    }
+
+    /// Sixteenths of a cell by which the grid is moved.
+    pub(super) fn phase(&self) -> u8 {
+        match self {
+            Self::Decimal { phase, .. } | Self::Line { phase, .. } => *phase,
+            _ => 0,
+        }
+    }
+
+    /// The grid moved to where neighbouring samples are most often in one cell, if that is worth the byte.
+    pub(super) fn fitted(self, samples: &[f64]) -> Self {
+        let phases = f64::from(PHASES);
+        let (scale, offset) = match self {
+            // Half a digit from the next cell, so that rounding takes none there.
+            Self::Decimal { decimals, width, .. } if width > 1 => {
+                let scale = phases / width as f64;
+                (scale * TENS[usize::from(decimals)], scale * 0.5 / phases)
+            }
+            Self::Line { anchor, step, .. } => (phases / step, phases * (0.5 - anchor / step)),
+            _ => return self,
+        };
+        let crossings = vectorised_narrow(
+            #[inline(always)]
+            || {
+                let mut crossings = [0_u32; PHASES as usize];
+                let (mut last, mut origin) = (0, None);
+                for sample in samples.iter().take(FITTED).filter(|sample| sample.is_finite()) {
+                    let place = sample * scale + offset;
+                    let origin = *origin.get_or_insert_with(|| (place / phases).floor() * phases);
+                    // Above zero, where a conversion rounds down.
+                    let place = ((place - origin).clamp(-FARTHEST_PLACE, FARTHEST_PLACE) + 2.0 * FARTHEST_PLACE) as i32;
+                    let before = std::mem::replace(&mut last, place);
+                    for (phase, crossings) in (0..).zip(&mut crossings) {
+                        *crossings += u32::from((place - phase) >> PHASE_BITS != (before - phase) >> PHASE_BITS);
+                    }
+                }
+                crossings
+            },
+        );
+        let best = (0..PHASES).min_by_key(|phase| crossings[usize::from(*phase)]);
+        let best = best.unwrap_or(0);
+        let saved = crossings[0] - crossings[usize::from(best)];
+        if saved > CROSSINGS_OF_A_BYTE {
+            self.with_phase(best)
+        } else {
+            self
         }
     }
 
@@ -88,6 +164,13 @@ impl Grid {
         }
     }
 
+    /// Digits by which the first of a cell's neighbours is moved.
+    #[inline(always)]
+    fn digits_moved(width: i64, phase: u8) -> i64 {
+        let sixteenths = i128::from(width) * i128::from(phase);
+        ((sixteenths + i128::from(PHASES) - 1) >> PHASE_BITS) as i64
+    }
+
     /// Whether the points are as dense, wherever they begin.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
@@ -98,7 +181,7 @@ impl Grid {
                     decimals: d, unit: u, ..
                 },
             ) => (decimals, unit) == (d, u),
-            _ => self == other,
+            _ => self.with_phase(0) == other.with_phase(0),
         }
     }
 
@@ -114,21 +197,24 @@ impl Grid {
     #[inline(always)]
     pub(super) fn value(&self, index: i64) -> f64 {
         match self {
-            Self::Decimal { decimals, width } => {
+            Self::Decimal { decimals, width, phase } => {
+                let moved = width - 1 + 2 * Self::digits_moved(*width, *phase);
                 // Twice the digits of the middle, which may be half of one.
                 let short = width
                     .checked_mul(index)
-                    .and_then(|middle| middle.checked_mul(2)?.checked_add(width - 1));
+                    .and_then(|middle| middle.checked_mul(2)?.checked_add(moved));
                 let twice = match short {
                     Some(twice) => twice as f64,
-                    None => (2 * i128::from(*width) * i128::from(index) + i128::from(*width) - 1) as f64,
+                    None => (2 * i128::from(*width) * i128::from(index) + i128::from(moved)) as f64,
                 };
                 0.5 * twice / TENS[usize::from(*decimals)]
             }
             Self::Stepped { decimals, unit, origin } => {
                 (i128::from(*origin) + i128::from(*unit) * i128::from(index)) as f64 / TENS[usize::from(*decimals)]
             }
-            Self::Line { anchor, step } => (anchor + step * index as f64).clamp(f64::MIN, f64::MAX),
+            Self::Line { anchor, step, phase } => {
+                (anchor + step * (index as f64 + f64::from(*phase) / f64::from(PHASES))).clamp(f64::MIN, f64::MAX)
+            }
             Self::Circle { period, cells } => {
                 let value = period / *cells as f64 * index.rem_euclid(*cells) as f64;
                 if value < *period { value } else { 0.0 }
@@ -141,9 +227,10 @@ impl Grid {
         // Of any that are a little larger than these, the arithmetic is that of doubles: exact, and in vectors.
         let exact = |largest: i64| indices.iter().all(|index| index.unsigned_abs() < largest as u64);
         match *self {
-            Self::Decimal { decimals, width } if exact(WHOLE / (4 * width)) => {
+            Self::Decimal { decimals, width, phase } if exact(WHOLE / (4 * width)) => {
+                let moved = (width - 1 + 2 * Self::digits_moved(width, phase)) as f64;
                 let (width, ten) = (width as f64, TENS[usize::from(decimals)]);
-                let twice = indices.iter().map(|index| 2.0 * width * *index as f64 + (width - 1.0));
+                let twice = indices.iter().map(|index| 2.0 * width * *index as f64 + moved);
                 twice.map(|twice| 0.5 * twice / ten).collect()
             }
             _ => indices.iter().map(|index| self.value(*index)).collect(),
@@ -156,18 +243,20 @@ impl Grid {
     pub(super) fn index(&self, sample: f64, near: i64) -> Option<i64> {
         let whole = |x: f64| (x.abs() < super::rows::LARGEST as f64).then(|| x.round() as i64);
         match self {
-            Self::Decimal { decimals, width } => {
+            Self::Decimal { decimals, width, phase } => {
                 let digits = (sample * TENS[usize::from(*decimals)]).round();
                 (digits.abs() < LARGEST_DIGITS)
                     .then_some(digits as i64)
-                    .map(|digits| digits.div_euclid(*width))
+                    .map(|digits| (digits - Self::digits_moved(*width, *phase)).div_euclid(*width))
             }
             Self::Stepped { decimals, unit, origin } => {
                 let digits = digits(sample, TENS[usize::from(*decimals)])?;
                 let offset = i128::from(digits) - i128::from(*origin);
                 i64::try_from(offset.div_euclid(i128::from(*unit))).ok()
             }
-            Self::Line { anchor, step } => whole((sample - anchor) / step),
+            Self::Line { anchor, step, phase } => {
+                whole((sample - anchor) / step - f64::from(*phase) / f64::from(PHASES))
+            }
             Self::Circle { period, cells } => {
                 let turned = sample.rem_euclid(*period);
                 let index = whole(turned / (period / *cells as f64))?;
@@ -188,6 +277,9 @@ impl Grid {
             }
             Self::Line { anchor, .. } if *anchor != 0.0 => bytes.extend_from_slice(&anchor.to_le_bytes()),
             _ => {}
+        }
+        if self.phase() != 0 {
+            bytes.push(self.phase());
         }
     }
 }

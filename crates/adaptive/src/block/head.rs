@@ -46,7 +46,8 @@ pub(super) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &
         Coding::Raw => 2,
         Coding::Counts => 3,
     };
-    let second = own | u8::from(!exceptions.is_empty());
+    let moved = if grid.phase() == 0 { 0 } else { 8 };
+    let second = own | moved | u8::from(!exceptions.is_empty());
     bytes.push(kind | coding << 4 | u8::from(joint) << 6 | u8::from(second != 0) << 7);
     if second != 0 {
         bytes.push(second);

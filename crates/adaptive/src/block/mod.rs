@@ -20,9 +20,10 @@
 //! | part | bytes | when |
 //! |---|---|---|
 //! | head | 1 | always: low 4 bits the grid (0 to 12: decimals of the samples; 13: line; 14: circle; 15: the samples themselves), then 2 bits the coding (0: models; 1: pco; 2: as they are; 3: counts), 1 bit joint, 1 bit whether a second byte follows |
-//! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor |
+//! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor; bit 3: phase |
 //! | steps | 2 varints | unit and origin (zigzag) in units of the last decimal |
 //! | anchor | 8 | a point of the line, little-endian; otherwise zero is one |
+//! | phase | 1 | the grid of a line, or of cells of several decimals, is moved by so many sixteenths of a cell (1 to 15; whole decimals, rounded up) |
 //! | exceptions | varints and 8 each | number; rows since the last one; the sample |
 //! | indices | the rest | models: 6 bits length and as many bits of the first index (zigzag), then decisions (`block/model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`block/counts.rs`); pco: its standalone format |
 //!
@@ -45,7 +46,7 @@ use crate::{Config, Error};
 use fewbits_core::CodecError;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::vectorised;
-use grid::{Bytes, DECIMALS, Grid, unzigzag};
+use grid::{Bytes, DECIMALS, Grid, PHASES, unzigzag};
 use head::{CIRCLE, Coding, Head, LINE, SAMPLES, invalid, write_head};
 use indices::{from_pco_bytes, raw_samples, read_counts, read_models, smallest_pco, with_counts, with_models};
 pub use rows::JOINT_COLUMNS;
@@ -139,7 +140,7 @@ impl BlockCodec {
                 *best = Some(bytes);
             }
         };
-        if let Some(grid) = self.grid(samples) {
+        if let Some(grid) = self.grid(samples).map(|grid| grid.fitted(samples)) {
             let (indices, exceptions) = self.indices(&grid, samples);
             if self.effort == Effort::Thorough {
                 keep(with_models(&grid, &indices, &exceptions, None)?, &mut best);
@@ -295,7 +296,11 @@ impl BlockCodec {
         }
         let width = Grid::width(self.delta(), fewbits_node::adaptive::TENS[usize::from(decimals)]);
         let width = width.ok_or_else(|| invalid("decimals", decimals, "a grid not finer than the samples"))?;
-        Ok(Grid::Decimal { decimals, width })
+        Ok(Grid::Decimal {
+            decimals,
+            width,
+            phase: 0,
+        })
     }
 
     fn circle(&self, config: &Config) -> Result<Grid, CodecError> {
@@ -316,8 +321,12 @@ impl BlockCodec {
             _ => return Err(invalid("head", head, "a grid and a coding that belong together")),
         };
         let [second] = if head & 128 == 0 { [0] } else { bytes.array()? };
-        if second > 7 || (head & 128 != 0 && second == 0) || (kind == SAMPLES && head & 192 != 0) {
-            return Err(invalid("second byte", second, "exceptions, steps or an anchor, and a grid that has them"));
+        if second > 15 || (head & 128 != 0 && second == 0) || (kind == SAMPLES && head & 192 != 0) {
+            return Err(invalid(
+                "second byte",
+                second,
+                "exceptions, steps, an anchor or a phase, and a grid that has them",
+            ));
         }
         let grid = match (kind, self.accuracy) {
             (SAMPLES, _) => None,
@@ -335,6 +344,10 @@ impl BlockCodec {
             }
             (CIRCLE, Accuracy::Within(config)) => Some(self.circle(&config)?),
             _ => return Err(invalid("grid", kind, "one of the agreed accuracy")),
+        };
+        let grid = match grid {
+            Some(grid) if second & 8 != 0 => Some(read_phase(grid, bytes)?),
+            grid => grid,
         };
         let mut exceptions = Vec::new();
         if second & 1 == 1 {
@@ -354,6 +367,15 @@ impl BlockCodec {
             joint: head & 64 != 0,
             exceptions,
         })
+    }
+}
+
+/// The grid moved as the next byte says.
+fn read_phase(grid: Grid, bytes: &mut Bytes<'_>) -> Result<Grid, CodecError> {
+    let [phase] = bytes.array()?;
+    match grid {
+        Grid::Decimal { .. } | Grid::Line { .. } if (1..PHASES).contains(&phase) => Ok(grid.with_phase(phase)),
+        _ => Err(invalid("phase", phase, "1 to 15, of a grid of cells on a line")),
     }
 }
 

@@ -8,8 +8,8 @@
 //! first index less the usual one: zigzag, its high bits by an Elias gamma code, k low bits   decisions as in other blocks
 //! ```
 //!
-//! The start itself: grid (byte: decimals, or 13 line, 14 circle, 16 more if steps follow), steps (unit and origin as in blocks), usual index
-//! (zigzag varint), `k` (byte).
+//! The start itself: grid (byte: decimals, or 13 line, 14 circle, 16 more if steps follow, 32 more if a phase does), steps (unit and origin as in
+//! blocks), phase (byte, as in blocks), usual index (zigzag varint), `k` (byte).
 
 use super::coder::{Coder, Reader, Writer};
 use super::counts::{Counts, gamma};
@@ -32,6 +32,8 @@ const COARSE_BITS_OF_FEW: usize = 2;
 const FEW_ROWS: usize = 1024;
 /// Flag beside the grid: steps follow.
 const STEPPED: u8 = 16;
+/// Flag beside the grid: a phase follows.
+const MOVED: u8 = 32;
 /// Indices are smaller than `2^47` in zigzag form.
 const MOST_BITS: u8 = 47;
 
@@ -56,12 +58,16 @@ pub struct StartedBlock {
 impl Start {
     /// The bytes that [`BlockCodec::read_start`] reads.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = vec![match self.grid {
-            Grid::Decimal { decimals, .. } => decimals,
-            Grid::Stepped { decimals, .. } => decimals | STEPPED,
-            Grid::Line { .. } => LINE,
-            Grid::Circle { .. } => CIRCLE,
-        }];
+        let moved = if self.grid.phase() == 0 { 0 } else { MOVED };
+        let mut bytes = vec![
+            moved
+                | match self.grid {
+                    Grid::Decimal { decimals, .. } => decimals,
+                    Grid::Stepped { decimals, .. } => decimals | STEPPED,
+                    Grid::Line { .. } => LINE,
+                    Grid::Circle { .. } => CIRCLE,
+                },
+        ];
         self.grid.write(&mut bytes);
         push_varint(&mut bytes, zigzag(self.usual));
         bytes.push(self.k);
@@ -90,9 +96,14 @@ impl BlockCodec {
     /// What blocks of samples like these may begin with; `None` where no grid holds them.
     pub fn start(&self, samples: &[f64]) -> Option<Start> {
         let grid = match self.grid(samples)? {
-            Grid::Line { step, .. } => Grid::Line { anchor: 0.0, step },
+            Grid::Line { step, .. } => Grid::Line {
+                anchor: 0.0,
+                step,
+                phase: 0,
+            },
             grid => grid,
-        };
+        }
+        .fitted(samples);
         let (mut indices, _) = self.indices(&grid, samples);
         indices.sort_unstable();
         let usual = indices[indices.len() / 2];
@@ -119,13 +130,17 @@ impl BlockCodec {
     /// If they are none.
     pub fn read_start(&self, bytes: &mut &[u8]) -> Result<Start, Error> {
         let mut reader = Bytes(bytes);
-        let [kind] = reader.array()?;
-        let grid = match (kind & !STEPPED, self.accuracy) {
+        let [head] = reader.array()?;
+        let kind = head & !MOVED;
+        let mut grid = match (kind & !STEPPED, self.accuracy) {
             (0..DECIMALS, _) => self.decimal_grid(kind & !STEPPED, kind & STEPPED != 0, &mut reader)?,
             (LINE, Accuracy::Within(config)) if kind == LINE => Grid::line(config.delta(), 0.0),
             (CIRCLE, Accuracy::Within(config)) if kind == CIRCLE => self.circle(&config)?,
             _ => return Err(invalid("grid", kind, "one of the agreed accuracy").into()),
         };
+        if head & MOVED != 0 {
+            grid = super::read_phase(grid, &mut reader)?;
+        }
         let usual = unzigzag(reader.varint()?);
         let [k] = reader.array()?;
         if usual.unsigned_abs() > LARGEST as u64 || k > MOST_BITS {

@@ -104,6 +104,23 @@ fn packed_table_verifies_and_unpacks() {
 }
 
 #[test]
+fn refused_bound_names_its_column() {
+    let (_kept, folder) = folder();
+    let words = [
+        "pack",
+        "a.csv",
+        "--bound",
+        "temp=±0.1,flow=-1",
+        "--time",
+        "exact",
+        "-o",
+        "a.fewb",
+    ];
+    let message = refused(&folder, &words, b"");
+    assert!(message.contains("a.csv: column `flow`") && message.contains("-1"), "{message}");
+}
+
+#[test]
 fn altered_table_fails_verification() {
     let (_kept, folder) = folder();
     good(&folder, &["pack", "a.csv", "--bound", "*=±0.01", "--time", "exact", "-o", "a.fewb"], b"");
@@ -115,7 +132,7 @@ fn altered_table_fails_verification() {
     let verdict: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&verdict["holds"], &verdict["columns"][0]["failed"]), (&false.into(), &1.into()));
     let failure = verdict["columns"][0]["first_failures"][0].as_str().unwrap();
-    assert!(failure.contains(": 20.5 was restored as 19.99"), "{failure}");
+    assert!(failure.contains(": 20.5 was restored as 20.0"), "{failure}");
 }
 
 #[test]
