@@ -28,7 +28,7 @@
 //! let belief = Gaussian::scalar(0.0, 2.0)?;
 //! let (belief, info) = kalman::step(&dynamics, &sensing, &belief, &[1.5].into())?;
 //! assert!(belief.covariance()[0] < 1.0 && info.innovation[0] == 1.5);
-//! # Ok::<(), fewbits_filters::Error>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Not here: the schemes of any one paper, and time-varying models (pass another model at each step).

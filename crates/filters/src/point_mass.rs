@@ -48,7 +48,7 @@ fn sinc(t: f64) -> f64 {
 /// let mut belief = filter.predict(&PointMass::normal(*filter.grid(), 0.0, 1.0)?)?;
 /// belief.update_with(|x| log_cdf(x - 0.3))?;          // a sign bit at threshold 0.3 in unit noise
 /// assert!(belief.mean() > 0.3);
-/// # Ok::<(), fewbits_filters::Error>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointMassFilter {

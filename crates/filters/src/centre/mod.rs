@@ -19,7 +19,7 @@
 //! let asked = centre.advance(&mut rng, 2.0)?.feedback(7)?;
 //! centre.receive(&mut rng, &[Slot::new(7, asked, Observation::Received(report))])?;
 //! assert!((centre.estimate().mean()[0] - 2.1).abs() < 0.2 && centre.time() == 2.0);
-//! # Ok::<(), fewbits_filters::Error>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Not here: radio, addresses, frames; schemes of any one paper.
