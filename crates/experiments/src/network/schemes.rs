@@ -138,7 +138,7 @@ pub fn of_scalar(world: &World<1, Ar1>) -> Result<Vec<Entry>, Error> {
     Ok(all)
 }
 
-/// The schemes of the plane. Range sensors of unit noise stand at [`FAR`] on the axes: to first order each has the coordinate that the
+/// The schemes of the plane. Range sensors of unit noise stand at 10 km on the axes: to first order each has the coordinate that the
 /// world's own sensors have.
 ///
 /// # Errors
