@@ -285,7 +285,7 @@ fn the_pairwise_bound_ranks_as_exact_information_does() {
             ]
         })
     };
-    let all: Vec<[[f64; 3]; 3]> = (0..DEPLOYMENTS / 2).map(one).collect();
+    let all: Vec<[[f64; 3]; 3]> = (0..DEPLOYMENTS).map(one).collect();
     let [pairwise, gaussian, distance] =
         [0, 1, 2].map(|rule| [0, 1, 2].map(|k| mean(&all.iter().map(|one| one[rule][k]).collect::<Vec<_>>())));
     assert!(pairwise[0] > 0.98 && pairwise[0] > distance[0] + 0.2, "{pairwise:?} {distance:?}");

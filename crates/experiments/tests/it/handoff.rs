@@ -158,7 +158,7 @@ fn errors(setups: &[Setup], law: &[([i64; 2], f64)], stream: Stream) -> Result<V
 fn smoothing_costs_more_than_reduction() {
     let (setups, law) = (setups(), step_law());
     let trial = |it: Trial| errors(&setups, &law, it.stream);
-    let runs = MonteCarlo::new(Stream::new(1).named("handoff-bandwidth"), 12)
+    let runs = MonteCarlo::new(Stream::new(1).named("handoff-bandwidth"), 40)
         .run(trial)
         .unwrap();
     let mean = |i: usize| runs.iter().map(|run| run[i]).collect::<Measured>();
