@@ -337,7 +337,7 @@ fn assert_arrangement<const M: usize>(name: &str, at_once: bool) -> f64 {
         .trace();
     let start = Gaussian::new(Vector2::zeros(), steady).unwrap();
     let run = |it: Trial| Ok::<_, fewbits_dymbo::Error>(vector_run(&filter, at_once, start, it.stream));
-    let runs = MonteCarlo::new(Stream::new(1).named(name), 16).run(run).unwrap();
+    let runs = MonteCarlo::new(Stream::new(1).named(name), 40).run(run).unwrap();
     let [mmse, excess, nees] = [0, 1, 2].map(|of| Measured::mean(&runs.iter().map(|run| run[of]).collect::<Moments>()));
     for (quantity, value) in [
         ("trace", exact(steady.trace())),
