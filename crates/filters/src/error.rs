@@ -13,7 +13,7 @@ pub enum Error {
     /// A message that does not fit its format.
     #[error(transparent)]
     Codec(#[from] fewbits_core::CodecError),
-    /// A density that cannot be.
+    /// A density refused its parameters.
     #[error(transparent)]
     Density(fewbits_densities::Error),
     /// The innovation covariance has no Cholesky factor.

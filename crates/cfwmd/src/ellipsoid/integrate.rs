@@ -91,7 +91,7 @@ fn adaptive(
         .map(|pair| (pair[0], pair[1], mass(pair[0], pair[1]), 0));
     let mut waiting: Vec<_> = panels.rev().collect();
     let whole: f64 = waiting.iter().map(|panel| panel.2).sum();
-    // Halving a panel that is no number would never end.
+    // A panel whose ends are not numbers would be halved without end.
     if !whole.is_finite() {
         return;
     }

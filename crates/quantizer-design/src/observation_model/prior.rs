@@ -272,7 +272,7 @@ impl Prior {
         self.fit.as_ref()
     }
 
-    /// Weight, mean and standard deviation of every bell of a mixture or of the smooth density of a sample.
+    /// Weight, mean and standard deviation of every Gaussian of a mixture or of the smooth density of a sample.
     pub(super) fn bells(&self) -> Vec<(f64, f64, f64)> {
         match (&self.shape, &self.fit) {
             (
