@@ -5,6 +5,7 @@ use fewbits_models::Receptor;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, probabilities};
 use fewbits_numerics::kernels;
+use fewbits_numerics::normal::INV_SQRT_2PI;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
@@ -130,27 +131,35 @@ impl Predictions {
             })
             .collect();
         let steps = (REACH / SPACING) as i32;
+        let axis: Vec<f64> = (-steps..=steps).map(|i| f64::from(i) * SPACING).collect();
+        let densities = axis.iter().map(|y| (-0.5 * y * y).exp() * INV_SQRT_2PI * SPACING);
+        let densities: Vec<f64> = densities.collect();
         let mut total = 0.0;
-        for (own, weight) in points.iter().zip(&self.weights) {
-            let near: Vec<(Vector2<f64>, f64)> = points
-                .iter()
-                .zip(&self.weights)
-                .map(|(p, w)| (p - own, *w))
-                .filter(|(p, w)| *w > 0.0 && p.norm() < 3.0 * REACH)
-                .collect();
-            let mut expectation = 0.0;
-            for i in -steps..=steps {
-                for j in -steps..=steps {
-                    let y = Vector2::new(f64::from(i), f64::from(j)) * SPACING;
-                    let density = (-0.5 * y.norm_squared()).exp() / std::f64::consts::TAU;
-                    let ratio: f64 = near
-                        .iter()
-                        .map(|(p, w)| w * (p.dot(&y) - 0.5 * p.norm_squared()).exp())
-                        .sum();
-                    expectation -= density * SPACING * SPACING * ratio.ln();
+        for (own, weight) in points.iter().zip(&self.weights).filter(|(_, w)| **w > 0.0) {
+            let near = points.iter().zip(&self.weights).map(|(p, w)| (p - own, *w));
+            let near = near.filter(|(p, w)| *w > 0.0 && p.norm() < 3.0 * REACH);
+            // The density of the mixture over that of its component, at every y: products of a function of each axis.
+            let mut ratios = vec![0.0; axis.len() * axis.len()];
+            for (p, w) in near {
+                let [rows, columns] = [0, 1].map(|d| {
+                    let along = axis.iter().map(|y| (p[d] * (y - 0.5 * p[d])).exp());
+                    along.collect::<Vec<f64>>()
+                });
+                for (row, ratios) in rows.iter().zip(ratios.chunks_exact_mut(axis.len())) {
+                    let share = w * row;
+                    ratios
+                        .iter_mut()
+                        .zip(&columns)
+                        .for_each(|(ratio, column)| *ratio += share * column);
                 }
             }
-            total += weight * expectation;
+            for (density, ratios) in densities.iter().zip(ratios.chunks_exact(axis.len())) {
+                let along = ratios
+                    .iter()
+                    .zip(&densities)
+                    .map(|(ratio, density)| density * ratio.ln());
+                total -= weight * density * along.sum::<f64>();
+            }
         }
         total
     }
@@ -160,7 +169,7 @@ impl Predictions {
         let mut total = 0.0;
         for (i, w) in self.weights.iter().enumerate() {
             total += w * gauss_legendre::<16>().composite(-10.0, 10.0, 80, |y| {
-                let density = (-0.5 * y * y).exp() * fewbits_numerics::normal::INV_SQRT_2PI;
+                let density = (-0.5 * y * y).exp() * INV_SQRT_2PI;
                 let parts = column.iter().zip(&self.weights).map(|(m, v)| {
                     let d = m - column[i];
                     v * (d * y - 0.5 * d * d).exp()
