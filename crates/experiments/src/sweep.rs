@@ -52,6 +52,25 @@ impl Context<'_> {
         Ok(self.monte_carlo(self.stream(experiment), count).run(trial)?)
     }
 
+    /// What another figure of this run has put under this name, or what `make` returns. The name says all that it depends on.
+    ///
+    /// # Errors
+    /// If `make` fails.
+    pub fn once<T: Clone + Send + 'static>(
+        &self,
+        name: String,
+        make: impl FnOnce() -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        if let Some(known) = self.kept.and_then(|kept| kept.get(&name)) {
+            return Ok(known);
+        }
+        let made = make()?;
+        if let Some(kept) = self.kept {
+            kept.put(name, made.clone());
+        }
+        Ok(made)
+    }
+
     /// Runs `trials` trials at one point on the streams of `stream`, each adding to a tally that starts `empty`.
     ///
     /// # Errors

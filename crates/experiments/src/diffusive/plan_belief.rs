@@ -1,6 +1,7 @@
 //! Beliefs over the cells of a floor plan: which cell holds a source of unknown rate, from steady readings of sensors.
 
 use fewbits_diffusive::{RateRange, RateSums};
+use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal::log_interval;
 
 /// What sensors report.
@@ -18,6 +19,9 @@ pub(super) const THRESHOLDS: usize = 7;
 const NODES: usize = 4096;
 /// Distance of the rates, in their logarithm, at which the likelihood of words is averaged: below the least width that words leave.
 const RATE_STEP: f64 = 0.027;
+/// Sensors after which a cell may be given up, and by how much its logarithm must then be below that of the best.
+const BLOCK: usize = 8;
+const HOPELESS: f64 = 60.0;
 
 /// What a concentration becomes: noise, and the thresholds of words.
 pub(super) struct Instrument {
@@ -53,10 +57,15 @@ impl Instrument {
         self.thresholds.partition_point(|t| *t <= reading)
     }
 
-    /// The sum of two rows of the table between nodes.
+    /// A row of the table, or a sum of rows, between nodes.
+    #[inline(always)]
     fn look_up(&self, row: &[f64], clean: f64) -> f64 {
         let position = (clean / self.largest).clamp(0.0, 1.0) * (NODES - 1) as f64;
-        let low = (position as usize).min(NODES - 2);
+        let low = if position < (NODES - 2) as f64 {
+            position as usize
+        } else {
+            NODES - 2
+        };
         row[low] + (position - low as f64) * (row[low + 1] - row[low])
     }
 
@@ -149,24 +158,41 @@ fn of_words(
     let count = ((high / low).ln() / RATE_STEP).ceil() as usize;
     let rate = |k: usize| low * (high / low).powf((k as f64 + 0.5) / count as f64);
     let rates: Vec<f64> = (0..count).map(rate).collect();
-    let mut best = (f64::NEG_INFINITY, 0, 1.0);
-    let logs = (0..cells).map(|cell| {
-        let given = |rate: &f64| -> f64 {
-            let pairs = rows.iter().zip(sensors);
-            pairs
-                .map(|(row, sensor)| instrument.look_up(row, rate * sensor.0[cell]))
-                .sum()
-        };
-        let terms: Vec<f64> = rates.iter().map(|rate| given(rate) + rate.ln()).collect();
-        let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        for (log, rate) in terms.iter().zip(&rates) {
-            if log - rate.ln() > best.0 {
-                best = (log - rate.ln(), cell, *rate);
+    // Logarithms of probabilities: what some sensors say of a cell and a rate bounds from above what all say.
+    let add = |terms: &mut [f64], cell: usize, of: std::ops::Range<usize>| {
+        for (row, sensor) in rows[of.clone()].iter().zip(&sensors[of]) {
+            for (term, rate) in terms.iter_mut().zip(&rates) {
+                *term += instrument.look_up(row, rate * sensor.0[cell]);
             }
         }
-        largest + terms.iter().map(|log| (log - largest).exp()).sum::<f64>().ln()
-    });
-    let logs: Vec<f64> = logs.collect();
+        terms.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+    };
+    let first = BLOCK.min(rows.len());
+    let begin = |cell: usize| {
+        let mut terms = vec![0.0; count];
+        (add(&mut terms, cell, 0..first), cell, terms)
+    };
+    let mut open: Vec<(f64, usize, Vec<f64>)> = (0..cells).map(begin).collect();
+    open.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (mut best, mut logs) = ((f64::NEG_INFINITY, 0, 1.0), vec![f64::NEG_INFINITY; cells]);
+    for (mut bound, cell, mut terms) in open {
+        let mut done = first;
+        while done < rows.len() && bound > best.0 - HOPELESS {
+            let next = (done + BLOCK).min(rows.len());
+            bound = add(&mut terms, cell, done..next);
+            done = next;
+        }
+        if done < rows.len() {
+            continue;
+        }
+        for (term, rate) in terms.iter_mut().zip(&rates) {
+            if *term > best.0 {
+                best = (*term, cell, *rate);
+            }
+            *term += rate.ln();
+        }
+        logs[cell] = log_sum_exp(&terms);
+    }
     // The logarithm of the likelihood has known moments if the best cell and rate are true.
     let (log, cell, rate) = best;
     let (mut mean, mut variance) = (0.0, 0.0);

@@ -17,7 +17,7 @@ parameters! {
     pub struct Parameters {
         trials: u64 [2..=10_000] = 100 => quick 6 => "Random placements of source and sensors.",
         sensors: usize [4..=200] = 40 => "Sensors.",
-        visit_trials: u64 [2..=10_000] = 40 => quick 3 => "Placements in which sensors are visited one after the other.",
+        visit_trials: u64 [2..=10_000] = 20 => quick 3 => "Placements in which sensors are visited one after the other.",
         visit_sensors: usize [4..=1000] = 160 => quick 20 => "Sensors of such a placement.",
     }
 }

@@ -9,7 +9,7 @@ parameters! {
         /// Slots of a run.
         slots: usize [40..=100_000] = 300 => quick 60,
         /// Runs of each scheme.
-        trials: u64 [2..=100_000] = 20 => quick 2,
+        trials: u64 [2..=100_000] = 8 => quick 2,
     }
 }
 
