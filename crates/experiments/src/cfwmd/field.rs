@@ -150,23 +150,25 @@ pub(super) static FIG9: Simulated<Field, Summary> = Simulated {
 
 const THREE: [f64; 3] = [2.0, 4.0, 6.0];
 /// Where the first budget runs again, to see a small gain.
-const MANY: &str = "60 times the trials, a tenth of the particles";
+const MANY: &str = "20 times the trials, a fifth of the particles";
 
 pub(super) static FIG10: Simulated<Field, Step> = Simulated {
     about: About::of("cfwmd-fig10", "Received power, state against covariance feedback", "CFwMD paper, figure 10"),
     caption: "Feeding the particles' covariance back (CFwMD2) pays at four and six messages per step, more as time \
-              goes on. At two it gains a twentieth of the squared position error, which 200 trials do not tell from \
-              nothing; 12000 with fewer particles do (table `summary`). 5000 particles, where the publication has 10000.",
+              goes on. At two it gains a twentieth of the squared position error, which 400 trials do not tell from \
+              nothing; 8000 with fewer particles do (table `summary`). The publication has 200 trials of 10000 particles, here \
+              are 400 of 2500.",
     pairs: &[("CFwMD2", "CFwMD")],
     setting: || Field {
-        particles: 5000,
+        trials: 400,
+        particles: 2500,
         ..Field::new(&THREE)
     },
     simulate: |setting, context| {
         let mut all = setting.at_budgets(context, "", &FUSED)?;
         let many = Field {
-            trials: 60 * setting.trials,
-            particles: (setting.particles / 10).max(2),
+            trials: 20 * setting.trials,
+            particles: (setting.particles / 5).max(2),
             ..setting.clone()
         };
         all.extend(many.run(context, MANY, setting.messages[0], &FUSED)?);
