@@ -92,13 +92,13 @@ impl Scene {
 
 /// Parameters of a sweep over signal-to-noise ratios, in steps of 1 dB by default, behind the figure's own.
 macro_rules! swept {
-    ($from:literal to $to:literal $(=> quick $last:literal)?, step => quick $step:literal, $($own:tt)*) => {
+    ($from:literal to $to:literal $(=> quick $last:literal)?, step $step:literal => quick $quick:literal, $($own:tt)*) => {
         parameters! {
             pub struct Parameters {
                 $($own)*
                 from_db: f64 [-60.0..=60.0] = $from => "First signal-to-noise ratio, dB.",
                 to_db: f64 [-60.0..=60.0] = $to $(=> quick $last)? => "Last signal-to-noise ratio, dB.",
-                step_db: f64 [0.01..=60.0] = 1.0 => quick $step => "Step, dB.",
+                step_db: f64 [0.01..=60.0] = $step => quick $quick => "Step, dB.",
             }
             check |p| super::not_below(p.from_db, p.to_db);
         }

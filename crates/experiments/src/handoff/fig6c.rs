@@ -13,7 +13,7 @@ parameters! {
     pub struct Parameters {
         components: usize [1..=100] = 5 => "Components sent.",
         points: usize [2..=2000] = 250 => "Points of the reference at which densities are compared.",
-        trials: u64 [2..=100_000] = 500 => quick 4 => "Worlds.",
+        trials: u64 [2..=100_000] = 250 => quick 4 => "Worlds.",
     }
 }
 

@@ -8,7 +8,7 @@ use nalgebra::{Matrix4, Vector2};
 
 parameters! {
     pub struct Parameters {
-        trials: u64 [2..=100_000] = 400 => quick 10 => "Free trajectories.",
+        trials: u64 [2..=100_000] = 200 => quick 10 => "Free trajectories.",
     }
 }
 
