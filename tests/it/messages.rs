@@ -5,7 +5,7 @@ use crate::references::{agree, numbers};
 use fewbits::densities::{Component, Mixture};
 use fewbits::monte_carlo::{Moments, Stream};
 use fewbits::pf_mpa::product;
-use fewbits::pf_mpa::published::{LabelChain, RingBias, kernel_error, ratio_second_moments};
+use fewbits::pf_mpa::published::{LabelChain, ProductSampler, RingBias, kernel_error, ratio_second_moments};
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
 
 /// Erratum `mpa-3`.
@@ -111,7 +111,9 @@ fn mixing<const D: usize>(case: &str, factors: &[Mixture<D>]) -> [SVector<f64, D
     agree("mpa-gibbs", "eigenvalue", case, |_| chain.second_eigenvalue());
     let bias = SVector::from_vec(chain.bias(SWEEPS));
     let mut rng = Stream::new(1).named("mpa-gibbs").named(case).fast_rng();
-    let drawn = product::gibbs(&mut rng, &factors, 400_000, SWEEPS).unwrap();
+    let drawn = ProductSampler::Gibbs { sweeps: SWEEPS }
+        .sample(&mut rng, &factors, 400_000)
+        .unwrap();
     let mut off = SVector::zeros();
     for (axis, column) in drawn.columns().into_iter().enumerate() {
         let moments: Moments = column.iter().copied().collect();

@@ -1,5 +1,5 @@
 //! Ten sensors send only what surprises. Eight of them die; the centre stops believing their silence.
-use fewbits_cfwmd::scheme::{CovarianceFeedback, PredictedBelief};
+use fewbits_cfwmd::scheme::CovarianceFeedback;
 use fewbits_core::{Belief, Dynamics, Evolution, Gaussian, Link, NumberFormat, SchemeNode, Sensing, SensorNode};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scheme = CovarianceFeedback::new(sensing, 1.0, NumberFormat::Double)?;
     let mut centre = FusionCentre::new(&mut rng, world, MomentFilter, &prior)?;
     for number in 0..10 {
-        let ask = |state: &Gaussian<1>, _: &Gaussian<1>| PredictedBelief(*state);
+        let ask = |state: &Gaussian<1>, _: &Gaussian<1>| *state;
         centre.join(number, Reporting::new(sensing, scheme.clone(), Link::lossy(0.2)?, ask))?;
     }
     let (mut node, mut truth, mut nees) = (SchemeNode::new(scheme), prior.sample(&mut rng), 0.0);

@@ -406,6 +406,7 @@ impl<const M: usize> Factor<M> for Censored<M> {
 pub(crate) fn as_core(error: Error) -> fewbits_core::Error {
     match error {
         Error::Core(error) => error,
+        Error::Argument(error) => error.into(),
         other => ArgumentError::new("report", other.to_string(), "a report that the rule sends").into(),
     }
 }

@@ -5,7 +5,7 @@ use crate::censored::as_core;
 use crate::network::Network;
 use crate::no_feedback::advance;
 use crate::rule::{CensoringRule, OwnRecursion, Weighing};
-use crate::scheme::{Censoring, PredictedBelief};
+use crate::scheme::Censoring;
 use fewbits_core::{
     BitReader, BitString, BitWriter, CodecError, Gaussian, LinearDynamics, LinearSensing, Message, NumberFormat,
     Observation, Scheme, SensorNode,
@@ -24,7 +24,7 @@ pub enum Broadcast<const D: usize> {
     /// The predicted mean.
     Mean(SVector<f64, D>),
     /// Mean and covariance.
-    Belief(PredictedBelief<D>),
+    Belief(Gaussian<D>),
 }
 
 impl<const D: usize> Message for Broadcast<D> {
@@ -34,13 +34,13 @@ impl<const D: usize> Message for Broadcast<D> {
     fn encode(&self, _: &Weighing, writer: &mut BitWriter) -> Result<(), CodecError> {
         match self {
             Self::Mean(mean) => mean.encode(&NumberFormat::Double, writer),
-            Self::Belief(prediction) => prediction.encode(&NumberFormat::Double, writer),
+            Self::Belief(belief) => belief.encode(&NumberFormat::Double, writer),
         }
     }
 
     fn decode(weighing: &Weighing, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
         match weighing {
-            Weighing::FusionCentre => PredictedBelief::decode(&NumberFormat::Double, reader).map(Self::Belief),
+            Weighing::FusionCentre => Gaussian::decode(&NumberFormat::Double, reader).map(Self::Belief),
             _ => SVector::decode(&NumberFormat::Double, reader).map(Self::Mean),
         }
     }
@@ -160,7 +160,7 @@ where
 
     fn feedback(&self, predicted: &Gaussian<D>, _: usize) -> Result<Broadcast<D>, BoxError> {
         Ok(match self.weighing {
-            Weighing::FusionCentre => Broadcast::Belief(PredictedBelief(*predicted)),
+            Weighing::FusionCentre => Broadcast::Belief(*predicted),
             _ => Broadcast::Mean(*predicted.mean()),
         })
     }
@@ -238,7 +238,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         let sensing = sensors.get(self.sensor).ok_or_else(unknown)?.clone();
         let told = Broadcast::<D>::from_bits(&self.weighing, feedback).map_err(|e| refused("feedback", e))?;
         let (mean, rule) = match &told {
-            Broadcast::Belief(PredictedBelief(predicted)) => {
+            Broadcast::Belief(predicted) => {
                 (predicted.mean(), self.network.rule_under(self.sensor, predicted).map_err(as_core)?)
             }
             Broadcast::Mean(mean) => {

@@ -1,15 +1,15 @@
 //! Errors of this crate.
 
-use fewbits_numerics::ArgumentError;
-use thiserror::Error;
-
 /// What a censoring sensor or its fusion centre refuses, or finds impossible. A failed step leaves the belief as it was.
-#[derive(Debug, Clone, PartialEq, Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range, or an observation that is impossible under the belief ([`fewbits_core::Error::Impossible`]).
+    /// An argument out of range.
     #[error(transparent)]
-    Core(#[from] fewbits_core::Error),
+    Argument(#[from] fewbits_numerics::ArgumentError),
+    /// [`fewbits_core::Error::Impossible`] for an observation of probability zero under the belief.
+    #[error(transparent)]
+    Core(fewbits_core::Error),
     /// A filter refused a step.
     #[error(transparent)]
     Filter(fewbits_filters::Error),
@@ -61,22 +61,8 @@ impl Error {
     pub const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
 }
 
-impl From<ArgumentError> for Error {
-    fn from(error: ArgumentError) -> Self {
-        Self::Core(error.into())
-    }
-}
-
-/// Unwraps what the filters only pass on, so that an impossible observation is one error whoever finds it.
-impl From<fewbits_filters::Error> for Error {
-    fn from(error: fewbits_filters::Error) -> Self {
-        match error {
-            fewbits_filters::Error::Core(error) => Self::Core(error),
-            fewbits_filters::Error::Argument(error) => error.into(),
-            other => Self::Filter(other),
-        }
-    }
-}
+fewbits_numerics::lift!(fewbits_core => Core);
+fewbits_numerics::lift!(fewbits_filters with Core => Filter);
 
 impl From<fewbits_densities::Error> for Error {
     fn from(error: fewbits_densities::Error) -> Self {

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | budget to threshold | [`Budget`](threshold::Budget) |
 //! | the rule, and whose covariance weighs the innovation | [`CensoringRule`](rule::CensoringRule), [`Weighing`](rule::Weighing), [`OwnRecursion`](rule::OwnRecursion) |
-//! | the schemes: state feedback or a schedule, state and covariance feedback, none | [`Censoring`](scheme::Censoring), [`CovarianceFeedback`](scheme::CovarianceFeedback), [`LocalCensoring`](no_feedback::LocalCensoring) |
+//! | the schemes: state feedback or a schedule, state and covariance feedback, none | [`Censoring`](scheme::Censoring), [`CovarianceFeedback`](scheme::CovarianceFeedback), [`LocalSensor`](no_feedback::LocalSensor) |
 //! | `ln p(value or silence given the noise-free measurement)` | [`Censored`](censored::Censored), [`Ellipsoid`](ellipsoid::Ellipsoid) |
 //! | fusion with feedback: Gaussian (the default), or a likelihood for any particle or grid filter | [`Network::fuse`](network::Network::fuse), [`Network::likelihood`](network::Network::likelihood) |
 //! | fusion without feedback | [`no_feedback`] |

@@ -3,10 +3,7 @@
 use crate::Error;
 use crate::censored::{Censored, MissingReports, as_core};
 use crate::rule::CensoringRule;
-use fewbits_core::{
-    BitReader, BitWriter, CodecError, Gaussian, LinearSensing, Link, MeasurementNoise, Memoryless, Message,
-    NumberFormat, Observation, Sensing,
-};
+use fewbits_core::{Gaussian, LinearSensing, Link, MeasurementNoise, Memoryless, NumberFormat, Observation, Sensing};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};
 use fewbits_numerics::linalg::symmetrised;
@@ -168,22 +165,6 @@ pub(crate) fn send_if<const M: usize>(
     Ok(Some(report))
 }
 
-/// The fusion centre's prediction with its covariance, as it is broadcast: `D + D (D + 1)/2` numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PredictedBelief<const D: usize>(pub Gaussian<D>);
-
-impl<const D: usize> Message for PredictedBelief<D> {
-    type Format = NumberFormat;
-
-    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
-        self.0.encode(format, writer)
-    }
-
-    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        Gaussian::decode(format, reader).map(Self)
-    }
-}
-
 /// A sensor that is also told the covariance of the prediction and weighs its innovation with `S = R + H P H'` (the paper's
 /// CFwMD2): the message budget is met, at the price of a covariance in every broadcast.
 #[derive(Debug, Clone, PartialEq)]
@@ -212,8 +193,8 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> CovarianceFeedbac
     ///
     /// # Errors
     /// If `R + H P H'` is not positive definite.
-    pub fn under(&self, broadcast: &PredictedBelief<D>) -> Result<Censoring<S, D, M>, Error> {
-        let rule = rule_under(&self.sensing, &broadcast.0, self.threshold)?;
+    pub fn under(&self, broadcast: &Gaussian<D>) -> Result<Censoring<S, D, M>, Error> {
+        let rule = rule_under(&self.sensing, broadcast, self.threshold)?;
         Censoring::new(self.sensing.clone(), rule, self.format)
     }
 }
@@ -245,7 +226,8 @@ impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M>
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for CovarianceFeedback<S, D, M> {
-    type Feedback = PredictedBelief<D>;
+    /// The prediction of the fusion centre: `D + D (D + 1)/2` numbers.
+    type Feedback = Gaussian<D>;
     type Report = SVector<f64, M>;
     type Factor = Censored<M>;
 
@@ -260,19 +242,19 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for
     fn report_of(
         &self,
         measurement: &SVector<f64, M>,
-        broadcast: &PredictedBelief<D>,
+        broadcast: &Gaussian<D>,
     ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
         let sensor = self.under(broadcast).map_err(as_core)?;
-        sensor.report_of(measurement, broadcast.0.mean())
+        sensor.report_of(measurement, broadcast.mean())
     }
 
     fn meaning_of(
         &self,
-        broadcast: &PredictedBelief<D>,
+        broadcast: &Gaussian<D>,
         observation: &Observation<SVector<f64, M>>,
         link: &Link,
     ) -> Result<Censored<M>, fewbits_core::Error> {
         let sensor = self.under(broadcast).map_err(as_core)?;
-        sensor.meaning_of(broadcast.0.mean(), observation, link)
+        sensor.meaning_of(broadcast.mean(), observation, link)
     }
 }

@@ -224,7 +224,7 @@ fn join<const D: usize>(
             centre.join(sensor.number, Reporting::values(sensing, FullValue::new(variance)?, link))?;
         }
         Report::Censored { threshold } => {
-            let ask = |state: &Gaussian<D>, _: &Gaussian<1>| fewbits_cfwmd::scheme::PredictedBelief(*state);
+            let ask = |state: &Gaussian<D>, _: &Gaussian<1>| *state;
             let scheme = censored::<D>(sensor.reads, variance, threshold)?;
             centre.join(sensor.number, Reporting::new(coordinate::<D>(sensor.reads, variance)?, scheme, link, ask))?;
         }

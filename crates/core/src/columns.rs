@@ -45,7 +45,21 @@ pub fn columns_agree<const D: usize>(columns: &mut ColumnsMut<'_, D>) -> bool {
     agree
 }
 
-/// The same for a sweep from states to measurements.
+/// Changes every state of a cloud, the first first; NaN where columns differ in length ([`columns_agree`]).
+#[inline]
+pub fn change_each<const D: usize>(
+    mut columns: ColumnsMut<'_, D>,
+    mut change: impl FnMut(SVector<f64, D>) -> SVector<f64, D>,
+) {
+    if columns_agree(&mut columns) {
+        for i in 0..count(&columns) {
+            let changed = change(SVector::from_fn(|d, _| columns[d][i]));
+            set_state(&mut columns, i, &changed);
+        }
+    }
+}
+
+/// As [`lengths_agree`] for a sweep from states to measurements.
 #[inline]
 pub fn measurements_agree<const D: usize, const M: usize>(
     states: &Columns<'_, D>,

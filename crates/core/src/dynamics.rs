@@ -3,7 +3,7 @@
 //! Three traits, each a refinement of the one before: anything that can be drawn from, Gaussian noise about a smooth mean,
 //! and linear Gaussian. An estimator asks for the least that it needs.
 
-use crate::columns::{ColumnsMut, columns_agree, count, set_state};
+use crate::columns::{ColumnsMut, change_each};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
@@ -18,15 +18,9 @@ pub trait Dynamics<const D: usize> {
     /// Draws `x_k` given `x_{k-1}`.
     fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, D>;
 
-    /// Propagates a whole cloud in place; NaN where columns differ in length ([`columns_agree`]). Override where a loop over columns is faster.
-    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        if !columns_agree(&mut states) {
-            return;
-        }
-        for i in 0..count(&states) {
-            let next = self.propagate(rng, &SVector::from_fn(|d, _| states[d][i]));
-            set_state(&mut states, i, &next);
-        }
+    /// Propagates a whole cloud in place; NaN where columns differ in length ([`crate::columns::columns_agree`]). Override where a loop over columns is faster.
+    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+        change_each(states, |state| self.propagate(rng, &state));
     }
 }
 

@@ -11,12 +11,13 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive, within};
 use nalgebra::{Matrix1, SVector, Vector1};
 
-/// A sensor that sends its scalar measurement in 64 bits: what a Kalman filter receives.
+/// A sensor that sends its scalar measurement as a number, in 64 bits or another format: what a Kalman filter receives.
 ///
 /// A value wants a checksum: over a link that inverts bits it has no factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullValue {
     noise_variance: f64,
+    format: NumberFormat,
 }
 
 /// What a sensor that always sends its value says: the value, which arrived with some probability, or a constant.
@@ -34,7 +35,14 @@ impl FullValue {
     pub fn new(noise_variance: f64) -> Result<Self, ArgumentError> {
         Ok(Self {
             noise_variance: positive("noise_variance", noise_variance)?,
+            format: NumberFormat::Double,
         })
+    }
+
+    /// The same with values that are rounded to a format.
+    #[must_use]
+    pub fn with_format(self, format: NumberFormat) -> Self {
+        Self { format, ..self }
     }
 }
 
@@ -73,11 +81,11 @@ impl Memoryless<1> for FullValue {
     fn feedback_format(&self) {}
 
     fn report_format(&self) -> NumberFormat {
-        NumberFormat::Double
+        self.format
     }
 
     fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<f64>, Error> {
-        Ok(Some(finite("measurement", measurement[0])?))
+        Ok(Some(self.format.rounded(finite("measurement", measurement[0])?)?))
     }
 
     fn meaning_of(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {

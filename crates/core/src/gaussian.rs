@@ -1,7 +1,7 @@
 //! The Gaussian belief.
 
 use crate::belief::{Belief, Density};
-use crate::columns::{Columns, ColumnsMut, columns_agree, count, lengths_agree, set_state};
+use crate::columns::{Columns, ColumnsMut, change_each, lengths_agree};
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
@@ -203,15 +203,10 @@ fn sample_normals<const D: usize, R: Rng + ?Sized>(
     rng: &mut R,
     mean: &SVector<f64, D>,
     factor: &SMatrix<f64, D, D>,
-    mut states: ColumnsMut<'_, D>,
+    states: ColumnsMut<'_, D>,
 ) {
-    if !columns_agree(&mut states) {
-        return;
-    }
-    for i in 0..count(&states) {
-        let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
-        set_state(&mut states, i, &(mean + factor * z));
-    }
+    let mut normals = || SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
+    change_each(states, |_| mean + factor * normals());
 }
 
 /// A [`Gaussian`] of positive definite covariance with its Cholesky factor, for repeated densities and draws.

@@ -86,21 +86,25 @@ impl Wire {
 pub enum Packet {
     /// Indices and samples of all nodes so far.
     Raw(Vec<(usize, Vec<f64>)>),
-    /// A belief of numbers in the order: weights (all but the last), means, lower Cholesky factors, coefficients.
-    Belief {
-        /// Number of components.
-        components: usize,
-        /// Degree of the polynomials, for polynomial Gaussians.
-        degree: Option<usize>,
-        /// Whether the rate is the third coordinate.
-        with_rate: bool,
-        /// The numbers.
-        numbers: Vec<f64>,
-        /// The sum of squared residuals so far, in single precision.
-        chi_squared: f64,
-        /// The samples in that sum.
-        samples: usize,
-    },
+    /// A belief.
+    Belief(PackedBelief),
+}
+
+/// A belief as it travels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PackedBelief {
+    /// Number of components.
+    pub components: usize,
+    /// Degree of the polynomials, for polynomial Gaussians.
+    pub degree: Option<usize>,
+    /// Whether the rate is the third coordinate.
+    pub with_rate: bool,
+    /// Weights (all but the last), means, lower Cholesky factors, coefficients.
+    pub numbers: Vec<f64>,
+    /// The sum of squared residuals so far, in single precision.
+    pub chi_squared: f64,
+    /// The samples in that sum.
+    pub samples: usize,
 }
 
 /// Components and degrees fit into this many bits.
@@ -129,7 +133,7 @@ impl Packet {
             Travelling::Position(belief) => numbers_of(belief),
             Travelling::WithRate(belief) => numbers_of(belief),
         };
-        Ok(Self::Belief {
+        Ok(Self::Belief(PackedBelief {
             components,
             degree,
             with_rate: matches!(belief, Travelling::WithRate(_)),
@@ -137,7 +141,7 @@ impl Packet {
             // A sum beyond single precision is refused as well as the largest number is.
             chi_squared: NumberFormat::Single.rounded(fit.chi_squared.min(f64::from(f32::MAX)))?,
             samples: fit.samples.min((1 << SAMPLE_COUNT_BITS) - 1),
-        })
+        }))
     }
 
     /// The belief that a packet of numbers holds, and the fit so far; `None` for raw records.
@@ -145,25 +149,15 @@ impl Packet {
     /// # Errors
     /// If the numbers are no belief.
     pub fn belief(&self) -> Result<Option<(Travelling, Fit)>, Error> {
-        let Self::Belief {
-            components,
-            degree,
-            with_rate,
-            numbers,
-            chi_squared,
-            samples,
-        } = self
-        else {
-            return Ok(None);
-        };
-        let belief = if *with_rate {
-            Travelling::WithRate(belief_of(*components, *degree, numbers)?)
+        let Self::Belief(packed) = self else { return Ok(None) };
+        let belief = if packed.with_rate {
+            Travelling::WithRate(belief_of(packed)?)
         } else {
-            Travelling::Position(belief_of(*components, *degree, numbers)?)
+            Travelling::Position(belief_of(packed)?)
         };
         let fit = Fit {
-            chi_squared: non_negative("chi_squared", *chi_squared)?,
-            samples: *samples,
+            chi_squared: non_negative("chi_squared", packed.chi_squared)?,
+            samples: packed.samples,
         };
         Ok(Some((belief, fit)))
     }
@@ -198,23 +192,16 @@ impl Message for Packet {
                     }
                 }
             }
-            Self::Belief {
-                components,
-                degree,
-                with_rate,
-                numbers,
-                chi_squared,
-                samples,
-            } => {
+            Self::Belief(belief) => {
                 writer.write_bit(true);
-                writer.write(*components as u64, COUNT_BITS)?;
-                writer.write(degree.map_or(31, |d| d as u64), COUNT_BITS)?;
-                writer.write_bit(*with_rate);
-                for number in numbers {
+                writer.write(belief.components as u64, COUNT_BITS)?;
+                writer.write(belief.degree.map_or(31, |d| d as u64), COUNT_BITS)?;
+                writer.write_bit(belief.with_rate);
+                for number in &belief.numbers {
                     format.wire.numbers.write(*number, writer)?;
                 }
-                NumberFormat::Single.write(*chi_squared, writer)?;
-                writer.write(*samples as u64, SAMPLE_COUNT_BITS)?;
+                NumberFormat::Single.write(belief.chi_squared, writer)?;
+                writer.write(belief.samples as u64, SAMPLE_COUNT_BITS)?;
             }
         }
         Ok(())
@@ -245,14 +232,14 @@ impl Message for Packet {
         let numbers = (0..count)
             .map(|_| format.wire.numbers.read(reader))
             .collect::<Result<_, _>>()?;
-        Ok(Self::Belief {
+        Ok(Self::Belief(PackedBelief {
             components,
             degree,
             with_rate,
             numbers,
             chi_squared: NumberFormat::Single.read(reader)?,
             samples: reader.read(SAMPLE_COUNT_BITS)? as usize,
-        })
+        }))
     }
 }
 
@@ -286,7 +273,8 @@ fn numbers_of<const D: usize>(belief: &SentBelief<D>) -> (usize, Option<usize>, 
     }
 }
 
-fn belief_of<const D: usize>(count: usize, degree: Option<usize>, numbers: &[f64]) -> Result<SentBelief<D>, Error> {
+fn belief_of<const D: usize>(packed: &PackedBelief) -> Result<SentBelief<D>, Error> {
+    let (count, degree, numbers) = (packed.components, packed.degree, &packed.numbers);
     // A mixture sends all weights but the first; a series has none.
     let weights = degree.map_or(count.saturating_sub(1), |_| 0).min(numbers.len());
     let (weights, rest) = numbers.split_at(weights);

@@ -90,7 +90,7 @@ impl Leader for SourceChain {
             None => Vec::new(),
             Some(bits) => match Packet::from_bits(&contract, bits)? {
                 Packet::Raw(records) => records,
-                Packet::Belief { .. } => return Err("the handover is a belief: expected raw records".into()),
+                Packet::Belief(_) => return Err("the handover is a belief: expected raw records".into()),
             },
         };
         let own = self.samples.get(node as usize);

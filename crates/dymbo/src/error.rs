@@ -51,6 +51,7 @@ impl Error {
 }
 
 fewbits_numerics::lift!(fewbits_core => Core);
+fewbits_numerics::lift!(fewbits_filters with Core => Filter);
 
 impl From<fewbits_models::Error> for Error {
     fn from(error: fewbits_models::Error) -> Self {
@@ -65,15 +66,5 @@ impl From<fewbits_models::Error> for Error {
 impl From<fewbits_densities::Error> for Error {
     fn from(error: fewbits_densities::Error) -> Self {
         fewbits_filters::Error::from(error).into()
-    }
-}
-
-impl From<fewbits_filters::Error> for Error {
-    fn from(error: fewbits_filters::Error) -> Self {
-        match error {
-            fewbits_filters::Error::Argument(argument) => Self::Argument(argument),
-            fewbits_filters::Error::Core(word) => word.into(),
-            other => Self::Filter(other),
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! How the filter starts: a belief, a finely rounded first sample, or both.
+//! How the filter starts without a belief: from a finely rounded first sample, and perhaps a prior.
 
 use crate::Error;
 use crate::plant::scalar;
@@ -138,6 +138,29 @@ impl RoundedSample {
         let upper = if multiple.0 == most { f64::INFINITY } else { edge(0.5) };
         Cell::new(lower, upper)
     }
+
+    /// The belief about the state after a first message and no other knowledge: `theta_hat(0) = m(0)`, variance `sigma^2 + tau^2/12`.
+    ///
+    /// The bound of Proposition 2, `(sigma + tau/2)^2`, is no variance to start from: it is up to twice too large and makes
+    /// the filter over-cautious (erratum `dymbo-7`).
+    ///
+    /// # Errors
+    /// If mean or variance leave the range of numbers.
+    pub fn belief(&self, message: Multiple) -> Result<Gaussian<1>, Error> {
+        let variance = self.noise_variance + self.resolution * self.resolution / 12.0;
+        Ok(scalar(finite("message", self.value(message))?, finite("resolution^2", variance)?))
+    }
+
+    /// The belief after a first message that meets a prior for `theta(0)`. Where the prior is real information, this is far better than
+    /// [`belief`](Self::belief): at `a = 0.9`, `gamma = 0.05` the message alone is worse than the prior alone.
+    ///
+    /// # Errors
+    /// [`fewbits_core::Error::Impossible`] if message and prior exclude each other to the last digit.
+    pub fn belief_with_prior(&self, message: Multiple, prior: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
+        let factor = self.meaning_of(&(), &Observation::Received(message), &Link::PERFECT)?;
+        let posterior = factor.tilted(prior)?;
+        Ok(scalar(posterior.mean[0], posterior.covariance[0]))
+    }
 }
 
 impl Memoryless<1> for RoundedSample {
@@ -179,56 +202,6 @@ impl Memoryless<1> for RoundedSample {
         let word = |k: i64| k as u64 & mask;
         let sent = |k: i64| arrives * link.word_probability(word(k), word(multiple.0), self.bits);
         Ok(Partition::new(edges, (least..=most).map(sent).collect(), self.noise_variance)?.into())
-    }
-}
-
-/// The three ways to start.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Initialisation {
-    /// A belief about the state, and no message yet. If it is about `theta(-1)`, the first bit is that of `n = 0`.
-    Prior(Gaussian<1>),
-    /// A first message of resolution `tau` and no other knowledge: `theta_hat(0) = m(0)`, variance `sigma^2 + tau^2/12`.
-    ///
-    /// The bound of Proposition 2, `(sigma + tau/2)^2`, is no variance to start from: it is up to twice too large and makes
-    /// the filter over-cautious (erratum `dymbo-7`).
-    Fine {
-        /// The sensor that sent it.
-        scheme: RoundedSample,
-        /// The message.
-        message: Multiple,
-    },
-    /// A first message that meets a prior for `theta(0)`. Where the prior is real information, this is far better than
-    /// [`Initialisation::Fine`]: at `a = 0.9`, `gamma = 0.05` the message alone is worse than the prior alone.
-    FineWithPrior {
-        /// The sensor that sent it.
-        scheme: RoundedSample,
-        /// The message.
-        message: Multiple,
-        /// The belief about `theta(0)` before the message.
-        prior: Gaussian<1>,
-    },
-}
-
-impl Initialisation {
-    /// The belief to start from.
-    ///
-    /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if message and prior exclude each other to the last digit.
-    pub fn belief(&self) -> Result<Gaussian<1>, Error> {
-        match self {
-            Self::Prior(belief) => Ok(*belief),
-            Self::Fine { scheme, message } => {
-                let tau = scheme.resolution;
-                let variance = scheme.noise_variance + tau * tau / 12.0;
-                Ok(scalar(finite("message", scheme.value(*message))?, finite("resolution^2", variance)?))
-            }
-            Self::FineWithPrior { scheme, message, prior } => {
-                let factor = scheme.meaning_of(&(), &Observation::Received(*message), &Link::PERFECT)?;
-                let posterior = factor.tilted(prior)?;
-                Ok(scalar(posterior.mean[0], posterior.covariance[0]))
-            }
-        }
     }
 }
 
@@ -314,7 +287,7 @@ pub fn first_message_mse(scheme: &RoundedSample, theta: &Gaussian<1>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Initialisation, Multiple, RoundedSample, first_message_mse, first_message_value};
+    use super::{Multiple, RoundedSample, first_message_mse, first_message_value};
     use fewbits_core::laws::message::round_trip;
     use fewbits_core::{Gaussian, Link, Message, Observation, Scheme};
     use fewbits_numerics::normal;
@@ -412,12 +385,9 @@ mod tests {
         let value = first_message_value(&scheme, &prior).unwrap();
         assert!(value.expected_variance < prior.covariance()[0]);
         let message = Multiple(1);
-        let alone = Initialisation::Fine { scheme, message }.belief().unwrap();
-        let both = Initialisation::FineWithPrior { scheme, message, prior }
-            .belief()
-            .unwrap();
+        let alone = scheme.belief(message).unwrap();
+        let both = scheme.belief_with_prior(message, &prior).unwrap();
         assert!(both.covariance()[0] < prior.covariance()[0] && alone.covariance()[0] > prior.covariance()[0]);
-        assert_eq!(Initialisation::Prior(prior).belief().unwrap(), prior);
         let fine = RoundedSample::new(1.0, 1e-9).unwrap();
         assert!(first_message_value(&fine, &prior).is_err());
     }

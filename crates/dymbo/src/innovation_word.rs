@@ -9,7 +9,7 @@ use fewbits_core::{
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::stored;
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
-use nalgebra::{Matrix1, Vector1};
+use nalgebra::{Matrix1, Vector1, Vector2};
 use serde::{Deserialize, Serialize};
 
 /// What the fusion centre broadcasts to sensors that report several bits.
@@ -38,16 +38,12 @@ impl Message for Prediction {
     type Format = NumberFormat;
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
-        format.write(self.mean, writer)?;
-        format.write(self.deviation, writer)
+        Vector2::new(self.mean, self.deviation).encode(format, writer)
     }
 
     fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        let mean = format.read(reader)?;
-        Ok(Self {
-            mean,
-            deviation: format.read(reader)?,
-        })
+        let [mean, deviation] = Vector2::decode(format, reader)?.into();
+        Ok(Self { mean, deviation })
     }
 }
 

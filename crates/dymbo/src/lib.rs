@@ -14,7 +14,7 @@
 //! | task | item |
 //! |---|---|
 //! | the sensors' schemes | [`SignBit`] (any threshold), [`InnovationWord`], [`RoundedSample`] |
-//! | the filter, one bit | [`DymboFilter`], [`Initialisation`] |
+//! | the filter, one bit | [`DymboFilter`] |
 //! | more bits, more sensors, vectors | [`MultibitFilter`], [`ParallelFilter`], [`SignFilter`] |
 //! | a closed loop in one call | [`ScalarFilter::exchange`] |
 //! | what to expect | [`steady`] (closed forms, loss, contours), [`chain`] and [`tree`] (exact errors), [`gap`] (beside the exact posterior) |
@@ -27,14 +27,14 @@
 //!
 //! ```
 //! use fewbits_core::{Observation, Sign};
-//! use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
+//! use fewbits_dymbo::{DymboFilter, RoundedSample, ScalarFilter, ScalarPlant};
 //!
 //! let filter = DymboFilter::new(ScalarPlant::new(0.9, 0.5, 1.0)?);
 //! let samples = [2.31, 1.27, 3.05, 0.42];
 //!
 //! let scheme = RoundedSample::new(1.0, 1.0)?;
 //! let message = scheme.round(samples[0])?;
-//! let mut belief = Initialisation::Fine { scheme, message }.belief()?;
+//! let mut belief = scheme.belief(message)?;
 //! for sample in &samples[1..] {
 //!     let bit = Sign::of(*sample, filter.threshold(&belief))?;      // at the sensor
 //!     belief = filter.step(&belief, &Observation::Received(bit))?.0;
@@ -64,9 +64,7 @@ mod vector;
 pub use centre::{ParallelEstimator, ScalarEstimator};
 pub use error::Error;
 pub use filter::{DymboFilter, ScalarFilter, StepInfo};
-pub use first_message::{
-    FirstMessageValue, Initialisation, Multiple, RoundedSample, first_message_mse, first_message_value,
-};
+pub use first_message::{FirstMessageValue, Multiple, RoundedSample, first_message_mse, first_message_value};
 pub use innovation_word::{CellIndex, InnovationWord, Prediction};
 pub use multibit::MultibitFilter;
 pub use parallel::{CountFusion, ParallelFilter};

@@ -1,6 +1,7 @@
 //! The interacting-multiple-model filter: several models of one world, and any factor.
 
 use crate::{Error, assumed_density};
+use fewbits_core::columns::change_each;
 use fewbits_core::{Belief, ColumnsMut, Factor, Gaussian, GaussianDynamics, Observed, Sensing};
 use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities, within};
 use fewbits_numerics::stored;
@@ -108,12 +109,8 @@ impl<const D: usize> Belief<D> for ImmBelief<D> {
         *self.moment_matched().covariance()
     }
 
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        if !fewbits_core::columns::columns_agree(&mut states) {
-            return;
-        }
-        let count = states.first().map_or(0, |column| column.len());
-        for i in 0..count {
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+        change_each(states, |old| {
             let mut left: f64 = rng.random();
             let mut chosen = 0;
             for (m, p) in self.probabilities.iter().enumerate() {
@@ -125,13 +122,8 @@ impl<const D: usize> Belief<D> for ImmBelief<D> {
                     }
                 }
             }
-            if let Some(mode) = self.modes.get(chosen) {
-                let point = mode.sample(rng);
-                for d in 0..D {
-                    states[d][i] = point[d];
-                }
-            }
-        }
+            self.modes.get(chosen).map_or(old, |mode| mode.sample(rng))
+        });
     }
 }
 

@@ -7,7 +7,7 @@
 //! - [`HandoffFilter`]: one leader's step, from the mixture that was received to the one that is sent. How the belief is reduced
 //!   is a [`Reducer`]: to a number of components, to a number of bits, or a type of your own.
 //! - [`Leaders`]: the same as bits from node to node, over any network that runs the walks of `fewbits-protocol`.
-//! - [`published::Accounting`]: what the losses of all steps say about the error at the end, by the bounds as printed, corrected and
+//! - [`published::bounds`]: what the losses of all steps say about the error at the end, by the bounds as printed, corrected and
 //!   tightened.
 //!
 //! ```

@@ -13,10 +13,7 @@ pub enum Error {
     /// A message that does not fit its format.
     #[error(transparent)]
     Codec(#[from] fewbits_core::CodecError),
-    /// A density refused its parameters.
-    #[error(transparent)]
-    Density(fewbits_densities::Error),
-    /// A filter failed.
+    /// A filter or a density failed.
     #[error(transparent)]
     Filter(fewbits_filters::Error),
     /// A model refused its parameters.
@@ -24,7 +21,7 @@ pub enum Error {
     Model(fewbits_models::Error),
     /// A quantizer refused its parameters.
     #[error(transparent)]
-    Quantizer(fewbits_quantizers::Error),
+    Quantizer(#[from] fewbits_quantizers::Error),
 }
 
 impl Error {
@@ -35,30 +32,10 @@ impl Error {
 pub(crate) use fewbits_numerics::error::refuse;
 
 fewbits_numerics::lift!(fewbits_core => Core, fewbits_models => Model);
+fewbits_numerics::lift!(fewbits_filters with Core => Filter);
 
 impl From<fewbits_densities::Error> for Error {
     fn from(error: fewbits_densities::Error) -> Self {
-        match error {
-            fewbits_densities::Error::Argument(error) => Self::Argument(error),
-            fewbits_densities::Error::Core(error) => error.into(),
-            other => Self::Density(other),
-        }
-    }
-}
-
-impl From<fewbits_filters::Error> for Error {
-    fn from(error: fewbits_filters::Error) -> Self {
-        match error {
-            fewbits_filters::Error::Argument(error) => Self::Argument(error),
-            fewbits_filters::Error::Core(error) => error.into(),
-            fewbits_filters::Error::Density(error) => error.into(),
-            other => Self::Filter(other),
-        }
-    }
-}
-
-impl From<fewbits_quantizers::Error> for Error {
-    fn from(error: fewbits_quantizers::Error) -> Self {
-        Self::Quantizer(error)
+        fewbits_filters::Error::from(error).into()
     }
 }

@@ -1,10 +1,10 @@
 //! What a quantized or plain range says about the distance, when the noise grows with the distance.
 
-use crate::Error;
 use crate::sensor::RangeNoise;
 use fewbits_core::columns::lengths_agree;
 use fewbits_core::factor::{Factor, Feature, InCell, Tilted, Value, tilted_by_quadrature};
 use fewbits_core::{Cell, Columns, Gaussian};
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, within};
 use fewbits_numerics::kernels::{scalar, vectorised};
 use fewbits_numerics::normal;
@@ -29,10 +29,7 @@ pub struct RangeFactor {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Kind {
-    Value {
-        range: f64,
-        log_share: f64,
-    },
+    Value(f64),
     Cell {
         lower: f64,
         upper: f64,
@@ -53,22 +50,9 @@ impl RangeFactor {
     ///
     /// # Errors
     /// If it is not finite.
-    pub fn value(range: f64, noise: RangeNoise) -> Result<Self, Error> {
-        Self::arrived(range, 1.0, noise)
-    }
-
-    /// The range itself, of a report that arrives with probability `share`.
-    ///
-    /// # Errors
-    /// If it is not finite, or `share` is outside `(0, 1]`.
-    pub fn arrived(range: f64, share: f64, noise: RangeNoise) -> Result<Self, Error> {
-        finite("range", range)?;
-        within("share", share, f64::MIN_POSITIVE, 1.0)?;
-        let log_share = share.ln();
-        Ok(Self {
-            noise,
-            kind: Kind::Value { range, log_share },
-        })
+    pub fn value(range: f64, noise: RangeNoise) -> Result<Self, ArgumentError> {
+        let kind = Kind::Value(finite("range", range)?);
+        Ok(Self { noise, kind })
     }
 
     /// The range lies in `cell`; the report arrives with probability `share`. `nominal` is the cell with both ends finite: what
@@ -76,7 +60,7 @@ impl RangeFactor {
     ///
     /// # Errors
     /// If a nominal end is not finite or the ends are not increasing, or `share` is outside `(0, 1]`.
-    pub fn in_cell(cell: Cell, nominal: [f64; 2], share: f64, noise: RangeNoise) -> Result<Self, Error> {
+    pub fn in_cell(cell: Cell, nominal: [f64; 2], share: f64, noise: RangeNoise) -> Result<Self, ArgumentError> {
         within("share", share, f64::MIN_POSITIVE, 1.0)?;
         finite("nominal", nominal[0])?;
         finite("nominal", nominal[1])?;
@@ -104,7 +88,7 @@ impl RangeFactor {
     ///
     /// # Errors
     /// If `probability` is outside `[0, 1]`.
-    pub fn constant(probability: f64, noise: RangeNoise) -> Result<Self, Error> {
+    pub fn constant(probability: f64, noise: RangeNoise) -> Result<Self, ArgumentError> {
         within("probability", probability, 0.0, 1.0)?;
         Ok(Self {
             noise,
@@ -131,7 +115,7 @@ impl RangeFactor {
     pub fn reconstruction(&self) -> Option<(f64, f64)> {
         let uniform = |[a, b]: [f64; 2]| (0.5 * (a + b), (b - a) * (b - a) / 12.0);
         let (mean, variance) = match &self.kind {
-            Kind::Value { range, .. } => (*range, 0.0),
+            Kind::Value(range) => (*range, 0.0),
             Kind::Cell { nominal, .. } => uniform(*nominal),
             Kind::Levels { edges, given } => {
                 let cells = || edges.windows(2).zip(given).map(|(e, p)| (uniform([e[0], e[1]]), *p));
@@ -150,7 +134,7 @@ impl RangeFactor {
     pub fn log_probability(&self, d: f64) -> f64 {
         let deviation = self.noise.deviation(d);
         match &self.kind {
-            Kind::Value { range, log_share } => log_share + normal::log_pdf((range - d) / deviation) - deviation.ln(),
+            Kind::Value(range) => normal::log_pdf((range - d) / deviation) - deviation.ln(),
             Kind::Cell {
                 lower,
                 upper,
@@ -177,7 +161,7 @@ impl RangeFactor {
             width: self.noise.deviation(location),
         };
         let mut features: Vec<Feature> = match &self.kind {
-            Kind::Value { range, .. } => vec![feature(*range)],
+            Kind::Value(range) => vec![feature(*range)],
             Kind::Cell { lower, upper, .. } => [*lower, *upper]
                 .into_iter()
                 .filter(|e| e.is_finite())
@@ -248,14 +232,14 @@ impl Factor<1> for RangeFactor {
         }
         let (noise, distances) = (self.noise, means[0]);
         match &self.kind {
-            Kind::Value { range, log_share } => add_to_each(
+            Kind::Value(range) => add_to_each(
                 log_weights,
                 distances,
                 #[inline(always)]
                 |d| {
                     let deviation = noise.deviation(d);
                     let t = (range - d) / deviation;
-                    log_share - (0.5 * t * t + normal::LN_SQRT_2PI + scalar::ln(deviation))
+                    -(0.5 * t * t + normal::LN_SQRT_2PI + scalar::ln(deviation))
                 },
             ),
             Kind::Cell {
@@ -316,11 +300,7 @@ impl Factor<1> for RangeFactor {
         if self.noise.relative() == 0.0 {
             let variance = self.noise.at_sensor() * self.noise.at_sensor();
             match &self.kind {
-                Kind::Value { range, log_share } => {
-                    let mut tilted = Value::scalar(*range, variance)?.tilted(prior)?;
-                    tilted.log_evidence += log_share;
-                    return Ok(tilted);
-                }
+                Kind::Value(range) => return Value::scalar(*range, variance)?.tilted(prior),
                 Kind::Cell {
                     lower,
                     upper,

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::linearised::Linearised;
-use crate::target::{Manoeuvres, Target};
-use crate::tracker::{GaussianTracker, POSITION, Ranged, StepInfo};
+use crate::target::Manoeuvres;
+use crate::tracker::{GaussianTracker, POSITION, Step, StepInfo};
 use fewbits_core::Gaussian;
 use fewbits_filters::{GridFilter, GridWorkspace};
 use rand::Rng;
@@ -15,28 +15,16 @@ impl GaussianTracker for GridFilter {
     fn advance<R: Rng + ?Sized>(
         &self,
         _: &mut R,
-        target: &Target,
-        k: usize,
-        belief: &Gaussian<4>,
-        observed: &[Ranged],
+        step: Step<'_>,
         workspace: &mut GridWorkspace<2>,
     ) -> Result<(Gaussian<4>, StepInfo), Error> {
         use fewbits_filters::Error::Unresolved;
-        let predicted = target.predict(belief, k, Manoeuvres::AsNoise);
-        let updated = self.update(&predicted, POSITION, observed, workspace);
+        let predicted = step.predicted(Manoeuvres::AsNoise);
+        let updated = self.update(&predicted, POSITION, step.observed, workspace);
         match updated.map_err(Error::from) {
-            Ok((next, info)) => {
-                let log_likelihood = Some(info.log_likelihood);
-                Ok((
-                    next,
-                    StepInfo {
-                        log_likelihood,
-                        ..StepInfo::default()
-                    },
-                ))
-            }
+            Ok((next, info)) => Ok((next, StepInfo::of(info.log_likelihood))),
             Err(Error::Core(fewbits_core::Error::Impossible) | Error::Filter(Unresolved { .. })) => {
-                let (next, info) = Linearised::MESSAGE_PASSING.update(&predicted, observed)?;
+                let (next, info) = Linearised::MESSAGE_PASSING.update(&predicted, step.observed)?;
                 Ok((next, StepInfo { fallbacks: 1, ..info }))
             }
             Err(error) => Err(error),

@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::error::refuse;
 use crate::linearised::Linearised;
-use crate::target::{Manoeuvres, Target};
-use crate::tracker::{GaussianTracker, Ranged, StepInfo};
+use crate::target::Manoeuvres;
+use crate::tracker::{GaussianTracker, Ranged, Step, StepInfo};
 use fewbits_core::columns::set_state;
 use fewbits_core::{Gaussian, Likelihood};
 use fewbits_numerics::kernels;
@@ -127,18 +127,15 @@ impl GaussianTracker for GuidedGaussian {
     fn advance<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
-        target: &Target,
-        k: usize,
-        belief: &Gaussian<4>,
-        observed: &[Ranged],
+        step: Step<'_>,
         workspace: &mut GuidedWorkspace,
     ) -> Result<(Gaussian<4>, StepInfo), Error> {
-        let predicted = target.predict(belief, k, Manoeuvres::AsNoise);
-        let (guide, guess) = Linearised::MESSAGE_PASSING.update(&predicted, observed)?;
+        let predicted = step.predicted(Manoeuvres::AsNoise);
+        let (guide, guess) = Linearised::MESSAGE_PASSING.update(&predicted, step.observed)?;
         if !guide.is_finite() {
             return Err(Error::IMPOSSIBLE);
         }
-        let updated = self.update(rng, &predicted, &guide, observed, workspace)?;
+        let updated = self.update(rng, &predicted, &guide, step.observed, workspace)?;
         Ok(updated.unwrap_or((guide, StepInfo { fallbacks: 1, ..guess })))
     }
 }

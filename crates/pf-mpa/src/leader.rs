@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::error::refuse;
-use crate::target::at_least_one_sensor;
 use fewbits_core::{BitReader, BitWriter, CodecError, Gaussian, Message, NumberFormat};
+use fewbits_numerics::error::at_least_one;
 use nalgebra::{Matrix4, SMatrix, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ pub struct Election {
 /// # Errors
 /// If there is no sensor, or not one estimate per sensor, or a number is not finite.
 pub fn elect(positions: &[Vector2<f64>], estimates: &[Vector2<f64>]) -> Result<Election, Error> {
-    at_least_one_sensor(positions.len())?;
+    at_least_one("sensors", positions.len())?;
     if positions.len() != estimates.len() {
         let expected = format!("{}, one per sensor", positions.len());
         return refuse("estimates", format!("{} estimates", estimates.len()), expected);
@@ -105,15 +105,12 @@ impl Message for LeaderMessage {
     type Format = NumberFormat;
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
-        self.mean.iter().try_for_each(|x| format.write(*x, writer))?;
+        self.mean.encode(format, writer)?;
         triangle().try_for_each(|at| format.write(self.lower[at], writer))
     }
 
     fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        let (mut mean, mut lower) = (Vector4::zeros(), Matrix4::zeros());
-        for x in mean.iter_mut() {
-            *x = format.read(reader)?;
-        }
+        let (mean, mut lower) = (Vector4::decode(format, reader)?, Matrix4::zeros());
         for at in triangle() {
             lower[at] = format.read(reader)?;
         }
@@ -139,7 +136,7 @@ impl StepBits {
     /// # Errors
     /// If there is no sensor or there are fewer than two levels.
     pub fn new(sensors: usize, levels: usize, format: &NumberFormat) -> Result<Self, Error> {
-        at_least_one_sensor(sensors)?;
+        at_least_one("sensors", sensors)?;
         let word = fewbits_quantizers::Labelling::natural(levels)?.bits();
         let known = LeaderMessage::new(&Gaussian::known(Vector4::zeros())?, format);
         let handover = known.and_then(|h| Ok(h.to_bits(format)?.bits()))?;

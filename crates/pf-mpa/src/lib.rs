@@ -77,5 +77,5 @@ pub use rao_blackwell::{RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
 pub use recording::{RangeEstimate, RangeSettings, RangeTracker, Travel};
 pub use sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
 pub use target::{Manoeuvres, Target, WithManoeuvre};
-pub use tracker::{GaussianTracker, Network, POSITION, Ranged, Reports, StepInfo, Tracker};
+pub use tracker::{GaussianTracker, Network, POSITION, Ranged, Reports, Step, StepInfo, Tracker};
 pub use {nalgebra, rand};

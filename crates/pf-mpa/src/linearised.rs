@@ -1,8 +1,8 @@
 //! Gaussian trackers that linearise the range: the extended Kalman filters and Gaussian message passing.
 
 use crate::Error;
-use crate::target::{Manoeuvres, Target};
-use crate::tracker::{GaussianTracker, Ranged, StepInfo};
+use crate::target::Manoeuvres;
+use crate::tracker::{GaussianTracker, Ranged, Step, StepInfo};
 use fewbits_core::Gaussian;
 use fewbits_filters::kalman;
 use fewbits_models::LinearSensor;
@@ -93,11 +93,7 @@ impl Linearised {
         if self.velocity == Velocity::Transfer {
             next = transferred(predicted, &next);
         }
-        let info = StepInfo {
-            log_likelihood: Some(log_likelihood),
-            ..StepInfo::default()
-        };
-        Ok((next, info))
+        Ok((next, StepInfo::of(log_likelihood)))
     }
 }
 
@@ -142,12 +138,9 @@ impl GaussianTracker for Linearised {
     fn advance<R: Rng + ?Sized>(
         &self,
         _: &mut R,
-        target: &Target,
-        k: usize,
-        belief: &Gaussian<4>,
-        observed: &[Ranged],
+        step: Step<'_>,
         (): &mut (),
     ) -> Result<(Gaussian<4>, StepInfo), Error> {
-        self.update(&target.predict(belief, k, self.manoeuvres), observed)
+        self.update(&step.predicted(self.manoeuvres), step.observed)
     }
 }

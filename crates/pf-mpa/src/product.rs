@@ -1,18 +1,15 @@
-//! Products of mixtures: exact by enumeration, and Gibbs sampling over labels.
+//! Products of mixtures, exact by enumeration.
 //!
 //! The product of `F` mixtures is a mixture of one Gaussian for each choice of labels `b_1 .. b_F`, with
 //! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form: exact where the labels can
-//! be enumerated. Where they cannot, Gibbs sweeps draw one label at a time given the others. Where one factor is as concentrated as the
-//! product, as a prediction is, [`MixtureImportance`](crate::published::ProductSampler::MixtureImportance) is better.
+//! be enumerated. Where they cannot, [`ProductSampler`](crate::published::ProductSampler) draws from it.
 
 use crate::Error;
-use fewbits_densities::{Component, Mixture, Particles};
+use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 
 /// The most label choices that [`exact`] enumerates.
 pub const MOST_TERMS: usize = 1_000_000;
@@ -124,107 +121,4 @@ pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<D>, Erro
         belief: Mixture::new(components.collect::<Result<_, _>>()?)?,
         log_normaliser: largest + total.ln(),
     })
-}
-
-/// `count` draws of the product by Gibbs sweeps over the labels, one independent chain per draw: labels start from the weights,
-/// `sweeps` sweeps follow, then one draw of `N(J^-1 h, J^-1)`.
-///
-/// ```text
-/// update of label l: C = (J - S_l^-1)^-1, m = C (h - S_l^-1 m_l)              what the other labels say
-///                    ln w~_i = ln w_l^i + ln N(m_l^i; m, C + S_l^i)          drawn with the maximum taken out
-/// ```
-///
-/// Chains do not mix between well separated modes: the label a chain starts with decides. Five sweeps reach a total variation
-/// of 0.006 in moderately overlapping cases. Cost per draw: `sweeps` times all components.
-///
-/// # Errors
-/// If there is no factor or no draw.
-pub fn gibbs<const D: usize, R: Rng + ?Sized>(
-    rng: &mut R,
-    factors: &[&Mixture<D>],
-    count: usize,
-    sweeps: usize,
-) -> Result<Particles<D>, Error> {
-    let origin = check(factors)?;
-    at_least_one("count", count)?;
-    let parts: Vec<Vec<Information<D>>> = factors
-        .iter()
-        .map(|f| f.components().iter().map(|c| Information::of(c, &origin)).collect())
-        .collect();
-    let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(count));
-    let mut labels = vec![0; factors.len()];
-    let mut logs = Vec::new();
-    for _ in 0..count {
-        for (label, factor) in labels.iter_mut().zip(factors) {
-            *label = pick(rng, factor.components().iter().map(Component::weight));
-        }
-        if factors.len() > 1 {
-            for _ in 0..sweeps {
-                for l in 0..factors.len() {
-                    labels[l] = draw_label(rng, factors, &parts, &labels, l, &origin, &mut logs)?;
-                }
-            }
-        }
-        let (mut precision, mut shift) = (SMatrix::zeros(), SVector::zeros());
-        for (part, label) in parts.iter().zip(&labels) {
-            precision += part[*label].precision;
-            shift += part[*label].shift;
-        }
-        let (mean, _, factor) = gaussian(&precision, &shift)?;
-        let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
-        let draw = origin + mean + factor.whitener.transpose() * z;
-        columns
-            .iter_mut()
-            .zip(draw.iter())
-            .for_each(|(column, x)| column.push(*x));
-    }
-    Ok(Particles::uniform(columns)?)
-}
-
-/// Draws label `l` given the others.
-fn draw_label<const D: usize, R: Rng + ?Sized>(
-    rng: &mut R,
-    factors: &[&Mixture<D>],
-    parts: &[Vec<Information<D>>],
-    labels: &[usize],
-    l: usize,
-    origin: &SVector<f64, D>,
-    logs: &mut Vec<f64>,
-) -> Result<usize, Error> {
-    let (mut precision, mut shift) = (SMatrix::zeros(), SVector::zeros());
-    for k in (0..parts.len()).filter(|k| *k != l) {
-        precision += parts[k][labels[k]].precision;
-        shift += parts[k][labels[k]].shift;
-    }
-    let (mean, covariance, _) = gaussian(&precision, &shift)?;
-    logs.clear();
-    let mut previous: Option<(SMatrix<f64, D, D>, Factored<D>)> = None;
-    for c in factors[l].components() {
-        // Components of one mixture mostly share their covariance; then one factor does for all.
-        let factor = match previous {
-            Some((covariance, factor)) if covariance == *c.covariance() => factor,
-            _ => Factored::new("covariance", &((covariance + covariance.transpose()) * 0.5 + c.covariance()))?,
-        };
-        previous = Some((*c.covariance(), factor));
-        logs.push(c.weight().ln() - 0.5 * factor.squared(&(c.mean() - origin - mean)) - factor.half_log_det);
-    }
-    let largest = fewbits_numerics::kernels::largest(logs);
-    Ok(pick(rng, logs.iter().map(|x| (x - largest).exp())))
-}
-
-/// Index drawn with the given weights; the last one of positive weight if rounding leaves a rest.
-fn pick<R: Rng + ?Sized>(rng: &mut R, weights: impl Iterator<Item = f64> + Clone) -> usize {
-    let total: f64 = weights.clone().sum();
-    let level = rng.random::<f64>() * total;
-    let (mut cumulative, mut last) = (0.0, 0);
-    for (i, w) in weights.enumerate() {
-        if w > 0.0 {
-            last = i;
-            cumulative += w;
-            if level < cumulative {
-                return i;
-            }
-        }
-    }
-    last
 }

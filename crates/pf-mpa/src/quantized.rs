@@ -10,7 +10,7 @@ use fewbits_core::{
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_quantizers::{Labelling, Symbol};
-use nalgebra::{Matrix1, Vector1};
+use nalgebra::{Matrix1, Vector1, Vector2};
 use serde::{Deserialize, Serialize};
 
 /// Where the cells of a quantized range lie: `L` equal cells on `centre +- half_width`, the first and the last continued to
@@ -49,12 +49,12 @@ impl RangeReference {
     ///
     /// # Errors
     /// If the level is not below `levels`, the reference is none, or rounding closes the cell.
-    pub fn nominal_cell(&self, level: usize, levels: usize) -> Result<Cell, Error> {
+    pub fn nominal_cell(&self, level: usize, levels: usize) -> Result<Cell, ArgumentError> {
         self.check()?;
         if level >= levels {
             return refuse("level", level, format!("a level below {levels}"));
         }
-        Ok(Cell::new(self.edge(level, levels), self.edge(level + 1, levels))?)
+        Cell::new(self.edge(level, levels), self.edge(level + 1, levels))
     }
 }
 
@@ -62,16 +62,12 @@ impl Message for RangeReference {
     type Format = NumberFormat;
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
-        format.write(self.centre, writer)?;
-        format.write(self.half_width, writer)
+        Vector2::new(self.centre, self.half_width).encode(format, writer)
     }
 
     fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        let centre = format.read(reader)?;
-        Ok(Self {
-            centre,
-            half_width: format.read(reader)?,
-        })
+        let [centre, half_width] = Vector2::decode(format, reader)?.into();
+        Ok(Self { centre, half_width })
     }
 }
 
@@ -172,7 +168,7 @@ impl QuantizedRange {
     }
 
     /// What a level that arrived unharmed with probability `share` says.
-    fn cell_factor(&self, level: usize, reference: &RangeReference, share: f64) -> Result<RangeFactor, Error> {
+    fn cell_factor(&self, level: usize, reference: &RangeReference, share: f64) -> Result<RangeFactor, ArgumentError> {
         let (levels, nominal) = (self.levels(), reference.nominal_cell(level, self.levels())?);
         let lower = if level == 0 { f64::NEG_INFINITY } else { nominal.lower() };
         let upper = if level + 1 == levels {
@@ -191,17 +187,8 @@ impl QuantizedRange {
     ///
     /// # Errors
     /// If there is no such level, or the reference is none.
-    pub fn received(&self, level: Symbol, reference: &RangeReference) -> Result<RangeFactor, Error> {
+    pub fn received(&self, level: Symbol, reference: &RangeReference) -> Result<RangeFactor, ArgumentError> {
         self.cell_factor(level.0, reference, 1.0)
-    }
-}
-
-/// What a scheme reports.
-pub(crate) fn reported(error: Error) -> fewbits_core::Error {
-    match error {
-        Error::Argument(error) => error.into(),
-        Error::Core(error) => error,
-        other => ArgumentError::new("reference", other, "a reference of a quantized range").into(),
     }
 }
 
@@ -241,11 +228,11 @@ impl Memoryless<1> for QuantizedRange {
     ) -> Result<RangeFactor, fewbits_core::Error> {
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
-            missing => return RangeFactor::constant(link.delivery(missing), self.noise).map_err(reported),
+            missing => return Ok(RangeFactor::constant(link.delivery(missing), self.noise)?),
         };
         let arrives = link.of_received()?;
         if link.crossover() == 0.0 {
-            return self.cell_factor(symbol.0, reference, arrives).map_err(reported);
+            return Ok(self.cell_factor(symbol.0, reference, arrives)?);
         }
         reference.check()?;
         let (levels, word) = (self.levels(), |symbol: usize| self.labelling.word(symbol).map(u64::from));

@@ -2,7 +2,6 @@
 
 use crate::Error;
 use crate::chain::AccelerationChain;
-use crate::error::refuse;
 use fewbits_core::{Dynamics, Gaussian};
 use fewbits_densities::Particles;
 use fewbits_filters::Imm;
@@ -255,14 +254,6 @@ impl Dynamics<6> for WithManoeuvre {
         let moved = self.target.moved(rng, &own, &acceleration);
         Vector6::new(moved[0], moved[1], moved[2], moved[3], acceleration[0], acceleration[1])
     }
-}
-
-/// Refuses an empty list of sensors.
-pub(crate) fn at_least_one_sensor(count: usize) -> Result<(), Error> {
-    if count == 0 {
-        return refuse("sensors", "an empty list", "at least one sensor (three for an unambiguous position)");
-    }
-    Ok(())
 }
 
 #[cfg(test)]

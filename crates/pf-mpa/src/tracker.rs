@@ -6,8 +6,9 @@ use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::RangeSensor;
-use crate::target::{Manoeuvres, Target, at_least_one_sensor};
+use crate::target::{Manoeuvres, Target};
 use fewbits_core::{Gaussian, Observed};
+use fewbits_numerics::error::at_least_one;
 use nalgebra::Vector2;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -28,6 +29,16 @@ pub struct StepInfo {
     pub effective_sample_size: Option<f64>,
     /// How often the step fell back to Gaussian message passing, or widened a kernel without spread.
     pub fallbacks: u32,
+}
+
+impl StepInfo {
+    /// Of a step without draws.
+    pub(crate) fn of(log_likelihood: f64) -> Self {
+        Self {
+            log_likelihood: Some(log_likelihood),
+            ..Self::default()
+        }
+    }
 }
 
 /// A tracker of the manoeuvring [`Target`]. Beliefs are values; a failed step leaves them as they were.
@@ -78,6 +89,21 @@ pub trait Tracker {
     }
 }
 
+/// What one step of a [`GaussianTracker`] is given: step `k` of the target, the belief before it, and what was observed after it.
+#[derive(Debug, Clone, Copy)]
+pub struct Step<'a> {
+    pub(crate) target: &'a Target,
+    pub(crate) k: usize,
+    pub(crate) belief: &'a Gaussian<4>,
+    pub(crate) observed: &'a [Ranged],
+}
+
+impl Step<'_> {
+    pub(crate) fn predicted(&self, manoeuvres: Manoeuvres) -> Gaussian<4> {
+        self.target.predict(self.belief, self.k, manoeuvres)
+    }
+}
+
 /// A tracker whose belief is a Gaussian, and what makes it a [`Tracker`].
 pub trait GaussianTracker {
     /// Buffers kept from step to step.
@@ -91,17 +117,14 @@ pub trait GaussianTracker {
         Ok(())
     }
 
-    /// The belief after step `k`. A mean or covariance that is no number is [`fewbits_core::Error::Impossible`].
+    /// The belief after a step. A mean or covariance that is no number is [`fewbits_core::Error::Impossible`].
     ///
     /// # Errors
     /// As [`Tracker::step_in_place`].
     fn advance<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
-        target: &Target,
-        k: usize,
-        belief: &Gaussian<4>,
-        observed: &[Ranged],
+        step: Step<'_>,
         workspace: &mut Self::Workspace,
     ) -> Result<(Gaussian<4>, StepInfo), Error>;
 }
@@ -128,7 +151,13 @@ impl<T: GaussianTracker> Tracker for T {
         observed: &[Ranged],
         workspace: &mut T::Workspace,
     ) -> Result<StepInfo, Error> {
-        let (next, info) = self.advance(rng, target, k, belief, observed, workspace)?;
+        let step = Step {
+            target,
+            k,
+            belief,
+            observed,
+        };
+        let (next, info) = self.advance(rng, step, workspace)?;
         if !next.is_finite() {
             return Err(Error::IMPOSSIBLE);
         }
@@ -161,7 +190,7 @@ impl Network {
     /// # Errors
     /// If there is none, a position is not finite, or two sensors stand at the same place.
     pub fn new(positions: &[Vector2<f64>], scheme: QuantizedRange, encoder: Encoder) -> Result<Self, Error> {
-        at_least_one_sensor(positions.len())?;
+        at_least_one("sensors", positions.len())?;
         if let Some(i) = (1..positions.len()).find(|i| positions[..*i].contains(&positions[*i])) {
             return refuse("positions", format!("{:?} twice", positions[i]), "sensors at different places");
         }

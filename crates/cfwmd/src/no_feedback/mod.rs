@@ -17,78 +17,20 @@ pub mod joint;
 pub use joint::JointBelief;
 
 use crate::Error;
-use crate::censored::Censored;
 use crate::network::Network;
 use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
-use crate::scheme::{Censoring, send_if};
-use fewbits_core::{
-    Deterministic, Gaussian, LinearDynamics, LinearSensing, Link, NumberFormat, Observation, Scheme, Sensing,
-};
+use crate::scheme::send_if;
+use fewbits_core::{Gaussian, LinearDynamics, LinearSensing, NumberFormat, Observation, Sensing};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};
-use nalgebra::{SMatrix, SVector};
-use rand::Rng;
+use nalgebra::SVector;
 
-/// A sensor in one slot that compares its measurement with its own filter's prediction, and updates its filter with the
-/// measurement whether it reports or not (as it travels, if it does).
+/// A sensor that compares each measurement with its own filter's prediction, and updates that filter with the measurement whether it
+/// reports or not (as it travels, if it does).
 ///
-/// What only the sensor knows, its estimate, is its `State`. The factor is that of a receiver that supposes
-/// [`start`](Scheme::start) for it: one that does not know the estimate carries it in its belief, as [`joint`] and
+/// What its silence says is a factor of the state only for who knows its estimate, as [`Censoring`](crate::scheme::Censoring) told that
+/// estimate. A fusion centre does not: it carries the estimate in its belief, as [`joint`] and
 /// [`imputing`](crate::published::imputing) do.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LocalCensoring<S, const D: usize, const M: usize> {
-    scheme: Censoring<S, D, M>,
-    sensing: S,
-    transition: SMatrix<f64, D, D>,
-    gain: SMatrix<f64, D, M>,
-    supposed: SVector<f64, D>,
-}
-
-impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> Deterministic<M> for LocalCensoring<S, D, M> {}
-
-impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> Scheme<M> for LocalCensoring<S, D, M> {
-    /// The sensor's estimate after the last slot.
-    type State = SVector<f64, D>;
-    type Feedback = ();
-    type Report = SVector<f64, M>;
-    type Factor = Censored<M>;
-
-    fn start(&self) -> SVector<f64, D> {
-        self.supposed
-    }
-
-    fn feedback_format(&self) {}
-
-    fn report_format(&self) -> NumberFormat {
-        self.scheme.report_format()
-    }
-
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        state: &mut SVector<f64, D>,
-        measurement: &SVector<f64, M>,
-        (): &(),
-    ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
-        let predicted = self.transition * *state;
-        let prediction = self.sensing.mean(&predicted);
-        let report = send_if(self.scheme.rule(), measurement, &prediction, &self.scheme.report_format())?;
-        *state = predicted + self.gain * (report.unwrap_or(*measurement) - prediction);
-        Ok(report)
-    }
-
-    fn factor(
-        &self,
-        (): &(),
-        observation: &Observation<SVector<f64, M>>,
-        link: &Link,
-    ) -> Result<Censored<M>, fewbits_core::Error> {
-        self.scheme
-            .factor(&(self.transition * self.supposed), observation, link)
-    }
-}
-
-/// A sensor with its own filter, from slot to slot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalSensor<S, const D: usize, const M: usize> {
     sensing: S,
@@ -98,7 +40,7 @@ pub struct LocalSensor<S, const D: usize, const M: usize> {
     estimate: SVector<f64, D>,
 }
 
-impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> LocalSensor<S, D, M> {
+impl<S: LinearSensing<D, M>, const D: usize, const M: usize> LocalSensor<S, D, M> {
     /// A sensor that starts from the common belief.
     ///
     /// # Errors
@@ -122,39 +64,22 @@ impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> LocalSensor
         &self.estimate
     }
 
-    /// The scheme of the next slot, and the sensor's recursion after it.
-    ///
-    /// # Errors
-    /// If an innovation covariance is not positive definite.
-    pub fn next_slot(
-        &self,
-        dynamics: &impl LinearDynamics<D>,
-    ) -> Result<(LocalCensoring<S, D, M>, OwnRecursion<D>), Error> {
-        let mut own = self.own;
-        let step = own.advance(dynamics, &self.sensing, &self.estimate)?;
-        let rule = CensoringRule::new(&step.innovation_covariance, self.threshold)?;
-        let slot = LocalCensoring {
-            scheme: Censoring::new(self.sensing.clone(), rule, self.format)?,
-            sensing: self.sensing.clone(),
-            transition: *dynamics.transition(),
-            gain: step.gain,
-            supposed: self.estimate,
-        };
-        Ok((slot, own))
-    }
-
     /// Takes one measurement, updates its own filter with it and reports what the rule lets it report.
     ///
     /// # Errors
-    /// If the measurement is not finite; the sensor is then as it was.
-    pub fn step<R: Rng + ?Sized>(
+    /// If the measurement is not finite, or an innovation covariance not positive definite; the sensor is then as it was.
+    pub fn step(
         &mut self,
-        rng: &mut R,
         dynamics: &impl LinearDynamics<D>,
         measurement: &SVector<f64, M>,
     ) -> Result<Option<SVector<f64, M>>, Error> {
-        let (slot, own) = self.next_slot(dynamics)?;
-        let report = slot.encode(rng, &mut self.estimate, measurement, &())?;
+        let mut own = self.own;
+        let step = own.advance(dynamics, &self.sensing, &self.estimate)?;
+        let rule = CensoringRule::new(&step.innovation_covariance, self.threshold)?;
+        let predicted = dynamics.transition() * self.estimate;
+        let prediction = self.sensing.mean(&predicted);
+        let report = send_if(&rule, measurement, &prediction, &self.format)?;
+        self.estimate = predicted + step.gain * (report.unwrap_or(*measurement) - prediction);
         self.own = own;
         Ok(report)
     }

@@ -1,6 +1,6 @@
 //! Censoring sensors at a fusion centre: most of them die, and the centre notices.
 
-use fewbits_cfwmd::scheme::{CovarianceFeedback, PredictedBelief};
+use fewbits_cfwmd::scheme::CovarianceFeedback;
 use fewbits_core::{Dynamics, Evolution, Gaussian, Link, NumberFormat, Observation, SchemeNode, Sensing, SensorNode};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{Event, FusionCentre, Reporting, Slot};
@@ -29,7 +29,7 @@ fn run(loss: f64, slots: u32, seed: u64) -> Outcome {
     let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior).unwrap();
     let mut nodes = Vec::new();
     for number in 0..SENSORS {
-        let ask = |state: &Gaussian<1>, _: &Gaussian<1>| PredictedBelief(*state);
+        let ask = |state: &Gaussian<1>, _: &Gaussian<1>| *state;
         let link = Link::lossy(loss).unwrap();
         centre
             .join(number, Reporting::new(sensing, scheme.clone(), link, ask))
@@ -125,7 +125,7 @@ fn a_lost_report_is_no_silence() {
     let scheme = CovarianceFeedback::new(sensing, 1.0, NumberFormat::Double).unwrap();
     let prior = Gaussian::scalar(0.0, 1.0).unwrap();
     let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior).unwrap();
-    let ask = |state: &Gaussian<1>, _: &Gaussian<1>| PredictedBelief(*state);
+    let ask = |state: &Gaussian<1>, _: &Gaussian<1>| *state;
     centre
         .join(0, Reporting::new(sensing, scheme, Link::PERFECT, ask))
         .unwrap();

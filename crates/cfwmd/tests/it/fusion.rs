@@ -301,7 +301,7 @@ fn bad_steps_are_typed_errors_and_leave_the_belief() {
         }
     );
     assert!(matches!(fuse(&[value(1.1), value(9.0)]).unwrap_err(), Error::ProtocolViolation { sensor: 0, .. }));
-    assert!(matches!(fuse(&[value(9.0), value(f64::NAN)]).unwrap_err(), Error::Core(_)));
+    assert!(matches!(fuse(&[value(9.0), value(f64::NAN)]).unwrap_err(), Error::Argument(_)));
     assert!(fuse(&[Observation::Nothing, Observation::Nothing]).is_ok());
     // What was sent and lost was large.
     let lost = fuse(&[Observation::Lost, Observation::Lost]).unwrap().0;

@@ -59,7 +59,7 @@ fn simulate<const M: usize>(
                 .zip(network.sensors())
                 .map(|(half, sensor)| {
                     let z = sensor.sample(&mut rng, &truth);
-                    let report = half.step(&mut rng, dynamics, &z).unwrap();
+                    let report = half.step(dynamics, &z).unwrap();
                     network
                         .link()
                         .transmit(&mut rng, report.as_ref(), &NumberFormat::Double)
@@ -208,7 +208,7 @@ fn own_estimates_are_known_as_far_as_reports_came() {
     let (network, dynamics, start) = (scalar(0.0), constant_velocity_1d(1.0, 4.0).unwrap(), known());
     let mut own = LocalSensor::new(network.sensors()[1], network.threshold(), NumberFormat::Double, &start).unwrap();
     let z = Vector1::new(21.0);
-    assert!(own.step(&mut Stream::new(1).rng(), &dynamics, &z).unwrap().is_some());
+    assert!(own.step(&dynamics, &z).unwrap().is_some());
     let belief = JointBelief::new(&start, 2).unwrap();
     let (after, _) =
         joint::step(&network, &dynamics, &belief, &[Observation::Nothing, Observation::Received(z)]).unwrap();
@@ -269,7 +269,7 @@ fn bad_steps_are_typed_errors() {
     assert!(LocalSensor::new(sensor, 1.0, NumberFormat::fixed(0.0, 1.0, 4).unwrap(), &known()).is_err());
     let mut half = LocalSensor::new(sensor, 1.0, NumberFormat::Double, &known()).unwrap();
     let fresh = half.clone();
-    assert!(half.step(&mut rng, &dynamics, &Vector1::new(f64::NAN)).is_err());
+    assert!(half.step(&dynamics, &Vector1::new(f64::NAN)).is_err());
     assert_eq!(half, fresh);
 }
 

@@ -2,7 +2,7 @@
 
 use fewbits_cfwmd::no_feedback::LocalSensor;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
-use fewbits_cfwmd::scheme::{CovarianceFeedback, PredictedBelief};
+use fewbits_cfwmd::scheme::CovarianceFeedback;
 use fewbits_core::{Gaussian, NumberFormat};
 use fewbits_models::{LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
@@ -15,7 +15,7 @@ fn sensor() -> LinearSensor<2, 1> {
 }
 
 #[test]
-fn own_filter_is_that_of_local_censoring_to_the_bit() {
+fn own_filter_is_that_of_a_local_sensor_to_the_bit() {
     let dynamics = constant_velocity_1d(1.0, 0.5).unwrap();
     let start = Gaussian::new(Vector2::new(0.3, 1.0), Matrix2::identity()).unwrap();
     let mut local = LocalSensor::new(sensor(), 0.45, NumberFormat::Double, &start).unwrap();
@@ -30,7 +30,7 @@ fn own_filter_is_that_of_local_censoring_to_the_bit() {
         let z = 0.9 * f64::from(n) + 4.0 * rng.random::<f64>();
         let step = recursion.advance(&dynamics, &h, &SVector::zeros()).unwrap();
         let rule = CensoringRule::new(&step.innovation_covariance, 0.45).unwrap();
-        let report = local.step(&mut rng, &dynamics, &Vector1::new(z)).unwrap();
+        let report = local.step(&dynamics, &Vector1::new(z)).unwrap();
         let gain: [f64; 2] = step.gain.into();
         assert_eq!(node.speaks(z, &gain, rule.half_width()).unwrap(), report.is_some(), "slot {n}");
         assert_eq!(*node.estimate(), <[f64; 2]>::from(*local.estimate()), "slot {n}");
@@ -45,7 +45,7 @@ fn told_half_width_is_that_of_covariance_feedback_to_the_bit() {
     let mut rng = Stream::new(4).rng();
     for _ in 0..500 {
         let (a, b, d) = (1.0 + rng.random::<f64>(), rng.random::<f64>(), 1.0 + 9.0 * rng.random::<f64>());
-        let told = PredictedBelief(Gaussian::new(Vector2::zeros(), Matrix2::new(a, b, b, d)).unwrap());
+        let told = Gaussian::new(Vector2::zeros(), Matrix2::new(a, b, b, d)).unwrap();
         let width = half_width(&[1.0, 0.25], &[[a, b], [b, d]], 0.3, 1.7).unwrap();
         assert_eq!(width, scheme.under(&told).unwrap().rule().half_width());
     }

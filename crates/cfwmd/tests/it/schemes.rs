@@ -3,8 +3,8 @@
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::LocalSensor;
 use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
-use fewbits_cfwmd::rule::CensoringRule;
-use fewbits_cfwmd::scheme::{Censoring, CovarianceFeedback, PredictedBelief};
+use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
+use fewbits_cfwmd::scheme::{Censoring, CovarianceFeedback};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::laws::factor::tilted_is_quadrature;
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
@@ -99,9 +99,9 @@ fn censoring_with_state_feedback_is_lawful() {
 fn covariance_feedback_and_the_random_trigger_are_lawful() {
     let scheme = CovarianceFeedback::new(position(), 0.45, NumberFormat::Double).unwrap();
     let told = Gaussian::new(Vector2::new(0.5, 2.0), Matrix2::new(2.0, 0.4, 0.4, 1.0)).unwrap();
-    scalar_laws(&scheme, &PredictedBelief(told), 1.3, Vector1::new);
-    draws_nothing(&scheme, &PredictedBelief(told), Vector1::new(0.5));
-    assert_eq!(round_trip(&PredictedBelief(told), &NumberFormat::Double).unwrap(), 5 * 64);
+    scalar_laws(&scheme, &told, 1.3, Vector1::new);
+    draws_nothing(&scheme, &told, Vector1::new(0.5));
+    assert_eq!(round_trip(&told, &NumberFormat::Double).unwrap(), 5 * 64);
     assert!(CovarianceFeedback::new(position(), -1.0, NumberFormat::Double).is_err());
 
     let trigger = StochasticTrigger::for_rate(0.4, 2.4).unwrap();
@@ -215,23 +215,26 @@ fn a_sensor_with_its_own_filter_is_lawful_given_its_memory() {
     let dynamics = constant_velocity_1d(1.0, 0.5).unwrap();
     let mut sensor = LocalSensor::new(position(), 0.45, NumberFormat::Double, &start).unwrap();
     let mut rng = Stream::new(2).rng();
-    sensor.step(&mut rng, &dynamics, &Vector1::new(11.0)).unwrap();
-    let (slot, _) = sensor.next_slot(&dynamics).unwrap();
+    sensor.step(&dynamics, &Vector1::new(11.0)).unwrap();
+    // The scheme of its second slot, told what only the sensor knows.
+    let mut own = OwnRecursion::new(&start);
+    let [_, second] = [(); 2].map(|()| own.advance(&dynamics, &position(), start.mean()).unwrap());
+    let rule = CensoringRule::new(&second.innovation_covariance, 0.45).unwrap();
+    let slot = Censoring::new(position(), rule, NumberFormat::Double).unwrap();
+    let told = dynamics.transition() * sensor.estimate();
     for link in links() {
-        let nothing = slot.factor(&(), &Observation::Nothing, &link).unwrap();
+        let nothing = slot.factor(&told, &Observation::Nothing, &link).unwrap();
         for m in [18.0, 20.5, 23.0] {
             let p = nothing.log_likelihood(&Vector1::new(m)).exp();
             let silent = (0..20_000).filter(|_| {
                 let z = Vector1::new(m + draw(&mut rng) * 1.3_f64.sqrt());
-                let report = slot.encode(&mut rng, &mut slot.start(), &z, &()).unwrap();
+                let report = sensor.clone().step(&dynamics, &z).unwrap();
                 link.transmit(&mut rng, report.as_ref(), &NumberFormat::Double).unwrap() == Observation::Nothing
             });
             let share = silent.count() as f64 / 20_000.0;
             assert!((share - p).abs() < 4.0 * (p * (1.0 - p) / 20_000.0).sqrt(), "{share} {p}");
         }
     }
-    draws_nothing(&slot, &(), Vector1::new(20.0));
-    assert_eq!(slot.start(), *sensor.estimate());
 }
 
 proptest! {
@@ -239,7 +242,7 @@ proptest! {
     fn broadcasts_decode_totally(bytes in prop::collection::vec(any::<u8>(), 0..48), cut in 0..8usize) {
         let bits = BitString::from_bytes(bytes.clone(), (bytes.len() * 8).saturating_sub(cut)).unwrap();
         for format in [NumberFormat::Double, NumberFormat::Single, NumberFormat::fixed(-5.0, 5.0, 12).unwrap()] {
-            let _ = decoding_is_total::<PredictedBelief<2>>(&bits, &format);
+            let _ = decoding_is_total::<Gaussian<2>>(&bits, &format);
         }
     }
 

@@ -4,7 +4,7 @@ use super::axis::WIDEST;
 use super::line::{TRIANGULAR_VARIANCE, absorb, check_density, normalise, triangular};
 use crate::Error;
 use crate::particles::weights::Categorical;
-use fewbits_core::columns::{count, set_state};
+use fewbits_core::columns::change_each;
 use fewbits_core::{Belief, ColumnsMut, Density, Gaussian, Likelihood};
 use fewbits_numerics::error::{ArgumentError, all_finite, refuse};
 use fewbits_numerics::stored;
@@ -208,10 +208,7 @@ impl Belief<2> for PlaneMass {
     }
 
     /// Draws of the bilinear interpolant, drawn towards the mean by what interpolation adds to the covariance.
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, 2>) {
-        if !fewbits_core::columns::columns_agree(&mut states) {
-            return;
-        }
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, 2>) {
         let cumulative = Categorical::new(&self.density);
         let (mean, covariance) = self.lattice_moments();
         let widened = covariance + Matrix2::identity() * TRIANGULAR_VARIANCE;
@@ -219,14 +216,14 @@ impl Belief<2> for PlaneMass {
             (Some(own), Some(wide)) => own.l() * wide.l().try_inverse().unwrap_or_else(Matrix2::identity),
             _ => Matrix2::zeros(),
         };
-        for i in 0..count(&states) {
+        change_each(states, |_| {
             let node = cumulative.draw(rng);
             let (row, column) = (node / self.size[1], node % self.size[1]);
             let at = |axis: usize, n: usize| (self.first[axis] + n as i64) as f64;
             let offset = Vector2::new(triangular(rng), triangular(rng));
             let drawn = Vector2::new(at(0, row), at(1, column)) + offset;
-            set_state(&mut states, i, &(self.basis * (mean + shrink * (drawn - mean))));
-        }
+            self.basis * (mean + shrink * (drawn - mean))
+        });
     }
 }
 

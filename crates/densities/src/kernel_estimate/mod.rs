@@ -9,6 +9,7 @@ pub use sums::add_cross_sums;
 use crate::Error;
 use crate::mixture::{Component, Mixture};
 use crate::particles::{Particles, systematic};
+use fewbits_core::columns::change_each;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::factored::Factored;
@@ -235,17 +236,11 @@ impl<const D: usize> Belief<D> for KernelEstimate<D> {
     crate::own_moments!();
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        if !fewbits_core::columns::columns_agree(&mut states) {
-            return;
-        }
         let drawn = states.each_mut().map(|column| &mut **column);
         self.particles().sample_columns(rng, drawn);
-        let count = states.iter().map(|c| c.len()).min().unwrap_or(0);
-        for k in 0..count {
-            let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
-            let kick = self.factor.lower * z;
-            states.iter_mut().zip(kick.iter()).for_each(|(state, x)| state[k] += x);
-        }
+        change_each(states, |centre| {
+            centre + self.factor.lower * SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal))
+        });
     }
 }
 

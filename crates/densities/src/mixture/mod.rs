@@ -8,6 +8,7 @@ pub use ellipse::ellipse;
 
 use crate::Error;
 use crate::particles::{Particles, systematic};
+use fewbits_core::columns::change_each;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density, Gaussian};
 use fewbits_numerics::LogSum;
 use fewbits_numerics::error::{at_least_one, entries, refuse};
@@ -218,15 +219,8 @@ fn log_sum_rows(terms: &[f64], out: &mut [f64]) {
 impl<const D: usize> Belief<D> for Mixture<D> {
     crate::own_moments!();
 
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        if !fewbits_core::columns::columns_agree(&mut states) {
-            return;
-        }
-        let count = states.iter().map(|c| c.len()).min().unwrap_or(0);
-        for k in 0..count {
-            let draw = self.sample(rng);
-            states.iter_mut().zip(draw.iter()).for_each(|(state, x)| state[k] = *x);
-        }
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+        change_each(states, |_| self.sample(rng));
     }
 }
 

@@ -3,7 +3,7 @@
 use super::Particles;
 use super::weights::Categorical;
 use crate::Error;
-use fewbits_core::columns::{count, set_state, state_at};
+use fewbits_core::columns::{change_each, state_at};
 use fewbits_core::{Belief, ColumnsMut, Gaussian};
 use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
@@ -82,16 +82,9 @@ impl<const D: usize> Belief<D> for GaussianCloud<D> {
 
     /// A particle by its weight, then its Gaussian.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        if !fewbits_core::columns::columns_agree(&mut states) {
-            return;
-        }
         let spread = Gaussian::from_trusted_parts(SVector::zeros(), self.covariance);
         spread.sample_columns(rng, states.each_mut().map(|column| &mut **column));
         let cumulative = Categorical::new(self.means.weights());
-        for i in 0..count(&states) {
-            let mean = state_at(&self.means.columns(), cumulative.draw(rng));
-            let offset = SVector::<f64, D>::from_fn(|d, _| states[d][i]);
-            set_state(&mut states, i, &(mean + offset));
-        }
+        change_each(states, |offset| state_at(&self.means.columns(), cumulative.draw(rng)) + offset);
     }
 }

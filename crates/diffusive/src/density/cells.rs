@@ -1,6 +1,7 @@
 //! Equal cells that cover where a density is: the exact belief in few dimensions.
 
 use crate::Error;
+use fewbits_core::columns::{change_each, state_at};
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Categorical;
 use fewbits_numerics::eigen::symmetric_eigen;
@@ -234,18 +235,9 @@ impl<const D: usize> Belief<D> for Cells<D> {
     }
 
     /// Draws are centres of cells, for the same reason.
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        if !fewbits_core::columns::columns_agree(&mut states) {
-            return;
-        }
-        let count = states.first().map_or(0, |column| column.len());
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
         let weighted = Categorical::new(&self.weights);
-        for i in 0..count {
-            let chosen = weighted.draw(rng);
-            for d in 0..D {
-                states[d][i] = self.columns[d][chosen];
-            }
-        }
+        change_each(states, |_| state_at(&self.columns(), weighted.draw(rng)));
     }
 }
 

@@ -4,7 +4,7 @@ use super::clumps::{Clump, Clumps};
 use crate::Error;
 use fewbits_core::Columns;
 use fewbits_densities::{Component, Mixture};
-use fewbits_numerics::eigen::symmetric_eigen;
+use fewbits_numerics::eigen::raised;
 use fewbits_numerics::error::{at_least_one, within};
 use nalgebra::{Cholesky, SMatrix, SVector};
 
@@ -144,21 +144,6 @@ impl<const D: usize> Clumps<D> {
     }
 }
 
-/// A covariance whose eigenvalues, in coordinates where the given variances are one, are at least one.
-fn raised<const D: usize>(covariance: SMatrix<f64, D, D>, least: &SVector<f64, D>) -> SMatrix<f64, D, D> {
-    if least.iter().any(|v| *v <= 0.0) {
-        return covariance;
-    }
-    let scale = least.map(f64::sqrt);
-    let scaled = SMatrix::<f64, D, D>::from_fn(|i, j| covariance[(i, j)] / (scale[i] * scale[j]));
-    let (values, vectors) = symmetric_eigen(scaled);
-    if values.iter().all(|v| *v >= 1.0) {
-        return covariance;
-    }
-    let lifted = vectors * SMatrix::from_diagonal(&values.map(|v| v.max(1.0))) * vectors.transpose();
-    SMatrix::from_fn(|i, j| 0.5 * (lifted[(i, j)] + lifted[(j, i)]) * scale[i] * scale[j])
-}
-
 /// A component ready to be evaluated.
 struct Prepared<const D: usize> {
     mean: SVector<f64, D>,
@@ -227,21 +212,6 @@ impl<const D: usize> Sums<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn eigenvalues_are_raised_in_the_units_of_the_least_variances() {
-        let turn = SMatrix::<f64, 2, 2>::new(0.8, -0.6, 0.6, 0.8);
-        let unit = SMatrix::<f64, 2, 2>::new(2.0, 0.0, 0.0, 0.25);
-        let of =
-            |a: f64, b: f64| unit * turn * SMatrix::from_diagonal(&SVector::from([a, b])) * turn.transpose() * unit;
-        let least = SVector::from([4.0, 0.0625]);
-        for (a, b) in [(0.3, 2.0), (3.0, 0.2), (0.1, 0.4), (1.5, 2.5)] {
-            assert!((raised(of(a, b), &least) - of(a.max(1.0), b.max(1.0))).amax() < 1e-14, "{a} {b}");
-        }
-        for none in [[0.0, 0.0625], [4.0, 0.0]] {
-            assert_eq!(raised(of(0.3, 0.2), &SVector::from(none)), of(0.3, 0.2));
-        }
-    }
 
     /// One step of expectation-maximisation as the textbooks have it, and the mean log density before it.
     fn step(clumps: &[Clump<2>], components: &[Clump<2>]) -> (Vec<Clump<2>>, f64) {

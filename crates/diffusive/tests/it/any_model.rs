@@ -1,13 +1,14 @@
 //! Models of the medium that are not air: everything along the general path.
 
-use super::{field, joint, sensor};
+use super::{field, joint, searched, sensor};
 use fewbits_core::{Belief, Gaussian, Likelihood};
 use fewbits_diffusive::density::CellOptions;
-use fewbits_diffusive::{Form, Posterior, Prior, RateModel, RateRange, Search, SourceLikelihood, SourceSensor, Status};
+use fewbits_diffusive::{
+    Form, ModelGrid, Posterior, Prior, RateModel, RateRange, SourceLikelihood, SourceSensor, Status,
+};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_models::{Receptor, SourceGradient, SourceModel};
 use fewbits_monte_carlo::Stream;
-use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 /// Air that does not say that nothing changes along the ground, with a block in which no source can be, and receptors within 200 m.
@@ -128,27 +129,14 @@ fn posterior_within_a_wall_is_zero() {
     assert!(at(60.0) == f64::NEG_INFINITY && at(50.0).is_finite());
 }
 
-fn search(sensor: &SourceSensor, form: Form) -> Result<Status, fewbits_diffusive::Error> {
-    let mut rng = Stream::new(3).rng();
-    let alarm = Vector2::new(44.396, 52.042);
-    let deployed = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], 150).unwrap();
-    let start = deployed.nearest_to(&alarm);
-    let graph = Graph::within(deployed.positions(), 18.0).unwrap();
-    let mut search = Search::new(&alarm, 50.0, field(1.0), joint(), 1e-4)?;
-    search.form = form;
-    let source = Vector2::new(62.0, 50.0);
-    let outcome = search.run(sensor, &deployed, &graph, start, |node| {
-        sensor.sample(&mut rng, &deployed.positions()[node], &source, 1.0)
-    })?;
-    let error = (outcome.estimate().unwrap().mean() - source).norm();
-    assert!(error < 0.5, "{form:?}: {error}");
-    Ok(outcome.status)
-}
-
 #[test]
 fn search_runs_on_any_model() {
+    let sensor = opaque(false, None);
+    let alone = ModelGrid::single(sensor.clone());
     for form in [Form::Raw, Form::Mixture(4)] {
-        assert_eq!(search(&opaque(false, None), form).unwrap(), Status::Converged);
+        let (outcome, error) = searched((3, 150, 18.0, 1e-4), form, &alone, &sensor).unwrap();
+        assert_eq!(outcome.status, Status::Converged);
+        assert!(error < 0.5, "{form:?}: {error}");
     }
 }
 

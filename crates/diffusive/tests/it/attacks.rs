@@ -8,7 +8,8 @@ use fewbits_diffusive::density::polynomials::{hermite, multi_indices};
 use fewbits_diffusive::density::{CellOptions, Cells, Clumps, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
-    Form, Posterior, Prior, RateModel, RateRange, RateSums, Search, SearchBox, SourceLikelihood, SourceSensor, Status,
+    Form, Posterior, Prior, RateModel, RateRange, RateSums, Record, Search, SearchBox, SourceLikelihood, SourceSensor,
+    Status,
 };
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_topology::{Deployment, Graph};
@@ -177,13 +178,16 @@ fn absurd_samples() {
     }
 }
 
+/// What one node measures without noise.
+fn clean_record(node: &Vector2<f64>) -> Record {
+    let sensor = sensor(1.0, false);
+    let samples = sensor.responses(node, &Vector2::new(62.0, 50.0)).unwrap();
+    sensor.record(node, &samples).unwrap()
+}
+
 #[test]
 fn two_densities_that_exclude_each_other() {
-    let sensor = sensor(1.0, false);
-    let node = Vector2::new(50.0, 54.0);
-    let record = sensor
-        .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)).unwrap())
-        .unwrap();
+    let record = clean_record(&Vector2::new(50.0, 54.0));
     let far = Gaussian::new(Vector2::new(1e6, 1e6), Matrix2::identity() * 1e-6).unwrap();
     let result = Posterior::new(
         &Prior::Exact(far),
@@ -209,11 +213,8 @@ fn a_ring_has_no_peak() {
 
 #[test]
 fn polynomial_gaussians_refuse_bad_parts() {
-    let sensor = sensor(1.0, false);
     let node = Vector2::new(50.0, 54.0);
-    let record = sensor
-        .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)).unwrap())
-        .unwrap();
+    let record = clean_record(&node);
     let prior = Prior::Exact(Gaussian::new(node, Matrix2::identity() * 2500.0).unwrap());
     let cells: Cells<2> = Posterior::new(
         &prior,

@@ -27,9 +27,13 @@ mod slices;
 mod unknown_models;
 mod wild;
 
-use fewbits_diffusive::{RateModel, RateRange, SearchBox, SelectionRule, SourceSensor};
+use fewbits_diffusive::{
+    Error, Form, ModelGrid, Outcome, RateModel, RateRange, Search, SearchBox, SelectionRule, SourceSensor,
+};
 use fewbits_models::diffusion::{Air, Ground};
-use nalgebra::Vector3;
+use fewbits_monte_carlo::Stream;
+use fewbits_topology::{Deployment, Graph};
+use nalgebra::{Vector2, Vector3};
 
 /// The rules that searches choose by.
 const RULES: [SelectionRule; 5] = [
@@ -71,4 +75,26 @@ fn field(unit: f64) -> SearchBox {
         lower: [-20.0 * unit; 2],
         upper: [120.0 * unit; 2],
     }
+}
+
+/// A search for a source at (62, 50) among `nodes` nodes of a range of `reach`, and how far its estimate is off; NaN without estimate.
+fn searched(
+    (seed, nodes, reach, threshold): (u64, usize, f64, f64),
+    form: Form,
+    models: &ModelGrid,
+    truth: &SourceSensor,
+) -> Result<(Outcome, f64), Error> {
+    let mut rng = Stream::new(seed).rng();
+    let alarm = Vector2::new(44.396, 52.042);
+    let deployed = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], nodes).unwrap();
+    let start = deployed.nearest_to(&alarm);
+    let graph = Graph::within(deployed.positions(), reach).unwrap();
+    let mut search = Search::new(&alarm, 50.0, field(1.0), joint(), threshold)?;
+    search.form = form;
+    let source = Vector2::new(62.0, 50.0);
+    let outcome = search.run_models(models, &deployed, &graph, start, |node| {
+        truth.sample(&mut rng, &deployed.positions()[node], &source, 1.0)
+    })?;
+    let error = outcome.estimate().map_or(f64::NAN, |e| (e.mean() - source).norm());
+    Ok((outcome, error))
 }

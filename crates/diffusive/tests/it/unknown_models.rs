@@ -1,7 +1,7 @@
 //! Wind and diffusivity known up to a few models.
 
-use super::{field, joint, sensor};
-use fewbits_diffusive::{Form, ModelGrid, Posterior, Prior, Search, SourceLikelihood, SourceSensor, Status};
+use super::{field, joint, searched, sensor};
+use fewbits_diffusive::{Error, Form, ModelGrid, Posterior, Prior, Search, SourceLikelihood, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
@@ -60,23 +60,8 @@ fn probabilities_of_models_are_bayes() {
     assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12);
 }
 
-fn search(
-    truth: &SourceSensor,
-    models: &ModelGrid,
-    form: Form,
-) -> Result<(Status, Vec<f64>, f64), fewbits_diffusive::Error> {
-    let mut rng = Stream::new(4).rng();
-    let alarm = Vector2::new(44.396, 52.042);
-    let deployed = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], 300).unwrap();
-    let start = deployed.nearest_to(&alarm);
-    let graph = Graph::within(deployed.positions(), 15.0).unwrap();
-    let mut search = Search::new(&alarm, 50.0, field(1.0), joint(), 1e-5)?;
-    search.form = form;
-    let source = Vector2::from(SOURCE);
-    let outcome = search.run_models(models, &deployed, &graph, start, |node| {
-        truth.sample(&mut rng, &deployed.positions()[node], &source, 1.0)
-    })?;
-    let error = outcome.estimate().map_or(f64::NAN, |e| (e.mean() - source).norm());
+fn search(truth: &SourceSensor, models: &ModelGrid, form: Form) -> Result<(Status, Vec<f64>, f64), Error> {
+    let (outcome, error) = searched((4, 300, 15.0, 1e-5), form, models, truth)?;
     Ok((outcome.status, outcome.models, error))
 }
 

@@ -8,8 +8,8 @@ use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::chain::{self, TransientStep};
 use fewbits_dymbo::published::{iterated, skew_normal};
 use fewbits_dymbo::{
-    CountFusion, DymboFilter, Initialisation, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter,
-    ScalarPlant, SignFilter, filtered_variance, first_message_mse, first_message_value, sign_bit, steady, tree,
+    CountFusion, DymboFilter, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant,
+    SignFilter, filtered_variance, first_message_mse, first_message_value, sign_bit, steady, tree,
 };
 use fewbits_filters::{
     PointMass, PointMassFilter, UniformGrid, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
@@ -290,11 +290,7 @@ fn prop2_entry(entry: &Entry<'_>) -> Vec<f64> {
     let scheme = RoundedSample::new(sigma * sigma, tau).unwrap();
     let at = |theta: f64| first_message_mse(&scheme, &Gaussian::scalar(theta, 0.0).unwrap());
     if entry.inputs["theta"].is_null() {
-        let start = Initialisation::Fine {
-            scheme,
-            message: Multiple(0),
-        };
-        let tight = start.belief().unwrap().covariance()[0];
+        let tight = scheme.belief(Multiple(0)).unwrap().covariance()[0];
         vec![at(0.5 * tau), tight, (sigma + 0.5 * tau).powi(2)]
     } else {
         vec![at(entry.number("theta"))]
@@ -339,7 +335,7 @@ fn regress_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let (filter, r) = (DymboFilter::new(plant), plant.measurement_variance());
     let scheme = RoundedSample::new(r, entry.number("tau")).unwrap();
     let message = scheme.round(x[0]).unwrap();
-    let mut belief = Initialisation::Fine { scheme, message }.belief().unwrap();
+    let mut belief = scheme.belief(message).unwrap();
     let first = scheme
         .factor(&(), &Observation::Received(message), &Link::PERFECT)
         .unwrap();

@@ -2,8 +2,8 @@
 
 use fewbits_core::{Gaussian, Link, Observation, Sign};
 use fewbits_dymbo::{
-    CellIndex, CountFusion, DymboFilter, Initialisation, InnovationWord, MultibitFilter, Multiple, ParallelFilter,
-    Prediction, RoundedSample, ScalarFilter, ScalarPlant, SignBit, SignFilter, first_message_value,
+    CellIndex, CountFusion, DymboFilter, InnovationWord, MultibitFilter, Multiple, ParallelFilter, Prediction,
+    RoundedSample, ScalarFilter, ScalarPlant, SignBit, SignFilter, first_message_value,
 };
 use fewbits_models::{LinearGaussian, ScalarSensor};
 use nalgebra::{Matrix2, Vector2};
@@ -67,11 +67,11 @@ proptest! {
         let Ok(scheme) = RoundedSample::new(x[0], x[1]).and_then(|scheme| scheme.with_bits(bits)) else { return Ok(()) };
         let _ = (scheme.round(x[2]), scheme.cell(Multiple(multiple)));
         let message = Multiple(multiple);
-        if let Ok(belief) = (Initialisation::Fine { scheme, message }).belief() {
+        if let Ok(belief) = scheme.belief(message) {
             prop_assert!(finite(&belief), "{:?}", belief);
         }
         if let Ok(prior) = Gaussian::scalar(x[3], x[4]) {
-            if let Ok(belief) = (Initialisation::FineWithPrior { scheme, message, prior }).belief() {
+            if let Ok(belief) = scheme.belief_with_prior(message, &prior) {
                 prop_assert!(finite(&belief), "{:?}", belief);
             }
             if prior.covariance()[0] + x[0] < 1e4 * x[1] * x[1]

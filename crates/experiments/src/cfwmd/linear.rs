@@ -308,7 +308,7 @@ impl<const M: usize> Line<M> {
         let mut imputed = ImputedBelief::new(&self.start, halves.len(), particles)?;
         Ok(Box::new(move |k| {
             let reports = halves.iter_mut().zip(&draws.measurements[k]);
-            let reports = reports.map(|(half, z)| half.step(&mut rng, &self.dynamics, z).map(Observation::from));
+            let reports = reports.map(|(half, z)| half.step(&self.dynamics, z).map(Observation::from));
             let observations = reports.collect::<Result<Vec<_>, _>>()?;
             let received = observations.iter().filter(|o| o.received().is_some()).count();
             let predicted = kalman::predict(&self.dynamics, &belief);

@@ -4,9 +4,7 @@ use super::common::{Plant, each, plants};
 use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Sensing, Sign};
 use fewbits_dymbo::chain::first_message_transient;
-use fewbits_dymbo::{
-    DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value,
-};
+use fewbits_dymbo::{DymboFilter, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value};
 use fewbits_filters::kalman;
 use nalgebra::Vector1;
 use std::f64::consts::FRAC_2_PI;
@@ -81,13 +79,8 @@ fn simulate(
     let mut run = vec![Step {
         truth: state[0],
         kalman: Gaussian::scalar(sample, plant.measurement_variance())?,
-        dymbo: Initialisation::Fine { scheme, message }.belief()?,
-        informed: Initialisation::FineWithPrior {
-            scheme,
-            message,
-            prior: *prior,
-        }
-        .belief()?,
+        dymbo: scheme.belief(message)?,
+        informed: scheme.belief_with_prior(message, prior)?,
         bit: None,
     }];
     for n in 0..p.steps {

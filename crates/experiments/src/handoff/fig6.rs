@@ -3,7 +3,9 @@
 use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, median, paper_cut, prior, world};
 use super::world::Walk;
 use crate::prelude::*;
-use fewbits_handoff::published::{Accounting, Amplification, Bounds, StepError};
+use fewbits_handoff::published::{Amplification, Bounds, bounds};
+use fewbits_mixture_codec::divergence::Divergence;
+use fewbits_mixture_codec::plug_in::plug_in;
 use std::f64::consts::LN_10;
 
 parameters! {
@@ -81,7 +83,7 @@ impl Fig6 {
                 let (particles, _) = filter.posterior(&mut rng, &known, &Walk, reading)?;
                 let estimate = estimate(&filter, &particles)?;
                 known = paper_cut(&estimate, c, components)?;
-                let StepError { ml, dr, kl, l1 } = StepError::plug_in(&estimate, &known);
+                let Divergence { ml, dr, kl, l1 } = plug_in(&estimate, &known).into();
                 steps.push([ml, dr, kl, l1, known.len() as f64]);
             }
         }
@@ -149,8 +151,8 @@ impl Fig6 {
 
 /// Bounds after these hand-overs.
 fn account(losses: impl Iterator<Item = Loss>) -> Bounds {
-    let error = |[ml, dr, kl, l1, _]: Loss| StepError { ml, dr, kl, l1 };
-    losses.map(error).collect::<Accounting>().bounds(Amplification::Ml)
+    let error = |[ml, dr, kl, l1, _]: Loss| Divergence { ml, dr, kl, l1 };
+    bounds(&losses.map(error).collect::<Vec<_>>(), Amplification::Ml)
 }
 
 impl Rows {

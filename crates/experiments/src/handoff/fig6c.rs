@@ -7,7 +7,8 @@ use super::world::Walk;
 use crate::prelude::*;
 use fewbits_core::Columns;
 use fewbits_densities::{KernelEstimate, Mixture, Particles};
-use fewbits_handoff::published::StepError;
+use fewbits_mixture_codec::divergence::Divergence;
+use fewbits_mixture_codec::plug_in::plug_in;
 
 parameters! {
     pub struct Parameters {
@@ -127,8 +128,8 @@ fn trial(p: &Parameters, it: Trial) -> Result<Vec<Moment>, Error> {
                 let mixture = sent.insert(reduce(&estimate, p.components)?);
                 at.after[m] = base - mean_log(&|x, out| mixture.log_pdf_columns(x, out));
                 match m {
-                    0 => at.ml = StepError::plug_in(&estimate, mixture).ml,
-                    1 => at.kl = StepError::plug_in(&estimate, mixture).kl,
+                    0 => at.ml = Divergence::from(plug_in(&estimate, mixture)).ml,
+                    1 => at.kl = Divergence::from(plug_in(&estimate, mixture)).kl,
                     _ => {}
                 }
             }

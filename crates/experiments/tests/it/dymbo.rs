@@ -5,8 +5,7 @@ use fewbits_core::factor::InCell;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
 use fewbits_dymbo::gap::{SmoothedGap, Twin, exact_filter};
 use fewbits_dymbo::{
-    CountFusion, DymboFilter, Initialisation, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, SignFilter,
-    chain, steady,
+    CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, SignFilter, chain, steady,
 };
 use fewbits_experiments::{Measured, reference};
 use fewbits_filters::{CloudWorkspace, GaussianCloud, RaoBlackwellised, scalar_fixed_lag_variance, steady_state};
@@ -127,7 +126,7 @@ fn escapes(plant: &ScalarPlant, stream: Stream) -> bool {
     let scheme = RoundedSample::new(plant.measurement_variance(), 1.0).unwrap();
     let mut error = Vector1::new(0.0);
     let message = scheme.round(plant.sensor().sample(&mut rng, &error)[0]).unwrap();
-    let mut belief = Initialisation::Fine { scheme, message }.belief().unwrap();
+    let mut belief = scheme.belief(message).unwrap();
     for _ in 0..500 {
         error -= belief.mean();
         belief = Gaussian::scalar(0.0, belief.covariance()[0]).unwrap();

@@ -1,6 +1,6 @@
 //! The bounds on chains of lossy hand-overs of discrete beliefs, where everything is exact.
 
-use fewbits_handoff::published::{Accounting, Amplification, StepError};
+use fewbits_handoff::published::{Amplification, bounds};
 use fewbits_mixture_codec::divergence::discrete;
 use fewbits_monte_carlo::Stream;
 use rand::{Rng, RngExt};
@@ -41,21 +41,15 @@ fn bounds_for_every_data_sequence_hold_on_three_thousand_chains() {
         let n = rng.random_range(2..6);
         let mut exact = law(&mut rng, n, 2.0);
         let mut known = exact.clone();
-        let mut account = Accounting::new();
+        let mut steps = Vec::new();
         for _ in 0..rng.random_range(1..5) {
             let rows: Vec<Vec<f64>> = (0..n).map(|_| law(&mut rng, n, 2.0)).collect();
             let likelihood = law(&mut rng, n, 2.0);
             exact = filtered(&exact, &rows, &likelihood);
             let posterior = filtered(&known, &rows, &likelihood);
             known = blurred(&mut rng, &posterior);
-            let d = discrete(&posterior, &known).unwrap();
-            account.push(StepError {
-                ml: d.ml,
-                dr: d.dr,
-                kl: d.kl,
-                l1: d.l1,
-            });
-            let (truth, bounds) = (discrete(&exact, &known).unwrap(), account.bounds(Amplification::Dr));
+            steps.push(discrete(&posterior, &known).unwrap());
+            let (truth, bounds) = (discrete(&exact, &known).unwrap(), bounds(&steps, Amplification::Dr));
             let slack = 1.0 + 1e-9;
             assert!(truth.ml <= bounds.ml_from_dr * slack && bounds.ml_from_dr <= bounds.ml_printed * slack);
             assert!(truth.kl <= bounds.kl_from_dr * slack && truth.l1 <= bounds.l1_from_dr * slack);
@@ -96,14 +90,7 @@ fn expected_bounds_hold_over_all_data() {
                 let posterior = filtered(&known, &rows, &given(second));
                 let sent = blurred(&mut rng, &posterior);
                 let e = discrete(&posterior, &sent).unwrap();
-                let step = |d: &fewbits_mixture_codec::divergence::Divergence| StepError {
-                    ml: d.ml,
-                    dr: d.dr,
-                    kl: d.kl,
-                    l1: d.l1,
-                };
-                let account: Accounting = [step(&d), step(&e)].into_iter().collect();
-                let b = account.bounds(Amplification::Dr);
+                let b = bounds(&[d, e], Amplification::Dr);
                 let truth = discrete(&after, &sent).unwrap();
                 kl += q * truth.kl;
                 l1 += q * truth.l1;

@@ -1,6 +1,6 @@
 //! A world of ten sensors of a scalar, and their centre.
 
-use fewbits_cfwmd::scheme::{CovarianceFeedback, PredictedBelief};
+use fewbits_cfwmd::scheme::CovarianceFeedback;
 use fewbits_core::{BitString, Gaussian, Link, NumberFormat, Observation, SchemeNode, SensorNode};
 use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant, SignBit};
 use fewbits_filters::MomentFilter;
@@ -60,7 +60,7 @@ fn mixed(reports: Reports, loss: f64) -> FusionReceiver<1, MomentFilter> {
                 centre.join(number, Reporting::new(sensing, SignBit::new(1.0).unwrap(), link, ask))
             }
             _ => {
-                let ask = |state: &Gaussian<1>, _: &Gaussian<1>| PredictedBelief(*state);
+                let ask = |state: &Gaussian<1>, _: &Gaussian<1>| *state;
                 centre.join(number, Reporting::new(sensing, censored(), link, ask))
             }
         }

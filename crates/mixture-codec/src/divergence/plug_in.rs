@@ -1,5 +1,6 @@
 //! Errors of a kernel estimate's approximations, estimated at its centres or around them.
 
+use super::Divergence;
 use crate::{Error, Tree};
 use fewbits_densities::{KernelEstimate, Mixture, add_cross_sums};
 use fewbits_numerics::factored::Factored;
@@ -39,6 +40,18 @@ impl PlugIn {
             estimate.dr_plugin = 0.5 * (top - bottom);
         }
         estimate
+    }
+}
+
+/// As if the estimates were the measures themselves; a KL below zero counts as zero.
+impl From<PlugIn> for Divergence {
+    fn from(estimate: PlugIn) -> Self {
+        Self {
+            kl: estimate.kl_plugin.max(0.0),
+            l1: estimate.l1_plugin,
+            ml: estimate.ml_plugin,
+            dr: estimate.dr_plugin,
+        }
     }
 }
 

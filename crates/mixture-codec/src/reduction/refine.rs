@@ -3,10 +3,10 @@
 use crate::Error;
 use crate::divergence::plug_in::Cubature;
 use fewbits_densities::{Component, KernelEstimate, Mixture};
-use fewbits_numerics::eigen::symmetric_eigen;
-use fewbits_numerics::factored::Factored;
+use fewbits_numerics::eigen::raised;
 use fewbits_numerics::kernels::scalar::power_of_half;
 use fewbits_numerics::kernels::{LANES, folded, vectorised};
+use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
 
 /// Improves a mixture as an approximation of a kernel estimate by `iterations` steps of expectation-maximisation over the
@@ -33,22 +33,22 @@ pub fn refine<const D: usize>(
     let points = Points::new(estimate, rule);
     let origin = estimate.particles().mean();
     let white = estimate.kernel_factor();
-    let mut parts: Vec<Part<D>> = mixture
+    let mut parts: Vec<Component<D>> = mixture
         .components()
         .iter()
         .filter(|c| c.weight() > 0.0)
         .map(|c| {
             let mean = white.whitener * (c.mean() - origin);
             let covariance = white.whitener * c.covariance() * white.whitener.transpose();
-            Part::new(c.weight(), mean, covariance)
+            Component::new(c.weight(), mean, symmetrised(&covariance))
         })
         .collect::<Result<_, _>>()?;
     for _ in 0..iterations {
         step(&points, &mut parts)?;
     }
     let back = parts.iter().map(|p| {
-        let covariance = white.lower * p.covariance * white.lower.transpose();
-        Component::new(p.weight, white.lower * p.mean + origin, (covariance + covariance.transpose()) * 0.5)
+        let covariance = white.lower * p.covariance() * white.lower.transpose();
+        Component::new(p.weight(), white.lower * p.mean() + origin, symmetrised(&covariance))
     });
     Ok(Mixture::new(back.collect::<Result<_, _>>()?)?)
 }
@@ -88,28 +88,9 @@ impl<const D: usize> Points<D> {
     }
 }
 
-struct Part<const D: usize> {
-    weight: f64,
-    mean: SVector<f64, D>,
-    covariance: SMatrix<f64, D, D>,
-    factor: Factored<D>,
-}
-
-impl<const D: usize> Part<D> {
-    fn new(weight: f64, mean: SVector<f64, D>, covariance: SMatrix<f64, D, D>) -> Result<Self, Error> {
-        let covariance = (covariance + covariance.transpose()) * 0.5;
-        Ok(Self {
-            weight,
-            mean,
-            covariance,
-            factor: Factored::new("covariance", &covariance)?,
-        })
-    }
-
-    /// `log2(w / sqrt(det S))`.
-    fn height(&self) -> f64 {
-        (self.weight.ln() - self.factor.half_log_det) * std::f64::consts::LOG2_E
-    }
+/// `log2(w / sqrt(det S))`.
+fn height<const D: usize>(part: &Component<D>) -> f64 {
+    (part.weight().ln() - part.factor().half_log_det) * std::f64::consts::LOG2_E
 }
 
 /// Sums over a part's points, about the part's mean before the step: shares, first and second moments.
@@ -145,8 +126,8 @@ impl<const D: usize> Sums<D> {
 }
 
 /// One step.
-fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>) -> Result<(), Error> {
-    let heights: Vec<f64> = parts.iter().map(Part::height).collect();
+fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Component<D>>) -> Result<(), Error> {
+    let heights: Vec<f64> = parts.iter().map(height).collect();
     let top = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mut sums: Vec<Sums<D>> = parts.iter().map(|_| Sums::ZERO).collect();
     let mut gaps = vec![[[0.0; BLOCK]; D]; parts.len()];
@@ -194,17 +175,17 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>) -> Result<
 /// Writes the gaps to a part's mean, and `below - log2` of the part's unnormalised density.
 #[inline(always)]
 fn exponents<const D: usize>(
-    part: &Part<D>,
+    part: &Component<D>,
     below: f64,
     columns: &[[f64; BLOCK]; D],
     gaps: &mut [[f64; BLOCK]; D],
     out: &mut [f64; BLOCK],
 ) {
     let scale = (0.5 * std::f64::consts::LOG2_E).sqrt();
-    let whitener = part.factor.whitener * scale;
+    let whitener = part.factor().whitener * scale;
     for d in 0..D {
         for j in 0..BLOCK {
-            gaps[d][j] = columns[d][j] - part.mean[d];
+            gaps[d][j] = columns[d][j] - part.mean()[d];
         }
     }
     *out = [below; BLOCK];
@@ -223,7 +204,7 @@ fn exponents<const D: usize>(
 #[cold]
 #[inline(never)]
 fn far_shares<const D: usize>(
-    parts: &[Part<D>],
+    parts: &[Component<D>],
     heights: &[f64],
     columns: &[[f64; BLOCK]; D],
     gaps: &mut [[[f64; BLOCK]; D]],
@@ -245,7 +226,7 @@ fn far_shares<const D: usize>(
 }
 
 /// Weight, mean and covariance from the sums, with the eigenvalue floor.
-fn moments<const D: usize>(part: &Part<D>, sums: &Sums<D>) -> Result<Part<D>, Error> {
+fn moments<const D: usize>(part: &Component<D>, sums: &Sums<D>) -> Result<Component<D>, Error> {
     let weight = folded(sums.share);
     let shift = SVector::<f64, D>::from_fn(|d, _| folded(sums.first[d]) / weight);
     let mut covariance = SMatrix::<f64, D, D>::zeros();
@@ -256,10 +237,6 @@ fn moments<const D: usize>(part: &Part<D>, sums: &Sums<D>) -> Result<Part<D>, Er
             covariance[(b, a)] = entry;
         }
     }
-    let (values, vectors) = symmetric_eigen(covariance);
-    if values.iter().any(|v| *v < 1.0) {
-        let raised = vectors * SMatrix::from_diagonal(&values.map(|v| v.max(1.0))) * vectors.transpose();
-        covariance = (raised + raised.transpose()) * 0.5;
-    }
-    Part::new(weight, part.mean + shift, covariance)
+    let covariance = raised(covariance, &SVector::repeat(1.0));
+    Ok(Component::new(weight, part.mean() + shift, covariance)?)
 }

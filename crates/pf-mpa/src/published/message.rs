@@ -1,10 +1,11 @@
-//! Messages of particle message passing over the plane: points under a common kernel.
+//! Messages of particle message passing: points under a common kernel.
 
 use crate::Error;
 use crate::error::refuse;
+use fewbits_core::columns::set_state;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::kernels;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
@@ -52,27 +53,67 @@ pub enum DynamicsWeight {
     PrintedRatio,
 }
 
-/// A message over the plane: weighted points under a common Gaussian kernel.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct KernelMessage {
-    pub(crate) x: Vec<f64>,
-    pub(crate) y: Vec<f64>,
+/// Weighted points under a common Gaussian kernel: a mixture whose components share their covariance.
+#[derive(Debug, Clone)]
+pub(crate) struct KernelMessage<const D: usize> {
+    pub(crate) points: [Vec<f64>; D],
     /// Logarithms of the weights; any offset until [`KernelMessage::finish`], normalised after it.
     pub(crate) log_weights: Vec<f64>,
     pub(crate) cumulative: Vec<f64>,
-    pub(crate) kernel: Matrix2<f64>,
+    pub(crate) kernel: SMatrix<f64, D, D>,
     /// `1 / sum w^2`.
     pub(crate) effective: f64,
     /// Points in the coordinates that whiten their own kernel plus the rest of the product.
-    pub(crate) white: [Vec<f64>; 2],
+    pub(crate) white: Vec<SVector<f64, D>>,
 }
 
-impl KernelMessage {
+impl<const D: usize> KernelMessage<D> {
+    pub(crate) fn new(count: usize) -> Self {
+        Self {
+            points: std::array::from_fn(|_| vec![0.0; count]),
+            log_weights: vec![0.0; count],
+            cumulative: vec![0.0; count],
+            kernel: SMatrix::zeros(),
+            effective: 0.0,
+            white: vec![SVector::zeros(); count],
+        }
+    }
+
+    /// The message of a mixture.
+    pub(crate) fn of(mixture: &Mixture<D>) -> Result<Self, Error> {
+        let (mut message, components) = (Self::new(mixture.len()), mixture.components());
+        message.kernel = *components[0].covariance();
+        for (i, component) in components.iter().enumerate() {
+            if *component.covariance() != message.kernel {
+                return refuse("factors", "a mixture of different covariances", "one covariance in each mixture");
+            }
+            set_state(&mut message.points.each_mut().map(Vec::as_mut_slice), i, component.mean());
+            message.log_weights[i] = component.weight().ln();
+        }
+        message.finish();
+        Ok(message)
+    }
+
     pub(crate) fn resize(&mut self, count: usize) {
-        for buffer in [&mut self.x, &mut self.y, &mut self.log_weights, &mut self.cumulative] {
+        for buffer in self
+            .points
+            .iter_mut()
+            .chain([&mut self.log_weights, &mut self.cumulative])
+        {
             buffer.resize(count, 0.0);
         }
-        self.white.iter_mut().for_each(|w| w.resize(count, 0.0));
+        self.white.resize(count, SVector::zeros());
+    }
+
+    /// Moves all points.
+    pub(crate) fn shift(&mut self, by: &SVector<f64, D>) {
+        for (column, by) in self.points.iter_mut().zip(by.iter()) {
+            column.iter_mut().for_each(|x| *x += by);
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.log_weights.len()
     }
 
     pub(crate) fn weight(&self, i: usize) -> f64 {
@@ -82,8 +123,8 @@ impl KernelMessage {
 
     /// Normalises the weights and returns mean and covariance of the points. Weights that underflow altogether count as equal;
     /// the second number says so.
-    pub(crate) fn finish(&mut self) -> (Vector2<f64>, Matrix2<f64>, u32) {
-        let count = self.x.len();
+    pub(crate) fn finish(&mut self) -> (SVector<f64, D>, SMatrix<f64, D, D>, u32) {
+        let count = self.len();
         let largest = kernels::largest(&self.log_weights);
         let mut fallbacks = 0;
         if !largest.is_finite() {
@@ -92,19 +133,19 @@ impl KernelMessage {
         }
         let offset = if fallbacks == 1 { 0.0 } else { largest };
         let total: f64 = self.log_weights.iter().map(|l| (l - offset).exp()).sum();
-        let (mut sum, mut squares, mut mean) = (0.0, 0.0, Vector2::zeros());
+        let (mut sum, mut squares, mut mean) = (0.0, 0.0, SVector::zeros());
         for i in 0..count {
             let w = (self.log_weights[i] - offset).exp() / total;
             self.log_weights[i] -= offset + total.ln();
             sum += w;
             squares += w * w;
             self.cumulative[i] = sum;
-            mean += Vector2::new(self.x[i], self.y[i]) * w;
+            mean += self.point(i) * w;
         }
         self.effective = 1.0 / squares;
-        let mut covariance = Matrix2::zeros();
+        let mut covariance = SMatrix::zeros();
         for i in 0..count {
-            let d = Vector2::new(self.x[i], self.y[i]) - mean;
+            let d = self.point(i) - mean;
             covariance += d * d.transpose() * self.weight(i);
         }
         (mean, covariance, fallbacks)
@@ -120,7 +161,7 @@ impl KernelMessage {
 
     /// Systematic draws by weight; equal weights give every point once.
     pub(crate) fn resample<R: Rng + ?Sized>(&self, rng: &mut R, labels: &mut [usize]) {
-        let (offset, count, last) = (rng.random::<f64>(), labels.len() as f64, self.x.len().saturating_sub(1));
+        let (offset, count, last) = (rng.random::<f64>(), labels.len() as f64, self.len().saturating_sub(1));
         let mut label = 0;
         for (n, drawn) in labels.iter_mut().enumerate() {
             while label < last && self.cumulative[label] * count <= n as f64 + offset {
@@ -130,13 +171,13 @@ impl KernelMessage {
         }
     }
 
-    pub(crate) fn point(&self, i: usize) -> Vector2<f64> {
-        Vector2::new(self.x[i], self.y[i])
+    pub(crate) fn point(&self, i: usize) -> SVector<f64, D> {
+        SVector::from_fn(|d, _| self.points[d][i])
     }
 
     /// As a mixture of the densities crate.
-    pub(crate) fn mixture(&self) -> Result<Mixture<2>, Error> {
-        let components = (0..self.x.len()).map(|i| Component::new(self.weight(i), self.point(i), self.kernel));
+    pub(crate) fn mixture(&self) -> Result<Mixture<D>, Error> {
+        let components = (0..self.len()).map(|i| Component::new(self.weight(i), self.point(i), self.kernel));
         Ok(Mixture::new(components.collect::<Result<_, _>>()?)?)
     }
 }
@@ -164,4 +205,15 @@ pub fn kernel_error(n: f64, d: u32, lambda: f64) -> f64 {
     let power = |x: f64| x.powf(-0.5 * f64::from(d));
     let sum = power(lambda) / n + (1.0 - 1.0 / n) * power(1.0 + lambda) - 2.0 * power(1.0 + 0.5 * lambda) + 1.0;
     sum * power(4.0 * std::f64::consts::PI)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kernels_without_spread_are_refused_or_widened() {
+        assert!(kernel_of(&Matrix2::zeros(), 0.3).is_err());
+        assert_eq!(kernel_of(&Matrix2::new(1.0, 1.0, 1.0, 1.0), 0.3).unwrap().1, 1);
+    }
 }

@@ -7,8 +7,7 @@ use crate::leader::lower_factor;
 use crate::linearised::Velocity;
 use crate::published::message::{DynamicsWeight, KernelMessage, KernelRule, Ring, RingWeight, kernel_of};
 use crate::published::product_sampler::{Drawn, ProductSampler, ProductWorkspace};
-use crate::target::Target;
-use crate::tracker::{GaussianTracker, Ranged, StepInfo};
+use crate::tracker::{GaussianTracker, Ranged, Step, StepInfo};
 use fewbits_core::Gaussian;
 use fewbits_core::columns::set_state;
 use fewbits_numerics::kernels;
@@ -53,8 +52,8 @@ pub struct MessageWorkspace {
     /// Means of the predicted positions, for the printed ratio; ranges and radii of a ring.
     means: [Vec<f64>; 2],
     logs: Vec<f64>,
-    messages: Vec<KernelMessage>,
-    product: ProductWorkspace,
+    messages: Vec<KernelMessage<2>>,
+    product: ProductWorkspace<2>,
     places: [Vec<f64>; 2],
     labels: Vec<usize>,
 }
@@ -105,9 +104,7 @@ impl MessagePassing {
     fn predict<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
-        target: &Target,
-        k: usize,
-        belief: &Gaussian<4>,
+        &Step { target, k, belief, .. }: &Step<'_>,
         workspace: &mut MessageWorkspace,
     ) -> Result<(Vector2<f64>, Matrix4<f64>, f64, u32), Error> {
         let n = self.particles;
@@ -141,8 +138,11 @@ impl MessagePassing {
                 states[2 + axis][i] += ts * (a + noise);
             }
         }
-        message.x.copy_from_slice(&states[0]);
-        message.y.copy_from_slice(&states[1]);
+        message
+            .points
+            .iter_mut()
+            .zip(&*states)
+            .for_each(|(to, from)| to.copy_from_slice(from));
         message.log_weights.fill(0.0);
         let spread = half * half * target.noise_variance();
         if self.dynamics_weight == DynamicsWeight::PrintedRatio && spread > 0.0 {
@@ -175,7 +175,7 @@ impl MessagePassing {
         range: &Ranged,
         predicted: &Vector2<f64>,
         spread: f64,
-        message: &mut KernelMessage,
+        message: &mut KernelMessage<2>,
         (radii, logs): (&mut [Vec<f64>; 2], &mut Vec<f64>),
     ) -> Result<Option<u32>, Error> {
         let cell = range.factor.nominal_cell().or_else(|| {
@@ -207,8 +207,8 @@ impl MessagePassing {
                 Ring::Local => bearing + half * (2.0 * rng.random::<f64>() - 1.0),
             };
             (ranges[i], distances[i]) = (z, d);
-            message.x[i] = at[0] + d * angle.cos();
-            message.y[i] = at[1] + d * angle.sin();
+            message.points[0][i] = at[0] + d * angle.cos();
+            message.points[1][i] = at[1] + d * angle.sin();
             message.log_weights[i] = match self.ring_weight {
                 RingWeight::Jacobian => d.abs().max(1e-9 * upper).ln(),
                 RingWeight::Uniform | RingWeight::PrintedRatio => 0.0,
@@ -271,10 +271,7 @@ impl GaussianTracker for MessagePassing {
     fn advance<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
-        target: &Target,
-        k: usize,
-        belief: &Gaussian<4>,
-        observed: &[Ranged],
+        step: Step<'_>,
         workspace: &mut MessageWorkspace,
     ) -> Result<(Gaussian<4>, StepInfo), Error> {
         self.checked()?;
@@ -288,10 +285,10 @@ impl GaussianTracker for MessagePassing {
             buffer.resize(n, 0.0);
         }
         workspace.labels.resize(n, 0);
-        let wanted = workspace.messages.len().max(observed.len() + 1);
-        workspace.messages.resize_with(wanted, KernelMessage::default);
+        let wanted = workspace.messages.len().max(step.observed.len() + 1);
+        workspace.messages.resize_with(wanted, || KernelMessage::new(n));
         workspace.messages.iter_mut().for_each(|m| m.resize(n));
-        let (mean, whole, lambda, mut fallbacks) = self.predict(rng, target, k, belief, workspace)?;
+        let (mean, whole, lambda, mut fallbacks) = self.predict(rng, &step, workspace)?;
         let MessageWorkspace {
             states,
             means,
@@ -303,15 +300,17 @@ impl GaussianTracker for MessagePassing {
         } = workspace;
         let spread = whole[(0, 0)].max(whole[(1, 1)]);
         let mut used = 1;
-        for range in observed {
+        for range in step.observed {
             let message = &mut messages[used];
             if let Some(widened) = self.ring(rng, range, &mean, spread, message, (&mut *means, &mut *logs))? {
                 fallbacks += widened;
                 used += 1;
             }
         }
-        let [x, y] = places;
-        let mut drawn = Drawn { x, y, labels };
+        let mut drawn = Drawn {
+            points: places.each_mut().map(Vec::as_mut_slice),
+            labels,
+        };
         self.sampler.draw(rng, &mut messages[..used], product, &mut drawn)?;
         if self.velocity == Velocity::Transfer {
             messages[0].resample(rng, drawn.labels);
@@ -326,7 +325,7 @@ impl GaussianTracker for MessagePassing {
         let kernel = lower_factor(&((left + left.transpose()) * 0.5));
         let mut sum = Vector4::zeros();
         for i in 0..n {
-            let place = Vector2::new(drawn.x[i], drawn.y[i]);
+            let place = Vector2::new(drawn.points[0][i], drawn.points[1][i]);
             let from = drawn.labels[i];
             let mut velocity = Vector2::new(states[2][from], states[3][from]);
             if self.velocity == Velocity::Joint {
@@ -341,7 +340,7 @@ impl GaussianTracker for MessagePassing {
         let mean = sum / n as f64;
         let mut covariance = Matrix4::zeros();
         for i in 0..n {
-            let d = Vector4::new(drawn.x[i], drawn.y[i], means[0][i], means[1][i]) - mean;
+            let d = Vector4::new(drawn.points[0][i], drawn.points[1][i], means[0][i], means[1][i]) - mean;
             covariance += d * d.transpose();
         }
         covariance /= (n - 1) as f64;

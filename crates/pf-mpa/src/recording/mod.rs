@@ -22,14 +22,14 @@ use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
-use fewbits_core::{Gaussian, Link, NumberFormat, Observed, SchemeNode, SensorNode};
+use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, Observed, SchemeNode, SensorNode};
 use fewbits_filters::centre::{Event, FalseAlarms, FusionCentre, Reporting, Slot};
 use fewbits_filters::{GridFilter, GridWorkspace, MomentFilter, NoiseBank};
 use fewbits_numerics::error::{finite, within};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2};
 use rand::Rng;
-use scheme::{FullRange, Tolerant, stray_level};
+use scheme::{Tolerant, stray_level};
 use std::collections::BTreeMap;
 
 /// Coordinates of position and bias in the state.
@@ -120,7 +120,7 @@ impl RangeTracker {
         for (name, place) in anchors {
             let sensor = RangeSensor::new(place, noise)?;
             let node: Box<dyn SensorNode<1>> = match travel {
-                Travel::Full => Box::new(SchemeNode::new(FullRange(noise))),
+                Travel::Full => Box::new(SchemeNode::new(full_value(noise)?)),
                 Travel::Bits(bits) => Box::new(SchemeNode::new(quantizer(bits, noise)?)),
             };
             let number = seated.len() as u32;
@@ -177,27 +177,13 @@ impl RangeTracker {
             self.forget();
         }
         self.last = time;
-        if self.centre.is_none() {
+        let (Some(centre), Some(anchor)) = (self.centre.as_mut(), self.anchors.get_mut(anchor)) else {
             self.bits += FULL_BITS;
             self.collected.insert(number, (time, place, range));
             if self.collected.len() >= self.anchors.len().min(4) {
                 self.acquire(rng, time)?;
             }
             return Ok(self.centre.as_ref().map(|centre| self.estimate(centre, false)));
-        }
-        self.track(rng, time, anchor, range)
-    }
-
-    /// One range in the track.
-    fn track(
-        &mut self,
-        rng: &mut dyn Rng,
-        time: f64,
-        anchor: &str,
-        range: f64,
-    ) -> Result<Option<RangeEstimate>, Error> {
-        let (Some(centre), Some(anchor)) = (self.centre.as_mut(), self.anchors.get_mut(anchor)) else {
-            return Ok(None);
         };
         let feedback = centre.advance(rng, time - self.origin)?.feedback(anchor.number)?;
         let report = anchor.node.report(rng, &Vector1::new(range), &feedback)?;
@@ -299,7 +285,7 @@ impl RangeTracker {
             match self.travel {
                 Travel::Full => {
                     let scheme = Tolerant {
-                        scheme: FullRange(self.noise),
+                        scheme: full_value(self.noise)?,
                         outliers,
                         stray: move |(): &(), _: &f64| 1.0 / stray,
                     };
@@ -326,4 +312,9 @@ fn quantizer(bits: u32, noise: RangeNoise) -> Result<QuantizedRange, Error> {
     within("bits", f64::from(bits), 1.0, 8.0)?;
     // All nodes that hear the reports compute the references themselves: they do not travel.
     Ok(QuantizedRange::new(1 << bits, noise)?.with_format(NumberFormat::Double))
+}
+
+fn full_value(noise: RangeNoise) -> Result<FullValue, Error> {
+    let deviation = noise.at_sensor();
+    Ok(FullValue::new(deviation * deviation)?.with_format(NumberFormat::Single))
 }

@@ -1,53 +1,10 @@
-//! How the ranges of a recording travel: in full or as levels, some of them outliers.
+//! Ranges of which some are outliers.
 
-use crate::factor::RangeFactor;
-use crate::quantized::{RangeReference, reported};
-use crate::sensor::RangeNoise;
+use crate::quantized::RangeReference;
 use fewbits_core::factor::Robust;
-use fewbits_core::{Link, MeasurementNoise, Memoryless, Message, NumberFormat, Observation};
-use fewbits_numerics::error::finite;
+use fewbits_core::{Link, MeasurementNoise, Memoryless, Message, Observation};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix1, Vector1};
-
-/// A range in full.
-#[derive(Clone, Copy)]
-pub(super) struct FullRange(pub RangeNoise);
-
-impl MeasurementNoise<1> for FullRange {
-    fn noise_covariance_at(&self, range: &Vector1<f64>) -> Matrix1<f64> {
-        let deviation = self.0.deviation(range[0]);
-        Matrix1::new(deviation * deviation)
-    }
-}
-
-impl Memoryless<1> for FullRange {
-    type Feedback = ();
-    type Report = f64;
-    type Factor = RangeFactor;
-
-    fn feedback_format(&self) {}
-
-    fn report_format(&self) -> NumberFormat {
-        NumberFormat::Single
-    }
-
-    fn report_of(&self, range: &Vector1<f64>, (): &()) -> Result<Option<f64>, fewbits_core::Error> {
-        Ok(Some(self.report_format().rounded(finite("range", range[0])?)?))
-    }
-
-    fn meaning_of(
-        &self,
-        (): &(),
-        observation: &Observation<f64>,
-        link: &Link,
-    ) -> Result<RangeFactor, fewbits_core::Error> {
-        match observation {
-            Observation::Received(range) => RangeFactor::arrived(*range, link.of_received()?, self.0),
-            Observation::Nothing | Observation::Lost => RangeFactor::constant(link.delivery(observation), self.0),
-        }
-        .map_err(reported)
-    }
-}
 
 /// What a level has on average if its range is stray: such a range seldom falls into an inner cell.
 pub(super) fn stray_level(levels: usize, stray: f64, reference: &RangeReference, level: &Symbol) -> f64 {

@@ -3,7 +3,8 @@
 use crate::common::{lobe, random_mixture};
 use fewbits_densities::{Component, Mixture};
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::product::{exact, gibbs};
+use fewbits_pf_mpa::product::exact;
+use fewbits_pf_mpa::published::ProductSampler;
 use nalgebra::{Matrix1, SVector, Vector1};
 
 fn line(means: &[f64], variance: f64, weights: &[f64]) -> Mixture<1> {
@@ -141,16 +142,20 @@ fn gibbs_sweeps_have_the_law_of_their_chain() {
         let distance = 0.5 * law.iter().zip(&truth).map(|(a, b)| (a - b).abs()).sum::<f64>();
         assert!((distance - variation).abs() < 5e-6, "{sweeps}: {distance}");
         let mean: f64 = law.iter().zip(&means).map(|(p, m)| p * m).sum();
-        let draws = gibbs(&mut rng, &views, n, sweeps).unwrap();
+        let draws = ProductSampler::Gibbs { sweeps }.sample(&mut rng, &views, n).unwrap();
         let error = (draws.covariance()[(0, 0)] / n as f64).sqrt();
         assert!((draws.mean()[0] - mean).abs() < 4.0 * error, "{sweeps}: {} {mean}", draws.mean()[0]);
     }
-    let draws = gibbs(&mut rng, &views, n, 10).unwrap();
+    let draws = ProductSampler::Gibbs { sweeps: 10 }
+        .sample(&mut rng, &views, n)
+        .unwrap();
     for x in [-0.5, 0.5, 1.0, 1.5, 2.5] {
         let below = draws.columns()[0].iter().filter(|s| **s < x).count() as f64 / n as f64;
         assert!((below - belief.cdf(x)).abs() < 4.0 * (0.25 / n as f64).sqrt(), "{x}");
     }
-    let single = gibbs(&mut rng, &views[..1], n, 5).unwrap();
+    let single = ProductSampler::Gibbs { sweeps: 5 }
+        .sample(&mut rng, &views[..1], n)
+        .unwrap();
     assert!(
         (single.mean()[0] - factors[0].mean()[0]).abs() < 4.0 * (factors[0].covariance()[(0, 0)] / n as f64).sqrt()
     );
@@ -163,32 +168,20 @@ fn gibbs_draws_the_product_in_the_plane() {
     let mut rng = Stream::new(33).rng();
     let n = 15_000;
     let slack = 4.0 * (truth.belief.covariance()[(0, 0)] / n as f64).sqrt();
-    let draws = gibbs(&mut rng, &[&a, &b], n, 10).unwrap();
+    let draws = ProductSampler::Gibbs { sweeps: 10 }
+        .sample(&mut rng, &[&a, &b], n)
+        .unwrap();
     assert!((draws.mean() - truth.belief.mean()).amax() < slack);
 }
 
-/// Components of one factor with widths of their own, two factors: the labels' law by enumeration.
 #[test]
-fn gibbs_minds_that_components_differ_in_width() {
-    let own = |parts: &[(f64, f64, f64)]| {
-        let parts = parts
-            .iter()
-            .map(|(w, m, v)| Component::new(*w, Vector1::new(*m), Matrix1::new(*v)).unwrap());
-        Mixture::new(parts.collect()).unwrap()
-    };
-    let a = own(&[(0.5, 0.0, 0.04), (0.2, 0.6, 3.0), (0.3, 1.9, 0.3)]);
-    let b = own(&[(0.3, 1.2, 0.1), (0.7, -0.5, 2.0)]);
-    let truth = exact(&[&a, &b]).unwrap().belief;
+fn components_of_no_weight_are_never_chosen() {
+    let zero = line(&[-50.0, 0.3, 50.0], 0.5, &[0.0, 1.0, 0.0]);
+    let other = line(&[1.2, -0.5], 0.8, &[0.3, 0.7]);
     let mut rng = Stream::new(35).rng();
-    let n = 12_000;
-    let draws = gibbs(&mut rng, &[&a, &b], n, 12).unwrap();
-    for x in [-0.3, 0.05, 0.4, 1.0, 1.5, 2.2] {
-        let below = draws.columns()[0].iter().filter(|s| **s < x).count() as f64 / n as f64;
-        assert!((below - truth.cdf(x)).abs() < 4.0 * (0.25 / n as f64).sqrt(), "{x}: {below} {}", truth.cdf(x));
-    }
-    // Components of no weight are never chosen, not even the last.
-    let zero = own(&[(0.0, -50.0, 1.0), (1.0, 0.3, 0.5), (0.0, 50.0, 1.0)]);
-    let draws = gibbs(&mut rng, &[&zero, &b], 2000, 2).unwrap();
+    let draws = ProductSampler::Gibbs { sweeps: 2 }
+        .sample(&mut rng, &[&zero, &other], 2000)
+        .unwrap();
     assert!(draws.columns()[0].iter().all(|x| x.abs() < 10.0));
 }
 
@@ -198,8 +191,12 @@ fn contradictions_and_bad_arguments_are_errors() {
     let a = line(&[0.0], 1e-6, &[1.0]);
     let b = line(&[1e200], 1e-6, &[1.0]);
     assert!(exact(&[&a, &b]).is_err());
-    assert!(exact::<1>(&[]).is_err() && gibbs::<1, _>(&mut rng, &[], 5, 5).is_err());
-    assert!(gibbs(&mut rng, &[&a], 0, 5).is_err());
+    let sampler = ProductSampler::Gibbs { sweeps: 5 };
+    assert!(exact::<1>(&[]).is_err() && sampler.sample::<1, _>(&mut rng, &[], 5).is_err());
+    assert!(sampler.sample(&mut rng, &[&a], 0).is_err());
+    let widths = [0.04, 3.0].map(|v| Component::new(0.5, Vector1::new(0.0), Matrix1::new(v)).unwrap());
+    let widths = Mixture::new(widths.to_vec()).unwrap();
+    assert!(sampler.sample(&mut rng, &[&widths], 5).is_err() && exact(&[&widths]).is_ok());
     let many = line(&[0.0; 101], 1.0, &[1.0; 101]);
     let refusal = exact(&[&many, &many, &many]).unwrap_err().to_string();
     assert!(refusal.contains("factors") && refusal.contains("1000000"), "{refusal}");

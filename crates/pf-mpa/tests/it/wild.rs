@@ -57,7 +57,7 @@ proptest! {
         let prior = Gaussian::scalar(x[3], x[4]).ok();
         let reference = RangeReference { centre: x[5], half_width: x[6] };
         let link = Link::new(x[7], x[8]).and_then(|link| link.with_erasure(x[9])).unwrap_or(Link::PERFECT);
-        let mut factors: Vec<RangeFactor> = [RangeFactor::value(x[10], noise), RangeFactor::arrived(x[10], x[9], noise), RangeFactor::constant(x[9], noise)].into_iter().flatten().collect();
+        let mut factors: Vec<RangeFactor> = [RangeFactor::value(x[10], noise), RangeFactor::constant(x[9], noise)].into_iter().flatten().collect();
         if let Ok(scheme) = QuantizedRange::new(levels, noise) {
             let told = scheme.level(x[10], &reference);
             prop_assert!(told.is_ok_and(|level| level.0 < levels) || scheme.level(x[10], &reference).is_err());

@@ -2,33 +2,10 @@
 
 use super::polynomials::HIGHEST_DEGREE;
 use nalgebra::{DMatrix, SVector};
+use std::sync::LazyLock;
 
 /// `sqrt(n)` for `n` from 0 on.
-#[rustfmt::skip]
-const ROOTS: [f64; HIGHEST_DEGREE + 2] = [
-    0.0,
-    1.0,
-    std::f64::consts::SQRT_2,
-    1.732_050_807_568_877_2,
-    2.0,
-    2.236_067_977_499_79,
-    2.449_489_742_783_178,
-    2.645_751_311_064_590_7,
-    2.828_427_124_746_190_3,
-    3.0,
-    3.162_277_660_168_379_5,
-    3.316_624_790_355_4,
-    3.464_101_615_137_754_4,
-    3.605_551_275_463_989,
-    3.741_657_386_773_941_3,
-    3.872_983_346_207_417,
-    4.0,
-    4.123_105_625_617_661,
-    4.242_640_687_119_285,
-    4.358_898_943_540_674,
-    4.472_135_954_999_58,
-    4.582_575_694_955_84,
-];
+static ROOTS: LazyLock<[f64; HIGHEST_DEGREE + 2]> = LazyLock::new(|| std::array::from_fn(|n| (n as f64).sqrt()));
 
 /// Orthonormal Hermite products `prod_d he_nu_d(u_d) / sqrt(nu_d!)` for every index.
 #[inline]
@@ -50,11 +27,12 @@ pub(super) fn hermite_products<const D: usize>(
 /// Orthonormal Hermite polynomials `he_n(x) / sqrt(n!)` of increasing degree.
 #[inline]
 pub(super) fn row_of_polynomials(x: f64, row: &mut [f64]) {
+    let roots = &*ROOTS;
     for n in 0..row.len() {
         row[n] = match n {
             0 => 1.0,
             1 => x,
-            _ => (x * row[n - 1] - ROOTS[n - 1] * row[n - 2]) / ROOTS[n],
+            _ => (x * row[n - 1] - roots[n - 1] * row[n - 2]) / roots[n],
         };
     }
 }
@@ -65,13 +43,14 @@ pub(super) const LANES: usize = 8;
 /// `sum_n c_n he_n(x) / sqrt(n!)` at each point, or of the absolute values of these terms.
 #[inline(always)]
 pub(super) fn sums_of_polynomials(x: &[f64; LANES], coefficients: &[f64], absolute: bool) -> [f64; LANES] {
+    let roots = &*ROOTS;
     let (mut before, mut now, mut sums) = ([0.0; LANES], [1.0; LANES], [0.0; LANES]);
     for (n, c) in coefficients.iter().enumerate() {
         for lane in 0..LANES {
             let part = now[lane] * c;
             sums[lane] += if absolute { part.abs() } else { part };
         }
-        let (this, next) = (ROOTS[n], ROOTS[n + 1]);
+        let (this, next) = (roots[n], roots[n + 1]);
         for lane in 0..LANES {
             let above = (x[lane] * now[lane] - this * before[lane]) / next;
             (before[lane], now[lane]) = (now[lane], above);

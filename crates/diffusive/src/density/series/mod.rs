@@ -10,7 +10,7 @@ pub use three_dimensions::{Slice, SliceMoments};
 
 use crate::Error;
 use basis::{gauss_hermite, hermite_products};
-use fewbits_core::columns::state_at;
+use fewbits_core::columns::{change_each, state_at};
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Component;
 use fewbits_numerics::LogSum;
@@ -254,11 +254,7 @@ impl<const D: usize> Belief<D> for Lpg<D> {
 
     /// Rejection from a widened mixture of the Gaussians with a bound found on 1000 trial points times three; a point above the
     /// bound is accepted as it is.
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        if !fewbits_core::columns::columns_agree(&mut states) {
-            return;
-        }
-        let count = states.first().map_or(0, |column| column.len());
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
         let widened = |rng: &mut R| {
             let term = &self.terms[rng.random_range(0..self.terms.len())];
             let g = SVector::<f64, D>::from_fn(|_, _| rng.sample(rand_distr::StandardNormal));
@@ -279,7 +275,7 @@ impl<const D: usize> Belief<D> for Lpg<D> {
             bound = bound.max(self.log_density_and_bound(&x, 0.0, &mut values).0 - log_proposal(&x));
         }
         bound += 3.0_f64.ln();
-        for i in 0..count {
+        change_each(states, |_| {
             let mut x = widened(rng);
             for _ in 0..100_000 {
                 let ratio = self.log_density_and_bound(&x, 0.0, &mut values).0 - log_proposal(&x) - bound;
@@ -288,10 +284,8 @@ impl<const D: usize> Belief<D> for Lpg<D> {
                 }
                 x = widened(rng);
             }
-            for d in 0..D {
-                states[d][i] = x[d];
-            }
-        }
+            x
+        });
     }
 }
 
