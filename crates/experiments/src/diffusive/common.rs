@@ -31,7 +31,7 @@ parameters! {
     /// Settings of every search.
     #[derive(Debug, Clone)]
     pub struct Settings {
-        pub(super) trials: u64 [1..=100_000] = 80 => quick 8 => "Random deployments, each searched by every scheme.",
+        pub(super) trials: u64 [1..=100_000] = 120 => quick 8 => "Random deployments, each searched by every scheme.",
         pub(super) nodes: usize [2..=100_000] = 300 => "Deployed nodes.",
         pub(super) prior_sd: f64 [1.0..=1e4] = 50.0 => "Standard deviation of the prior about the first node, m.",
         pub(super) rate_low: f64 [0.0..=0.99] = 0.5 => "Lower end of the rate's prior, kg/s.",
