@@ -1,6 +1,6 @@
 //! A simulated number and its standard error, as one cell of a row.
 
-use fewbits_monte_carlo::{Estimate, Moments};
+use fewbits_monte_carlo::Moments;
 use serde::{Deserialize, Serialize};
 use std::ops::Sub;
 
@@ -14,14 +14,6 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// The mean of what was added.
-    pub fn mean(moments: &Moments) -> Self {
-        Self {
-            value: moments.mean(),
-            standard_error: (moments.count() > 1).then(|| moments.standard_error()),
-        }
-    }
-
     /// The root of the mean: an RMSE from squared errors.
     pub fn root_mean(moments: &Moments) -> Self {
         let root = moments.root_mean();
@@ -50,25 +42,20 @@ impl Measured {
     }
 }
 
-impl From<Estimate> for Measured {
-    fn from(estimate: Estimate) -> Self {
+/// The mean of what was added.
+impl From<Moments> for Measured {
+    fn from(moments: Moments) -> Self {
         Self {
-            value: estimate.value,
-            standard_error: Some(estimate.standard_error),
+            value: moments.mean(),
+            standard_error: (moments.count() > 1).then(|| moments.standard_error()),
         }
-    }
-}
-
-impl From<&Moments> for Measured {
-    fn from(moments: &Moments) -> Self {
-        Self::mean(moments)
     }
 }
 
 /// The mean of the numbers.
 impl FromIterator<f64> for Measured {
     fn from_iter<I: IntoIterator<Item = f64>>(numbers: I) -> Self {
-        Self::mean(&numbers.into_iter().collect())
+        numbers.into_iter().collect::<Moments>().into()
     }
 }
 

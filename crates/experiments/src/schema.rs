@@ -172,18 +172,6 @@ cells! {
     Cow<'static, str>: |text| Value::Text(text.clone().into_owned());
 }
 
-/// A label is its variant in lower case.
-macro_rules! label {
-    ($type:ty) => {
-        impl $crate::schema::Field for $type {
-            fn put(&self, to: &mut $crate::schema::Cells) {
-                format!("{self:?}").to_lowercase().put(to);
-            }
-        }
-    };
-}
-pub(crate) use label;
-
 impl Field for Measured {
     const COLUMNS: usize = 2;
 
@@ -272,15 +260,9 @@ pub(crate) fn tables<T: Field>() -> Vec<Table> {
 mod tests {
     use super::*;
 
-    #[derive(Debug)]
-    enum Method {
-        Lloyd,
-    }
-    label!(Method);
-
     rows! {
         struct Key {
-            method: Method => "How.",
+            method: &'static str => "How.",
         }
 
         struct Row {
@@ -309,7 +291,7 @@ mod tests {
             standard_error: Some(0.5),
         };
         Row {
-            key: Key { method: Method::Lloyd },
+            key: Key { method: "lloyd" },
             time,
             mse,
             other: None,

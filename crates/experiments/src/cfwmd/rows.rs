@@ -50,7 +50,7 @@ impl Ensemble {
 
     /// Mean number of messages a step.
     pub(super) fn rate(&self) -> Measured {
-        (&self.averaged(|r| &r.sent)).into()
+        self.averaged(|r| &r.sent).into()
     }
 }
 
@@ -151,7 +151,7 @@ impl Summary {
             position_rmse: Measured::root_mean(&e.averaged(|r| &r.position)),
             velocity_rmse: Measured::root_mean(&e.averaged(|r| &r.velocity)),
             rate: e.rate(),
-            nees: consistent.then(|| (&e.averaged(|r| &r.consistency)).into()),
+            nees: consistent.then(|| e.averaged(|r| &r.consistency).into()),
             trials: e.records.len(),
         }
     }
@@ -169,8 +169,8 @@ pub(super) fn paired(ensembles: &[Ensemble], pairs: &[(&'static str, &'static st
                 second,
                 world: a.run.world.clone(),
                 l: a.run.l,
-                position: (&position).into(),
-                velocity: (&a.less(b, |r| &r.velocity)).into(),
+                position: position.into(),
+                velocity: a.less(b, |r| &r.velocity).into(),
                 trials: position.count(),
             })
         })

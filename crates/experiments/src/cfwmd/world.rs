@@ -111,7 +111,7 @@ pub(super) trait World<const D: usize, const M: usize>: Sync {
                 .map(|(_, scheme)| run(*scheme, &draws, it.stream))
                 .collect()
         };
-        let mut trials = context.monte_carlo(stream, trials).run(every)?;
+        let mut trials = context.trials(stream, trials, every)?;
         let of = |(place, (scheme, _)): (usize, &(&'static str, Self::Scheme))| Ensemble {
             run: Run {
                 scheme,

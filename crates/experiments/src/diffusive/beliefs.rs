@@ -96,11 +96,10 @@ pub static FIG6: Lobes = Lobes {
 
 fn fields(p: &Parameters, context: &Context<'_>, form: Option<Form>) -> Result<Fields, Error> {
     let settings = Settings::default();
-    let run = context.monte_carlo(context.stream(CHAINS), 1);
     let mut shown = None;
     for deployment in p.deployment..p.deployment + 100 {
         context.check()?;
-        let outcome = Scheme::exact(p.nodes).run(&settings, run.trial(deployment))?;
+        let outcome = Scheme::exact(p.nodes).run(&settings, context.stream(CHAINS).indexed(deployment))?;
         let Some(posterior) = outcome.posterior else {
             continue;
         };

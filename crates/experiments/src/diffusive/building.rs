@@ -53,11 +53,9 @@ pub(super) struct Building {
 
 impl Building {
     pub(super) fn new(windy: bool) -> Result<Self, Error> {
-        let domain = Plan::parse(PLAN)
-            .and_then(|plan| plan.domain(CELL, 1, 0.0))
-            .map_err(Error::failed)?;
+        let domain = Plan::parse(PLAN)?.domain(CELL, 1, 0.0)?;
         let flow = match windy {
-            true => PotentialFlow::new(&domain, WIND).map_err(Error::failed)?.flow,
+            true => PotentialFlow::new(&domain, WIND)?.flow,
             false => Flow::still(&domain),
         };
         let velocities = flow.velocities(&domain);
@@ -65,10 +63,8 @@ impl Building {
             .iter()
             .fold(Vector3::zeros(), |sum, v| sum + Vector3::from(*v))
             / velocities.len() as f64;
-        let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, Scheme::default()).map_err(Error::failed)?;
-        let free = Air::new(DIFFUSIVITY, mean, Ground::None)
-            .and_then(|air| air.with_closest(0.5 * CELL))
-            .map_err(Error::failed)?;
+        let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, Scheme::default())?;
+        let free = Air::new(DIFFUSIVITY, mean, Ground::None)?.with_closest(0.5 * CELL)?;
         Ok(Self { transport, free })
     }
 
@@ -110,7 +106,7 @@ impl Placement {
             }
         }
         let points: Vec<[f64; 3]> = sensors.iter().map(|cell| building.centre(*cell)).collect();
-        let field = SensorField::steady(&building.transport, &points).map_err(Error::failed)?;
+        let field = SensorField::steady(&building.transport, &points)?;
         let indoors: Vec<Vec<f64>> = (0..count)
             .filter_map(|sensor| field.response(sensor, 0).map(<[f64]>::to_vec))
             .collect();

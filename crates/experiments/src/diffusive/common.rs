@@ -82,8 +82,7 @@ impl Example {
         };
         let air = Air::new(DIFFUSIVITY, wind, Ground::Impermeable)?;
         let instants = (1..=self.samples).map(|j| 5.0 * j as f64).collect();
-        let sensor = SourceSensor::new(air, instants, self.noise)?;
-        sensor.with_bias(BIAS).map_err(Error::failed)
+        Ok(SourceSensor::new(air, instants, self.noise)?.with_bias(BIAS)?)
     }
 }
 
@@ -227,19 +226,18 @@ impl Scheme {
         Ok(search)
     }
 
-    /// Runs it on the network and noise of a trial, which all schemes share.
-    pub fn run(&self, settings: &Settings, trial: Trial) -> Result<Outcome, Error> {
-        let network = Network::draw(trial.stream, settings.nodes, self.range)?;
+    /// Runs it on the network and noise of a trial's stream, which all schemes share.
+    pub fn run(&self, settings: &Settings, stream: Stream) -> Result<Outcome, Error> {
+        let network = Network::draw(stream, settings.nodes, self.range)?;
         let sensor = self.example.sensor(self.windy)?;
         let source = self.example.source();
         let positions = network.deployment.positions();
         let samples = |node: usize| {
-            let mut rng = trial.stream.named("noise").indexed(node as u64).rng();
+            let mut rng = stream.named("noise").indexed(node as u64).rng();
             sensor.sample(&mut rng, &positions[node], &source, RATE)
         };
-        self.search(settings)?
-            .run(&sensor, &network.deployment, &network.graph, network.start, samples)
-            .map_err(Error::failed)
+        let search = self.search(settings)?;
+        Ok(search.run(&sensor, &network.deployment, &network.graph, network.start, samples)?)
     }
 }
 
@@ -300,11 +298,11 @@ pub(super) fn tracks(context: &Context<'_>, settings: &Settings, schemes: &[Sche
     let kept = context.kept.unwrap_or(&own);
     let missing: Vec<&Scheme> = select(schemes, |s| kept.get::<Vec<Track>>(&name(s)).is_none()).collect();
     let every = |trial: Trial| -> Result<Vec<Track>, Error> {
-        let one = |scheme: &&Scheme| Ok(Track::of(&scheme.run(settings, trial)?, &scheme.example.source()));
+        let one = |scheme: &&Scheme| Ok(Track::of(&scheme.run(settings, trial.stream)?, &scheme.example.source()));
         missing.iter().map(one).collect()
     };
     if !missing.is_empty() {
-        let new = context.trials(CHAINS, settings.trials, every)?;
+        let new = context.trials(context.stream(CHAINS), settings.trials, every)?;
         for (i, scheme) in missing.iter().enumerate() {
             kept.put(name(scheme), new.iter().map(|tracks| tracks[i].clone()).collect::<Vec<_>>());
         }

@@ -53,9 +53,9 @@ rows! {
 pub struct Envelope;
 
 impl Parameters {
-    fn area(&self, trial: Trial) -> Result<Option<Area>, Error> {
+    fn area(&self, stream: Stream) -> Result<Option<Area>, Error> {
         let settings = Settings::default();
-        let outcome = Scheme::exact(self.nodes).run(&settings, trial)?;
+        let outcome = Scheme::exact(self.nodes).run(&settings, stream)?;
         let Some(posterior) = outcome.posterior else {
             return Ok(None);
         };
@@ -87,8 +87,10 @@ impl Figure for Envelope {
         let radius = contour_radius(RATE, p.threshold, p.time, DIFFUSIVITY)?;
         let source = B.source();
         let edges = [("east", 0.0), ("north", 90.0_f64)];
-        let all = context.trials(CHAINS, p.trials, |trial| {
-            let Some(area) = p.area(trial)? else { return Ok(None) };
+        let all = context.trials(context.stream(CHAINS), p.trials, |trial| {
+            let Some(area) = p.area(trial.stream)? else {
+                return Ok(None);
+            };
             let quantile = |angle: f64, level| p.reach(&area, &Vector2::zeros(), angle.to_radians(), level);
             let bands = edges.map(|(_, angle)| Ok((quantile(angle, 0.05)?, quantile(angle, 0.95)?)));
             let bands = bands.into_iter().collect::<Result<Vec<_>, Error>>()?;
@@ -107,7 +109,7 @@ impl Figure for Envelope {
             })
         });
         let coverage = coverage.collect();
-        let first = p.area(context.monte_carlo(context.stream(CHAINS), 1).trial(0))?;
+        let first = p.area(context.stream(CHAINS).indexed(0))?;
         let (mut band, mut exceedance) = (Vec::new(), Vec::new());
         if let Some(area) = first {
             let origin = Vector2::from(ALARM);

@@ -116,14 +116,15 @@ impl Figure for Rooms {
                     report,
                     readings,
                 };
-                let all =
-                    context.trials("diffusive-rooms", p.trials, |trial| self.one(building, &case, p, trial.stream))?;
+                let all = context.trials(context.stream("diffusive-rooms"), p.trials, |trial| {
+                    self.one(building, &case, p, trial.stream)
+                })?;
                 found.push(summary(case.name(), &all));
             }
         }
         let building = &buildings[usize::from(VISITED.windy)];
         let stops: Vec<usize> = STOPS.into_iter().filter(|stop| *stop <= p.visit_sensors).collect();
-        let tracks = context.trials("diffusive-rooms-visits", p.visit_trials, |trial| {
+        let tracks = context.trials(context.stream("diffusive-rooms-visits"), p.visit_trials, |trial| {
             let placement = Placement::draw(building, &VISITED, p.visit_sensors, None, trial.stream)?;
             let (visited, mut errors) = ((0..p.visit_sensors).collect::<Vec<_>>(), Vec::new());
             for stop in &stops {
@@ -252,7 +253,7 @@ impl Rooms {
 
     fn map(&self, building: &Building, p: &Parameters, context: &Context<'_>) -> Result<Vec<Square>, Error> {
         let domain = building.domain();
-        let source = domain.locate(SHOWN).map_err(Error::failed)?;
+        let source = domain.locate(SHOWN)?;
         let placement =
             Placement::draw(building, &VISITED, p.sensors, Some(source), context.stream("diffusive-rooms-map"))?;
         let everyone: Vec<usize> = (0..p.sensors).collect();
@@ -303,6 +304,6 @@ fn summary(case: String, all: &[Trialled]) -> Found {
         false_alarms: fraction(count(|r| r.alarm), all.len()),
         free_within_two_cells: fraction(count(|r| r.free_error <= TWO_CELLS), all.len()),
         free_misses_flagged: fraction(count(|r| r.free_error > TWO_CELLS && r.free_alarm), misses),
-        error_median: median(&errors).unwrap_or_else(|| Measured::mean(&Moments::default())),
+        error_median: median(&errors).unwrap_or_else(|| Moments::default().into()),
     }
 }

@@ -90,7 +90,7 @@ pub(super) fn summary(scheme: &Scheme, settings: &Settings, tracks: &[Track]) ->
         scalars: scheme.form.scalars(&rate),
         reach: fraction(reached.len(), tracks.len()),
         nodes_median: median(&counts),
-        nodes_mean: (!counts.is_empty()).then(|| Measured::mean(&counts.iter().copied().collect())),
+        nodes_mean: (!counts.is_empty()).then(|| counts.iter().copied().collect()),
         nodes_q10: quantile(counts.iter().copied(), 0.1),
         nodes_q90: quantile(counts.iter().copied(), 0.9),
         final_err_median: median(&finals),

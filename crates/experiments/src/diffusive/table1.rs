@@ -76,11 +76,9 @@ impl Figure for Table1 {
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let w = p.precision()?;
         let mean_of = |terms: &[([usize; 2], f64)]| -> Result<f64, Error> {
-            let parts = terms.iter().map(|(power, c)| {
-                gaussian_moment(*power, &Vector2::zeros(), &w)
-                    .map(|moment| c * moment)
-                    .map_err(Error::failed)
-            });
+            let parts = terms
+                .iter()
+                .map(|(power, c)| Ok(c * gaussian_moment(*power, &Vector2::zeros(), &w)?));
             parts.sum()
         };
         let (mut monomials, mut means) = (Vec::new(), Vec::new());

@@ -105,7 +105,7 @@ impl Figure for Unknowns {
         let mut rows = Vec::new();
         for count in &p.nodes {
             let kinds = models()?;
-            let all = context.trials("diffusive-layouts", p.trials, |trial| {
+            let all = context.trials(context.stream("diffusive-layouts"), p.trials, |trial| {
                 let mut rng = trial.stream.rng();
                 let mut draw = || -> Result<Record, Error> {
                     let angle = std::f64::consts::TAU * rng.random::<f64>();
@@ -116,7 +116,7 @@ impl Figure for Unknowns {
                         .iter()
                         .map(|a| a + sensor.bias())
                         .collect();
-                    sensor.record(&node, &clean).map_err(Error::failed)
+                    Ok(sensor.record(&node, &clean)?)
                 };
                 let records = (0..*count).map(|_| draw()).collect::<Result<Vec<_>, _>>()?;
                 let variance = Settings::default().prior_sd.powi(2);
@@ -135,7 +135,7 @@ impl Figure for Unknowns {
             for (k, (model, _)) in kinds.iter().enumerate() {
                 let of = |f: fn(&(f64, f64)) -> f64| -> Measured {
                     let values: Vec<f64> = all.iter().map(|trial| f(&trial[k])).collect();
-                    super::common::median(&values).unwrap_or_else(|| Measured::mean(&Moments::default()))
+                    super::common::median(&values).unwrap_or_else(|| Moments::default().into())
                 };
                 rows.push(Model {
                     model,

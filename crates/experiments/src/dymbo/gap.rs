@@ -59,13 +59,12 @@ fn steady_excess<F: ScalarFilter + Clone + Sync>(
     trials: u64,
 ) -> Result<Measured, Error> {
     let exact = exact_filter(filter.plant(), BURN + MEASURED)?;
-    let sum = context.tally(stream, trials, Moments::default, |sum, trial| {
+    let sums = context.moments(stream, trials, |trial| {
         let mut rng = trial.stream.fast_rng();
         let mut twin = Twin::new(&mut rng, filter.clone(), &exact)?;
-        sum.add(twin.steady_excess(&mut rng, BURN, MEASURED)?);
-        Ok::<_, fewbits_dymbo::Error>(())
+        Ok([twin.steady_excess(&mut rng, BURN, MEASURED)?])
     })?;
-    Ok(Measured::mean(&sum))
+    Ok(sums[0].into())
 }
 
 /// Exact steady error when the filter's gain is multiplied by a factor: it is that at another predicted variance.

@@ -196,10 +196,10 @@ impl Figure for SelfTuning {
             jumps: true,
         };
         let scenes: Vec<Scene> = still.into_iter().chain([jump]).collect();
-        let trial = |scene: &Scene, of: &(&str, Receiver), it: Trial| one_run(scene, of.1, p, it.stream);
-        let found = context.compare(ID, p.trials, &scenes, Scene::name, &RECEIVERS, trial)?;
         let mut rows = Vec::new();
-        for (scene, found) in scenes.iter().zip(&found) {
+        for scene in &scenes {
+            let stream = context.stream(ID).named(&scene.name());
+            let found = context.compare(stream, p.trials, &RECEIVERS, |of, it| one_run(scene, of.1, p, it.stream))?;
             for (i, (receiver, kind)) in RECEIVERS.iter().enumerate() {
                 let windows = if scene.jumps { 1..6 } else { 0..1 };
                 let inverted =

@@ -81,7 +81,7 @@ fn relative(a: &[f64], b: &[f64]) -> Measured {
     let residuals: Moments = a.iter().zip(b).map(|(a, b)| (b - ratio * a) / mean).collect();
     Measured {
         value: ratio - 1.0,
-        ..(&residuals).into()
+        ..residuals.into()
     }
 }
 
@@ -98,8 +98,8 @@ impl Figure for ThresholdPlace {
         let mut rows = Vec::new();
         for &plant in &p.plants {
             let (model, start) = (plant.model()?, plant.stationary()?);
-            let run = context.monte_carlo(context.stream(ID).named(&plant.to_string()), p.trials);
-            let runs = run.run(|trial| one_run(&model, &start, p, trial.stream))?;
+            let stream = context.stream(ID).named(&plant.to_string());
+            let runs = context.trials(stream, p.trials, |trial| Ok(one_run(&model, &start, p, trial.stream)?))?;
             let of = |what: usize, rule: usize| runs.iter().map(|run| run[what][rule]).collect::<Vec<f64>>();
             rows.extend(RULES.iter().enumerate().map(|(i, (rule, _))| Row {
                 plant,

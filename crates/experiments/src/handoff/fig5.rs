@@ -65,17 +65,20 @@ impl Figure for Fig5 {
                 ellipses.extend(closed.map(|&[x, y]| Outline { t, component, x, y }));
             }
         }
-        let far = |sum: &mut Moments, trial: Trial| {
-            for estimate in posteriors(trial.stream)? {
-                sum.add(Truth::new(&estimate).kl(&single(&estimate)?));
-            }
-            Ok::<_, Error>(())
+        let far = |trial: Trial| -> Result<Vec<f64>, Error> {
+            let estimates = posteriors(trial.stream)?;
+            estimates
+                .iter()
+                .map(|estimate| Ok(Truth::new(estimate).kl(&single(estimate)?)))
+                .collect()
         };
-        let distance = context.tally(stream.named("worlds"), p.trials, Moments::default, far)?;
+        let distances = context.trials(stream.named("worlds"), p.trials, far)?;
         Ok(Rows {
             particles,
             ellipses,
-            gaussian: vec![Distance { kl: (&distance).into() }],
+            gaussian: vec![Distance {
+                kl: distances.into_iter().flatten().collect(),
+            }],
         })
     }
 

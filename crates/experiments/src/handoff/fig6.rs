@@ -190,11 +190,7 @@ impl Figure for Fig6 {
         let mut rows = Rows::default();
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let stream = context.stream("handoff-fig6").named(smoothing.name());
-            let runs = |components| {
-                context
-                    .monte_carlo(stream, p.trials)
-                    .run(|trial| Self::trial(components, smoothing, trial))
-            };
+            let runs = |components| context.trials(stream, p.trials, |it| Self::trial(components, smoothing, it));
             let (bounds, steps) = Self::rows(smoothing, &runs(self.components)?);
             rows.bounds.extend(bounds);
             rows.steps.extend(steps);

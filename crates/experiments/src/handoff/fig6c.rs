@@ -159,7 +159,7 @@ impl Figure for Fig6c {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let runs = context.trials("handoff-fig6c", p.trials, |it| trial(p, it))?;
+        let runs = context.trials(context.stream("handoff-fig6c"), p.trials, |it| trial(p, it))?;
         let mut rows = Rows::default();
         for t in 1..=STEPS {
             let after = |m: usize| runs.iter().map(move |run| run[t - 1].after[m]);

@@ -163,7 +163,7 @@ pub(super) fn over_beliefs<K: Copy + Send, const N: usize>(
         }
         Ok(sums)
     };
-    let runs = context.trials(experiment, trials, one)?;
+    let runs = context.trials(context.stream(experiment), trials, one)?;
     let mean = |(i, (key, _)): (usize, &(K, [f64; N]))| {
         (*key, std::array::from_fn(|k| runs.iter().map(|run| run[i].1[k]).collect()))
     };

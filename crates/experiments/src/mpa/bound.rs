@@ -63,7 +63,7 @@ impl Figure for Bounds {
                     }
                     Ok((runs.map(|run| world.mse(&run)), sums))
                 };
-                let all = context.trials("mpa-free", p.trials, one)?;
+                let all = context.trials(context.stream("mpa-free"), p.trials, one)?;
                 // The bound without the trajectories of one group of `GROUPS`.
                 let without = |which: usize, group: Option<usize>| -> Result<f64, Error> {
                     let mut bound = CramerRao::new(*prior()?.covariance());

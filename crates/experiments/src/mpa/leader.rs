@@ -43,7 +43,7 @@ impl Figure for Leaders {
         let row = |(snr_db, particles): (f64, usize)| -> Result<Row, Error> {
             let network = Point::published(snr_db, 4, SPEED)?.network()?;
             let tracker = MessagePassing::improved(particles)?;
-            let one = |sums: &mut [Moments; 6], trial: Trial| -> Result<(), Error> {
+            let one = |trial: Trial| {
                 let world = World::draw(trial.stream, &target, Field::Confined)?;
                 let name = Method::Messages(tracker).name();
                 let own = |i: usize| trial.stream.named(&name).indexed(i as u64);
@@ -75,21 +75,18 @@ impl Figure for Leaders {
                     let all = [is(count == 1), is(count == 0), is(count > 1), is(leads), error, spread];
                     means.iter_mut().zip(all).for_each(|(m, x)| m.add(x));
                 }
-                sums.iter_mut().zip(means).for_each(|(s, m)| s.add(m.mean()));
-                Ok(())
+                Ok(means.map(|m| m.mean()))
             };
-            let stream = context.stream("mpa-trajectories");
-            let sums = context.tally(stream, p.trials, || [Moments::default(); 6], one)?;
-            let [one, none, several, nearest, mse, spread] = sums.map(|m| Measured::from(&m));
+            let sums = context.moments(context.stream("mpa-trajectories"), p.trials, one)?;
             Ok(Row {
                 snr_db,
                 particles,
-                one,
-                none,
-                several,
-                nearest,
-                mse,
-                spread,
+                one: sums[0].into(),
+                none: sums[1].into(),
+                several: sums[2].into(),
+                nearest: sums[3].into(),
+                mse: sums[4].into(),
+                spread: sums[5].into(),
             })
         };
         SETTINGS.into_iter().map(row).collect()

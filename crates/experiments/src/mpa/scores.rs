@@ -50,7 +50,7 @@ pub(super) fn rows(
 ) -> Result<Vec<Row>, Error> {
     let (network, target) = (point.network()?, Target::printed()?);
     let most = methods.iter().map(|m| m.1).max().unwrap_or(0);
-    let all = context.trials("mpa-trajectories", most, |trial| {
+    let all = context.trials(context.stream("mpa-trajectories"), most, |trial| {
         let world = World::draw(trial.stream, &target, Field::Confined)?;
         let error = |(method, count): &(Method, u64)| {
             let counts = trial.index < *count;

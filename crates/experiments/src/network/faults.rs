@@ -140,28 +140,22 @@ impl Figure for Faulty {
                 }));
             }
         }
-        let sums = context.sweep(
-            "network-faults",
-            p.trials,
-            &points,
-            |point| format!("{} {}", point.fault, point.level),
-            |_| [Moments::default(); 4],
-            |point, sums, it| {
-                let numbers = run(point, it.stream, p.slots)?;
-                sums.iter_mut().zip(numbers).for_each(|(sum, x)| sum.add(x));
-                Ok::<_, Error>(())
-            },
-        )?;
-        let row = |(point, sums): (&Point, &[Moments; 4])| Row {
-            fault: point.fault,
-            level: point.level,
-            feedback: if point.echoed { "echoed" } else { "told" },
-            rmse: Measured::root_mean(&sums[0]),
-            recovery: Measured::mean(&sums[1]),
-            disagreements: Measured::mean(&sums[2]),
-            unrecovered: Measured::mean(&sums[3]),
+        let row = |point: &Point| {
+            let stream = context
+                .stream("network-faults")
+                .named(&format!("{} {}", point.fault, point.level));
+            let sums = context.moments(stream, p.trials, |it| run(point, it.stream, p.slots))?;
+            Ok(Row {
+                fault: point.fault,
+                level: point.level,
+                feedback: if point.echoed { "echoed" } else { "told" },
+                rmse: Measured::root_mean(&sums[0]),
+                recovery: sums[1].into(),
+                disagreements: sums[2].into(),
+                unrecovered: sums[3].into(),
+            })
         };
-        Ok(points.iter().zip(&sums).map(row).collect())
+        points.iter().map(row).collect()
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {

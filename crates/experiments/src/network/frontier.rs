@@ -65,7 +65,7 @@ fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<&'static str> {
 
 fn rows_of(world: &'static str, entries: &[Entry], runs: &Comparison<4>, floor: impl Fn(f64) -> f64) -> Vec<Row> {
     let row = |(i, entry): (usize, &Entry)| {
-        let mean = |of: usize| Measured::mean(&runs.moments(i, of));
+        let mean = |of: usize| Measured::from(runs.moments(i, of));
         let payload = mean(1);
         Row {
             world,
@@ -100,13 +100,12 @@ impl Figure for Frontier {
         let (scalar, plane) = (worlds::scalar(p.slots)?, worlds::plane(p.slots)?);
         let (least, everything) = (scalar.everything()?, plane.everything()?[1].sqrt());
         let rows_of = |world, entries: Vec<Entry>, floor: &dyn Fn(f64) -> f64| -> Result<Vec<Row>, Error> {
-            let one = |_: &_, entry: &Entry, it: Trial| {
+            let one = |entry: &Entry, it: Trial| {
                 let bill = entry.run(it.stream)?;
-                Ok::<_, Error>([bill.squared, bill.reports, bill.air, bill.joules])
+                Ok([bill.squared, bill.reports, bill.air, bill.joules])
             };
-            let name = |world: &&str| (*world).to_owned();
-            let runs = context.compare("network-frontier", p.trials, &[world], name, &entries, one)?;
-            Ok(rows_of(world, &entries, &runs[0], floor))
+            let stream = context.stream("network-frontier").named(world);
+            Ok(rows_of(world, &entries, &context.compare(stream, p.trials, &entries, one)?, floor))
         };
         let mut rows = rows_of("scalar", schemes::of_scalar(&scalar)?, &|rate| floor_at(rate, least))?;
         rows.extend(rows_of("plane", schemes::of_plane(&plane)?, &|_| everything)?);

@@ -79,7 +79,7 @@ pub fn scalar(slots: usize) -> Result<World<1, Ar1>, Error> {
 /// Never for the constants here.
 pub fn plane(slots: usize) -> Result<World<4, LinearGaussian<4, 2>>, Error> {
     let along = [Vector4::new(1.0, 0.0, 0.0, 0.0), Vector4::new(0.0, 0.0, 1.0, 0.0)];
-    let sensor = |i: usize| LinearSensor::scalar(along[i % 2], 1.0).map_err(Error::failed);
+    let sensor = |i: usize| LinearSensor::scalar(along[i % 2], 1.0);
     Ok(World {
         dynamics: constant_velocity_2d(1.0, ACCELERATION)?,
         sensors: (0..SENSORS).map(sensor).collect::<Result<_, _>>()?,
