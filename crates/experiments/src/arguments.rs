@@ -157,9 +157,8 @@ impl Parameter {
             return all;
         }
         self.entries = fields.iter().map(|field| field.name.clone()).collect();
-        let ranges = fields
-            .iter()
-            .filter_map(|field| Some(format!("{} {}", field.name, field.limits.range()?)));
+        let named = |field: &Self| Some(format!("{} {}", field.name, field.limits.range()?));
+        let ranges = fields.iter().filter_map(named);
         let own = [self.limits.entries(), self.limits.range()];
         self.range = own.into_iter().flatten().chain(ranges).collect::<Vec<_>>().join("; ");
         self.points = fields;
@@ -244,13 +243,10 @@ mod tests {
             });
             own.count() + parameter.points.iter().map(|point| check(id, point)).sum::<usize>()
         }
-        let read = |figure: &dyn crate::figure::AnyFigure| {
-            figure
-                .parameters()
-                .iter()
-                .map(|p| check(figure.about().id, p))
-                .sum::<usize>()
-        };
-        assert!(crate::all().into_iter().map(read).sum::<usize>() > 400);
+        let figures = crate::all()
+            .into_iter()
+            .map(|figure| (figure.about().id, figure.parameters()));
+        let read = |(id, all): (&str, Vec<Parameter>)| all.iter().map(|p| check(id, p)).sum::<usize>();
+        assert!(figures.map(read).sum::<usize>() > 400);
     }
 }

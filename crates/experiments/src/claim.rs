@@ -357,10 +357,7 @@ pub trait Cell {
 
 impl Cell for f64 {
     fn measured(&self) -> Option<Measured> {
-        Some(Measured {
-            value: *self,
-            standard_error: None,
-        })
+        Some(Measured::new(*self, None))
     }
 }
 

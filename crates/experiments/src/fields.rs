@@ -169,12 +169,24 @@ macro_rules! rows {
 /// publications it comes from, and its caption.
 ///
 /// `figure!(Parameters => Vec<Row>, "demo-fig1", "Averages", "the paper, figure 1", "What it shows.");`
+///
+/// Where many figures are values of one type, a field says what stands above: `figure!(Parameters => Vec<Row>, about);`.
 #[macro_export]
 macro_rules! figure {
     ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal) => {
         type Parameters = $parameters;
         type Tables = $tables;
 
-        const ABOUT: $crate::About = $crate::About::of($id, $title, $source).showing($caption);
+        fn about(&self) -> $crate::About {
+            $crate::About::of($id, $title, $source).showing($caption)
+        }
+    };
+    ($parameters:ty => $tables:ty, $about:ident) => {
+        type Parameters = $parameters;
+        type Tables = $tables;
+
+        fn about(&self) -> $crate::About {
+            self.$about
+        }
     };
 }

@@ -148,13 +148,8 @@ pub trait Figure: Sync {
     /// `Vec<Row>`, or a struct of such lists (the first is the main table): see [`Table::of`].
     type Tables: Field;
 
-    /// What stands above the figure, unless [`Figure::about`] says so of each value of the type.
-    const ABOUT: About = About::of("", "", "");
-
     /// What stands above the figure.
-    fn about(&self) -> About {
-        Self::ABOUT
-    }
+    fn about(&self) -> About;
 
     /// The paper's setting.
     fn defaults(&self) -> Self::Parameters {

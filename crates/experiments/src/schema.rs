@@ -190,6 +190,15 @@ impl Field for Measured {
     }
 }
 
+/// No columns and no table.
+impl Field for () {
+    const COLUMNS: usize = 0;
+
+    fn describe(_: Column, _: &mut Described) {}
+
+    fn put(&self, _: &mut Cells) {}
+}
+
 impl<T: Field> Field for Option<T> {
     const COLUMNS: usize = T::COLUMNS;
 
@@ -286,14 +295,10 @@ mod tests {
     }
 
     fn row(time: f64) -> Row {
-        let mse = Measured {
-            value: 2.0,
-            standard_error: Some(0.5),
-        };
         Row {
             key: Key { method: "lloyd" },
             time,
-            mse,
+            mse: Measured::new(2.0, 0.5),
             other: None,
             printed: None,
         }
@@ -302,12 +307,8 @@ mod tests {
     #[test]
     fn the_fields_are_the_columns() {
         let table = Table::of(&vec![row(1.0)]).unwrap().remove(0);
-        let cells: Vec<_> = table
-            .columns
-            .iter()
-            .zip(&table.rows[0])
-            .map(|(c, v)| format!("{}[{}]={v}", c.name, c.unit))
-            .collect();
+        let cells = table.columns.iter().zip(&table.rows[0]);
+        let cells: Vec<_> = cells.map(|(c, v)| format!("{}[{}]={v}", c.name, c.unit)).collect();
         let expected = [
             "method[]=lloyd",
             "time[s]=1",

@@ -64,11 +64,13 @@ impl Context<'_> {
 
 /// The words of these with `by` between them.
 pub fn joined<T: ToString>(words: impl IntoIterator<Item = T>, by: &str) -> String {
-    words
-        .into_iter()
-        .map(|word| word.to_string())
-        .collect::<Vec<_>>()
-        .join(by)
+    let words: Vec<String> = words.into_iter().map(|word| word.to_string()).collect();
+    words.join(by)
+}
+
+/// Every one of `first` with every one of `second`.
+pub fn product<'a, A, B>(first: &'a [A], second: &'a [B]) -> Vec<(&'a A, &'a B)> {
+    first.iter().flat_map(|a| second.iter().map(move |b| (a, b))).collect()
 }
 
 /// The first row of which this holds.
@@ -106,10 +108,8 @@ impl<const K: usize> Comparison<K> {
 
     /// Number `of` of the first scheme minus that of the second, trial by trial.
     pub fn difference(&self, first: usize, second: usize, of: usize) -> Moments {
-        self.trials
-            .iter()
-            .map(|schemes| schemes[first][of] - schemes[second][of])
-            .collect()
+        let less = |schemes: &Vec<[f64; K]>| schemes[first][of] - schemes[second][of];
+        self.trials.iter().map(less).collect()
     }
 }
 

@@ -153,12 +153,7 @@ fn centre(rows: &[Row]) -> impl Iterator<Item = &Row> {
 }
 
 impl Figure for Networks {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        self.about
-    }
+    figure!(Parameters => Vec<Row>, about);
 
     fn defaults(&self) -> Parameters {
         Parameters {
@@ -172,9 +167,7 @@ impl Figure for Networks {
         let mut rows = Vec::new();
         for moment in &p.points {
             let places = [moment.mean, moment.sd].map(|v| (v * 1e9).round() as u64);
-            let stream = places
-                .into_iter()
-                .fold(context.stream("assign-networks"), Stream::indexed);
+            let stream = context.stream("assign-networks").indexed(places[0]).indexed(places[1]);
             // Without spread there is only one network.
             let trials = if moment.sd == 0.0 { 1 } else { p.trials };
             let one = |trial: Trial| {

@@ -139,29 +139,22 @@ impl Figure for Decoders {
         let panels = [("uniform", "uniform"), ("gaussian", "Gaussian")].map(|(kind, name)| {
             let own = || select(&rows.curves, move |r| r.source == kind);
             let panel = |title: &str| Panel::semilog(format!("{title}, {name} source"), SNR, ERROR);
-            let decoders = panel("Decoders").with_lines(
-                own(),
-                |r| r.snr_db,
-                &[
-                    ("posterior mean", |r| r.mmse),
-                    ("continuous MAP", |r| r.cmap),
-                    ("discrete MAP", |r| r.dmap),
-                    ("discrete MAP as printed", |r| r.dmap_print),
-                ],
-            );
-            let bounds = panel("Bounds").with_lines(
-                own(),
-                |r| r.snr_db,
-                &[
-                    ("posterior mean", |r| r.mmse),
-                    ("equation 5.13", |r| r.crlb),
-                    ("van Trees", |r| r.vt),
-                    ("rate-distortion, printed", |r| r.rd_print),
-                    ("rate-distortion, N bits", |r| r.rd_per_n),
-                    ("centralised", |r| r.central),
-                ],
-            );
-            [decoders, bounds]
+            let decoders: [Curve<'_, Row, f64>; 4] = [
+                ("posterior mean", |r| r.mmse),
+                ("continuous MAP", |r| r.cmap),
+                ("discrete MAP", |r| r.dmap),
+                ("discrete MAP as printed", |r| r.dmap_print),
+            ];
+            let bounds: [Curve<'_, Row, f64>; 6] = [
+                ("posterior mean", |r| r.mmse),
+                ("equation 5.13", |r| r.crlb),
+                ("van Trees", |r| r.vt),
+                ("rate-distortion, printed", |r| r.rd_print),
+                ("rate-distortion, N bits", |r| r.rd_per_n),
+                ("centralised", |r| r.central),
+            ];
+            let panels = [("Decoders", &decoders[..]), ("Bounds", &bounds)];
+            panels.map(|(title, curves)| panel(title).with_lines(own(), |r| r.snr_db, curves))
         });
         Plot::grid(2, panels.concat())
     }

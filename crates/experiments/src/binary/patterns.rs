@@ -214,12 +214,7 @@ pub static EXTRA: Patterns = Patterns {
 };
 
 impl Figure for Patterns {
-    type Parameters = PatternParameters;
-    type Tables = Vec<Bit>;
-
-    fn about(&self) -> About {
-        self.about
-    }
+    figure!(PatternParameters => Vec<Bit>, about);
 
     fn defaults(&self) -> PatternParameters {
         PatternParameters {

@@ -206,17 +206,13 @@ impl<const M: usize> Line<M> {
         loss: f64,
     ) -> (Vec<Observation<SVector<f64, M>>>, usize) {
         let mut sent = 0;
-        let observations = self
-            .sensors
-            .iter()
-            .zip(&draws.measurements[k])
-            .enumerate()
-            .map(|(i, (sensor, z))| {
-                let sends = rules[i].sends(&(z - sensor.matrix() * broadcast));
-                sent += usize::from(sends);
-                (sends && draws.losses[k][i] >= loss).then_some(*z).into()
-            });
-        (observations.collect(), sent)
+        let observe = |(i, (sensor, z)): (usize, (&LinearSensor<2, M>, &SVector<f64, M>))| {
+            let sends = rules[i].sends(&(z - sensor.matrix() * broadcast));
+            sent += usize::from(sends);
+            (sends && draws.losses[k][i] >= loss).then_some(*z).into()
+        };
+        let measured = self.sensors.iter().zip(&draws.measurements[k]).enumerate();
+        (measured.map(observe).collect(), sent)
     }
 
     fn gaussian<'a>(

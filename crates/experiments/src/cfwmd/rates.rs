@@ -36,13 +36,8 @@ impl Main for Rates {
             printed_covariance: print("covariance"),
             trials: run.records.len(),
         };
-        let state = run.run.scheme == "CFwMD";
-        run.run
-            .of("CFwMD2", all)
-            .filter(|_| state)
-            .map(row)
-            .into_iter()
-            .collect()
+        let covariance = run.run.of("CFwMD2", all).filter(|_| run.run.scheme == "CFwMD");
+        covariance.map(row).into_iter().collect()
     }
 
     /// Rates of both schemes against the budget, with the printed ones.
@@ -70,8 +65,7 @@ impl Main for Rates {
 
 /// Claims that the printed rates are met in one world.
 pub(super) fn as_printed(claims: &mut Claims, rows: &[Rates], world: &str) {
-    type Column = fn(&Rates) -> Measured;
-    let columns: [(&str, Column); 2] = [("state", |r| r.state), ("covariance", |r| r.covariance)];
+    let columns: [(&str, fn(&Rates) -> Measured); 2] = [("state", |r| r.state), ("covariance", |r| r.covariance)];
     for (name, of) in columns {
         let what = format!("rate with {name} feedback as printed ({world})");
         let own = rows.iter().filter(|r| r.setting == world);

@@ -178,19 +178,9 @@ pub(super) fn paired(ensembles: &[Ensemble], pairs: &[(&'static str, &'static st
     pairs.iter().copied().flat_map(of).collect()
 }
 
-/// No further tables.
-#[derive(Debug, Default)]
-pub struct Nothing;
-
-impl Field for Nothing {
-    fn describe(_: Column, _: &mut Described) {}
-
-    fn put(&self, _: &mut Cells) {}
-}
-
 /// All tables of a simulated figure.
 #[derive(Debug)]
-pub struct Rows<M, X = Nothing> {
+pub struct Rows<M, X = ()> {
     /// The figure's own rows.
     pub(super) main: Vec<M>,
     /// Averages over trials and steps.

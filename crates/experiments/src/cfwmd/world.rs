@@ -98,18 +98,15 @@ pub(super) trait World<const D: usize, const M: usize>: Sync {
                 record.position.push(squared.iter().step_by(2).sum());
                 record.velocity.push(squared.iter().skip(1).step_by(2).sum());
                 record.sent.push(known.sent as f64);
-                record
-                    .consistency
-                    .extend(known.variance.map(|variance| squared[0] / variance));
+                let consistency = known.variance.map(|variance| squared[0] / variance);
+                record.consistency.extend(consistency);
             }
             Ok(record)
         };
         let every = |it: Trial| -> Result<Vec<Record>, Error> {
             let draws = self.draw(it.stream);
-            schemes
-                .iter()
-                .map(|(_, scheme)| run(*scheme, &draws, it.stream))
-                .collect()
+            let records = schemes.iter().map(|(_, scheme)| run(*scheme, &draws, it.stream));
+            records.collect()
         };
         let mut trials = context.trials(stream, trials, every)?;
         let of = |(place, (scheme, _)): (usize, &(&'static str, Self::Scheme))| Ensemble {

@@ -15,10 +15,7 @@ fn verdict(make: impl FnOnce(&Claims)) -> Verdict {
 }
 
 fn measured(value: f64, error: f64) -> Measured {
-    Measured {
-        value,
-        standard_error: Some(error),
-    }
+    Measured::new(value, error)
 }
 
 /// Every kind: an example that holds, one that does not, and one about nothing.
@@ -61,11 +58,7 @@ fn what_is_not_finite_fails_every_kind() {
     let rows = [measured(nan, 1.0), measured(0.0, 1.0)];
     assert_eq!(verdict(|c| c.all_within("x", "", rows, |r| (r, 0.0), 4.0)), Verdict::Fail);
     // A single trial has no standard error and shows nothing.
-    let single = Measured {
-        value: 1.0,
-        standard_error: None,
-    };
-    assert_eq!(verdict(|c| c.within("x", "", single, 0.9, 4.0)), Verdict::Fail);
+    assert_eq!(verdict(|c| c.within("x", "", Measured::new(1.0, None), 0.9, 4.0)), Verdict::Fail);
 }
 
 #[test]
@@ -75,11 +68,8 @@ fn undecided_claims_are_skipped() {
         claims.at_defaults().near("a", "", 0.0, 1.0, 0.1);
         claims.at_full_trials().near("b", "", 0.0, 1.0, 0.1);
         claims.near("c", "", None, 1.0, 0.1);
-        claims
-            .judged(defaults, full)
-            .into_iter()
-            .map(|c| c.verdict)
-            .collect::<Vec<_>>()
+        let judged = claims.judged(defaults, full).into_iter();
+        judged.map(|c| c.verdict).collect::<Vec<_>>()
     };
     use Verdict::{Fail, Skipped};
     assert_eq!(of(true, true), [Fail, Fail, Fail]);

@@ -58,11 +58,8 @@ impl Building {
             true => PotentialFlow::new(&domain, WIND)?.flow,
             false => Flow::still(&domain),
         };
-        let velocities = flow.velocities(&domain);
-        let mean = velocities
-            .iter()
-            .fold(Vector3::zeros(), |sum, v| sum + Vector3::from(*v))
-            / velocities.len() as f64;
+        let velocities: Vec<Vector3<f64>> = flow.velocities(&domain).into_iter().map(Vector3::from).collect();
+        let mean = velocities.iter().sum::<Vector3<f64>>() / velocities.len() as f64;
         let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, Scheme::default())?;
         let free = Air::new(DIFFUSIVITY, mean, Ground::None)?.with_closest(0.5 * CELL)?;
         Ok(Self { transport, free })
@@ -110,14 +107,12 @@ impl Placement {
         let indoors: Vec<Vec<f64>> = (0..count)
             .filter_map(|sensor| field.response(sensor, 0).map(<[f64]>::to_vec))
             .collect();
+        let centres: Vec<Vector3<f64>> = (0..cells).map(|cell| building.centre(cell).into()).collect();
         let free = |point: &[f64; 3]| -> Vec<f64> {
             let at = Vector3::from(*point);
-            (0..cells)
-                .map(|cell| {
-                    building
-                        .free
-                        .concentration(&at, &Vector3::from(building.centre(cell)), 1e9)
-                })
+            centres
+                .iter()
+                .map(|cell| building.free.concentration(&at, cell, 1e9))
                 .collect()
         };
         let free = points.iter().map(free).collect();
@@ -146,12 +141,10 @@ impl Placement {
 
     /// The belief after some sensors, in the building (0) or in free space (1).
     pub(super) fn belief(&self, model: usize, case: &Case, visited: &[usize]) -> Result<PlanBelief, Error> {
-        let rows: Vec<(&[f64], &[f64])> = visited
-            .iter()
-            .map(|i| (self.responses[model][*i].as_slice(), self.readings[*i].as_slice()))
-            .collect();
-        let rates = [RATES, FREE_RATES][model];
-        Ok(PlanBelief::new(&self.instrument, case.report, rates, &rows, self.responses[model][0].len())?)
+        let (responses, rates) = (&self.responses[model], [RATES, FREE_RATES][model]);
+        let row = |i: &usize| (responses[*i].as_slice(), self.readings[*i].as_slice());
+        let rows: Vec<_> = visited.iter().map(row).collect();
+        Ok(PlanBelief::new(&self.instrument, case.report, rates, &rows, responses[0].len())?)
     }
 
     pub(super) fn error(&self, building: &Building, belief: &PlanBelief) -> f64 {

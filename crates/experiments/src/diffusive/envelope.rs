@@ -8,7 +8,6 @@ use fewbits_numerics::ArgumentError;
 use nalgebra::Vector2;
 
 parameters! {
-    /// Settings of the envelope.
     #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [1..=100_000] = 200 => quick 8 => "Random deployments.",
@@ -49,7 +48,6 @@ rows! {
     }
 }
 
-/// The envelope.
 pub struct Envelope;
 
 impl Parameters {
@@ -100,11 +98,11 @@ impl Figure for Envelope {
         let coverage = edges.iter().enumerate().filter_map(|(i, (edge, angle))| {
             let truth = radius + source.x * angle.to_radians().cos() + source.y * angle.to_radians().sin();
             let hits = select(&known, |bands| (bands[i].0..=bands[i].1).contains(&truth)).count();
-            let widths: Vec<f64> = known.iter().map(|bands| bands[i].1 - bands[i].0).collect();
+            let widths = known.iter().map(|bands| bands[i].1 - bands[i].0);
             Some(Coverage {
                 edge,
                 coverage: fraction(hits, known.len()),
-                width_median: median(&widths)?,
+                width_median: median(widths)?,
                 radius,
             })
         });
@@ -164,11 +162,7 @@ impl Figure for Envelope {
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let at = |i: usize| (i as f64 + 0.5) * (100.0 / GRID as f64);
         let centres: Vec<f64> = (0..GRID).map(at).collect();
-        let values = rows
-            .exceedance
-            .chunks(GRID)
-            .map(|row| row.iter().map(|e| e.p_exceed).collect())
-            .collect();
+        let values = rows.exceedance.iter().map(|e| e.p_exceed);
         let radius = rows.coverage.first().map_or(0.0, |c| c.radius);
         let circle = (0..=72).map(|i| {
             let angle = f64::from(i * 5).to_radians();

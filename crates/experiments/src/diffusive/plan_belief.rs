@@ -138,9 +138,8 @@ fn of_words(
     let row = |readings: &[f64]| {
         let mut row = vec![0.0; NODES];
         for word in readings.iter().map(|y| instrument.word(*y)) {
-            row.iter_mut()
-                .zip(&instrument.table[word])
-                .for_each(|(sum, log)| *sum += log);
+            let logs = row.iter_mut().zip(&instrument.table[word]);
+            logs.for_each(|(sum, log)| *sum += log);
         }
         row
     };
@@ -152,10 +151,8 @@ fn of_words(
     let mut best = (f64::NEG_INFINITY, 0, 1.0);
     let logs = (0..cells).map(|cell| {
         let given = |rate: &f64| -> f64 {
-            let pairs = rows.iter().zip(sensors);
-            pairs
-                .map(|(row, sensor)| instrument.look_up(row, rate * sensor.0[cell]))
-                .sum()
+            let log = |(row, sensor): (&Vec<f64>, &(&[f64], _))| instrument.look_up(row, rate * sensor.0[cell]);
+            rows.iter().zip(sensors).map(log).sum()
         };
         let terms: Vec<f64> = rates.iter().map(|rate| given(rate) + rate.ln()).collect();
         let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -12,7 +12,6 @@ const WRONG: f64 = 2.6;
 const CREDIBLE: f64 = 0.9;
 
 parameters! {
-    /// Settings of all placements.
     #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [2..=10_000] = 100 => quick 6 => "Random placements of source and sensors.",
@@ -90,7 +89,6 @@ const STOPS: [usize; 7] = [2, 5, 10, 20, 40, 80, 160];
 /// Two cells and a rounding.
 const TWO_CELLS: f64 = 2.0 * CELL + 1e-9;
 
-/// The figure.
 pub struct Rooms;
 
 impl Figure for Rooms {
@@ -135,7 +133,7 @@ impl Figure for Rooms {
         })?;
         let mut visits = Vec::new();
         for (k, sensors) in stops.iter().enumerate() {
-            let of = |model: usize| median(&tracks.iter().filter_map(|t| Some(t.get(k)?[model])).collect::<Vec<_>>());
+            let of = |model: usize| median(tracks.iter().filter_map(|t| Some(t.get(k)?[model])));
             if let (Some(error), Some(error_free)) = (of(0), of(1)) {
                 visits.push(Visit {
                     sensors: *sensors,
@@ -196,17 +194,12 @@ impl Figure for Rooms {
         let along = runs(columns, lines, wall).map(|(line, from, to)| [from, to, line, line + 1]);
         let across = runs(lines, columns, |line, column| wall(column, line))
             .map(|(column, from, to)| [column, column + 1, from, to]);
-        let walls: Vec<(f64, f64, f64, f64)> = along
+        let walls = along
             .chain(across)
-            .map(|sides| sides.map(|side| CELL * side as f64))
-            .map(|[left, right, bottom, top]| (left, right, bottom, top))
-            .collect();
+            .map(|sides| sides.map(|side| CELL * side as f64).into());
+        let walls: Vec<(f64, f64, f64, f64)> = walls.collect();
         let panel = |title: &str, belief: fn(&Square) -> f64| {
-            let values = rows
-                .map
-                .chunks(columns)
-                .map(|line| line.iter().map(belief).collect())
-                .collect();
+            let values = rows.map.iter().map(belief);
             Panel::new(title, Axis::linear("x / m").between(0.0, 15.0), Axis::linear("y / m").between(0.0, 10.0))
                 .with(Layer::heat("share of the largest", centres(columns), centres(lines), values))
                 .with(Layer::boxes("wall", walls.clone()).coloured(7))
@@ -296,7 +289,6 @@ fn runs(
 fn summary(case: String, all: &[Trialled]) -> Found {
     let count = |holds: fn(&Trialled) -> bool| all.iter().filter(|result| holds(result)).count();
     let misses = count(|r| r.free_error > TWO_CELLS);
-    let errors: Vec<f64> = all.iter().map(|result| result.error).collect();
     Found {
         case,
         within_two_cells: fraction(count(|r| r.error <= TWO_CELLS), all.len()),
@@ -304,6 +296,6 @@ fn summary(case: String, all: &[Trialled]) -> Found {
         false_alarms: fraction(count(|r| r.alarm), all.len()),
         free_within_two_cells: fraction(count(|r| r.free_error <= TWO_CELLS), all.len()),
         free_misses_flagged: fraction(count(|r| r.free_error > TWO_CELLS && r.free_alarm), misses),
-        error_median: median(&errors).unwrap_or_else(|| Moments::default().into()),
+        error_median: median(all.iter().map(|result| result.error)).unwrap_or_else(|| Moments::default().into()),
     }
 }

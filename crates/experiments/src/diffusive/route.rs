@@ -6,7 +6,6 @@ use fewbits_densities::ellipse;
 use fewbits_diffusive::{Outcome, SelectionRule};
 
 parameters! {
-    /// Which deployment is shown.
     #[derive(Debug, Clone)]
     pub struct Parameters {
         deployment: u64 [..=1_000_000] = 0 => "Number of the random deployment.",

@@ -5,7 +5,6 @@ use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite_terms, mu
 use nalgebra::{Matrix2, Vector2};
 
 parameters! {
-    /// The covariance at which the table is evaluated.
     #[derive(Debug, Clone)]
     pub struct Parameters {
         variance1: f64 [0.01..=100.0] = 2.0 => "Variance of the first coordinate.",
@@ -86,13 +85,8 @@ impl Figure for Table1 {
             let terms = hermite_terms(nu, &w)?;
             let misprint = printed(nu, &w);
             let mut powers: Vec<[usize; 2]> = terms.iter().map(|t| t.0).collect();
-            powers.extend(
-                misprint
-                    .iter()
-                    .flatten()
-                    .map(|t| t.0)
-                    .filter(|power| !terms.iter().any(|t| t.0 == *power)),
-            );
+            let further = misprint.iter().flatten().map(|t| t.0);
+            powers.extend(further.filter(|power| !terms.iter().any(|t| t.0 == *power)));
             let value = |list: &[([usize; 2], f64)], power| list.iter().find(|t| t.0 == power).map_or(0.0, |t| t.1);
             for power in powers {
                 monomials.push(Monomial {

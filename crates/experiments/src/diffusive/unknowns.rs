@@ -1,6 +1,6 @@
 //! What else could be unknown, and what the model of the rate does to the estimate.
 
-use super::common::{B, Settings, search_box};
+use super::common::{B, Settings, median, search_box};
 use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian};
 use fewbits_diffusive::density::CellOptions;
@@ -10,7 +10,6 @@ use nalgebra::{Matrix2, Vector2};
 use rand::RngExt;
 
 parameters! {
-    /// Settings of both tables.
     #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [1..=10_000] = 200 => quick 4 => "Random layouts about the source for the comparison of rate models.",
@@ -59,7 +58,6 @@ fn models() -> Result<[(&'static str, RateModel); 3], Error> {
     ])
 }
 
-/// What else could be unknown.
 pub struct Unknowns;
 
 impl Figure for Unknowns {
@@ -111,31 +109,24 @@ impl Figure for Unknowns {
                     let angle = std::f64::consts::TAU * rng.random::<f64>();
                     let rho = p.radius * rng.random::<f64>().sqrt();
                     let node = source + Vector2::new(angle.cos(), angle.sin()) * rho.max(3.0);
-                    let clean: Vec<f64> = sensor
-                        .responses(&node, &source)?
-                        .iter()
-                        .map(|a| a + sensor.bias())
-                        .collect();
+                    let responses = sensor.responses(&node, &source)?;
+                    let clean: Vec<f64> = responses.iter().map(|a| a + sensor.bias()).collect();
                     Ok(sensor.record(&node, &clean)?)
                 };
                 let records = (0..*count).map(|_| draw()).collect::<Result<Vec<_>, _>>()?;
                 let variance = Settings::default().prior_sd.powi(2);
                 let prior = Prior::Exact(Gaussian::new(*records[0].node(), Matrix2::identity() * variance)?);
-                kinds
-                    .iter()
-                    .map(|(_, model)| {
-                        let likelihood = SourceLikelihood::new(records.clone(), *model)?;
-                        let posterior =
-                            Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())?;
-                        let width = posterior.cells.covariance().determinant().powf(0.25);
-                        Ok(((posterior.cells.mean() - source).norm(), width))
-                    })
-                    .collect::<Result<Vec<_>, Error>>()
+                let under = |(_, model): &(&str, RateModel)| -> Result<(f64, f64), Error> {
+                    let likelihood = SourceLikelihood::new(records.clone(), *model)?;
+                    let cells =
+                        Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())?.cells;
+                    Ok(((cells.mean() - source).norm(), cells.covariance().determinant().powf(0.25)))
+                };
+                kinds.iter().map(under).collect::<Result<Vec<_>, _>>()
             })?;
             for (k, (model, _)) in kinds.iter().enumerate() {
                 let of = |f: fn(&(f64, f64)) -> f64| -> Measured {
-                    let values: Vec<f64> = all.iter().map(|trial| f(&trial[k])).collect();
-                    super::common::median(&values).unwrap_or_else(|| Moments::default().into())
+                    median(all.iter().map(|trial| f(&trial[k]))).unwrap_or_else(|| Moments::default().into())
                 };
                 rows.push(Model {
                     model,

@@ -40,7 +40,6 @@ rows! {
     }
 }
 
-/// Loss against word length.
 pub struct WordLength;
 
 impl Figure for WordLength {
@@ -50,12 +49,7 @@ impl Figure for WordLength {
          batch words and by successive bits; the usual formula for the latter promises too much.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        let cases: Vec<_> = p
-            .plants
-            .iter()
-            .flat_map(|at| p.bits.iter().map(move |bits| (*at, *bits)))
-            .collect();
-        let row = |&(plant, bits): &(Plant, usize)| {
+        let row = |&(&plant, &bits): &(&Plant, &usize)| {
             let filter = MultibitFilter::new(plant.model()?, bits)?;
             let (kalman, c) = (plant.kalman_variance()?, filter.information());
             let riccati = plant.model()?.steady_state(c)?.filtered_variance;
@@ -84,7 +78,7 @@ impl Figure for WordLength {
             })
         };
         Ok(Rows {
-            words: parallel::try_map(&cases, row)?,
+            words: parallel::try_map(&product(&p.plants, &p.bits), row)?,
             successive: (1..=5).map(successive).collect::<Result<_, Error>>()?,
         })
     }

@@ -44,7 +44,6 @@ fn loss(a: f64, gamma: f64) -> Option<f64> {
     steady::loss(&Plant { a, gamma }.model().ok()?).ok()
 }
 
-/// Contours of the plane.
 pub struct Loss;
 
 impl Figure for Loss {

@@ -108,7 +108,6 @@ fn simulate(
     Ok(run)
 }
 
-/// Exact and predicted curves, and the first run.
 pub struct Convergence;
 
 impl Figure for Convergence {
@@ -149,10 +148,10 @@ impl Figure for Convergence {
                     dymbo_exact: exact.mse,
                     dymbo_minf: plant.sign_bit_variance()?,
                     kf_minf: plant.kalman_variance()?,
-                    nees: Measured {
-                        value: dymbo_mse.value / exact.filtered_variance,
-                        standard_error: dymbo_mse.standard_error.map(|se| se / exact.filtered_variance),
-                    },
+                    nees: Measured::new(
+                        dymbo_mse.value / exact.filtered_variance,
+                        dymbo_mse.standard_error.map(|se| se / exact.filtered_variance),
+                    ),
                     informed_mse: sums[2].into(),
                     informed_nees: sums[3].into(),
                 });

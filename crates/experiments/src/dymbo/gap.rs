@@ -91,7 +91,6 @@ fn tuned_gain_mse(filter: &DymboFilter) -> Result<f64, Error> {
     scaled_gain_mse(filter, 0.5 * (low + high))
 }
 
-/// Exact gaps: after a first message and in the steady state.
 pub struct GapToExact;
 
 impl Figure for GapToExact {

@@ -79,13 +79,9 @@ fn relative(a: &[f64], b: &[f64]) -> Measured {
     let ratio = b.iter().sum::<f64>() / a.iter().sum::<f64>();
     let mean = a.iter().sum::<f64>() / a.len() as f64;
     let residuals: Moments = a.iter().zip(b).map(|(a, b)| (b - ratio * a) / mean).collect();
-    Measured {
-        value: ratio - 1.0,
-        ..residuals.into()
-    }
+    Measured::new(ratio - 1.0, Measured::from(residuals).standard_error)
 }
 
-/// Errors of the three rules.
 pub struct ThresholdPlace;
 
 impl Figure for ThresholdPlace {

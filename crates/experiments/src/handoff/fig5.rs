@@ -3,7 +3,7 @@
 use super::filters::{PARTICLES, SENSORS, STEPS, Smoothing, Truth, VARIANCE, posteriors, single, uncompressed};
 use super::world::World;
 use crate::prelude::*;
-use fewbits_densities::ellipse;
+use fewbits_densities::{KernelEstimate, ellipse};
 use fewbits_mixture_codec::Reduction;
 
 parameters! {
@@ -66,11 +66,8 @@ impl Figure for Fig5 {
             }
         }
         let far = |trial: Trial| -> Result<Vec<f64>, Error> {
-            let estimates = posteriors(trial.stream)?;
-            estimates
-                .iter()
-                .map(|estimate| Ok(Truth::new(estimate).kl(&single(estimate)?)))
-                .collect()
+            let kl = |estimate: &KernelEstimate<2>| Ok(Truth::new(estimate).kl(&single(estimate)?));
+            posteriors(trial.stream)?.iter().map(kl).collect()
         };
         let distances = context.trials(stream.named("worlds"), p.trials, far)?;
         Ok(Rows {

@@ -224,13 +224,10 @@ impl Figure for Fig6c {
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let of = |method: &'static str| select(&rows.error, move |r| r.method == method);
-        let layers = METHODS.into_iter().enumerate().map(|(i, (method, label, _))| {
-            Layer::measured(label, of(method), |r| (r.t as f64, r.kl_increase)).coloured(i)
-        });
-        let lines = METHODS
-            .into_iter()
-            .enumerate()
-            .map(|(i, (method, ..))| Layer::line("", points(of(method), |r| (r.t as f64, r.kl_increase))).coloured(i));
+        let each = || METHODS.iter().enumerate();
+        let place = |r: &Row| (r.t as f64, r.kl_increase);
+        let layers = each().map(|(i, (method, label, _))| Layer::measured(*label, of(method), place).coloured(i));
+        let lines = each().map(|(i, (method, ..))| Layer::line("", points(of(method), place)).coloured(i));
         let sums = points(&rows.bounds, |b| (b.t as f64, b.kl_sum.value));
         let panel = Panel::linear("Five components", "hand-overs t", "KL increase / nat")
             .with_all(lines)

@@ -173,11 +173,9 @@ pub(super) fn over_beliefs<K: Copy + Send, const N: usize>(
 /// A mixture whose every number was sent as a 32-bit float.
 pub(super) fn as_f32(mixture: &Mixture<2>) -> Result<Mixture<2>, Error> {
     let short = |x: f64| f64::from(x as f32);
-    let components = mixture
-        .components()
-        .iter()
-        .map(|c| Component::new(short(c.weight()), c.mean().map(short), c.covariance().map(short)));
-    Ok(Mixture::new(components.collect::<Result<_, _>>()?)?)
+    let component =
+        |c: &Component<2>| Component::new(short(c.weight()), c.mean().map(short), c.covariance().map(short));
+    Ok(Mixture::new(mixture.components().iter().map(component).collect::<Result<_, _>>()?)?)
 }
 
 /// KL of an estimate to several mixtures by quadrature, the estimate's own density computed once.

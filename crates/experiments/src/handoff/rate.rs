@@ -27,7 +27,6 @@ rows! {
     }
 }
 
-/// Bits against error.
 pub struct Rate;
 
 fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
@@ -45,11 +44,8 @@ impl Figure for Rate {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         // A message format has at most 16 resolutions of which one is chosen in the message; here both ends agree on it.
-        let single: Vec<WireFormat<2>> = p
-            .resolution
-            .iter()
-            .map(|r| WireFormat::new(Vector2::zeros(), 20.0, 1.0, &[*r]))
-            .collect::<Result<_, _>>()?;
+        let format = |r: &f64| WireFormat::new(Vector2::zeros(), 20.0, 1.0, &[*r]);
+        let single = p.resolution.iter().map(format).collect::<Result<Vec<_>, _>>()?;
         let all = over_beliefs(context, "handoff-rate", p.trials, |estimate, stream| {
             let truth = Truth::new(estimate);
             let mut cells = Vec::new();
@@ -116,11 +112,9 @@ impl Figure for Rate {
         let place = |r: &Row| (r.bits.value, r.kl);
         let of = |size: usize| select(rows, move |r| r.message == "coded" && r.size == size);
         let all = |message: &'static str| select(rows, move |r| r.message == message);
-        let layers = p
-            .components
-            .iter()
-            .enumerate()
-            .flat_map(|(i, m)| Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect()));
+        let coded = p.components.iter().enumerate();
+        let layers =
+            coded.flat_map(|(i, m)| Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect()));
         let panel = Panel::loglog("One belief", "message / bit", "KL / nat")
             .with_all(layers)
             .with(Layer::dashed("mixture as floats", points(all("f32"), place)).coloured(5))

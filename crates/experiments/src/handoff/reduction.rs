@@ -88,7 +88,6 @@ impl Method {
     }
 }
 
-/// The comparison of reductions.
 pub struct Reductions;
 
 impl Figure for Reductions {
@@ -103,14 +102,11 @@ impl Figure for Reductions {
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let all = over_beliefs(context, "handoff-reduction", p.trials, |estimate, _| {
             let truth = Truth::new(estimate);
-            let cases = METHODS
-                .iter()
-                .flat_map(|method| p.components.iter().map(move |m| (method, *m)));
-            let cell = |((name, _, method), m): (&(&'static str, _, Method), usize)| {
-                let kl = truth.kl(&method.reduce(estimate, m)?);
-                Ok(((*name, m), [kl / TIMES.len() as f64]))
+            let cell = |((name, _, method), m): (&(&'static str, _, Method), &usize)| {
+                let kl = truth.kl(&method.reduce(estimate, *m)?);
+                Ok(((*name, *m), [kl / TIMES.len() as f64]))
             };
-            cases.map(cell).collect()
+            product(&METHODS, &p.components).into_iter().map(cell).collect()
         })?;
         let row = |((method, components), [kl]): (_, [Measured; 1])| Row { method, components, kl };
         Ok(all.into_iter().map(row).collect())

@@ -47,7 +47,6 @@ rows! {
     }
 }
 
-/// Table 4.1.
 pub struct Table41;
 
 impl Figure for Table41 {

@@ -39,7 +39,6 @@ rows! {
     }
 }
 
-/// Table 4.2.
 pub struct Table42;
 
 impl Figure for Table42 {

@@ -60,7 +60,6 @@ impl Values {
     }
 }
 
-/// Table 4.3.
 pub struct Table43;
 
 impl Figure for Table43 {

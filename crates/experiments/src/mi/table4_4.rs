@@ -96,7 +96,6 @@ fn row(p: &Parameters, signal: f64, method: &'static str, system: &System) -> Re
     })
 }
 
-/// Table 4.4.
 pub struct Table44;
 
 impl Figure for Table44 {

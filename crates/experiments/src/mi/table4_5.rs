@@ -42,7 +42,6 @@ rows! {
     }
 }
 
-/// Table 4.5.
 pub struct Table45;
 
 impl Figure for Table45 {
@@ -130,7 +129,6 @@ impl Figure for Table45 {
 }
 
 rows! {
-    /// All tables of the mismatch matrix.
     pub struct Mismatches {
         rows: Vec<Met> => "Designs for one channel on another.",
         printed: Vec<AtPrinted> => "The printed design for a clean channel at a crossover of 0.05.",
@@ -151,7 +149,6 @@ rows! {
     }
 }
 
-/// The mismatch matrix of Table 4.5.
 pub struct Mismatch;
 
 impl Figure for Mismatch {

@@ -247,7 +247,6 @@ impl Figure for Fig37 {
 pub struct Table;
 
 parameters! {
-    /// Settings.
     pub struct Effort {
         trials: u64 [2..=100_000] = 400 => quick 10 => "Tracks of each setting.",
     }

@@ -80,10 +80,7 @@ impl Figure for Bounds {
                 let bound = |which: usize| -> Result<Measured, Error> {
                     let groups = (0..GROUPS).map(|group| without(which, Some(group)));
                     let spread: Moments = groups.collect::<Result<Vec<f64>, Error>>()?.into_iter().collect();
-                    Ok(Measured {
-                        value: without(which, None)?,
-                        standard_error: Some(spread.standard_error() * (GROUPS - 1) as f64),
-                    })
+                    Ok(Measured::new(without(which, None)?, spread.standard_error() * (GROUPS - 1) as f64))
                 };
                 let score = |m: usize| Score::of(all.iter().map(|(errors, _)| errors[m]).collect());
                 let [grid, message_passing, filter] = [0, 1, 2].map(score);

@@ -54,12 +54,8 @@ impl Figure for Leaders {
                 for k in 0..STEPS {
                     let ranges = world.ranges(&network, k);
                     let observed = network.observe(&target, k, &shared, &ranges, Reports::Levels)?;
-                    let step = |rng| {
-                        tracker
-                            .step(rng, &target, k, &shared, &observed)
-                            .map_or(shared, |s| s.0)
-                    };
-                    let copies: Vec<_> = streams.iter_mut().map(step).collect();
+                    let step = |rng| Some(tracker.step(rng, &target, k, &shared, &observed).ok()?.0);
+                    let copies: Vec<_> = streams.iter_mut().map(|rng| step(rng).unwrap_or(shared)).collect();
                     let place = |c: &Gaussian<4>| Vector2::new(c.mean()[0], c.mean()[1]);
                     let places: Vec<_> = copies.iter().map(place).collect();
                     let election = elect(&sensors, &places)?;

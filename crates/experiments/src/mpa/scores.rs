@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_pf_mpa::{Reports, Target};
 
 parameters! {
-    /// How many trajectories.
     pub struct Effort {
         pub(super) trials: u64 [2..=100_000] = 200 => quick 8 => "Trajectories of every tracker but message passing with particles.",
         /// Trajectories of message passing with particles, and of the finest grid and largest clouds; the first of the others'.

@@ -319,10 +319,7 @@ impl Score {
         let error = 0.5 * (at((middle + give).ceil()) - at((middle - give).floor()));
         Self {
             mse,
-            median: Measured {
-                value: 0.5 * (at(middle.floor()) + at(middle.ceil())),
-                standard_error: (n > 1.0).then_some(error),
-            },
+            median: Measured::new(0.5 * (at(middle.floor()) + at(middle.ceil())), (n > 1.0).then_some(error)),
             lost: errors.iter().filter(|e| **e > LOST).count() as f64 / n,
             trajectories: errors.len() as u64,
         }

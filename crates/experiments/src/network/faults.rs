@@ -10,41 +10,29 @@ use fewbits_protocol::{Feedback, ReportLength};
 
 parameters! {
     pub struct Parameters {
-        /// Probabilities that a frame is lost.
-        loss: Vec<f64> [0.0..=0.8; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6],
+        loss: Vec<f64> [0.0..=0.8; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6] => "Probabilities that a frame is lost.",
         /// Probabilities that a bit is inverted.
         crossover: Vec<f64> [0.0..=0.1; 1..] = vec![0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2],
-        /// Mean delays of a frame, in slots.
-        delay: Vec<f64> [0.0..=10.0; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8],
-        /// Sensors of four that die after a quarter of the run.
-        deaths: Vec<u32> [0..=4; 1..] = vec![0, 1, 2, 3, 4],
-        /// Slots of a run.
-        slots: usize [60..=100_000] = 200 => quick 80,
-        /// Runs at each point.
-        trials: u64 [2..=1_000_000] = 40 => quick 2,
+        delay: Vec<f64> [0.0..=10.0; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8] => "Mean delays of a frame, in slots.",
+        deaths: Vec<u32> [0..=4; 1..] = vec![0, 1, 2, 3, 4] => "Sensors of four that die after a quarter of the run.",
+        slots: usize [60..=100_000] = 200 => quick 80 => "Slots of a run.",
+        trials: u64 [2..=1_000_000] = 40 => quick 2 => "Runs at each point.",
     }
 }
 
 rows! {
     pub struct Row {
-        /// loss, flips, delay or deaths.
-        fault: &'static str,
-        /// Its level.
-        level: f64,
-        /// told: the centre sends its prediction; echoed: sensors follow by what it received.
-        feedback: &'static str,
-        /// Root mean squared error.
-        rmse: Measured,
+        fault: &'static str => "loss, flips, delay or deaths.",
+        level: f64 => "Its level.",
+        feedback: &'static str => "told: the centre sends its prediction; echoed: sensors follow by what it received.",
+        rmse: Measured => "Root mean squared error.",
         /// Slots until a sensor that restarts in the middle of the run answers again; 50 where it has not by then.
         recovery: Measured,
-        /// Share of the runs in which it has not within 50 slots.
-        unrecovered: Measured,
-        /// Disagreements noted, of 100 slots.
-        disagreements: Measured,
+        unrecovered: Measured => "Share of the runs in which it has not within 50 slots.",
+        disagreements: Measured => "Disagreements noted, of 100 slots.",
     }
 }
 
-/// Faults.
 pub struct Faulty;
 
 struct Point {
@@ -163,25 +151,18 @@ impl Figure for Faulty {
         let at = |fault: &str, level: f64, feedback: &str| {
             first(rows, |r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
         };
-        let gap = |feedback| {
-            at("loss", 0.0, feedback)
-                .zip(at("loss", 0.6, feedback))
-                .map(|(none, much)| much.rmse.value - none.rmse.value)
-        };
+        let rmse = |level, feedback| at("loss", level, feedback).map(|r| r.rmse);
         for feedback in ["told", "echoed"] {
-            here.above(format!("loss-{feedback}"), "lost frames cost accuracy", gap(feedback), 0.0);
+            let gap = minus(rmse(0.6, feedback), rmse(0.0, feedback));
+            here.above(format!("loss-{feedback}"), "lost frames cost accuracy", gap, 0.0);
         }
-        let worse = at("loss", 0.4, "echoed")
-            .zip(at("loss", 0.4, "told"))
-            .map(|(e, t)| e.rmse.value / t.rmse.value);
+        let worse = over(rmse(0.4, "echoed"), rmse(0.4, "told"));
         paper.above("replicas", "over links that lose much, replicas do worse than questions in full", worse, 1.0);
-        let clean = at("loss", 0.0, "echoed")
-            .zip(at("loss", 0.0, "told"))
-            .map(|(e, t)| (e.recovery.value, t.recovery.value));
+        let recovery = |feedback| at("loss", 0.0, feedback).map(|r| r.recovery.value);
         let what = "a restarted sensor that is told answers in the next slot";
-        here.near("recovery-told", what, clean.map(|c| c.1), 1.0, 0.0);
+        here.near("recovery-told", what, recovery("told"), 1.0, 0.0);
         let what = "one that follows by echo answers in the slot after";
-        here.near("recovery-echoed", what, clean.map(|c| c.0), 2.0, 0.0);
+        here.near("recovery-echoed", what, recovery("echoed"), 2.0, 0.0);
         let restart = at("loss", 0.0, "told").map(|r| r.disagreements.value);
         here.near("told", "without faults on air nobody disagrees with a centre that tells", restart, 0.0, 0.0);
         let lossy = select(rows, |r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");

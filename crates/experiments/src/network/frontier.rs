@@ -6,10 +6,8 @@ use crate::prelude::*;
 
 parameters! {
     pub struct Parameters {
-        /// Slots of a run.
-        slots: usize [40..=100_000] = 300 => quick 60,
-        /// Runs of each scheme.
-        trials: u64 [2..=100_000] = 20 => quick 2,
+        slots: usize [40..=100_000] = 300 => quick 60 => "Slots of a run.",
+        trials: u64 [2..=100_000] = 20 => quick 2 => "Runs of each scheme.",
     }
 }
 
@@ -17,32 +15,24 @@ rows! {
     pub struct Row {
         /// scalar: AR(1), a = 0.95, process variance 0.2; plane: constant velocity. Four sensors of unit noise.
         world: &'static str,
-        /// The scheme.
-        scheme: &'static str,
+        scheme: &'static str => "The scheme.",
         /// Its setting: K sensors, m bits, n messages in a slot, L levels, M components at resolution r, a guaranteed error of delta.
         setting: String,
         /// How sensors learn the question: told it in full, following by echo, not at all; or the belief travels.
         feedback: &'static str,
-        /// Root mean squared error of the state, or of the position.
-        rmse: Measured,
-        /// Payload bits of reports (of beliefs, where these travel) in a slot.
-        payload: Measured ["bit"],
+        rmse: Measured => "Root mean squared error of the state, or of the position.",
+        payload: Measured ["bit"] => "Payload bits of reports (of beliefs, where these travel) in a slot.",
         /// Bits on air in a slot: all frames of all nodes with preambles, headers, checks and feedback.
         air: Measured ["bit"],
-        /// Energy of all radios in a slot.
-        energy: Measured ["J"],
+        energy: Measured ["J"] => "Energy of all radios in a slot.",
         /// What no scheme can beat with so many payload bits and no information in silence (scalar), or with all measurements (plane).
         floor: f64,
-        /// Nothing else has a smaller error with at most as many payload bits.
-        best_by_payload: &'static str,
-        /// The same by bits on air.
-        best_by_air: &'static str,
-        /// The same by energy.
-        best_by_energy: &'static str,
+        best_by_payload: &'static str => "Nothing else has a smaller error with at most as many payload bits.",
+        best_by_air: &'static str => "The same by bits on air.",
+        best_by_energy: &'static str => "The same by energy.",
     }
 }
 
-/// The comparison.
 pub struct Frontier;
 
 /// Least root mean squared error at `rate` bits a slot: the error of the Kalman filter of all measurements, and on top the causal

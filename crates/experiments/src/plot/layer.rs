@@ -210,8 +210,10 @@ impl Layer {
         Self::new(label, Shape::Bars { points, width })
     }
 
-    /// A coloured field; the label stands at its colour bar.
-    pub fn heat(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, values: Vec<Vec<f64>>) -> Self {
+    /// A coloured field of values, line by line; the label stands at its colour bar.
+    pub fn heat(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, values: impl IntoIterator<Item = f64>) -> Self {
+        let mut values = values.into_iter();
+        let values = y.iter().map(|_| values.by_ref().take(x.len()).collect()).collect();
         Self::new(label, Shape::Heat { x, y, values })
     }
 

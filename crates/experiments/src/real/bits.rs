@@ -51,7 +51,6 @@ rows! {
 /// Errors below this share of the range count as that.
 pub(super) const NEGLIGIBLE: f64 = 1e-6;
 
-/// Error against bits.
 pub struct Bits;
 
 fn row(recording: &Recording, rate: f64, scheme: &'static str, delta: Option<f64>, played: &Played) -> Row {
@@ -70,10 +69,8 @@ fn row(recording: &Recording, rate: f64, scheme: &'static str, delta: Option<f64
 /// The baselines at `rate` bits per sample.
 fn baselines(recording: &Recording, rate: f64) -> Vec<Row> {
     let samples = &recording.samples;
-    let mut rows: Vec<Row> = searched(recording, rate, |played| played.bits)
-        .iter()
-        .map(|(scheme, delta, played)| row(recording, rate, scheme, Some(*delta), played))
-        .collect();
+    let of = |(scheme, delta, played): &(&'static str, f64, Played)| row(recording, rate, scheme, Some(*delta), played);
+    let mut rows: Vec<Row> = searched(recording, rate, |played| played.bits).iter().map(of).collect();
     if rate >= 1.0 {
         rows.push(row(recording, rate, "modulation", None, &delta_modulation(samples)));
     }
@@ -93,12 +90,7 @@ fn compare(recording: &Recording, rate: f64, context: &Context<'_>) -> Result<(V
     let best = kept.min_by(|a, b| a.rmse.total_cmp(&b.rmse)).or(rows.first());
     let (best, best_rmse) = best.map_or(("none", f64::INFINITY), |r| (r.scheme, r.rmse));
     let (config, ours) = best_for(recording, rate, context, Replay::rate)?;
-    let played = Played {
-        bits: ours.information.iter().sum(),
-        packets: ours.packets,
-        values: ours.values.clone(),
-    };
-    let ours_row = row(recording, rate, "adaptive", Some(config.delta()), &played);
+    let ours_row = row(recording, rate, "adaptive", Some(config.delta()), &ours.clone().into());
     let negligible = NEGLIGIBLE * recording.range();
     let pair = Pair {
         column: recording.name.clone(),

@@ -47,7 +47,6 @@ const REFERENCES: [(&str, [(f64, f64); 4]); 3] = [
     ("SerfQT", [(0.25, 4.401), (0.5, 3.409), (1.0, 2.604), (2.0, 1.982)]),
 ];
 
-/// Bits against the bound.
 pub struct Codecs;
 
 fn measured(recording: &Recording, percent: f64) -> Result<Row, Error> {

@@ -41,7 +41,6 @@ rows! {
     }
 }
 
-/// Loss and recovery.
 pub struct Loss;
 
 /// What one sequence of losses did: means over the slots, and slots.

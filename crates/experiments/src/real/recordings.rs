@@ -18,6 +18,15 @@ pub(super) struct Recording {
 }
 
 impl Recording {
+    /// One that is not circular.
+    fn straight(name: &str, samples: Vec<f64>) -> Self {
+        Self {
+            name: name.to_owned(),
+            samples,
+            period: None,
+        }
+    }
+
     /// Largest minus smallest sample, or the period.
     pub fn range(&self) -> f64 {
         self.period.unwrap_or_else(|| self.straight_range())
@@ -25,10 +34,8 @@ impl Recording {
 
     /// Largest minus smallest sample.
     pub fn straight_range(&self) -> f64 {
-        let (low, high) = self
-            .samples
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let (low, high) = self.samples.iter().fold(ends, |(l, h), x| (l.min(*x), h.max(*x)));
         high - low
     }
 
@@ -89,30 +96,21 @@ pub(super) fn each<T: Send>(
     numbers: &[f64],
     one: impl Fn(&Recording, f64) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
-    let pairs = recordings.iter().flat_map(|r| numbers.iter().map(move |n| (r, *n)));
-    let pairs: Vec<(&Recording, f64)> = pairs.collect();
-    parallel::try_map(&pairs, |(recording, number)| one(recording, *number))
+    parallel::try_map(&product(recordings, numbers), |(recording, number)| one(recording, **number))
 }
 
 /// Numeric columns of a CSV text: the named ones, or all but the first.
 pub(super) fn parse(text: &str, columns: &[String]) -> Result<Vec<Recording>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let headers = reader.headers().map_err(|error| error.to_string())?.clone();
-    let wanted = |(i, name): &(usize, &str)| {
-        if columns.is_empty() {
-            *i > 0
-        } else {
-            columns.iter().any(|c| c == name)
-        }
+    let wanted = |(i, name): &(usize, &str)| match columns {
+        [] => *i > 0,
+        _ => columns.iter().any(|c| c == name),
     };
     let chosen: Vec<(usize, &str)> = headers.iter().enumerate().filter(wanted).collect();
-    let mut found: Vec<Recording> = chosen
+    let mut found: Vec<_> = chosen
         .iter()
-        .map(|(_, name)| Recording {
-            name: (*name).to_owned(),
-            samples: Vec::new(),
-            period: None,
-        })
+        .map(|(_, name)| Recording::straight(name, Vec::new()))
         .collect();
     for (row, record) in reader.records().enumerate() {
         let record = record.map_err(|error| error.to_string())?;
@@ -149,11 +147,7 @@ fn synthetic(stream: &Stream, n: usize) -> Vec<Recording> {
         ("direction", direction),
         ("gusts", gusts),
     ];
-    let one = |(name, samples): &(&str, Synthesis)| Recording {
-        name: (*name).to_owned(),
-        samples: samples(&mut stream.named(name).rng(), n),
-        period: None,
-    };
+    let one = |(name, of): &(&str, Synthesis)| Recording::straight(name, of(&mut stream.named(name).rng(), n));
     make.iter().map(one).collect()
 }
 
@@ -256,13 +250,8 @@ mod tests {
         source.columns = vec!["b".into()];
         assert_eq!(source.load("demo", &context).unwrap().len(), 1);
         source.columns = vec!["c".into()];
-        assert!(
-            source
-                .load("demo", &context)
-                .unwrap_err()
-                .to_string()
-                .contains("no such column")
-        );
+        let refused = source.load("demo", &context).unwrap_err().to_string();
+        assert!(refused.contains("no such column"), "{refused}");
         assert!(source.load("demo", &Context::new(1)).is_err());
         assert!(parse("t,a\n1,x\n", &[]).unwrap_err().contains("row 2"));
     }
