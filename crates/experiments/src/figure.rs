@@ -1,6 +1,6 @@
 //! What a figure is, and how it is run.
 
-use crate::arguments::{self, Argument, Parameter, Quick};
+use crate::arguments::{self, Argument, Cost, Parameter, Quick};
 use crate::claim::{Claim, Claims};
 use crate::error::Error;
 use crate::kept::Kept;
@@ -113,28 +113,6 @@ impl Context<'_> {
     }
 }
 
-/// Rough need of a run: seconds on one core, bytes at its peak.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Cost {
-    /// Seconds on one core.
-    pub seconds: f64,
-    /// Bytes.
-    pub bytes: f64,
-}
-
-impl Cost {
-    /// So many seconds on one core and bytes at the peak.
-    pub fn new(seconds: f64, bytes: f64) -> Self {
-        Self { seconds, bytes }
-    }
-
-    /// More is refused: a day on one core, 2 GB.
-    const LIMIT: Self = Self {
-        seconds: 86_400.0,
-        bytes: 2e9,
-    };
-}
-
 /// A figure or table of a publication, or one of our own: parameters in, rows out, and the claims they must meet.
 ///
 /// A parameter named `trials` or ending in `_trials` is effort: lowering it leaves the meaning of the figure and skips the
@@ -157,8 +135,8 @@ pub trait Figure: Sync {
     }
 
     /// What a run with these parameters needs, roughly: more than a day or 2 GB is refused before it starts.
-    fn cost(&self, _parameters: &Self::Parameters) -> Cost {
-        Cost::default()
+    fn cost(&self, parameters: &Self::Parameters) -> Cost {
+        parameters.cost()
     }
 
     /// The world that the figure shares with others: these are run one after the other, and results in [`Context::kept`] serve all.

@@ -40,10 +40,10 @@ mod words;
 
 #[doc(hidden)]
 pub use arguments::Limits;
-pub use arguments::{Argument, Parameter, Quick, Refusal, plain};
+pub use arguments::{Argument, Cost, Parameter, Quick, Refusal, plain};
 pub use claim::{Claim, Claims, Expected, Verdict};
 pub use error::Error;
-pub use figure::{About, AnyFigure, Context, Cost, Figure, Outcome};
+pub use figure::{About, AnyFigure, Context, Figure, Outcome};
 pub use kept::Kept;
 pub use measured::Measured;
 pub use schema::{Column, Table, Value};

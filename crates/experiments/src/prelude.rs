@@ -1,9 +1,14 @@
-//! What nearly every figure uses.
+//! What many figures use.
 
 pub(crate) use crate::arguments::{Refusal, accept, accept_each};
 pub(crate) use crate::claim::{Keyed, minus, over};
 pub(crate) use crate::plot::{Axis, Curve, Layer, Marker, Panel, Plot, points};
+pub(crate) use crate::reference;
 pub(crate) use crate::schema::Field;
 pub(crate) use crate::sweep::{distinct, first, joined, product, select};
 pub(crate) use crate::{About, Claims, Comparison, Context, Cost, Error, Figure, Measured, Quick};
+pub(crate) use fewbits_core::{Gaussian, Link};
+pub(crate) use fewbits_monte_carlo::parallel;
 pub(crate) use fewbits_monte_carlo::{Moments, Stream, Trial};
+pub(crate) use rand::{Rng, RngExt};
+pub(crate) use rand_distr::StandardNormal;

@@ -2,7 +2,6 @@
 
 use super::{ERROR, SNR, Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
-use crate::reference;
 use fewbits_binary_patterns::bounds::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 

@@ -14,7 +14,6 @@ pub(crate) mod table5_2;
 use crate::prelude::*;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
 use fewbits_binary_patterns::{Bank, CellGrid, Mask, Pattern, Source, linear_pattern, rank};
-use fewbits_monte_carlo::parallel;
 
 /// Axes of the curves.
 const SNR: &str = "signal-to-noise ratio / dB";

@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_binary_patterns::{
     BinaryQuantizer, CellGrid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
 };
-use fewbits_monte_carlo::parallel;
 
 pub struct Clipping;
 

@@ -63,10 +63,6 @@ impl<S: Setting, M: Main, X: Default + Field> Figure for Simulated<S, M, X> {
         (self.setting)()
     }
 
-    fn cost(&self, setting: &S) -> Cost {
-        setting.cost()
-    }
-
     fn run(&self, setting: &S, context: &Context<'_>) -> Result<Rows<M, X>, Error> {
         let ensembles = (self.simulate)(setting, context)?;
         let printed = self.is_printed(setting);

@@ -3,7 +3,6 @@
 use super::pictures::Main;
 use super::rows::Ensemble;
 use crate::prelude::*;
-use crate::reference;
 
 rows! {
     /// Rates of one budget in one setting.

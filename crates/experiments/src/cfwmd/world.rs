@@ -2,9 +2,8 @@
 
 use super::rows::{Ensemble, Record, Run};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Gaussian, Sensing};
+use fewbits_core::{Belief, Dynamics, Sensing};
 use nalgebra::SVector;
-use rand::RngExt;
 
 /// What all schemes of one trial share, an entry a step.
 #[derive(Default)]

@@ -42,10 +42,6 @@ impl Figure for Bytes {
         Some(CHAINS)
     }
 
-    fn cost(&self, p: &Settings) -> Cost {
-        Cost::new(p.trials as f64, p.trials as f64 * 2e4)
-    }
-
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Summary>, Error> {
         let schemes = schemes();
         let all = tracks(context, p, &schemes)?;

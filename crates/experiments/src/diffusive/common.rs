@@ -42,6 +42,7 @@ parameters! {
         pub(super) rate_low: f64 [0.0..=0.99] = 0.5 => "Lower end of the rate's prior, kg/s.",
         pub(super) rate_high: f64 [1.01..=1e3] = 1.5 => "Upper end of the rate's prior, kg/s.",
     }
+    cost |p| Cost::new(p.trials as f64, p.trials as f64 * 2e4);
 }
 
 impl Settings {

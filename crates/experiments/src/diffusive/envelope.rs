@@ -15,6 +15,7 @@ parameters! {
         time: f64 [1.0..=1e5] = 100.0 => "Time of the envelope after the release began, s.",
         threshold: f64 [1e-8..=1.0] = 1e-4 => "Threshold of the concentration, kg/m^3.",
     }
+    cost |p| Cost::new(p.trials as f64 * 0.1, 1e6);
 }
 
 rows! {
@@ -76,10 +77,6 @@ impl Figure for Envelope {
         "Where the concentration on the ground exceeds 1e-4 kg/m^3 after 100 s, as a belief of three nodes sees it \
          (example B, rate unknown): probability of exceedance, and how often the 90 per cent band of the eastern \
          edge holds the true edge.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(p.trials as f64 * 0.1, 1e6)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let radius = contour_radius(RATE, p.threshold, p.time, DIFFUSIVITY)?;

@@ -4,7 +4,6 @@ use super::building::{Building, CELL, Case, Placement};
 use super::common::{fraction, median};
 use super::plan_belief::Report;
 use crate::prelude::*;
-use rand::RngExt;
 
 /// Misfit above which a model is said to be wrong: one in a hundred, if it is right.
 const WRONG: f64 = 2.6;
@@ -19,6 +18,10 @@ parameters! {
         visit_trials: u64 [2..=10_000] = 40 => quick 3 => "Placements in which sensors are visited one after the other.",
         visit_sensors: usize [4..=1000] = 160 => quick 20 => "Sensors of such a placement.",
     }
+    cost |p| {
+        let (placements, visits) = (p.trials as f64 * p.sensors as f64, p.visit_trials as f64 * p.visit_sensors as f64);
+        Cost::new(0.1 * placements + 0.03 * visits, 1e8)
+    };
 }
 
 rows! {
@@ -97,11 +100,6 @@ impl Figure for Rooms {
          random cell, its rate is unknown. Beliefs over the cells by the true geometry (finite volumes, adjoint \
          solutions) and by free space, errors over the sensors visited, and how often either is right. Noise is a \
          share of the median concentration. Truth and model share their cells.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        let (placements, visits) = (p.trials as f64 * p.sensors as f64, p.visit_trials as f64 * p.visit_sensors as f64);
-        Cost::new(0.1 * placements + 0.03 * visits, 1e8)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let buildings = [Building::new(false)?, Building::new(true)?];

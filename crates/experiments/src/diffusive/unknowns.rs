@@ -2,12 +2,11 @@
 
 use super::common::{B, Settings, median, search_box};
 use crate::prelude::*;
-use fewbits_core::{Belief, Gaussian};
+use fewbits_core::Belief;
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
 use nalgebra::{Matrix2, Vector2};
-use rand::RngExt;
 
 parameters! {
     #[derive(Debug, Clone)]
@@ -16,6 +15,7 @@ parameters! {
         nodes: Vec<usize> [1..=100; 1..] = vec![6, 20] => "Nodes of a layout.",
         radius: f64 [1.0..=1000.0] = 25.0 => "Radius of a layout, m.",
     }
+    cost |p| Cost::new(p.trials as f64 * p.nodes.iter().sum::<usize>() as f64 * 0.02, 1e6);
 }
 
 rows! {
@@ -65,10 +65,6 @@ impl Figure for Unknowns {
         "Left: the Cramer-Rao bound of x for six nodes on the way to the source of example B with more and more unknowns. Right: posterior \
          means of noise-free samples by what is assumed of the rate. Redrawing the rate for every sample, as the \
          paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(p.trials as f64 * p.nodes.iter().sum::<usize>() as f64 * 0.02, 1e6)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let sensor = B.sensor(false)?;

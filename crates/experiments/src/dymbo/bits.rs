@@ -4,7 +4,6 @@ use super::common::{Plant, plants};
 use crate::prelude::*;
 use fewbits_dymbo::published::iterated;
 use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain};
-use fewbits_monte_carlo::parallel;
 
 parameters! {
     pub struct Parameters {

@@ -1,7 +1,6 @@
 //! What the Dymbo figures share.
 
 use crate::prelude::*;
-use fewbits_core::Gaussian;
 use fewbits_dymbo::ScalarPlant;
 use std::f64::consts::FRAC_2_PI;
 

@@ -3,7 +3,6 @@
 use super::common::{Plant, each, log_spaced};
 use crate::prelude::*;
 use fewbits_dymbo::{chain, filtered_variance, steady};
-use fewbits_monte_carlo::parallel;
 use std::f64::consts::{FRAC_2_PI, PI};
 
 fn hundredths(i: i32) -> f64 {

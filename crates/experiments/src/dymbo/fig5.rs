@@ -2,7 +2,7 @@
 
 use super::common::{Plant, each, plants};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Sensing, Sign};
+use fewbits_core::{Belief, Dynamics, Observation, Sensing, Sign};
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{
     DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value,

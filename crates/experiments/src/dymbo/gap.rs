@@ -2,7 +2,6 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_core::Link;
 use fewbits_dymbo::chain::{self, MessageLaw};
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain, tree};

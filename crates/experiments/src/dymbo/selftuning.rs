@@ -1,13 +1,12 @@
 //! Process noise learnt from single bits.
 
 use crate::prelude::*;
-use fewbits_core::{BitString, Dynamics, Gaussian, Link, Observation, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{BitString, Dynamics, Observation, SchemeNode, Sensing, SensorNode};
 use fewbits_dymbo::SignBit;
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, NoiseLearning, Reporting, Slot};
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use nalgebra::Vector1;
-use rand::{Rng, RngExt};
 
 const ID: &str = "dymbo-selftuning";
 /// Plants of the specification: coefficient, process variance, measurement variance.

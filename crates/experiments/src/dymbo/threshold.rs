@@ -2,7 +2,7 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Scheme, Sensing, Sign};
+use fewbits_core::{Belief, Dynamics, Observation, Scheme, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
 use nalgebra::Matrix1;

@@ -10,6 +10,7 @@ parameters! {
     pub struct Parameters {
         trials: u64 [2..=100_000] = 400 => quick 4 => "Worlds.",
     }
+    cost |p| Cost::new(0.1 * p.trials as f64, 5e3 * p.trials as f64);
 }
 
 rows! {
@@ -170,10 +171,6 @@ const EXPONENTIAL: [(&str, Of<Bound, f64>); 2] = [
 
 impl Figure for Fig6 {
     figure!(Parameters => Rows, about);
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(0.1 * p.trials as f64, 5e3 * p.trials as f64)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rows = Rows::default();

@@ -15,6 +15,7 @@ parameters! {
         points: usize [2..=2000] = 250 => "Points of the reference at which densities are compared.",
         trials: u64 [2..=100_000] = 500 => quick 4 => "Worlds.",
     }
+    cost |p| Cost::new(0.2 * p.trials as f64, 2e3 * p.trials as f64);
 }
 
 rows! {
@@ -153,10 +154,6 @@ impl Figure for Fig6c {
     figure!(Parameters => Rows, "handoff-fig6c", "The actual error", "compressed particle filter, Section 6, Figure 6(c)",
         "KL from a reference filter of 2000 particles, less that to an independent copy of it. The three criteria are \
          close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(0.2 * p.trials as f64, 2e3 * p.trials as f64)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let runs = context.trials(context.stream("handoff-fig6c"), p.trials, |it| trial(p, it))?;

@@ -2,13 +2,12 @@
 
 use super::world::{Point, Reading, START, Walk, World};
 use crate::prelude::*;
-use fewbits_core::{Dynamics, Gaussian, Likelihood};
+use fewbits_core::{Dynamics, Likelihood};
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles, SampleSize};
 use fewbits_handoff::{HandoffFilter, Whole, trimmed};
 use fewbits_mixture_codec::published::PaperReductions;
 use fewbits_mixture_codec::{Reduction, cut};
 use nalgebra::SMatrix;
-use rand::{Rng, RngExt};
 
 /// Particles of a filter.
 pub const PARTICLES: usize = 500;

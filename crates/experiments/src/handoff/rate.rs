@@ -14,6 +14,7 @@ parameters! {
         resolution: Vec<f64> [0.01..=1.0; 1..] = vec![0.5, 0.35, 0.25, 0.15] => "Resolutions: quantiser steps in standard deviations.",
         trials: u64 [2..=10_000] = 12 => quick 2 => "Worlds, of three beliefs each.",
     }
+    cost |p| Cost::new(p.trials as f64, 1e6 * p.trials as f64);
 }
 
 rows! {
@@ -37,10 +38,6 @@ impl Figure for Rate {
     figure!(Parameters => Vec<Row>, "handoff-rate", "What bits buy", "our own comparison",
         "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
          seventh of the bits of their parameters as floats, and a hundredth of those of particles.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(p.trials as f64, 1e6 * p.trials as f64)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         // A message format has at most 16 resolutions of which one is chosen in the message; here both ends agree on it.

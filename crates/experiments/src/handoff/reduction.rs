@@ -12,6 +12,7 @@ parameters! {
         components: Vec<usize> [1..=100; 1..] = vec![3, 5, 10, 20] => "Components.",
         trials: u64 [2..=10_000] = 10 => quick 2 => "Worlds, of three beliefs each.",
     }
+    cost |p| Cost::new(2.0 * p.trials as f64, 1e6 * p.trials as f64);
 }
 
 rows! {
@@ -94,10 +95,6 @@ impl Figure for Reductions {
     figure!(Parameters => Vec<Row>, "handoff-reduction", "What a reduction loses", "our own comparison",
         "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
          2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(2.0 * p.trials as f64, 1e6 * p.trials as f64)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let all = over_beliefs(context, "handoff-reduction", p.trials, |estimate, _| {

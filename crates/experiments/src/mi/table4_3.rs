@@ -2,7 +2,6 @@
 
 use super::common::{MI, MSE, outer, scene};
 use crate::prelude::*;
-use crate::reference;
 use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design, lloyd_max};
 
 parameters! {

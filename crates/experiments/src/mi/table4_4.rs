@@ -2,7 +2,6 @@
 
 use super::common::MI;
 use crate::prelude::*;
-use crate::reference;
 use fewbits_numerics::normal;
 use fewbits_quantizer_design::decoder::NeymanPearson;
 use fewbits_quantizer_design::published::{self, Separation};

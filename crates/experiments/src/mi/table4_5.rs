@@ -2,7 +2,6 @@
 
 use super::common::{MI, MSE, Pair, lloyd_system, odd, over_bsc, scene};
 use crate::prelude::*;
-use crate::reference;
 use fewbits_quantizer_design::{Newton, System, design};
 
 /// Name, title and words of the four levels.

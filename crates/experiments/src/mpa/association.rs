@@ -1,7 +1,6 @@
 //! `mpa-fig3-7`, `mpa-table3-da`: two targets on a line, two measurements in unknown order.
 
 use crate::prelude::*;
-use fewbits_core::Gaussian;
 use fewbits_filters::Resampling;
 use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal;
@@ -9,8 +8,6 @@ use fewbits_pf_mpa::association::{
     AssociationRule, Hypotheses, PRINTED_GAIN, PairTracker, separation, sigmoid, tanh_rule,
 };
 use rand::seq::SliceRandom;
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 
 /// Variance of a step.
 const WALK: f64 = 1e-4;

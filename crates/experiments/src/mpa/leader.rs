@@ -3,7 +3,7 @@
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
-use fewbits_core::{Gaussian, NumberFormat};
+use fewbits_core::NumberFormat;
 use fewbits_pf_mpa::leader::{LeaderMessage, elect, nearest};
 use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{Reports, Target, Tracker};

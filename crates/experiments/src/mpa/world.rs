@@ -1,7 +1,7 @@
 //! The canonical scenario, and every tracker on it.
 
 use crate::prelude::*;
-use fewbits_core::{Belief, Gaussian, Observed, OnAxes};
+use fewbits_core::{Belief, Observed, OnAxes};
 use fewbits_filters::ParticleFilter;
 use fewbits_pf_mpa::published::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_pf_mpa::{
@@ -9,8 +9,6 @@ use fewbits_pf_mpa::{
     RangeNoise, RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
-use rand::RngExt;
-use rand_distr::StandardNormal;
 
 /// Steps of a trajectory.
 pub(super) const STEPS: usize = 25;
@@ -237,7 +235,7 @@ fn in_state(range: &Ranged) -> Result<Observed<OnAxes<RangeSensor, 6, 2>, RangeF
 fn track<T: Tracker>(
     tracker: &T,
     all: (&World, &Network, &Target, Reports),
-    rng: &mut impl rand::Rng,
+    rng: &mut impl Rng,
 ) -> Result<Estimates, Error> {
     let belief = tracker.start(rng, all.2, &prior()?)?;
     let mut workspace = T::Workspace::default();

@@ -3,7 +3,6 @@
 use super::receivers::{each, over_bits};
 use super::worlds::{self, COEFFICIENT, PROCESS, RADIUS, SENSORS};
 use crate::prelude::*;
-use fewbits_core::Link;
 use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant};
 use fewbits_network::{BitStar, Channel, Fault, FaultKind, Loss, Seconds, SensorId, Setup};
 use fewbits_protocol::{Feedback, ReportLength};

@@ -9,6 +9,7 @@ parameters! {
         slots: usize [40..=100_000] = 300 => quick 60 => "Slots of a run.",
         trials: u64 [2..=100_000] = 20 => quick 2 => "Runs of each scheme.",
     }
+    cost |p| Cost::new(2e-2 * (p.trials * p.slots as u64) as f64, 1e8);
 }
 
 rows! {
@@ -81,10 +82,6 @@ impl Figure for Frontier {
          all radios (CC2420 at 0 dBm), on the same scalar and plane worlds with four sensors. The line joins what nothing else \
          beats in both. By payload one bit a sensor is a bargain; on air a frame's overhead of 200 bits buries the difference \
          between one bit and 32, so that few frames win, and sensors that are silent while they are predicted (adaptive) win most.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(2e-2 * (p.trials * p.slots as u64) as f64, 1e8)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (scalar, plane) = (worlds::scalar(p.slots)?, worlds::plane(p.slots)?);

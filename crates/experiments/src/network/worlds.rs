@@ -6,9 +6,7 @@
 use super::receivers::{each, mixed, over_bits};
 use crate::prelude::*;
 use fewbits_core::factor::Value;
-use fewbits_core::{
-    Belief, Gaussian, LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, Sensing, SensorNode,
-};
+use fewbits_core::{Belief, LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, Sensing, SensorNode};
 use fewbits_densities::Mixture;
 use fewbits_filters::kalman;
 use fewbits_handoff::{Coded, HandoffFilter, Leaders};

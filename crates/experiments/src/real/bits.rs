@@ -12,6 +12,7 @@ parameters! {
         source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
         rate: Vec<f64> [0.02..=12.0; 1..=20] = vec![0.25, 0.5, 1.0, 2.0] => quick vec![0.5, 2.0] => "Bits per sample, at most.",
     }
+    cost |p| Cost::new(2e-4 * (p.source.samples * p.rate.len()) as f64, 1e4 * p.source.samples as f64);
 }
 
 rows! {
@@ -130,10 +131,6 @@ impl Figure for Bits {
          a file. The adaptive scheme needs no fit and bounds every error; the baselines are what an engineer would \
          try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight. Errors below a \
          millionth of the signal's range are drawn there.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(2e-4 * (p.source.samples * p.rate.len()) as f64, 1e4 * p.source.samples as f64)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let recordings = p.source.load("real-bits", context)?;

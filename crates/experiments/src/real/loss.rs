@@ -4,7 +4,6 @@ use super::recordings::{Recording, Source};
 use super::tracking::best_for;
 use crate::prelude::*;
 use fewbits_adaptive::{Config, Receiver, Replay, Sensor};
-use fewbits_core::Link;
 
 fn shown() -> Source {
     Source {

@@ -1,9 +1,6 @@
 //! Signals: synthetic ones with the traits of recordings, or columns of a user's file.
 
 use crate::prelude::*;
-use fewbits_monte_carlo::parallel;
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 
 /// Samples of a synthetic signal, of the length asked for.
 type Synthesis = fn(&mut rand_pcg::Pcg64Dxsm, usize) -> Vec<f64>;
