@@ -255,16 +255,14 @@ impl<F: Figure> AnyFigure for F {
         let typed = typed(self, parameters)?;
         let rows = self.run(&typed, context)?;
         let tables = Table::of(&rows)?;
-        let mut claims = Claims::about(Figure::about(self).id);
-        Figure::claims(self, &typed, &rows, &mut claims);
         let (defaults, full) = parameters::meaning(parameters, &parameters::map(&self.defaults()));
-        let claims = claims.judged(defaults, full);
-        let plot = self.plot(&typed, &rows);
+        let mut claims = Claims::about(Figure::about(self).id, defaults, full);
+        Figure::claims(self, &typed, &rows, &mut claims);
         Ok(Outcome {
             parameters: parameters.clone(),
             tables,
-            claims,
-            plot,
+            claims: claims.made(),
+            plot: self.plot(&typed, &rows),
         })
     }
 }

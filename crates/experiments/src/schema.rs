@@ -7,7 +7,6 @@
 use crate::error::Error;
 use crate::measured::Measured;
 use serde::Serialize;
-use std::borrow::Cow;
 use std::fmt;
 
 /// A column: its name in the CSV header, its unit and what it holds.
@@ -161,15 +160,11 @@ cells! {
     f64: |x| Value::Number(*x);
     bool: |flag| Value::Text(flag.to_string());
     u8: |n| Value::Integer((*n).into());
-    u16: |n| Value::Integer((*n).into());
     u32: |n| Value::Integer((*n).into());
-    i32: |n| Value::Integer((*n).into());
-    i64: |n| Value::Integer(*n);
     u64: |n| count(*n, *n as f64);
     usize: |n| count(*n, *n as f64);
     String: |text| Value::Text(text.clone());
     &'static str: |text| Value::Text((*text).to_owned());
-    Cow<'static, str>: |text| Value::Text(text.clone().into_owned());
 }
 
 impl Field for Measured {

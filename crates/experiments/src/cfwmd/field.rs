@@ -20,20 +20,17 @@ const FUSED: [(&str, Scheme); 2] = [("CFwMD", Scheme::State), ("CFwMD2", Scheme:
 pub(crate) struct Fig7;
 
 parameters! {
-    #[derive(Debug, Clone)]
     pub(crate) struct Shown {
         trial: u64 [..=1_000_000] = 1 => "Index of the trial whose truth is drawn.",
     }
 }
 
 rows! {
-    #[derive(Debug)]
     pub(crate) struct Map {
         path: Vec<Place> => "The target.",
         sensors: Vec<Place> => "The sensors.",
     }
 
-    #[derive(Debug)]
     struct Place {
         k: usize => "Time step, or index of the sensor.",
         x: f64 ["m"] => "Position.",

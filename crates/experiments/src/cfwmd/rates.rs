@@ -6,7 +6,6 @@ use crate::prelude::*;
 
 rows! {
     /// Rates of one budget in one setting.
-    #[derive(Debug)]
     pub struct Rates {
         l: f64 ["messages/step"] => "Message budget.",
         setting: String => "How start and noise are read, and the estimator.",

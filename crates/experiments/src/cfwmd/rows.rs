@@ -99,7 +99,6 @@ pub(super) fn in_world(world: &str) -> String {
 
 rows! {
     /// One step of one run.
-    #[derive(Debug, Clone)]
     pub struct Step {
         pub(super) run: Run,
         pub(super) k: usize => "Time step.",
@@ -110,7 +109,6 @@ rows! {
     }
 
     /// One run, averaged over its steps.
-    #[derive(Debug, Clone)]
     pub struct Summary {
         pub(super) run: Run,
         pub(super) position_rmse: Measured ["m"] => "Root mean squared position error over trials and steps.",
@@ -122,7 +120,6 @@ rows! {
     }
 
     /// Two schemes on the same truth, noise and draws.
-    #[derive(Debug, Clone)]
     pub struct Paired {
         pub(super) first: &'static str => "Scheme.",
         pub(super) second: &'static str => "Scheme it is compared with.",
@@ -179,7 +176,6 @@ pub(super) fn paired(ensembles: &[Ensemble], pairs: &[(&'static str, &'static st
 }
 
 /// All tables of a simulated figure.
-#[derive(Debug)]
 pub struct Rows<M, X = ()> {
     /// The figure's own rows.
     pub(super) main: Vec<M>,

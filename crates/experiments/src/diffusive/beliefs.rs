@@ -36,7 +36,6 @@ fn lobes(posterior: &Posterior) -> Result<f64, Error> {
 }
 
 parameters! {
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         /// Number of the random deployment; it is moved on to the next whose belief has two lobes.
         deployment: u64 [..=1_000_000] = 0,

@@ -8,7 +8,6 @@ use fewbits_numerics::ArgumentError;
 use nalgebra::Vector2;
 
 parameters! {
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [1..=100_000] = 200 => quick 8 => "Random deployments.",
         nodes: usize [1..=20] = 3 => "Nodes that have sampled.",

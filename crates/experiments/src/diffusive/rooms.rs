@@ -11,7 +11,6 @@ const WRONG: f64 = 2.6;
 const CREDIBLE: f64 = 0.9;
 
 parameters! {
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [2..=10_000] = 100 => quick 6 => "Random placements of source and sensors.",
         sensors: usize [4..=200] = 40 => "Sensors.",

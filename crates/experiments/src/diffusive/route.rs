@@ -6,7 +6,6 @@ use fewbits_densities::ellipse;
 use fewbits_diffusive::{Outcome, SelectionRule};
 
 parameters! {
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         deployment: u64 [..=1_000_000] = 0 => "Number of the random deployment.",
         nodes: usize [2..=100_000] = 300 => "Deployed nodes.",

@@ -5,7 +5,6 @@ use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite_terms, mu
 use nalgebra::{Matrix2, Vector2};
 
 parameters! {
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         variance1: f64 [0.01..=100.0] = 2.0 => "Variance of the first coordinate.",
         variance2: f64 [0.01..=100.0] = 0.5 => "Variance of the second coordinate.",

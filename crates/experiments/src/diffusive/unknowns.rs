@@ -9,7 +9,6 @@ use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLi
 use nalgebra::{Matrix2, Vector2};
 
 parameters! {
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [1..=10_000] = 200 => quick 4 => "Random layouts about the source for the comparison of rate models.",
         nodes: Vec<usize> [1..=100; 1..] = vec![6, 20] => "Nodes of a layout.",

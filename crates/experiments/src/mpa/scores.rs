@@ -28,7 +28,6 @@ impl Effort {
 
 rows! {
     /// One tracker at one point.
-    #[derive(Debug, Clone)]
     pub struct Row by "{point} {method}" {
         pub(super) point: String => "Which setting.",
         pub(super) snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",

@@ -294,7 +294,6 @@ impl Point {
 
 rows! {
     /// What a method did on many trajectories.
-    #[derive(Debug, Clone)]
     pub(super) struct Score {
         pub(super) mse: Measured => "Mean squared position error, averaged over trajectories.",
         pub(super) median: Measured => "Median over trajectories of their mean squared error.",

@@ -5,7 +5,6 @@ use fewbits_adaptive::Replay;
 use std::collections::BTreeMap;
 
 /// What a scheme does with a signal.
-#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Played {
     /// Reconstructions.
     pub values: Vec<f64>,

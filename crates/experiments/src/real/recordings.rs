@@ -46,7 +46,6 @@ impl Recording {
 
 parameters! {
     /// Which signals.
-    #[derive(Clone)]
     pub(super) struct Source {
         /// A CSV file with a header line and a row a sample; empty for the synthetic set.
         pub recording: String = String::new(),
