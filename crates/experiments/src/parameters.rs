@@ -134,11 +134,9 @@ fn scalar(text: &str) -> Json {
     match value {
         Some(Json::Number(n)) if n.is_f64() => {
             let number = n.as_f64().unwrap_or(f64::NAN);
-            let whole = text.contains(['e', 'E']) && number.fract() == 0.0 && (0.0..9e15).contains(&number);
-            if whole {
-                Json::from(number as u64)
-            } else {
-                Json::Number(n)
+            match text.contains(['e', 'E']) && number.fract() == 0.0 && (0.0..9e15).contains(&number) {
+                true => Json::from(number as u64),
+                false => Json::Number(n),
             }
         }
         Some(value) => value,

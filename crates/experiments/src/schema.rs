@@ -230,13 +230,12 @@ impl<T: Field> Field for Vec<T> {
     fn describe(about: Column, to: &mut Described) {
         let mut row = Described::default();
         T::describe(Column::of("", "", ""), &mut row);
-        let further = about.name.replace('_', "-");
+        let name = match to.tables.as_slice() {
+            [] => "main".to_owned(),
+            _ => about.name.replace('_', "-"),
+        };
         to.tables.push(Table {
-            name: if to.tables.is_empty() {
-                "main".to_owned()
-            } else {
-                further
-            },
+            name,
             meaning: about.meaning,
             columns: row.columns,
             rows: Vec::new(),

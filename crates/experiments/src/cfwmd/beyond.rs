@@ -13,7 +13,6 @@ use fewbits_filters::cramer_rao;
 use fewbits_models::constant_velocity_1d;
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
-use nalgebra::Matrix2;
 
 const NO_LOSS: &str = "no loss";
 const IGNORED: &str = "loss ignored";

@@ -12,12 +12,11 @@ use fewbits_cfwmd::published::{ImputedBelief, fuse_received, imputing};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{NumberFormat, Observation, Scheme as _};
+use fewbits_core::{NumberFormat, Scheme as _};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace, assumed_density, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_numerics::linalg::semidefinite_factor;
-use nalgebra::{SMatrix, SVector, Vector2};
 
 /// How a fusion centre without feedback treats silence.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,11 +8,10 @@ use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Dynamics, Observation, Observed, Sensing};
+use fewbits_core::Observed;
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
 use fewbits_models::{LinearGaussian, ReceivedPower, constant_velocity_2d};
-use nalgebra::{Matrix4, Vector2, Vector4};
 
 /// What is sent, and whether silence is fused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -90,10 +90,9 @@ impl Run {
 
 /// A world behind a comma, if it has a name.
 pub(super) fn in_world(world: &str) -> String {
-    if world.is_empty() {
-        String::new()
-    } else {
-        format!(", {world}")
+    match world {
+        "" => String::new(),
+        world => format!(", {world}"),
     }
 }
 

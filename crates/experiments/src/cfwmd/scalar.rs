@@ -136,11 +136,8 @@ pub(crate) static TABLE1: Simulated<Linear, Rates> = Simulated {
             start_variances: vec![5.0, 5.0],
             ..setting.clone()
         };
-        let own = if setting.start_variances == [0.0, 0.0] {
-            KNOWN
-        } else {
-            "start as set"
-        };
+        let known = setting.start_variances == [0.0, 0.0];
+        let own = if known { KNOWN } else { "start as set" };
         let mut all = setting.at_budgets(context, own, &CENSORED)?;
         all.extend(drawn.at_budgets(context, DRAWN, &CENSORED)?);
         all.extend(drawn.of_trials(CLOUD_TRIALS).at_budgets(context, CLOUDS, &clouds)?);

@@ -3,7 +3,6 @@
 use super::rows::Ensemble;
 use crate::Argument;
 use crate::prelude::*;
-use nalgebra::{Matrix2, Vector2};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// Parameters of an experiment whose schemes are simulated on common trials.

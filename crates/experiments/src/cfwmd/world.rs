@@ -2,8 +2,6 @@
 
 use super::rows::{Ensemble, Record, Run};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Sensing};
-use nalgebra::SVector;
 
 /// What all schemes of one trial share, an entry a step.
 #[derive(Default)]

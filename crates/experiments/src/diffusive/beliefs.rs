@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_core::Density;
 use fewbits_diffusive::density::{Clumps, MixtureFit};
 use fewbits_diffusive::{Form, PositionBelief, Posterior, RateModel, Travelling, project};
-use nalgebra::Vector2;
 
 /// Only the position is approximated here.
 const POSITION_ONLY: RateModel = RateModel::Known(1.0);

@@ -147,12 +147,9 @@ impl Figure for Chains {
     fn plot(&self, _: &Settings, rows: &Rows) -> Plot {
         let schemes = self.schemes();
         let several = schemes.iter().any(|s| s.range != schemes[0].range);
-        let label = |s: &Scheme| {
-            if several {
-                format!("{}, {} m", s.name, s.range)
-            } else {
-                s.name.to_owned()
-            }
+        let label = |s: &Scheme| match several {
+            true => format!("{}, {} m", s.name, s.range),
+            false => s.name.to_owned(),
         };
         let of = |s: &Scheme| {
             let (name, range) = (s.name, s.range);

@@ -6,7 +6,6 @@ use fewbits_diffusive::message::Wire;
 use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Search, SearchBox, SelectionRule, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
-use nalgebra::{Vector2, Vector3};
 
 /// Diffusivity, m^2/s.
 pub(super) const DIFFUSIVITY: f64 = 40.0;
@@ -81,12 +80,8 @@ impl Example {
     }
 
     pub fn sensor(&self, windy: bool) -> Result<SourceSensor, Error> {
-        let wind = if windy {
-            Vector3::new(WIND[0], WIND[1], 0.0)
-        } else {
-            Vector3::zeros()
-        };
-        let air = Air::new(DIFFUSIVITY, wind, Ground::Impermeable)?;
+        let [x, y] = if windy { WIND } else { [0.0; 2] };
+        let air = Air::new(DIFFUSIVITY, Vector3::new(x, y, 0.0), Ground::Impermeable)?;
         let instants = (1..=self.samples).map(|j| 5.0 * j as f64).collect();
         Ok(SourceSensor::new(air, instants, self.noise)?.with_bias(BIAS)?)
     }
@@ -192,10 +187,9 @@ impl Scheme {
 
     /// The search of this scheme from the alarm node.
     pub fn search(&self, settings: &Settings) -> Result<Search, Error> {
-        let rate = if self.known_rate {
-            RateModel::Known(RATE)
-        } else {
-            settings.joint()?
+        let rate = match self.known_rate {
+            true => RateModel::Known(RATE),
+            false => settings.joint()?,
         };
         let alarm = Vector2::from(ALARM);
         let mut search = Search::new(&alarm, settings.prior_sd, search_box(), rate, self.example.threshold)?;

@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
 use fewbits_models::diffusion::contour_radius;
 use fewbits_numerics::ArgumentError;
-use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {

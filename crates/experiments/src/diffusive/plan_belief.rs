@@ -168,13 +168,10 @@ fn of_words(
     let (log, cell, rate) = best;
     let (mut mean, mut variance) = (0.0, 0.0);
     for (responses, readings) in sensors {
-        let entropy = instrument.words(rate * responses[cell]).map(|p| {
-            if p > 0.0 {
-                [p * p.ln(), p * p.ln().powi(2)]
-            } else {
-                [0.0; 2]
-            }
-        });
+        let terms = |p: f64| [p * p.ln(), p * p.ln().powi(2)];
+        let entropy = instrument
+            .words(rate * responses[cell])
+            .map(|p| if p > 0.0 { terms(p) } else { [0.0; 2] });
         let first: f64 = entropy.iter().map(|e| e[0]).sum();
         mean += readings.len() as f64 * first;
         variance += readings.len() as f64 * (entropy.iter().map(|e| e[1]).sum::<f64>() - first * first);

@@ -185,8 +185,8 @@ impl Figure for Route {
         panel = panel
             .with(Layer::points("deployed", rows.field.iter().map(|p| (p.x, p.y)).collect()).styled(7, Marker::Circle));
         for r in &rows.route {
-            let covariance = nalgebra::Matrix2::new(r.variance_x, r.covariance_xy, r.covariance_xy, r.variance_y);
-            let belief = Gaussian::new(nalgebra::Vector2::new(r.estimate_x, r.estimate_y), covariance);
+            let covariance = Matrix2::new(r.variance_x, r.covariance_xy, r.covariance_xy, r.variance_y);
+            let belief = Gaussian::new(Vector2::new(r.estimate_x, r.estimate_y), covariance);
             if let Ok(Ok(outline)) = belief.map(|b| ellipse(&b, 0.9, 90)) {
                 let mut closed: Vec<(f64, f64)> = outline.iter().map(|p| (p[0], p[1])).collect();
                 closed.extend(closed.first().copied());

@@ -2,7 +2,6 @@
 
 use crate::prelude::*;
 use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite_terms, multi_indices};
-use nalgebra::{Matrix2, Vector2};
 
 parameters! {
     pub struct Parameters {

@@ -2,11 +2,9 @@
 
 use super::common::{B, Settings, median, search_box};
 use crate::prelude::*;
-use fewbits_core::Belief;
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
-use nalgebra::{Matrix2, Vector2};
 
 parameters! {
     pub struct Parameters {

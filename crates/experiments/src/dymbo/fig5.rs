@@ -2,16 +2,13 @@
 
 use super::common::{Plant, each, plants};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Observation, Sensing, Sign};
+use fewbits_core::Sign;
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{
     DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value,
 };
 use fewbits_filters::kalman;
-use nalgebra::Vector1;
 use std::f64::consts::FRAC_2_PI;
-
-const ID: &str = "dymbo-fig5";
 
 parameters! {
     pub struct Parameters {
@@ -111,7 +108,7 @@ fn simulate(
 pub struct Convergence;
 
 impl Figure for Convergence {
-    figure!(Parameters => Rows, ID, "Convergence after a fine first message", "Ribeiro and Giannakis, Fig. 5",
+    figure!(Parameters => Rows, "dymbo-fig5", "Convergence after a fine first message", "Ribeiro and Giannakis, Fig. 5",
         "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
          exact (lines); the third curve starts from first message and stationary prior together. The level differs \
          by the loss, the convergence by a step or two (erratum dymbo-12); for the slow plant the first message without the \
@@ -121,7 +118,7 @@ impl Figure for Convergence {
         let (mut errors, mut path) = (Vec::new(), Vec::new());
         for plant in each(p.a, &p.gamma) {
             let (model, prior) = (plant.model()?, plant.stationary()?);
-            let stream = context.stream(ID).named(&plant.gamma.to_string());
+            let stream = context.stream(self.about().id).named(&plant.gamma.to_string());
             let sums = context.moments(stream, p.trials, |trial| {
                 let numbers = simulate(&model, &prior, p, trial.stream)?.into_iter().flat_map(|step| {
                     let squared = |belief: &Gaussian<1>| (belief.mean()[0] - step.truth).powi(2);

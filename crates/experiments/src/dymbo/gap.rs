@@ -6,8 +6,6 @@ use fewbits_dymbo::chain::{self, MessageLaw};
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain, tree};
 
-const ID: &str = "dymbo-gap";
-
 parameters! {
     pub struct Parameters {
         plants: Vec<Plant> [; 1..] = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0), (1.0, 1.0)]) => "Plants, `a:gamma`.",
@@ -93,7 +91,7 @@ fn tuned_gain_mse(filter: &DymboFilter) -> Result<f64, Error> {
 pub struct GapToExact;
 
 impl Figure for GapToExact {
-    figure!(Parameters => Rows, ID, "The gap to the exact posterior", "",
+    figure!(Parameters => Rows, "dymbo-gap", "The gap to the exact posterior", "",
         "Mean squared distance of the sign-bit filter's estimate from the exact posterior mean given the same bits, as a \
          fraction of its error: after a first message over all bit strings (left), and in the steady state (right). \
          It stays near a hundredth of a percent: that is all that a better estimator of the present state could gain.");
@@ -116,12 +114,11 @@ impl Figure for GapToExact {
                 let filter = MultibitFilter::new(model, bits)?;
                 let settled = model.steady_state(filter.information())?;
                 let error = chain::stationary(&model, &MessageLaw::word(&filter, settled.predicted_variance)?)?;
-                let stream = context.stream(ID).named(&format!("{plant} {bits}"));
+                let stream = context.stream(self.about().id).named(&format!("{plant} {bits}"));
                 let one = DymboFilter::new(model);
-                let excess = if bits == 1 {
-                    steady_excess(&one, context, stream, p.trials)?
-                } else {
-                    steady_excess(&filter, context, stream, p.trials)?
+                let excess = match bits {
+                    1 => steady_excess(&one, context, stream, p.trials)?,
+                    _ => steady_excess(&filter, context, stream, p.trials)?,
                 };
                 steady.push(Steady {
                     plant,

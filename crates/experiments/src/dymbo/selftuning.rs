@@ -1,14 +1,12 @@
 //! Process noise learnt from single bits.
 
 use crate::prelude::*;
-use fewbits_core::{BitString, Dynamics, Observation, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{BitString, SchemeNode, SensorNode};
 use fewbits_dymbo::SignBit;
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, NoiseLearning, Reporting, Slot};
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
-use nalgebra::Vector1;
 
-const ID: &str = "dymbo-selftuning";
 /// Plants of the specification: coefficient, process variance, measurement variance.
 const PLANTS: [[f64; 3]; 5] = [
     [0.9, 0.5, 1.0],
@@ -98,7 +96,7 @@ fn one_run(scene: &Scene, receiver: &Receiver, p: &Parameters, stream: Stream) -
     let (before, after) = (Ar1::new(a, q)?, Ar1::new(a, if jumps { FACTOR * q } else { q })?);
     let sensor = LinearSensor::<1, 1>::direct(r)?;
     let prior = Gaussian::scalar(0.0, before.stationary_variance()?)?;
-    let mut state: Vector1<f64> = fewbits_core::Belief::sample(&prior, &mut world);
+    let mut state: Vector1<f64> = prior.sample(&mut world);
     let (_, kind, process, noise, inverted) = *receiver;
     let flips = if inverted { p.flips } else { 0.0 };
     let mut centre = seated(&mut rng, [a, process * q, noise * r], flips, &prior)?;
@@ -163,7 +161,7 @@ rows! {
 pub struct SelfTuning;
 
 impl Figure for SelfTuning {
-    figure!(Parameters => Vec<Row>, ID, "Process noise from single bits", "",
+    figure!(Parameters => Vec<Row>, "dymbo-selftuning", "Process noise from single bits", "",
         "Error of one-bit tracking in parts of the filter that knows the process variance Q: with Q nine times too small or large, with Q \
          learnt from products of neighbouring signs, with a wrong measurement variance, with inverted bits, and of adaptive delta \
          modulation (left, five plants); after Q has become nine times as large (right).");
@@ -173,7 +171,7 @@ impl Figure for SelfTuning {
         let scenes: Vec<Scene> = still.into_iter().chain([Scene(PLANTS[1], true)]).collect();
         let mut rows = Vec::new();
         for scene in &scenes {
-            let stream = context.stream(ID).named(&scene.name());
+            let stream = context.stream(self.about().id).named(&scene.name());
             let found = context.compare(stream, p.trials, &RECEIVERS, |of, it| one_run(scene, of, p, it.stream))?;
             for (i, (receiver, .., inverted)) in RECEIVERS.iter().enumerate() {
                 let windows = if scene.1 { 1..6 } else { 0..1 };
@@ -246,11 +244,7 @@ impl Figure for SelfTuning {
         for (i, name) in shown.iter().enumerate() {
             let marks = rows.iter().filter(|r| r.receiver == *name && names.contains(&r.plant));
             let shift = 0.09 * (i as f64 - 3.5);
-            let marker = if name.contains("learnt") {
-                Marker::Circle
-            } else {
-                Marker::Cross
-            };
+            let marker = [Marker::Cross, Marker::Circle][usize::from(name.contains("learnt"))];
             still = still.with(Layer::measured(*name, marks, |r| (place(r) + shift, r.ratio)).styled(i, marker));
         }
         let mut jump = Panel::new("Q jumps to 9 Q", Axis::log("steps since the jump"), y());

@@ -2,12 +2,9 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Observation, Scheme, Sensing, Sign};
+use fewbits_core::{Scheme, Sign};
 use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
-use nalgebra::Matrix1;
-
-const ID: &str = "dymbo-threshold";
 
 parameters! {
     pub struct Parameters {
@@ -85,7 +82,7 @@ fn relative(a: &[f64], b: &[f64]) -> Measured {
 pub struct ThresholdPlace;
 
 impl Figure for ThresholdPlace {
-    figure!(Parameters => Vec<Row>, ID, "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
+    figure!(Parameters => Vec<Row>, "dymbo-threshold", "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
         "Steady mean squared error with the threshold at the prediction a theta_hat(n-1), at theta_hat(n-1) as equation \
          (14) prints it with the update unchanged, and the same with the exact update (erratum dymbo-1). For a > 0 the mistake \
          hides within the width of a line; for a < 0 it is a catastrophe.");
@@ -94,7 +91,7 @@ impl Figure for ThresholdPlace {
         let mut rows = Vec::new();
         for &plant in &p.plants {
             let (model, start) = (plant.model()?, plant.stationary()?);
-            let stream = context.stream(ID).named(&plant.to_string());
+            let stream = context.stream(self.about().id).named(&plant.to_string());
             let runs = context.trials(stream, p.trials, |trial| Ok(one_run(&model, &start, p, trial.stream)?))?;
             let of = |what: usize, rule: usize| runs.iter().map(|run| run[what][rule]).collect::<Vec<f64>>();
             rows.extend(RULES.iter().enumerate().map(|(i, (rule, _))| Row {

@@ -92,10 +92,9 @@ fn trial(p: &Parameters, it: Trial) -> Result<Vec<Moment>, Error> {
     let mut filters = Vec::new();
     for (method, ..) in METHODS {
         let (mut own, start) = (rng(method), prior()?);
-        let known = if method == "raw_pf" {
-            Known::Particles(start.sample_systematic(&mut own, PARTICLES)?)
-        } else {
-            Known::Mixture(start)
+        let known = match method {
+            "raw_pf" => Known::Particles(start.sample_systematic(&mut own, PARTICLES)?),
+            _ => Known::Mixture(start),
         };
         filters.push((known, own));
     }

@@ -2,12 +2,11 @@
 
 use super::world::{Point, Reading, START, Walk, World};
 use crate::prelude::*;
-use fewbits_core::{Dynamics, Likelihood};
+use fewbits_core::Likelihood;
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles, SampleSize};
 use fewbits_handoff::{HandoffFilter, Whole, trimmed};
 use fewbits_mixture_codec::published::PaperReductions;
 use fewbits_mixture_codec::{Reduction, cut};
-use nalgebra::SMatrix;
 
 /// Particles of a filter.
 pub const PARTICLES: usize = 500;

@@ -6,7 +6,6 @@ use fewbits_core::Message;
 use fewbits_densities::{Bandwidth, KernelEstimate, Mixture};
 use fewbits_mixture_codec::wire::{CodedMixture, WireFormat};
 use fewbits_mixture_codec::{Criterion, Reduction};
-use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {

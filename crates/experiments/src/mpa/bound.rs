@@ -4,7 +4,6 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, Score, World, prior};
 use crate::prelude::*;
 use fewbits_pf_mpa::{CramerRao, Target, position_information};
-use nalgebra::{Matrix4, Vector2};
 
 parameters! {
     pub struct Parameters {

@@ -4,7 +4,6 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, World, canonical};
 use crate::prelude::*;
 use fewbits_pf_mpa::Target;
-use nalgebra::Vector4;
 
 parameters! {
     pub struct Parameters {

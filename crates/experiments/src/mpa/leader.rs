@@ -7,7 +7,6 @@ use fewbits_core::NumberFormat;
 use fewbits_pf_mpa::leader::{LeaderMessage, elect, nearest};
 use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{Reports, Target, Tracker};
-use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {

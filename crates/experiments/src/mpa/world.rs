@@ -1,14 +1,13 @@
 //! The canonical scenario, and every tracker on it.
 
 use crate::prelude::*;
-use fewbits_core::{Belief, Observed, OnAxes};
+use fewbits_core::{Observed, OnAxes};
 use fewbits_filters::ParticleFilter;
 use fewbits_pf_mpa::published::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_pf_mpa::{
     Encoder, GridFilter, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, QuantizedRange, RangeFactor,
     RangeNoise, RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,
 };
-use nalgebra::{Matrix4, Vector2, Vector4};
 
 /// Steps of a trajectory.
 pub(super) const STEPS: usize = 25;

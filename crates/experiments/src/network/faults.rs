@@ -177,12 +177,9 @@ impl Figure for Faulty {
             ("deaths", "sensors that died"),
         ] {
             let of = |feedback: &'static str| rows.iter().filter(move |r| r.fault == fault && r.feedback == feedback);
-            let axis = || {
-                if fault == "flips" {
-                    Axis::log(label)
-                } else {
-                    Axis::linear(label)
-                }
+            let axis = || match fault {
+                "flips" => Axis::log(label),
+                _ => Axis::linear(label),
             };
             let both = |panel: Panel, of_row: fn(&Row) -> Option<Measured>| {
                 panel

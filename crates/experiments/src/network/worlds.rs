@@ -6,7 +6,7 @@
 use super::receivers::{each, mixed, over_bits};
 use crate::prelude::*;
 use fewbits_core::factor::Value;
-use fewbits_core::{Belief, LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, Sensing, SensorNode};
+use fewbits_core::{LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, SensorNode};
 use fewbits_densities::Mixture;
 use fewbits_filters::kalman;
 use fewbits_handoff::{Coded, HandoffFilter, Leaders};
@@ -15,7 +15,6 @@ use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_network::{Account, BitStar, Clock, Field, Ledger, Radio, Seconds, SensorId, Setup, Walk};
 use fewbits_protocol::{BoxError, Estimator, Feedback, Member, Receiver, ReportLength};
-use nalgebra::{Matrix4, SVector, Vector1, Vector4};
 
 /// Sensors of either world; their noise has unit variance.
 pub const SENSORS: usize = 4;

@@ -187,11 +187,8 @@ fn spikes<R: Rng>(rng: &mut R, n: usize) -> Vec<f64> {
     let mut x = 5.0;
     let one = |_| {
         x += 0.02 * (5.0 - x) + 0.05 * normal(rng);
-        let wild = if rng.random::<f64>() < 0.01 {
-            20.0 * normal(rng)
-        } else {
-            0.0
-        };
+        let outlier = rng.random::<f64>() < 0.01;
+        let wild = if outlier { 20.0 * normal(rng) } else { 0.0 };
         rounded(x + wild, 1000.0)
     };
     (0..n).map(one).collect()
