@@ -75,18 +75,20 @@ impl Building {
 }
 
 /// Sensors, a source, and the readings.
-pub(super) struct Placement {
+pub(super) struct Placement<'a> {
+    building: &'a Building,
+    report: Report,
     pub(super) sensors: Vec<usize>,
     pub(super) source: usize,
     /// Responses of each sensor to a source in each cell: of the building, and of free space.
-    pub(super) responses: [Vec<Vec<f64>>; 2],
-    pub(super) readings: Vec<Vec<f64>>,
-    pub(super) instrument: Instrument,
+    responses: [Vec<Vec<f64>>; 2],
+    readings: Vec<Vec<f64>>,
+    instrument: Instrument,
 }
 
-impl Placement {
+impl<'a> Placement<'a> {
     pub(super) fn draw(
-        building: &Building,
+        building: &'a Building,
         case: &Case,
         count: usize,
         source: Option<usize>,
@@ -131,6 +133,8 @@ impl Placement {
         };
         let readings = indoors.iter().map(|row| read(rate * row[source])).collect();
         Ok(Self {
+            building,
+            report: case.report,
             sensors,
             source,
             responses: [indoors, free],
@@ -139,16 +143,15 @@ impl Placement {
         })
     }
 
-    /// The belief after some sensors, in the building (0) or in free space (1).
-    pub(super) fn belief(&self, model: usize, case: &Case, visited: &[usize]) -> Result<PlanBelief, Error> {
-        let (responses, rates) = (&self.responses[model], [RATES, FREE_RATES][model]);
-        let row = |i: &usize| (responses[*i].as_slice(), self.readings[*i].as_slice());
-        let rows: Vec<_> = visited.iter().map(row).collect();
-        Ok(PlanBelief::new(&self.instrument, case.report, rates, &rows, responses[0].len())?)
+    /// The belief after the first `count` sensors, in the building (0) or in free space (1).
+    pub(super) fn belief(&self, model: usize, count: usize) -> Result<PlanBelief, Error> {
+        let (responses, rates) = (&self.responses[model][..count], [RATES, FREE_RATES][model]);
+        Ok(PlanBelief::new(&self.instrument, self.report, rates, responses, &self.readings[..count])?)
     }
 
-    pub(super) fn error(&self, building: &Building, belief: &PlanBelief) -> f64 {
-        let [a, b] = [self.source, belief.mode].map(|cell| building.centre(cell));
+    /// Distance of the most probable cell from the source.
+    pub(super) fn error(&self, belief: &PlanBelief) -> f64 {
+        let [a, b] = [self.source, belief.mode].map(|cell| self.building.centre(cell));
         (a[0] - b[0]).hypot(a[1] - b[1])
     }
 }

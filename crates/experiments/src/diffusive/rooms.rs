@@ -77,13 +77,11 @@ const VISITED: Case = Case {
 /// Where the source of the map is: in the large room, away from its door.
 const SHOWN: [f64; 3] = [11.1, 8.1, 0.0];
 
-/// What is kept of one placement.
-struct Trialled {
+/// What is kept of one belief.
+struct Judged {
     error: f64,
     covered: bool,
     alarm: bool,
-    free_error: f64,
-    free_alarm: bool,
 }
 
 /// The number of sensors after which errors are shown.
@@ -111,9 +109,8 @@ impl Figure for Rooms {
                     report,
                     readings,
                 };
-                let all = context.trials(context.stream("diffusive-rooms"), p.trials, |trial| {
-                    self.one(building, &case, p, trial.stream)
-                })?;
+                let stream = context.stream("diffusive-rooms");
+                let all = context.trials(stream, p.trials, |it| one(building, &case, p.sensors, it.stream))?;
                 found.push(summary(case.name(), &all));
             }
         }
@@ -121,12 +118,11 @@ impl Figure for Rooms {
         let stops: Vec<usize> = STOPS.into_iter().filter(|stop| *stop <= p.visit_sensors).collect();
         let tracks = context.trials(context.stream("diffusive-rooms-visits"), p.visit_trials, |trial| {
             let placement = Placement::draw(building, &VISITED, p.visit_sensors, None, trial.stream)?;
-            let (visited, mut errors) = ((0..p.visit_sensors).collect::<Vec<_>>(), Vec::new());
-            for stop in &stops {
-                let [belief, free] = [0, 1].map(|model| placement.belief(model, &VISITED, &visited[..*stop]));
-                errors.push([placement.error(building, &belief?), placement.error(building, &free?)]);
-            }
-            Ok(errors)
+            let after = |stop: &usize| -> Result<[f64; 2], Error> {
+                let [belief, free] = [0, 1].map(|model| placement.belief(model, *stop));
+                Ok([placement.error(&belief?), placement.error(&free?)])
+            };
+            stops.iter().map(after).collect::<Result<Vec<_>, _>>()
         })?;
         let mut visits = Vec::new();
         for (k, sensors) in stops.iter().enumerate() {
@@ -142,7 +138,7 @@ impl Figure for Rooms {
         Ok(Rows {
             found,
             visits,
-            map: self.map(building, p, context)?,
+            map: map(building, p, context)?,
         })
     }
 
@@ -221,53 +217,48 @@ impl Figure for Rooms {
     }
 }
 
-impl Rooms {
-    fn one(&self, building: &Building, case: &Case, p: &Parameters, stream: Stream) -> Result<Trialled, Error> {
-        let placement = Placement::draw(building, case, p.sensors, None, stream)?;
-        let everyone: Vec<usize> = (0..p.sensors).collect();
-        let [belief, free] = [
-            placement.belief(0, case, &everyone)?,
-            placement.belief(1, case, &everyone)?,
-        ];
-        // The region of exactly nine tenths: the cell that would exceed it belongs to it by chance.
+/// What the true geometry and free space make of one placement.
+fn one(building: &Building, case: &Case, sensors: usize, stream: Stream) -> Result<[Judged; 2], Error> {
+    let placement = Placement::draw(building, case, sensors, None, stream)?;
+    // The region of exactly nine tenths: the cell that would exceed it belongs to it by chance.
+    let chance: f64 = stream.named("region").rng().random();
+    let judge = |model| -> Result<Judged, Error> {
+        let belief = placement.belief(model, sensors)?;
         let [above, own] = belief.above(placement.source);
-        let chance: f64 = stream.named("region").rng().random();
-        Ok(Trialled {
-            error: placement.error(building, &belief),
+        Ok(Judged {
+            error: placement.error(&belief),
             covered: above + chance * own < CREDIBLE,
             alarm: belief.misfit > WRONG,
-            free_error: placement.error(building, &free),
-            free_alarm: free.misfit > WRONG,
         })
-    }
+    };
+    Ok([judge(0)?, judge(1)?])
+}
 
-    fn map(&self, building: &Building, p: &Parameters, context: &Context<'_>) -> Result<Vec<Square>, Error> {
-        let domain = building.domain();
-        let source = domain.locate(SHOWN)?;
-        let placement =
-            Placement::draw(building, &VISITED, p.sensors, Some(source), context.stream("diffusive-rooms-map"))?;
-        let everyone: Vec<usize> = (0..p.sensors).collect();
-        let share = |model: usize| -> Result<Vec<f64>, Error> {
-            let belief = placement.belief(model, &VISITED, &everyone)?;
-            let largest = belief.weights[belief.mode];
-            Ok(domain.spread(&belief.weights.iter().map(|weight| weight / largest).collect::<Vec<_>>(), 0.0))
-        };
-        let [belief, free] = [share(0)?, share(1)?];
-        let square = |cell: usize| {
-            let [x, y, _] = domain.grid().centre(cell);
-            let number = domain.number(cell);
-            Square {
-                x,
-                y,
-                wall: number.is_none(),
-                belief: belief[cell],
-                belief_free: free[cell],
-                sensor: number.is_some_and(|number| placement.sensors.contains(&number)),
-                source: number == Some(source),
-            }
-        };
-        Ok((0..domain.grid().cells()).map(square).collect())
-    }
+fn map(building: &Building, p: &Parameters, context: &Context<'_>) -> Result<Vec<Square>, Error> {
+    let domain = building.domain();
+    let source = domain.locate(SHOWN)?;
+    let placement =
+        Placement::draw(building, &VISITED, p.sensors, Some(source), context.stream("diffusive-rooms-map"))?;
+    let share = |model: usize| -> Result<Vec<f64>, Error> {
+        let belief = placement.belief(model, p.sensors)?;
+        let largest = belief.weights[belief.mode];
+        Ok(domain.spread(&belief.weights.iter().map(|weight| weight / largest).collect::<Vec<_>>(), 0.0))
+    };
+    let [belief, free] = [share(0)?, share(1)?];
+    let square = |cell: usize| {
+        let [x, y, _] = domain.grid().centre(cell);
+        let number = domain.number(cell);
+        Square {
+            x,
+            y,
+            wall: number.is_none(),
+            belief: belief[cell],
+            belief_free: free[cell],
+            sensor: number.is_some_and(|number| placement.sensors.contains(&number)),
+            source: number == Some(source),
+        }
+    };
+    Ok((0..domain.grid().cells()).map(square).collect())
 }
 
 /// In each of `lines` lines of `length` squares, the first and one past the last square of every run that holds `chosen`.
@@ -283,16 +274,16 @@ fn runs(
     })
 }
 
-fn summary(case: String, all: &[Trialled]) -> Found {
-    let count = |holds: fn(&Trialled) -> bool| all.iter().filter(|result| holds(result)).count();
-    let misses = count(|r| r.free_error > TWO_CELLS);
+fn summary(case: String, all: &[[Judged; 2]]) -> Found {
+    let count = |holds: fn(&[Judged; 2]) -> bool| all.iter().filter(|result| holds(result)).count();
+    let misses = count(|[_, free]| free.error > TWO_CELLS);
     Found {
         case,
-        within_two_cells: fraction(count(|r| r.error <= TWO_CELLS), all.len()),
-        coverage: fraction(count(|r| r.covered), all.len()),
-        false_alarms: fraction(count(|r| r.alarm), all.len()),
-        free_within_two_cells: fraction(count(|r| r.free_error <= TWO_CELLS), all.len()),
-        free_misses_flagged: fraction(count(|r| r.free_error > TWO_CELLS && r.free_alarm), misses),
-        error_median: median(all.iter().map(|result| result.error)).unwrap_or_else(|| Moments::default().into()),
+        within_two_cells: fraction(count(|[own, _]| own.error <= TWO_CELLS), all.len()),
+        coverage: fraction(count(|[own, _]| own.covered), all.len()),
+        false_alarms: fraction(count(|[own, _]| own.alarm), all.len()),
+        free_within_two_cells: fraction(count(|[_, free]| free.error <= TWO_CELLS), all.len()),
+        free_misses_flagged: fraction(count(|[_, free]| free.error > TWO_CELLS && free.alarm), misses),
+        error_median: median(all.iter().map(|[own, _]| own.error)).unwrap_or_else(|| Moments::default().into()),
     }
 }
