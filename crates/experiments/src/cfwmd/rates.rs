@@ -63,7 +63,8 @@ impl Main for Rates {
 
 /// Claims that the printed rates are met in one world.
 pub(super) fn as_printed(claims: &mut Claims, rows: &[Rates], world: &str) {
-    let columns: [(&str, fn(&Rates) -> Measured); 2] = [("state", |r| r.state), ("covariance", |r| r.covariance)];
+    type Column = fn(&Rates) -> Measured;
+    let columns: [(&str, Column); 2] = [("state", |r| r.state), ("covariance", |r| r.covariance)];
     for (name, of) in columns {
         let what = format!("rate with {name} feedback as printed ({world})");
         let own = rows.iter().filter(|r| r.setting == world);

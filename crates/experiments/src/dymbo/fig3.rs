@@ -40,7 +40,8 @@ impl Figure for KalmanVariance {
 
     fn claims(&self, p: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let schemes: [(&str, fn(&Row) -> f64); 2] = [("kf", |r| r.kf_reduction), ("dymbo", |r| r.dymbo_reduction)];
+        type Of = fn(&Row) -> f64;
+        let schemes: [(&str, Of); 2] = [("kf", |r| r.kf_reduction), ("dymbo", |r| r.dymbo_reduction)];
         for (scheme, of) in schemes {
             let neighbours = rows.windows(2).filter(|w| w[0].plant.a == w[1].plant.a);
             let what = format!("the {scheme} variance increases strictly with gamma");

@@ -85,11 +85,11 @@ impl Figure for Packets {
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let columns = distinct(rows, |r| r.column.clone());
         let panel = |column: &String| {
-            let curve = |(colour, scheme): (usize, &&'static str)| {
-                let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == *scheme);
+            let curve = |(colour, &scheme): (usize, &&'static str)| {
+                let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == scheme);
                 let curve = points(chosen, |r| (r.target, r.rmse.max(r.negligible)));
                 let layer = if colour == 0 { Layer::line } else { Layer::dashed };
-                layer(*scheme, curve).coloured(colour)
+                layer(scheme, curve).coloured(colour)
             };
             let schemes = ["adaptive", "dpcm-0", "dpcm-1", "send-on-delta"];
             Panel::loglog(column, "packets per sample", "rms error").with_all(schemes.iter().enumerate().map(curve))
