@@ -49,10 +49,37 @@ pub trait Argument {
     }
 }
 
+/// Rough need of a run: seconds on one core, bytes at its peak.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Cost {
+    /// Seconds on one core.
+    pub seconds: f64,
+    /// Bytes.
+    pub bytes: f64,
+}
+
+impl Cost {
+    /// So many seconds on one core and bytes at the peak.
+    pub fn new(seconds: f64, bytes: f64) -> Self {
+        Self { seconds, bytes }
+    }
+
+    /// More is refused: a day on one core, 2 GB.
+    pub(crate) const LIMIT: Self = Self {
+        seconds: 86_400.0,
+        bytes: 2e9,
+    };
+}
+
 /// Parameters that `--quick` lowers, and that may depend on each other.
 pub trait Quick {
     /// Reduces effort: the whole figure should then take about a second. The default changes nothing.
     fn quicken(&mut self) {}
+
+    /// What a run with these parameters needs, roughly. The default is nothing.
+    fn cost(&self) -> Cost {
+        Cost::default()
+    }
 
     /// Refuses what is beyond the limits of the fields themselves. The default refuses nothing.
     ///
@@ -110,15 +137,11 @@ impl Limits {
     /// Why a number, a list or its entries are not within the limits.
     fn refusal(&self, value: &Json, path: &str, nested: bool) -> Option<Refusal> {
         let outside = |x: f64, low, high, what: &str| {
-            let below = number(low)
-                .filter(|low| x < *low)
-                .map(|low| format!("{what}lower than {low}"));
-            let above = || {
-                number(high)
-                    .filter(|high| x > *high)
-                    .map(|high| format!("{what}greater than {high}"))
+            let reason = match (number(low), number(high)) {
+                (Some(low), _) if x < low => format!("{what}lower than {low}"),
+                (_, Some(high)) if x > high => format!("{what}greater than {high}"),
+                _ => return None,
             };
-            let reason = below.or_else(above)?;
             let path = path.to_owned();
             Some(Refusal { path, reason })
         };
@@ -157,9 +180,8 @@ impl Parameter {
             return all;
         }
         self.entries = fields.iter().map(|field| field.name.clone()).collect();
-        let ranges = fields
-            .iter()
-            .filter_map(|field| Some(format!("{} {}", field.name, field.limits.range()?)));
+        let named = |field: &Self| Some(format!("{} {}", field.name, field.limits.range()?));
+        let ranges = fields.iter().filter_map(named);
         let own = [self.limits.entries(), self.limits.range()];
         self.range = own.into_iter().flatten().chain(ranges).collect::<Vec<_>>().join("; ");
         self.points = fields;
@@ -244,13 +266,10 @@ mod tests {
             });
             own.count() + parameter.points.iter().map(|point| check(id, point)).sum::<usize>()
         }
-        let read = |figure: &dyn crate::figure::AnyFigure| {
-            figure
-                .parameters()
-                .iter()
-                .map(|p| check(figure.about().id, p))
-                .sum::<usize>()
-        };
-        assert!(crate::all().into_iter().map(read).sum::<usize>() > 400);
+        let figures = crate::all()
+            .into_iter()
+            .map(|figure| (figure.about().id, figure.parameters()));
+        let read = |(id, all): (&str, Vec<Parameter>)| all.iter().map(|p| check(id, p)).sum::<usize>();
+        assert!(figures.map(read).sum::<usize>() > 400);
     }
 }

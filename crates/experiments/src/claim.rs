@@ -58,15 +58,6 @@ pub struct Claim {
     pub expected: Expected,
     /// Allowed deviation, where the expectation is a number.
     pub tolerance: Option<f64>,
-    /// Holds only at the figure's own parameters.
-    #[serde(skip)]
-    pub(crate) at_defaults: bool,
-    /// Can only be decided at the full trial count.
-    #[serde(skip)]
-    pub(crate) full_effort: bool,
-    /// What it speaks of was not there.
-    #[serde(skip)]
-    pub(crate) absent: bool,
 }
 
 /// A text, owned or not.
@@ -94,28 +85,29 @@ pub struct Claims {
     figure: &'static str,
     made: Rc<RefCell<Vec<Claim>>>,
     erratum: Option<&'static str>,
-    at_defaults: bool,
-    full_effort: bool,
+    /// Whether what is claimed holds at the figure's own parameters only, and needs the full trial count.
+    limits: [bool; 2],
+    /// Whether the run has these parameters, and that count.
+    run: [bool; 2],
 }
 
 impl Claims {
-    /// No claims yet about the figure of this id.
-    pub fn about(figure: &'static str) -> Self {
+    /// No claims yet about a run of the figure of this id: whether its parameters were the defaults, and its trial counts full.
+    pub fn about(figure: &'static str, defaults: bool, full_effort: bool) -> Self {
         Self {
             figure,
             made: Rc::default(),
             erratum: None,
-            at_defaults: false,
-            full_effort: false,
+            limits: [false; 2],
+            run: [defaults, full_effort],
         }
     }
 
     /// What is claimed through this is made for the figure's own parameters only; skipped after `--set`.
     pub fn at_defaults(&self) -> Self {
-        Self {
-            at_defaults: true,
-            ..self.clone()
-        }
+        let mut limited = self.clone();
+        limited.limits[0] = true;
+        limited
     }
 
     /// What is claimed through this says at its end that it shows this erratum of `docs/errata.md`.
@@ -129,10 +121,9 @@ impl Claims {
     /// What is claimed through this can only be decided at the full trial count, skipped with fewer trials: what it compares is
     /// no plain average of trials.
     pub fn at_full_trials(&self) -> Self {
-        Self {
-            full_effort: true,
-            ..self.clone()
-        }
+        let mut limited = self.clone();
+        limited.limits[1] = true;
+        limited
     }
 
     fn decide(
@@ -143,7 +134,11 @@ impl Claims {
         expected: Expected,
         holds: impl FnOnce(f64) -> bool,
     ) {
+        // Where the parameters are not the defaults, what a claim speaks of may rightly be absent.
+        let needed = [self.limits[0] || value.is_none(), self.limits[1]];
+        let undecided = needed.iter().zip(self.run).any(|(needed, given)| *needed && !given);
         let verdict = match value {
+            _ if undecided => Verdict::Skipped,
             Some(value) if value.is_finite() && holds(value) => Verdict::Pass,
             _ => Verdict::Fail,
         };
@@ -158,9 +153,6 @@ impl Claims {
             value: value.filter(|value| value.is_finite()),
             expected,
             tolerance: None,
-            at_defaults: self.at_defaults,
-            full_effort: self.full_effort,
-            absent: value.is_none(),
         });
     }
 
@@ -328,13 +320,9 @@ impl Claims {
         }
     }
 
-    /// The claims with the verdicts of a run: undecided ones are skipped.
-    pub(crate) fn judged(self, defaults: bool, full_effort: bool) -> Vec<Claim> {
-        let undecided = |c: &Claim| ((c.at_defaults || c.absent) && !defaults) || (c.full_effort && !full_effort);
-        let mut judged = self.made.take();
-        let open = judged.iter_mut().filter(|claim| undecided(claim));
-        open.for_each(|claim| claim.verdict = Verdict::Skipped);
-        judged
+    /// All that were made.
+    pub(crate) fn made(self) -> Vec<Claim> {
+        self.made.take()
     }
 }
 
@@ -357,10 +345,7 @@ pub trait Cell {
 
 impl Cell for f64 {
     fn measured(&self) -> Option<Measured> {
-        Some(Measured {
-            value: *self,
-            standard_error: None,
-        })
+        Some(Measured::new(*self, None))
     }
 }
 

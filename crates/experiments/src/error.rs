@@ -46,9 +46,6 @@ pub enum Error {
     /// The run was cancelled.
     #[error("cancelled")]
     Cancelled,
-    /// An argument was refused further down.
-    #[error(transparent)]
-    Argument(#[from] fewbits_numerics::ArgumentError),
     /// A crate below failed.
     #[error("{0}")]
     Failed(#[source] Box<dyn std::error::Error + Send + Sync>),
@@ -70,34 +67,6 @@ impl From<fewbits_monte_carlo::MonteCarloError> for Error {
     }
 }
 
-/// An argument refused further down keeps its name; any other error of a crate below is wrapped.
-macro_rules! wrapped {
-    ($($library:ident),+) => {
-        $(impl From<$library::Error> for Error {
-            fn from(error: $library::Error) -> Self {
-                match error {
-                    $library::Error::Argument(argument) => Self::Argument(argument),
-                    other => Self::failed(other),
-                }
-            }
-        })+
-    };
-}
-wrapped!(
-    fewbits_adaptive,
-    fewbits_binary_patterns,
-    fewbits_core,
-    fewbits_densities,
-    fewbits_handoff,
-    fewbits_mixture_codec,
-    fewbits_models,
-    fewbits_pf_mpa,
-    fewbits_quantizer_design,
-    fewbits_quantizers,
-    fewbits_sensor_assignment
-);
-
-/// The error of a crate below, whatever it is.
 macro_rules! failed {
     ($($error:ty),+ $(,)?) => {
         $(impl From<$error> for Error {
@@ -108,11 +77,24 @@ macro_rules! failed {
     };
 }
 failed!(
+    fewbits_adaptive::Error,
+    fewbits_binary_patterns::Error,
     fewbits_cfwmd::Error,
     fewbits_core::CodecError,
+    fewbits_core::Error,
+    fewbits_densities::Error,
+    fewbits_diffusion::Error,
     fewbits_diffusive::Error,
     fewbits_dymbo::Error,
     fewbits_filters::Error,
+    fewbits_handoff::Error,
+    fewbits_mixture_codec::Error,
+    fewbits_models::Error,
     fewbits_network::Error,
-    fewbits_topology::Error
+    fewbits_numerics::ArgumentError,
+    fewbits_pf_mpa::Error,
+    fewbits_quantizer_design::Error,
+    fewbits_quantizers::Error,
+    fewbits_sensor_assignment::Error,
+    fewbits_topology::Error,
 );

@@ -4,7 +4,8 @@
 ///
 /// Limits are `[low..=high]`, either end may be missing; of a list `[low..=high; least..=most]`, first of its entries, then of its
 /// length. The meaning is the field's documentation; one that is longer than a line may stand above the field instead. What speaks
-/// of several fields is a function behind the struct: `check |p| accept("low", p.low < p.high, || ...);`. A struct `point struct` is an entry of a list or the
+/// of several fields is a function behind the struct: `check |p| accept("low", p.low < p.high, || ...);`, before it `cost |p| Cost::new(seconds, bytes);`
+/// where a setting could ask for too much. A struct `point struct` is an entry of a list or the
 /// settings of several figures: it has no defaults, and its fields may be columns of a row.
 ///
 /// ```
@@ -26,12 +27,13 @@ macro_rules! parameters {
             $($(#[doc = $doc:literal])* $(#[serde($($serde:tt)*)])? $shown:vis $field:ident: $type:ty $([$($limits:tt)*])?
                 = $default:expr $(=> quick $quick:expr)? $(=> $meaning:literal)?,)*
         }
+        $(cost $cost:expr;)?
         $(check $check:expr;)?
     ) => {
-        $crate::parameters! { @arguments
+        $crate::parameters! {
             $(#[$outer])*
-            $visible struct $name {
-                $($(#[doc = $doc])* $(#[doc = $meaning])? $(#[serde($($serde)*)])? $shown $field: $type [$($($limits)*)?],)*
+            $visible point struct $name {
+                $($(#[doc = $doc])* $(#[serde($($serde)*)])? $shown $field: $type $([$($limits)*])? $(=> $meaning)?,)*
             }
         }
 
@@ -46,6 +48,11 @@ macro_rules! parameters {
                 $($(self.$field = $quick;)?)*
             }
 
+            $(fn cost(&self) -> $crate::Cost {
+                let cost: fn(&Self) -> $crate::Cost = $cost;
+                cost(self)
+            })?
+
             $(fn check(&self) -> Result<(), $crate::Refusal> {
                 let check: fn(&Self) -> Result<(), $crate::Refusal> = $check;
                 check(self)
@@ -59,36 +66,24 @@ macro_rules! parameters {
                 $(=> $meaning:literal)?,)*
         }
     ) => {
-        $crate::parameters! { @arguments
-            $(#[$outer])*
-            $visible struct $name {
-                $($(#[doc = $doc])* $(#[doc = $meaning])? $(#[serde($($serde)*)])? $shown $field: $type [$($($limits)*)?],)*
-            }
-        }
-
-        $crate::rows! { @fields $name $($field: $type [] concat!("" $(, $doc)* $(, $meaning)?),)* }
-    };
-    (@arguments
-        $(#[$outer:meta])*
-        $visible:vis struct $name:ident {
-            $($(#[doc = $doc:literal])* $(#[serde($($serde:tt)*)])? $shown:vis $field:ident: $type:ty [$($limits:tt)*],)*
-        }
-    ) => {
         $(#[$outer])*
         #[derive(::serde::Serialize, ::serde::Deserialize)]
         #[serde(deny_unknown_fields)]
         $visible struct $name {
-            $($(#[doc = $doc])* $(#[serde($($serde)*)])? $shown $field: $type,)*
+            $($(#[doc = $doc])* $(#[doc = $meaning])? $(#[serde($($serde)*)])? $shown $field: $type,)*
         }
 
         impl $crate::Argument for $name {
             fn fields() -> Vec<$crate::Parameter> {
                 let all = Vec::new();
-                $(let all = $crate::Parameter::of(stringify!($field), concat!("" $(, $doc)*), $crate::limits!($($limits)*))
-                    .add(stringify!($($($serde)*)?), <$type as $crate::Argument>::fields(), all);)*
+                $(let all = $crate::Parameter::of(
+                    stringify!($field), concat!("" $(, $doc)* $(, $meaning)?), $crate::limits!($($($limits)*)?)
+                ).add(stringify!($($($serde)*)?), <$type as $crate::Argument>::fields(), all);)*
                 all
             }
         }
+
+        $crate::rows! { @fields $name $($field: $type [] concat!("" $(, $doc)* $(, $meaning)?),)* }
     };
 }
 
@@ -169,12 +164,24 @@ macro_rules! rows {
 /// publications it comes from, and its caption.
 ///
 /// `figure!(Parameters => Vec<Row>, "demo-fig1", "Averages", "the paper, figure 1", "What it shows.");`
+///
+/// Where many figures are values of one type, a field says what stands above: `figure!(Parameters => Vec<Row>, about);`.
 #[macro_export]
 macro_rules! figure {
     ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal) => {
         type Parameters = $parameters;
         type Tables = $tables;
 
-        const ABOUT: $crate::About = $crate::About::of($id, $title, $source).showing($caption);
+        fn about(&self) -> $crate::About {
+            $crate::About::of($id, $title, $source).showing($caption)
+        }
+    };
+    ($parameters:ty => $tables:ty, $about:ident) => {
+        type Parameters = $parameters;
+        type Tables = $tables;
+
+        fn about(&self) -> $crate::About {
+            self.$about
+        }
     };
 }

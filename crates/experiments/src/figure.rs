@@ -1,6 +1,6 @@
 //! What a figure is, and how it is run.
 
-use crate::arguments::{self, Argument, Parameter, Quick};
+use crate::arguments::{self, Argument, Cost, Parameter, Quick};
 use crate::claim::{Claim, Claims};
 use crate::error::Error;
 use crate::kept::Kept;
@@ -113,28 +113,6 @@ impl Context<'_> {
     }
 }
 
-/// Rough need of a run: seconds on one core, bytes at its peak.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Cost {
-    /// Seconds on one core.
-    pub seconds: f64,
-    /// Bytes.
-    pub bytes: f64,
-}
-
-impl Cost {
-    /// So many seconds on one core and bytes at the peak.
-    pub fn new(seconds: f64, bytes: f64) -> Self {
-        Self { seconds, bytes }
-    }
-
-    /// More is refused: a day on one core, 2 GB.
-    const LIMIT: Self = Self {
-        seconds: 86_400.0,
-        bytes: 2e9,
-    };
-}
-
 /// A figure or table of a publication, or one of our own: parameters in, rows out, and the claims they must meet.
 ///
 /// A parameter named `trials` or ending in `_trials` is effort: lowering it leaves the meaning of the figure and skips the
@@ -148,13 +126,8 @@ pub trait Figure: Sync {
     /// `Vec<Row>`, or a struct of such lists (the first is the main table): see [`Table::of`].
     type Tables: Field;
 
-    /// What stands above the figure, unless [`Figure::about`] says so of each value of the type.
-    const ABOUT: About = About::of("", "", "");
-
     /// What stands above the figure.
-    fn about(&self) -> About {
-        Self::ABOUT
-    }
+    fn about(&self) -> About;
 
     /// The paper's setting.
     fn defaults(&self) -> Self::Parameters {
@@ -162,8 +135,8 @@ pub trait Figure: Sync {
     }
 
     /// What a run with these parameters needs, roughly: more than a day or 2 GB is refused before it starts.
-    fn cost(&self, _parameters: &Self::Parameters) -> Cost {
-        Cost::default()
+    fn cost(&self, parameters: &Self::Parameters) -> Cost {
+        parameters.cost()
     }
 
     /// The world that the figure shares with others: these are run one after the other, and results in [`Context::kept`] serve all.
@@ -282,16 +255,14 @@ impl<F: Figure> AnyFigure for F {
         let typed = typed(self, parameters)?;
         let rows = self.run(&typed, context)?;
         let tables = Table::of(&rows)?;
-        let mut claims = Claims::about(Figure::about(self).id);
-        Figure::claims(self, &typed, &rows, &mut claims);
         let (defaults, full) = parameters::meaning(parameters, &parameters::map(&self.defaults()));
-        let claims = claims.judged(defaults, full);
-        let plot = self.plot(&typed, &rows);
+        let mut claims = Claims::about(Figure::about(self).id, defaults, full);
+        Figure::claims(self, &typed, &rows, &mut claims);
         Ok(Outcome {
             parameters: parameters.clone(),
             tables,
-            claims,
-            plot,
+            claims: claims.made(),
+            plot: self.plot(&typed, &rows),
         })
     }
 }

@@ -2,7 +2,6 @@
 
 use std::any::Any;
 use std::collections::HashMap;
-use std::fmt;
 use std::sync::{Mutex, PoisonError};
 
 /// Results by name. Figures that name the same world are run one after the other, so that the later ones find what the first computed.
@@ -20,12 +19,6 @@ impl Kept {
     pub fn put<T: Send + 'static>(&self, name: String, value: T) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.insert(name, Box::new(value));
-    }
-}
-
-impl fmt::Debug for Kept {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Kept").finish_non_exhaustive()
     }
 }
 

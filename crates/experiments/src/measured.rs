@@ -1,6 +1,6 @@
 //! A simulated number and its standard error, as one cell of a row.
 
-use fewbits_monte_carlo::{Estimate, Moments};
+use fewbits_monte_carlo::Moments;
 use serde::{Deserialize, Serialize};
 use std::ops::Sub;
 
@@ -14,30 +14,22 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// The mean of what was added.
-    pub fn mean(moments: &Moments) -> Self {
-        Self {
-            value: moments.mean(),
-            standard_error: (moments.count() > 1).then(|| moments.standard_error()),
-        }
+    /// An estimate and its standard error, if it has one.
+    pub fn new(value: f64, standard_error: impl Into<Option<f64>>) -> Self {
+        let standard_error = standard_error.into();
+        Self { value, standard_error }
     }
 
     /// The root of the mean: an RMSE from squared errors.
     pub fn root_mean(moments: &Moments) -> Self {
         let root = moments.root_mean();
-        Self {
-            value: root.value,
-            standard_error: (moments.count() > 1).then_some(root.standard_error),
-        }
+        Self::new(root.value, (moments.count() > 1).then_some(root.standard_error))
     }
 
     /// The same in another unit, or against a reference without error.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
-        Self {
-            value: self.value * factor,
-            standard_error: self.standard_error.map(|s| s * factor.abs()),
-        }
+        Self::new(self.value * factor, self.standard_error.map(|s| s * factor.abs()))
     }
 
     /// Deviation from `expected` in standard errors; none without a standard error.
@@ -50,25 +42,17 @@ impl Measured {
     }
 }
 
-impl From<Estimate> for Measured {
-    fn from(estimate: Estimate) -> Self {
-        Self {
-            value: estimate.value,
-            standard_error: Some(estimate.standard_error),
-        }
-    }
-}
-
-impl From<&Moments> for Measured {
-    fn from(moments: &Moments) -> Self {
-        Self::mean(moments)
+/// The mean of what was added.
+impl From<Moments> for Measured {
+    fn from(moments: Moments) -> Self {
+        Self::new(moments.mean(), (moments.count() > 1).then(|| moments.standard_error()))
     }
 }
 
 /// The mean of the numbers.
 impl FromIterator<f64> for Measured {
     fn from_iter<I: IntoIterator<Item = f64>>(numbers: I) -> Self {
-        Self::mean(&numbers.into_iter().collect())
+        numbers.into_iter().collect::<Moments>().into()
     }
 }
 
@@ -77,10 +61,7 @@ impl Sub<f64> for Measured {
     type Output = Self;
 
     fn sub(self, exact: f64) -> Self {
-        Self {
-            value: self.value - exact,
-            ..self
-        }
+        Self::new(self.value - exact, self.standard_error)
     }
 }
 

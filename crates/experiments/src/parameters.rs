@@ -14,16 +14,10 @@ pub(crate) fn is_effort(name: &str) -> bool {
 /// Whether these parameters are the defaults (but for effort), and whether effort is not below the defaults.
 pub(crate) fn meaning(map: &Map<String, Json>, defaults: &Map<String, Json>) -> (bool, bool) {
     let (effort, setting): (Vec<_>, Vec<_>) = map.iter().partition(|(name, _)| is_effort(name));
-    let same = setting
-        .into_iter()
-        .all(|(name, value)| defaults.get(name) == Some(value));
     let number = |value: Option<&Json>| value.and_then(Json::as_f64).unwrap_or(0.0);
-    (
-        same,
-        effort
-            .into_iter()
-            .all(|(name, value)| number(Some(value)) >= number(defaults.get(name))),
-    )
+    let same = |(name, value): (&String, &Json)| defaults.get(name) == Some(value);
+    let enough = |(name, value): (&String, &Json)| number(Some(value)) >= number(defaults.get(name));
+    (setting.into_iter().all(same), effort.into_iter().all(enough))
 }
 
 /// A struct as the map of its fields.
@@ -87,21 +81,18 @@ pub(crate) fn set(
 ) -> Result<(), Error> {
     let Some(slot) = values.get_mut(name) else {
         let valid: Vec<_> = described.iter().map(|p| p.name.as_str()).collect();
-        let valid = if valid.is_empty() {
-            "none".to_owned()
-        } else {
-            valid.join(", ")
-        };
         return Err(Error::UnknownParameter {
             figure,
             name: name.to_owned(),
-            valid,
+            valid: if valid.is_empty() {
+                "none".to_owned()
+            } else {
+                valid.join(", ")
+            },
         });
     };
-    let entries = described
-        .iter()
-        .find(|p| p.name == name)
-        .map_or(&[][..], |p| &p.entries);
+    let own = described.iter().find(|p| p.name == name);
+    let entries = own.map_or(&[][..], |p| &p.entries);
     let refused = |reason: &str| Error::Refused {
         figure,
         name: name.to_owned(),
@@ -143,11 +134,9 @@ fn scalar(text: &str) -> Json {
     match value {
         Some(Json::Number(n)) if n.is_f64() => {
             let number = n.as_f64().unwrap_or(f64::NAN);
-            let whole = text.contains(['e', 'E']) && number.fract() == 0.0 && (0.0..9e15).contains(&number);
-            if whole {
-                Json::from(number as u64)
-            } else {
-                Json::Number(n)
+            match text.contains(['e', 'E']) && number.fract() == 0.0 && (0.0..9e15).contains(&number) {
+                true => Json::from(number as u64),
+                false => Json::Number(n),
             }
         }
         Some(value) => value,

@@ -33,10 +33,7 @@ pub struct Plot {
 impl Plot {
     /// A single panel.
     pub fn of(panel: Panel) -> Self {
-        Self {
-            panels: vec![panel],
-            columns: 1,
-        }
+        Self::grid(1, vec![panel])
     }
 
     /// Panels in rows of `columns`.
@@ -83,19 +80,16 @@ impl Axis {
 
     /// A logarithmic axis.
     pub fn log(label: impl Into<String>) -> Self {
-        Self {
-            scale: Scale::Log,
-            ..Self::linear(label)
-        }
+        let mut axis = Self::linear(label);
+        axis.scale = Scale::Log;
+        axis
     }
 
     /// Fixes the limits.
     #[must_use]
-    pub fn between(self, low: f64, high: f64) -> Self {
-        Self {
-            range: Some((low, high)),
-            ..self
-        }
+    pub fn between(mut self, low: f64, high: f64) -> Self {
+        self.range = Some((low, high));
+        self
     }
 
     /// Categories at 0, 1, 2, ...
@@ -107,21 +101,17 @@ impl Axis {
 
     /// Categories from the top downwards, at 0, -1, -2, ...
     pub fn ladder<N: Into<String>>(names: impl IntoIterator<Item = N>) -> Self {
-        let named: Vec<_> = (0..)
-            .map(|i: i32| f64::from(-i))
-            .zip(names.into_iter().map(Into::into))
-            .collect();
+        let places = (0..).map(|i: i32| f64::from(-i));
+        let named: Vec<_> = places.zip(names.into_iter().map(Into::into)).collect();
         let end = 0.6 - named.len() as f64;
         Self::linear("").named(named).between(end, 0.6)
     }
 
     /// Names places: category axes.
     #[must_use]
-    pub fn named(self, names: impl IntoIterator<Item = (f64, String)>) -> Self {
-        Self {
-            names: names.into_iter().map(|(at, name)| (at, in_words(name))).collect(),
-            ..self
-        }
+    pub fn named(mut self, names: impl IntoIterator<Item = (f64, String)>) -> Self {
+        self.names = names.into_iter().map(|(at, name)| (at, in_words(name))).collect();
+        self
     }
 }
 

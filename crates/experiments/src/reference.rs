@@ -28,11 +28,9 @@ pub struct Reference {
 type Read = Result<Vec<Reference>, String>;
 
 fn read(system: &str, text: &str) -> Read {
-    let rows: Read = csv::Reader::from_reader(text.as_bytes())
-        .into_deserialize()
-        .map(|r| r.map_err(|e| e.to_string()))
-        .collect();
-    rows.map_err(|reason| format!("references of {system}: {reason}"))
+    let rows = csv::Reader::from_reader(text.as_bytes()).into_deserialize();
+    let rows: Result<_, csv::Error> = rows.collect();
+    rows.map_err(|error| format!("references of {system}: {error}"))
 }
 
 macro_rules! systems {
@@ -65,15 +63,8 @@ fn of(key: &str) -> Result<&'static [Reference], String> {
 /// # Errors
 /// If the system's file cannot be read.
 pub fn group(figure: &str, quantity: &str) -> Result<Vec<(&'static str, &'static Reference)>, String> {
-    let rest = |r: &'static Reference| {
-        let key = r
-            .key
-            .strip_prefix(figure)?
-            .strip_prefix('/')?
-            .strip_prefix(quantity)?
-            .strip_prefix('/')?;
-        Some((key, r))
-    };
+    let group = format!("{figure}/{quantity}/");
+    let rest = |r: &'static Reference| Some((r.key.strip_prefix(&group)?, r));
     Ok(of(figure)?.iter().filter_map(rest).collect())
 }
 

@@ -7,7 +7,6 @@
 use crate::error::Error;
 use crate::measured::Measured;
 use serde::Serialize;
-use std::borrow::Cow;
 use std::fmt;
 
 /// A column: its name in the CSV header, its unit and what it holds.
@@ -161,28 +160,12 @@ cells! {
     f64: |x| Value::Number(*x);
     bool: |flag| Value::Text(flag.to_string());
     u8: |n| Value::Integer((*n).into());
-    u16: |n| Value::Integer((*n).into());
     u32: |n| Value::Integer((*n).into());
-    i32: |n| Value::Integer((*n).into());
-    i64: |n| Value::Integer(*n);
     u64: |n| count(*n, *n as f64);
     usize: |n| count(*n, *n as f64);
     String: |text| Value::Text(text.clone());
     &'static str: |text| Value::Text((*text).to_owned());
-    Cow<'static, str>: |text| Value::Text(text.clone().into_owned());
 }
-
-/// A label is its variant in lower case.
-macro_rules! label {
-    ($type:ty) => {
-        impl $crate::schema::Field for $type {
-            fn put(&self, to: &mut $crate::schema::Cells) {
-                format!("{self:?}").to_lowercase().put(to);
-            }
-        }
-    };
-}
-pub(crate) use label;
 
 impl Field for Measured {
     const COLUMNS: usize = 2;
@@ -200,6 +183,15 @@ impl Field for Measured {
         self.value.put(to);
         self.standard_error.put(to);
     }
+}
+
+/// No columns and no table.
+impl Field for () {
+    const COLUMNS: usize = 0;
+
+    fn describe(_: Column, _: &mut Described) {}
+
+    fn put(&self, _: &mut Cells) {}
 }
 
 impl<T: Field> Field for Option<T> {
@@ -238,13 +230,12 @@ impl<T: Field> Field for Vec<T> {
     fn describe(about: Column, to: &mut Described) {
         let mut row = Described::default();
         T::describe(Column::of("", "", ""), &mut row);
-        let further = about.name.replace('_', "-");
+        let name = match to.tables.as_slice() {
+            [] => "main".to_owned(),
+            _ => about.name.replace('_', "-"),
+        };
         to.tables.push(Table {
-            name: if to.tables.is_empty() {
-                "main".to_owned()
-            } else {
-                further
-            },
+            name,
             meaning: about.meaning,
             columns: row.columns,
             rows: Vec::new(),
@@ -272,15 +263,9 @@ pub(crate) fn tables<T: Field>() -> Vec<Table> {
 mod tests {
     use super::*;
 
-    #[derive(Debug)]
-    enum Method {
-        Lloyd,
-    }
-    label!(Method);
-
     rows! {
         struct Key {
-            method: Method => "How.",
+            method: &'static str => "How.",
         }
 
         struct Row {
@@ -304,14 +289,10 @@ mod tests {
     }
 
     fn row(time: f64) -> Row {
-        let mse = Measured {
-            value: 2.0,
-            standard_error: Some(0.5),
-        };
         Row {
-            key: Key { method: Method::Lloyd },
+            key: Key { method: "lloyd" },
             time,
-            mse,
+            mse: Measured::new(2.0, 0.5),
             other: None,
             printed: None,
         }
@@ -320,12 +301,8 @@ mod tests {
     #[test]
     fn the_fields_are_the_columns() {
         let table = Table::of(&vec![row(1.0)]).unwrap().remove(0);
-        let cells: Vec<_> = table
-            .columns
-            .iter()
-            .zip(&table.rows[0])
-            .map(|(c, v)| format!("{}[{}]={v}", c.name, c.unit))
-            .collect();
+        let cells = table.columns.iter().zip(&table.rows[0]);
+        let cells: Vec<_> = cells.map(|(c, v)| format!("{}[{}]={v}", c.name, c.unit)).collect();
         let expected = [
             "method[]=lloyd",
             "time[s]=1",

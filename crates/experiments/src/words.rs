@@ -64,10 +64,8 @@ pub(crate) fn in_words(label: String) -> String {
         };
         whole.then_some(rest)
     };
-    let found = WORDS
-        .iter()
-        .find_map(|(name, words)| Some(format!("{words}{}", rest(name)?)));
-    found.unwrap_or(label)
+    let known = |(name, words): &(&str, &str)| Some(format!("{words}{}", rest(name)?));
+    WORDS.iter().find_map(known).unwrap_or(label)
 }
 
 #[cfg(test)]

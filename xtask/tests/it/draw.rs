@@ -51,7 +51,7 @@ fn every_shape_leaves_its_elements() {
     assert_eq!(more(Layer::bars("", points.clone(), 0.5), "<rect"), 3);
     assert_eq!(more(Layer::boxes("", vec![(0.0, 1.0, 1.0, 2.0)]), "<rect"), 1);
     assert_eq!(more(Layer::band("", vec![(0.0, 1.0, 2.0), (1.0, 2.0, 3.0)]), "<polygon"), 1);
-    let heat = Layer::heat("", vec![0.0, 1.0], vec![1.0, 2.0, 3.0], vec![vec![0.0, 1.0]; 3]);
+    let heat = Layer::heat("", vec![0.0, 1.0], vec![1.0, 2.0, 3.0], [0.0, 1.0].repeat(3));
     assert!(more(heat, "<rect") >= 6);
     assert!(svg(empty().with(Layer::texts(vec![(1.0, 2.0, "here".into())]))).contains("here"));
 }
@@ -59,7 +59,7 @@ fn every_shape_leaves_its_elements() {
 /// Two marks a metre apart across and down, of maps that are wide, high, and beside a field.
 #[test]
 fn a_metre_of_a_map_is_as_long_on_both_axes() {
-    let field = Layer::heat("level", vec![0.0, 30.0], vec![0.0, 10.0], vec![vec![0.0, 1.0]; 2]);
+    let field = Layer::heat("level", vec![0.0, 30.0], vec![0.0, 10.0], [0.0, 1.0].repeat(2));
     let bare = |x: f64, y: f64| {
         Panel::new("", Axis::linear("x / m").between(0.0, x), Axis::linear("y / m").between(0.0, y))
             .with(Layer::points("", vec![(1.0, 1.0), (2.0, 1.0), (1.0, 2.0)]))

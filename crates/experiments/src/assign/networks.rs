@@ -68,26 +68,19 @@ fn draw(stream: Stream, sensors: usize, moment: &Moment) -> Result<Vec<f64>, Err
     Err(Error::Table(format!("no network of mean {mean} and deviation {sd} in {MAX_DRAWS} draws")))
 }
 
-/// The errors of each decoder in the order of the columns.
-fn evaluate(variances: &[f64]) -> Result<[[f64; 6]; 2], Error> {
+/// The errors in the order of the columns, of one decoder after the other.
+fn evaluate(variances: &[f64]) -> Result<Vec<f64>, Error> {
     let sensors = CodedSensors::with_variances(1.0, variances)?;
     let linear = pair_costs(&sensors).solve();
     let second = by_precision(variances);
-    let mut errors = [[0.0; 6]; 2];
-    for (errors, (.., decoder)) in errors.iter_mut().zip(DECODERS) {
+    let mut errors = Vec::new();
+    for (.., decoder) in DECODERS {
         let all = all_errors(&sensors, decoder)?;
         let own = sensors.mse(&linear, decoder)?;
         // The enumeration and single evaluations round differently.
         let least = all.least.min(own);
-        let swapped = exchange(&sensors, &linear, decoder)?.error;
-        *errors = [
-            own,
-            least,
-            sensors.mse(&second, decoder)?,
-            all.mean,
-            swapped,
-            own / least - 1.0,
-        ];
+        let (second, swapped) = (sensors.mse(&second, decoder)?, exchange(&sensors, &linear, decoder)?.error);
+        errors.extend([own, least, second, all.mean, swapped, own / least - 1.0]);
     }
     Ok(errors)
 }
@@ -160,12 +153,7 @@ fn centre(rows: &[Row]) -> impl Iterator<Item = &Row> {
 }
 
 impl Figure for Networks {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        self.about
-    }
+    figure!(Parameters => Vec<Row>, about);
 
     fn defaults(&self) -> Parameters {
         Parameters {
@@ -179,36 +167,28 @@ impl Figure for Networks {
         let mut rows = Vec::new();
         for moment in &p.points {
             let places = [moment.mean, moment.sd].map(|v| (v * 1e9).round() as u64);
-            let stream = places
-                .into_iter()
-                .fold(context.stream("assign-networks"), Stream::indexed);
+            let stream = context.stream("assign-networks").indexed(places[0]).indexed(places[1]);
             // Without spread there is only one network.
             let trials = if moment.sd == 0.0 { 1 } else { p.trials };
-            let one = |sums: &mut [[Moments; 6]; 2], trial: Trial| {
+            let one = |trial: Trial| {
                 let variances = match moment.sd {
                     0.0 => vec![moment.mean; p.sensors],
                     _ => draw(trial.stream, p.sensors, moment)?,
                 };
-                let errors = evaluate(&variances)?.into_iter().flatten();
-                sums.iter_mut()
-                    .flatten()
-                    .zip(errors)
-                    .for_each(|(sum, error)| sum.add(error));
-                Ok::<_, Error>(())
+                evaluate(&variances)
             };
-            let sums = context.tally(stream, trials, || [[Moments::default(); 6]; 2], one)?;
-            for ((decoder, ..), sums) in DECODERS.into_iter().zip(sums) {
-                let [alg, min, ii, avg, swap, excess] = sums.each_ref().map(Measured::mean);
+            let sums = context.moments(stream, trials, one)?;
+            for ((decoder, ..), sums) in DECODERS.into_iter().zip(sums.chunks(6)) {
                 rows.push(Row {
                     at: (self.varied)(moment),
                     decoder,
                     trials,
-                    alg,
-                    min,
-                    ii,
-                    avg,
-                    swap,
-                    excess,
+                    alg: sums[0].into(),
+                    min: sums[1].into(),
+                    ii: sums[2].into(),
+                    avg: sums[3].into(),
+                    swap: sums[4].into(),
+                    excess: sums[5].into(),
                 });
             }
         }

@@ -150,8 +150,7 @@ impl Figure for Table {
         let n = p.variances.len();
         let index: Vec<f64> = (1..=n).map(|i| i as f64).collect();
         // The coarsest bit on top.
-        let line = |bit: usize| select(&rows.costs, |c| c.bit == bit).map(|c| c.gamma.log10()).collect();
-        let field = (1..=n).rev().map(line).collect();
+        let field = rows.costs.rchunks(n).flatten().map(|c| c.gamma.log10());
         let names = (1..=n).map(|b| ((n + 1 - b) as f64, format!("bit {b}")));
         let optimal = find(&rows.assignments, "optimal").map_or("", |r| r.sensors.as_str());
         let chosen = optimal.split(' ').filter_map(|s| s.parse::<f64>().ok()).enumerate();

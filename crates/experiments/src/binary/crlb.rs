@@ -2,7 +2,6 @@
 
 use super::{ERROR, SNR, Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
-use crate::reference;
 use fewbits_binary_patterns::bounds::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 
@@ -108,25 +107,20 @@ impl Figure for PrintedBounds {
         let panels = p.bits.iter().flat_map(|&bits| {
             let own = || select(&rows.sets, move |r| r.bits == bits);
             let title = |what: &str| format!("{what}, {bits} sensors of {bits} bits");
-            let values = Panel::semilog(title("Equation 5.13"), SNR, "value / V²").with_lines(
-                own(),
-                |r| r.snr_db,
-                &[
-                    ("fixed threshold", |r| r.crlb_fixed),
-                    ("natural patterns", |r| r.crlb_natural),
-                    ("Gray patterns", |r| r.crlb_gray),
-                ],
-            );
-            let errors = Panel::semilog(title("Exact error"), SNR, ERROR).with_lines(
-                own(),
-                |r| r.snr_db,
-                &[
-                    ("fixed threshold", |r| r.mse_fixed),
-                    ("natural patterns", |r| r.mse_natural),
-                    ("Gray patterns", |r| r.mse_gray),
-                ],
-            );
-            [values, errors]
+            let values: [Curve<'_, Row, f64>; 3] = [
+                ("fixed threshold", |r| r.crlb_fixed),
+                ("natural patterns", |r| r.crlb_natural),
+                ("Gray patterns", |r| r.crlb_gray),
+            ];
+            let errors: [Curve<'_, Row, f64>; 3] = [
+                (values[0].0, |r| r.mse_fixed),
+                (values[1].0, |r| r.mse_natural),
+                (values[2].0, |r| r.mse_gray),
+            ];
+            [
+                Panel::semilog(title("Equation 5.13"), SNR, "value / V²").with_lines(own(), |r| r.snr_db, &values),
+                Panel::semilog(title("Exact error"), SNR, ERROR).with_lines(own(), |r| r.snr_db, &errors),
+            ]
         });
         Plot::grid(2, panels.collect())
     }

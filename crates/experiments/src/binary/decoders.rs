@@ -2,7 +2,6 @@
 
 use super::{ERROR, SNR, Scene, each, sweep, swept};
 use crate::prelude::*;
-use crate::schema::label;
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
 };
@@ -17,20 +16,9 @@ rows! {
         curves: Vec<Row> => "Errors and bounds.",
         tightness: Vec<Tightness> => "How close the van Trees bound is, uniform source.",
     }
-}
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
-    /// Uniform on [-1, 1].
-    Uniform,
-    /// Gaussian of variance 0.1.
-    Gaussian,
-}
-label!(Kind);
-
-rows! {
     struct Row by "{snr_db} dB" {
-        source: Kind => "Uniform on [-1, 1], or Gaussian of variance 0.1.",
+        source: &'static str => "Uniform on [-1, 1], or Gaussian of variance 0.1.",
         snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
         mmse: f64 ["V^2"] => "Posterior mean.",
         cmap: f64 ["V^2"] => "Continuous maximum a posteriori.",
@@ -53,10 +41,10 @@ rows! {
     }
 }
 
-fn row(source: Kind, snr_db: f64) -> Result<Row, Error> {
+fn row(source: &'static str, snr_db: f64) -> Result<Row, Error> {
     let scene = match source {
-        Kind::Uniform => Scene::uniform(3, snr_db)?,
-        Kind::Gaussian => Scene::gaussian(snr_db)?,
+        "uniform" => Scene::uniform(3, snr_db)?,
+        _ => Scene::gaussian(snr_db)?,
     };
     let bank = scene.bank(&gray_basis(3)?)?;
     Ok(Row {
@@ -98,14 +86,14 @@ impl Figure for Decoders {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
         let of = |kind| each(&ratios, move |snr| row(kind, snr));
         Ok(Rows {
-            curves: of(Kind::Uniform)?.into_iter().chain(of(Kind::Gaussian)?).collect(),
+            curves: of("uniform")?.into_iter().chain(of("gaussian")?).collect(),
             tightness: each(&[-20.0, 0.0, 5.0, 8.0, 10.0, 15.0, 20.0, 25.0, 40.0], tightness)?,
         })
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let of = |kind: Kind| select(&rows.curves, move |r| r.source == kind);
+        let of = |kind: &'static str| select(&rows.curves, move |r| r.source == kind);
         let at_most = 1.0 + 1e-9;
         let what = "the posterior mean is no worse than any other decoder, for either source (erratum binary-17)";
         claims.all("mmse", what, &rows.curves, |r| {
@@ -124,20 +112,20 @@ impl Figure for Decoders {
         let what = "the exact centralised bound is above the rate-distortion bound";
         claims.all("central-tighter", what, &rows.curves, |r| r.rd_per_n <= r.central * at_most);
         let what = "for a uniform source the continuous MAP decoder is worse than the discrete one throughout (erratum binary-15)";
-        claims.all("uniform-cmap", what, of(Kind::Uniform), |r| r.cmap > r.dmap);
+        claims.all("uniform-cmap", what, of("uniform"), |r| r.cmap > r.dmap);
         let what = "for a Gaussian source continuous MAP beats discrete MAP up to 13 dB and loses from 14 dB on";
-        here.all("gaussian-cmap", what, of(Kind::Gaussian), |r| match r.snr_db {
+        here.all("gaussian-cmap", what, of("gaussian"), |r| match r.snr_db {
             snr if snr <= 13.0 => r.cmap < r.dmap,
             snr => snr < 14.0 || r.cmap > r.dmap,
         });
         let what = "for a Gaussian source equation 5.13 is a bound";
-        claims.all("gaussian-crlb", what, of(Kind::Gaussian), |r| r.crlb <= r.mmse * at_most);
+        claims.all("gaussian-crlb", what, of("gaussian"), |r| r.crlb <= r.mmse * at_most);
         let what =
             "exact cell probabilities change the discrete decoder's error by less than a hundredth (erratum binary-5)";
         claims.all("exact-division", what, &rows.curves, |r| (r.dmap_exact / r.dmap - 1.0).abs() < 0.01);
         let what = "Gaussian source: equation 5.10 as printed (erratum binary-4)";
-        claims.keyed("as-printed", what, of(Kind::Gaussian), |r| r.dmap_print);
-        claims.keyed("corrected", "the same corrected", of(Kind::Gaussian), |r| r.dmap);
+        claims.keyed("as-printed", what, of("gaussian"), |r| r.dmap_print);
+        claims.keyed("corrected", "the same corrected", of("gaussian"), |r| r.dmap);
         claims.keyed("tightness", "van Trees bound over error", &rows.tightness, |r| r.ratio);
         let what = "equation 5.13 with the denominators of its scores (erratum binary-8), uniform source";
         claims.keyed("crlb", what, &rows.tightness, |r| r.crlb);
@@ -148,32 +136,25 @@ impl Figure for Decoders {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let panels = [(Kind::Uniform, "uniform"), (Kind::Gaussian, "Gaussian")].map(|(kind, name)| {
+        let panels = [("uniform", "uniform"), ("gaussian", "Gaussian")].map(|(kind, name)| {
             let own = || select(&rows.curves, move |r| r.source == kind);
             let panel = |title: &str| Panel::semilog(format!("{title}, {name} source"), SNR, ERROR);
-            let decoders = panel("Decoders").with_lines(
-                own(),
-                |r| r.snr_db,
-                &[
-                    ("posterior mean", |r| r.mmse),
-                    ("continuous MAP", |r| r.cmap),
-                    ("discrete MAP", |r| r.dmap),
-                    ("discrete MAP as printed", |r| r.dmap_print),
-                ],
-            );
-            let bounds = panel("Bounds").with_lines(
-                own(),
-                |r| r.snr_db,
-                &[
-                    ("posterior mean", |r| r.mmse),
-                    ("equation 5.13", |r| r.crlb),
-                    ("van Trees", |r| r.vt),
-                    ("rate-distortion, printed", |r| r.rd_print),
-                    ("rate-distortion, N bits", |r| r.rd_per_n),
-                    ("centralised", |r| r.central),
-                ],
-            );
-            [decoders, bounds]
+            let decoders: [Curve<'_, Row, f64>; 4] = [
+                ("posterior mean", |r| r.mmse),
+                ("continuous MAP", |r| r.cmap),
+                ("discrete MAP", |r| r.dmap),
+                ("discrete MAP as printed", |r| r.dmap_print),
+            ];
+            let bounds: [Curve<'_, Row, f64>; 6] = [
+                ("posterior mean", |r| r.mmse),
+                ("equation 5.13", |r| r.crlb),
+                ("van Trees", |r| r.vt),
+                ("rate-distortion, printed", |r| r.rd_print),
+                ("rate-distortion, N bits", |r| r.rd_per_n),
+                ("centralised", |r| r.central),
+            ];
+            let panels = [("Decoders", &decoders[..]), ("Bounds", &bounds)];
+            panels.map(|(title, curves)| panel(title).with_lines(own(), |r| r.snr_db, curves))
         });
         Plot::grid(2, panels.concat())
     }

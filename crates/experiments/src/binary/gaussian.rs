@@ -104,19 +104,16 @@ impl Figure for GaussianSource {
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let bound = |value: fn(&Row) -> f64| points(&rows.errors, |r| (r.snr_db, value(r)));
+        let errors: [Curve<'_, Row, f64>; 5] = [
+            ("best basis", |r| r.mse_opt),
+            ("any three masks", |r| r.mse_unconstrained),
+            ("Gray", |r| r.mse_gray),
+            ("natural", |r| r.mse_natural),
+            ("three signs", |r| r.mse_signs),
+        ];
         Plot::of(
             Panel::semilog("Three sensors, Gaussian source of variance 0.1", SNR, "mean squared error")
-                .with_lines(
-                    &rows.errors,
-                    |r| r.snr_db,
-                    &[
-                        ("best basis", |r| r.mse_opt),
-                        ("any three masks", |r| r.mse_unconstrained),
-                        ("Gray", |r| r.mse_gray),
-                        ("natural", |r| r.mse_natural),
-                        ("three signs", |r| r.mse_signs),
-                    ],
-                )
+                .with_lines(&rows.errors, |r| r.snr_db, &errors)
                 .with(Layer::dashed("D(R), printed", bound(|r| r.dr_print)).coloured(6))
                 .with(Layer::dashed("D(R), three observations", bound(|r| r.dr_per_n)).coloured(7))
                 .with(Layer::dashed("van Trees bound, best basis", bound(|r| r.vt)).coloured(5)),

@@ -2,38 +2,18 @@
 //!
 //! Everything here is exact: no figure of this system draws a random number.
 
-mod crlb;
-mod decoders;
-mod feedback;
-mod gaussian;
-mod optimum;
-mod patterns;
-mod table5_1;
-mod table5_2;
+pub(crate) mod crlb;
+pub(crate) mod decoders;
+pub(crate) mod feedback;
+pub(crate) mod gaussian;
+pub(crate) mod optimum;
+pub(crate) mod patterns;
+pub(crate) mod table5_1;
+pub(crate) mod table5_2;
 
-use crate::AnyFigure;
 use crate::prelude::*;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
 use fewbits_binary_patterns::{Bank, CellGrid, Mask, Pattern, Source, linear_pattern, rank};
-use fewbits_monte_carlo::parallel;
-
-/// The figures of this system, in the order of the publication.
-pub fn figures() -> Vec<&'static dyn AnyFigure> {
-    vec![
-        &patterns::Clipping,
-        &patterns::NATURAL,
-        &patterns::GRAY,
-        &patterns::EXTRA,
-        &patterns::Response,
-        &crlb::PrintedBounds,
-        &table5_1::Table,
-        &optimum::Optimum,
-        &decoders::Decoders,
-        &gaussian::GaussianSource,
-        &table5_2::Table,
-        &feedback::Feedback,
-    ]
-}
 
 /// Axes of the curves.
 const SNR: &str = "signal-to-noise ratio / dB";
@@ -113,9 +93,8 @@ fn not_below(from: f64, to: f64) -> Result<(), Refusal> {
 
 /// `from, from + step, ..., to`.
 fn sweep(from: f64, to: f64, step: f64) -> Vec<f64> {
-    (0..=((to - from) / step + 1e-9) as usize)
-        .map(|i| from + step * i as f64)
-        .collect()
+    let last = ((to - from) / step + 1e-9) as usize;
+    (0..=last).map(|i| from + step * i as f64).collect()
 }
 
 /// Computes one result a sweep point, in parallel and in order.
@@ -183,15 +162,11 @@ fn pattern_panel(title: impl Into<String>, rows: &[(String, Pattern)]) -> Panel 
         })
     };
     let boxes = |value: bool| {
-        let own = bits().filter(|(.., bit)| *bit == value);
-        own.map(|(left, middle, _)| (left + 0.03, left + 0.97, middle - 0.36, middle + 0.36))
-            .collect()
+        let cell = |(left, middle, _)| (left + 0.03, left + 0.97, middle - 0.36, middle + 0.36);
+        bits().filter(|(.., bit)| *bit == value).map(cell).collect()
     };
     let digits = bits().map(|(left, middle, bit)| (left + 0.5, middle, u8::from(bit).to_string()));
-    let names = rows
-        .iter()
-        .enumerate()
-        .map(|(row, (name, _))| (middle(row), name.clone()));
+    let names = (0..).zip(rows).map(|(row, (name, _))| (middle(row), name.clone()));
     let x = Axis::linear("cell of the measurement").between(0.4, cells as f64 + 0.6);
     Panel::new(title, x, Axis::linear("").between(0.4, rows.len() as f64 + 0.6).named(names))
         .with(Layer::boxes("", boxes(false)).coloured(5))

@@ -182,21 +182,18 @@ impl Figure for Optimum {
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let curves: [Curve<'_, Row, Option<f64>>; 6] = [
+            ("best of full rank", |r| Some(r.mse_opt)),
+            ("best of any rank", |r| Some(r.mse_unconstrained)),
+            ("Gray basis forced", |r| Some(r.mse_strategy1)),
+            ("Gray, filled by eq. 5.13", |r| Some(r.mse_strategy13)),
+            ("Luo, linear", |r| r.luo_soft),
+            ("Luo, posterior mean", |r| r.luo_mmse),
+        ];
         let panel = |&sensors: &usize| {
             let own = select(&rows.errors, move |r| r.sensors == sensors);
             let title = format!("{sensors} sensors, {} bits", p.bits);
-            Panel::semilog(title, SNR, ERROR).with_lines(
-                own,
-                |r| r.snr_db,
-                &[
-                    ("best of full rank", |r| Some(r.mse_opt)),
-                    ("best of any rank", |r| Some(r.mse_unconstrained)),
-                    ("Gray basis forced", |r| Some(r.mse_strategy1)),
-                    ("Gray, filled by eq. 5.13", |r| Some(r.mse_strategy13)),
-                    ("Luo, linear", |r| r.luo_soft),
-                    ("Luo, posterior mean", |r| r.luo_mmse),
-                ],
-            )
+            Panel::semilog(title, SNR, ERROR).with_lines(own, |r| r.snr_db, &curves)
         };
         Plot::grid(2, p.sensors.iter().map(panel).collect())
     }

@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_binary_patterns::{
     BinaryQuantizer, CellGrid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
 };
-use fewbits_monte_carlo::parallel;
 
 pub struct Clipping;
 
@@ -214,12 +213,7 @@ pub static EXTRA: Patterns = Patterns {
 };
 
 impl Figure for Patterns {
-    type Parameters = PatternParameters;
-    type Tables = Vec<Bit>;
-
-    fn about(&self) -> About {
-        self.about
-    }
+    figure!(PatternParameters => Vec<Bit>, about);
 
     fn defaults(&self) -> PatternParameters {
         PatternParameters {

@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_binary_patterns::bounds::{optimal_weight_van_trees, printed_crlb};
 use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};
-use fewbits_monte_carlo::parallel;
 
 pub struct Table;
 

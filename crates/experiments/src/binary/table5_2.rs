@@ -3,7 +3,6 @@
 use super::{Scene, each, pattern, pattern_panel, sweep};
 use crate::prelude::*;
 use fewbits_binary_patterns::{Decoder, Pattern, check_separation, count, mask_of};
-use fewbits_monte_carlo::parallel;
 
 pub struct Table;
 

@@ -13,14 +13,12 @@ use fewbits_filters::cramer_rao;
 use fewbits_models::constant_velocity_1d;
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
-use nalgebra::Matrix2;
 
 const NO_LOSS: &str = "no loss";
 const IGNORED: &str = "loss ignored";
 const MODELLED: &str = "loss modelled";
 
-/// Links that lose messages.
-pub(super) static LOSSY: Simulated<Linear, Step> = Simulated {
+pub(crate) static LOSSY: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-lossy", "Censored or lost?", ""),
     caption: "Nothing arrived: the sensor was silent, or its message was lost. A fusion centre that takes loss for \
               silence believes too much; one that weighs both loses far less.",
@@ -101,8 +99,7 @@ fn world(sensors: u64) -> String {
     format!("{sensors} sensors")
 }
 
-/// Thresholds computed before deployment.
-pub(super) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
+pub(crate) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
     further: bounds,
     about: About::of("cfwmd-scheduled", "The rate of covariance feedback without the feedback", ""),
     caption: "A schedule of innovation variances, simulated once before deployment, meets the message budget and the \
@@ -153,11 +150,8 @@ pub(super) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
         let own = world(setting.sensors);
         let all: Vec<&Summary> = select(&rows.summary, |r| r.run.world == own).collect();
         let bounds = || {
-            rows.further
-                .bound
-                .iter()
-                .filter(|b| b.sensors == setting.sensors)
-                .take(setting.messages.len())
+            let own = select(&rows.further.bound, |b| b.sensors == setting.sensors);
+            own.take(setting.messages.len())
         };
         let error = by_budget(&all, "Position error", "time-averaged RMSE / m", |r| r.position_rmse)
             .with(Layer::dashed("bound on CFwMD", points(bounds(), |b| (b.l, b.bound_m))).coloured(0))

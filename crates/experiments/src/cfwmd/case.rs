@@ -1,13 +1,13 @@
 //! A simulated figure in few words: a setting, the runs, what is claimed of them, a picture.
 
 use super::pictures::Main;
-use super::rows::{Ensemble, Nothing, Rows, Run, Summary, paired};
+use super::rows::{Ensemble, Rows, Run, Summary, paired};
 use super::setting::Setting;
 use crate::parameters;
 use crate::prelude::*;
 
 /// What a simulated figure runs and claims.
-pub(super) struct Simulated<S, M, X = Nothing> {
+pub(crate) struct Simulated<S, M, X = ()> {
     pub(super) about: About,
     pub(super) caption: &'static str,
     /// Schemes that are compared trial by trial, wherever both ran.
@@ -61,10 +61,6 @@ impl<S: Setting, M: Main, X: Default + Field> Figure for Simulated<S, M, X> {
 
     fn defaults(&self) -> S {
         (self.setting)()
-    }
-
-    fn cost(&self, setting: &S) -> Cost {
-        setting.cost()
     }
 
     fn run(&self, setting: &S, context: &Context<'_>) -> Result<Rows<M, X>, Error> {

@@ -17,24 +17,20 @@ const FOUR: [(&str, Scheme); 4] = [
 ];
 const FUSED: [(&str, Scheme); 2] = [("CFwMD", Scheme::State), ("CFwMD2", Scheme::StateAndCovariance)];
 
-pub(super) struct Fig7;
+pub(crate) struct Fig7;
 
 parameters! {
-    /// Which trial is shown.
-    #[derive(Debug, Clone)]
-    pub(super) struct Shown {
+    pub(crate) struct Shown {
         trial: u64 [..=1_000_000] = 1 => "Index of the trial whose truth is drawn.",
     }
 }
 
 rows! {
-    #[derive(Debug)]
-    pub(super) struct Map {
+    pub(crate) struct Map {
         path: Vec<Place> => "The target.",
         sensors: Vec<Place> => "The sensors.",
     }
 
-    #[derive(Debug)]
     struct Place {
         k: usize => "Time step, or index of the sensor.",
         x: f64 ["m"] => "Position.",
@@ -79,7 +75,7 @@ impl Figure for Fig7 {
     }
 }
 
-pub(super) static FIG8: Simulated<Field, Step> = Simulated {
+pub(crate) static FIG8: Simulated<Field, Step> = Simulated {
     about: About::of("cfwmd-fig8", "Received power, two messages a step", "CFwMD paper, figure 8"),
     caption: "Time-averaged, the order is that of the linear case. Not at every step: at first the truth sits exactly \
               on the prior mean, so that a filter that receives little is right by construction. Errors rise when the \
@@ -109,7 +105,7 @@ pub(super) static FIG8: Simulated<Field, Step> = Simulated {
     ..Simulated::BASE
 };
 
-pub(super) static FIG9: Simulated<Field, Summary> = Simulated {
+pub(crate) static FIG9: Simulated<Field, Summary> = Simulated {
     about: About::of("cfwmd-fig9", "Received power against the budget", "CFwMD paper, figure 9"),
     caption: "Using silence is worth most where little is sent. Censoring with silence ignored beats random selection \
               only up to two messages a step; from four on it does not, in velocity clearly, contrary to the paper. 2500 particles, where the publication has 10000.",
@@ -152,7 +148,7 @@ const THREE: [f64; 3] = [2.0, 4.0, 6.0];
 /// Where the first budget runs again, to see a small gain.
 const MANY: &str = "20 times the trials, a fifth of the particles";
 
-pub(super) static FIG10: Simulated<Field, Step> = Simulated {
+pub(crate) static FIG10: Simulated<Field, Step> = Simulated {
     about: About::of("cfwmd-fig10", "Received power, state against covariance feedback", "CFwMD paper, figure 10"),
     caption: "Feeding the particles' covariance back (CFwMD2) pays at four and six messages per step, more as time \
               goes on. At two it gains a twentieth of the squared position error, which 400 trials do not tell from \
@@ -187,7 +183,7 @@ pub(super) static FIG10: Simulated<Field, Step> = Simulated {
 const ON_MEAN: &str = "start on the mean";
 const DRAWN: &str = "start drawn from the prior";
 
-pub(super) static TABLE3: Simulated<Field, Rates> = Simulated {
+pub(crate) static TABLE3: Simulated<Field, Rates> = Simulated {
     about: About::of("cfwmd-table3", "Rates among sensors of received power", "CFwMD paper, table III"),
     caption: "Mean number of messages a step. The grid is not printed; a spacing of 10 m with the truth starting on \
               the prior mean fits best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. \

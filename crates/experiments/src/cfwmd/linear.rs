@@ -1,7 +1,7 @@
 //! The linear experiments: a target with constant velocity, identical sensors, every scheme on the same truth and noise.
 
 use super::rows::Ensemble;
-use super::setting::{Linear, Setting, cost};
+use super::setting::{Linear, Setting};
 use super::world::{Centre, Draws, Known, World};
 use crate::prelude::*;
 use fewbits_cfwmd::censored::Censored;
@@ -12,14 +12,11 @@ use fewbits_cfwmd::published::{ImputedBelief, fuse_received, imputing};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Gaussian, Link, NumberFormat, Observation, Scheme as _};
+use fewbits_core::{NumberFormat, Scheme as _};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace, assumed_density, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_numerics::linalg::semidefinite_factor;
-use nalgebra::{SMatrix, SVector, Vector2};
-use rand::RngExt;
-use rand_distr::StandardNormal;
 
 /// How a fusion centre without feedback treats silence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,11 +67,6 @@ impl Setting for Linear {
 
     fn messages(&self) -> &[f64] {
         &self.messages
-    }
-
-    fn cost(&self) -> Cost {
-        let fusion = self.sensors as f64 * 2e-6 + self.cloud() as f64 * 2e-8;
-        cost(self.trials, self.steps, self.messages.len(), fusion)
     }
 
     /// On common random numbers. Schemes for scalar measurements are left out where position and velocity are measured.
@@ -206,17 +198,13 @@ impl<const M: usize> Line<M> {
         loss: f64,
     ) -> (Vec<Observation<SVector<f64, M>>>, usize) {
         let mut sent = 0;
-        let observations = self
-            .sensors
-            .iter()
-            .zip(&draws.measurements[k])
-            .enumerate()
-            .map(|(i, (sensor, z))| {
-                let sends = rules[i].sends(&(z - sensor.matrix() * broadcast));
-                sent += usize::from(sends);
-                (sends && draws.losses[k][i] >= loss).then_some(*z).into()
-            });
-        (observations.collect(), sent)
+        let observe = |(i, (sensor, z)): (usize, (&LinearSensor<2, M>, &SVector<f64, M>))| {
+            let sends = rules[i].sends(&(z - sensor.matrix() * broadcast));
+            sent += usize::from(sends);
+            (sends && draws.losses[k][i] >= loss).then_some(*z).into()
+        };
+        let measured = self.sensors.iter().zip(&draws.measurements[k]).enumerate();
+        (measured.map(observe).collect(), sent)
     }
 
     fn gaussian<'a>(

@@ -15,7 +15,7 @@ pub(super) const FOUR_ALONE: [(&str, Scheme); 4] = [
     ("random", Scheme::Random),
 ];
 
-pub(super) static FIG3: Simulated<Linear, Step> = Simulated {
+pub(crate) static FIG3: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-fig3", "Scalar measurements, no feedback", "CFwMD paper, figure 3"),
     caption: "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the \
               state and the sensors' own estimates. With the printed likelihood CFwMD would coincide with CFoMD.",
@@ -34,8 +34,7 @@ pub(super) static FIG3: Simulated<Linear, Step> = Simulated {
     ..Simulated::BASE
 };
 
-/// Ways to use silence without feedback.
-pub(super) static NO_FEEDBACK: Simulated<Linear, Step> = Simulated {
+pub(crate) static NO_FEEDBACK: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-nofeedback", "What silence is worth without feedback", ""),
     caption: "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' \
               estimates about the fusion centre's, the filter that ignores silence, and the paper's law of the \

@@ -1,20 +1,17 @@
 //! The nonlinear experiments: a target in a plane among sensors of received power.
 
 use super::rows::Ensemble;
-use super::setting::{Field, Setting, cost};
+use super::setting::{Field, Setting};
 use super::world::{Centre, Draws, Known, World};
 use crate::prelude::*;
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Dynamics, Gaussian, Link, Observation, Observed, Sensing};
+use fewbits_core::Observed;
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
 use fewbits_models::{LinearGaussian, ReceivedPower, constant_velocity_2d};
-use nalgebra::{Matrix4, Vector2, Vector4};
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 
 /// What is sent, and whether silence is fused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,10 +135,6 @@ impl Setting for Field {
 
     fn messages(&self) -> &[f64] {
         &self.messages
-    }
-
-    fn cost(&self) -> Cost {
-        cost(self.trials, self.steps, self.messages.len(), self.particles as f64 * 1e-7)
     }
 
     fn run(

@@ -22,7 +22,7 @@ impl Main for Step {
             k: k + 1,
             position_rmse: Measured::root_mean(&run.at(k, |r| &r.position)),
             velocity_rmse: Measured::root_mean(&run.at(k, |r| &r.velocity)),
-            messages: (&run.at(k, |r| &r.sent)).into(),
+            messages: run.at(k, |r| &r.sent).into(),
             trials: run.records.len(),
         };
         (0..steps).map(row).collect()

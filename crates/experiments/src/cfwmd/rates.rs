@@ -3,11 +3,9 @@
 use super::pictures::Main;
 use super::rows::Ensemble;
 use crate::prelude::*;
-use crate::reference;
 
 rows! {
     /// Rates of one budget in one setting.
-    #[derive(Debug)]
     pub struct Rates {
         l: f64 ["messages/step"] => "Message budget.",
         setting: String => "How start and noise are read, and the estimator.",
@@ -36,13 +34,8 @@ impl Main for Rates {
             printed_covariance: print("covariance"),
             trials: run.records.len(),
         };
-        let state = run.run.scheme == "CFwMD";
-        run.run
-            .of("CFwMD2", all)
-            .filter(|_| state)
-            .map(row)
-            .into_iter()
-            .collect()
+        let covariance = run.run.of("CFwMD2", all).filter(|_| run.run.scheme == "CFwMD");
+        covariance.map(row).into_iter().collect()
     }
 
     /// Rates of both schemes against the budget, with the printed ones.

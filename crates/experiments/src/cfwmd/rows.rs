@@ -50,7 +50,7 @@ impl Ensemble {
 
     /// Mean number of messages a step.
     pub(super) fn rate(&self) -> Measured {
-        (&self.averaged(|r| &r.sent)).into()
+        self.averaged(|r| &r.sent).into()
     }
 }
 
@@ -90,16 +90,14 @@ impl Run {
 
 /// A world behind a comma, if it has a name.
 pub(super) fn in_world(world: &str) -> String {
-    if world.is_empty() {
-        String::new()
-    } else {
-        format!(", {world}")
+    match world {
+        "" => String::new(),
+        world => format!(", {world}"),
     }
 }
 
 rows! {
     /// One step of one run.
-    #[derive(Debug, Clone)]
     pub struct Step {
         pub(super) run: Run,
         pub(super) k: usize => "Time step.",
@@ -110,7 +108,6 @@ rows! {
     }
 
     /// One run, averaged over its steps.
-    #[derive(Debug, Clone)]
     pub struct Summary {
         pub(super) run: Run,
         pub(super) position_rmse: Measured ["m"] => "Root mean squared position error over trials and steps.",
@@ -122,7 +119,6 @@ rows! {
     }
 
     /// Two schemes on the same truth, noise and draws.
-    #[derive(Debug, Clone)]
     pub struct Paired {
         pub(super) first: &'static str => "Scheme.",
         pub(super) second: &'static str => "Scheme it is compared with.",
@@ -151,7 +147,7 @@ impl Summary {
             position_rmse: Measured::root_mean(&e.averaged(|r| &r.position)),
             velocity_rmse: Measured::root_mean(&e.averaged(|r| &r.velocity)),
             rate: e.rate(),
-            nees: consistent.then(|| (&e.averaged(|r| &r.consistency)).into()),
+            nees: consistent.then(|| e.averaged(|r| &r.consistency).into()),
             trials: e.records.len(),
         }
     }
@@ -169,8 +165,8 @@ pub(super) fn paired(ensembles: &[Ensemble], pairs: &[(&'static str, &'static st
                 second,
                 world: a.run.world.clone(),
                 l: a.run.l,
-                position: (&position).into(),
-                velocity: (&a.less(b, |r| &r.velocity)).into(),
+                position: position.into(),
+                velocity: a.less(b, |r| &r.velocity).into(),
                 trials: position.count(),
             })
         })
@@ -178,19 +174,8 @@ pub(super) fn paired(ensembles: &[Ensemble], pairs: &[(&'static str, &'static st
     pairs.iter().copied().flat_map(of).collect()
 }
 
-/// No further tables.
-#[derive(Debug, Default)]
-pub struct Nothing;
-
-impl Field for Nothing {
-    fn describe(_: Column, _: &mut Described) {}
-
-    fn put(&self, _: &mut Cells) {}
-}
-
 /// All tables of a simulated figure.
-#[derive(Debug)]
-pub struct Rows<M, X = Nothing> {
+pub struct Rows<M, X = ()> {
     /// The figure's own rows.
     pub(super) main: Vec<M>,
     /// Averages over trials and steps.

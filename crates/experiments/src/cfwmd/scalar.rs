@@ -21,7 +21,7 @@ pub(super) const CENSORED: [(&str, Scheme); 2] = [
     ("CFwMD2", Scheme::Gaussian(Weighing::FusionCentre)),
 ];
 
-pub(super) static FIG1: Simulated<Linear, Step> = Simulated {
+pub(crate) static FIG1: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-fig1", "Scalar measurements, state feedback", "CFwMD paper, figure 1"),
     caption: "Two sensors share one message a step. Silence that the fusion centre takes into account (CFwMD) closes a \
               third of the gap to sending everything that it leaves open when ignored (CFoMD). The gap that remains is \
@@ -94,7 +94,7 @@ fn exact_all_send(sensors: u32) -> Vec<f64> {
 /// Budgets of four sensors in figure 2 and table I.
 pub(super) const BUDGETS: [f64; 5] = [1.0, 1.2, 1.5, 2.0, 3.0];
 
-pub(super) static FIG2: Simulated<Linear, Step> = Simulated {
+pub(crate) static FIG2: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-fig2", "Scalar measurements, state against covariance feedback", "CFwMD paper, figure 2"),
     caption: "Four sensors, five budgets. Weighing innovations with the fusion centre's covariance (CFwMD2) meets the \
               budget and is better from l = 1.2 on; at l = 1 the paper's CFwMD is, in position, because it sends more \
@@ -120,7 +120,7 @@ const KNOWN: &str = "known start";
 const DRAWN: &str = "start variance 5";
 const CLOUDS: &str = "start variance 5, particles";
 
-pub(super) static TABLE1: Simulated<Linear, Rates> = Simulated {
+pub(crate) static TABLE1: Simulated<Linear, Rates> = Simulated {
     about: About::of("cfwmd-table1", "Rates with scalar measurements", "CFwMD paper, table I"),
     caption: "Mean number of messages a step. The initial covariance is not printed; the published numbers fit a start \
               drawn with variance 5 and 1000 particles better than a known one. With state feedback alone the budget \
@@ -136,11 +136,8 @@ pub(super) static TABLE1: Simulated<Linear, Rates> = Simulated {
             start_variances: vec![5.0, 5.0],
             ..setting.clone()
         };
-        let own = if setting.start_variances == [0.0, 0.0] {
-            KNOWN
-        } else {
-            "start as set"
-        };
+        let known = setting.start_variances == [0.0, 0.0];
+        let own = if known { KNOWN } else { "start as set" };
         let mut all = setting.at_budgets(context, own, &CENSORED)?;
         all.extend(drawn.at_budgets(context, DRAWN, &CENSORED)?);
         all.extend(drawn.of_trials(CLOUD_TRIALS).at_budgets(context, CLOUDS, &clouds)?);

@@ -3,8 +3,6 @@
 use super::rows::Ensemble;
 use crate::Argument;
 use crate::prelude::*;
-use fewbits_core::Gaussian;
-use nalgebra::{Matrix2, Vector2};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// Parameters of an experiment whose schemes are simulated on common trials.
@@ -14,9 +12,6 @@ pub trait Setting: Clone + Default + Serialize + DeserializeOwned + Argument + Q
 
     /// Message budgets.
     fn messages(&self) -> &[f64];
-
-    /// Rough need of a figure of so many schemes.
-    fn cost(&self) -> Cost;
 
     /// Runs schemes at one budget.
     ///
@@ -47,7 +42,7 @@ pub trait Setting: Clone + Default + Serialize + DeserializeOwned + Argument + Q
 }
 
 /// Seconds and bytes of so many trials of ten schemes.
-pub(super) fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
+fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
     let runs = trials as f64 * steps as f64 * budgets as f64 * 10.0;
     Cost::new(runs * step_seconds, runs * 32.0)
 }
@@ -101,11 +96,9 @@ impl Linear {
         }
     }
 
-    pub(super) fn with_particles(self, particles: u64) -> Self {
-        Self {
-            particles: Some(particles),
-            ..self
-        }
+    pub(super) fn with_particles(mut self, particles: u64) -> Self {
+        self.particles = Some(particles);
+        self
     }
 
     /// So many particles as the particle schemes have.
@@ -140,6 +133,11 @@ impl Quick for Linear {
     fn quicken(&mut self) {
         self.trials = 100;
         self.particles = self.particles.map(|_| 100);
+    }
+
+    fn cost(&self) -> Cost {
+        let fusion = self.sensors as f64 * 2e-6 + self.cloud() as f64 * 2e-8;
+        cost(self.trials, self.steps, self.messages.len(), fusion)
     }
 
     fn check(&self) -> Result<(), Refusal> {
@@ -195,5 +193,9 @@ impl Quick for Field {
     fn quicken(&mut self) {
         self.trials = 24;
         self.particles = 500;
+    }
+
+    fn cost(&self) -> Cost {
+        cost(self.trials, self.steps, self.messages.len(), self.particles as f64 * 1e-7)
     }
 }

@@ -41,7 +41,7 @@ fn worlds() -> [String; 2] {
     [world(1.0), world(STATED)]
 }
 
-pub(super) static FIG4: Simulated<Linear, Step> = Simulated {
+pub(crate) static FIG4: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-fig4", "Vector measurements, state feedback", "CFwMD paper, figure 4"),
     caption: "Position and velocity measured by two sensors that share one message a step. The order of the schemes is \
               that of scalar measurements, at the acceleration variance that fits the published rates (1) and at the \
@@ -70,7 +70,7 @@ pub(super) static FIG4: Simulated<Linear, Step> = Simulated {
     ..Simulated::BASE
 };
 
-pub(super) static FIG5: Simulated<Linear, Step> = Simulated {
+pub(crate) static FIG5: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-fig5", "Vector measurements, state against covariance feedback", "CFwMD paper, figure 5"),
     caption: "With vector measurements covariance feedback (CFwMD2) is better at each budget; at the acceleration \
               variance that the text states it would not be, at one message a step.",
@@ -97,7 +97,7 @@ const PARTICLE_TRIALS: u64 = 500;
 /// The joint belief on the trials of the particle filter.
 const SAME_TRIALS: &str = "CFwMD on these trials";
 
-pub(super) static FIG6: Simulated<Linear, Step> = Simulated {
+pub(crate) static FIG6: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-fig6", "Vector measurements, no feedback", "CFwMD paper, figure 6"),
     caption: "Without feedback the fusion centre does not know what a silent sensor compared with. A joint belief over \
               the state and the sensors' own estimates (CFwMD) makes silence informative all the same; the printed \
@@ -135,7 +135,7 @@ pub(super) static FIG6: Simulated<Linear, Step> = Simulated {
 
 const DEVIATIONS: &str = "acceleration variance 4, noise deviations 2 and 4";
 
-pub(super) static TABLE2: Simulated<Linear, Rates> = Simulated {
+pub(crate) static TABLE2: Simulated<Linear, Rates> = Simulated {
     about: About::of("cfwmd-table2", "Rates with vector measurements", "CFwMD paper, table II"),
     caption: "The published rates fit an acceleration variance of 1, not the stated 4; next best is 4 with the printed \
               noise [2 4] read as standard deviations.",

@@ -2,9 +2,6 @@
 
 use super::rows::{Ensemble, Record, Run};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Gaussian, Sensing};
-use nalgebra::SVector;
-use rand::RngExt;
 
 /// What all schemes of one trial share, an entry a step.
 #[derive(Default)]
@@ -98,20 +95,17 @@ pub(super) trait World<const D: usize, const M: usize>: Sync {
                 record.position.push(squared.iter().step_by(2).sum());
                 record.velocity.push(squared.iter().skip(1).step_by(2).sum());
                 record.sent.push(known.sent as f64);
-                record
-                    .consistency
-                    .extend(known.variance.map(|variance| squared[0] / variance));
+                let consistency = known.variance.map(|variance| squared[0] / variance);
+                record.consistency.extend(consistency);
             }
             Ok(record)
         };
         let every = |it: Trial| -> Result<Vec<Record>, Error> {
             let draws = self.draw(it.stream);
-            schemes
-                .iter()
-                .map(|(_, scheme)| run(*scheme, &draws, it.stream))
-                .collect()
+            let records = schemes.iter().map(|(_, scheme)| run(*scheme, &draws, it.stream));
+            records.collect()
         };
-        let mut trials = context.monte_carlo(stream, trials).run(every)?;
+        let mut trials = context.trials(stream, trials, every)?;
         let of = |(place, (scheme, _)): (usize, &(&'static str, Self::Scheme))| Ensemble {
             run: Run {
                 scheme,

@@ -3,9 +3,9 @@
 use super::*;
 
 fn verdict(make: impl FnOnce(&Claims)) -> Verdict {
-    let claims = Claims::about("demo-fig1");
+    let claims = Claims::about("demo-fig1", true, true);
     make(&claims);
-    let judged = claims.judged(true, true);
+    let judged = claims.made();
     assert!(!judged.is_empty());
     if judged.iter().all(|c| c.verdict == Verdict::Pass) {
         Verdict::Pass
@@ -15,10 +15,7 @@ fn verdict(make: impl FnOnce(&Claims)) -> Verdict {
 }
 
 fn measured(value: f64, error: f64) -> Measured {
-    Measured {
-        value,
-        standard_error: Some(error),
-    }
+    Measured::new(value, error)
 }
 
 /// Every kind: an example that holds, one that does not, and one about nothing.
@@ -61,25 +58,17 @@ fn what_is_not_finite_fails_every_kind() {
     let rows = [measured(nan, 1.0), measured(0.0, 1.0)];
     assert_eq!(verdict(|c| c.all_within("x", "", rows, |r| (r, 0.0), 4.0)), Verdict::Fail);
     // A single trial has no standard error and shows nothing.
-    let single = Measured {
-        value: 1.0,
-        standard_error: None,
-    };
-    assert_eq!(verdict(|c| c.within("x", "", single, 0.9, 4.0)), Verdict::Fail);
+    assert_eq!(verdict(|c| c.within("x", "", Measured::new(1.0, None), 0.9, 4.0)), Verdict::Fail);
 }
 
 #[test]
 fn undecided_claims_are_skipped() {
     let of = |defaults, full| {
-        let claims = Claims::about("demo-fig1");
+        let claims = Claims::about("demo-fig1", defaults, full);
         claims.at_defaults().near("a", "", 0.0, 1.0, 0.1);
         claims.at_full_trials().near("b", "", 0.0, 1.0, 0.1);
         claims.near("c", "", None, 1.0, 0.1);
-        claims
-            .judged(defaults, full)
-            .into_iter()
-            .map(|c| c.verdict)
-            .collect::<Vec<_>>()
+        claims.made().iter().map(|c| c.verdict).collect::<Vec<_>>()
     };
     use Verdict::{Fail, Skipped};
     assert_eq!(of(true, true), [Fail, Fail, Fail]);
@@ -90,10 +79,10 @@ fn undecided_claims_are_skipped() {
 #[test]
 fn references_are_found_by_key_and_fail_where_the_row_is_absent_or_off() {
     let judge = |rows: Vec<(&str, f64)>| {
-        let claims = Claims::about("mi-table4-3");
+        let claims = Claims::about("mi-table4-3", true, true);
         claims.references("mse", "squared error", rows, |(key, value)| (key.to_owned(), value));
         let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
-        claims.judged(true, true).into_iter().find_map(of).unwrap()
+        claims.made().into_iter().find_map(of).unwrap()
     };
     assert_eq!(judge(vec![("other", 1.0), ("lloyd-x", 0.130_486_15)]), Verdict::Pass);
     assert_eq!(judge(vec![("lloyd-x", 0.130_487)]), Verdict::Fail);
@@ -105,10 +94,10 @@ fn references_are_found_by_key_and_fail_where_the_row_is_absent_or_off() {
         }
     }
     let one_sided = |value: f64| {
-        let claims = Claims::about("mi-table4-3");
+        let claims = Claims::about("mi-table4-3", true, true);
         claims.keyed_at_most("mse", "squared error", &[Named(value)], |row| Some(row.0));
         let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
-        claims.judged(true, true).into_iter().find_map(of).unwrap()
+        claims.made().into_iter().find_map(of).unwrap()
     };
     assert_eq!((one_sided(0.1), one_sided(0.130_487)), (Verdict::Pass, Verdict::Fail));
     // A group without references is a mistake, not a success.

@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_core::Density;
 use fewbits_diffusive::density::{Clumps, MixtureFit};
 use fewbits_diffusive::{Form, PositionBelief, Posterior, RateModel, Travelling, project};
-use nalgebra::Vector2;
 
 /// Only the position is approximated here.
 const POSITION_ONLY: RateModel = RateModel::Known(1.0);
@@ -36,8 +35,6 @@ fn lobes(posterior: &Posterior) -> Result<f64, Error> {
 }
 
 parameters! {
-    /// Settings of Figures 5 and 6.
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         /// Number of the random deployment; it is moved on to the next whose belief has two lobes.
         deployment: u64 [..=1_000_000] = 0,
@@ -75,7 +72,6 @@ pub struct Lobes {
     form: Option<Form>,
 }
 
-/// Figure 5.
 pub static FIG5: Lobes = Lobes {
     about: About::of("diffusive-fig5", "The belief after three nodes", "Zhao and Nehorai 2007, Fig. 5").showing(
         "Exact density of the source's position after three nodes of example B, rate unknown, in the first random \
@@ -84,7 +80,6 @@ pub static FIG5: Lobes = Lobes {
     form: None,
 };
 
-/// Figure 6.
 pub static FIG6: Lobes = Lobes {
     about: About::of("diffusive-fig6", "The same belief in polynomial Gaussians", "Zhao and Nehorai 2007, Fig. 6")
         .showing(
@@ -96,17 +91,15 @@ pub static FIG6: Lobes = Lobes {
 
 fn fields(p: &Parameters, context: &Context<'_>, form: Option<Form>) -> Result<Fields, Error> {
     let settings = Settings::default();
-    let run = context.monte_carlo(context.stream(CHAINS), 1);
     let mut shown = None;
     for deployment in p.deployment..p.deployment + 100 {
         context.check()?;
-        let outcome = Scheme::exact(p.nodes).run(&settings, run.trial(deployment))?;
+        let outcome = Scheme::exact(p.nodes).run(&settings, context.stream(CHAINS).indexed(deployment))?;
         let Some(posterior) = outcome.posterior else {
             continue;
         };
         let apart = lobes(&posterior)?;
-        let better = shown.as_ref().is_none_or(|(_, _, most)| apart > *most);
-        if better {
+        if shown.as_ref().is_none_or(|(_, _, most)| apart > *most) {
             shown = Some((deployment, posterior, apart));
         }
         if apart > 4.0 {
@@ -116,10 +109,8 @@ fn fields(p: &Parameters, context: &Context<'_>, form: Option<Form>) -> Result<F
     let Some((deployment, posterior, apart)) = shown else {
         return Err(Error::Table("no search gave a belief".to_owned()));
     };
-    let belief = form
-        .map(|form| project(&posterior, form, &POSITION_ONLY))
-        .transpose()?
-        .flatten();
+    let projected = form.map(|form| project(&posterior, form, &POSITION_ONLY));
+    let belief = projected.transpose()?.flatten();
     let (lower, upper) = posterior.cells.bounds();
     let at = |d: usize, i: usize| {
         let (low, high) = (lower[d] - 0.05 * (upper[d] - lower[d]), upper[d] + 0.05 * (upper[d] - lower[d]));
@@ -163,37 +154,23 @@ const DECADES: f64 = 4.0;
 
 fn field_panel(title: &str, rows: &Fields, of: fn(&Point) -> f64) -> Panel {
     let lowest = rows.field.first().map(|f| f.y);
-    let x: Vec<f64> = rows
-        .field
-        .iter()
-        .take_while(|p| Some(p.y) == lowest)
-        .map(|p| p.x)
-        .collect();
+    let line = rows.field.iter().take_while(|p| Some(p.y) == lowest);
+    let x: Vec<f64> = line.map(|p| p.x).collect();
     let side = x.len().max(1);
     let y: Vec<f64> = rows.field.iter().step_by(side).map(|p| p.y).collect();
     // Lobes are thin and of different heights: decades below the exact belief's peak show them all.
     let exact = rows.field.iter().map(|p| p.exact);
     let peak = exact.fold(f64::MIN_POSITIVE, f64::max).log10();
     let decades = |p: &Point| (of(p).log10() - peak).clamp(-DECADES, 0.0);
-    let values = rows
-        .field
-        .chunks(side)
-        .map(|row| row.iter().map(decades).collect())
-        .collect();
     let ends = |axis: &[f64]| (axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(1.0));
     let ((x0, x1), (y0, y1)) = (ends(&x), ends(&y));
     Panel::new(title, Axis::linear("x / m").between(x0, x1), Axis::linear("y / m").between(y0, y1))
-        .with(Layer::heat("lg(p/peak)", x, y, values))
+        .with(Layer::heat("lg(p/peak)", x, y, rows.field.iter().map(decades)))
         .with(Layer::points("source", vec![B.source.into()]).styled(3, Marker::OpenCircle))
 }
 
 impl Figure for Lobes {
-    type Parameters = Parameters;
-    type Tables = Fields;
-
-    fn about(&self) -> About {
-        self.about
-    }
+    figure!(Parameters => Fields, about);
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Fields, Error> {
         fields(p, context, self.form)

@@ -53,22 +53,15 @@ pub(super) struct Building {
 
 impl Building {
     pub(super) fn new(windy: bool) -> Result<Self, Error> {
-        let domain = Plan::parse(PLAN)
-            .and_then(|plan| plan.domain(CELL, 1, 0.0))
-            .map_err(Error::failed)?;
+        let domain = Plan::parse(PLAN)?.domain(CELL, 1, 0.0)?;
         let flow = match windy {
-            true => PotentialFlow::new(&domain, WIND).map_err(Error::failed)?.flow,
+            true => PotentialFlow::new(&domain, WIND)?.flow,
             false => Flow::still(&domain),
         };
-        let velocities = flow.velocities(&domain);
-        let mean = velocities
-            .iter()
-            .fold(Vector3::zeros(), |sum, v| sum + Vector3::from(*v))
-            / velocities.len() as f64;
-        let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, Scheme::default()).map_err(Error::failed)?;
-        let free = Air::new(DIFFUSIVITY, mean, Ground::None)
-            .and_then(|air| air.with_closest(0.5 * CELL))
-            .map_err(Error::failed)?;
+        let velocities: Vec<Vector3<f64>> = flow.velocities(&domain).into_iter().map(Vector3::from).collect();
+        let mean = velocities.iter().sum::<Vector3<f64>>() / velocities.len() as f64;
+        let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, Scheme::default())?;
+        let free = Air::new(DIFFUSIVITY, mean, Ground::None)?.with_closest(0.5 * CELL)?;
         Ok(Self { transport, free })
     }
 
@@ -82,18 +75,20 @@ impl Building {
 }
 
 /// Sensors, a source, and the readings.
-pub(super) struct Placement {
+pub(super) struct Placement<'a> {
+    building: &'a Building,
+    report: Report,
     pub(super) sensors: Vec<usize>,
     pub(super) source: usize,
     /// Responses of each sensor to a source in each cell: of the building, and of free space.
-    pub(super) responses: [Vec<Vec<f64>>; 2],
-    pub(super) readings: Vec<Vec<f64>>,
-    pub(super) instrument: Instrument,
+    responses: [Vec<Vec<f64>>; 2],
+    readings: Vec<Vec<f64>>,
+    instrument: Instrument,
 }
 
-impl Placement {
+impl<'a> Placement<'a> {
     pub(super) fn draw(
-        building: &Building,
+        building: &'a Building,
         case: &Case,
         count: usize,
         source: Option<usize>,
@@ -110,18 +105,16 @@ impl Placement {
             }
         }
         let points: Vec<[f64; 3]> = sensors.iter().map(|cell| building.centre(*cell)).collect();
-        let field = SensorField::steady(&building.transport, &points).map_err(Error::failed)?;
+        let field = SensorField::steady(&building.transport, &points)?;
         let indoors: Vec<Vec<f64>> = (0..count)
             .filter_map(|sensor| field.response(sensor, 0).map(<[f64]>::to_vec))
             .collect();
+        let centres: Vec<Vector3<f64>> = (0..cells).map(|cell| building.centre(cell).into()).collect();
         let free = |point: &[f64; 3]| -> Vec<f64> {
             let at = Vector3::from(*point);
-            (0..cells)
-                .map(|cell| {
-                    building
-                        .free
-                        .concentration(&at, &Vector3::from(building.centre(cell)), 1e9)
-                })
+            centres
+                .iter()
+                .map(|cell| building.free.concentration(&at, cell, 1e9))
                 .collect()
         };
         let free = points.iter().map(free).collect();
@@ -140,6 +133,8 @@ impl Placement {
         };
         let readings = indoors.iter().map(|row| read(rate * row[source])).collect();
         Ok(Self {
+            building,
+            report: case.report,
             sensors,
             source,
             responses: [indoors, free],
@@ -148,18 +143,15 @@ impl Placement {
         })
     }
 
-    /// The belief after some sensors, in the building (0) or in free space (1).
-    pub(super) fn belief(&self, model: usize, case: &Case, visited: &[usize]) -> Result<PlanBelief, Error> {
-        let rows: Vec<(&[f64], &[f64])> = visited
-            .iter()
-            .map(|i| (self.responses[model][*i].as_slice(), self.readings[*i].as_slice()))
-            .collect();
-        let rates = [RATES, FREE_RATES][model];
-        Ok(PlanBelief::new(&self.instrument, case.report, rates, &rows, self.responses[model][0].len())?)
+    /// The belief after the first `count` sensors, in the building (0) or in free space (1).
+    pub(super) fn belief(&self, model: usize, count: usize) -> Result<PlanBelief, Error> {
+        let (responses, rates) = (&self.responses[model][..count], [RATES, FREE_RATES][model]);
+        Ok(PlanBelief::new(&self.instrument, self.report, rates, responses, &self.readings[..count])?)
     }
 
-    pub(super) fn error(&self, building: &Building, belief: &PlanBelief) -> f64 {
-        let [a, b] = [self.source, belief.mode].map(|cell| building.centre(cell));
+    /// Distance of the most probable cell from the source.
+    pub(super) fn error(&self, belief: &PlanBelief) -> f64 {
+        let [a, b] = [self.source, belief.mode].map(|cell| self.building.centre(cell));
         (a[0] - b[0]).hypot(a[1] - b[1])
     }
 }

@@ -30,7 +30,6 @@ fn schemes() -> Vec<Scheme> {
         .collect()
 }
 
-/// Bytes to the threshold.
 pub struct Bytes;
 
 impl Figure for Bytes {
@@ -43,18 +42,11 @@ impl Figure for Bytes {
         Some(CHAINS)
     }
 
-    fn cost(&self, p: &Settings) -> Cost {
-        Cost::new(p.trials as f64, p.trials as f64 * 2e4)
-    }
-
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Summary>, Error> {
         let schemes = schemes();
         let all = tracks(context, p, &schemes)?;
-        schemes
-            .iter()
-            .zip(&all)
-            .map(|(scheme, tracks)| summary(scheme, p, tracks))
-            .collect()
+        let each = schemes.iter().zip(&all);
+        each.map(|(scheme, tracks)| summary(scheme, p, tracks)).collect()
     }
 
     fn claims(&self, _: &Settings, rows: &Vec<Summary>, claims: &mut Claims) {

@@ -49,7 +49,6 @@ const OF_B: [(&str, f64); 11] = [
 ];
 const IN_WIND: [(&str, f64); 3] = [("covariance", 15.0), ("information", 15.0), ("mahalanobis", 15.0)];
 
-/// Figure 3: error, example A.
 pub static FIG3: Chains = Chains {
     about: About::of("diffusive-fig3", "Error along the search, two radio ranges", "Zhao and Nehorai 2007, Fig. 3")
         .showing("Median distance of estimate and source after each node (bands: deciles), example A, ranges of 15 and 10 m, \
@@ -59,7 +58,6 @@ pub static FIG3: Chains = Chains {
     claims: chain_claims::fig3,
 };
 
-/// Figure 4: determinant, example A.
 pub static FIG4: Chains = Chains {
     about: About::of("diffusive-fig4", "Determinant along the search, two radio ranges", "Zhao and Nehorai 2007, Fig. 4")
         .showing("Median log10 determinant of the position's covariance after each node, example A, ranges of 15 and 10 m. The \
@@ -70,7 +68,6 @@ pub static FIG4: Chains = Chains {
     claims: chain_claims::fig4,
 };
 
-/// Figure 7: error, example B.
 pub static FIG7: Chains = Chains {
     about: About::of(
         "diffusive-fig7",
@@ -86,7 +83,6 @@ pub static FIG7: Chains = Chains {
     claims: chain_claims::fig7,
 };
 
-/// Figure 8: determinant, example B.
 pub static FIG8: Chains = Chains {
     about: About::of("diffusive-fig8", "Nodes to the threshold, by what travels", "Zhao and Nehorai 2007, Fig. 8")
         .showing(
@@ -98,7 +94,6 @@ pub static FIG8: Chains = Chains {
     claims: chain_claims::fig8,
 };
 
-/// Figure 9: wind, sensors and source of example B.
 pub static FIG9: Chains = Chains {
     about: About::of("diffusive-fig9", "Choosing nodes in wind, source of example B", "Zhao and Nehorai 2007, Figs. 9 and 10")
         .showing("Error and determinant along searches in a wind of (-20, -10) m/s, source at (62, 50), by the rule that chooses \
@@ -109,7 +104,6 @@ pub static FIG9: Chains = Chains {
     claims: chain_claims::wind,
 };
 
-/// Figure 10: wind, sensors and source of example A.
 pub static FIG10: Chains = Chains {
     about: About::of(
         "diffusive-fig10",
@@ -123,12 +117,7 @@ pub static FIG10: Chains = Chains {
 };
 
 impl Figure for Chains {
-    type Parameters = Settings;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        self.about
-    }
+    figure!(Settings => Rows, about);
 
     fn cost(&self, p: &Settings) -> Cost {
         let searches = p.trials as f64 * self.schemes.len() as f64;
@@ -158,12 +147,9 @@ impl Figure for Chains {
     fn plot(&self, _: &Settings, rows: &Rows) -> Plot {
         let schemes = self.schemes();
         let several = schemes.iter().any(|s| s.range != schemes[0].range);
-        let label = |s: &Scheme| {
-            if several {
-                format!("{}, {} m", s.name, s.range)
-            } else {
-                s.name.to_owned()
-            }
+        let label = |s: &Scheme| match several {
+            true => format!("{}, {} m", s.name, s.range),
+            false => s.name.to_owned(),
         };
         let of = |s: &Scheme| {
             let (name, range) = (s.name, s.range);
@@ -176,7 +162,7 @@ impl Figure for Chains {
                 (true, true) => Layer::unbroken(label(s), points),
                 (true, false) => Layer::dashed(label(s), points),
             };
-            line.coloured(s.place())
+            line.coloured(s.place)
         };
         let threshold = schemes[0].example.threshold.log10();
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;
@@ -201,7 +187,7 @@ impl Figure for Chains {
         }
         let mut errors = Panel::semilog("Error", "nodes", "distance to the source / m").without_legend();
         let band = of(&schemes[0]).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();
-        errors = errors.with(Layer::band("", band).coloured(schemes[0].place()));
+        errors = errors.with(Layer::band("", band).coloured(schemes[0].place));
         for scheme in &schemes {
             let line = points(of(scheme), |c| (c.step as f64, c.err_med));
             errors = errors.with(curve(scheme, line));

@@ -6,7 +6,6 @@ use fewbits_diffusive::message::Wire;
 use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Search, SearchBox, SelectionRule, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
-use nalgebra::{Vector2, Vector3};
 
 /// Diffusivity, m^2/s.
 pub(super) const DIFFUSIVITY: f64 = 40.0;
@@ -26,6 +25,11 @@ pub(super) const LPG: Form = Form::Lpg {
     components: 2,
     degree: 5,
 };
+/// One of them.
+const ONE_LPG: Form = Form::Lpg {
+    components: 1,
+    degree: 5,
+};
 
 parameters! {
     /// Settings of every search.
@@ -37,6 +41,7 @@ parameters! {
         pub(super) rate_low: f64 [0.0..=0.99] = 0.5 => "Lower end of the rate's prior, kg/s.",
         pub(super) rate_high: f64 [1.01..=1e3] = 1.5 => "Upper end of the rate's prior, kg/s.",
     }
+    cost |p| Cost::new(p.trials as f64, p.trials as f64 * 2e4);
 }
 
 impl Settings {
@@ -75,15 +80,10 @@ impl Example {
     }
 
     pub fn sensor(&self, windy: bool) -> Result<SourceSensor, Error> {
-        let wind = if windy {
-            Vector3::new(WIND[0], WIND[1], 0.0)
-        } else {
-            Vector3::zeros()
-        };
-        let air = Air::new(DIFFUSIVITY, wind, Ground::Impermeable)?;
+        let [x, y] = if windy { WIND } else { [0.0; 2] };
+        let air = Air::new(DIFFUSIVITY, Vector3::new(x, y, 0.0), Ground::Impermeable)?;
         let instants = (1..=self.samples).map(|j| 5.0 * j as f64).collect();
-        let sensor = SourceSensor::new(air, instants, self.noise)?;
-        sensor.with_bias(BIAS).map_err(Error::failed)
+        Ok(SourceSensor::new(air, instants, self.noise)?.with_bias(BIAS)?)
     }
 }
 
@@ -118,29 +118,20 @@ pub(super) fn search_box() -> SearchBox {
     }
 }
 
-/// Forms of the belief, each with its place in the palette: one colour in every figure, whether the rate is known or not.
-const FORMS: [(&str, Form, usize); 8] = [
-    ("exact", Form::Raw, 0),
-    ("gmm-4", Form::Mixture(4), 1),
-    ("gaussian", Form::Gaussian, 2),
-    ("gaussian-9", Form::Gaussian, 3),
-    ("lpg-2x5", LPG, 4),
-    (
-        "lpg-1x5",
-        Form::Lpg {
-            components: 1,
-            degree: 5,
-        },
-        5,
-    ),
-    ("particles-25", Form::Particles(25), 6),
-    ("mode and curvature", Form::Laplace, 8),
-];
-/// Rules that choose nodes in wind, with a mixture of four Gaussians over position and rate.
-const RULES: [(&str, SelectionRule, usize); 3] = [
-    ("information", SelectionRule::MutualInformation, 0),
-    ("covariance", SelectionRule::Covariance, 1),
-    ("mahalanobis", SelectionRule::Mahalanobis, 2),
+/// Forms of the belief and rules that choose nodes in wind, each with its place in the palette: one colour in every figure, whether
+/// the rate is known or not.
+const KINDS: [(&str, Form, Option<SelectionRule>, usize); 11] = [
+    ("exact", Form::Raw, None, 0),
+    ("gmm-4", Form::Mixture(4), None, 1),
+    ("gaussian", Form::Gaussian, None, 2),
+    ("gaussian-9", Form::Gaussian, None, 3),
+    ("lpg-2x5", LPG, None, 4),
+    ("lpg-1x5", ONE_LPG, None, 5),
+    ("particles-25", Form::Particles(25), None, 6),
+    ("mode and curvature", Form::Laplace, None, 8),
+    ("information", Form::Mixture(4), Some(SelectionRule::MutualInformation), 0),
+    ("covariance", Form::Mixture(4), Some(SelectionRule::Covariance), 1),
+    ("mahalanobis", Form::Mixture(4), Some(SelectionRule::Mahalanobis), 2),
 ];
 /// Ends the name of a form that travels without the rate.
 const KNOWN: &str = " known rate";
@@ -155,6 +146,8 @@ pub(super) struct Scheme {
     pub form: Form,
     pub known_rate: bool,
     pub rule: SelectionRule,
+    /// Its place in the palette; 7 is the threshold's.
+    pub place: usize,
     pub most_nodes: usize,
     pub wire: Wire,
 }
@@ -163,12 +156,8 @@ impl Scheme {
     /// The scheme of this name. A form travels in still air to the node that is nearest by Mahalanobis distance, a rule chooses in wind; any
     /// other name is that of raw records.
     pub fn new(name: &'static str, example: Example, range: f64) -> Self {
-        let form = FORMS.iter().find(|form| form.0 == name.trim_end_matches(KNOWN));
-        let rule = RULES.iter().find(|rule| rule.0 == name);
-        let form = match rule {
-            Some(_) => Form::Mixture(4),
-            None => form.map_or(Form::Raw, |form| form.1),
-        };
+        let kind = KINDS.iter().find(|kind| kind.0 == name.trim_end_matches(KNOWN));
+        let (form, rule, place) = kind.map_or((Form::Raw, None, 8), |kind| (kind.1, kind.2, kind.3));
         Self {
             name,
             example,
@@ -176,7 +165,8 @@ impl Scheme {
             range,
             form,
             known_rate: name.ends_with(KNOWN),
-            rule: rule.map_or(SelectionRule::Mahalanobis, |rule| rule.1),
+            rule: rule.unwrap_or(SelectionRule::Mahalanobis),
+            place,
             most_nodes: match (rule, form) {
                 (Some(_), _) => 14,
                 (None, Form::Raw) => 30,
@@ -195,19 +185,11 @@ impl Scheme {
         }
     }
 
-    /// Its place in the palette; 7 is the threshold's.
-    pub fn place(&self) -> usize {
-        let name = self.name.trim_end_matches(KNOWN);
-        let mut places = FORMS.iter().map(|f| (f.0, f.2)).chain(RULES.iter().map(|r| (r.0, r.2)));
-        places.find(|(known, _)| *known == name).map_or(8, |(_, place)| place)
-    }
-
     /// The search of this scheme from the alarm node.
     pub fn search(&self, settings: &Settings) -> Result<Search, Error> {
-        let rate = if self.known_rate {
-            RateModel::Known(RATE)
-        } else {
-            settings.joint()?
+        let rate = match self.known_rate {
+            true => RateModel::Known(RATE),
+            false => settings.joint()?,
         };
         let alarm = Vector2::from(ALARM);
         let mut search = Search::new(&alarm, settings.prior_sd, search_box(), rate, self.example.threshold)?;
@@ -227,19 +209,18 @@ impl Scheme {
         Ok(search)
     }
 
-    /// Runs it on the network and noise of a trial, which all schemes share.
-    pub fn run(&self, settings: &Settings, trial: Trial) -> Result<Outcome, Error> {
-        let network = Network::draw(trial.stream, settings.nodes, self.range)?;
+    /// Runs it on the network and noise of a trial's stream, which all schemes share.
+    pub fn run(&self, settings: &Settings, stream: Stream) -> Result<Outcome, Error> {
+        let network = Network::draw(stream, settings.nodes, self.range)?;
         let sensor = self.example.sensor(self.windy)?;
         let source = self.example.source();
         let positions = network.deployment.positions();
         let samples = |node: usize| {
-            let mut rng = trial.stream.named("noise").indexed(node as u64).rng();
+            let mut rng = stream.named("noise").indexed(node as u64).rng();
             sensor.sample(&mut rng, &positions[node], &source, RATE)
         };
-        self.search(settings)?
-            .run(&sensor, &network.deployment, &network.graph, network.start, samples)
-            .map_err(Error::failed)
+        let search = self.search(settings)?;
+        Ok(search.run(&sensor, &network.deployment, &network.graph, network.start, samples)?)
     }
 }
 
@@ -261,14 +242,12 @@ impl Track {
             // The first samples already excluded the prior.
             errors.push((Vector2::from(ALARM) - source).norm());
         }
+        let nees = steps.iter().filter_map(|s| s.estimate.mahalanobis_squared(source).ok());
         Self {
             status: outcome.status,
             errors,
             log10_determinants: steps.iter().map(|s| s.log10_determinant).collect(),
-            nees: steps
-                .iter()
-                .filter_map(|s| s.estimate.mahalanobis_squared(source).ok())
-                .collect(),
+            nees: nees.collect(),
             bits: outcome.bits(),
         }
     }
@@ -293,18 +272,22 @@ pub(super) const CHAINS: &str = "diffusive-chains";
 pub(super) fn tracks(context: &Context<'_>, settings: &Settings, schemes: &[Scheme]) -> Result<Vec<Vec<Track>>, Error> {
     // All that the tracks of a scheme depend on; its name is none of it.
     let name = |scheme: &Scheme| {
-        let unnamed = Scheme { name: "", ..*scheme };
+        let unnamed = Scheme {
+            name: "",
+            place: 0,
+            ..*scheme
+        };
         format!("{CHAINS} {} {settings:?} {unnamed:?}", context.seed)
     };
     let own = Kept::default();
     let kept = context.kept.unwrap_or(&own);
     let missing: Vec<&Scheme> = select(schemes, |s| kept.get::<Vec<Track>>(&name(s)).is_none()).collect();
     let every = |trial: Trial| -> Result<Vec<Track>, Error> {
-        let one = |scheme: &&Scheme| Ok(Track::of(&scheme.run(settings, trial)?, &scheme.example.source()));
+        let one = |scheme: &&Scheme| Ok(Track::of(&scheme.run(settings, trial.stream)?, &scheme.example.source()));
         missing.iter().map(one).collect()
     };
     if !missing.is_empty() {
-        let new = context.trials(CHAINS, settings.trials, every)?;
+        let new = context.trials(context.stream(CHAINS), settings.trials, every)?;
         for (i, scheme) in missing.iter().enumerate() {
             kept.put(name(scheme), new.iter().map(|tracks| tracks[i].clone()).collect::<Vec<_>>());
         }
@@ -327,24 +310,20 @@ pub(super) fn quantile(values: impl IntoIterator<Item = f64>, at: f64) -> Option
 }
 
 /// The median with a standard error from the spread of the middle half, as of a normal sample: `1.2533 sd / sqrt n`.
-pub(super) fn median(values: &[f64]) -> Option<Measured> {
+pub(super) fn median(values: impl IntoIterator<Item = f64>) -> Option<Measured> {
+    let values: Vec<f64> = values.into_iter().collect();
     let value = quantile(values.iter().copied(), 0.5)?;
     let spread = quantile(values.iter().copied(), 0.75)? - quantile(values.iter().copied(), 0.25)?;
     // Counts may have no spread in their middle half; half a count is the least that they resolve.
     let discrete = values.iter().all(|v| v.fract() == 0.0);
     let deviation = (spread / 1.349).max(if discrete { 0.5 } else { 0.0 });
     let n = values.len() as f64;
-    Some(Measured {
-        value,
-        standard_error: (values.len() > 1).then(|| 1.2533 * deviation / n.sqrt()),
-    })
+    Some(Measured::new(value, (values.len() > 1).then(|| 1.2533 * deviation / n.sqrt())))
 }
 
 /// A fraction of trials. Its standard error is that of the fraction with one success and one failure more, never zero.
 pub(super) fn fraction(hits: usize, trials: usize) -> Measured {
     let smoothed = (hits as f64 + 1.0) / (trials as f64 + 2.0);
-    Measured {
-        value: hits as f64 / trials.max(1) as f64,
-        standard_error: (trials > 1).then(|| (smoothed * (1.0 - smoothed) / trials as f64).sqrt()),
-    }
+    let error = (trials > 1).then(|| (smoothed * (1.0 - smoothed) / trials as f64).sqrt());
+    Measured::new(hits as f64 / trials.max(1) as f64, error)
 }

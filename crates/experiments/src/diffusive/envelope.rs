@@ -5,17 +5,15 @@ use crate::prelude::*;
 use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
 use fewbits_models::diffusion::contour_radius;
 use fewbits_numerics::ArgumentError;
-use nalgebra::Vector2;
 
 parameters! {
-    /// Settings of the envelope.
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [1..=100_000] = 200 => quick 8 => "Random deployments.",
         nodes: usize [1..=20] = 3 => "Nodes that have sampled.",
         time: f64 [1.0..=1e5] = 100.0 => "Time of the envelope after the release began, s.",
         threshold: f64 [1e-8..=1.0] = 1e-4 => "Threshold of the concentration, kg/m^3.",
     }
+    cost |p| Cost::new(p.trials as f64 * 0.1, 1e6);
 }
 
 rows! {
@@ -49,13 +47,12 @@ rows! {
     }
 }
 
-/// The envelope.
 pub struct Envelope;
 
 impl Parameters {
-    fn area(&self, trial: Trial) -> Result<Option<Area>, Error> {
+    fn area(&self, stream: Stream) -> Result<Option<Area>, Error> {
         let settings = Settings::default();
-        let outcome = Scheme::exact(self.nodes).run(&settings, trial)?;
+        let outcome = Scheme::exact(self.nodes).run(&settings, stream)?;
         let Some(posterior) = outcome.posterior else {
             return Ok(None);
         };
@@ -79,16 +76,14 @@ impl Figure for Envelope {
          (example B, rate unknown): probability of exceedance, and how often the 90 per cent band of the eastern \
          edge holds the true edge.");
 
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(p.trials as f64 * 0.1, 1e6)
-    }
-
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let radius = contour_radius(RATE, p.threshold, p.time, DIFFUSIVITY)?;
         let source = B.source();
         let edges = [("east", 0.0), ("north", 90.0_f64)];
-        let all = context.trials(CHAINS, p.trials, |trial| {
-            let Some(area) = p.area(trial)? else { return Ok(None) };
+        let all = context.trials(context.stream(CHAINS), p.trials, |trial| {
+            let Some(area) = p.area(trial.stream)? else {
+                return Ok(None);
+            };
             let quantile = |angle: f64, level| p.reach(&area, &Vector2::zeros(), angle.to_radians(), level);
             let bands = edges.map(|(_, angle)| Ok((quantile(angle, 0.05)?, quantile(angle, 0.95)?)));
             let bands = bands.into_iter().collect::<Result<Vec<_>, Error>>()?;
@@ -98,16 +93,16 @@ impl Figure for Envelope {
         let coverage = edges.iter().enumerate().filter_map(|(i, (edge, angle))| {
             let truth = radius + source.x * angle.to_radians().cos() + source.y * angle.to_radians().sin();
             let hits = select(&known, |bands| (bands[i].0..=bands[i].1).contains(&truth)).count();
-            let widths: Vec<f64> = known.iter().map(|bands| bands[i].1 - bands[i].0).collect();
+            let widths = known.iter().map(|bands| bands[i].1 - bands[i].0);
             Some(Coverage {
                 edge,
                 coverage: fraction(hits, known.len()),
-                width_median: median(&widths)?,
+                width_median: median(widths)?,
                 radius,
             })
         });
         let coverage = coverage.collect();
-        let first = p.area(context.monte_carlo(context.stream(CHAINS), 1).trial(0))?;
+        let first = p.area(context.stream(CHAINS).indexed(0))?;
         let (mut band, mut exceedance) = (Vec::new(), Vec::new());
         if let Some(area) = first {
             let origin = Vector2::from(ALARM);
@@ -162,11 +157,7 @@ impl Figure for Envelope {
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let at = |i: usize| (i as f64 + 0.5) * (100.0 / GRID as f64);
         let centres: Vec<f64> = (0..GRID).map(at).collect();
-        let values = rows
-            .exceedance
-            .chunks(GRID)
-            .map(|row| row.iter().map(|e| e.p_exceed).collect())
-            .collect();
+        let values = rows.exceedance.iter().map(|e| e.p_exceed);
         let radius = rows.coverage.first().map_or(0.0, |c| c.radius);
         let circle = (0..=72).map(|i| {
             let angle = f64::from(i * 5).to_radians();

@@ -92,20 +92,19 @@ impl PlanBelief {
         instrument: &Instrument,
         report: Report,
         rates: [f64; 2],
-        sensors: &[(&[f64], &[f64])],
-        cells: usize,
+        responses: &[Vec<f64>],
+        readings: &[Vec<f64>],
     ) -> Result<Self, fewbits_numerics::ArgumentError> {
         let (logs, misfit) = match report {
-            Report::Value => of_values(instrument, rates, sensors, cells)?,
-            Report::Word => of_words(instrument, rates, sensors, cells),
+            Report::Value => of_values(instrument, rates, responses, readings)?,
+            Report::Word => of_words(instrument, rates, responses, readings),
         };
         let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut weights: Vec<f64> = logs.iter().map(|log| (log - largest).exp()).collect();
         let total: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|weight| *weight /= total);
-        let mode = (0..cells)
-            .max_by(|a, b| weights[*a].total_cmp(&weights[*b]))
-            .unwrap_or(0);
+        let mode = (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]));
+        let mode = mode.unwrap_or(0);
         Ok(Self { weights, mode, misfit })
     }
 
@@ -119,14 +118,14 @@ impl PlanBelief {
 fn of_values(
     instrument: &Instrument,
     [low, high]: [f64; 2],
-    sensors: &[(&[f64], &[f64])],
-    cells: usize,
+    responses: &[Vec<f64>],
+    readings: &[Vec<f64>],
 ) -> Result<(Vec<f64>, f64), fewbits_numerics::ArgumentError> {
-    let range = RateRange::new(low, high)?;
-    let samples: Vec<f64> = sensors.iter().flat_map(|sensor| sensor.1.iter().copied()).collect();
-    let (mut logs, mut smallest) = (Vec::with_capacity(cells), f64::INFINITY);
-    for cell in 0..cells {
-        let responses: Vec<f64> = sensors.iter().flat_map(|(a, y)| y.iter().map(|_| a[cell])).collect();
+    let (range, samples) = (RateRange::new(low, high)?, readings.concat());
+    let (mut logs, mut smallest) = (Vec::new(), f64::INFINITY);
+    for cell in 0..responses[0].len() {
+        let each = responses.iter().zip(readings);
+        let responses: Vec<f64> = each.flat_map(|(a, y)| y.iter().map(|_| a[cell])).collect();
         let sums = RateSums::of(&samples, &responses, instrument.noise)?;
         logs.push(sums.log_marginal(&range));
         let best = (sums.correlation / sums.response.max(f64::MIN_POSITIVE)).clamp(low, high);
@@ -140,29 +139,28 @@ fn of_values(
 fn of_words(
     instrument: &Instrument,
     [low, high]: [f64; 2],
-    sensors: &[(&[f64], &[f64])],
-    cells: usize,
+    responses: &[Vec<f64>],
+    readings: &[Vec<f64>],
 ) -> (Vec<f64>, f64) {
     // One row for each sensor: all its words together.
-    let row = |readings: &[f64]| {
+    let row = |readings: &Vec<f64>| {
         let mut row = vec![0.0; NODES];
         for word in readings.iter().map(|y| instrument.word(*y)) {
-            row.iter_mut()
-                .zip(&instrument.table[word])
-                .for_each(|(sum, log)| *sum += log);
+            let logs = row.iter_mut().zip(&instrument.table[word]);
+            logs.for_each(|(sum, log)| *sum += log);
         }
         row
     };
-    let rows: Vec<Vec<f64>> = sensors.iter().map(|sensor| row(sensor.1)).collect();
+    let rows: Vec<Vec<f64>> = readings.iter().map(row).collect();
     // Nodes in the logarithm of the rate, weighted by the uniform density.
     let count = ((high / low).ln() / RATE_STEP).ceil() as usize;
     let rate = |k: usize| low * (high / low).powf((k as f64 + 0.5) / count as f64);
     let rates: Vec<f64> = (0..count).map(rate).collect();
     // Logarithms of probabilities: what some sensors say of a cell and a rate bounds from above what all say.
     let add = |terms: &mut [f64], cell: usize, of: std::ops::Range<usize>| {
-        for (row, sensor) in rows[of.clone()].iter().zip(&sensors[of]) {
+        for (row, response) in rows[of.clone()].iter().zip(&responses[of]) {
             for (term, rate) in terms.iter_mut().zip(&rates) {
-                *term += instrument.look_up(row, rate * sensor.0[cell]);
+                *term += instrument.look_up(row, rate * response[cell]);
             }
         }
         terms.iter().copied().fold(f64::NEG_INFINITY, f64::max)
@@ -172,9 +170,9 @@ fn of_words(
         let mut terms = vec![0.0; count];
         (add(&mut terms, cell, 0..first), cell, terms)
     };
-    let mut open: Vec<(f64, usize, Vec<f64>)> = (0..cells).map(begin).collect();
+    let mut open: Vec<(f64, usize, Vec<f64>)> = (0..responses[0].len()).map(begin).collect();
     open.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let (mut best, mut logs) = ((f64::NEG_INFINITY, 0, 1.0), vec![f64::NEG_INFINITY; cells]);
+    let (mut best, mut logs) = ((f64::NEG_INFINITY, 0, 1.0), vec![f64::NEG_INFINITY; responses[0].len()]);
     for (mut bound, cell, mut terms) in open {
         let mut done = first;
         while done < rows.len() && bound > best.0 - HOPELESS {
@@ -196,14 +194,11 @@ fn of_words(
     // The logarithm of the likelihood has known moments if the best cell and rate are true.
     let (log, cell, rate) = best;
     let (mut mean, mut variance) = (0.0, 0.0);
-    for (responses, readings) in sensors {
-        let entropy = instrument.words(rate * responses[cell]).map(|p| {
-            if p > 0.0 {
-                [p * p.ln(), p * p.ln().powi(2)]
-            } else {
-                [0.0; 2]
-            }
-        });
+    for (responses, readings) in responses.iter().zip(readings) {
+        let terms = |p: f64| [p * p.ln(), p * p.ln().powi(2)];
+        let entropy = instrument
+            .words(rate * responses[cell])
+            .map(|p| if p > 0.0 { terms(p) } else { [0.0; 2] });
         let first: f64 = entropy.iter().map(|e| e[0]).sum();
         mean += readings.len() as f64 * first;
         variance += readings.len() as f64 * (entropy.iter().map(|e| e[1]).sum::<f64>() - first * first);

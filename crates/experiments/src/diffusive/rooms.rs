@@ -4,7 +4,6 @@ use super::building::{Building, CELL, Case, Placement};
 use super::common::{fraction, median};
 use super::plan_belief::Report;
 use crate::prelude::*;
-use rand::RngExt;
 
 /// Misfit above which a model is said to be wrong: one in a hundred, if it is right.
 const WRONG: f64 = 2.6;
@@ -12,14 +11,16 @@ const WRONG: f64 = 2.6;
 const CREDIBLE: f64 = 0.9;
 
 parameters! {
-    /// Settings of all placements.
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [2..=10_000] = 100 => quick 6 => "Random placements of source and sensors.",
         sensors: usize [4..=200] = 40 => "Sensors.",
         visit_trials: u64 [2..=10_000] = 20 => quick 3 => "Placements in which sensors are visited one after the other.",
         visit_sensors: usize [4..=1000] = 160 => quick 20 => "Sensors of such a placement.",
     }
+    cost |p| {
+        let (placements, visits) = (p.trials as f64 * p.sensors as f64, p.visit_trials as f64 * p.visit_sensors as f64);
+        Cost::new(0.1 * placements + 0.03 * visits, 1e8)
+    };
 }
 
 rows! {
@@ -76,13 +77,11 @@ const VISITED: Case = Case {
 /// Where the source of the map is: in the large room, away from its door.
 const SHOWN: [f64; 3] = [11.1, 8.1, 0.0];
 
-/// What is kept of one placement.
-struct Trialled {
+/// What is kept of one belief.
+struct Judged {
     error: f64,
     covered: bool,
     alarm: bool,
-    free_error: f64,
-    free_alarm: bool,
 }
 
 /// The number of sensors after which errors are shown.
@@ -90,7 +89,6 @@ const STOPS: [usize; 7] = [2, 5, 10, 20, 40, 80, 160];
 /// Two cells and a rounding.
 const TWO_CELLS: f64 = 2.0 * CELL + 1e-9;
 
-/// The figure.
 pub struct Rooms;
 
 impl Figure for Rooms {
@@ -99,11 +97,6 @@ impl Figure for Rooms {
          random cell, its rate is unknown. Beliefs over the cells by the true geometry (finite volumes, adjoint \
          solutions) and by free space, errors over the sensors visited, and how often either is right. Noise is a \
          share of the median concentration. Truth and model share their cells.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        let (placements, visits) = (p.trials as f64 * p.sensors as f64, p.visit_trials as f64 * p.visit_sensors as f64);
-        Cost::new(0.1 * placements + 0.03 * visits, 1e8)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let buildings = [Building::new(false)?, Building::new(true)?];
@@ -116,25 +109,24 @@ impl Figure for Rooms {
                     report,
                     readings,
                 };
-                let all =
-                    context.trials("diffusive-rooms", p.trials, |trial| self.one(building, &case, p, trial.stream))?;
+                let stream = context.stream("diffusive-rooms");
+                let all = context.trials(stream, p.trials, |it| one(building, &case, p.sensors, it.stream))?;
                 found.push(summary(case.name(), &all));
             }
         }
         let building = &buildings[usize::from(VISITED.windy)];
         let stops: Vec<usize> = STOPS.into_iter().filter(|stop| *stop <= p.visit_sensors).collect();
-        let tracks = context.trials("diffusive-rooms-visits", p.visit_trials, |trial| {
+        let tracks = context.trials(context.stream("diffusive-rooms-visits"), p.visit_trials, |trial| {
             let placement = Placement::draw(building, &VISITED, p.visit_sensors, None, trial.stream)?;
-            let (visited, mut errors) = ((0..p.visit_sensors).collect::<Vec<_>>(), Vec::new());
-            for stop in &stops {
-                let [belief, free] = [0, 1].map(|model| placement.belief(model, &VISITED, &visited[..*stop]));
-                errors.push([placement.error(building, &belief?), placement.error(building, &free?)]);
-            }
-            Ok(errors)
+            let after = |stop: &usize| -> Result<[f64; 2], Error> {
+                let [belief, free] = [0, 1].map(|model| placement.belief(model, *stop));
+                Ok([placement.error(&belief?), placement.error(&free?)])
+            };
+            stops.iter().map(after).collect::<Result<Vec<_>, _>>()
         })?;
         let mut visits = Vec::new();
         for (k, sensors) in stops.iter().enumerate() {
-            let of = |model: usize| median(&tracks.iter().filter_map(|t| Some(t.get(k)?[model])).collect::<Vec<_>>());
+            let of = |model: usize| median(tracks.iter().filter_map(|t| Some(t.get(k)?[model])));
             if let (Some(error), Some(error_free)) = (of(0), of(1)) {
                 visits.push(Visit {
                     sensors: *sensors,
@@ -146,7 +138,7 @@ impl Figure for Rooms {
         Ok(Rows {
             found,
             visits,
-            map: self.map(building, p, context)?,
+            map: map(building, p, context)?,
         })
     }
 
@@ -195,17 +187,12 @@ impl Figure for Rooms {
         let along = runs(columns, lines, wall).map(|(line, from, to)| [from, to, line, line + 1]);
         let across = runs(lines, columns, |line, column| wall(column, line))
             .map(|(column, from, to)| [column, column + 1, from, to]);
-        let walls: Vec<(f64, f64, f64, f64)> = along
+        let walls = along
             .chain(across)
-            .map(|sides| sides.map(|side| CELL * side as f64))
-            .map(|[left, right, bottom, top]| (left, right, bottom, top))
-            .collect();
+            .map(|sides| sides.map(|side| CELL * side as f64).into());
+        let walls: Vec<(f64, f64, f64, f64)> = walls.collect();
         let panel = |title: &str, belief: fn(&Square) -> f64| {
-            let values = rows
-                .map
-                .chunks(columns)
-                .map(|line| line.iter().map(belief).collect())
-                .collect();
+            let values = rows.map.iter().map(belief);
             Panel::new(title, Axis::linear("x / m").between(0.0, 15.0), Axis::linear("y / m").between(0.0, 10.0))
                 .with(Layer::heat("share of the largest", centres(columns), centres(lines), values))
                 .with(Layer::boxes("wall", walls.clone()).coloured(7))
@@ -230,53 +217,48 @@ impl Figure for Rooms {
     }
 }
 
-impl Rooms {
-    fn one(&self, building: &Building, case: &Case, p: &Parameters, stream: Stream) -> Result<Trialled, Error> {
-        let placement = Placement::draw(building, case, p.sensors, None, stream)?;
-        let everyone: Vec<usize> = (0..p.sensors).collect();
-        let [belief, free] = [
-            placement.belief(0, case, &everyone)?,
-            placement.belief(1, case, &everyone)?,
-        ];
-        // The region of exactly nine tenths: the cell that would exceed it belongs to it by chance.
+/// What the true geometry and free space make of one placement.
+fn one(building: &Building, case: &Case, sensors: usize, stream: Stream) -> Result<[Judged; 2], Error> {
+    let placement = Placement::draw(building, case, sensors, None, stream)?;
+    // The region of exactly nine tenths: the cell that would exceed it belongs to it by chance.
+    let chance: f64 = stream.named("region").rng().random();
+    let judge = |model| -> Result<Judged, Error> {
+        let belief = placement.belief(model, sensors)?;
         let [above, own] = belief.above(placement.source);
-        let chance: f64 = stream.named("region").rng().random();
-        Ok(Trialled {
-            error: placement.error(building, &belief),
+        Ok(Judged {
+            error: placement.error(&belief),
             covered: above + chance * own < CREDIBLE,
             alarm: belief.misfit > WRONG,
-            free_error: placement.error(building, &free),
-            free_alarm: free.misfit > WRONG,
         })
-    }
+    };
+    Ok([judge(0)?, judge(1)?])
+}
 
-    fn map(&self, building: &Building, p: &Parameters, context: &Context<'_>) -> Result<Vec<Square>, Error> {
-        let domain = building.domain();
-        let source = domain.locate(SHOWN).map_err(Error::failed)?;
-        let placement =
-            Placement::draw(building, &VISITED, p.sensors, Some(source), context.stream("diffusive-rooms-map"))?;
-        let everyone: Vec<usize> = (0..p.sensors).collect();
-        let share = |model: usize| -> Result<Vec<f64>, Error> {
-            let belief = placement.belief(model, &VISITED, &everyone)?;
-            let largest = belief.weights[belief.mode];
-            Ok(domain.spread(&belief.weights.iter().map(|weight| weight / largest).collect::<Vec<_>>(), 0.0))
-        };
-        let [belief, free] = [share(0)?, share(1)?];
-        let square = |cell: usize| {
-            let [x, y, _] = domain.grid().centre(cell);
-            let number = domain.number(cell);
-            Square {
-                x,
-                y,
-                wall: number.is_none(),
-                belief: belief[cell],
-                belief_free: free[cell],
-                sensor: number.is_some_and(|number| placement.sensors.contains(&number)),
-                source: number == Some(source),
-            }
-        };
-        Ok((0..domain.grid().cells()).map(square).collect())
-    }
+fn map(building: &Building, p: &Parameters, context: &Context<'_>) -> Result<Vec<Square>, Error> {
+    let domain = building.domain();
+    let source = domain.locate(SHOWN)?;
+    let placement =
+        Placement::draw(building, &VISITED, p.sensors, Some(source), context.stream("diffusive-rooms-map"))?;
+    let share = |model: usize| -> Result<Vec<f64>, Error> {
+        let belief = placement.belief(model, p.sensors)?;
+        let largest = belief.weights[belief.mode];
+        Ok(domain.spread(&belief.weights.iter().map(|weight| weight / largest).collect::<Vec<_>>(), 0.0))
+    };
+    let [belief, free] = [share(0)?, share(1)?];
+    let square = |cell: usize| {
+        let [x, y, _] = domain.grid().centre(cell);
+        let number = domain.number(cell);
+        Square {
+            x,
+            y,
+            wall: number.is_none(),
+            belief: belief[cell],
+            belief_free: free[cell],
+            sensor: number.is_some_and(|number| placement.sensors.contains(&number)),
+            source: number == Some(source),
+        }
+    };
+    Ok((0..domain.grid().cells()).map(square).collect())
 }
 
 /// In each of `lines` lines of `length` squares, the first and one past the last square of every run that holds `chosen`.
@@ -292,17 +274,16 @@ fn runs(
     })
 }
 
-fn summary(case: String, all: &[Trialled]) -> Found {
-    let count = |holds: fn(&Trialled) -> bool| all.iter().filter(|result| holds(result)).count();
-    let misses = count(|r| r.free_error > TWO_CELLS);
-    let errors: Vec<f64> = all.iter().map(|result| result.error).collect();
+fn summary(case: String, all: &[[Judged; 2]]) -> Found {
+    let count = |holds: fn(&[Judged; 2]) -> bool| all.iter().filter(|result| holds(result)).count();
+    let misses = count(|[_, free]| free.error > TWO_CELLS);
     Found {
         case,
-        within_two_cells: fraction(count(|r| r.error <= TWO_CELLS), all.len()),
-        coverage: fraction(count(|r| r.covered), all.len()),
-        false_alarms: fraction(count(|r| r.alarm), all.len()),
-        free_within_two_cells: fraction(count(|r| r.free_error <= TWO_CELLS), all.len()),
-        free_misses_flagged: fraction(count(|r| r.free_error > TWO_CELLS && r.free_alarm), misses),
-        error_median: median(&errors).unwrap_or_else(|| Measured::mean(&Moments::default())),
+        within_two_cells: fraction(count(|[own, _]| own.error <= TWO_CELLS), all.len()),
+        coverage: fraction(count(|[own, _]| own.covered), all.len()),
+        false_alarms: fraction(count(|[own, _]| own.alarm), all.len()),
+        free_within_two_cells: fraction(count(|[_, free]| free.error <= TWO_CELLS), all.len()),
+        free_misses_flagged: fraction(count(|[_, free]| free.error > TWO_CELLS && free.alarm), misses),
+        error_median: median(all.iter().map(|[own, _]| own.error)).unwrap_or_else(|| Moments::default().into()),
     }
 }

@@ -2,13 +2,10 @@
 
 use super::common::{A, ALARM, CHAINS, Network, Scheme, Settings};
 use crate::prelude::*;
-use crate::schema::label;
 use fewbits_densities::ellipse;
 use fewbits_diffusive::{Outcome, SelectionRule};
 
 parameters! {
-    /// Which deployment is shown.
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         deployment: u64 [..=1_000_000] = 0 => "Number of the random deployment.",
         nodes: usize [2..=100_000] = 300 => "Deployed nodes.",
@@ -17,51 +14,26 @@ parameters! {
 }
 
 impl Parameters {
-    fn settings(&self) -> Settings {
-        Settings {
-            nodes: self.nodes,
-            ..Settings::default()
-        }
-    }
-
-    fn trial(&self, context: &Context<'_>) -> Trial {
-        context.monte_carlo(context.stream(CHAINS), 1).trial(self.deployment)
+    fn stream(&self, context: &Context<'_>) -> Stream {
+        context.stream(CHAINS).indexed(self.deployment)
     }
 
     fn search(&self, scheme: &Scheme, context: &Context<'_>) -> Result<Outcome, Error> {
-        scheme.run(&self.settings(), self.trial(context))
-    }
-
-    fn network(&self, context: &Context<'_>) -> Result<Network, Error> {
-        Network::draw(self.trial(context).stream, self.nodes, self.range)
+        let settings = Settings {
+            nodes: self.nodes,
+            ..Settings::default()
+        };
+        scheme.run(&settings, self.stream(context))
     }
 }
-
-/// What happens at a node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Event {
-    /// The belief arrives.
-    Receive,
-    /// The node samples.
-    Sample,
-    /// Belief times likelihood, projected.
-    Update,
-    /// The determinant is compared with the threshold.
-    Test,
-    /// The next node is chosen.
-    Select,
-    /// The belief is sent on.
-    Send,
-    /// The search ends.
-    Stop,
-}
-label!(Event);
 
 rows! {
     pub struct TraceRow {
         step: usize => "Nodes that have sampled, this one included.",
         node: usize => "The node.",
-        event: Event => "What happens.",
+        /// The belief is received; the node samples; the belief is updated and its determinant tested; the next node is selected and the
+        /// belief sent on, or the search stops.
+        event: &'static str,
         bytes: f64 ["bytes"] => "Bytes that travel.",
         log10_determinant: Option<f64> => "Decimal logarithm of the determinant, where it is tested.",
     }
@@ -92,17 +64,17 @@ impl Figure for Trace {
                 });
             };
             if i > 0 {
-                push(Event::Receive, step.bits as f64 / 8.0, None);
+                push("receive", step.bits as f64 / 8.0, None);
             }
-            push(Event::Sample, 0.0, None);
-            push(Event::Update, 0.0, None);
-            push(Event::Test, 0.0, Some(step.log10_determinant));
+            push("sample", 0.0, None);
+            push("update", 0.0, None);
+            push("test", 0.0, Some(step.log10_determinant));
             match outcome.steps.get(i + 1) {
                 Some(next) => {
-                    push(Event::Select, 0.0, None);
-                    push(Event::Send, next.bits as f64 / 8.0, None);
+                    push("select", 0.0, None);
+                    push("send", next.bits as f64 / 8.0, None);
                 }
-                None => push(Event::Stop, 0.0, None),
+                None => push("stop", 0.0, None),
             }
         }
         Ok(rows)
@@ -111,9 +83,9 @@ impl Figure for Trace {
     fn claims(&self, _: &Parameters, rows: &Vec<TraceRow>, claims: &mut Claims) {
         let here = claims.at_defaults();
         let count = |event| rows.iter().filter(|r| r.event == event).count();
-        let balance = count(Event::Send) as f64 - count(Event::Receive) as f64;
+        let balance = count("send") as f64 - count("receive") as f64;
         claims.near("delivered", "what is sent is received", balance, 0.0, 0.0);
-        claims.near("one-end", "the search ends once", count(Event::Stop) as f64, 1.0, 0.0);
+        claims.near("one-end", "the search ends once", count("stop") as f64, 1.0, 0.0);
         let last = rows.iter().filter_map(|r| r.log10_determinant).next_back();
         here.below("sharp", "the last determinant is below the threshold", last, A.threshold.log10());
     }
@@ -121,7 +93,7 @@ impl Figure for Trace {
     fn plot(&self, _: &Parameters, rows: &Vec<TraceRow>) -> Plot {
         let tests = points(rows, |r| (r.step as f64, r.log10_determinant));
         let mut total = 0.0;
-        let bytes = select(rows, |r| r.event == Event::Receive)
+        let bytes = select(rows, |r| r.event == "receive")
             .map(|r| {
                 total += r.bytes;
                 (r.step as f64, total)
@@ -169,7 +141,7 @@ impl Figure for Route {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<RouteRows, Error> {
         let outcome = p.search(&Scheme::new("exact", A, p.range), context)?;
-        let network = p.network(context)?;
+        let network = Network::draw(p.stream(context), p.nodes, p.range)?;
         let positions = network.deployment.positions();
         let route = outcome.steps.iter().enumerate().map(|(i, step)| {
             let c = step.estimate.covariance();
@@ -213,8 +185,8 @@ impl Figure for Route {
         panel = panel
             .with(Layer::points("deployed", rows.field.iter().map(|p| (p.x, p.y)).collect()).styled(7, Marker::Circle));
         for r in &rows.route {
-            let covariance = nalgebra::Matrix2::new(r.variance_x, r.covariance_xy, r.covariance_xy, r.variance_y);
-            let belief = fewbits_core::Gaussian::new(nalgebra::Vector2::new(r.estimate_x, r.estimate_y), covariance);
+            let covariance = Matrix2::new(r.variance_x, r.covariance_xy, r.covariance_xy, r.variance_y);
+            let belief = Gaussian::new(Vector2::new(r.estimate_x, r.estimate_y), covariance);
             if let Ok(Ok(outline)) = belief.map(|b| ellipse(&b, 0.9, 90)) {
                 let mut closed: Vec<(f64, f64)> = outline.iter().map(|p| (p[0], p[1])).collect();
                 closed.extend(closed.first().copied());

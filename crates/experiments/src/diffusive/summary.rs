@@ -49,39 +49,31 @@ rows! {
 /// Medians and bands of a scheme's searches, node by node; searches that have ended keep their last values.
 pub(super) fn curve(scheme: &Scheme, tracks: &[Track]) -> Vec<Curve> {
     let longest = tracks.iter().map(|t| t.nodes()).max().unwrap_or(0);
-    (1..=longest)
-        .filter_map(|step| {
-            let at = |values: &Vec<f64>| values.get(step - 1).or(values.last()).copied();
-            let errors = || tracks.iter().filter_map(|t| at(&t.errors));
-            Some(Curve {
-                scheme: scheme.name,
-                range: scheme.range,
-                step,
-                err_med: quantile(errors(), 0.5)?,
-                err_q10: quantile(errors(), 0.1)?,
-                err_q90: quantile(errors(), 0.9)?,
-                sqrt_err_med: quantile(errors().map(f64::sqrt), 0.5)?,
-                log10det_med: median(
-                    &tracks
-                        .iter()
-                        .filter_map(|t| at(&t.log10_determinants))
-                        .collect::<Vec<_>>(),
-                ),
-                nees_med: quantile(tracks.iter().filter_map(|t| at(&t.nees)), 0.5)?,
-            })
+    let after = |step: usize| {
+        let at = |values: &Vec<f64>| values.get(step - 1).or(values.last()).copied();
+        let errors = || tracks.iter().filter_map(|t| at(&t.errors));
+        Some(Curve {
+            scheme: scheme.name,
+            range: scheme.range,
+            step,
+            err_med: quantile(errors(), 0.5)?,
+            err_q10: quantile(errors(), 0.1)?,
+            err_q90: quantile(errors(), 0.9)?,
+            sqrt_err_med: quantile(errors().map(f64::sqrt), 0.5)?,
+            log10det_med: median(tracks.iter().filter_map(|t| at(&t.log10_determinants))),
+            nees_med: quantile(tracks.iter().filter_map(|t| at(&t.nees)), 0.5)?,
         })
-        .collect()
+    };
+    (1..=longest).filter_map(after).collect()
 }
 
 /// How the searches of a scheme ended.
 pub(super) fn summary(scheme: &Scheme, settings: &Settings, tracks: &[Track]) -> Result<Summary, Error> {
     let reached: Vec<&Track> = tracks.iter().filter(|t| t.converged()).collect();
     let counts: Vec<f64> = reached.iter().map(|t| t.nodes() as f64).collect();
-    let finals: Vec<f64> = tracks.iter().map(|t| t.final_error()).collect();
-    let third: Vec<f64> = tracks
+    let third = tracks
         .iter()
-        .filter_map(|t| t.errors.get(2).or(t.errors.last()).copied())
-        .collect();
+        .filter_map(|t| t.errors.get(2).or(t.errors.last()).copied());
     let wrong = |t: &Track| t.final_error() > 1.0;
     let rate = scheme.search(settings)?.rate;
     Ok(Summary {
@@ -89,15 +81,15 @@ pub(super) fn summary(scheme: &Scheme, settings: &Settings, tracks: &[Track]) ->
         range: scheme.range,
         scalars: scheme.form.scalars(&rate),
         reach: fraction(reached.len(), tracks.len()),
-        nodes_median: median(&counts),
-        nodes_mean: (!counts.is_empty()).then(|| Measured::mean(&counts.iter().copied().collect())),
+        nodes_median: median(counts.iter().copied()),
+        nodes_mean: (!counts.is_empty()).then(|| counts.iter().copied().collect()),
         nodes_q10: quantile(counts.iter().copied(), 0.1),
         nodes_q90: quantile(counts.iter().copied(), 0.9),
-        final_err_median: median(&finals),
+        final_err_median: median(tracks.iter().map(|t| t.final_error())),
         wrong: fraction(tracks.iter().filter(|t| wrong(t)).count(), tracks.len()),
         converged_wrong: fraction(reached.iter().filter(|t| wrong(t)).count(), reached.len()),
         nees_median: quantile(tracks.iter().filter_map(|t| t.nees.last().copied()), 0.5),
-        err_after_3: median(&third),
-        bytes_median: median(&reached.iter().map(|t| t.bits as f64 / 8.0).collect::<Vec<_>>()),
+        err_after_3: median(third),
+        bytes_median: median(reached.iter().map(|t| t.bits as f64 / 8.0)),
     })
 }

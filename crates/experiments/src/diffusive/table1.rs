@@ -2,11 +2,8 @@
 
 use crate::prelude::*;
 use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite_terms, multi_indices};
-use nalgebra::{Matrix2, Vector2};
 
 parameters! {
-    /// The covariance at which the table is evaluated.
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         variance1: f64 [0.01..=100.0] = 2.0 => "Variance of the first coordinate.",
         variance2: f64 [0.01..=100.0] = 0.5 => "Variance of the second coordinate.",
@@ -76,11 +73,9 @@ impl Figure for Table1 {
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let w = p.precision()?;
         let mean_of = |terms: &[([usize; 2], f64)]| -> Result<f64, Error> {
-            let parts = terms.iter().map(|(power, c)| {
-                gaussian_moment(*power, &Vector2::zeros(), &w)
-                    .map(|moment| c * moment)
-                    .map_err(Error::failed)
-            });
+            let parts = terms
+                .iter()
+                .map(|(power, c)| Ok(c * gaussian_moment(*power, &Vector2::zeros(), &w)?));
             parts.sum()
         };
         let (mut monomials, mut means) = (Vec::new(), Vec::new());
@@ -88,13 +83,8 @@ impl Figure for Table1 {
             let terms = hermite_terms(nu, &w)?;
             let misprint = printed(nu, &w);
             let mut powers: Vec<[usize; 2]> = terms.iter().map(|t| t.0).collect();
-            powers.extend(
-                misprint
-                    .iter()
-                    .flatten()
-                    .map(|t| t.0)
-                    .filter(|power| !terms.iter().any(|t| t.0 == *power)),
-            );
+            let further = misprint.iter().flatten().map(|t| t.0);
+            powers.extend(further.filter(|power| !terms.iter().any(|t| t.0 == *power)));
             let value = |list: &[([usize; 2], f64)], power| list.iter().find(|t| t.0 == power).map_or(0.0, |t| t.1);
             for power in powers {
                 monomials.push(Monomial {

@@ -1,22 +1,18 @@
 //! What else could be unknown, and what the model of the rate does to the estimate.
 
-use super::common::{B, Settings, search_box};
+use super::common::{B, Settings, median, search_box};
 use crate::prelude::*;
-use fewbits_core::{Belief, Gaussian};
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
-use nalgebra::{Matrix2, Vector2};
-use rand::RngExt;
 
 parameters! {
-    /// Settings of both tables.
-    #[derive(Debug, Clone)]
     pub struct Parameters {
         trials: u64 [1..=10_000] = 50 => quick 4 => "Random layouts about the source for the comparison of rate models.",
         nodes: Vec<usize> [1..=100; 1..] = vec![6, 20] => "Nodes of a layout.",
         radius: f64 [1.0..=1000.0] = 25.0 => "Radius of a layout, m.",
     }
+    cost |p| Cost::new(p.trials as f64 * p.nodes.iter().sum::<usize>() as f64 * 0.02, 1e6);
 }
 
 rows! {
@@ -59,7 +55,6 @@ fn models() -> Result<[(&'static str, RateModel); 3], Error> {
     ])
 }
 
-/// What else could be unknown.
 pub struct Unknowns;
 
 impl Figure for Unknowns {
@@ -67,10 +62,6 @@ impl Figure for Unknowns {
         "Left: the Cramer-Rao bound of x for six nodes on the way to the source of example B with more and more unknowns. Right: posterior \
          means of noise-free samples by what is assumed of the rate. Redrawing the rate for every sample, as the \
          paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(p.trials as f64 * p.nodes.iter().sum::<usize>() as f64 * 0.02, 1e6)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let sensor = B.sensor(false)?;
@@ -105,37 +96,30 @@ impl Figure for Unknowns {
         let mut rows = Vec::new();
         for count in &p.nodes {
             let kinds = models()?;
-            let all = context.trials("diffusive-layouts", p.trials, |trial| {
+            let all = context.trials(context.stream("diffusive-layouts"), p.trials, |trial| {
                 let mut rng = trial.stream.rng();
                 let mut draw = || -> Result<Record, Error> {
                     let angle = std::f64::consts::TAU * rng.random::<f64>();
                     let rho = p.radius * rng.random::<f64>().sqrt();
                     let node = source + Vector2::new(angle.cos(), angle.sin()) * rho.max(3.0);
-                    let clean: Vec<f64> = sensor
-                        .responses(&node, &source)?
-                        .iter()
-                        .map(|a| a + sensor.bias())
-                        .collect();
-                    sensor.record(&node, &clean).map_err(Error::failed)
+                    let responses = sensor.responses(&node, &source)?;
+                    let clean: Vec<f64> = responses.iter().map(|a| a + sensor.bias()).collect();
+                    Ok(sensor.record(&node, &clean)?)
                 };
                 let records = (0..*count).map(|_| draw()).collect::<Result<Vec<_>, _>>()?;
                 let variance = Settings::default().prior_sd.powi(2);
                 let prior = Prior::Exact(Gaussian::new(*records[0].node(), Matrix2::identity() * variance)?);
-                kinds
-                    .iter()
-                    .map(|(_, model)| {
-                        let likelihood = SourceLikelihood::new(records.clone(), *model)?;
-                        let posterior =
-                            Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())?;
-                        let width = posterior.cells.covariance().determinant().powf(0.25);
-                        Ok(((posterior.cells.mean() - source).norm(), width))
-                    })
-                    .collect::<Result<Vec<_>, Error>>()
+                let under = |(_, model): &(&str, RateModel)| -> Result<(f64, f64), Error> {
+                    let likelihood = SourceLikelihood::new(records.clone(), *model)?;
+                    let cells =
+                        Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())?.cells;
+                    Ok(((cells.mean() - source).norm(), cells.covariance().determinant().powf(0.25)))
+                };
+                kinds.iter().map(under).collect::<Result<Vec<_>, _>>()
             })?;
             for (k, (model, _)) in kinds.iter().enumerate() {
                 let of = |f: fn(&(f64, f64)) -> f64| -> Measured {
-                    let values: Vec<f64> = all.iter().map(|trial| f(&trial[k])).collect();
-                    super::common::median(&values).unwrap_or_else(|| Measured::mean(&Moments::default()))
+                    median(all.iter().map(|trial| f(&trial[k]))).unwrap_or_else(|| Moments::default().into())
                 };
                 rows.push(Model {
                     model,

@@ -4,7 +4,6 @@ use super::common::{Plant, plants};
 use crate::prelude::*;
 use fewbits_dymbo::published::iterated;
 use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain};
-use fewbits_monte_carlo::parallel;
 
 parameters! {
     pub struct Parameters {
@@ -40,7 +39,6 @@ rows! {
     }
 }
 
-/// Loss against word length.
 pub struct WordLength;
 
 impl Figure for WordLength {
@@ -50,12 +48,7 @@ impl Figure for WordLength {
          batch words and by successive bits; the usual formula for the latter promises too much.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        let cases: Vec<_> = p
-            .plants
-            .iter()
-            .flat_map(|at| p.bits.iter().map(move |bits| (*at, *bits)))
-            .collect();
-        let row = |&(plant, bits): &(Plant, usize)| {
+        let row = |&(&plant, &bits): &(&Plant, &usize)| {
             let filter = MultibitFilter::new(plant.model()?, bits)?;
             let (kalman, c) = (plant.kalman_variance()?, filter.information());
             let riccati = plant.model()?.steady_state(c)?.filtered_variance;
@@ -84,7 +77,7 @@ impl Figure for WordLength {
             })
         };
         Ok(Rows {
-            words: parallel::try_map(&cases, row)?,
+            words: parallel::try_map(&product(&p.plants, &p.bits), row)?,
             successive: (1..=5).map(successive).collect::<Result<_, Error>>()?,
         })
     }

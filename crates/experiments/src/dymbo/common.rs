@@ -1,7 +1,6 @@
 //! What the Dymbo figures share.
 
 use crate::prelude::*;
-use fewbits_core::Gaussian;
 use fewbits_dymbo::ScalarPlant;
 use std::f64::consts::FRAC_2_PI;
 
@@ -9,10 +8,8 @@ parameters! {
     /// A plant of unit measurement noise.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub(super) point struct Plant {
-        /// Plant coefficient; one bit cannot hold an unstable plant.
-        pub(super) a: f64 [-1.0..=1.0],
-        /// Process variance over measurement variance.
-        pub(super) gamma: f64 [1e-6..=1e3],
+        pub(super) a: f64 [-1.0..=1.0] => "Plant coefficient; one bit cannot hold an unstable plant.",
+        pub(super) gamma: f64 [1e-6..=1e3] => "Process variance over measurement variance.",
     }
 }
 

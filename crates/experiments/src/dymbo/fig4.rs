@@ -3,7 +3,6 @@
 use super::common::{Plant, each, log_spaced};
 use crate::prelude::*;
 use fewbits_dymbo::{chain, filtered_variance, steady};
-use fewbits_monte_carlo::parallel;
 use std::f64::consts::{FRAC_2_PI, PI};
 
 fn hundredths(i: i32) -> f64 {
@@ -44,7 +43,6 @@ fn loss(a: f64, gamma: f64) -> Option<f64> {
     steady::loss(&Plant { a, gamma }.model().ok()?).ok()
 }
 
-/// Contours of the plane.
 pub struct Loss;
 
 impl Figure for Loss {

@@ -2,14 +2,11 @@
 
 use super::common::{Plant, each, plants};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Sensing, Sign};
+use fewbits_core::Sign;
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{DymboFilter, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value};
 use fewbits_filters::kalman;
-use nalgebra::Vector1;
 use std::f64::consts::FRAC_2_PI;
-
-const ID: &str = "dymbo-fig5";
 
 parameters! {
     pub struct Parameters {
@@ -101,65 +98,57 @@ fn simulate(
     Ok(run)
 }
 
-/// Exact and predicted curves, and the first run.
 pub struct Convergence;
 
 impl Figure for Convergence {
-    figure!(Parameters => Rows, ID, "Convergence after a fine first message", "Ribeiro and Giannakis, Fig. 5",
+    figure!(Parameters => Rows, "dymbo-fig5", "Convergence after a fine first message", "Ribeiro and Giannakis, Fig. 5",
         "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
          exact (lines); the third curve starts from first message and stationary prior together. The level differs \
          by the loss, the convergence by a step or two (erratum dymbo-12); for the slow plant the first message without the \
          prior is worse than the prior alone (erratum dymbo-13).");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let plants = each(p.a, &p.gamma);
-        let models = plants
-            .iter()
-            .map(|plant| Ok((*plant, plant.model()?, plant.stationary()?)))
-            .collect::<Result<Vec<_>, Error>>()?;
-        let name = |at: &(Plant, _, _)| at.0.gamma.to_string();
-        let empty = |_: &_| vec![[Moments::default(); 4]; p.steps + 1];
-        let sums = context.sweep(ID, p.trials, &models, name, empty, |(_, model, prior), sums, trial| {
-            for (sums, step) in sums.iter_mut().zip(simulate(model, prior, p, trial.stream)?) {
-                let squared = |belief: &Gaussian<1>| (belief.mean()[0] - step.truth).powi(2);
-                let [kalman, dymbo, informed] = [&step.kalman, &step.dymbo, &step.informed].map(squared);
-                let numbers = [kalman, dymbo, informed, informed / step.informed.covariance()[0]];
-                sums.iter_mut().zip(numbers).for_each(|(sum, number)| sum.add(number));
-            }
-            Ok::<_, fewbits_dymbo::Error>(())
-        })?;
         let (mut errors, mut path) = (Vec::new(), Vec::new());
-        for ((plant, model, prior), sums) in models.iter().zip(&sums) {
-            let transient = first_message_transient(model, p.tau, 1.0 + p.tau * p.tau / 12.0, p.steps)?;
+        for plant in each(p.a, &p.gamma) {
+            let (model, prior) = (plant.model()?, plant.stationary()?);
+            let stream = context.stream(self.about().id).named(&plant.gamma.to_string());
+            let sums = context.moments(stream, p.trials, |trial| {
+                let numbers = simulate(&model, &prior, p, trial.stream)?.into_iter().flat_map(|step| {
+                    let squared = |belief: &Gaussian<1>| (belief.mean()[0] - step.truth).powi(2);
+                    let [kalman, dymbo, informed] = [&step.kalman, &step.dymbo, &step.informed].map(squared);
+                    [kalman, dymbo, informed, informed / step.informed.covariance()[0]]
+                });
+                Ok(numbers.collect::<Vec<_>>())
+            })?;
+            let transient = first_message_transient(&model, p.tau, 1.0 + p.tau * p.tau / 12.0, p.steps)?;
             let mut kf_pred = 1.0;
-            for (n, (exact, sums)) in transient.iter().zip(sums).enumerate() {
+            for (n, (exact, sums)) in transient.iter().zip(sums.chunks(4)).enumerate() {
                 if n > 0 {
                     kf_pred = filtered_variance(model.dynamics().predict_variance(kf_pred), 1.0, 1.0);
                 }
-                let dymbo_mse = Measured::mean(&sums[1]);
+                let dymbo_mse = Measured::from(sums[1]);
                 errors.push(Row {
-                    plant: *plant,
+                    plant,
                     n,
                     trials: p.trials,
                     kf_pred,
-                    kf_mse: Measured::mean(&sums[0]),
+                    kf_mse: sums[0].into(),
                     dymbo_pred: exact.filtered_variance,
                     dymbo_mse,
                     dymbo_exact: exact.mse,
                     dymbo_minf: plant.sign_bit_variance()?,
                     kf_minf: plant.kalman_variance()?,
-                    nees: Measured {
-                        value: dymbo_mse.value / exact.filtered_variance,
-                        standard_error: dymbo_mse.standard_error.map(|se| se / exact.filtered_variance),
-                    },
-                    informed_mse: Measured::mean(&sums[2]),
-                    informed_nees: Measured::mean(&sums[3]),
+                    nees: Measured::new(
+                        dymbo_mse.value / exact.filtered_variance,
+                        dymbo_mse.standard_error.map(|se| se / exact.filtered_variance),
+                    ),
+                    informed_mse: sums[2].into(),
+                    informed_nees: sums[3].into(),
                 });
             }
-            let run = context.monte_carlo(context.stream(ID).named(&plant.gamma.to_string()), p.trials);
-            let steps = run.single(0, |trial| simulate(model, prior, p, trial.stream))?;
+            let steps = simulate(&model, &prior, p, stream.indexed(0))?;
             path.extend(steps.into_iter().enumerate().map(|(n, step)| Point {
-                plant: *plant,
+                plant,
                 n,
                 theta: step.truth,
                 kf: step.kalman.mean()[0],

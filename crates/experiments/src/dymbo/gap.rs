@@ -2,12 +2,9 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_core::Link;
 use fewbits_dymbo::chain::{self, MessageLaw};
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain, tree};
-
-const ID: &str = "dymbo-gap";
 
 parameters! {
     pub struct Parameters {
@@ -59,13 +56,12 @@ fn steady_excess<F: ScalarFilter + Clone + Sync>(
     trials: u64,
 ) -> Result<Measured, Error> {
     let exact = exact_filter(filter.plant(), BURN + MEASURED)?;
-    let sum = context.tally(stream, trials, Moments::default, |sum, trial| {
+    let sums = context.moments(stream, trials, |trial| {
         let mut rng = trial.stream.fast_rng();
         let mut twin = Twin::new(&mut rng, filter.clone(), &exact)?;
-        sum.add(twin.steady_excess(&mut rng, BURN, MEASURED)?);
-        Ok::<_, fewbits_dymbo::Error>(())
+        Ok([twin.steady_excess(&mut rng, BURN, MEASURED)?])
     })?;
-    Ok(Measured::mean(&sum))
+    Ok(sums[0].into())
 }
 
 /// Exact steady error when the filter's gain is multiplied by a factor: it is that at another predicted variance.
@@ -92,11 +88,10 @@ fn tuned_gain_mse(filter: &DymboFilter) -> Result<f64, Error> {
     scaled_gain_mse(filter, 0.5 * (low + high))
 }
 
-/// Exact gaps: after a first message and in the steady state.
 pub struct GapToExact;
 
 impl Figure for GapToExact {
-    figure!(Parameters => Rows, ID, "The gap to the exact posterior", "",
+    figure!(Parameters => Rows, "dymbo-gap", "The gap to the exact posterior", "",
         "Mean squared distance of the sign-bit filter's estimate from the exact posterior mean given the same bits, as a \
          fraction of its error: after a first message over all bit strings (left), and in the steady state (right). \
          It stays near a hundredth of a percent: that is all that a better estimator of the present state could gain.");
@@ -119,12 +114,11 @@ impl Figure for GapToExact {
                 let filter = MultibitFilter::new(model, bits)?;
                 let settled = model.steady_state(filter.information())?;
                 let error = chain::stationary(&model, &MessageLaw::word(&filter, settled.predicted_variance)?)?;
-                let stream = context.stream(ID).named(&format!("{plant} {bits}"));
+                let stream = context.stream(self.about().id).named(&format!("{plant} {bits}"));
                 let one = DymboFilter::new(model);
-                let excess = if bits == 1 {
-                    steady_excess(&one, context, stream, p.trials)?
-                } else {
-                    steady_excess(&filter, context, stream, p.trials)?
+                let excess = match bits {
+                    1 => steady_excess(&one, context, stream, p.trials)?,
+                    _ => steady_excess(&filter, context, stream, p.trials)?,
                 };
                 steady.push(Steady {
                     plant,

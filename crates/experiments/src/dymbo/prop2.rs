@@ -1,7 +1,6 @@
 //! The fine first message: what it brings, and the variance to start from.
 
 use crate::prelude::*;
-use fewbits_core::Gaussian;
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{RoundedSample, ScalarPlant, first_message_mse};
 

@@ -1,15 +1,12 @@
 //! Process noise learnt from single bits.
 
 use crate::prelude::*;
-use fewbits_core::{BitString, Dynamics, Gaussian, Link, Observation, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{BitString, SchemeNode, SensorNode};
 use fewbits_dymbo::SignBit;
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, NoiseLearning, Reporting, Slot};
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
-use nalgebra::Vector1;
-use rand::{Rng, RngExt};
 
-const ID: &str = "dymbo-selftuning";
 /// Plants of the specification: coefficient, process variance, measurement variance.
 const PLANTS: [[f64; 3]; 5] = [
     [0.9, 0.5, 1.0],
@@ -37,55 +34,45 @@ parameters! {
 
 /// A plant, and whether its process variance jumps after half of a run.
 #[derive(Clone, Copy)]
-struct Scene {
-    plant: [f64; 3],
-    jumps: bool,
-}
+struct Scene([f64; 3], bool);
 
 impl Scene {
     fn name(&self) -> String {
-        let [a, q, r] = self.plant;
-        format!("{a} {q} {r}{}", if self.jumps { " jump" } else { "" })
+        let [a, q, r] = self.0;
+        format!("{a} {q} {r}{}", if self.1 { " jump" } else { "" })
     }
 }
 
 /// What receives the bits.
 #[derive(Clone, Copy, PartialEq)]
-enum Receiver {
-    /// A centre whose stated process variance is right times `process` at the beginning, its noise right times `noise`.
-    Centre {
-        process: f64,
-        noise: f64,
-        learns: bool,
-        inverted: bool,
-    },
-    /// The centre that is told of the jump.
-    Informed { inverted: bool },
+enum Kind {
+    /// A centre that keeps to the variances it supposes.
+    Fixed,
+    /// One that learns the process variance.
+    Learning,
+    /// One that is told of the jump.
+    Informed,
     /// Adaptive delta modulation of the samples.
     Delta,
 }
 
-const RECEIVERS: [(&str, Receiver); 11] = {
-    const fn centre(process: f64, noise: f64, learns: bool, inverted: bool) -> Receiver {
-        Receiver::Centre {
-            process,
-            noise,
-            learns,
-            inverted,
-        }
-    }
+/// Name and kind, the supposed process variance and noise variance in parts of the right ones, whether bits are inverted.
+type Receiver = (&'static str, Kind, f64, f64, bool);
+
+const RECEIVERS: [Receiver; 11] = {
+    use Kind::{Delta, Fixed, Informed, Learning};
     [
-        ("knows Q", Receiver::Informed { inverted: false }),
-        ("Q / 9", centre(1.0 / FACTOR, 1.0, false, false)),
-        ("9 Q", centre(FACTOR, 1.0, false, false)),
-        ("Q learnt from Q / 9", centre(1.0 / FACTOR, 1.0, true, false)),
-        ("Q learnt from 9 Q", centre(FACTOR, 1.0, true, false)),
-        ("Q right, not learnt", centre(1.0, 1.0, false, false)),
-        ("Q learnt, r / 4", centre(1.0, 0.25, true, false)),
-        ("Q learnt, 4 r", centre(1.0, 4.0, true, false)),
-        ("knows Q, inverted bits", Receiver::Informed { inverted: true }),
-        ("Q learnt from Q / 9, inverted bits", centre(1.0 / FACTOR, 1.0, true, true)),
-        ("adaptive delta modulation", Receiver::Delta),
+        ("knows Q", Informed, 1.0, 1.0, false),
+        ("Q / 9", Fixed, 1.0 / FACTOR, 1.0, false),
+        ("9 Q", Fixed, FACTOR, 1.0, false),
+        ("Q learnt from Q / 9", Learning, 1.0 / FACTOR, 1.0, false),
+        ("Q learnt from 9 Q", Learning, FACTOR, 1.0, false),
+        ("Q right, not learnt", Fixed, 1.0, 1.0, false),
+        ("Q learnt, r / 4", Learning, 1.0, 0.25, false),
+        ("Q learnt, 4 r", Learning, 1.0, 4.0, false),
+        ("knows Q, inverted bits", Informed, 1.0, 1.0, true),
+        ("Q learnt from Q / 9, inverted bits", Learning, 1.0 / FACTOR, 1.0, true),
+        ("adaptive delta modulation", Delta, 1.0, 1.0, false),
     ]
 };
 
@@ -102,27 +89,18 @@ fn seated(rng: &mut dyn Rng, [a, q, r]: [f64; 3], flips: f64, prior: &Gaussian<1
 }
 
 /// Mean squared errors over the second half, over the windows after its beginning, and `ln` of the learnt factor.
-fn one_run(scene: &Scene, receiver: Receiver, p: &Parameters, stream: Stream) -> Result<[f64; 7], Error> {
+fn one_run(scene: &Scene, receiver: &Receiver, p: &Parameters, stream: Stream) -> Result<[f64; 7], Error> {
     let mut world = stream.named("world").fast_rng();
     let (mut rng, mut air) = (stream.named("filter").fast_rng(), stream.named("air").fast_rng());
-    let [a, q, r] = scene.plant;
-    let (before, after) = (Ar1::new(a, q)?, Ar1::new(a, if scene.jumps { FACTOR * q } else { q })?);
+    let Scene([a, q, r], jumps) = *scene;
+    let (before, after) = (Ar1::new(a, q)?, Ar1::new(a, if jumps { FACTOR * q } else { q })?);
     let sensor = LinearSensor::<1, 1>::direct(r)?;
     let prior = Gaussian::scalar(0.0, before.stationary_variance()?)?;
-    let mut state: Vector1<f64> = fewbits_core::Belief::sample(&prior, &mut world);
-    let (process, noise, inverted) = match receiver {
-        Receiver::Centre {
-            process,
-            noise,
-            inverted,
-            ..
-        } => (process, noise, inverted),
-        Receiver::Informed { inverted } => (1.0, 1.0, inverted),
-        Receiver::Delta => (1.0, 1.0, false),
-    };
+    let mut state: Vector1<f64> = prior.sample(&mut world);
+    let (_, kind, process, noise, inverted) = *receiver;
     let flips = if inverted { p.flips } else { 0.0 };
     let mut centre = seated(&mut rng, [a, process * q, noise * r], flips, &prior)?;
-    if let Receiver::Centre { learns: true, .. } = receiver {
+    if kind == Kind::Learning {
         centre = centre.learning_noise(NoiseLearning {
             gain: p.gain,
             ..NoiseLearning::DEFAULT
@@ -133,12 +111,12 @@ fn one_run(scene: &Scene, receiver: Receiver, p: &Parameters, stream: Stream) ->
     let half = WINDOWS[4];
     let (mut sums, mut window) = ([0.0; 7], 0);
     for k in 0..2 * half {
-        if k == half && scene.jumps && matches!(receiver, Receiver::Informed { .. }) {
+        if k == half && jumps && kind == Kind::Informed {
             centre = seated(&mut rng, [a, FACTOR * q, r], flips, &centre.estimate())?;
         }
         state = if k < half { &before } else { &after }.propagate(&mut world, &state);
         let sample = sensor.sample(&mut world, &state);
-        if receiver == Receiver::Delta {
+        if kind == Kind::Delta {
             let sign = (sample[0] - a * estimate).signum();
             step *= if sign == last { JAYANT } else { 1.0 / JAYANT };
             (estimate, last) = (a * estimate + sign * step, sign);
@@ -180,31 +158,24 @@ rows! {
     }
 }
 
-/// Errors of receivers that learn the process variance from bits.
 pub struct SelfTuning;
 
 impl Figure for SelfTuning {
-    figure!(Parameters => Vec<Row>, ID, "Process noise from single bits", "",
+    figure!(Parameters => Vec<Row>, "dymbo-selftuning", "Process noise from single bits", "",
         "Error of one-bit tracking in parts of the filter that knows the process variance Q: with Q nine times too small or large, with Q \
          learnt from products of neighbouring signs, with a wrong measurement variance, with inverted bits, and of adaptive delta \
          modulation (left, five plants); after Q has become nine times as large (right).");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
-        let still = PLANTS.map(|plant| Scene { plant, jumps: false });
-        let jump = Scene {
-            plant: PLANTS[1],
-            jumps: true,
-        };
-        let scenes: Vec<Scene> = still.into_iter().chain([jump]).collect();
-        let trial = |scene: &Scene, of: &(&str, Receiver), it: Trial| one_run(scene, of.1, p, it.stream);
-        let found = context.compare(ID, p.trials, &scenes, Scene::name, &RECEIVERS, trial)?;
+        let still = PLANTS.map(|plant| Scene(plant, false));
+        let scenes: Vec<Scene> = still.into_iter().chain([Scene(PLANTS[1], true)]).collect();
         let mut rows = Vec::new();
-        for (scene, found) in scenes.iter().zip(&found) {
-            for (i, (receiver, kind)) in RECEIVERS.iter().enumerate() {
-                let windows = if scene.jumps { 1..6 } else { 0..1 };
-                let inverted =
-                    matches!(kind, Receiver::Centre { inverted: true, .. } | Receiver::Informed { inverted: true });
-                let knows = if inverted { 8 } else { 0 };
+        for scene in &scenes {
+            let stream = context.stream(self.about().id).named(&scene.name());
+            let found = context.compare(stream, p.trials, &RECEIVERS, |of, it| one_run(scene, of, p, it.stream))?;
+            for (i, (receiver, .., inverted)) in RECEIVERS.iter().enumerate() {
+                let windows = if scene.1 { 1..6 } else { 0..1 };
+                let knows = if *inverted { 8 } else { 0 };
                 for of in windows {
                     let (own, known) = (found.moments(i, of), found.moments(knows, of).mean());
                     // Runs are paired: the error of the ratio is that of the difference.
@@ -217,10 +188,7 @@ impl Figure for SelfTuning {
                         to: WINDOWS[of.wrapping_sub(1).min(4)],
                         trials: p.trials,
                         error: Measured::root_mean(&own),
-                        ratio: Measured {
-                            value: ratio,
-                            standard_error: Some(spread / (2.0 * known * ratio)),
-                        },
+                        ratio: Measured::new(ratio, spread / (2.0 * known * ratio)),
                         learnt: found.moments(i, 6).mean().exp(),
                     });
                 }
@@ -239,11 +207,7 @@ impl Figure for SelfTuning {
             r.map(|r| r.ratio.value - 4.0 * r.ratio.standard_error.unwrap_or(0.0) - bound)
         };
         for (plant, learnt) in PLANTS.iter().zip(LEARNT) {
-            let plant = Scene {
-                plant: *plant,
-                jumps: false,
-            }
-            .name();
+            let plant = Scene(*plant, false).name();
             for from in ["Q / 9", "9 Q"] {
                 let what = format!(
                     "{plant}: Q learnt from {from} costs at most what the specification found, to .02 and 4 standard errors"
@@ -252,19 +216,10 @@ impl Figure for SelfTuning {
                 here.at_most(format!("learnt-{plant}-{from}"), what, less(own, learnt + 0.02), 0.0);
             }
             let what = format!("{plant}: learning beats the filter whose Q is nine times too small");
-            let pair = at(&plant, "Q / 9", 1000).zip(at(&plant, "Q learnt from Q / 9", 1000));
-            here.above(
-                format!("pays-{plant}"),
-                what,
-                pair.map(|(fixed, own)| fixed.ratio.value - own.ratio.value),
-                0.0,
-            );
+            let [fixed, own] = ["Q / 9", "Q learnt from Q / 9"].map(|of| at(&plant, of, 1000).map(|r| r.ratio));
+            here.above(format!("pays-{plant}"), what, minus(fixed, own), 0.0);
         }
-        let jump = Scene {
-            plant: PLANTS[1],
-            jumps: true,
-        }
-        .name();
+        let jump = Scene(PLANTS[1], true).name();
         let what = "a jump is followed: over the last 600 steps learning is within 10 % of knowing";
         here.at_most("jump", what, less(at(&jump, "Q learnt from Q / 9", 1000), 1.10), 0.0);
         let what = "a jump is not followed without learning";
@@ -282,18 +237,14 @@ impl Figure for SelfTuning {
             "Q learnt from Q / 9, inverted bits",
             "adaptive delta modulation",
         ];
-        let names = PLANTS.map(|plant| Scene { plant, jumps: false }.name());
+        let names = PLANTS.map(|plant| Scene(plant, false).name());
         let place = |r: &Row| names.iter().position(|name| *name == r.plant).unwrap_or(0) as f64;
         let y = || Axis::log("error over that of knowing Q");
         let mut still = Panel::new("a, Q, r", Axis::categories("", names.clone()), y());
         for (i, name) in shown.iter().enumerate() {
             let marks = rows.iter().filter(|r| r.receiver == *name && names.contains(&r.plant));
             let shift = 0.09 * (i as f64 - 3.5);
-            let marker = if name.contains("learnt") {
-                Marker::Circle
-            } else {
-                Marker::Cross
-            };
+            let marker = [Marker::Cross, Marker::Circle][usize::from(name.contains("learnt"))];
             still = still.with(Layer::measured(*name, marks, |r| (place(r) + shift, r.ratio)).styled(i, marker));
         }
         let mut jump = Panel::new("Q jumps to 9 Q", Axis::log("steps since the jump"), y());

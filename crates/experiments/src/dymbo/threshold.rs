@@ -2,12 +2,9 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Scheme, Sensing, Sign};
+use fewbits_core::{Scheme, Sign};
 use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
-use nalgebra::Matrix1;
-
-const ID: &str = "dymbo-threshold";
 
 parameters! {
     pub struct Parameters {
@@ -79,17 +76,13 @@ fn relative(a: &[f64], b: &[f64]) -> Measured {
     let ratio = b.iter().sum::<f64>() / a.iter().sum::<f64>();
     let mean = a.iter().sum::<f64>() / a.len() as f64;
     let residuals: Moments = a.iter().zip(b).map(|(a, b)| (b - ratio * a) / mean).collect();
-    Measured {
-        value: ratio - 1.0,
-        ..(&residuals).into()
-    }
+    Measured::new(ratio - 1.0, Measured::from(residuals).standard_error)
 }
 
-/// Errors of the three rules.
 pub struct ThresholdPlace;
 
 impl Figure for ThresholdPlace {
-    figure!(Parameters => Vec<Row>, ID, "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
+    figure!(Parameters => Vec<Row>, "dymbo-threshold", "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
         "Steady mean squared error with the threshold at the prediction a theta_hat(n-1), at theta_hat(n-1) as equation \
          (14) prints it with the update unchanged, and the same with the exact update (erratum dymbo-1). For a > 0 the mistake \
          hides within the width of a line; for a < 0 it is a catastrophe.");
@@ -98,8 +91,8 @@ impl Figure for ThresholdPlace {
         let mut rows = Vec::new();
         for &plant in &p.plants {
             let (model, start) = (plant.model()?, plant.stationary()?);
-            let run = context.monte_carlo(context.stream(ID).named(&plant.to_string()), p.trials);
-            let runs = run.run(|trial| one_run(&model, &start, p, trial.stream))?;
+            let stream = context.stream(self.about().id).named(&plant.to_string());
+            let runs = context.trials(stream, p.trials, |trial| Ok(one_run(&model, &start, p, trial.stream)?))?;
             let of = |what: usize, rule: usize| runs.iter().map(|run| run[what][rule]).collect::<Vec<f64>>();
             rows.extend(RULES.iter().enumerate().map(|(i, (rule, _))| Row {
                 plant,

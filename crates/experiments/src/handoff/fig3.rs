@@ -4,7 +4,6 @@ use crate::prelude::*;
 use fewbits_core::Columns;
 use fewbits_densities::{Component, Mixture};
 use fewbits_mixture_codec::quadrature::QuadratureGrid;
-use nalgebra::{Matrix1, Vector1};
 
 parameters! {
     pub struct Parameters {

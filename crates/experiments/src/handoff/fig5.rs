@@ -3,7 +3,7 @@
 use super::filters::{PARTICLES, SENSORS, STEPS, Smoothing, Truth, VARIANCE, posteriors, single, uncompressed};
 use super::world::World;
 use crate::prelude::*;
-use fewbits_densities::ellipse;
+use fewbits_densities::{KernelEstimate, ellipse};
 use fewbits_mixture_codec::Reduction;
 
 parameters! {
@@ -65,17 +65,17 @@ impl Figure for Fig5 {
                 ellipses.extend(closed.map(|&[x, y]| Outline { t, component, x, y }));
             }
         }
-        let far = |sum: &mut Moments, trial: Trial| {
-            for estimate in posteriors(trial.stream)? {
-                sum.add(Truth::new(&estimate).kl(&single(&estimate)?));
-            }
-            Ok::<_, Error>(())
+        let far = |trial: Trial| -> Result<Vec<f64>, Error> {
+            let kl = |estimate: &KernelEstimate<2>| Ok(Truth::new(estimate).kl(&single(estimate)?));
+            posteriors(trial.stream)?.iter().map(kl).collect()
         };
-        let distance = context.tally(stream.named("worlds"), p.trials, Moments::default, far)?;
+        let distances = context.trials(stream.named("worlds"), p.trials, far)?;
         Ok(Rows {
             particles,
             ellipses,
-            gaussian: vec![Distance { kl: (&distance).into() }],
+            gaussian: vec![Distance {
+                kl: distances.into_iter().flatten().collect(),
+            }],
         })
     }
 

@@ -12,6 +12,7 @@ parameters! {
     pub struct Parameters {
         trials: u64 [2..=100_000] = 200 => quick 4 => "Worlds.",
     }
+    cost |p| Cost::new(0.1 * p.trials as f64, 5e3 * p.trials as f64);
 }
 
 rows! {
@@ -48,21 +49,23 @@ rows! {
 
 /// Figure 6(a) or (b).
 pub struct Fig6 {
-    id: &'static str,
-    title: &'static str,
+    about: About,
     components: usize,
 }
 
-/// Five components.
+const fn about(id: &'static str, title: &'static str) -> About {
+    About::of(id, title, "compressed particle filter, Section 6, Figure 6").showing(
+        "Bounds on the error after t lossy hand-overs. The ML bound grows in proportion to time, those of KL and L1 exponentially; \
+         the DR bounds (ours) hold for every data sequence and stay below what is trivial.",
+    )
+}
+
 pub static FIG6A: Fig6 = Fig6 {
-    id: "handoff-fig6a",
-    title: "Bounds with five components",
+    about: about("handoff-fig6a", "Bounds with five components"),
     components: 5,
 };
-/// Ten components.
 pub static FIG6B: Fig6 = Fig6 {
-    id: "handoff-fig6b",
-    title: "Bounds with ten components",
+    about: about("handoff-fig6b", "Bounds with ten components"),
     components: 10,
 };
 
@@ -108,10 +111,8 @@ impl Fig6 {
                 log(&account(totals[c][..t].iter().zip(&run[c]).map(rest))) / LN_10
             };
             let error = (worlds - 1.0) * runs.iter().map(without).collect::<Moments>().standard_error();
-            Measured {
-                value: log(&typical(c, t)) / LN_10,
-                standard_error: Some(error).filter(|error| runs.len() > 1 && error.is_finite()),
-            }
+            let error = Some(error).filter(|error| runs.len() > 1 && error.is_finite());
+            Measured::new(log(&typical(c, t)) / LN_10, error)
         };
         let bounds = (1..=STEPS).map(|t| {
             let own = |c: usize| runs.iter().map(move |run| account(run[c][..t].iter().copied()));
@@ -171,22 +172,7 @@ const EXPONENTIAL: [(&str, Of<Bound, f64>); 2] = [
 ];
 
 impl Figure for Fig6 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: self.id,
-            title: self.title,
-            caption: "Bounds on the error after t lossy hand-overs. The ML bound grows in proportion to time, those of KL and L1 \
-                      exponentially; the DR bounds (ours) hold for every data sequence and stay below what is trivial.",
-            source: "compressed particle filter, Section 6, Figure 6",
-        }
-    }
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(0.1 * p.trials as f64, 5e3 * p.trials as f64)
-    }
+    figure!(Parameters => Rows, about);
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rows = Rows::default();
@@ -195,10 +181,7 @@ impl Figure for Fig6 {
             let runs = |components| {
                 // The worlds with five components are part of both figures.
                 let name = format!("handoff-fig6 {} {} {components} {}", context.seed, p.trials, smoothing.name());
-                context.once(name, || {
-                    let runs = context.monte_carlo(stream, p.trials);
-                    Ok(runs.run(|trial| Self::trial(components, smoothing, trial))?)
-                })
+                context.once(name, || context.trials(stream, p.trials, |it| Self::trial(components, smoothing, it)))
             };
             let (bounds, steps) = Self::rows(smoothing, &runs(self.components)?);
             rows.bounds.extend(bounds);
@@ -274,11 +257,8 @@ impl Figure for Fig6 {
         }
         let times = if self.components == 5 { [4.0, 2.0] } else { [7.0, 3.0] };
         for ((measure, log), time) in EXPONENTIAL.into_iter().zip(times) {
-            let preset = rows.under(Smoothing::Preset);
-            let useful = preset
-                .iter()
-                .take_while(|b| log(b) < b.ml_printed.value.log10())
-                .count();
+            let preset = rows.under(Smoothing::Preset).into_iter();
+            let useful = preset.take_while(|b| log(b) < b.ml_printed.value.log10()).count();
             let what = format!("the {} bound is below the ML bound up to this time", measure.to_uppercase());
             full.near(format!("{measure}-useful"), what, useful as f64, time, 1.0);
         }

@@ -16,6 +16,7 @@ parameters! {
         points: usize [2..=2000] = 250 => "Points of the reference at which densities are compared.",
         trials: u64 [2..=100_000] = 250 => quick 4 => "Worlds.",
     }
+    cost |p| Cost::new(0.2 * p.trials as f64, 2e3 * p.trials as f64);
 }
 
 rows! {
@@ -92,10 +93,9 @@ fn trial(p: &Parameters, it: Trial) -> Result<Vec<Moment>, Error> {
     let mut filters = Vec::new();
     for (method, ..) in METHODS {
         let (mut own, start) = (rng(method), prior()?);
-        let known = if method == "raw_pf" {
-            Known::Particles(start.sample_systematic(&mut own, PARTICLES)?)
-        } else {
-            Known::Mixture(start)
+        let known = match method {
+            "raw_pf" => Known::Particles(start.sample_systematic(&mut own, PARTICLES)?),
+            _ => Known::Mixture(start),
         };
         filters.push((known, own));
     }
@@ -155,12 +155,8 @@ impl Figure for Fig6c {
         "KL from a reference filter of 2000 particles, less that to an independent copy of it. The three criteria are \
          close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.");
 
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(0.2 * p.trials as f64, 2e3 * p.trials as f64)
-    }
-
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let runs = context.trials("handoff-fig6c", p.trials, |it| trial(p, it))?;
+        let runs = context.trials(context.stream("handoff-fig6c"), p.trials, |it| trial(p, it))?;
         let mut rows = Rows::default();
         for t in 1..=STEPS {
             let after = |m: usize| runs.iter().map(move |run| run[t - 1].after[m]);
@@ -225,13 +221,10 @@ impl Figure for Fig6c {
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let of = |method: &'static str| select(&rows.error, move |r| r.method == method);
-        let layers = METHODS.into_iter().enumerate().map(|(i, (method, label, _))| {
-            Layer::measured(label, of(method), |r| (r.t as f64, r.kl_increase)).coloured(i)
-        });
-        let lines = METHODS
-            .into_iter()
-            .enumerate()
-            .map(|(i, (method, ..))| Layer::line("", points(of(method), |r| (r.t as f64, r.kl_increase))).coloured(i));
+        let each = || METHODS.iter().enumerate();
+        let place = |r: &Row| (r.t as f64, r.kl_increase);
+        let layers = each().map(|(i, (method, label, _))| Layer::measured(*label, of(method), place).coloured(i));
+        let lines = each().map(|(i, (method, ..))| Layer::line("", points(of(method), place)).coloured(i));
         let sums = points(&rows.bounds, |b| (b.t as f64, b.kl_sum.value));
         let panel = Panel::linear("Five components", "hand-overs t", "KL increase / nat")
             .with_all(lines)

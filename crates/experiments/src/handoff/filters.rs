@@ -2,13 +2,11 @@
 
 use super::world::{Point, Reading, START, Walk, World};
 use crate::prelude::*;
-use fewbits_core::{Dynamics, Gaussian, Likelihood};
+use fewbits_core::Likelihood;
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles, SampleSize};
 use fewbits_handoff::{HandoffFilter, Whole, trimmed};
 use fewbits_mixture_codec::published::PaperReductions;
 use fewbits_mixture_codec::{Reduction, cut};
-use nalgebra::SMatrix;
-use rand::{Rng, RngExt};
 
 /// Particles of a filter.
 pub const PARTICLES: usize = 500;
@@ -163,7 +161,7 @@ pub(super) fn over_beliefs<K: Copy + Send, const N: usize>(
         }
         Ok(sums)
     };
-    let runs = context.trials(experiment, trials, one)?;
+    let runs = context.trials(context.stream(experiment), trials, one)?;
     let mean = |(i, (key, _)): (usize, &(K, [f64; N]))| {
         (*key, std::array::from_fn(|k| runs.iter().map(|run| run[i].1[k]).collect()))
     };
@@ -173,11 +171,9 @@ pub(super) fn over_beliefs<K: Copy + Send, const N: usize>(
 /// A mixture whose every number was sent as a 32-bit float.
 pub(super) fn as_f32(mixture: &Mixture<2>) -> Result<Mixture<2>, Error> {
     let short = |x: f64| f64::from(x as f32);
-    let components = mixture
-        .components()
-        .iter()
-        .map(|c| Component::new(short(c.weight()), c.mean().map(short), c.covariance().map(short)));
-    Ok(Mixture::new(components.collect::<Result<_, _>>()?)?)
+    let component =
+        |c: &Component<2>| Component::new(short(c.weight()), c.mean().map(short), c.covariance().map(short));
+    Ok(Mixture::new(mixture.components().iter().map(component).collect::<Result<_, _>>()?)?)
 }
 
 /// KL of an estimate to several mixtures by quadrature, the estimate's own density computed once.

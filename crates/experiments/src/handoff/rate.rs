@@ -6,7 +6,6 @@ use fewbits_core::Message;
 use fewbits_densities::{Bandwidth, KernelEstimate, Mixture};
 use fewbits_mixture_codec::wire::{CodedMixture, WireFormat};
 use fewbits_mixture_codec::{Criterion, Reduction};
-use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {
@@ -14,6 +13,7 @@ parameters! {
         resolution: Vec<f64> [0.01..=1.0; 1..] = vec![0.5, 0.35, 0.25, 0.15] => "Resolutions: quantiser steps in standard deviations.",
         trials: u64 [2..=10_000] = 12 => quick 2 => "Worlds, of three beliefs each.",
     }
+    cost |p| Cost::new(p.trials as f64, 1e6 * p.trials as f64);
 }
 
 rows! {
@@ -27,7 +27,6 @@ rows! {
     }
 }
 
-/// Bits against error.
 pub struct Rate;
 
 fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
@@ -39,17 +38,10 @@ impl Figure for Rate {
         "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
          seventh of the bits of their parameters as floats, and a hundredth of those of particles.");
 
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(p.trials as f64, 1e6 * p.trials as f64)
-    }
-
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         // A message format has at most 16 resolutions of which one is chosen in the message; here both ends agree on it.
-        let single: Vec<WireFormat<2>> = p
-            .resolution
-            .iter()
-            .map(|r| WireFormat::new(Vector2::zeros(), 20.0, 1.0, &[*r]))
-            .collect::<Result<_, _>>()?;
+        let format = |r: &f64| WireFormat::new(Vector2::zeros(), 20.0, 1.0, &[*r]);
+        let single = p.resolution.iter().map(format).collect::<Result<Vec<_>, _>>()?;
         let all = over_beliefs(context, "handoff-rate", p.trials, |estimate, stream| {
             let truth = Truth::new(estimate);
             let mut cells = Vec::new();
@@ -116,11 +108,9 @@ impl Figure for Rate {
         let place = |r: &Row| (r.bits.value, r.kl);
         let of = |size: usize| select(rows, move |r| r.message == "coded" && r.size == size);
         let all = |message: &'static str| select(rows, move |r| r.message == message);
-        let layers = p
-            .components
-            .iter()
-            .enumerate()
-            .flat_map(|(i, m)| Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect()));
+        let coded = p.components.iter().enumerate();
+        let layers =
+            coded.flat_map(|(i, m)| Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect()));
         let panel = Panel::loglog("One belief", "message / bit", "KL / nat")
             .with_all(layers)
             .with(Layer::dashed("mixture as floats", points(all("f32"), place)).coloured(5))

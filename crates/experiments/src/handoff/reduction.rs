@@ -12,6 +12,7 @@ parameters! {
         components: Vec<usize> [1..=100; 1..] = vec![3, 5, 10, 20] => "Components.",
         trials: u64 [2..=10_000] = 10 => quick 2 => "Worlds, of three beliefs each.",
     }
+    cost |p| Cost::new(2.0 * p.trials as f64, 1e6 * p.trials as f64);
 }
 
 rows! {
@@ -88,7 +89,6 @@ impl Method {
     }
 }
 
-/// The comparison of reductions.
 pub struct Reductions;
 
 impl Figure for Reductions {
@@ -96,21 +96,14 @@ impl Figure for Reductions {
         "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
          2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.");
 
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(2.0 * p.trials as f64, 1e6 * p.trials as f64)
-    }
-
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let all = over_beliefs(context, "handoff-reduction", p.trials, |estimate, _| {
             let truth = Truth::new(estimate);
-            let cases = METHODS
-                .iter()
-                .flat_map(|method| p.components.iter().map(move |m| (method, *m)));
-            let cell = |((name, _, method), m): (&(&'static str, _, Method), usize)| {
-                let kl = truth.kl(&method.reduce(estimate, m)?);
-                Ok(((*name, m), [kl / TIMES.len() as f64]))
+            let cell = |((name, _, method), m): (&(&'static str, _, Method), &usize)| {
+                let kl = truth.kl(&method.reduce(estimate, *m)?);
+                Ok(((*name, *m), [kl / TIMES.len() as f64]))
             };
-            cases.map(cell).collect()
+            product(&METHODS, &p.components).into_iter().map(cell).collect()
         })?;
         let row = |((method, components), [kl]): (_, [Measured; 1])| Row { method, components, kl };
         Ok(all.into_iter().map(row).collect())

@@ -7,7 +7,6 @@ use fewbits_quantizer_design::{System, published};
 use std::f64::consts::LN_2;
 
 parameters! {
-    /// Settings of Figures 4.2 to 4.5.
     pub struct Parameters {
         steps: usize [1..=1000] = 15 => "Steps of each stage.",
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -88,7 +87,6 @@ const ERROR: &str = "mean squared error / prior variances";
 /// The channels of Figures 4.4 and 4.5.
 const CHANNELS: Option<&[f64]> = Some(&[0.0, 0.001, 0.01, 0.05]);
 
-/// Figure 4.2.
 pub static FIGURE42: Iterations = Iterations {
     about: About::of("mi-fig4-2", "Information over iterations, clean channel", "thesis, Figure 4.2")
         .showing("Mutual information rises in two steps, one per sensor, to a plateau each."),
@@ -107,7 +105,6 @@ pub static FIGURE42: Iterations = Iterations {
     },
 };
 
-/// Figure 4.3.
 pub static FIGURE43: Iterations = Iterations {
     about: About::of("mi-fig4-3", "Squared error over iterations, clean channel", "thesis, Figure 4.3")
         .showing("The squared error falls while the information rises, though it is not what is optimised."),
@@ -120,7 +117,6 @@ pub static FIGURE43: Iterations = Iterations {
     },
 };
 
-/// Figure 4.4.
 pub static FIGURE44: Iterations = Iterations {
     about: About::of("mi-fig4-4", "Information over iterations, noisy channels", "thesis, Figure 4.4")
         .showing("Joint information at four crossovers, natural words. It rises for the better channels; at 0.05 the first stage \
@@ -141,7 +137,6 @@ pub static FIGURE44: Iterations = Iterations {
     },
 };
 
-/// Figure 4.5.
 pub static FIGURE45: Iterations = Iterations {
     about: About::of("mi-fig4-5", "Squared error over iterations, noisy channels", "thesis, Figure 4.5")
         .showing("Squared error at four crossovers, natural words. It falls at every step, on every channel."),
@@ -193,12 +188,7 @@ fn error_falls(rows: &Rows, here: &Claims) {
 }
 
 impl Figure for Iterations {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        self.about
-    }
+    figure!(Parameters => Rows, about);
 
     fn defaults(&self) -> Parameters {
         Parameters {
@@ -219,19 +209,17 @@ impl Figure for Iterations {
             rows.cyclic.push(step(crossover, [0, 1, 0], &cyclic)?);
             for k in 1..=2 * steps {
                 let sensor = usize::from(k > steps);
-                let designed_for = if sensor == 0 {
-                    first_alone(&chain)?
-                } else {
-                    chain.clone()
+                let quantizer = match sensor {
+                    0 => published::alternating_step(&first_alone(&chain)?, 0, MI)?,
+                    _ => published::alternating_step(&chain, sensor, MI)?,
                 };
-                let quantizer = published::alternating_step(&designed_for, sensor, MI)?;
                 chain = chain.with_quantizer(sensor, quantizer)?;
-                rows.chain
-                    .push(step(crossover, [k, sensor + 1, k - sensor * steps], &chain)?);
+                let row = step(crossover, [k, sensor + 1, k - sensor * steps], &chain)?;
+                rows.chain.push(row);
                 let sensor = (k - 1) % 2;
                 cyclic = cyclic.with_quantizer(sensor, published::alternating_step(&cyclic, sensor, MI)?)?;
-                rows.cyclic
-                    .push(step(crossover, [k, sensor + 1, k.div_ceil(2)], &cyclic)?);
+                let row = step(crossover, [k, sensor + 1, k.div_ceil(2)], &cyclic)?;
+                rows.cyclic.push(row);
             }
         }
         Ok(rows)
@@ -247,12 +235,12 @@ impl Figure for Iterations {
         let all = p.crossovers().iter().flat_map(|crossover| {
             self.columns.iter().map(move |(column, name)| {
                 let own = select(&rows.chain, |r| r.crossover == *crossover);
-                let shared = if several {
+                let label = if several {
                     format!("crossover {crossover}")
                 } else {
                     (*name).to_owned()
                 };
-                (shared, points(own, |r| (r.iteration as f64, column(r))))
+                (label, points(own, |r| (r.iteration as f64, column(r))))
             })
         });
         let all: Vec<_> = all.enumerate().collect();
@@ -260,11 +248,9 @@ impl Figure for Iterations {
             let heights = drawn.iter().flat_map(|(_, (_, curve))| curve).map(|p| p.1);
             let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
             let divider = Layer::dashed("stage 2 begins", vec![(edge, low), (edge, high)]).coloured(6);
-            let curves = drawn
-                .iter()
-                .flat_map(|(i, (label, curve))| Layer::marked_line(label, *i, curve.clone()));
+            let curve = |(i, (label, curve)): &(usize, Curve)| Layer::marked_line(label, *i, curve.clone());
             Panel::linear(title, "iteration", self.axis)
-                .with_all(curves)
+                .with_all(drawn.iter().flat_map(curve))
                 .with(divider)
         };
         let mut panels = vec![panel(self.about.title.to_owned(), &all)];

@@ -2,7 +2,6 @@
 
 use super::common::{MI, MSE, Pair, arrived, errors, lloyd_system, odd, scene};
 use crate::prelude::*;
-use crate::reference;
 use fewbits_quantizer_design::{Newton, bounds, design};
 
 parameters! {
@@ -47,7 +46,6 @@ rows! {
     }
 }
 
-/// Table 4.1.
 pub struct Table41;
 
 impl Figure for Table41 {

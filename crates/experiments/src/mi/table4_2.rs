@@ -2,7 +2,6 @@
 
 use super::common::{MI, MSE, Pair, arrived, errors, lloyd_system, odd, scene};
 use crate::prelude::*;
-use crate::reference;
 use fewbits_quantizer_design::{Newton, bounds, design};
 
 parameters! {
@@ -39,7 +38,6 @@ rows! {
     }
 }
 
-/// Table 4.2.
 pub struct Table42;
 
 impl Figure for Table42 {

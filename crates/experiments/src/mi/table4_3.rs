@@ -2,7 +2,6 @@
 
 use super::common::{MI, MSE, outer, scene};
 use crate::prelude::*;
-use crate::reference;
 use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design, lloyd_max};
 
 parameters! {
@@ -60,7 +59,6 @@ impl Values {
     }
 }
 
-/// Table 4.3.
 pub struct Table43;
 
 impl Figure for Table43 {

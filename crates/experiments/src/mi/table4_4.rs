@@ -2,7 +2,6 @@
 
 use super::common::MI;
 use crate::prelude::*;
-use crate::reference;
 use fewbits_numerics::normal;
 use fewbits_quantizer_design::decoder::NeymanPearson;
 use fewbits_quantizer_design::published::{self, Separation};
@@ -96,7 +95,6 @@ fn row(p: &Parameters, signal: f64, method: &'static str, system: &System) -> Re
     })
 }
 
-/// Table 4.4.
 pub struct Table44;
 
 impl Figure for Table44 {

@@ -2,7 +2,6 @@
 
 use super::common::{MI, MSE, Pair, lloyd_system, odd, over_bsc, scene};
 use crate::prelude::*;
-use crate::reference;
 use fewbits_quantizer_design::{Newton, System, design};
 
 /// Name, title and words of the four levels.
@@ -42,7 +41,6 @@ rows! {
     }
 }
 
-/// Table 4.5.
 pub struct Table45;
 
 impl Figure for Table45 {
@@ -130,7 +128,6 @@ impl Figure for Table45 {
 }
 
 rows! {
-    /// All tables of the mismatch matrix.
     pub struct Mismatches {
         rows: Vec<Met> => "Designs for one channel on another.",
         printed: Vec<AtPrinted> => "The printed design for a clean channel at a crossover of 0.05.",
@@ -151,7 +148,6 @@ rows! {
     }
 }
 
-/// The mismatch matrix of Table 4.5.
 pub struct Mismatch;
 
 impl Figure for Mismatch {

@@ -1,7 +1,6 @@
 //! `mpa-fig3-7`, `mpa-table3-da`: two targets on a line, two measurements in unknown order.
 
 use crate::prelude::*;
-use fewbits_core::Gaussian;
 use fewbits_filters::Resampling;
 use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal;
@@ -9,8 +8,6 @@ use fewbits_pf_mpa::association::{
     AssociationRule, Hypotheses, PRINTED_GAIN, PairTracker, separation, sigmoid, tanh_rule,
 };
 use rand::seq::SliceRandom;
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 
 /// Variance of a step.
 const WALK: f64 = 1e-4;
@@ -247,7 +244,6 @@ impl Figure for Fig37 {
 pub struct Table;
 
 parameters! {
-    /// Settings.
     pub struct Effort {
         trials: u64 [2..=100_000] = 400 => quick 10 => "Tracks of each setting.",
     }
@@ -273,10 +269,10 @@ impl Figure for Table {
         let mut rules = Vec::new();
         for variance in [1e-4, 4e-4] {
             for apart in [0.1, 0.3] {
-                let one = |sums: &mut Vec<[Moments; 3]>, trial: Trial| -> Result<(), Error> {
+                let one = |trial: Trial| {
                     let world = draw(trial.stream, variance, apart);
-                    for (sums, method) in sums.iter_mut().zip(METHODS) {
-                        let mut means = [0.0; 3];
+                    let mut means = [[0.0; 3]; METHODS.len()];
+                    for (means, method) in means.iter_mut().zip(METHODS) {
                         let run = method.run(&world, variance, apart, trial.stream)?;
                         for (now, (estimate, p0)) in world.iter().zip(run) {
                             let apart = |i: usize, j: usize| (estimate[i] - now.targets[j]).powi(2);
@@ -285,22 +281,19 @@ impl Figure for Table {
                             let all = [labelled, labelled.min(swapped), (p0 - truth).abs()];
                             means.iter_mut().zip(all).for_each(|(m, x)| *m += x / STEPS as f64);
                         }
-                        sums.iter_mut().zip(means).for_each(|(s, m)| s.add(m));
                     }
-                    Ok(())
+                    Ok(means.concat())
                 };
-                let empty = || vec![[Moments::default(); 3]; METHODS.len()];
                 let stream = context.stream("mpa-table3-da").named(&format!("{apart}"));
-                let sums = context.tally(stream, p.trials, empty, one)?;
-                for (method, sum) in METHODS.into_iter().zip(sums) {
-                    let [labelled, unlabelled, association] = sum.map(|m| Measured::from(&m));
+                let sums = context.moments(stream, p.trials, one)?;
+                for (method, sum) in METHODS.into_iter().zip(sums.chunks(3)) {
                     rules.push(Row {
                         variance,
                         apart,
                         method: method.name(),
-                        labelled,
-                        unlabelled,
-                        association,
+                        labelled: sum[0].into(),
+                        unlabelled: sum[1].into(),
+                        association: sum[2].into(),
                     });
                 }
             }

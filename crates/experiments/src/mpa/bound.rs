@@ -4,7 +4,6 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, Score, World, prior};
 use crate::prelude::*;
 use fewbits_pf_mpa::{CramerRao, Target, position_information};
-use nalgebra::{Matrix4, Vector2};
 
 parameters! {
     pub struct Parameters {
@@ -63,7 +62,7 @@ impl Figure for Bounds {
                     }
                     Ok((runs.map(|run| world.mse(&run)), sums))
                 };
-                let all = context.trials("mpa-free", p.trials, one)?;
+                let all = context.trials(context.stream("mpa-free"), p.trials, one)?;
                 // The bound without the trajectories of one group of `GROUPS`.
                 let without = |which: usize, group: Option<usize>| -> Result<f64, Error> {
                     let mut bound = CramerRao::new(*prior()?.covariance());
@@ -80,10 +79,7 @@ impl Figure for Bounds {
                 let bound = |which: usize| -> Result<Measured, Error> {
                     let groups = (0..GROUPS).map(|group| without(which, Some(group)));
                     let spread: Moments = groups.collect::<Result<Vec<f64>, Error>>()?.into_iter().collect();
-                    Ok(Measured {
-                        value: without(which, None)?,
-                        standard_error: Some(spread.standard_error() * (GROUPS - 1) as f64),
-                    })
+                    Ok(Measured::new(without(which, None)?, spread.standard_error() * (GROUPS - 1) as f64))
                 };
                 let score = |m: usize| Score::of(all.iter().map(|(errors, _)| errors[m]).collect());
                 let [grid, message_passing, filter] = [0, 1, 2].map(score);

@@ -3,9 +3,7 @@
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, World, canonical};
 use crate::prelude::*;
-use fewbits_core::Gaussian;
 use fewbits_pf_mpa::Target;
-use nalgebra::Vector4;
 
 parameters! {
     pub struct Parameters {

@@ -3,11 +3,10 @@
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
-use fewbits_core::{Gaussian, NumberFormat};
+use fewbits_core::NumberFormat;
 use fewbits_pf_mpa::leader::{LeaderMessage, elect, nearest};
 use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{Reports, Target, Tracker};
-use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {
@@ -43,7 +42,7 @@ impl Figure for Leaders {
         let row = |(snr_db, particles): (f64, usize)| -> Result<Row, Error> {
             let network = Point::published(snr_db, 4, SPEED)?.network()?;
             let tracker = MessagePassing::improved(particles)?;
-            let one = |sums: &mut [Moments; 6], trial: Trial| -> Result<(), Error> {
+            let one = |trial: Trial| {
                 let world = World::draw(trial.stream, &target, Field::Confined)?;
                 let name = Method::Messages(tracker).name();
                 let own = |i: usize| trial.stream.named(&name).indexed(i as u64);
@@ -54,12 +53,8 @@ impl Figure for Leaders {
                 for k in 0..STEPS {
                     let ranges = world.ranges(&network, k);
                     let observed = network.observe(&target, k, &shared, &ranges, Reports::Levels)?;
-                    let step = |rng| {
-                        tracker
-                            .step(rng, &target, k, &shared, &observed)
-                            .map_or(shared, |s| s.0)
-                    };
-                    let copies: Vec<_> = streams.iter_mut().map(step).collect();
+                    let step = |rng| Some(tracker.step(rng, &target, k, &shared, &observed).ok()?.0);
+                    let copies: Vec<_> = streams.iter_mut().map(|rng| step(rng).unwrap_or(shared)).collect();
                     let place = |c: &Gaussian<4>| Vector2::new(c.mean()[0], c.mean()[1]);
                     let places: Vec<_> = copies.iter().map(place).collect();
                     let election = elect(&sensors, &places)?;
@@ -75,21 +70,18 @@ impl Figure for Leaders {
                     let all = [is(count == 1), is(count == 0), is(count > 1), is(leads), error, spread];
                     means.iter_mut().zip(all).for_each(|(m, x)| m.add(x));
                 }
-                sums.iter_mut().zip(means).for_each(|(s, m)| s.add(m.mean()));
-                Ok(())
+                Ok(means.map(|m| m.mean()))
             };
-            let stream = context.stream("mpa-trajectories");
-            let sums = context.tally(stream, p.trials, || [Moments::default(); 6], one)?;
-            let [one, none, several, nearest, mse, spread] = sums.map(|m| Measured::from(&m));
+            let sums = context.moments(context.stream("mpa-trajectories"), p.trials, one)?;
             Ok(Row {
                 snr_db,
                 particles,
-                one,
-                none,
-                several,
-                nearest,
-                mse,
-                spread,
+                one: sums[0].into(),
+                none: sums[1].into(),
+                several: sums[2].into(),
+                nearest: sums[3].into(),
+                mse: sums[4].into(),
+                spread: sums[5].into(),
             })
         };
         SETTINGS.into_iter().map(row).collect()

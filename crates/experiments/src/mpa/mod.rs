@@ -1,30 +1,11 @@
 //! Tracking from quantized ranges, particle message passing and what does better: figures and tables.
 
-mod ablation;
-mod association;
-mod bound;
-mod encoder;
-mod fig3_3;
-mod leader;
+pub(crate) mod ablation;
+pub(crate) mod association;
+pub(crate) mod bound;
+pub(crate) mod encoder;
+pub(crate) mod fig3_3;
+pub(crate) mod leader;
 mod scores;
-mod sweeps;
+pub(crate) mod sweeps;
 mod world;
-
-use crate::AnyFigure;
-
-/// The figures of this system, in the order of the publication.
-pub fn figures() -> Vec<&'static dyn AnyFigure> {
-    vec![
-        &fig3_3::Fig33,
-        &sweeps::Mse,
-        &sweeps::Fig34,
-        &sweeps::Fig35,
-        &sweeps::Low,
-        &association::Fig37,
-        &association::Table,
-        &ablation::Ablation,
-        &bound::Bounds,
-        &encoder::Encoders,
-        &leader::Leaders,
-    ]
-}

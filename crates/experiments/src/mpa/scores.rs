@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_pf_mpa::{Reports, Target};
 
 parameters! {
-    /// How many trajectories.
     pub struct Effort {
         pub(super) trials: u64 [2..=100_000] = 200 => quick 8 => "Trajectories of every tracker but message passing with particles.",
         /// Trajectories of message passing with particles, and of the finest grid and largest clouds; the first of the others'.
@@ -29,7 +28,6 @@ impl Effort {
 
 rows! {
     /// One tracker at one point.
-    #[derive(Debug, Clone)]
     pub struct Row by "{point} {method}" {
         pub(super) point: String => "Which setting.",
         pub(super) snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
@@ -50,7 +48,7 @@ pub(super) fn rows(
 ) -> Result<Vec<Row>, Error> {
     let (network, target) = (point.network()?, Target::printed()?);
     let most = methods.iter().map(|m| m.1).max().unwrap_or(0);
-    let all = context.trials("mpa-trajectories", most, |trial| {
+    let all = context.trials(context.stream("mpa-trajectories"), most, |trial| {
         let world = World::draw(trial.stream, &target, Field::Confined)?;
         let error = |(method, count): &(Method, u64)| {
             let counts = trial.index < *count;

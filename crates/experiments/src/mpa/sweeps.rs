@@ -6,7 +6,6 @@ use super::scores::{
 use super::world::{LAYOUTS, Method, Point};
 use crate::prelude::*;
 use fewbits_pf_mpa::Reports;
-use nalgebra::Vector2;
 
 /// The speed of the canonical scenario.
 pub(super) const SPEED: f64 = 3.0;

@@ -1,16 +1,13 @@
 //! The canonical scenario, and every tracker on it.
 
 use crate::prelude::*;
-use fewbits_core::{Belief, Gaussian, Observed, OnAxes};
+use fewbits_core::{Observed, OnAxes};
 use fewbits_filters::ParticleFilter;
 use fewbits_pf_mpa::published::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_pf_mpa::{
     Encoder, GridFilter, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, QuantizedRange, RangeFactor,
     RangeNoise, RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,
 };
-use nalgebra::{Matrix4, Vector2, Vector4};
-use rand::RngExt;
-use rand_distr::StandardNormal;
 
 /// Steps of a trajectory.
 pub(super) const STEPS: usize = 25;
@@ -237,7 +234,7 @@ fn in_state(range: &Ranged) -> Result<Observed<OnAxes<RangeSensor, 6, 2>, RangeF
 fn track<T: Tracker>(
     tracker: &T,
     all: (&World, &Network, &Target, Reports),
-    rng: &mut impl rand::Rng,
+    rng: &mut impl Rng,
 ) -> Result<Estimates, Error> {
     let belief = tracker.start(rng, all.2, &prior()?)?;
     let mut workspace = T::Workspace::default();
@@ -296,7 +293,6 @@ impl Point {
 
 rows! {
     /// What a method did on many trajectories.
-    #[derive(Debug, Clone)]
     pub(super) struct Score {
         pub(super) mse: Measured => "Mean squared position error, averaged over trajectories.",
         pub(super) median: Measured => "Median over trajectories of their mean squared error.",
@@ -319,10 +315,7 @@ impl Score {
         let error = 0.5 * (at((middle + give).ceil()) - at((middle - give).floor()));
         Self {
             mse,
-            median: Measured {
-                value: 0.5 * (at(middle.floor()) + at(middle.ceil())),
-                standard_error: (n > 1.0).then_some(error),
-            },
+            median: Measured::new(0.5 * (at(middle.floor()) + at(middle.ceil())), (n > 1.0).then_some(error)),
             lost: errors.iter().filter(|e| **e > LOST).count() as f64 / n,
             trajectories: errors.len() as u64,
         }

@@ -3,48 +3,35 @@
 use super::receivers::{each, over_bits};
 use super::worlds::{self, COEFFICIENT, PROCESS, RADIUS, SENSORS};
 use crate::prelude::*;
-use fewbits_core::Link;
 use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant};
 use fewbits_network::{BitStar, Channel, Fault, FaultKind, Loss, Seconds, SensorId, Setup};
 use fewbits_protocol::{Feedback, ReportLength};
 
 parameters! {
     pub struct Parameters {
-        /// Probabilities that a frame is lost.
-        loss: Vec<f64> [0.0..=0.8; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6],
+        loss: Vec<f64> [0.0..=0.8; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6] => "Probabilities that a frame is lost.",
         /// Probabilities that a bit is inverted.
         crossover: Vec<f64> [0.0..=0.1; 1..] = vec![0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2],
-        /// Mean delays of a frame, in slots.
-        delay: Vec<f64> [0.0..=10.0; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8],
-        /// Sensors of four that die after a quarter of the run.
-        deaths: Vec<u32> [0..=4; 1..] = vec![0, 1, 2, 3, 4],
-        /// Slots of a run.
-        slots: usize [60..=100_000] = 200 => quick 80,
-        /// Runs at each point.
-        trials: u64 [2..=1_000_000] = 40 => quick 2,
+        delay: Vec<f64> [0.0..=10.0; 1..] = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8] => "Mean delays of a frame, in slots.",
+        deaths: Vec<u32> [0..=4; 1..] = vec![0, 1, 2, 3, 4] => "Sensors of four that die after a quarter of the run.",
+        slots: usize [60..=100_000] = 200 => quick 80 => "Slots of a run.",
+        trials: u64 [2..=1_000_000] = 40 => quick 2 => "Runs at each point.",
     }
 }
 
 rows! {
     pub struct Row {
-        /// loss, flips, delay or deaths.
-        fault: &'static str,
-        /// Its level.
-        level: f64,
-        /// told: the centre sends its prediction; echoed: sensors follow by what it received.
-        feedback: &'static str,
-        /// Root mean squared error.
-        rmse: Measured,
+        fault: &'static str => "loss, flips, delay or deaths.",
+        level: f64 => "Its level.",
+        feedback: &'static str => "told: the centre sends its prediction; echoed: sensors follow by what it received.",
+        rmse: Measured => "Root mean squared error.",
         /// Slots until a sensor that restarts in the middle of the run answers again; 50 where it has not by then.
         recovery: Measured,
-        /// Share of the runs in which it has not within 50 slots.
-        unrecovered: Measured,
-        /// Disagreements noted, of 100 slots.
-        disagreements: Measured,
+        unrecovered: Measured => "Share of the runs in which it has not within 50 slots.",
+        disagreements: Measured => "Disagreements noted, of 100 slots.",
     }
 }
 
-/// Faults.
 pub struct Faulty;
 
 struct Point {
@@ -140,28 +127,22 @@ impl Figure for Faulty {
                 }));
             }
         }
-        let sums = context.sweep(
-            "network-faults",
-            p.trials,
-            &points,
-            |point| format!("{} {}", point.fault, point.level),
-            |_| [Moments::default(); 4],
-            |point, sums, it| {
-                let numbers = run(point, it.stream, p.slots)?;
-                sums.iter_mut().zip(numbers).for_each(|(sum, x)| sum.add(x));
-                Ok::<_, Error>(())
-            },
-        )?;
-        let row = |(point, sums): (&Point, &[Moments; 4])| Row {
-            fault: point.fault,
-            level: point.level,
-            feedback: if point.echoed { "echoed" } else { "told" },
-            rmse: Measured::root_mean(&sums[0]),
-            recovery: Measured::mean(&sums[1]),
-            disagreements: Measured::mean(&sums[2]),
-            unrecovered: Measured::mean(&sums[3]),
+        let row = |point: &Point| {
+            let stream = context
+                .stream("network-faults")
+                .named(&format!("{} {}", point.fault, point.level));
+            let sums = context.moments(stream, p.trials, |it| run(point, it.stream, p.slots))?;
+            Ok(Row {
+                fault: point.fault,
+                level: point.level,
+                feedback: if point.echoed { "echoed" } else { "told" },
+                rmse: Measured::root_mean(&sums[0]),
+                recovery: sums[1].into(),
+                disagreements: sums[2].into(),
+                unrecovered: sums[3].into(),
+            })
         };
-        Ok(points.iter().zip(&sums).map(row).collect())
+        points.iter().map(row).collect()
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
@@ -169,25 +150,18 @@ impl Figure for Faulty {
         let at = |fault: &str, level: f64, feedback: &str| {
             first(rows, |r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
         };
-        let gap = |feedback| {
-            at("loss", 0.0, feedback)
-                .zip(at("loss", 0.6, feedback))
-                .map(|(none, much)| much.rmse.value - none.rmse.value)
-        };
+        let rmse = |level, feedback| at("loss", level, feedback).map(|r| r.rmse);
         for feedback in ["told", "echoed"] {
-            here.above(format!("loss-{feedback}"), "lost frames cost accuracy", gap(feedback), 0.0);
+            let gap = minus(rmse(0.6, feedback), rmse(0.0, feedback));
+            here.above(format!("loss-{feedback}"), "lost frames cost accuracy", gap, 0.0);
         }
-        let worse = at("loss", 0.4, "echoed")
-            .zip(at("loss", 0.4, "told"))
-            .map(|(e, t)| e.rmse.value / t.rmse.value);
+        let worse = over(rmse(0.4, "echoed"), rmse(0.4, "told"));
         paper.above("replicas", "over links that lose much, replicas do worse than questions in full", worse, 1.0);
-        let clean = at("loss", 0.0, "echoed")
-            .zip(at("loss", 0.0, "told"))
-            .map(|(e, t)| (e.recovery.value, t.recovery.value));
+        let recovery = |feedback| at("loss", 0.0, feedback).map(|r| r.recovery.value);
         let what = "a restarted sensor that is told answers in the next slot";
-        here.near("recovery-told", what, clean.map(|c| c.1), 1.0, 0.0);
+        here.near("recovery-told", what, recovery("told"), 1.0, 0.0);
         let what = "one that follows by echo answers in the slot after";
-        here.near("recovery-echoed", what, clean.map(|c| c.0), 2.0, 0.0);
+        here.near("recovery-echoed", what, recovery("echoed"), 2.0, 0.0);
         let restart = at("loss", 0.0, "told").map(|r| r.disagreements.value);
         here.near("told", "without faults on air nobody disagrees with a centre that tells", restart, 0.0, 0.0);
         let lossy = select(rows, |r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
@@ -203,12 +177,9 @@ impl Figure for Faulty {
             ("deaths", "sensors that died"),
         ] {
             let of = |feedback: &'static str| rows.iter().filter(move |r| r.fault == fault && r.feedback == feedback);
-            let axis = || {
-                if fault == "flips" {
-                    Axis::log(label)
-                } else {
-                    Axis::linear(label)
-                }
+            let axis = || match fault {
+                "flips" => Axis::log(label),
+                _ => Axis::linear(label),
             };
             let both = |panel: Panel, of_row: fn(&Row) -> Option<Measured>| {
                 panel

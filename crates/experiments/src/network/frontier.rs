@@ -6,43 +6,34 @@ use crate::prelude::*;
 
 parameters! {
     pub struct Parameters {
-        /// Slots of a run.
-        slots: usize [40..=100_000] = 300 => quick 60,
-        /// Runs of each scheme.
-        trials: u64 [2..=100_000] = 8 => quick 2,
+        slots: usize [40..=100_000] = 300 => quick 60 => "Slots of a run.",
+        trials: u64 [2..=100_000] = 8 => quick 2 => "Runs of each scheme.",
     }
+    cost |p| Cost::new(2e-2 * (p.trials * p.slots as u64) as f64, 1e8);
 }
 
 rows! {
     pub struct Row {
         /// scalar: AR(1), a = 0.95, process variance 0.2; plane: constant velocity. Four sensors of unit noise.
         world: &'static str,
-        /// The scheme.
-        scheme: &'static str,
+        scheme: &'static str => "The scheme.",
         /// Its setting: K sensors, m bits, n messages in a slot, L levels, M components at resolution r, a guaranteed error of delta.
         setting: String,
         /// How sensors learn the question: told it in full, following by echo, not at all; or the belief travels.
         feedback: &'static str,
-        /// Root mean squared error of the state, or of the position.
-        rmse: Measured,
-        /// Payload bits of reports (of beliefs, where these travel) in a slot.
-        payload: Measured ["bit"],
+        rmse: Measured => "Root mean squared error of the state, or of the position.",
+        payload: Measured ["bit"] => "Payload bits of reports (of beliefs, where these travel) in a slot.",
         /// Bits on air in a slot: all frames of all nodes with preambles, headers, checks and feedback.
         air: Measured ["bit"],
-        /// Energy of all radios in a slot.
-        energy: Measured ["J"],
+        energy: Measured ["J"] => "Energy of all radios in a slot.",
         /// What no scheme can beat with so many payload bits and no information in silence (scalar), or with all measurements (plane).
         floor: f64,
-        /// Nothing else has a smaller error with at most as many payload bits.
-        best_by_payload: &'static str,
-        /// The same by bits on air.
-        best_by_air: &'static str,
-        /// The same by energy.
-        best_by_energy: &'static str,
+        best_by_payload: &'static str => "Nothing else has a smaller error with at most as many payload bits.",
+        best_by_air: &'static str => "The same by bits on air.",
+        best_by_energy: &'static str => "The same by energy.",
     }
 }
 
-/// The comparison.
 pub struct Frontier;
 
 /// Least root mean squared error at `rate` bits a slot: the error of the Kalman filter of all measurements, and on top the causal
@@ -65,7 +56,7 @@ fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<&'static str> {
 
 fn rows_of(world: &'static str, entries: &[Entry], runs: &Comparison<4>, floor: impl Fn(f64) -> f64) -> Vec<Row> {
     let row = |(i, entry): (usize, &Entry)| {
-        let mean = |of: usize| Measured::mean(&runs.moments(i, of));
+        let mean = |of: usize| Measured::from(runs.moments(i, of));
         let payload = mean(1);
         Row {
             world,
@@ -92,21 +83,16 @@ impl Figure for Frontier {
          beats in both. By payload one bit a sensor is a bargain; on air a frame's overhead of 200 bits buries the difference \
          between one bit and 32, so that few frames win, and sensors that are silent while they are predicted (adaptive) win most.");
 
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(2e-2 * (p.trials * p.slots as u64) as f64, 1e8)
-    }
-
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (scalar, plane) = (worlds::scalar(p.slots)?, worlds::plane(p.slots)?);
         let (least, everything) = (scalar.everything()?, plane.everything()?[1].sqrt());
         let rows_of = |world, entries: Vec<Entry>, floor: &dyn Fn(f64) -> f64| -> Result<Vec<Row>, Error> {
-            let one = |_: &_, entry: &Entry, it: Trial| {
+            let one = |entry: &Entry, it: Trial| {
                 let bill = entry.run(it.stream)?;
-                Ok::<_, Error>([bill.squared, bill.reports, bill.air, bill.joules])
+                Ok([bill.squared, bill.reports, bill.air, bill.joules])
             };
-            let name = |world: &&str| (*world).to_owned();
-            let runs = context.compare("network-frontier", p.trials, &[world], name, &entries, one)?;
-            Ok(rows_of(world, &entries, &runs[0], floor))
+            let stream = context.stream("network-frontier").named(world);
+            Ok(rows_of(world, &entries, &context.compare(stream, p.trials, &entries, one)?, floor))
         };
         let mut rows = rows_of("scalar", schemes::of_scalar(&scalar)?, &|rate| floor_at(rate, least))?;
         rows.extend(rows_of("plane", schemes::of_plane(&plane)?, &|_| everything)?);

@@ -105,7 +105,7 @@ pub fn of_scalar(world: &World<1, Ar1>) -> Result<Vec<Entry>, Error> {
         }
     }
     let untold = |levels: usize| member(Feedback::Clock, levels.next_power_of_two().trailing_zeros());
-    let scene = || ObservationModel::gaussian_with_deviations(deviation, &[1.0; SENSORS]).map_err(Error::failed);
+    let scene = || ObservationModel::gaussian_with_deviations(deviation, &[1.0; SENSORS]);
     let table = |family, system: &System, levels: usize| -> Result<Entry, Error> {
         let (look_up, schemes) = LookUp::of_system(system, 10_000)?;
         Ok(world.of_estimator((family, format!("L={levels}")), untold(levels), look_up, each(schemes)))
@@ -147,11 +147,8 @@ pub fn of_plane(world: &World<4, LinearGaussian<4, 2>>) -> Result<Vec<Entry>, Er
     let mut all = common(world)?;
     let noise = RangeNoise::constant(1.0)?;
     let places = [[-FAR, 0.0], [0.0, -FAR], [FAR, 0.0], [0.0, FAR]];
-    let sensor = |place: [f64; 2]| {
-        RangeSensor::new(place.into(), noise)
-            .and_then(|sensor| sensor.on_axes::<4>(PLANE_POSITION))
-            .map_err(Error::failed)
-    };
+    let sensor =
+        |place: [f64; 2]| RangeSensor::new(place.into(), noise).and_then(|sensor| sensor.on_axes::<4>(PLANE_POSITION));
     let sensors = places.into_iter().map(sensor).collect::<Result<Vec<_>, _>>()?;
     for talk in TALKS {
         for m in 1..=4 {

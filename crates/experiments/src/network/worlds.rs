@@ -6,9 +6,7 @@
 use super::receivers::{each, mixed, over_bits};
 use crate::prelude::*;
 use fewbits_core::factor::Value;
-use fewbits_core::{
-    Belief, Gaussian, LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, Sensing, SensorNode,
-};
+use fewbits_core::{LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, SensorNode};
 use fewbits_densities::Mixture;
 use fewbits_filters::kalman;
 use fewbits_handoff::{Coded, HandoffFilter, Leaders};
@@ -17,7 +15,6 @@ use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_network::{Account, BitStar, Clock, Field, Ledger, Radio, Seconds, SensorId, Setup, Walk};
 use fewbits_protocol::{BoxError, Estimator, Feedback, Member, Receiver, ReportLength};
-use nalgebra::{Matrix4, SVector, Vector1, Vector4};
 
 /// Sensors of either world; their noise has unit variance.
 pub const SENSORS: usize = 4;
@@ -79,7 +76,7 @@ pub fn scalar(slots: usize) -> Result<World<1, Ar1>, Error> {
 /// Never for the constants here.
 pub fn plane(slots: usize) -> Result<World<4, LinearGaussian<4, 2>>, Error> {
     let along = [Vector4::new(1.0, 0.0, 0.0, 0.0), Vector4::new(0.0, 0.0, 1.0, 0.0)];
-    let sensor = |i: usize| LinearSensor::scalar(along[i % 2], 1.0).map_err(Error::failed);
+    let sensor = |i: usize| LinearSensor::scalar(along[i % 2], 1.0);
     Ok(World {
         dynamics: constant_velocity_2d(1.0, ACCELERATION)?,
         sensors: (0..SENSORS).map(sensor).collect::<Result<_, _>>()?,

@@ -138,32 +138,23 @@ impl Layer {
         }
     }
 
+    fn stroked(label: impl Into<String>, points: Vec<(f64, f64)>, stroke: Stroke) -> Self {
+        Self::new(label, Shape::Line { points, stroke })
+    }
+
     /// A solid line: theory.
     pub fn line(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        Self::new(
-            label,
-            Shape::Line {
-                points,
-                stroke: Stroke::Solid,
-            },
-        )
+        Self::stroked(label, points, Stroke::Solid)
     }
 
     /// A black line without the dashes that tell schemes apart: the truth that is estimated, edges.
     pub fn unbroken(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        let stroke = Stroke::Unbroken;
-        Self::new(label, Shape::Line { points, stroke }).coloured(6)
+        Self::stroked(label, points, Stroke::Unbroken).coloured(6)
     }
 
     /// A dashed line: a bound or a reference.
     pub fn dashed(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        Self::new(
-            label,
-            Shape::Line {
-                points,
-                stroke: Stroke::Dashed,
-            },
-        )
+        Self::stroked(label, points, Stroke::Dashed)
     }
 
     /// Markers: measurements.
@@ -210,8 +201,10 @@ impl Layer {
         Self::new(label, Shape::Bars { points, width })
     }
 
-    /// A coloured field; the label stands at its colour bar.
-    pub fn heat(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, values: Vec<Vec<f64>>) -> Self {
+    /// A coloured field of values, line by line; the label stands at its colour bar.
+    pub fn heat(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, values: impl IntoIterator<Item = f64>) -> Self {
+        let mut values = values.into_iter();
+        let values = y.iter().map(|_| values.by_ref().take(x.len()).collect()).collect();
         Self::new(label, Shape::Heat { x, y, values })
     }
 
@@ -248,11 +241,9 @@ impl Layer {
 
     /// Fixes the colour.
     #[must_use]
-    pub fn coloured(self, colour: usize) -> Self {
-        Self {
-            colour: Some(colour),
-            ..self
-        }
+    pub fn coloured(mut self, colour: usize) -> Self {
+        self.colour = Some(colour);
+        self
     }
 
     /// Fixes colour and marker.

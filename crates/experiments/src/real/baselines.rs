@@ -1,10 +1,10 @@
 //! What an engineer would try first, and the strong baseline.
 
 use super::recordings::Recording;
+use fewbits_adaptive::Replay;
 use std::collections::BTreeMap;
 
 /// What a scheme does with a signal.
-#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Played {
     /// Reconstructions.
     pub values: Vec<f64>,
@@ -12,6 +12,16 @@ pub(super) struct Played {
     pub bits: f64,
     /// Slots in which something was sent.
     pub packets: usize,
+}
+
+impl From<Replay> for Played {
+    fn from(replay: Replay) -> Self {
+        Self {
+            bits: replay.information.iter().sum(),
+            packets: replay.packets,
+            values: replay.values,
+        }
+    }
 }
 
 /// Bits of a whole word.

@@ -12,6 +12,7 @@ parameters! {
         source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
         rate: Vec<f64> [0.02..=12.0; 1..=20] = vec![0.25, 0.5, 1.0, 2.0] => quick vec![0.5, 2.0] => "Bits per sample, at most.",
     }
+    cost |p| Cost::new(2e-4 * (p.source.samples * p.rate.len()) as f64, 1e4 * p.source.samples as f64);
 }
 
 rows! {
@@ -51,7 +52,6 @@ rows! {
 /// Errors below this share of the range count as that.
 pub(super) const NEGLIGIBLE: f64 = 1e-6;
 
-/// Error against bits.
 pub struct Bits;
 
 fn row(recording: &Recording, rate: f64, scheme: &'static str, delta: Option<f64>, played: &Played) -> Row {
@@ -70,10 +70,8 @@ fn row(recording: &Recording, rate: f64, scheme: &'static str, delta: Option<f64
 /// The baselines at `rate` bits per sample.
 fn baselines(recording: &Recording, rate: f64) -> Vec<Row> {
     let samples = &recording.samples;
-    let mut rows: Vec<Row> = searched(recording, rate, |played| played.bits)
-        .iter()
-        .map(|(scheme, delta, played)| row(recording, rate, scheme, Some(*delta), played))
-        .collect();
+    let of = |(scheme, delta, played): &(&'static str, f64, Played)| row(recording, rate, scheme, Some(*delta), played);
+    let mut rows: Vec<Row> = searched(recording, rate, |played| played.bits).iter().map(of).collect();
     if rate >= 1.0 {
         rows.push(row(recording, rate, "modulation", None, &delta_modulation(samples)));
     }
@@ -93,12 +91,7 @@ fn compare(recording: &Recording, rate: f64, context: &Context<'_>) -> Result<(V
     let best = kept.min_by(|a, b| a.rmse.total_cmp(&b.rmse)).or(rows.first());
     let (best, best_rmse) = best.map_or(("none", f64::INFINITY), |r| (r.scheme, r.rmse));
     let (config, ours) = best_for(recording, rate, context, Replay::rate)?;
-    let played = Played {
-        bits: ours.information.iter().sum(),
-        packets: ours.packets,
-        values: ours.values.clone(),
-    };
-    let ours_row = row(recording, rate, "adaptive", Some(config.delta()), &played);
+    let ours_row = row(recording, rate, "adaptive", Some(config.delta()), &ours.clone().into());
     let negligible = NEGLIGIBLE * recording.range();
     let pair = Pair {
         column: recording.name.clone(),
@@ -138,10 +131,6 @@ impl Figure for Bits {
          a file. The adaptive scheme needs no fit and bounds every error; the baselines are what an engineer would \
          try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight. Errors below a \
          millionth of the signal's range are drawn there.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(2e-4 * (p.source.samples * p.rate.len()) as f64, 1e4 * p.source.samples as f64)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let recordings = p.source.load("real-bits", context)?;

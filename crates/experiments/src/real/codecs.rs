@@ -14,6 +14,7 @@ parameters! {
         /// Bounds in percent of the range.
         percent: Vec<f64> [1e-4..=10.0; 1..=20] = vec![1e-4, 0.01, 0.25, 0.5, 1.0, 2.0] => quick vec![0.25, 1.0],
     }
+    cost |p| Cost::new(2e-5 * (p.source.samples * p.percent.len()) as f64, 1e4 * p.source.samples as f64);
 }
 
 rows! {
@@ -47,7 +48,6 @@ const REFERENCES: [(&str, [(f64, f64); 4]); 3] = [
     ("SerfQT", [(0.25, 4.401), (0.5, 3.409), (1.0, 2.604), (2.0, 1.982)]),
 ];
 
-/// Bits against the bound.
 pub struct Codecs;
 
 fn measured(recording: &Recording, percent: f64) -> Result<Row, Error> {
@@ -87,10 +87,6 @@ impl Figure for Codecs {
         "Bits per sample against the guaranteed largest error, on signals with the traits of recordings, or on the columns of a \
          file: a block of the adaptive codec, pco on lattice indices, and with the feature `zstd` zstd on them. Dashed: means of \
          programs that are no crates over recorded series, from the page of recordings.");
-
-    fn cost(&self, p: &Parameters) -> Cost {
-        Cost::new(2e-5 * (p.source.samples * p.percent.len()) as f64, 1e4 * p.source.samples as f64)
-    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let recordings = p.source.load("real-codecs", context)?;

@@ -4,7 +4,6 @@ use super::recordings::{Recording, Source};
 use super::tracking::best_for;
 use crate::prelude::*;
 use fewbits_adaptive::{Config, Receiver, Replay, Sensor};
-use fewbits_core::Link;
 
 fn shown() -> Source {
     Source {
@@ -41,28 +40,17 @@ rows! {
     }
 }
 
-/// Loss and recovery.
 pub struct Loss;
 
+/// What one sequence of losses did: means over the slots, and slots.
 #[derive(Default)]
-struct Sums {
-    bits: Moments,
-    squares: Moments,
-    beyond: Moments,
-    unnoticed: Moments,
+struct Outcome {
+    bits: f64,
+    squares: f64,
+    beyond: f64,
+    unnoticed: f64,
     longest: u64,
     violations: u64,
-}
-
-impl Tally for Sums {
-    fn merge(&mut self, part: &Self) {
-        self.bits.merge(&part.bits);
-        self.squares.merge(&part.squares);
-        self.beyond.merge(&part.beyond);
-        self.unnoticed.merge(&part.unnoticed);
-        self.longest = self.longest.max(part.longest);
-        self.violations += part.violations;
-    }
 }
 
 struct Point<'a> {
@@ -73,7 +61,7 @@ struct Point<'a> {
     sequence_bits: u32,
 }
 
-fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
+fn one(point: &Point<'_>, trial: Trial) -> Result<Outcome, Error> {
     let recording = point.recording;
     let config = point.config.resilient(point.sequence_bits, Some(point.refresh))?;
     let delta = config.delta();
@@ -81,11 +69,11 @@ fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
     let mut rng = trial.stream.rng();
     let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
     let n = recording.samples.len() as f64;
-    let (mut bits, mut squares, mut beyond, mut unnoticed) = (0.0, 0.0, 0.0, 0.0);
+    let mut all = Outcome::default();
     let mut lost: Option<u64> = None;
     for (slot, x) in (0_u64..).zip(&recording.samples) {
         let report = sensor.encode(*x)?;
-        bits += report.map_or(0.0, |r| r.packet.bits() as f64);
+        all.bits += report.map_or(0.0, |r| r.packet.bits() as f64);
         let observation = link.transmit(&mut rng, report.map(|r| r.packet).as_ref(), &())?;
         let arrived = observation.received().is_some();
         if report.is_some() && !arrived {
@@ -99,19 +87,16 @@ fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
         let error = recording
             .period
             .map_or(straight, |p| straight.min((p - straight).abs()));
-        squares += (error / delta).powi(2) / n;
+        all.squares += (error / delta).powi(2) / n;
         if error > delta {
-            beyond += 1.0 / n;
-            unnoticed += if tracked.synchronised { 1.0 / n } else { 0.0 };
-            sums.violations += u64::from(lost.is_none());
+            all.beyond += 1.0 / n;
+            all.unnoticed += if tracked.synchronised { 1.0 / n } else { 0.0 };
+            all.violations += u64::from(lost.is_none());
         }
-        sums.longest = sums.longest.max(lost.map_or(0, |since| slot - since + 1));
+        all.longest = all.longest.max(lost.map_or(0, |since| slot - since + 1));
     }
-    sums.bits.add(bits / n);
-    sums.squares.add(squares);
-    sums.beyond.add(beyond);
-    sums.unnoticed.add(unnoticed);
-    Ok(())
+    all.bits /= n;
+    Ok(all)
 }
 
 impl Figure for Loss {
@@ -136,20 +121,25 @@ impl Figure for Loss {
                 }
             }
         }
-        let name = |p: &Point<'_>| format!("{} {} {}", p.recording.name, p.loss, p.refresh);
-        let sums = context.sweep("real-loss", p.trials, &points, name, |_| Sums::default(), one)?;
-        let row = |(point, sums): (&Point<'_>, &Sums)| Row {
-            column: point.recording.name.clone(),
-            loss: point.loss,
-            refresh: point.refresh,
-            bits: (&sums.bits).into(),
-            rmse: Measured::root_mean(&sums.squares),
-            beyond: (&sums.beyond).into(),
-            unnoticed: (&sums.unnoticed).into(),
-            longest: sums.longest as f64 / point.refresh as f64,
-            violations: sums.violations,
+        let row = |point: &Point<'_>| {
+            let column = point.recording.name.clone();
+            let stream = context
+                .stream("real-loss")
+                .named(&format!("{column} {} {}", point.loss, point.refresh));
+            let all = context.trials(stream, p.trials, |trial| one(point, trial))?;
+            Ok(Row {
+                column,
+                loss: point.loss,
+                refresh: point.refresh,
+                bits: all.iter().map(|o| o.bits).collect(),
+                rmse: Measured::root_mean(&all.iter().map(|o| o.squares).collect()),
+                beyond: all.iter().map(|o| o.beyond).collect(),
+                unnoticed: all.iter().map(|o| o.unnoticed).collect(),
+                longest: all.iter().map(|o| o.longest).max().unwrap_or(0) as f64 / point.refresh as f64,
+                violations: all.iter().map(|o| o.violations).sum(),
+            })
         };
-        Ok(points.iter().zip(&sums).map(row).collect())
+        points.iter().map(row).collect()
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {

@@ -1,16 +1,9 @@
 //! Real signals within a guaranteed error: figures.
 
 mod baselines;
-mod bits;
-mod codecs;
-mod loss;
-mod packets;
+pub(crate) mod bits;
+pub(crate) mod codecs;
+pub(crate) mod loss;
+pub(crate) mod packets;
 mod recordings;
 mod tracking;
-
-use crate::AnyFigure;
-
-/// The figures of this system.
-pub fn figures() -> Vec<&'static dyn AnyFigure> {
-    vec![&bits::Bits, &packets::Packets, &loss::Loss, &codecs::Codecs]
-}

@@ -31,7 +31,6 @@ rows! {
     }
 }
 
-/// Error against packets.
 pub struct Packets;
 
 fn compare(recording: &Recording, target: f64, context: &Context<'_>) -> Result<Vec<Row>, Error> {
@@ -46,20 +45,16 @@ fn compare(recording: &Recording, target: f64, context: &Context<'_>) -> Result<
         ratio: None,
         negligible,
     };
-    let mut rows: Vec<Row> = searched(recording, target, |played| played.packets as f64)
+    let rivals = searched(recording, target, |played| played.packets as f64);
+    let mut rows: Vec<Row> = rivals
         .iter()
-        .map(|(scheme, delta, played)| row(*scheme, *delta, played))
+        .map(|(scheme, delta, played)| row(scheme, *delta, played))
         .collect();
     let rivals = rows.iter().filter(|r| r.scheme.starts_with("dpcm"));
     let best = rivals.map(|r| r.rmse).min_by(f64::total_cmp);
     let price = |replay: &Replay| replay.packets as f64 / recording.samples.len() as f64;
     let (config, ours) = best_for(recording, target, context, price)?;
-    let played = Played {
-        bits: ours.information.iter().sum(),
-        packets: ours.packets,
-        values: ours.values,
-    };
-    let mut ours = row("adaptive", config.delta(), &played);
+    let mut ours = row("adaptive", config.delta(), &ours.into());
     ours.ratio = best.map(|best| ours.rmse.max(negligible) / best.max(negligible));
     rows.push(ours);
     Ok(rows)
@@ -90,15 +85,11 @@ impl Figure for Packets {
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let columns = distinct(rows, |r| r.column.clone());
         let panel = |column: &String| {
-            let curve = |(colour, scheme): (usize, &&'static str)| {
-                let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == *scheme);
+            let curve = |(colour, &scheme): (usize, &&'static str)| {
+                let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == scheme);
                 let curve = points(chosen, |r| (r.target, r.rmse.max(r.negligible)));
-                let layer = if colour == 0 {
-                    Layer::line(*scheme, curve)
-                } else {
-                    Layer::dashed(*scheme, curve)
-                };
-                layer.coloured(colour)
+                let layer = if colour == 0 { Layer::line } else { Layer::dashed };
+                layer(scheme, curve).coloured(colour)
             };
             let schemes = ["adaptive", "dpcm-0", "dpcm-1", "send-on-delta"];
             Panel::loglog(column, "packets per sample", "rms error").with_all(schemes.iter().enumerate().map(curve))

@@ -1,9 +1,6 @@
 //! Signals: synthetic ones with the traits of recordings, or columns of a user's file.
 
 use crate::prelude::*;
-use fewbits_monte_carlo::parallel;
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 
 /// Samples of a synthetic signal, of the length asked for.
 type Synthesis = fn(&mut rand_pcg::Pcg64Dxsm, usize) -> Vec<f64>;
@@ -18,6 +15,15 @@ pub(super) struct Recording {
 }
 
 impl Recording {
+    /// One that is not circular.
+    fn straight(name: &str, samples: Vec<f64>) -> Self {
+        Self {
+            name: name.to_owned(),
+            samples,
+            period: None,
+        }
+    }
+
     /// Largest minus smallest sample, or the period.
     pub fn range(&self) -> f64 {
         self.period.unwrap_or_else(|| self.straight_range())
@@ -25,10 +31,8 @@ impl Recording {
 
     /// Largest minus smallest sample.
     pub fn straight_range(&self) -> f64 {
-        let (low, high) = self
-            .samples
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let (low, high) = self.samples.iter().fold(ends, |(l, h), x| (l.min(*x), h.max(*x)));
         high - low
     }
 
@@ -42,7 +46,6 @@ impl Recording {
 
 parameters! {
     /// Which signals.
-    #[derive(Clone)]
     pub(super) struct Source {
         /// A CSV file with a header line and a row a sample; empty for the synthetic set.
         pub recording: String = String::new(),
@@ -89,30 +92,21 @@ pub(super) fn each<T: Send>(
     numbers: &[f64],
     one: impl Fn(&Recording, f64) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
-    let pairs = recordings.iter().flat_map(|r| numbers.iter().map(move |n| (r, *n)));
-    let pairs: Vec<(&Recording, f64)> = pairs.collect();
-    parallel::try_map(&pairs, |(recording, number)| one(recording, *number))
+    parallel::try_map(&product(recordings, numbers), |(recording, number)| one(recording, **number))
 }
 
 /// Numeric columns of a CSV text: the named ones, or all but the first.
 pub(super) fn parse(text: &str, columns: &[String]) -> Result<Vec<Recording>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let headers = reader.headers().map_err(|error| error.to_string())?.clone();
-    let wanted = |(i, name): &(usize, &str)| {
-        if columns.is_empty() {
-            *i > 0
-        } else {
-            columns.iter().any(|c| c == name)
-        }
+    let wanted = |(i, name): &(usize, &str)| match columns {
+        [] => *i > 0,
+        _ => columns.iter().any(|c| c == name),
     };
     let chosen: Vec<(usize, &str)> = headers.iter().enumerate().filter(wanted).collect();
-    let mut found: Vec<Recording> = chosen
+    let mut found: Vec<_> = chosen
         .iter()
-        .map(|(_, name)| Recording {
-            name: (*name).to_owned(),
-            samples: Vec::new(),
-            period: None,
-        })
+        .map(|(_, name)| Recording::straight(name, Vec::new()))
         .collect();
     for (row, record) in reader.records().enumerate() {
         let record = record.map_err(|error| error.to_string())?;
@@ -149,11 +143,7 @@ fn synthetic(stream: &Stream, n: usize) -> Vec<Recording> {
         ("direction", direction),
         ("gusts", gusts),
     ];
-    let one = |(name, samples): &(&str, Synthesis)| Recording {
-        name: (*name).to_owned(),
-        samples: samples(&mut stream.named(name).rng(), n),
-        period: None,
-    };
+    let one = |(name, of): &(&str, Synthesis)| Recording::straight(name, of(&mut stream.named(name).rng(), n));
     make.iter().map(one).collect()
 }
 
@@ -197,11 +187,8 @@ fn spikes<R: Rng>(rng: &mut R, n: usize) -> Vec<f64> {
     let mut x = 5.0;
     let one = |_| {
         x += 0.02 * (5.0 - x) + 0.05 * normal(rng);
-        let wild = if rng.random::<f64>() < 0.01 {
-            20.0 * normal(rng)
-        } else {
-            0.0
-        };
+        let outlier = rng.random::<f64>() < 0.01;
+        let wild = if outlier { 20.0 * normal(rng) } else { 0.0 };
         rounded(x + wild, 1000.0)
     };
     (0..n).map(one).collect()
@@ -256,13 +243,8 @@ mod tests {
         source.columns = vec!["b".into()];
         assert_eq!(source.load("demo", &context).unwrap().len(), 1);
         source.columns = vec!["c".into()];
-        assert!(
-            source
-                .load("demo", &context)
-                .unwrap_err()
-                .to_string()
-                .contains("no such column")
-        );
+        let refused = source.load("demo", &context).unwrap_err().to_string();
+        assert!(refused.contains("no such column"), "{refused}");
         assert!(source.load("demo", &Context::new(1)).is_err());
         assert!(parse("t,a\n1,x\n", &[]).unwrap_err().contains("row 2"));
     }

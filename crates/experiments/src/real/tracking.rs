@@ -35,11 +35,8 @@ pub(super) fn best_for(
 /// A word of `bits` in every slot. The unit is the root mean square of the first fifty increments, as a short look at the signal
 /// gives it, or a thousandth of the range if nothing moved.
 pub(super) fn words(recording: &Recording, bits: u32) -> Result<Played, Error> {
-    let look = recording
-        .samples
-        .windows(2)
-        .take(50)
-        .map(|pair| (pair[1] - pair[0]).powi(2));
+    let increments = recording.samples.windows(2).take(50);
+    let look = increments.map(|pair| (pair[1] - pair[0]).powi(2));
     let unit = (look.sum::<f64>() / 50.0).sqrt().max(1e-3 * recording.range());
     let mut scheme = FixedRate::new(bits, unit, recording.samples.first().copied().unwrap_or(0.0))?;
     let mut values = Vec::with_capacity(recording.samples.len());
@@ -93,11 +90,8 @@ mod tests {
     #[test]
     fn gusts_raise_the_scale_over_a_calm() {
         let scale = |weights: &[f64]| {
-            let scales = weights
-                .iter()
-                .enumerate()
-                .map(|(m, w)| w * (2.0 * (m % SCALES) as f64 - 6.0));
-            scales.sum()
+            let all = weights.iter().enumerate();
+            all.map(|(m, w)| w * (2.0 * (m % SCALES) as f64 - 6.0)).sum()
         };
         let (moving, calm) = (mean("gusts", |x| x > 0.3, scale), mean("gusts", |x| x == 0.0, scale));
         assert!(moving - calm > 2.0, "{moving} {calm}");

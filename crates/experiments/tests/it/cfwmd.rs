@@ -128,7 +128,7 @@ fn thirty_rao_blackwellised_particles_are_on_a_par() {
         [
             Measured::root_mean(&position),
             Measured::root_mean(&velocity),
-            Measured::mean(&rate),
+            rate.into(),
         ]
     };
     let gaussian = of(0);

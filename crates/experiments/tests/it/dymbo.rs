@@ -10,7 +10,7 @@ use fewbits_dymbo::{
 use fewbits_experiments::{Measured, reference};
 use fewbits_filters::{CloudWorkspace, GaussianCloud, RaoBlackwellised, scalar_fixed_lag_variance, steady_state};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
-use fewbits_monte_carlo::{Moments, MonteCarlo, Stream, Trial};
+use fewbits_monte_carlo::{MonteCarlo, Stream, Trial};
 use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
 use rand::RngExt;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -337,7 +337,7 @@ fn assert_arrangement<const M: usize>(name: &str, at_once: bool) -> f64 {
     let start = Gaussian::new(Vector2::zeros(), steady).unwrap();
     let run = |it: Trial| Ok::<_, fewbits_dymbo::Error>(vector_run(&filter, at_once, start, it.stream));
     let runs = MonteCarlo::new(Stream::new(1).named(name), 40).run(run).unwrap();
-    let [mmse, excess, nees] = [0, 1, 2].map(|of| Measured::mean(&runs.iter().map(|run| run[of]).collect::<Moments>()));
+    let [mmse, excess, nees] = [0, 1, 2].map(|of| runs.iter().map(|run| run[of]).collect::<Measured>());
     for (quantity, value) in [
         ("trace", exact(steady.trace())),
         ("kalman", exact(kalman)),

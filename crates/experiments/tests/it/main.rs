@@ -26,8 +26,5 @@ fn assert_agrees(key: &str, own: impl Into<Measured>) {
 
 /// A number that was not simulated.
 fn exact(value: f64) -> Measured {
-    Measured {
-        value,
-        standard_error: None,
-    }
+    Measured::new(value, None)
 }
