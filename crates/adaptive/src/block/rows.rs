@@ -69,18 +69,27 @@ pub(super) fn code_all<C: Coder, S: State>(
     vectorised_narrow(
         #[inline(always)]
         move || {
-            // A variable of the loop's own: what nobody else can reach stays in registers.
+            // Variables of the loop's own: what nobody else can reach stays in registers.
             let mut state = state;
+            let mut own = std::mem::take(coder);
             let mut indices = Vec::with_capacity(rows.min(EXPECTED_ROWS));
             indices.push(state.last());
+            let mut result = Ok(());
             for row in 1..rows {
                 let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-                indices.push(state.code(coder, wanted.map(|wanted| wanted[row]), steps)?);
-                if coder.overran() {
+                match state.code(&mut own, wanted.map(|wanted| wanted[row]), steps) {
+                    Ok(index) => indices.push(index),
+                    Err(error) => {
+                        result = Err(error);
+                        break;
+                    }
+                }
+                if own.overran() {
                     break;
                 }
             }
-            Ok(indices)
+            *coder = own;
+            result.map(|()| indices)
         },
     )
 }
