@@ -7,7 +7,7 @@
 //! zero?   sign   at least 2, 3, .. 15?   the rest by an Elias gamma code   k low bits
 //! ```
 //!
-//! A second count of each decision, given the last index, would save 3 % of the bits and cost a quarter of the speed.
+//! A second count of each decision, given the last index, would save 3 % of the bits; reading would take a third longer.
 
 use super::coder::Coder;
 use super::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
