@@ -59,6 +59,7 @@ pub(super) trait State {
 }
 
 /// The indices behind the first one: `wanted` at the writer, `None` at the reader, which stops where the bytes end too early. Returns all.
+/// After an error nothing more can be coded.
 pub(super) fn code_all<C: Coder, S: State>(
     coder: &mut C,
     state: S,
@@ -74,22 +75,15 @@ pub(super) fn code_all<C: Coder, S: State>(
             let mut own = std::mem::take(coder);
             let mut indices = Vec::with_capacity(rows.min(EXPECTED_ROWS));
             indices.push(state.last());
-            let mut result = Ok(());
             for row in 1..rows {
                 let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-                match state.code(&mut own, wanted.map(|wanted| wanted[row]), steps) {
-                    Ok(index) => indices.push(index),
-                    Err(error) => {
-                        result = Err(error);
-                        break;
-                    }
-                }
+                indices.push(state.code(&mut own, wanted.map(|wanted| wanted[row]), steps)?);
                 if own.overran() {
                     break;
                 }
             }
             *coder = own;
-            result.map(|()| indices)
+            Ok(indices)
         },
     )
 }
