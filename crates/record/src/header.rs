@@ -11,7 +11,7 @@ use fewbits_adaptive::Start;
 /// The first bytes. Like PNG's they contain a byte above 127 and a line end, so that text transfers are noticed.
 const MAGIC: [u8; 7] = *b"\x8bfewb\r\n";
 /// The version of the format.
-pub(crate) const VERSION: u8 = 4;
+pub(crate) const VERSION: u8 = 5;
 /// No header is longer: 4096 columns with names and units.
 pub(crate) const MAX_HEADER: usize = 1 << 24;
 

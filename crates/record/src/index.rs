@@ -8,7 +8,7 @@ use crate::block::Cells;
 use crate::error::Damage;
 use crate::header::Header;
 use crate::ranges::{self, Ends};
-use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint, zigzag};
+use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint, unzigzag, zigzag};
 
 /// Blocks of one segment.
 pub(crate) const BLOCKS_PER_SEGMENT: usize = 1024;
@@ -225,12 +225,15 @@ pub(crate) fn push_segment(header: &Header, entries: &[Entry]) -> Vec<u8> {
         content.extend_from_slice(&high.to_be_bytes()[..SHORT]);
         scales.push((f64::from(low), f64::from(high)));
     }
-    let (mut last, mut before) = (header.origin, None);
+    let (mut last, mut before, mut length) = (header.origin, None, 0);
     for entry in entries {
         let distance = entry.ticks.0.wrapping_sub(last);
         let shape = (entry.rows, distance, entry.ticks.1.wrapping_sub(entry.ticks.0));
         let same = before == Some(shape);
-        push_varint(&mut content, 2 * entry.length + u64::from(same));
+        // Blocks of as many rows are of similar length: the difference mostly fits a byte.
+        let longer = zigzag(entry.length.wrapping_sub(length) as i64);
+        push_varint(&mut content, longer << 1 | u64::from(same));
+        length = entry.length;
         if !same {
             push_varint(&mut content, entry.rows);
         }
@@ -261,9 +264,11 @@ pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>
         scales.push((read_short(&mut reader)?, read_short(&mut reader)?));
     }
     let (mut entries, mut last, mut before) = (Vec::with_capacity(count), header.origin, None);
+    let mut length = 0_u64;
     for _ in 0..count {
         let head = reader.varint()?;
-        let mut entry = Entry::damaged(head >> 1, columns);
+        length = length.wrapping_add(unzigzag(head >> 1) as u64);
+        let mut entry = Entry::damaged(length, columns);
         let shape = if head & 1 == 1 {
             before.ok_or(Damage::Content("block like the one before"))?
         } else {

@@ -59,6 +59,7 @@ pub(super) trait State {
 }
 
 /// The indices behind the first one: `wanted` at the writer, `None` at the reader, which stops where the bytes end too early. Returns all.
+/// After an error nothing more can be coded.
 pub(super) fn code_all<C: Coder, S: State>(
     coder: &mut C,
     state: S,
@@ -69,17 +70,19 @@ pub(super) fn code_all<C: Coder, S: State>(
     vectorised_narrow(
         #[inline(always)]
         move || {
-            // A variable of the loop's own: what nobody else can reach stays in registers.
+            // Variables of the loop's own: what nobody else can reach stays in registers.
             let mut state = state;
+            let mut own = std::mem::take(coder);
             let mut indices = Vec::with_capacity(rows.min(EXPECTED_ROWS));
             indices.push(state.last());
             for row in 1..rows {
                 let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-                indices.push(state.code(coder, wanted.map(|wanted| wanted[row]), steps)?);
-                if coder.overran() {
+                indices.push(state.code(&mut own, wanted.map(|wanted| wanted[row]), steps)?);
+                if own.overran() {
                     break;
                 }
             }
+            *coder = own;
             Ok(indices)
         },
     )

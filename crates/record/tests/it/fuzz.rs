@@ -1,7 +1,7 @@
 //! The fuzzers' corpus and random mutations of it, without a fuzzer: no panic, and no more memory than the block's stated size.
 
 use crate::common::{Numbers, rows, schema};
-use fewbits_record::{Bound, Column, FrameWriter, Recorder, Schema, TimeBase, TimeFormat};
+use fewbits_record::{Bound, Column, Effort, FrameWriter, Recorder, Schema, TimeBase, TimeFormat};
 use std::path::{Path, PathBuf};
 
 #[path = "../../fuzz/checks.rs"]
@@ -122,7 +122,12 @@ fn corpus_is_written() {
         let columns = schema.columns().len();
         let row = |i: usize| -> Vec<_> { rows(80)[i].iter().cycle().take(columns).copied().collect() };
         let tick = |i: usize| 1000 * i as i64 + (i % 7) as i64 * 3;
-        let mut recorder = Recorder::new(Vec::new(), schema.clone());
+        let effort = if number % 2 == 0 {
+            Effort::Thorough
+        } else {
+            Effort::Fast
+        };
+        let mut recorder = Recorder::new(Vec::new(), schema.clone()).with_effort(effort);
         let mut writer = FrameWriter::new(schema, 400).unwrap();
         let mut frames = Vec::new();
         for i in 0..80 {
