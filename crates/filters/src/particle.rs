@@ -181,9 +181,9 @@ pub(crate) fn weigh<const D: usize>(
 /// [`ParticleFilter`] (bootstrap) with a number of particles.
 #[derive(Debug, Clone)]
 pub struct BootstrapFilter<const D: usize> {
-    pub(crate) filter: ParticleFilter,
+    filter: ParticleFilter,
     count: usize,
-    pub(crate) workspace: Workspace<D>,
+    workspace: Workspace<D>,
 }
 
 impl<const D: usize> BootstrapFilter<D> {

@@ -37,7 +37,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             for slot in checkpoint.slots.iter().filter(|slot| slot.used) {
                 // A sensor may have left since.
                 if let Ok(member) = self.member(slot.sensor) {
-                    likelihoods.push(member.sensor.likelihood(&slot.read()?, slot.working)?);
+                    likelihoods.push(member.sensor.likelihood(&slot.slot(), slot.working)?);
                 }
             }
             let likelihoods: Vec<&dyn StateLikelihood<D>> = likelihoods.iter().map(|one| &**one).collect();
