@@ -10,10 +10,8 @@ use crate::sign::Sign;
 use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::kernels::{self, scalar};
 use fewbits_numerics::normal;
-#[cfg(feature = "serde")]
 use fewbits_numerics::stored;
 use nalgebra::SVector;
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// `p(observation | m) = floor + share P(m + n in cell)`, `n ~ N(0, r)`.
@@ -23,9 +21,8 @@ use serde::{Deserialize, Serialize};
 /// | sign bit over a link with arrival `a` and crossover `c` | a half-line | `a c` | `a (1 - 2 c)` |
 /// | cell of a quantizer, perfect link | the cell | 0 | 1 |
 /// | nothing from a censoring sensor, loss `l` | region of silence | `l` | `1 - l` |
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Numbers", into = "Numbers"))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers", into = "Numbers")]
 pub struct InCell {
     cell: Cell,
     variance: f64,
@@ -34,8 +31,6 @@ pub struct InCell {
     share: f64,
     log_share: f64,
 }
-
-#[cfg(feature = "serde")]
 stored! { InCell as Numbers |factor| {
     cell: Cell = factor.cell,
     #[serde(with = "fewbits_numerics::stored")]
