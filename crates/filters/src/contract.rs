@@ -58,6 +58,27 @@ impl<const D: usize, G: GaussianDynamics<D>> Motion<D> for G {
     }
 }
 
+/// A motion whose process noise has its covariance multiplied by `noise_scale`.
+#[derive(Clone, Copy)]
+pub struct Move<'a, const D: usize> {
+    /// The motion as it was stated.
+    pub motion: &'a dyn Motion<D>,
+    /// Factor of the covariance of the process noise; 1 is the motion as it was stated.
+    pub noise_scale: f64,
+}
+
+impl<'a, const D: usize> Move<'a, D> {
+    /// `motion` with this factor.
+    pub fn new(motion: &'a dyn Motion<D>, noise_scale: f64) -> Self {
+        Self { motion, noise_scale }
+    }
+
+    /// Moves a Gaussian.
+    pub fn predict(&self, belief: &Gaussian<D>) -> Gaussian<D> {
+        self.motion.predict(belief, self.noise_scale)
+    }
+}
+
 /// A world that moves in continuous time as a filter sees it: [`Evolution`] without its types.
 pub trait Evolving<const D: usize> {
     /// The motion over `seconds`.
@@ -196,17 +217,11 @@ pub trait StateFilter<const D: usize> {
         self.start(rng, prior)
     }
 
-    /// Time update, the process noise multiplied by `noise_scale`.
+    /// Time update.
     ///
     /// # Errors
     /// Those of the filter.
-    fn predict(
-        &mut self,
-        rng: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut Self::Belief,
-    ) -> Result<(), Error>;
+    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Self::Belief) -> Result<(), Error>;
 
     /// Takes in all observations of one instant.
     ///
@@ -238,7 +253,7 @@ pub trait StateFilter<const D: usize> {
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<(Self::Belief, Info), Error> {
         let mut next = belief.clone();
-        self.predict(rng, motion, 1.0, &mut next)?;
+        self.predict(rng, Move::new(motion, 1.0), &mut next)?;
         let info = self.update(rng, &mut next, observed)?;
         Ok((next, info))
     }
@@ -256,14 +271,8 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
         Ok(*prior)
     }
 
-    fn predict(
-        &mut self,
-        _: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut Gaussian<D>,
-    ) -> Result<(), Error> {
-        *belief = motion.predict(belief, noise_scale);
+    fn predict(&mut self, _: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Gaussian<D>) -> Result<(), Error> {
+        *belief = motion.predict(belief);
         Ok(())
     }
 

@@ -1,11 +1,13 @@
 //! The interacting-multiple-model filter: several models of one world, and any factor.
 
 use crate::{Error, assumed_density};
+use fewbits_core::columns::{columns_agree, count, set_state};
 use fewbits_core::{Belief, ColumnsMut, Factor, Gaussian, GaussianDynamics, Observed, Sensing};
+use fewbits_densities::Categorical;
 use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities, within};
 use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
-use rand::{Rng, RngExt};
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// A filter for a world that moves by one of several models at a time and switches between them as a Markov chain.
@@ -109,28 +111,13 @@ impl<const D: usize> Belief<D> for ImmBelief<D> {
     }
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        if !fewbits_core::columns::columns_agree(&mut states) {
+        if !columns_agree(&mut states) {
             return;
         }
-        let count = states.first().map_or(0, |column| column.len());
-        for i in 0..count {
-            let mut left: f64 = rng.random();
-            let mut chosen = 0;
-            for (m, p) in self.probabilities.iter().enumerate() {
-                if *p > 0.0 {
-                    chosen = m;
-                    left -= p;
-                    if left < 0.0 {
-                        break;
-                    }
-                }
-            }
-            if let Some(mode) = self.modes.get(chosen) {
-                let point = mode.sample(rng);
-                for d in 0..D {
-                    states[d][i] = point[d];
-                }
-            }
+        let modes = Categorical::new(&self.probabilities);
+        for i in 0..count(&states) {
+            let point = self.modes[modes.draw(rng)].sample(rng);
+            set_state(&mut states, i, &point);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A linear Gaussian state observed through cells, Rao-Blackwellised.
 
-use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
-use crate::particle::{ParticleFilter, ParticleInfo, Workspace, weigh};
+use crate::contract::{Info, Move, StateFilter, StateLikelihood};
+use crate::particle::{ParticleFilter, Workspace, weigh};
 use crate::{Error, kalman};
 use fewbits_core::columns::{count, set_state};
 use fewbits_core::factor::Scalar;
@@ -91,7 +91,7 @@ impl RaoBlackwellised {
         belief: &mut GaussianCloud<D>,
         observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
         workspace: &mut CloudWorkspace<D>,
-    ) -> Result<ParticleInfo, Error> {
+    ) -> Result<Info, Error> {
         self.update_all(rng, belief, [(&observed.sensing, observed.factor.clone().into())].into_iter(), workspace)
     }
 
@@ -101,7 +101,7 @@ impl RaoBlackwellised {
         belief: &mut GaussianCloud<D>,
         observed: impl Iterator<Item = (&'a S, Scalar)>,
         workspace: &mut CloudWorkspace<D>,
-    ) -> Result<ParticleInfo, Error> {
+    ) -> Result<Info, Error> {
         let next = workspace.next.get_or_insert_with(|| belief.clone());
         next.clone_from(belief);
         let log_weights = &mut workspace.log_weights;
@@ -189,20 +189,14 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         Ok(GaussianCloud::agreed(prior, self.count)?)
     }
 
-    fn predict(
-        &mut self,
-        rng: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut GaussianCloud<D>,
-    ) -> Result<(), Error> {
+    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut GaussianCloud<D>) -> Result<(), Error> {
         let shared = Gaussian::from_trusted_parts(belief.means().mean(), *belief.shared_covariance());
-        let moved = motion.predict(&shared, noise_scale);
+        let moved = motion.predict(&shared);
         let particles = &mut self.workspace.particles;
         self.filter.filter.resample(rng, belief.means_mut(), particles)?;
         let mut columns = belief.means_mut().columns_mut();
         for i in 0..count(&columns) {
-            let mean = motion.mean(&SVector::<f64, D>::from_fn(|d, _| columns[d][i]));
+            let mean = motion.motion.mean(&SVector::<f64, D>::from_fn(|d, _| columns[d][i]));
             set_state(&mut columns, i, &mean);
         }
         belief.set_shared_covariance(*moved.covariance());
@@ -227,7 +221,7 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         let scalars = scalars.iter().map(|one| (&one.sensing, one.factor.clone()));
         let info = self.filter.update_all(rng, belief, scalars, &mut self.workspace)?;
         let log_likelihood = info.log_likelihood + log_scale;
-        Ok(ParticleInfo { log_likelihood, ..info }.into())
+        Ok(Info { log_likelihood, ..info })
     }
 }
 

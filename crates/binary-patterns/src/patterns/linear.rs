@@ -14,7 +14,7 @@ pub type Mask = u32;
 ///
 /// # Errors
 /// If `bits` is not in `1..=16`, or the mask is 0 or has a digit beyond `bits`.
-pub fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
+pub(crate) fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
     let bits = bits_in_range(bits)?;
     if mask != 0 && mask < 1 << bits {
         Ok(mask)

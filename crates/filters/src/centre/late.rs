@@ -3,7 +3,7 @@
 use super::state::{Checkpoint, StoredSlot};
 use super::{FusionCentre, Slot};
 use crate::Error;
-use crate::contract::{StateFilter, StateLikelihood};
+use crate::contract::{Move, StateFilter, StateLikelihood};
 use fewbits_numerics::error::finite;
 use rand::Rng;
 
@@ -50,10 +50,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(true)
     }
 
-    fn moved(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, seconds: f64) -> Result<(), Error> {
+    /// Moves a belief over some time.
+    pub(super) fn moved(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, seconds: f64) -> Result<(), Error> {
         if seconds > 0.0 {
             let motion = self.world.over(seconds)?;
-            self.filter.predict(rng, &*motion, self.noise_scale, belief)?;
+            self.filter
+                .predict(rng, Move::new(&*motion, self.noise_scale), belief)?;
         }
         Ok(())
     }
