@@ -61,6 +61,12 @@ impl<C: Scheme<M>, const M: usize> SchemeNode<C, M> {
     pub fn memory(&self) -> &C::State {
         &self.memory
     }
+
+    /// The same sensor with a memory that was stored.
+    #[must_use]
+    pub fn with_memory(self, memory: C::State) -> Self {
+        Self { memory, ..self }
+    }
 }
 
 impl<C: Deterministic<M>, const M: usize> SchemeNode<C, M> {

@@ -3,7 +3,6 @@
 //! Models, sensors and observations are object-safe, so that any kinds stand in one list.
 //! The table of the [crate] says which filter is for what.
 
-use crate::linear_row::LinearRow;
 use crate::{Error, assumed_density};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Belief, ColumnsMut, Evolution, Factor, Gaussian, GaussianDynamics, Likelihood, Observed, Sensing};
@@ -137,7 +136,20 @@ pub trait StateLikelihood<const D: usize>: Likelihood<D> {
 
     /// As a scalar factor seen through a linear sensor, times `exp` of a number: what filters need that impute measurements. `None` if
     /// the sensor is not linear about `state`, or the factor is of another kind.
-    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearRow<D>, Scalar, 1>, f64)>;
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>>;
+}
+
+/// A scalar factor of `z = h x + w`, `w ~ N(0, r)`, times `exp(log_scale)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearScalar<const D: usize> {
+    /// `h`.
+    pub matrix: SMatrix<f64, 1, D>,
+    /// `r`.
+    pub noise_covariance: SMatrix<f64, 1, 1>,
+    /// What was observed of `z`.
+    pub factor: Scalar,
+    /// What multiplies the factor.
+    pub log_scale: f64,
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikelihood<D> for Observed<S, F, M> {
@@ -165,14 +177,19 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
         jacobian.column(axis).iter().any(|x| *x != 0.0)
     }
 
-    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearRow<D>, Scalar, 1>, f64)> {
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>> {
         let (factor, log_scale) = self.factor.as_scalar().filter(|_| M == 1)?;
         let jacobian = self.sensing.jacobian(state);
-        let row = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
+        let matrix = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
         let (mean, noise) = (self.sensing.mean(state)[0], self.sensing.noise_covariance_at(state)[(0, 0)]);
-        let offset = (mean - (row * state)[0]).abs();
-        let sensor = LinearRow::new(row, noise)?;
-        (offset <= OFFSET * (mean.abs() + noise.sqrt())).then(|| (Observed::new(sensor, factor), log_scale))
+        let offset = (mean - (matrix * state)[0]).abs();
+        let is_sensor = noise > 0.0 && noise.is_finite() && matrix.iter().all(|x| x.is_finite());
+        (is_sensor && offset <= OFFSET * (mean.abs() + noise.sqrt())).then_some(LinearScalar {
+            matrix,
+            noise_covariance: [[noise]].into(),
+            factor,
+            log_scale,
+        })
     }
 }
 
