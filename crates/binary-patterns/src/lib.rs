@@ -40,15 +40,13 @@ pub mod published;
 pub mod search;
 
 pub use decoding::decoder::Decoder;
-pub use decoding::table::{LookupTable, MAX_TABLE_SENSORS};
+pub use decoding::table::LookupTable;
 pub use error::Error;
-pub use observation::bank::{Bank, IMPOSSIBLE, MAX_OUTCOMES};
+pub use observation::bank::{Bank, IMPOSSIBLE};
 pub use observation::sensor::PatternSensor;
 pub use observation::source::{Nodes, Source, Threshold};
 pub use patterns::count;
-pub use patterns::grid::{CellGrid, MAX_BITS, MAX_EIGHT_LEVEL_EDGES};
-pub use patterns::linear::{
-    Mask, check_mask, generator_matrix, gray_basis, linear_pattern, mask_of, natural_basis, rank,
-};
+pub use patterns::grid::CellGrid;
+pub use patterns::linear::{Mask, generator_matrix, gray_basis, linear_pattern, mask_of, natural_basis, rank};
 pub use patterns::pattern::{Pattern, check_separation};
 pub use patterns::quantizer::BinaryQuantizer;

@@ -64,9 +64,8 @@ pub enum CodecError {
 }
 
 /// A finished sequence of bits; up to 16 bytes need no memory of the heap. Stored as its bytes and the number of bits.
-#[derive(Debug, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "(Vec<u8>, usize)", into = "(Vec<u8>, usize)"))]
+#[derive(Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "(Vec<u8>, usize)", into = "(Vec<u8>, usize)")]
 pub struct BitString {
     bytes: SmallVec<[u8; 16]>,
     bits: usize,

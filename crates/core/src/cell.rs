@@ -3,13 +3,11 @@
 use crate::sign::Sign;
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::normal;
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// A half-open interval `[lower, upper)` that is known to hold a measurement; either end may be infinite.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Ends", into = "Ends"))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Ends", into = "Ends")]
 pub struct Cell {
     lower: f64,
     upper: f64,
@@ -71,7 +69,6 @@ impl Cell {
 }
 
 /// The stored form: an end that is left out is infinite, since JSON has no infinity.
-#[cfg(feature = "serde")]
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Ends {
@@ -80,8 +77,6 @@ struct Ends {
     #[serde(default, with = "fewbits_numerics::stored")]
     upper: Option<f64>,
 }
-
-#[cfg(feature = "serde")]
 impl From<Cell> for Ends {
     fn from(cell: Cell) -> Self {
         let end = |x: f64| x.is_finite().then_some(x);
@@ -91,8 +86,6 @@ impl From<Cell> for Ends {
         }
     }
 }
-
-#[cfg(feature = "serde")]
 impl TryFrom<Ends> for Cell {
     type Error = ArgumentError;
 

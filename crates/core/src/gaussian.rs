@@ -5,12 +5,10 @@ use crate::columns::{Columns, ColumnsMut, change_each, lengths_agree};
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
-#[cfg(feature = "serde")]
 use fewbits_numerics::stored;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// A normal distribution over a state of `D` coordinates: the belief of every Kalman-like estimator.
@@ -26,13 +24,12 @@ use serde::{Deserialize, Serialize};
 /// assert!(Gaussian::scalar(0.0, -1.0).is_err());
 /// # Ok::<(), fewbits_numerics::ArgumentError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Moments<D>"))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Moments<D>")]
 pub struct Gaussian<const D: usize> {
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
+    #[serde(with = "fewbits_numerics::stored")]
     mean: SVector<f64, D>,
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
+    #[serde(with = "fewbits_numerics::stored")]
     covariance: SMatrix<f64, D, D>,
 }
 
@@ -171,8 +168,6 @@ impl Gaussian<1> {
         Ok(Self::from_trusted_parts(SVector::from([mean]), SMatrix::from([[variance]])))
     }
 }
-
-#[cfg(feature = "serde")]
 stored! { #[serde(rename = "Gaussian")] [const D: usize] Gaussian as Moments {
     #[serde(with = "fewbits_numerics::stored")]
     mean: SVector<f64, D>,

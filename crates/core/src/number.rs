@@ -5,16 +5,13 @@ use crate::cell::Cell;
 use crate::gaussian::Gaussian;
 use crate::message::Message;
 use fewbits_numerics::error::{ArgumentError, finite, within};
-#[cfg(feature = "serde")]
 use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// How a number travels. Both ends know it; it costs no bits itself.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum NumberFormat {
     /// 64-bit floating point.
     #[default]
@@ -27,18 +24,15 @@ pub enum NumberFormat {
 
 /// `2^bits` evenly spaced levels from `lower` to `upper`, ends included. A value takes the nearest; beyond the ends it
 /// saturates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Numbers"))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers")]
 pub struct Levels {
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
+    #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
+    #[serde(with = "fewbits_numerics::stored")]
     upper: f64,
     bits: u32,
 }
-
-#[cfg(feature = "serde")]
 stored! { Levels as Numbers { #[serde(with = "fewbits_numerics::stored")] lower: f64, #[serde(with = "fewbits_numerics::stored")] upper: f64, bits: u32 } => Levels::new(lower, upper, bits), ArgumentError }
 
 impl Levels {

@@ -4,10 +4,8 @@ use crate::bits::BitString;
 use crate::error::Error;
 use crate::message::Message;
 use fewbits_numerics::ArgumentError;
-#[cfg(feature = "serde")]
 use fewbits_numerics::stored;
 use rand::{Rng, RngExt};
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// What arrives at the receiver in one slot from one sensor that was asked.
@@ -22,8 +20,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// They sum to one for every `m`. A sensor that was not asked (asleep, out of turn, known to be switched off) gives no observation
 /// and no factor at all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Observation<R> {
     /// A report was received.
     Received(R),
@@ -73,19 +70,16 @@ impl<R> From<Option<R>> for Observation<R> {
 /// assert!(Link::lossy(0.9)?.with_erasure(0.2).is_err());
 /// # Ok::<(), fewbits_core::ArgumentError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Numbers"))]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(try_from = "Numbers")]
 pub struct Link {
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
+    #[serde(with = "fewbits_numerics::stored")]
     loss: f64,
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
+    #[serde(with = "fewbits_numerics::stored")]
     erasure: f64,
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
+    #[serde(with = "fewbits_numerics::stored")]
     crossover: f64,
 }
-
-#[cfg(feature = "serde")]
 stored! { Link as Numbers { #[serde(with = "fewbits_numerics::stored")] loss: f64, #[serde(default, with = "fewbits_numerics::stored")] erasure: f64, #[serde(with = "fewbits_numerics::stored")] crossover: f64 } =>
 Link::new(loss, crossover)?.with_erasure(erasure), ArgumentError }
 

@@ -3,12 +3,10 @@
 use crate::bits::{BitReader, BitWriter, CodecError};
 use crate::message::Message;
 use fewbits_numerics::error::{ArgumentError, finite};
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// One bit: whether a measurement reached its threshold. `Above` is `+1`, ties included.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Sign {
     /// The measurement was below the threshold: `-1`.
     Below,

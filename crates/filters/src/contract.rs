@@ -3,7 +3,6 @@
 //! Models, sensors and observations are object-safe, so that any kinds stand in one list.
 //! The table of the [crate] says which filter is for what.
 
-use crate::linear_row::LinearRow;
 use crate::{Error, assumed_density};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Belief, ColumnsMut, Evolution, Factor, Gaussian, GaussianDynamics, Likelihood, Observed, Sensing};
@@ -55,6 +54,27 @@ impl<const D: usize, G: GaussianDynamics<D>> Motion<D> for G {
             let moved = mean + (self.propagate(rng, &state) - mean) * stretch;
             fewbits_core::columns::set_state(&mut states, i, &moved);
         }
+    }
+}
+
+/// A motion whose process noise has its covariance multiplied by `noise_scale`.
+#[derive(Clone, Copy)]
+pub struct Move<'a, const D: usize> {
+    /// The motion as it was stated.
+    pub motion: &'a dyn Motion<D>,
+    /// Factor of the covariance of the process noise; 1 is the motion as it was stated.
+    pub noise_scale: f64,
+}
+
+impl<'a, const D: usize> Move<'a, D> {
+    /// `motion` with this factor.
+    pub fn new(motion: &'a dyn Motion<D>, noise_scale: f64) -> Self {
+        Self { motion, noise_scale }
+    }
+
+    /// Moves a Gaussian.
+    pub fn predict(&self, belief: &Gaussian<D>) -> Gaussian<D> {
+        self.motion.predict(belief, self.noise_scale)
     }
 }
 
@@ -116,7 +136,20 @@ pub trait StateLikelihood<const D: usize>: Likelihood<D> {
 
     /// As a scalar factor seen through a linear sensor, times `exp` of a number: what filters need that impute measurements. `None` if
     /// the sensor is not linear about `state`, or the factor is of another kind.
-    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearRow<D>, Scalar, 1>, f64)>;
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>>;
+}
+
+/// A scalar factor of `z = h x + w`, `w ~ N(0, r)`, times `exp(log_scale)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearScalar<const D: usize> {
+    /// `h`.
+    pub matrix: SMatrix<f64, 1, D>,
+    /// `r`.
+    pub noise_covariance: SMatrix<f64, 1, 1>,
+    /// What was observed of `z`.
+    pub factor: Scalar,
+    /// What multiplies the factor.
+    pub log_scale: f64,
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikelihood<D> for Observed<S, F, M> {
@@ -144,14 +177,19 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
         jacobian.column(axis).iter().any(|x| *x != 0.0)
     }
 
-    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearRow<D>, Scalar, 1>, f64)> {
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>> {
         let (factor, log_scale) = self.factor.as_scalar().filter(|_| M == 1)?;
         let jacobian = self.sensing.jacobian(state);
-        let row = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
+        let matrix = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
         let (mean, noise) = (self.sensing.mean(state)[0], self.sensing.noise_covariance_at(state)[(0, 0)]);
-        let offset = (mean - (row * state)[0]).abs();
-        let sensor = LinearRow::new(row, noise)?;
-        (offset <= OFFSET * (mean.abs() + noise.sqrt())).then(|| (Observed::new(sensor, factor), log_scale))
+        let offset = (mean - (matrix * state)[0]).abs();
+        let is_sensor = noise > 0.0 && noise.is_finite() && matrix.iter().all(|x| x.is_finite());
+        (is_sensor && offset <= OFFSET * (mean.abs() + noise.sqrt())).then_some(LinearScalar {
+            matrix,
+            noise_covariance: [[noise]].into(),
+            factor,
+            log_scale,
+        })
     }
 }
 
@@ -196,17 +234,11 @@ pub trait StateFilter<const D: usize> {
         self.start(rng, prior)
     }
 
-    /// Time update, the process noise multiplied by `noise_scale`.
+    /// Time update.
     ///
     /// # Errors
     /// Those of the filter.
-    fn predict(
-        &mut self,
-        rng: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut Self::Belief,
-    ) -> Result<(), Error>;
+    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Self::Belief) -> Result<(), Error>;
 
     /// Takes in all observations of one instant.
     ///
@@ -238,7 +270,7 @@ pub trait StateFilter<const D: usize> {
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<(Self::Belief, Info), Error> {
         let mut next = belief.clone();
-        self.predict(rng, motion, 1.0, &mut next)?;
+        self.predict(rng, Move::new(motion, 1.0), &mut next)?;
         let info = self.update(rng, &mut next, observed)?;
         Ok((next, info))
     }
@@ -256,14 +288,8 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
         Ok(*prior)
     }
 
-    fn predict(
-        &mut self,
-        _: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut Gaussian<D>,
-    ) -> Result<(), Error> {
-        *belief = motion.predict(belief, noise_scale);
+    fn predict(&mut self, _: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Gaussian<D>) -> Result<(), Error> {
+        *belief = motion.predict(belief);
         Ok(())
     }
 

@@ -3,10 +3,11 @@
 use crate::{Error, assumed_density};
 use fewbits_core::columns::change_each;
 use fewbits_core::{Belief, ColumnsMut, Factor, Gaussian, GaussianDynamics, Observed, Sensing};
+use fewbits_densities::Categorical;
 use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities, within};
 use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
-use rand::{Rng, RngExt};
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// A filter for a world that moves by one of several models at a time and switches between them as a Markov chain.
@@ -110,20 +111,8 @@ impl<const D: usize> Belief<D> for ImmBelief<D> {
     }
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
-        change_each(states, |old| {
-            let mut left: f64 = rng.random();
-            let mut chosen = 0;
-            for (m, p) in self.probabilities.iter().enumerate() {
-                if *p > 0.0 {
-                    chosen = m;
-                    left -= p;
-                    if left < 0.0 {
-                        break;
-                    }
-                }
-            }
-            self.modes.get(chosen).map_or(old, |mode| mode.sample(rng))
-        });
+        let modes = Categorical::new(&self.probabilities);
+        change_each(states, |_| self.modes[modes.draw(rng)].sample(rng));
     }
 }
 

@@ -50,8 +50,17 @@ pub fn update<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     measurement: &SVector<f64, M>,
 ) -> Result<(Gaussian<D>, KalmanInfo<D, M>), Error> {
-    let matrix = sensing.matrix();
-    let noise = sensing.noise_covariance();
+    update_by(sensing.matrix(), sensing.noise_covariance(), belief, measurement)
+}
+
+/// [`update`] with `H` and `R`.
+#[inline(always)]
+pub(crate) fn update_by<const D: usize, const M: usize>(
+    matrix: &SMatrix<f64, M, D>,
+    noise: &SMatrix<f64, M, M>,
+    belief: &Gaussian<D>,
+    measurement: &SVector<f64, M>,
+) -> Result<(Gaussian<D>, KalmanInfo<D, M>), Error> {
     let cross = times_transposed(belief.covariance(), matrix);
     let innovation_covariance = congruence_of(matrix, &cross) + noise;
     let lower = Cholesky::new(innovation_covariance)

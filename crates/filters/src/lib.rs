@@ -9,7 +9,7 @@
 //! | a Gaussian belief and any factor | [`assumed_density`] | [`MomentFilter`] |
 //! | linear Gaussian filtering of values | [`kalman`] (Joseph form) | [`MomentFilter`] |
 //! | a Gaussian belief and any likelihood of a few coordinates | [`GridFilter`] (a grid that follows the posterior) | [`GridOnAxes`] |
-//! | any dynamics, any likelihood | [`ParticleFilter`], [`Resampling`] | [`BootstrapFilter`], [`GuidedFilter`] |
+//! | any dynamics, any likelihood | [`ParticleFilter`], [`Resampling`] | [`BootstrapFilter`] |
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`CloudFilter`] |
 //! | several models, one at a time | [`Imm`] (interacting multiple models, any factor) | [`NoiseBank`], [`Switching`] |
 //! | the exact answer for a scalar | [`PointMassFilter`] (filter and smoother on a grid) | [`PointMasses`] |
@@ -39,10 +39,8 @@ pub mod contract;
 pub mod cramer_rao;
 mod error;
 mod grid_filter;
-mod guided;
 mod imm;
 pub mod kalman;
-mod linear_row;
 mod noise_bank;
 mod particle;
 mod point_mass;
@@ -52,15 +50,13 @@ pub mod smoother;
 mod steady_state;
 mod switching;
 
-pub use contract::{Info, MomentFilter, StateFilter, StateLikelihood};
+pub use contract::{Info, LinearScalar, MomentFilter, StateFilter, StateLikelihood};
 pub use error::Error;
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
-pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace, MIN_NODES_PER_DEVIATION};
-pub use guided::GuidedFilter;
+pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};
 pub use imm::{Imm, ImmBelief, ImmWorkspace};
-pub use linear_row::LinearRow;
 pub use noise_bank::NoiseBank;
-pub use particle::{BootstrapFilter, ParticleFilter, ParticleInfo, Workspace};
+pub use particle::{BootstrapFilter, ParticleFilter, Workspace};
 pub use point_mass::{PointMassFilter, PointMasses};
 pub use rao_blackwell::{CloudFilter, CloudWorkspace, RaoBlackwellised};
 pub use resample::{Resampling, Schedule};

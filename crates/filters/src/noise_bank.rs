@@ -1,6 +1,6 @@
 //! Filters that differ in the scale of the process noise or in the model, weighed by evidence.
 
-use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
+use crate::contract::{Info, Move, StateFilter, StateLikelihood};
 use crate::imm::{ImmWorkspace, evenly, mix, weigh};
 use crate::{Error, ImmBelief};
 use fewbits_core::Gaussian;
@@ -80,27 +80,21 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         Ok(ImmBelief::new(lost.probabilities().to_vec(), vec![start; lost.modes().len()])?)
     }
 
-    fn predict(
-        &mut self,
-        rng: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut ImmBelief<D>,
-    ) -> Result<(), Error> {
+    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut ImmBelief<D>) -> Result<(), Error> {
         let Self {
             filter,
             scales,
             transition,
             workspace,
         } = self;
-        let modes = motion.modes();
+        let modes = motion.motion.modes();
         if !(modes.is_empty() || modes.len() == scales.len()) {
             return refuse("motion", format!("{} modes", modes.len()), format!("{}, one for each scale", scales.len()));
         }
         mix(belief, transition, workspace, |j, mixed| {
             let mut moved = *mixed;
-            let motion = modes.get(j).map_or(motion, |mode| &**mode);
-            filter.predict(rng, motion, noise_scale * scales[j], &mut moved)?;
+            let own = modes.get(j).map_or(motion.motion, |mode| &**mode);
+            filter.predict(rng, Move::new(own, motion.noise_scale * scales[j]), &mut moved)?;
             Ok(moved)
         })
     }

@@ -1,6 +1,6 @@
 //! The bootstrap particle filter.
 
-use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
+use crate::contract::{Info, Move, StateFilter, StateLikelihood};
 use crate::{Error, Resampling, Schedule};
 use fewbits_core::{Columns, Dynamics, Gaussian, Likelihood};
 use fewbits_densities::Particles;
@@ -40,25 +40,6 @@ pub struct ParticleFilter {
 pub struct Workspace<const D: usize> {
     ancestors: Vec<u32>,
     next: Option<Particles<D>>,
-}
-
-/// What an update learned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct ParticleInfo {
-    /// Estimate of `ln p(observed now | observed before)`.
-    pub log_likelihood: f64,
-    /// Effective sample size of the updated belief.
-    pub effective_sample_size: f64,
-}
-
-impl From<ParticleInfo> for Info {
-    fn from(info: ParticleInfo) -> Self {
-        Self {
-            log_likelihood: info.log_likelihood,
-            effective_sample_size: Some(info.effective_sample_size),
-        }
-    }
 }
 
 impl ParticleFilter {
@@ -125,7 +106,7 @@ impl ParticleFilter {
         &self,
         belief: &mut Particles<D>,
         observed: &(impl Likelihood<D> + ?Sized),
-    ) -> Result<ParticleInfo, Error> {
+    ) -> Result<Info, Error> {
         weigh(belief, |states, log_weights| observed.add_log_likelihoods(states, log_weights))
     }
 
@@ -140,7 +121,7 @@ impl ParticleFilter {
         belief: &mut Particles<D>,
         observed: &(impl Likelihood<D> + ?Sized),
         workspace: &mut Workspace<D>,
-    ) -> Result<ParticleInfo, Error> {
+    ) -> Result<Info, Error> {
         let Workspace { ancestors, next } = workspace;
         let next = next.get_or_insert_with(|| belief.clone());
         if self.schedule.is_due(belief.effective_sample_size(), belief.len()) {
@@ -166,24 +147,24 @@ impl ParticleFilter {
 pub(crate) fn weigh<const D: usize>(
     belief: &mut Particles<D>,
     change: impl FnOnce(Columns<'_, D>, &mut [f64]),
-) -> Result<ParticleInfo, Error> {
+) -> Result<Info, Error> {
     let finite = |column: &&[f64]| column.iter().fold(true, |finite, x| finite & x.is_finite());
     if !belief.columns().iter().all(finite) {
         return Err(fewbits_core::Error::NotANumber { what: "a particle" }.into());
     }
     let log_likelihood = belief.reweigh(change)?;
-    Ok(ParticleInfo {
+    Ok(Info {
         log_likelihood,
-        effective_sample_size: belief.effective_sample_size(),
+        effective_sample_size: Some(belief.effective_sample_size()),
     })
 }
 
 /// [`ParticleFilter`] (bootstrap) with a number of particles.
 #[derive(Debug, Clone)]
 pub struct BootstrapFilter<const D: usize> {
-    pub(crate) filter: ParticleFilter,
+    filter: ParticleFilter,
     count: usize,
-    pub(crate) workspace: Workspace<D>,
+    workspace: Workspace<D>,
 }
 
 impl<const D: usize> BootstrapFilter<D> {
@@ -207,15 +188,11 @@ impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
         Ok(Particles::from_belief(&mut rng, prior, self.count)?)
     }
 
-    fn predict(
-        &mut self,
-        mut rng: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut Particles<D>,
-    ) -> Result<(), Error> {
+    fn predict(&mut self, mut rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Particles<D>) -> Result<(), Error> {
         self.filter.resample(&mut rng, belief, &mut self.workspace)?;
-        motion.move_columns(rng, noise_scale, belief.columns_mut());
+        motion
+            .motion
+            .move_columns(rng, motion.noise_scale, belief.columns_mut());
         Ok(())
     }
 
@@ -225,6 +202,6 @@ impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
         belief: &mut Particles<D>,
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error> {
-        Ok(self.filter.update(belief, observed)?.into())
+        self.filter.update(belief, observed)
     }
 }

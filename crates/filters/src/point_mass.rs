@@ -1,7 +1,7 @@
 //! The exact scalar filter on a grid: the referee of every approximate one.
 
 use crate::Error;
-use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
+use crate::contract::{Info, Move, StateFilter, StateLikelihood};
 use fewbits_core::{Gaussian, GaussianDynamics, Likelihood, LinearDynamics};
 use fewbits_densities::{PointMass, UniformGrid};
 use fewbits_numerics::error::ArgumentError;
@@ -64,7 +64,7 @@ impl PointMassFilter {
     /// # Errors
     /// If the noise out of some node has a standard deviation below the spacing; see [`PointMassFilter::linear`].
     pub fn new(dynamics: &impl GaussianDynamics<1>, grid: UniformGrid) -> Result<Self, Error> {
-        let moved = moved(&grid, dynamics, 1.0);
+        let moved = moved(&grid, Move::new(dynamics, 1.0));
         Self::resolving(grid, &moved)
     }
 
@@ -243,8 +243,8 @@ impl PointMassFilter {
 }
 
 /// Mean and deviation of the next state from each node.
-fn moved(grid: &UniformGrid, motion: &(impl Motion<1> + ?Sized), noise_scale: f64) -> Vec<(f64, f64)> {
-    let from = |y: f64| motion.predict(&Gaussian::from_trusted_parts(Vector1::new(y), Matrix1::zeros()), noise_scale);
+fn moved(grid: &UniformGrid, motion: Move<'_, 1>) -> Vec<(f64, f64)> {
+    let from = |y: f64| motion.predict(&Gaussian::from_trusted_parts(Vector1::new(y), Matrix1::zeros()));
     let moves = grid.nodes().map(from);
     moves
         .map(|next| (next.mean()[0], next.covariance()[0].sqrt()))
@@ -277,14 +277,8 @@ impl StateFilter<1> for PointMasses {
         Ok(PointMass::normal(self.grid, prior.mean()[0], prior.covariance()[0])?)
     }
 
-    fn predict(
-        &mut self,
-        _: &mut dyn Rng,
-        motion: &dyn Motion<1>,
-        noise_scale: f64,
-        belief: &mut PointMass,
-    ) -> Result<(), Error> {
-        let moved = moved(&self.grid, motion, noise_scale);
+    fn predict(&mut self, _: &mut dyn Rng, motion: Move<'_, 1>, belief: &mut PointMass) -> Result<(), Error> {
+        let moved = moved(&self.grid, motion);
         let kernel = match self.kernel.take().filter(|_| self.moved == moved) {
             Some(kernel) => kernel,
             None => PointMassFilter::resolving(self.grid, &moved)?,

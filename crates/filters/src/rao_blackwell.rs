@@ -1,7 +1,7 @@
 //! A linear Gaussian state observed through cells, Rao-Blackwellised.
 
-use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
-use crate::particle::{ParticleFilter, ParticleInfo, Workspace, weigh};
+use crate::contract::{Info, LinearScalar, Move, StateFilter, StateLikelihood};
+use crate::particle::{ParticleFilter, Workspace, weigh};
 use crate::{Error, kalman};
 use fewbits_core::columns::{count, set_state};
 use fewbits_core::factor::Scalar;
@@ -9,7 +9,7 @@ use fewbits_core::{Cell, FactoredGaussian, Gaussian, LinearDynamics, LinearSensi
 use fewbits_densities::GaussianCloud;
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::normal;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
@@ -91,28 +91,43 @@ impl RaoBlackwellised {
         belief: &mut GaussianCloud<D>,
         observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
         workspace: &mut CloudWorkspace<D>,
-    ) -> Result<ParticleInfo, Error> {
-        self.update_all(rng, belief, [(&observed.sensing, observed.factor.clone().into())].into_iter(), workspace)
+    ) -> Result<Info, Error> {
+        let (matrix, noise_covariance) = (*observed.sensing.matrix(), *observed.sensing.noise_covariance());
+        let scalar = LinearScalar {
+            matrix,
+            noise_covariance,
+            factor: observed.factor.clone().into(),
+            log_scale: 0.0,
+        };
+        self.update_all(rng, belief, vec![scalar], workspace)
     }
 
-    fn update_all<'a, const D: usize, R: Rng + ?Sized, S: LinearSensing<D, 1> + 'a>(
+    fn update_all<const D: usize, R: Rng + ?Sized>(
         &self,
         rng: &mut R,
         belief: &mut GaussianCloud<D>,
-        observed: impl Iterator<Item = (&'a S, Scalar)>,
+        observed: Vec<LinearScalar<D>>,
         workspace: &mut CloudWorkspace<D>,
-    ) -> Result<ParticleInfo, Error> {
+    ) -> Result<Info, Error> {
         let next = workspace.next.get_or_insert_with(|| belief.clone());
         next.clone_from(belief);
         let log_weights = &mut workspace.log_weights;
         log_weights.clear();
         log_weights.resize(belief.means().len(), 0.0);
-        for (sensing, factor) in observed {
-            let imputation = Imputation::new(factor);
-            self.impute(rng, next, sensing, log_weights, |rng, innovation, predicted, _| {
-                let (z, log_weight) = imputation.draw(rng, predicted[0], innovation.lower()[(0, 0)]);
-                ([z].into(), log_weight)
-            })?;
+        let log_scale: f64 = observed.iter().map(|one| one.log_scale).sum();
+        for one in observed {
+            let imputation = Imputation::new(one.factor);
+            self.impute(
+                rng,
+                next,
+                &one.matrix,
+                &one.noise_covariance,
+                log_weights,
+                |rng, innovation, predicted, _| {
+                    let (z, log_weight) = imputation.draw(rng, predicted[0], innovation.lower()[(0, 0)]);
+                    ([z].into(), log_weight)
+                },
+            )?;
         }
         let info = weigh(next.means_mut(), |_, logs| {
             logs.iter_mut()
@@ -120,12 +135,13 @@ impl RaoBlackwellised {
                 .for_each(|(log, added)| *log += added);
         })?;
         std::mem::swap(belief, next);
-        Ok(info)
+        let log_likelihood = info.log_likelihood + log_scale;
+        Ok(Info { log_likelihood, ..info })
     }
 
-    /// The core of an update, for any linear sensor and any law of what was observed: imputes a measurement to every particle,
-    /// conditions the cloud on it and adds the log importance weights to `log_weights`, one per particle, with which the
-    /// caller reweighs when all sensors are in.
+    /// The core of an update, for any linear sensor `z = H x + w`, `w ~ N(0, R)`, and any law of what was observed: imputes a measurement
+    /// to every particle, conditions the cloud on it and adds the log importance weights to `log_weights`, one per particle, with which
+    /// the caller reweighs when all sensors are in.
     ///
     /// `draw(rng, innovation, predicted, side)` gets `N(0, S)`, a particle's `H m` and its side row, which it may change. It
     /// returns a measurement `z` drawn from some law `q` and `ln (N(z; H m, S) p(observed | z) / q(z))`.
@@ -136,16 +152,17 @@ impl RaoBlackwellised {
         &self,
         rng: &mut R,
         belief: &mut GaussianCloud<D>,
-        sensing: &impl LinearSensing<D, M>,
+        matrix: &SMatrix<f64, M, D>,
+        noise_covariance: &SMatrix<f64, M, M>,
         log_weights: &mut [f64],
         mut draw: impl FnMut(&mut R, &FactoredGaussian<M>, &SVector<f64, M>, &mut [f64]) -> (SVector<f64, M>, f64),
     ) -> Result<(), Error> {
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
-        let (updated, info) = kalman::update(sensing, &shared, &SVector::zeros())?;
+        let (updated, info) = kalman::update_by(matrix, noise_covariance, &shared, &SVector::zeros())?;
         let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
             .factored()
             .map_err(|_| Error::SingularInnovation)?;
-        let (matrix, width) = (sensing.matrix(), belief.means().auxiliary_width());
+        let width = belief.means().auxiliary_width();
         let (mut columns, side) = belief.means_mut().parts_mut();
         for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
             let mean = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
@@ -189,20 +206,14 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         Ok(GaussianCloud::agreed(prior, self.count)?)
     }
 
-    fn predict(
-        &mut self,
-        rng: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut GaussianCloud<D>,
-    ) -> Result<(), Error> {
+    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut GaussianCloud<D>) -> Result<(), Error> {
         let shared = Gaussian::from_trusted_parts(belief.means().mean(), *belief.shared_covariance());
-        let moved = motion.predict(&shared, noise_scale);
+        let moved = motion.predict(&shared);
         let particles = &mut self.workspace.particles;
         self.filter.filter.resample(rng, belief.means_mut(), particles)?;
         let mut columns = belief.means_mut().columns_mut();
         for i in 0..count(&columns) {
-            let mean = motion.mean(&SVector::<f64, D>::from_fn(|d, _| columns[d][i]));
+            let mean = motion.motion.mean(&SVector::<f64, D>::from_fn(|d, _| columns[d][i]));
             set_state(&mut columns, i, &mean);
         }
         belief.set_shared_covariance(*moved.covariance());
@@ -215,19 +226,15 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         belief: &mut GaussianCloud<D>,
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error> {
-        let (mean, mut log_scale) = (belief.means().mean(), 0.0);
+        let mean = belief.means().mean();
         let mut scalars = Vec::with_capacity(observed.len());
         for one in observed {
-            let Some((scalar, log)) = one.as_linear_scalar(&mean) else {
+            let Some(scalar) = one.as_linear_scalar(&mean) else {
                 return refuse("observed", "another likelihood", "scalar factors through linear sensors");
             };
             scalars.push(scalar);
-            log_scale += log;
         }
-        let scalars = scalars.iter().map(|one| (&one.sensing, one.factor.clone()));
-        let info = self.filter.update_all(rng, belief, scalars, &mut self.workspace)?;
-        let log_likelihood = info.log_likelihood + log_scale;
-        Ok(ParticleInfo { log_likelihood, ..info }.into())
+        self.filter.update_all(rng, belief, scalars, &mut self.workspace)
     }
 }
 

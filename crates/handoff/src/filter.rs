@@ -104,7 +104,7 @@ impl<R> HandoffFilter<R> {
         };
         let kernel = self.bandwidth.kernel_for(&kept, n)?;
         let centres = if self.shrink {
-            self.bandwidth.shrunk(&kept, &kernel)?
+            self.bandwidth.shrunk(&kept, &kernel)
         } else {
             kept
         };

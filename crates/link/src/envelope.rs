@@ -1,16 +1,17 @@
 //! Frames under a key: who sent them, and that they are new. `docs/wire.md` has the format.
 
 use crate::error::Error;
+use fewbits_numerics::error::refuse;
 use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
 use std::fmt;
 
 /// Bytes before the frame: sensor and counter.
-pub const ENVELOPE_HEADER: usize = 12;
+const ENVELOPE_HEADER: usize = 12;
 /// Bytes of the code behind the frame.
-pub const TAG_BYTES: usize = 16;
+const TAG_BYTES: usize = 16;
 /// The shortest key.
-pub const MIN_KEY_BYTES: usize = 32;
+const MIN_KEY_BYTES: usize = 32;
 
 /// Where an envelope goes. It is part of what is authenticated, so that an envelope cannot be sent back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,14 +38,10 @@ impl Key {
     /// # Errors
     /// If it is shorter.
     pub fn new(bytes: &[u8]) -> Result<Self, Error> {
-        let short = Error::ShortKey {
-            found: bytes.len(),
-            expected: MIN_KEY_BYTES,
-        };
-        if bytes.len() < MIN_KEY_BYTES {
-            return Err(short);
+        match Hmac::new_from_slice(bytes) {
+            Ok(code) if bytes.len() >= MIN_KEY_BYTES => Ok(Self(code)),
+            _ => refuse("key", format!("{} bytes", bytes.len()), format!("{MIN_KEY_BYTES} bytes or more")),
         }
-        Ok(Self(Hmac::new_from_slice(bytes).map_err(|_| short)?))
     }
 
     /// The key that a hexadecimal text states; spaces are ignored.
@@ -58,14 +55,12 @@ impl Key {
             .map(|c| c.to_digit(16).map(|digit| digit as u8))
             .collect();
         // The key itself is no part of the message.
-        let refused = |value: &str| Error::Argument {
-            name: "key",
-            value: value.to_owned(),
-            expected: "an even number of hexadecimal digits".to_owned(),
+        let expected = "an even number of hexadecimal digits";
+        let Some(digits) = digits else {
+            return refuse("key", "no hexadecimal text", expected);
         };
-        let digits = digits.ok_or_else(|| refused("no hexadecimal text"))?;
         if digits.len() % 2 == 1 {
-            return Err(refused("an odd number of digits"));
+            return refuse("key", "an odd number of digits", expected);
         }
         let bytes: Vec<u8> = digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect();
         Self::new(&bytes)

@@ -33,24 +33,9 @@ pub enum Error {
         /// What was found.
         reason: String,
     },
-    /// A key is too short.
-    #[error("key has {found} bytes: expected {expected} or more")]
-    ShortKey {
-        /// Its bytes.
-        found: usize,
-        /// The least that is taken.
-        expected: usize,
-    },
     /// An argument is out of range.
-    #[error("{name} is {value}: expected {expected}")]
-    Argument {
-        /// Which.
-        name: &'static str,
-        /// What it is.
-        value: String,
-        /// What it must be.
-        expected: String,
-    },
+    #[error(transparent)]
+    Argument(#[from] fewbits_numerics::ArgumentError),
     /// The estimator failed before the first slot.
     #[error("the estimator")]
     Estimator(#[source] BoxError),

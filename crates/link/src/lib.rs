@@ -49,11 +49,11 @@ mod udp;
 #[cfg(feature = "zenoh")]
 pub mod zenoh;
 
-pub use envelope::{Direction, ENVELOPE_HEADER, Key, MIN_KEY_BYTES, Refusal, ReplayWindow, TAG_BYTES, sensor_of};
+pub use envelope::{Direction, Key, Refusal, ReplayWindow, sensor_of};
 pub use error::Error;
 pub use fusion::FusionReceiver;
 #[cfg(feature = "live")]
-pub use live::{HISTORY, LivePage};
+pub use live::LivePage;
 pub use sensor::{Request, SensorLink};
 pub use station::{Counts, Output, Peer, Station, Step};
 pub use store::Store;

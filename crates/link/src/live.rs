@@ -1,6 +1,6 @@
 //! A page that shows a running centre: estimates with their band, the last reports and the health of each sensor, bits per second, refusals.
 //!
-//! The page is one file without scripts from elsewhere. It is fed by server-sent events, and shows the last [`HISTORY`] slots to whoever opens it later.
+//! The page is one file without scripts from elsewhere. It is fed by server-sent events, and shows the last 300 slots to whoever opens it later.
 
 use crate::error::Error;
 use crate::station::{Counts, Step};
@@ -21,7 +21,7 @@ use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::{Stream, StreamExt};
 
 /// Slots that are shown to whoever opens the page.
-pub const HISTORY: usize = 300;
+const HISTORY: usize = 300;
 
 const PAGE: &str = include_str!("live.html");
 

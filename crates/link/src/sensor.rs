@@ -4,6 +4,7 @@ use crate::envelope::{Direction, Key, ReplayWindow, sensor_of};
 use crate::error::Error;
 use crate::store::Store;
 use fewbits_core::BitString;
+use fewbits_numerics::error::refuse;
 use fewbits_protocol::{
     Feedback, Frame, Kind, Note, Payload, Reaction, Sensor, SensorSettings, SensorTimer, Slot, Task,
 };
@@ -51,11 +52,7 @@ impl SensorLink {
     /// If the sensor follows by echo, or the store cannot be read.
     pub fn new(settings: SensorSettings, number: u32, key: Key, store: Option<Store>) -> Result<Self, Error> {
         if settings.feedback == Feedback::Echoed {
-            return Err(Error::Argument {
-                name: "feedback",
-                value: "echoed".to_owned(),
-                expected: "told or clock: a follower needs the centre's estimator".to_owned(),
-            });
+            return refuse("feedback", "echoed", "told or clock: a follower needs the centre's estimator");
         }
         let counter = match &store {
             Some(store) => store.load::<u64>()?.unwrap_or(0),

@@ -4,6 +4,7 @@ use crate::envelope::{Direction, Key, Refusal, ReplayWindow, sensor_of};
 use crate::error::Error;
 use crate::store::Store;
 use fewbits_core::{BitString, Observation};
+use fewbits_numerics::error::refuse;
 use fewbits_protocol::{
     Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, SensorHealth,
     predict_and_ask, update_asked,
@@ -171,21 +172,13 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
         let sensors = receiver.sensors();
         for (name, found) in [("members", settings.members.len()), ("peers", peers.len())] {
             if found != sensors {
-                return Err(Error::Argument {
-                    name,
-                    value: format!("{found}"),
-                    expected: format!("{sensors}, as many as the receiver has sensors"),
-                });
+                return refuse(name, found, format!("{sensors}, as many as the receiver has sensors"));
             }
         }
         let mut places = HashMap::new();
         for (place, peer) in peers.iter().enumerate() {
             if places.insert(peer.number, place).is_some() {
-                return Err(Error::Argument {
-                    name: "sensor number",
-                    value: peer.number.to_string(),
-                    expected: "each number once".to_owned(),
-                });
+                return refuse("sensor number", peer.number, "each number once");
             }
         }
         let mut centre = Centre::new(settings);

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::transport::{Datagram, MAX_DATAGRAM};
+use fewbits_numerics::error::refuse;
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -21,11 +22,7 @@ impl Topics {
     /// If the name of the fleet has an empty part or a character with which one name stands for many.
     pub(crate) fn new(fleet: &str, sensor: Option<u32>) -> Result<Self, Error> {
         if fleet.split('/').any(str::is_empty) || fleet.contains(|c: char| "+#*$?".contains(c) || c.is_control()) {
-            return Err(Error::Argument {
-                name: "fleet",
-                value: fleet.to_owned(),
-                expected: "parts separated by `/`, none empty, without `+ # * $ ?`".to_owned(),
-            });
+            return refuse("fleet", fleet, "parts separated by `/`, none empty, without `+ # * $ ?`");
         }
         let fleet = fleet.to_owned();
         Ok(Self { fleet, sensor })

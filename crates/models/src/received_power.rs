@@ -123,35 +123,6 @@ impl<const D: usize> ReceivedPower<D> {
         let log = (0.5 * self.exponent).ln() + amplitude.ln() + share.ln() - distance.ln();
         offset / distance * -log.exp().min(f64::MAX)
     }
-
-    /// Writes the noise-free amplitude of every state of a cloud to `amplitudes`; NaN where lengths differ.
-    pub fn amplitudes(&self, states: &Columns<'_, D>, amplitudes: &mut [f64]) {
-        if !measurements_agree(states, &mut [&mut *amplitudes]) {
-            return;
-        }
-        let count = amplitudes.len();
-        let (x, y) = (&states[self.axes[0]][..count], &states[self.axes[1]][..count]);
-        let (sx, sy) = (self.position[0], self.position[1]);
-        let squared = |i: usize| {
-            let (dx, dy) = (x[i] - sx, y[i] - sy);
-            dx * dx + dy * dy
-        };
-        // The inverse square law needs no power function and vectorises.
-        if self.exponent == 2.0 {
-            vectorised(
-                #[inline(always)]
-                || {
-                    for (i, amplitude) in amplitudes.iter_mut().enumerate() {
-                        *amplitude = (self.power / (1.0 + self.attenuation * squared(i))).sqrt();
-                    }
-                },
-            );
-        } else {
-            for (i, amplitude) in amplitudes.iter_mut().enumerate() {
-                *amplitude = self.amplitude(squared(i));
-            }
-        }
-    }
 }
 
 impl<const D: usize> Sensing<D, 1> for ReceivedPower<D> {
@@ -176,8 +147,33 @@ impl<const D: usize> Sensing<D, 1> for ReceivedPower<D> {
         self.mean(state) + Vector1::new(self.noise_variance().sqrt() * normal)
     }
 
-    fn mean_columns(&self, states: &Columns<'_, D>, [means]: ColumnsMut<'_, 1>) {
-        self.amplitudes(states, means);
+    fn mean_columns(&self, states: &Columns<'_, D>, mut means: ColumnsMut<'_, 1>) {
+        if !measurements_agree(states, &mut means) {
+            return;
+        }
+        let [amplitudes] = means;
+        let count = amplitudes.len();
+        let (x, y) = (&states[self.axes[0]][..count], &states[self.axes[1]][..count]);
+        let (sx, sy) = (self.position[0], self.position[1]);
+        let squared = |i: usize| {
+            let (dx, dy) = (x[i] - sx, y[i] - sy);
+            dx * dx + dy * dy
+        };
+        // The inverse square law needs no power function and vectorises.
+        if self.exponent == 2.0 {
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (i, amplitude) in amplitudes.iter_mut().enumerate() {
+                        *amplitude = (self.power / (1.0 + self.attenuation * squared(i))).sqrt();
+                    }
+                },
+            );
+        } else {
+            for (i, amplitude) in amplitudes.iter_mut().enumerate() {
+                *amplitude = self.amplitude(squared(i));
+            }
+        }
     }
 }
 

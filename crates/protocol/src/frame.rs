@@ -8,9 +8,9 @@ use crc::{CRC_16_XMODEM, Crc};
 /// The version of the wire format that this crate writes and reads.
 pub const VERSION: u8 = 1;
 /// Bytes of the header: version, kind and padding in one; slot in three; digest in four.
-pub const HEADER_BYTES: usize = 8;
+const HEADER_BYTES: usize = 8;
 /// Bytes of the destination, which only a handover has, behind the header.
-pub const DESTINATION_BYTES: usize = 4;
+const DESTINATION_BYTES: usize = 4;
 /// Bytes of the check at the end.
 pub const CHECK_BYTES: usize = 2;
 

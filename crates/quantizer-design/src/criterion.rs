@@ -130,17 +130,7 @@ impl Scored {
                     .map(|(w, q)| w * q * (q.max(LOG_FLOOR) / total.max(LOG_FLOOR)).ln())
                     .sum()
             }
-            Kind::Decision => {
-                let best = self.best(m);
-                -self
-                    .weights
-                    .iter()
-                    .zip(m)
-                    .enumerate()
-                    .filter(|(k, _)| *k != best)
-                    .map(|(_, (w, q))| w * q)
-                    .sum::<f64>()
-            }
+            Kind::Decision => -self.favourite(m).2,
         }
     }
 
@@ -172,7 +162,7 @@ impl Scored {
                 }
             }
             Kind::Decision => {
-                let best = self.best(m);
+                let best = most_probable(&self.weights, m);
                 for (k, (o, w)) in out.iter_mut().zip(&self.weights).enumerate() {
                     *o = if k == best { 0.0 } else { -w };
                 }
@@ -225,13 +215,9 @@ impl Scored {
         self.weights.iter().zip(q).map(|(w, q)| w * q).sum()
     }
 
-    fn best(&self, q: &[f64]) -> usize {
-        most_probable(&self.weights, q)
-    }
-
     /// The most probable value, the mass of the outcome, and what of it belongs to the others.
     fn favourite(&self, q: &[f64]) -> (usize, f64, f64) {
-        let best = self.best(q);
+        let best = most_probable(&self.weights, q);
         let all = self.weights.iter().zip(q).enumerate();
         let others: f64 = all.filter(|(k, _)| *k != best).map(|(_, (w, q))| w * q).sum();
         (best, others + self.weights[best] * q[best], others)

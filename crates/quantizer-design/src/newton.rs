@@ -16,7 +16,7 @@ const SLACK: f64 = 1e-15;
 const HIDDEN_GAIN: f64 = 1e-13;
 /// A curvature above this marks a saddle, one below its negative an optimum; in units of the criterion and the breakpoints'
 /// scale, so that the verdict knows no unit.
-pub const CURVATURE: f64 = 1e-8;
+const CURVATURE: f64 = 1e-8;
 
 /// What the second derivatives say of a stationary point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -30,8 +30,6 @@ pub struct CodedSensors {
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`: the code is symmetric up to its first bit.
     pub(crate) nodes: Nodes,
-    /// `P(bit = 0|x) - P(bit = 1|x)` at the nodes, `[bit][sensor]`.
-    contrast: Vec<Vec<Vec<f64>>>,
     /// `[P0, P1]` at the nodes, `[bit][sensor][value]`.
     pub(crate) probability: Vec<Vec<[Vec<f64>; 2]>>,
 }
@@ -91,21 +89,12 @@ impl CodedSensors {
                     .collect()
             })
             .collect();
-        let contrast = probability
-            .iter()
-            .map(|row| {
-                row.iter()
-                    .map(|[p0, p1]| p0.iter().zip(p1).map(|(p0, p1)| p0 - p1).collect())
-                    .collect()
-            })
-            .collect();
         Ok(Self {
             source,
             half_width,
             noise_deviations,
             quantizers,
             nodes,
-            contrast,
             probability,
         })
     }
@@ -231,10 +220,11 @@ impl CodedSensors {
     /// One step of the recursion.
     #[inline]
     pub(crate) fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
-        let from = m1.iter().zip(m2).zip(&self.contrast[bit][sensor]);
-        for (((m1, m2), t), (next1, next2)) in from.zip(next.0.iter_mut().zip(&mut next.1)) {
+        let [p0, p1] = &self.probability[bit][sensor];
+        let from = m1.iter().zip(m2).zip(p0.iter().zip(p1));
+        for (((m1, m2), (p0, p1)), (next1, next2)) in from.zip(next.0.iter_mut().zip(&mut next.1)) {
             *next2 = 0.25 + 0.5 * m1 + 0.25 * m2;
-            *next1 = t * (0.5 + 0.5 * m1);
+            *next1 = (p0 - p1) * (0.5 + 0.5 * m1);
         }
     }
 

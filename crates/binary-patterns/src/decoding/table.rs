@@ -9,7 +9,7 @@ use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Most sensors for a table over bit strings.
-pub const MAX_TABLE_SENSORS: usize = 24;
+const MAX_TABLE_SENSORS: usize = 24;
 
 /// Estimates for every outcome of a bank.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

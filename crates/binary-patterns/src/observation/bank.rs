@@ -10,7 +10,7 @@ use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Most outcomes that may be enumerated.
-pub const MAX_OUTCOMES: u128 = 1 << 26;
+pub(crate) const MAX_OUTCOMES: u128 = 1 << 26;
 
 /// Outcomes less likely than this are never met; their share of any error is below `1e-280`.
 pub const IMPOSSIBLE: f64 = 1e-290;

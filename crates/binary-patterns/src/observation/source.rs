@@ -127,14 +127,18 @@ impl Source {
         Ok(positive("noise_deviation", (self.variance() / 10f64.powf(snr_db / 10.0)).sqrt())?)
     }
 
-    /// Panels no wider than `width`, half of `V`, or one and a half standard deviations of the source.
-    fn panels(&self, from: f64, to: f64, width: f64) -> usize {
-        let widest = match self.kind {
+    /// Widest panel: half of `V`, or one and a half standard deviations of the source.
+    fn widest_panel(&self) -> f64 {
+        match self.kind {
             Kind::Uniform { half_width } => 0.5 * half_width,
             Kind::Gaussian { deviation } => 1.5 * deviation,
-        };
+        }
+    }
+
+    /// Number of panels no wider than `width` or [`widest_panel`](Self::widest_panel).
+    fn panels(&self, from: f64, to: f64, width: f64) -> usize {
         // A noise far below the resolution of any grid must not ask for unbounded memory.
-        (((to - from) / width.min(widest)).ceil() as usize).clamp(1, MAX_PANELS)
+        (((to - from) / width.min(self.widest_panel())).ceil() as usize).clamp(1, MAX_PANELS)
     }
 
     /// Composite Gauss-Legendre nodes over `[from, to]`, weighted by the density.
@@ -220,10 +224,7 @@ impl Nodes {
     /// thresholds and not on how small the noise is.
     pub fn adapted(source: &Source, from: f64, to: f64, thresholds: &[Threshold], share: f64, rule: &Rule) -> Self {
         let mut nodes = Self::default();
-        let widest = match source.kind() {
-            Kind::Uniform { half_width } => 0.5 * half_width,
-            Kind::Gaussian { deviation } => 1.5 * deviation,
-        };
+        let widest = source.widest_panel();
         let mut x = from;
         while x < to {
             let mut step = widest.min(to - x);

@@ -7,10 +7,10 @@ use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use serde::{Deserialize, Serialize};
 
 /// Most bits a cell index may take.
-pub const MAX_BITS: usize = 16;
+pub(crate) const MAX_BITS: usize = 16;
 
 /// Interior edges of the eight-level Lloyd-Max quantizer of `N(0, 1)` with the four digits that Max (1960) prints.
-pub const MAX_EIGHT_LEVEL_EDGES: [f64; 7] = [-1.748, -1.05, -0.5006, 0.0, 0.5006, 1.05, 1.748];
+const MAX_EIGHT_LEVEL_EDGES: [f64; 7] = [-1.748, -1.05, -0.5006, 0.0, 0.5006, 1.05, 1.748];
 
 /// Interior edges `t_1 < ... < t_{L-1}` that divide the axis into `L` cells; the outer cells reach to infinity.
 ///
@@ -73,7 +73,7 @@ impl CellGrid {
         Self::from_breakpoints(table.breakpoints().iter().map(|t| t * deviation).collect())
     }
 
-    /// The eight-cell Gaussian grid with the printed four digits ([`MAX_EIGHT_LEVEL_EDGES`]), for reproductions.
+    /// The eight-cell Gaussian grid with the four digits that Max (1960) prints, for reproductions.
     ///
     /// # Errors
     /// If `deviation` is not positive and finite.

@@ -11,10 +11,7 @@ use fewbits_numerics::error::refuse;
 pub type Mask = u32;
 
 /// Checks that `mask` is in `1..2^bits`.
-///
-/// # Errors
-/// If `bits` is not in `1..=16`, or the mask is 0 or has a digit beyond `bits`.
-pub fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
+pub(crate) fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
     let bits = bits_in_range(bits)?;
     if mask != 0 && mask < 1 << bits {
         Ok(mask)
@@ -26,7 +23,7 @@ pub fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
 /// The pattern of a mask over `2^bits` cells: bit `l` is the parity of `mask & l`. [`mask_of`] is the way back.
 ///
 /// # Errors
-/// As [`check_mask`].
+/// If `bits` is not in `1..=16`, or the mask is 0 or has a digit beyond `bits`.
 pub fn linear_pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
     check_mask(mask, bits)?;
     Pattern::new((0..1u32 << bits).map(|l| (l & mask).count_ones() % 2 == 1).collect())
@@ -94,7 +91,7 @@ pub fn rank(masks: &[Mask]) -> usize {
 /// The generator matrix, one row a cell and one column a sensor: entry `(l, n)` is the bit of sensor `n` for cell `l`.
 ///
 /// # Errors
-/// As [`check_mask`], for any mask.
+/// As [`linear_pattern`], for any mask.
 pub fn generator_matrix(masks: &[Mask], bits: usize) -> Result<Vec<Vec<bool>>, Error> {
     let columns = masks
         .iter()

@@ -98,22 +98,30 @@ where
     for received in [true, false] {
         for (i, ((sensor, (step, rule)), observation)) in sensors().filter(|s| s.1.1.received().is_some() == received) {
             let mut contradicted = 0;
-            filter.impute(rng, &mut next.cloud, sensor, &mut log_weights, |rng, innovation, central, side| {
-                let own = &mut side[i * D..(i + 1) * D];
-                let predicted = sensor.matrix() * SVector::<f64, D>::from_column_slice(own);
-                let (z, log_weight) = match observation {
-                    Observation::Received(z) => {
-                        let clash = rule.statistic(&(z - predicted)) < rule.threshold() * (1.0 - 1e-9);
-                        contradicted += usize::from(clash);
-                        (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
-                    }
-                    Observation::Nothing => impute(rng, innovation, rule, loss, central, &predicted),
-                    Observation::Lost => impute_sent(rng, innovation, rule, central, &predicted),
-                };
-                let moved = step.gain * (z - predicted);
-                own.iter_mut().zip(moved.iter()).for_each(|(x, step)| *x += step);
-                (z, log_weight)
-            })?;
+            let (matrix, noise) = (sensor.matrix(), sensor.noise_covariance());
+            filter.impute(
+                rng,
+                &mut next.cloud,
+                matrix,
+                noise,
+                &mut log_weights,
+                |rng, innovation, central, side| {
+                    let own = &mut side[i * D..(i + 1) * D];
+                    let predicted = sensor.matrix() * SVector::<f64, D>::from_column_slice(own);
+                    let (z, log_weight) = match observation {
+                        Observation::Received(z) => {
+                            let clash = rule.statistic(&(z - predicted)) < rule.threshold() * (1.0 - 1e-9);
+                            contradicted += usize::from(clash);
+                            (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
+                        }
+                        Observation::Nothing => impute(rng, innovation, rule, loss, central, &predicted),
+                        Observation::Lost => impute_sent(rng, innovation, rule, central, &predicted),
+                    };
+                    let moved = step.gain * (z - predicted);
+                    own.iter_mut().zip(moved.iter()).for_each(|(x, step)| *x += step);
+                    (z, log_weight)
+                },
+            )?;
             info.received += usize::from(received);
             next.violations += usize::from(received && contradicted == log_weights.len());
         }

@@ -150,7 +150,7 @@ fn configuration_errors_name_file_and_value() {
         ("number = 2", "number = 1", "sensor 1 stands twice"),
         ("mean = [0.0]", "mean = [0.0, 1.0]", "expected 1 means"),
         ("kind = \"sign\"", "kind = \"sgin\"", "sgin"),
-        (&key('b'), "abcd", "key has 2 bytes: expected 32 or more"),
+        (&key('b'), "abcd", "`key` is 2 bytes: expected 32 bytes or more"),
         ("127.0.0.1:1", "coap://127.0.0.1:1/plant", "coap://127.0.0.1:1/plant: expected host:port"),
         #[cfg(feature = "mqtt")]
         ("127.0.0.1:1", "mqtt://127.0.0.1:1", "expected host:port, mqtt://host:port/fleet"),

@@ -10,10 +10,8 @@ use crate::sign::Sign;
 use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::kernels::{self, scalar};
 use fewbits_numerics::normal;
-#[cfg(feature = "serde")]
 use fewbits_numerics::stored;
 use nalgebra::SVector;
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// `p(observation | m) = floor + share P(m + n in cell)`, `n ~ N(0, r)`.
@@ -23,9 +21,8 @@ use serde::{Deserialize, Serialize};
 /// | sign bit over a link with arrival `a` and crossover `c` | a half-line | `a c` | `a (1 - 2 c)` |
 /// | cell of a quantizer, perfect link | the cell | 0 | 1 |
 /// | nothing from a censoring sensor, loss `l` | region of silence | `l` | `1 - l` |
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Numbers", into = "Numbers"))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers", into = "Numbers")]
 pub struct InCell {
     cell: Cell,
     variance: f64,
@@ -34,8 +31,6 @@ pub struct InCell {
     share: f64,
     log_share: f64,
 }
-
-#[cfg(feature = "serde")]
 stored! { InCell as Numbers |factor| {
     cell: Cell = factor.cell,
     #[serde(with = "fewbits_numerics::stored")]
@@ -119,29 +114,21 @@ impl InCell {
     #[inline]
     pub fn log_probability(&self, m: f64) -> f64 {
         if self.floor == 0.0 {
-            return self.log_share + self.log_inside(m);
+            return self.log_share + self.of_cell(m, normal::log_cdf, normal::log_interval);
         }
-        let (lower, upper) = (self.cell.lower(), self.cell.upper());
-        let inside = if upper == f64::INFINITY {
-            normal::cdf((m - lower) / self.deviation)
-        } else if lower == f64::NEG_INFINITY {
-            normal::cdf((upper - m) / self.deviation)
-        } else {
-            normal::interval((lower - m) / self.deviation, (upper - m) / self.deviation)
-        };
-        (self.floor + self.share * inside).ln()
+        (self.floor + self.share * self.of_cell(m, normal::cdf, normal::interval)).ln()
     }
 
-    /// `ln P(m + n in cell)`.
+    /// A function of the cell as it lies about `m` in deviations: of the distance of its only edge, inside positive, or of its two ends.
     #[inline]
-    fn log_inside(&self, m: f64) -> f64 {
+    fn of_cell(&self, m: f64, half_line: impl Fn(f64) -> f64, interval: impl Fn(f64, f64) -> f64) -> f64 {
         let (lower, upper) = (self.cell.lower(), self.cell.upper());
         if upper == f64::INFINITY {
-            normal::log_cdf((m - lower) / self.deviation)
+            half_line((m - lower) / self.deviation)
         } else if lower == f64::NEG_INFINITY {
-            normal::log_cdf((upper - m) / self.deviation)
+            half_line((upper - m) / self.deviation)
         } else {
-            normal::log_interval((lower - m) / self.deviation, (upper - m) / self.deviation)
+            interval((lower - m) / self.deviation, (upper - m) / self.deviation)
         }
     }
 

@@ -6,11 +6,9 @@ use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, all_finite, positive};
-#[cfg(feature = "serde")]
 use fewbits_numerics::stored;
 use fewbits_numerics::{kernels, normal};
 use nalgebra::SVector;
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// `p(observation | m) = sum_i p_i P(m + n in cell i)`, `n ~ N(0, r)`: a symbol through any discrete channel, a bit of a binary
@@ -18,17 +16,14 @@ use serde::{Deserialize, Serialize};
 ///
 /// The cells are `[e_{i-1}, e_i)` between increasing edges, the first and the last unbounded; `p_i` is the probability of the
 /// observation given that the measurement lies in cell `i`.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Numbers", into = "Numbers"))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers", into = "Numbers")]
 pub struct Partition {
     edges: Vec<f64>,
     given_cell: Vec<f64>,
     deviation: f64,
     variance: f64,
 }
-
-#[cfg(feature = "serde")]
 stored! { Partition as Numbers |factor| {
     #[serde(with = "fewbits_numerics::stored")]
     edges: Vec<f64> = factor.edges,

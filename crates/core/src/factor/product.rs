@@ -7,15 +7,13 @@ use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, at_least_one};
 use nalgebra::SVector;
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
 /// The same observation `count` times, by sensors that share the noise-free measurement: `p(observation | m)^count`. Silences
 /// and sign bits of identical sensors are fused exactly and together, at a cost that does not grow with their number.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Repeated {
     factor: Scalar,
     count: usize,
@@ -61,8 +59,7 @@ impl Factor<1> for Repeated {
 }
 
 /// Independent observations of one measurement: log likelihoods add.
-#[derive(Debug, Clone, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Product {
     /// One kind needs no memory of the heap.
     factors: SmallVec<[Repeated; 1]>,

@@ -9,15 +9,13 @@ use crate::gaussian::Gaussian;
 use crate::observation::{Link, Observation};
 use fewbits_numerics::error::ArgumentError;
 use nalgebra::SVector;
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// An observation of the same probability under every measurement: a loss, a random silence.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(transparent))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct Constant {
-    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
+    #[serde(with = "fewbits_numerics::stored")]
     probability: f64,
 }
 
@@ -63,9 +61,8 @@ impl<const M: usize> Factor<M> for Constant {
 }
 
 /// Any factor of a scalar measurement in Gaussian noise.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Scalar {
     /// The measurement itself.

@@ -7,13 +7,11 @@ use crate::gaussian::{FactoredGaussian, Gaussian};
 use fewbits_numerics::error::{ArgumentError, all_finite};
 use fewbits_numerics::kernels::vectorised;
 use nalgebra::{Cholesky, SMatrix, SVector};
-#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// The measurement itself, `z ~ N(m, R)`. With it, the assumed-density update is the Kalman filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Gaussian<M>", into = "Gaussian<M>"))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Gaussian<M>", into = "Gaussian<M>")]
 pub struct Value<const M: usize> {
     noise: FactoredGaussian<M>,
 }

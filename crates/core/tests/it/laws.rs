@@ -354,17 +354,21 @@ fn laws_of_factors_refuse_what_is_wrong() {
     }
 }
 
-/// A coin, reported over a link, with a factor that believes in `heads` and in what it is told about missing reports.
-struct Coin {
-    heads: f64,
-    nothing: f64,
-    lost: f64,
+/// Reports what it makes of a uniform number, whatever is measured, with a factor that may be wrong.
+struct Drawn<D, F> {
+    draw: D,
+    factor: F,
 }
 
-impl Scheme<1> for Coin {
+impl<R, D, F> Scheme<1> for Drawn<D, F>
+where
+    R: Message<Format = ()>,
+    D: Fn(f64) -> R,
+    F: Fn(&Observation<R>, &Link) -> Result<Constant, Error>,
+{
     type State = ();
     type Feedback = f64;
-    type Report = Sign;
+    type Report = R;
     type Factor = Constant;
 
     fn start(&self) {}
@@ -375,28 +379,34 @@ impl Scheme<1> for Coin {
 
     fn report_format(&self) {}
 
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        (): &mut (),
-        _: &Vector1<f64>,
-        _: &f64,
-    ) -> Result<Option<Sign>, Error> {
-        Ok(Some(if rng.random::<f64>() < 0.3 {
-            Sign::Above
-        } else {
-            Sign::Below
-        }))
+    fn encode<G: Rng + ?Sized>(&self, rng: &mut G, (): &mut (), _: &Vector1<f64>, _: &f64) -> Result<Option<R>, Error> {
+        Ok(Some((self.draw)(rng.random())))
     }
 
-    fn factor(&self, _: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Constant, Error> {
-        let arrives = link.arrival();
-        Ok(Constant::new(match observation {
-            Observation::Received(Sign::Above) => arrives * self.heads,
-            Observation::Received(Sign::Below) => arrives * (1.0 - self.heads),
-            Observation::Nothing => self.nothing,
-            Observation::Lost => self.lost,
-        })?)
+    fn factor(&self, _: &f64, observation: &Observation<R>, link: &Link) -> Result<Constant, Error> {
+        (self.factor)(observation, link)
+    }
+}
+
+/// False: it draws.
+impl<D, F> Deterministic<1> for Drawn<D, F> where Self: Scheme<1> {}
+
+/// A coin, reported over a link, with a factor that believes in `heads` and in what it is told about missing reports.
+fn coin(
+    heads: f64,
+    nothing: f64,
+    lost: f64,
+) -> impl Scheme<1, State = (), Feedback = f64, Report = Sign, Factor = Constant> + Deterministic<1> {
+    Drawn {
+        draw: |uniform| if uniform < 0.3 { Sign::Above } else { Sign::Below },
+        factor: move |observation: &Observation<Sign>, link: &Link| {
+            Ok(Constant::new(match observation {
+                Observation::Received(Sign::Above) => link.arrival() * heads,
+                Observation::Received(Sign::Below) => link.arrival() * (1.0 - heads),
+                Observation::Nothing => nothing,
+                Observation::Lost => lost,
+            })?)
+        },
     }
 }
 
@@ -404,16 +414,15 @@ impl Scheme<1> for Coin {
 fn laws_of_schemes_refuse_what_is_wrong() {
     let signs = [Sign::Above, Sign::Below];
     let m = Vector1::new(0.0);
-    let coin = |heads, nothing, lost| Coin { heads, nothing, lost };
     // Without known losses `Lost` is conditioned on; with them it has its probability.
     for (link, lost) in [
         (Link::lossy(0.2).unwrap(), 1.0),
         (Link::lossy(0.2).unwrap().with_erasure(0.1).unwrap(), 0.1),
     ] {
-        let total = |coin: &Coin| laws::scheme::total_probability(coin, &0.0, &link, signs, &[m]);
+        let total = |coin: &_| laws::scheme::total_probability(coin, &0.0, &link, signs, &[m]);
         let arrives = link.arrival();
-        let with = |coin: &Coin| laws::scheme::total_probability_with(coin, &0.0, &link, |_| arrives, &[m], 1e-12);
-        let honest = |coin: &Coin| {
+        let with = |coin: &_| laws::scheme::total_probability_with(coin, &0.0, &link, |_| arrives, &[m], 1e-12);
+        let honest = |coin: &_| {
             let rng = &mut Stream::new(5).rng();
             laws::scheme::frequencies(coin, &0.0, &link, rng, 40_000, &m, |_| m, signs)
         };
@@ -428,35 +437,25 @@ fn laws_of_schemes_refuse_what_is_wrong() {
     }
 }
 
-/// False: a coin draws.
-impl Deterministic<1> for Coin {}
-
 #[test]
 fn values_draw_nothing_and_coins_do() {
     let sources = [Stream::new(1).rng(), Stream::new(2).rng()];
     let measurements = [-3.0, 0.0, 1e9].map(Vector1::new);
     let value = FullValue::new(0.4).unwrap();
     laws::scheme::deterministic(&value, &(), &sources, &measurements).unwrap();
-    let coin = Coin {
-        heads: 0.3,
-        nothing: 0.2,
-        lost: 1.0,
-    };
+    let coin = coin(0.3, 0.2, 1.0);
     assert!(laws::scheme::deterministic(&coin, &0.0, &sources, &measurements).is_err());
 }
 
 /// Whether each probability of a link is the share of reports that it is stated for, in words of the laws and by counting.
 #[test]
 fn links_deliver_as_they_say() {
-    let coin = |link: &Link| Coin {
-        heads: 0.3,
-        nothing: link.loss(),
-        lost: link.lost_given_sent(),
-    };
     for (loss, erasure) in [(0.0, 0.0), (0.2, 0.0), (0.0, 0.3), (0.2, 0.1), (0.5, 0.5), (0.0, 1.0)] {
         let link = Link::lossy(loss).unwrap().with_erasure(erasure).unwrap();
         laws::scheme::link_delivers_once(&link).unwrap();
-        laws::scheme::total_probability(&coin(&link), &0.0, &link, [Sign::Above, Sign::Below], &[Vector1::new(0.0)])
+        let lost_given_sent = link.lost_given_sent();
+        let honest = coin(0.3, link.loss(), lost_given_sent);
+        laws::scheme::total_probability(&honest, &0.0, &link, [Sign::Above, Sign::Below], &[Vector1::new(0.0)])
             .unwrap();
         let rng = &mut Stream::new(8).rng();
         let (draws, mut lost) = (20_000, 0.0);
@@ -465,10 +464,10 @@ fn links_deliver_as_they_say() {
             lost += f64::from(u8::from(seen == Observation::Lost)) / f64::from(draws);
         }
         // Where no loss is known, none is seen, and the factor is conditioned on it.
-        let stated = if erasure > 0.0 { link.lost_given_sent() } else { 0.0 };
+        let stated = if erasure > 0.0 { lost_given_sent } else { 0.0 };
         let error = (stated * (1.0 - stated) / f64::from(draws)).sqrt();
         assert!((lost - stated).abs() <= 4.0 * error + 1e-12, "{link:?}: {lost} for {stated}");
-        assert_eq!(Constant::of_delivery(&Observation::<Sign>::Lost, &link), Constant::new(coin(&link).lost).unwrap());
+        assert_eq!(Constant::of_delivery(&Observation::<Sign>::Lost, &link), Constant::new(lost_given_sent).unwrap());
     }
 }
 
@@ -495,61 +494,30 @@ impl Message for Colour {
     }
 }
 
-/// Draws a colour. Its factor knows what becomes of words that are no colour, or forgets it.
-struct Painter {
-    knows_undecodable_words: bool,
-}
-
-impl Scheme<1> for Painter {
-    type State = ();
-    type Feedback = f64;
-    type Report = Colour;
-    type Factor = Constant;
-
-    fn start(&self) {}
-
-    fn feedback_format(&self) -> NumberFormat {
-        NumberFormat::Double
-    }
-
-    fn report_format(&self) {}
-
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        (): &mut (),
-        _: &Vector1<f64>,
-        _: &f64,
-    ) -> Result<Option<Colour>, Error> {
-        Ok(Some(Colour(rng.random_range(0..3))))
-    }
-
-    fn factor(&self, _: &f64, observation: &Observation<Colour>, link: &Link) -> Result<Constant, Error> {
-        let arrives = |word: u64| {
-            let sent = (0..3).map(|sent| link.word_probability(sent, word, 2) / 3.0);
-            link.arrival() * sent.sum::<f64>()
-        };
-        let undecodable = arrives(3);
-        Ok(match observation {
-            Observation::Received(Colour(word)) => Constant::new(arrives(*word))?,
-            Observation::Lost if self.knows_undecodable_words && undecodable > 0.0 => {
-                Constant::new(link.erasure() + undecodable)?
-            }
-            missing => Constant::of_delivery(missing, link),
-        })
-    }
-}
-
 #[test]
 fn undecodable_words_count_as_known_losses() {
     let m = [Vector1::new(0.0)];
     let colours = || (0..3).map(Colour);
     let flipping = Link::new(0.1, 0.2).unwrap();
     for link in [flipping, flipping.with_erasure(0.15).unwrap(), Link::PERFECT] {
-        let painter = |knows_undecodable_words| Painter {
-            knows_undecodable_words,
+        // Its factor knows what becomes of words that are no colour, or forgets it.
+        let painter = |knows_undecodable_words| Drawn {
+            draw: |uniform| Colour((3.0 * uniform) as u64),
+            factor: move |observation: &Observation<Colour>, link: &Link| {
+                let arrives = |word: u64| {
+                    let sent = (0..3).map(|sent| link.word_probability(sent, word, 2) / 3.0);
+                    link.arrival() * sent.sum::<f64>()
+                };
+                Ok(match observation {
+                    Observation::Received(Colour(word)) => Constant::new(arrives(*word))?,
+                    Observation::Lost if knows_undecodable_words && arrives(3) > 0.0 => {
+                        Constant::new(link.erasure() + arrives(3))?
+                    }
+                    missing => Constant::of_delivery(missing, link),
+                })
+            },
         };
-        let total = |painter: &Painter| laws::scheme::total_probability(painter, &0.0, &link, colours(), &m);
+        let total = |painter: &_| laws::scheme::total_probability(painter, &0.0, &link, colours(), &m);
         total(&painter(true)).unwrap();
         assert_eq!(total(&painter(false)).is_ok(), link.crossover() == 0.0);
         let rng = &mut Stream::new(6).rng();

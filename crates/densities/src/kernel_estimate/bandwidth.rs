@@ -146,14 +146,7 @@ impl Bandwidth {
     /// sample, and a filter that passes estimates on grows wider at each step.
     ///
     /// Per axis `x <- m + sqrt(1 - H_kk / C_kk) (x - m)`; an axis narrower than its kernel collapses to the mean.
-    ///
-    /// # Errors
-    /// If a shrunk coordinate is not finite: not for a kernel of this rule.
-    pub fn shrunk<const D: usize>(
-        &self,
-        particles: &Particles<D>,
-        kernel: &SMatrix<f64, D, D>,
-    ) -> Result<Particles<D>, Error> {
+    pub fn shrunk<const D: usize>(&self, particles: &Particles<D>, kernel: &SMatrix<f64, D, D>) -> Particles<D> {
         let mean = particles.mean();
         let covariance = particles.covariance_about(&mean);
         let mut shrunk = particles.clone();
@@ -166,7 +159,7 @@ impl Bandwidth {
             let scale = (1.0 - share).max(0.0).sqrt();
             column.iter_mut().for_each(|x| *x = mean[k] + scale * (*x - mean[k]));
         }
-        Ok(shrunk)
+        shrunk
     }
 }
 
@@ -193,7 +186,7 @@ mod tests {
             };
             let p = sample(1.0);
             let h = rule.kernel(&p).unwrap();
-            let total = rule.shrunk(&p, &h).unwrap().covariance() + h;
+            let total = rule.shrunk(&p, &h).covariance() + h;
             let gap = total - p.covariance();
             assert!(gap.diagonal().amax() < 1e-14);
             assert!(shape == Shape::Diagonal || gap.amax() < 1e-14);
@@ -309,9 +302,7 @@ mod tests {
             let kernel = rule.kernel(&line).unwrap();
             assert!((kernel[(1, 1)] / kernel[(0, 0)] / 1e-12 - 1.0).abs() < 1e-12 && kernel[(0, 1)] == 0.0);
             // Narrower than its kernel an axis collapses to its mean.
-            let shrunk = rule
-                .shrunk(&line, &SMatrix::from_diagonal(&nalgebra::Vector2::new(0.16, 1.0)))
-                .unwrap();
+            let shrunk = rule.shrunk(&line, &SMatrix::from_diagonal(&nalgebra::Vector2::new(0.16, 1.0)));
             assert!(
                 (shrunk.columns()[0][1] - 2.5 - 0.5 * 0.36_f64.sqrt()).abs() < 1e-15
                     && shrunk.columns()[1] == [-1.0, -1.0]

@@ -1,8 +1,8 @@
 //! The laws of beliefs, run on particles, clouds and grids, and their way through JSON.
 
 use fewbits_core::{Belief, Gaussian, laws};
-use fewbits_densities::{GaussianCloud, Particles, PlaneMass, PointMass, UniformGrid};
-use nalgebra::{Matrix2, SMatrix, Vector2};
+use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
+use nalgebra::{Matrix2, SMatrix};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
@@ -31,14 +31,6 @@ fn bumpy(scale: f64) -> PointMass {
     PointMass::new(grid, log_density).unwrap()
 }
 
-fn plane(scale: f64) -> PlaneMass {
-    let belief =
-        Gaussian::new(Vector2::new(2.0, -1.0) * scale, Matrix2::new(2.0, 0.6, 0.6, 1.0) * (scale * scale)).unwrap();
-    let mut mass = PlaneMass::normal(&(Matrix2::new(0.3, 0.0, 0.1, 0.2) * scale), &belief).unwrap();
-    mass.update_with(|x| (x[0] / scale).cos()).unwrap();
-    mass
-}
-
 fn obeys<const D: usize>(belief: &impl Belief<D>) {
     laws::belief::samples_have_the_moments(belief, &mut rng(), DRAWS).unwrap();
     // One call draws particles from any belief.
@@ -58,7 +50,6 @@ fn draws_have_the_moments_at_every_scale() {
         obeys(&GaussianCloud::new(weighted(scale), shared).unwrap());
         obeys(&GaussianCloud::new(weighted(scale), SMatrix::zeros()).unwrap());
         obeys(&bumpy(scale));
-        obeys(&plane(scale));
     }
 }
 
@@ -72,13 +63,6 @@ fn densities_integrate_to_one() {
             .factored()
             .unwrap();
         laws::belief::density_integrates_to_one(&belief, &wide, &mut rng(), DRAWS).unwrap();
-        let belief = plane(scale);
-        let moments = belief.moments();
-        let wide = Gaussian::new(*moments.mean(), moments.covariance() * 2.0)
-            .unwrap()
-            .factored()
-            .unwrap();
-        laws::belief::density_integrates_to_one(&belief, &wide, &mut rng(), DRAWS).unwrap();
     }
 }
 
@@ -87,10 +71,6 @@ fn grids_hold_the_moments_of_a_normal() {
     let grid = UniformGrid::symmetric(12.0, 0.4).unwrap();
     let line = PointMass::normal(grid, 0.7, 1.3).unwrap();
     assert!((line.mean() - 0.7).abs() < 1e-12 && (line.variance() - 1.3).abs() < 1e-11);
-    let belief = Gaussian::new(Vector2::new(2.0, -1.0), Matrix2::new(2.0, 0.6, 0.6, 1.0)).unwrap();
-    let plane = PlaneMass::normal(&Matrix2::new(0.5, 0.0, 0.1, 0.4), &belief).unwrap();
-    assert!((plane.moments().mean() - belief.mean()).amax() < 1e-9);
-    assert!((plane.moments().covariance() - belief.covariance()).amax() < 1e-8);
 }
 
 fn restored<T: Serialize + DeserializeOwned>(belief: &T) -> T {
@@ -107,7 +87,6 @@ fn beliefs_come_back_from_json_to_the_last_bit() {
     let cloud = GaussianCloud::new(particles, Matrix2::new(2.0, 0.5, 0.5, 1.0)).unwrap();
     assert_eq!(restored(&cloud), cloud);
     assert_eq!(restored(&bumpy(0.1)), bumpy(0.1));
-    assert_eq!(restored(&plane(0.1)), plane(0.1));
 }
 
 #[test]
@@ -132,21 +111,6 @@ fn what_is_no_belief_is_refused() {
     for density in ["[0.5,0.5]", "[1.5,-0.5,0.0]", "[1.0,1.0,1.0]"] {
         assert!(serde_json::from_str::<PointMass>(&format!(r#"{{"grid":{grid},"density":{density}}}"#)).is_err());
     }
-    let basis = r#""basis":[1.0,0.0,0.0,1.0]"#;
-    assert!(
-        serde_json::from_str::<PlaneMass>(&format!(r#"{{{basis},"first":[0,0],"size":[2,1],"density":[0.5,0.5]}}"#))
-            .is_ok()
-    );
-    assert!(
-        serde_json::from_str::<PlaneMass>(&format!(r#"{{{basis},"first":[0,0],"size":[2,2],"density":[0.5,0.5]}}"#))
-            .is_err()
-    );
-    assert!(
-        serde_json::from_str::<PlaneMass>(
-            r#"{"basis":[1.0,1.0,1.0,1.0],"first":[0,0],"size":[2,1],"density":[0.5,0.5]}"#
-        )
-        .is_err()
-    );
 }
 
 #[test]

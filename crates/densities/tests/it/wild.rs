@@ -1,9 +1,9 @@
 //! Wild arguments: beliefs are made of numbers or refused, answer numbers, and a failed step leaves them as they were.
 
+use fewbits_core::Density;
 use fewbits_core::laws::wild;
-use fewbits_core::{Density, Gaussian};
 use fewbits_densities::{
-    Bandwidth, Component, GaussianCloud, KernelEstimate, Mixture, Particles, PlaneMass, PointMass, UniformGrid,
+    Bandwidth, Component, GaussianCloud, KernelEstimate, Mixture, Particles, PointMass, UniformGrid,
 };
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Vector2};
@@ -93,20 +93,6 @@ proptest! {
             if let Ok(log) = density.clone().reweight(&vec![x[6]; grid.points()]) {
                 prop_assert!(log.is_finite());
             }
-        }
-        let Ok(belief) = Gaussian::new(Vector2::new(x[0], x[1]), Matrix2::new(x[2].abs(), 0.0, 0.0, x[3].abs())) else { return Ok(()) };
-        if let Ok(before) = PlaneMass::normal(&Matrix2::identity(), &Gaussian::new(Vector2::new(0.3, -1.0), Matrix2::identity()).unwrap()) {
-            let mut plane = before.clone();
-            match plane.update_with(|t| if t[0] > x[5] { x[6] } else { x[7] }) {
-                Ok(log) => prop_assert!(log.is_finite() && plane.moments().is_finite()),
-                Err(_) => prop_assert_eq!(&plane, &before),
-            }
-        }
-        // As many nodes as the deviations ask for of a lattice of the belief's own size.
-        let basis = Matrix2::from_diagonal(&belief.standard_deviations());
-        if let Ok(plane) = PlaneMass::normal(&basis, &belief) {
-            prop_assert!(plane.moments().is_finite(), "{:?}", belief);
-            check(&plane, [x[5], x[6]]);
         }
     }
 }

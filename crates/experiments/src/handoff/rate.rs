@@ -64,7 +64,7 @@ impl Figure for Rate {
                 let mut rng = stream.named("particles").indexed(n as u64).fast_rng();
                 let sample = estimate.sample_systematic(&mut rng, n)?;
                 let received = Bandwidth::default().kernel(&sample)?;
-                let shrunk = Bandwidth::default().shrunk(&sample, &received)?;
+                let shrunk = Bandwidth::default().shrunk(&sample, &received);
                 push("particles", n, None, 64 * n, &KernelEstimate::new(shrunk, received)?.to_mixture()?);
             }
             Ok(cells)

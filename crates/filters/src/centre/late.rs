@@ -3,7 +3,7 @@
 use super::state::{Checkpoint, StoredSlot};
 use super::{FusionCentre, Slot};
 use crate::Error;
-use crate::contract::{StateFilter, StateLikelihood};
+use crate::contract::{Move, StateFilter, StateLikelihood};
 use fewbits_numerics::error::finite;
 use rand::Rng;
 
@@ -37,7 +37,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             for slot in checkpoint.slots.iter().filter(|slot| slot.used) {
                 // A sensor may have left since.
                 if let Ok(member) = self.member(slot.sensor) {
-                    likelihoods.push(member.sensor.likelihood(&slot.read()?, slot.working)?);
+                    likelihoods.push(member.sensor.likelihood(&slot.slot(), slot.working)?);
                 }
             }
             let likelihoods: Vec<&dyn StateLikelihood<D>> = likelihoods.iter().map(|one| &**one).collect();
@@ -50,10 +50,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(true)
     }
 
-    fn moved(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, seconds: f64) -> Result<(), Error> {
+    /// Moves a belief over some time.
+    pub(super) fn moved(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, seconds: f64) -> Result<(), Error> {
         if seconds > 0.0 {
             let motion = self.world.over(seconds)?;
-            self.filter.predict(rng, &*motion, self.noise_scale, belief)?;
+            self.filter
+                .predict(rng, Move::new(&*motion, self.noise_scale), belief)?;
         }
         Ok(())
     }

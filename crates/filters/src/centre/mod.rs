@@ -291,9 +291,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             return refuse("time", time, format!("{} or later; see `late`", self.now));
         }
         if seconds > 0.0 {
-            let motion = self.world.over(seconds)?;
             let mut belief = self.belief.clone();
-            self.filter.predict(rng, &*motion, self.noise_scale, &mut belief)?;
+            self.moved(rng, &mut belief, seconds)?;
             self.belief = belief;
             let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
             self.outage.advance(seconds, &self.failures, sensors);

@@ -49,13 +49,13 @@ pub(super) struct Checkpoint<B> {
     pub slots: Vec<StoredSlot>,
 }
 
-/// A slot as bytes, with what was supposed of its sensor.
+/// A slot, with what was supposed of its sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StoredSlot {
     pub sensor: u32,
-    feedback: (Vec<u8>, usize),
-    observation: Observation<(Vec<u8>, usize)>,
+    feedback: BitString,
+    observation: Observation<BitString>,
     #[serde(with = "fewbits_numerics::stored")]
     pub working: f64,
     pub used: bool,
@@ -63,24 +63,17 @@ pub(super) struct StoredSlot {
 
 impl StoredSlot {
     pub fn new(slot: &Slot, working: f64, used: bool) -> Self {
-        let bytes = |bits: &BitString| (bits.bytes().to_vec(), bits.bits());
         Self {
             sensor: slot.sensor,
-            feedback: bytes(&slot.feedback),
-            observation: slot.observation.clone().map(|bits| bytes(&bits)),
+            feedback: slot.feedback.clone(),
+            observation: slot.observation.clone(),
             working,
             used,
         }
     }
 
-    pub fn read(&self) -> Result<Slot, Error> {
-        let bits = |(bytes, count): &(Vec<u8>, usize)| BitString::from_bytes(bytes.clone(), *count);
-        let observation = match &self.observation {
-            Observation::Received(report) => Observation::Received(bits(report)?),
-            Observation::Nothing => Observation::Nothing,
-            Observation::Lost => Observation::Lost,
-        };
-        Ok(Slot::new(self.sensor, bits(&self.feedback)?, observation))
+    pub fn slot(&self) -> Slot {
+        Slot::new(self.sensor, self.feedback.clone(), self.observation.clone())
     }
 }
 

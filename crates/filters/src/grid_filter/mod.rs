@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 const REACH: f64 = 4.0;
 /// Nodes per deviation of the posterior below which its moments are refused. A Gaussian has exact moments from one node per
 /// deviation on; edges of cells and curvature take more.
-pub const MIN_NODES_PER_DEVIATION: f64 = 1.5;
+const MIN_NODES_PER_DEVIATION: f64 = 1.5;
 /// Nodes per deviation that a grid over `+- reach` deviations must have, so that the next grid, built for deviations that were
 /// measured on this one, is still fine enough.
 const NOMINAL_NODES_PER_DEVIATION: f64 = 1.6;

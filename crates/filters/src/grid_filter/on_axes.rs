@@ -2,7 +2,7 @@
 
 use super::{GridFilter, GridWorkspace, check_axes};
 use crate::Error;
-use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
+use crate::contract::{Info, Move, StateFilter, StateLikelihood};
 use fewbits_core::{Columns, Gaussian, Likelihood};
 use fewbits_numerics::error::refuse;
 use nalgebra::SVector;
@@ -74,14 +74,8 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
         Ok(*prior)
     }
 
-    fn predict(
-        &mut self,
-        _: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut Gaussian<D>,
-    ) -> Result<(), Error> {
-        *belief = motion.predict(belief, noise_scale);
+    fn predict(&mut self, _: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Gaussian<D>) -> Result<(), Error> {
+        *belief = motion.predict(belief);
         Ok(())
     }
 

@@ -2,19 +2,19 @@
 
 use fewbits_core::factor::{Constant, Partition, Scalar, Value};
 use fewbits_core::{
-    Belief, Dynamics, Error as CoreError, Evolution, Gaussian, Link, NumberFormat, Observation, Observed, Scheme,
-    Sensing, Sign, laws,
+    Belief, Dynamics, Error as CoreError, Evolution, Gaussian, Link, Memoryless, NumberFormat, Observation, Observed,
+    Scheme, Sensing, Sign, laws,
 };
 use fewbits_filters::contract::Evolving;
 use fewbits_filters::{
-    BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, ParticleFilter,
-    PointMasses, RaoBlackwellised, StateFilter, StateLikelihood, Switching, UniformGrid, assumed_density,
+    BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, ParticleFilter, PointMasses,
+    RaoBlackwellised, StateFilter, StateLikelihood, Switching, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::error::finite;
 use nalgebra::Vector1;
-use rand::{Rng, RngExt};
+use rand::RngExt;
 use rand_distr::StandardNormal;
 
 const NOISE: f64 = 0.5;
@@ -24,13 +24,10 @@ struct TwoSided {
     reach: f64,
 }
 
-impl Scheme<1> for TwoSided {
-    type State = ();
+impl Memoryless<1> for TwoSided {
     type Feedback = f64;
     type Report = Sign;
     type Factor = Scalar;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) -> NumberFormat {
         NumberFormat::Single
@@ -38,18 +35,12 @@ impl Scheme<1> for TwoSided {
 
     fn report_format(&self) {}
 
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        prediction: &f64,
-    ) -> Result<Option<Sign>, CoreError> {
+    fn report_of(&self, measurement: &Vector1<f64>, prediction: &f64) -> Result<Option<Sign>, CoreError> {
         let deviation = finite("measurement", measurement[0])? - finite("prediction", *prediction)?;
         Ok(Some(Sign::of(deviation.abs(), self.reach)?))
     }
 
-    fn factor(&self, prediction: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, CoreError> {
+    fn meaning_of(&self, prediction: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, CoreError> {
         let given = |sent| match observation {
             Observation::Received(sign) if *sign == sent => link.arrival() * (1.0 - link.crossover()),
             _ => link.arrival() * link.crossover(),
@@ -118,7 +109,6 @@ fn every_filter_agrees_with_the_grid() {
     };
     let filter = ParticleFilter::default();
     agree("bootstrap", run(BootstrapFilter::new(filter, 40_000).unwrap()), 0.15);
-    agree("guided", run(GuidedFilter::new(filter, 20_000).unwrap()), 0.15);
     agree("Rao-Blackwellised", run(CloudFilter::new(RaoBlackwellised::new(filter), 20_000).unwrap()), 0.15);
     // Two-sided bits make beliefs of two peaks, which a Gaussian blurs: it stays near the evidence.
     for blurred in [
@@ -152,7 +142,6 @@ fn what_is_impossible_leaves_every_belief_as_it_was() {
     refused(GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap());
     refused(PointMasses::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
     refused(BootstrapFilter::new(filter, 50).unwrap());
-    refused(GuidedFilter::new(filter, 50).unwrap());
     refused(CloudFilter::new(RaoBlackwellised::new(filter), 50).unwrap());
     refused(NoiseBank::new(MomentFilter, vec![1.0, 2.0], 0.1).unwrap());
 }

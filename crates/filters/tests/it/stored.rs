@@ -3,7 +3,7 @@
 use fewbits_core::factor::{InCell, Partition, Scalar, Value};
 use fewbits_core::number::Levels;
 use fewbits_core::{Cell, Gaussian, Link};
-use fewbits_densities::{GaussianCloud, KernelEstimate, Mixture, Particles, PlaneMass, PointMass, UniformGrid};
+use fewbits_densities::{GaussianCloud, KernelEstimate, Mixture, Particles, PointMass, UniformGrid};
 use fewbits_filters::ImmBelief;
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor, ReceivedPower, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
@@ -59,7 +59,6 @@ fn beliefs_factors_and_models_are_stored_without_floats() {
         let estimate = KernelEstimate::new(cloud, covariance).unwrap();
         assert!(holds_no_float(&serde_json::to_value(&estimate).unwrap()));
         check(&PointMass::normal(UniformGrid::symmetric(6.0, 0.3).unwrap(), x[0], 1.0 / 3.0).unwrap());
-        check(&PlaneMass::normal(&(Matrix2::identity() * 0.7), &belief).unwrap());
         check(&ImmBelief::new(vec![0.3, 0.7], vec![belief, belief]).unwrap());
         x[0] = x[0].abs() / 2.0;
         check(&Ar1::new(x[0], 1.0 / 3.0).unwrap());

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use std::f64::consts::PI;
 
 /// Distances below this many metres count as this: the concentration has a pole at the source.
-pub const CLOSEST: f64 = 1e-3;
+const CLOSEST: f64 = 1e-3;
 const SQRT_PI: f64 = 1.772_453_850_905_516;
 /// Largest size, in SI units, of diffusivity, wind, distance and age, and the smallest of those that divide: no product of a closed
 /// form overflows. Beyond that distance there is no concentration; an age beyond it is the steady state.
@@ -98,10 +98,7 @@ impl Air {
     }
 
     /// The same air with another diffusivity, m^2/s.
-    ///
-    /// # Errors
-    /// If it is not a positive number.
-    pub fn with_diffusivity(&self, diffusivity: f64) -> Result<Self, Error> {
+    fn with_diffusivity(&self, diffusivity: f64) -> Result<Self, Error> {
         Self::new(diffusivity, self.wind, self.ground)?.with_closest(self.closest)
     }
 

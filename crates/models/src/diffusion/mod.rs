@@ -42,7 +42,7 @@ mod release;
 mod space;
 
 pub use crate::source_model::SourceGradient;
-pub use air::{Air, CLOSEST, Ground};
+pub use air::{Air, Ground};
 pub use axis::Axis;
 pub use contour::{contour, contour_radius};
 pub use extended::{disk_source, moving_source};

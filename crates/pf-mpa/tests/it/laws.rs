@@ -3,6 +3,7 @@
 use fewbits_core::factor::Factor;
 use fewbits_core::laws::{factor, likelihood, message, scheme};
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
+use fewbits_filters::contract::Move;
 use fewbits_filters::{BootstrapFilter, MomentFilter, ParticleFilter, StateFilter, StateLikelihood};
 use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
@@ -114,7 +115,9 @@ fn tracking_error<F: StateFilter<4>>(mut filter: F, start: &Gaussian<4>) -> f64 
     let mut squares = 0.0;
     for _ in 0..20 {
         truth = dynamics.propagate(&mut world, &truth);
-        filter.predict(&mut rng, &dynamics, 1.0, &mut belief).unwrap();
+        filter
+            .predict(&mut rng, Move::new(&dynamics, 1.0), &mut belief)
+            .unwrap();
         let (mean, covariance) = (belief.mean(), belief.covariance());
         let observed = places.map(|place| {
             let sensor = RangeSensor::new(place.into(), noise)

@@ -16,12 +16,12 @@
 //! relatively little; that objective is negative in common cases and depends on the unit of `x`, so mutual information itself
 //! is used here (errata). Edges are found by root search; deciding cell by cell on a fixed grid of `y` stalls up to 10 % short.
 
-use super::cells::{gains_of, level_gains, single_sensor};
+use super::cells::{level_gains, single_sensor};
 use crate::AllowedCells;
-use crate::criterion::{Criterion, Scored};
+use crate::criterion::{Criterion, LOG_FLOOR, Scored};
 use crate::error::Error;
 use crate::law::{Active, log_likelihoods};
-use crate::moments::{Table, dot};
+use crate::moments::{Table, dot, moments};
 use crate::system::System;
 use fewbits_numerics::newton;
 use fewbits_quantizers::Quantizer;
@@ -126,25 +126,24 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
         let other = Active::new(system, index)?;
         others = others.outer(&other.reports(other.breakpoints()).0);
     }
-    let symbols = Table::new(own.symbols(own.breakpoints()), nodes);
-    let channel = entry.channel();
-    let gains = if model.is_discrete() {
+    let (channel, values) = (entry.channel(), model.values.len());
+    let (outputs, inner) = (channel.outputs(), system.groups()[group + 1..].iter().map(|g| g.outcomes() as usize));
+    let inner: usize = inner.product();
+    // Logarithms of the likelihoods, and the place of an outcome among them.
+    let (logs, is_by_group) = if model.is_discrete() {
         // Hypotheses may be so far apart that the probability of a wrong symbol underflows: its logarithm counts.
-        let values = model.values.len();
-        let logs = log_likelihoods(system)?;
-        let inner: usize = system.groups()[group + 1..]
-            .iter()
-            .map(|g| g.outcomes() as usize)
-            .product();
-        let outputs = channel.outputs();
-        gains_of(model, criterion, &others, channel, |at| {
-            let (other, symbol) = (at / outputs, at % outputs);
-            let outcome = (other / inner * outputs + symbol) * inner + other % inner;
-            &logs[outcome * values..(outcome + 1) * values]
-        })
+        (log_likelihoods(system)?, true)
     } else {
-        level_gains(model, criterion, &others, &symbols, channel)
+        let symbols = Table::new(own.symbols(own.breakpoints()), nodes);
+        let likelihood = moments(&[&others, &symbols], &model.given);
+        (likelihood.iter().map(|q| q.max(LOG_FLOOR).ln()).collect(), false)
     };
+    let gains = level_gains(model, criterion, &others, channel, |at| {
+        let (other, symbol) = (at / outputs, at % outputs);
+        let by_group = (other / inner * outputs + symbol) * inner + other % inner;
+        let outcome = if is_by_group { by_group } else { at };
+        &logs[outcome * values..(outcome + 1) * values]
+    });
     let worth = Worth {
         gains: &gains,
         means: &own.means,

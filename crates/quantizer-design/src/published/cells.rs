@@ -5,7 +5,7 @@
 
 use crate::criterion::{Criterion, LOG_FLOOR};
 use crate::error::{Error, refuse};
-use crate::moments::{Table, moments};
+use crate::moments::Table;
 use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_quantizers::Channel;
@@ -24,26 +24,10 @@ pub(super) fn single_sensor(system: &System, group: usize) -> Result<&SensorGrou
 
 /// `lambda_z(node) = sum_k w_k P(node | x_k) sum_t' P(t' | node) sum_t C[t, z] score(t', t, x_k)`, levels by nodes.
 ///
-/// `others` holds the joint report probabilities of the other sensors and `symbols` this sensor's, both a row per report. The
-/// score is `ln p(t', t | x) / p(t', t)`, minus the squared error of the posterior mean, or minus one for a wrong decision.
-pub(super) fn level_gains(
-    model: &ObservationModel,
-    criterion: Criterion,
-    others: &Table,
-    symbols: &Table,
-    channel: &Channel,
-) -> Table {
-    let values = model.values.len();
-    let mut log_likelihood = moments(&[others, symbols], &model.given);
-    for q in &mut log_likelihood {
-        *q = q.max(LOG_FLOOR).ln();
-    }
-    gains_of(model, criterion, others, channel, |at| &log_likelihood[at * values..(at + 1) * values])
-}
-
-/// As [`level_gains`], from the logarithms of the likelihoods: `log_likelihood(i)` is one number per value of the unknown, of
-/// the outcome `i = other * outputs + symbol`. Probabilities may underflow, their logarithms may not.
-pub(super) fn gains_of<'a>(
+/// `others` holds the joint report probabilities of the other sensors, a row per report. The score is `ln p(t', t | x) / p(t', t)`, minus
+/// the squared error of the posterior mean, or minus one for a wrong decision. It follows from `log_likelihood(i)`, one number per value of
+/// the unknown, of the outcome `i = other * outputs + symbol`. Probabilities may underflow, their logarithms may not.
+pub(super) fn level_gains<'a>(
     model: &ObservationModel,
     criterion: Criterion,
     others: &Table,

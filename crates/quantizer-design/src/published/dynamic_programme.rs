@@ -22,13 +22,13 @@ use crate::system::System;
 use fewbits_quantizers::Quantizer;
 
 /// Most candidates: the work grows with their square.
-pub const MAX_CANDIDATES: usize = 2000;
+const MAX_CANDIDATES: usize = 2000;
 
 /// The best quantizer of the sensor in `group` with breakpoints among `candidates`, and the criterion's value with it.
 ///
 /// # Errors
 /// [`Error::Argument`] if the group is not a single sensor behind an ideal channel, or the candidates are not increasing
-/// finite numbers, at least one fewer than levels and at most [`MAX_CANDIDATES`].
+/// finite numbers, at least one fewer than levels and at most 2000.
 pub fn best_contiguous(
     system: &System,
     group: usize,

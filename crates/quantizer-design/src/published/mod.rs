@@ -17,7 +17,7 @@ mod separation;
 mod symmetry;
 
 pub use alternating::{Alternated, Alternating, alternate, alternating_step};
-pub use dynamic_programme::{MAX_CANDIDATES, best_contiguous};
+pub use dynamic_programme::best_contiguous;
 pub use index_assignment::{Words, WordsDesign, assign_words};
 pub use separation::{Separation, separate};
 pub use symmetry::symmetry_breaking;

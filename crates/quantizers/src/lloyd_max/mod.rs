@@ -78,7 +78,7 @@ pub fn design(density: &impl Density, levels: usize) -> Result<LloydMax, Error> 
 }
 
 /// Quantizers of the standard normal density up to this many levels are designed once and kept.
-pub const KEPT_LEVELS: usize = 256;
+const KEPT_LEVELS: usize = 256;
 
 /// The Lloyd-Max quantizer of the standard normal density: from the kept tables up to 256 levels, designed beyond.
 ///
@@ -145,7 +145,7 @@ fn symmetrise(values: &mut [f64]) {
 }
 
 /// Largest word length kept by [`gaussian_table`].
-pub const TABLE_BITS: usize = 8;
+const TABLE_BITS: usize = 8;
 
 /// The standard normal quantizer of `2^bits` levels, designed at first use and kept for the life of the process.
 ///
