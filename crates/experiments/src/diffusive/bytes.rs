@@ -34,7 +34,7 @@ pub struct Bytes;
 
 impl Figure for Bytes {
     figure!(Settings => Vec<Summary>, "diffusive-bytes", "Bytes to the threshold", "",
-        "What all messages of a search cost together (example B, numbers in single precision, messages of raw \
+        "What all messages of a search cost together (120 deployments of example B, numbers in single precision, messages of raw \
          records grow with every node): on a short route the samples themselves, quantised to the noise, are the \
          cheapest message and lose nothing.");
 

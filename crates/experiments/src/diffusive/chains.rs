@@ -52,7 +52,7 @@ const IN_WIND: [(&str, f64); 3] = [("covariance", 15.0), ("information", 15.0), 
 pub static FIG3: Chains = Chains {
     about: About::of("diffusive-fig3", "Error along the search, two radio ranges", "Zhao and Nehorai 2007, Fig. 3")
         .showing("Median distance of estimate and source after each node (bands: deciles), example A, ranges of 15 and 10 m, \
-                  over random deployments. What the paper calls bias is the root of this distance; both are in the table."),
+                  over 120 random deployments. What the paper calls bias is the root of this distance; both are in the table."),
     example: A,
     schemes: OF_A.split_at(6).0,
     claims: chain_claims::fig3,
@@ -60,7 +60,7 @@ pub static FIG3: Chains = Chains {
 
 pub static FIG4: Chains = Chains {
     about: About::of("diffusive-fig4", "Determinant along the search, two radio ranges", "Zhao and Nehorai 2007, Fig. 4")
-        .showing("Median log10 determinant of the position's covariance after each node, example A, ranges of 15 and 10 m. The \
+        .showing("Median log10 determinant of the position's covariance after each node in 120 deployments, example A, ranges of 15 and 10 m. The \
                   threshold is 1e-6. One Gaussian spends about ten nodes near the start, because a ring matched by moments is a \
                   broad blob; mixtures and the exact belief do not."),
     example: A,
@@ -75,7 +75,7 @@ pub static FIG7: Chains = Chains {
         "Zhao and Nehorai 2007, Fig. 7",
     )
     .showing(
-        "Median distance of estimate and source after each node, example B: polynomial Gaussians of degree 5 with two \
+        "Median distance of estimate and source after each node in 120 deployments, example B: polynomial Gaussians of degree 5 with two \
                   components against one Gaussian, and the exact belief as the referee.",
     ),
     example: B,
@@ -86,7 +86,7 @@ pub static FIG7: Chains = Chains {
 pub static FIG8: Chains = Chains {
     about: About::of("diffusive-fig8", "Nodes to the threshold, by what travels", "Zhao and Nehorai 2007, Fig. 8")
         .showing(
-            "Median log10 determinant after each node, example B, threshold 1e-5, for every form of the belief. A \
+            "Median log10 determinant after each node in 120 deployments, example B, threshold 1e-5, for every form of the belief. A \
                   determinant alone can mislead: the summary says how many searches end more than a metre off.",
         ),
     example: B,
@@ -96,7 +96,7 @@ pub static FIG8: Chains = Chains {
 
 pub static FIG9: Chains = Chains {
     about: About::of("diffusive-fig9", "Choosing nodes in wind, source of example B", "Zhao and Nehorai 2007, Figs. 9 and 10")
-        .showing("Error and determinant along searches in a wind of (-20, -10) m/s, source at (62, 50), by the rule that chooses \
+        .showing("Error and determinant along searches in 120 deployments in a wind of (-20, -10) m/s, source at (62, 50), by the rule that chooses \
                   nodes. A mixture of four Gaussians over position and rate travels. The paper does not print its source: \
                   diffusive-fig10 has the other one."),
     example: B,

@@ -55,7 +55,7 @@ pub struct Fig6 {
 
 const fn about(id: &'static str, title: &'static str) -> About {
     About::of(id, title, "compressed particle filter, Section 6, Figure 6").showing(
-        "Bounds on the error after t lossy hand-overs. The ML bound grows in proportion to time, those of KL and L1 exponentially; \
+        "Bounds on the error after t lossy hand-overs in 200 worlds. The ML bound grows in proportion to time, those of KL and L1 exponentially; \
          the DR bounds (ours) hold for every data sequence and stay below what is trivial.",
     )
 }
