@@ -9,7 +9,7 @@
 //! | a Gaussian belief and any factor | [`assumed_density`] | [`MomentFilter`] |
 //! | linear Gaussian filtering of values | [`kalman`] (Joseph form) | [`MomentFilter`] |
 //! | a Gaussian belief and any likelihood of a few coordinates | [`GridFilter`] (a grid that follows the posterior) | [`GridOnAxes`] |
-//! | any dynamics, any likelihood | [`ParticleFilter`], [`Resampling`] | [`BootstrapFilter`] |
+//! | any dynamics, any likelihood | [`ParticleFilter`], [`Resampling`] | [`BootstrapFilter`], [`GuidedFilter`] |
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`CloudFilter`] |
 //! | several models, one at a time | [`Imm`] (interacting multiple models, any factor) | [`NoiseBank`], [`Switching`] |
 //! | the exact answer for a scalar | [`PointMassFilter`] (filter and smoother on a grid) | [`PointMasses`] |
@@ -39,6 +39,7 @@ pub mod contract;
 pub mod cramer_rao;
 mod error;
 mod grid_filter;
+mod guided;
 mod imm;
 pub mod kalman;
 mod noise_bank;
@@ -54,6 +55,7 @@ pub use contract::{Info, LinearScalar, MomentFilter, StateFilter, StateLikelihoo
 pub use error::Error;
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
 pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};
+pub use guided::GuidedFilter;
 pub use imm::{Imm, ImmBelief, ImmWorkspace};
 pub use noise_bank::NoiseBank;
 pub use particle::{BootstrapFilter, ParticleFilter, Workspace};

@@ -179,6 +179,11 @@ impl<const D: usize> BootstrapFilter<D> {
             workspace: Workspace::default(),
         })
     }
+
+    /// Resamples where it is due.
+    pub(crate) fn resample(&mut self, mut rng: &mut dyn Rng, belief: &mut Particles<D>) -> Result<(), Error> {
+        Ok(self.filter.resample(&mut rng, belief, &mut self.workspace)?)
+    }
 }
 
 impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
@@ -188,8 +193,8 @@ impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
         Ok(Particles::from_belief(&mut rng, prior, self.count)?)
     }
 
-    fn predict(&mut self, mut rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Particles<D>) -> Result<(), Error> {
-        self.filter.resample(&mut rng, belief, &mut self.workspace)?;
+    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Particles<D>) -> Result<(), Error> {
+        self.resample(rng, belief)?;
         motion
             .motion
             .move_columns(rng, motion.noise_scale, belief.columns_mut());

@@ -7,8 +7,8 @@ use fewbits_core::{
 };
 use fewbits_filters::contract::Evolving;
 use fewbits_filters::{
-    BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, ParticleFilter, PointMasses,
-    RaoBlackwellised, StateFilter, StateLikelihood, Switching, UniformGrid, assumed_density,
+    BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, ParticleFilter,
+    PointMasses, RaoBlackwellised, StateFilter, StateLikelihood, Switching, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -109,6 +109,7 @@ fn every_filter_agrees_with_the_grid() {
     };
     let filter = ParticleFilter::default();
     agree("bootstrap", run(BootstrapFilter::new(filter, 40_000).unwrap()), 0.15);
+    agree("guided", run(GuidedFilter::new(filter, 20_000).unwrap()), 0.15);
     agree("Rao-Blackwellised", run(CloudFilter::new(RaoBlackwellised::new(filter), 20_000).unwrap()), 0.15);
     // Two-sided bits make beliefs of two peaks, which a Gaussian blurs: it stays near the evidence.
     for blurred in [
@@ -142,6 +143,7 @@ fn what_is_impossible_leaves_every_belief_as_it_was() {
     refused(GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap());
     refused(PointMasses::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
     refused(BootstrapFilter::new(filter, 50).unwrap());
+    refused(GuidedFilter::new(filter, 50).unwrap());
     refused(CloudFilter::new(RaoBlackwellised::new(filter), 50).unwrap());
     refused(NoiseBank::new(MomentFilter, vec![1.0, 2.0], 0.1).unwrap());
 }

@@ -3,12 +3,12 @@
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
 use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
-    BootstrapFilter, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule, StateFilter,
-    StateLikelihood, UniformGrid, Workspace, kalman,
+    BootstrapFilter, GuidedFilter, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule,
+    StateFilter, StateLikelihood, UniformGrid, Workspace, kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
-use nalgebra::{Matrix2, SVector, Vector2};
+use nalgebra::{Matrix1, Matrix2, SVector, Vector1, Vector2};
 use rand_pcg::Pcg64Mcg;
 
 const STEPS: usize = 12;
@@ -62,8 +62,19 @@ impl Scene {
     }
 }
 
-/// One step of the filter under the contract; the estimate of the log-likelihood and the effective sample size.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Bootstrap,
+    Guided,
+}
+
+impl Kind {
+    const ALL: [Self; 2] = [Self::Bootstrap, Self::Guided];
+}
+
+/// One step of either filter in place; the estimate of the log-likelihood and the effective sample size.
 fn advance<const D: usize>(
+    kind: Kind,
     filter: ParticleFilter,
     rng: &mut Pcg64Mcg,
     dynamics: &impl fewbits_core::GaussianDynamics<D>,
@@ -71,21 +82,26 @@ fn advance<const D: usize>(
     observed: &dyn StateLikelihood<D>,
 ) -> (f64, f64) {
     let count = belief.len();
-    let (next, info) = BootstrapFilter::new(filter, count)
-        .unwrap()
-        .step(rng, dynamics, belief, &[observed])
-        .unwrap();
+    let (next, info) = match kind {
+        Kind::Bootstrap => BootstrapFilter::new(filter, count)
+            .unwrap()
+            .step(rng, dynamics, belief, &[observed]),
+        Kind::Guided => GuidedFilter::new(filter, count)
+            .unwrap()
+            .step(rng, dynamics, belief, &[observed]),
+    }
+    .unwrap();
     *belief = next;
     (info.log_likelihood, info.effective_sample_size.unwrap())
 }
 
-/// Runs the filter over the scene; the final belief and the estimate of the log-likelihood.
-fn run(scene: &Scene, filter: ParticleFilter, count: usize, stream: Stream) -> (Particles<2>, f64) {
+/// Runs one filter over the scene; the final belief and the estimate of the log-likelihood.
+fn run(scene: &Scene, kind: Kind, filter: ParticleFilter, count: usize, stream: Stream) -> (Particles<2>, f64) {
     let mut rng = stream.fast_rng();
     let mut belief = scene.start(count, &mut rng);
     let mut log_likelihood = 0.0;
     for z in &scene.measurements {
-        let (log, size) = advance(filter, &mut rng, &scene.dynamics, &mut belief, &scene.value(*z));
+        let (log, size) = advance(kind, filter, &mut rng, &scene.dynamics, &mut belief, &scene.value(*z));
         log_likelihood += log;
         assert!((size - belief.effective_sample_size()).abs() < 1e-9);
     }
@@ -96,28 +112,30 @@ fn run(scene: &Scene, filter: ParticleFilter, count: usize, stream: Stream) -> (
 fn all_filters_agree_with_the_kalman_filter() {
     let scene = scene(STEPS);
     let (exact, log_likelihood) = scene.kalman();
-    for resampling in Resampling::ALL {
-        let filter = ParticleFilter::new(resampling, Schedule::Below(0.7));
-        let (mut x, mut v, mut spread, mut evidence) = <(Moments, Moments, Moments, Moments)>::default();
-        for repeat in 0..8 {
-            let stream = Stream::new(5).named("kalman").indexed(repeat);
-            let (belief, estimate) = run(&scene, filter, 4000, stream);
-            x.add(belief.mean()[0]);
-            v.add(belief.mean()[1]);
-            spread.add(belief.covariance()[(0, 1)]);
-            evidence.add(estimate);
-        }
-        for (name, moments, truth) in [
-            ("position", x, exact.mean()[0]),
-            ("velocity", v, exact.mean()[1]),
-            ("covariance", spread, exact.covariance()[(0, 1)]),
-            ("log-likelihood", evidence, log_likelihood),
-        ] {
-            // Eight repeats estimate their own error: Student's t with 7 degrees of freedom.
-            let slack = 6.0 * moments.standard_error() + 2e-3;
-            let off = (moments.mean() - truth).abs();
-            assert!(off < slack, "{resampling:?} {name}: {} against {truth}", moments.mean());
-            assert!(off < 0.15, "{resampling:?} {name}: {} against {truth}", moments.mean());
+    for kind in Kind::ALL {
+        for resampling in Resampling::ALL {
+            let filter = ParticleFilter::new(resampling, Schedule::Below(0.7));
+            let (mut x, mut v, mut spread, mut evidence) = <(Moments, Moments, Moments, Moments)>::default();
+            for repeat in 0..8 {
+                let stream = Stream::new(5).named("kalman").indexed(repeat);
+                let (belief, estimate) = run(&scene, kind, filter, 4000, stream);
+                x.add(belief.mean()[0]);
+                v.add(belief.mean()[1]);
+                spread.add(belief.covariance()[(0, 1)]);
+                evidence.add(estimate);
+            }
+            for (name, moments, truth) in [
+                ("position", x, exact.mean()[0]),
+                ("velocity", v, exact.mean()[1]),
+                ("covariance", spread, exact.covariance()[(0, 1)]),
+                ("log-likelihood", evidence, log_likelihood),
+            ] {
+                // Eight repeats estimate their own error: Student's t with 7 degrees of freedom.
+                let slack = 6.0 * moments.standard_error() + 2e-3;
+                let off = (moments.mean() - truth).abs();
+                assert!(off < slack, "{kind:?} {resampling:?} {name}: {} against {truth}", moments.mean());
+                assert!(off < 0.15, "{kind:?} {resampling:?} {name}: {} against {truth}", moments.mean());
+            }
         }
     }
 }
@@ -127,18 +145,20 @@ fn all_filters_agree_with_the_kalman_filter() {
 fn the_likelihood_estimate_is_unbiased_for_every_law() {
     let scene = scene(6);
     let (_, log_likelihood) = scene.kalman();
-    for resampling in Resampling::ALL {
-        for schedule in [Schedule::Always, Schedule::Below(0.5)] {
-            let filter = ParticleFilter::new(resampling, schedule);
-            let ratio: Moments = (0..1000)
-                .map(|repeat| {
-                    let stream = Stream::new(8).named("unbiased").indexed(repeat);
-                    (run(&scene, filter, 60, stream).1 - log_likelihood).exp()
-                })
-                .collect();
-            let z = ratio.estimate().z_score(1.0);
-            assert!(z.abs() < 4.0, "{resampling:?} {schedule:?}: {:?}, z = {z}", ratio.estimate());
-            assert!(ratio.standard_error() < 0.05);
+    for kind in Kind::ALL {
+        for resampling in Resampling::ALL {
+            for schedule in [Schedule::Always, Schedule::Below(0.5)] {
+                let filter = ParticleFilter::new(resampling, schedule);
+                let ratio: Moments = (0..1000)
+                    .map(|repeat| {
+                        let stream = Stream::new(8).named("unbiased").indexed(repeat);
+                        (run(&scene, kind, filter, 60, stream).1 - log_likelihood).exp()
+                    })
+                    .collect();
+                let z = ratio.estimate().z_score(1.0);
+                assert!(z.abs() < 4.0, "{kind:?} {resampling:?} {schedule:?}: {:?}, z = {z}", ratio.estimate());
+                assert!(ratio.standard_error() < 0.05);
+            }
         }
     }
 }
@@ -159,27 +179,29 @@ fn against_the_grid(observed_at: impl Fn(usize) -> Scalar) {
         evidence += increment;
     }
     let filter = ParticleFilter::default();
-    let mut moments = <(Moments, Moments, Moments)>::default();
-    for repeat in 0..10 {
-        let mut rng = Stream::new(21).indexed(repeat).fast_rng();
-        let prior = Gaussian::scalar(0.0, 3.0).unwrap();
-        let mut belief = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
-        let mut total = 0.0;
-        for likelihood in &likelihoods {
-            total += advance(filter, &mut rng, &dynamics, &mut belief, likelihood).0;
+    for kind in Kind::ALL {
+        let mut moments = <(Moments, Moments, Moments)>::default();
+        for repeat in 0..10 {
+            let mut rng = Stream::new(21).indexed(repeat).fast_rng();
+            let prior = Gaussian::scalar(0.0, 3.0).unwrap();
+            let mut belief = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
+            let mut total = 0.0;
+            for likelihood in &likelihoods {
+                total += advance(kind, filter, &mut rng, &dynamics, &mut belief, likelihood).0;
+            }
+            moments.0.add(belief.mean()[0]);
+            moments.1.add(belief.covariance()[(0, 0)]);
+            moments.2.add(total);
         }
-        moments.0.add(belief.mean()[0]);
-        moments.1.add(belief.covariance()[(0, 0)]);
-        moments.2.add(total);
-    }
-    for (ours, truth) in [
-        (moments.0, exact.mean()),
-        (moments.1, exact.variance()),
-        (moments.2, evidence),
-    ] {
-        let off = (ours.mean() - truth).abs();
-        let found = ours.estimate();
-        assert!(off < 5.0 * ours.standard_error() + 1e-3 && off < 0.05, "{found:?} against {truth}");
+        for (ours, truth) in [
+            (moments.0, exact.mean()),
+            (moments.1, exact.variance()),
+            (moments.2, evidence),
+        ] {
+            let off = (ours.mean() - truth).abs();
+            let found = ours.estimate();
+            assert!(off < 5.0 * ours.standard_error() + 1e-3 && off < 0.05, "{kind:?}: {found:?} against {truth}");
+        }
     }
 }
 
@@ -233,4 +255,42 @@ fn the_number_of_particles_can_change() {
             .is_err()
     );
     assert_eq!(belief.len(), 400);
+}
+
+/// A sharp value seen through the square root of a distance: weights of the proposal that has seen it are far more even.
+#[test]
+fn a_guided_filter_pays_where_the_dynamics_are_wide() {
+    struct Root;
+    impl Sensing<1, 1> for Root {
+        fn mean(&self, state: &Vector1<f64>) -> Vector1<f64> {
+            state.map(|x| (1.0 + x * x).sqrt())
+        }
+        fn jacobian(&self, state: &Vector1<f64>) -> Matrix1<f64> {
+            state.map(|x| x / (1.0 + x * x).sqrt())
+        }
+        fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+            Matrix1::new(1e-4)
+        }
+        fn sample<R: rand::Rng + ?Sized>(&self, _: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
+            self.mean(state)
+        }
+    }
+    let dynamics = Ar1::new(0.9, 1.0).unwrap();
+    let observed = Observed::new(Root, Value::scalar(5.0, 1e-4).unwrap());
+    let prior = Gaussian::scalar(5.0, 0.5).unwrap();
+    let (mut plain, mut guided) = <(Moments, Moments)>::default();
+    let mut sizes = [0.0; 2];
+    for repeat in 0..40 {
+        let mut rng = Stream::new(22).indexed(repeat).fast_rng();
+        let start = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
+        for (kind, moments, sum) in [(Kind::Bootstrap, &mut plain, 0), (Kind::Guided, &mut guided, 1)] {
+            let mut belief = start.clone();
+            let (log, size) = advance(kind, ParticleFilter::default(), &mut rng, &dynamics, &mut belief, &observed);
+            moments.add(log.exp());
+            sizes[sum] += size;
+        }
+    }
+    let error = plain.standard_error().hypot(guided.standard_error());
+    assert!((plain.mean() - guided.mean()).abs() < 4.0 * error, "{:?} {:?}", plain.estimate(), guided.estimate());
+    assert!(sizes[1] > 20.0 * sizes[0], "{sizes:?}");
 }

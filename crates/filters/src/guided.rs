@@ -1,0 +1,124 @@
+//! Particles that move towards what was observed.
+
+use crate::Error;
+use crate::contract::{Info, Move, StateFilter, StateLikelihood};
+use crate::particle::{BootstrapFilter, ParticleFilter, weigh};
+use fewbits_core::columns::{set_state, state_at};
+use fewbits_core::{Gaussian, Likelihood};
+use fewbits_densities::Particles;
+use fewbits_numerics::linalg::{congruence, semidefinite_factor, solve_semidefinite, symmetrised};
+use nalgebra::{Cholesky, SMatrix, SVector};
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+/// Share of draws that are taken from the motion itself.
+const DEFENCE: f64 = 0.1;
+
+/// A particle filter whose particles are drawn with a look at what was observed, for likelihoods that are sharp against the process
+/// noise.
+///
+/// ```text
+/// predict:  resample if due; f = E[x' | x], Q = Cov[x' | x] of each particle, Q = L L', x' = f + L u, u ~ N(0, I)
+/// update:   N(d, S) of u: the moments of N(f, Q) given the observations, one after the other
+///           nine times in ten: u ~ N(d, S)          otherwise: as predicted
+///           w *= p(observed | x') N(u; 0, I) / (.9 N(u; d, S) + .1 N(u; 0, I))
+/// ```
+/// The draws from the motion bound the weight by ten times the likelihood, however light the tails of `N(d, S)` may be. Exact for every
+/// sensor: linearisation shapes the proposal only. `Q` may be singular. An update must follow its own predict; a second one weighs only.
+#[derive(Debug, Clone)]
+pub struct GuidedFilter<const D: usize> {
+    bootstrap: BootstrapFilter<D>,
+    /// `N(f, Q)` of each particle since the last predict.
+    moves: Vec<Gaussian<D>>,
+}
+
+impl<const D: usize> GuidedFilter<D> {
+    /// The filter with `count` particles.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn new(filter: ParticleFilter, count: usize) -> Result<Self, Error> {
+        Ok(Self {
+            bootstrap: BootstrapFilter::new(filter, count)?,
+            moves: Vec::new(),
+        })
+    }
+}
+
+/// A particle under its proposal, and `ln` of the motion's density over the proposal's there. The predicted particle if the
+/// observations have no moments under its motion.
+fn propose<const D: usize>(
+    rng: &mut dyn Rng,
+    own: &SVector<f64, D>,
+    moved: &Gaussian<D>,
+    observed: &[&dyn StateLikelihood<D>],
+) -> Option<(SVector<f64, D>, f64)> {
+    let posterior = observed
+        .iter()
+        .try_fold(*moved, |mut belief, one| one.condition(&mut belief).map(|_| belief))
+        .ok()?;
+    // u = back (x' - f) on the range of Q; elsewhere u stays standard normal.
+    let lower = semidefinite_factor("noise_covariance", moved.covariance()).ok()?;
+    let back = solve_semidefinite(moved.covariance(), &lower).ok()?.transpose();
+    let still = SMatrix::<f64, D, D>::identity() - symmetrised(&(back * lower));
+    let shift = back * (posterior.mean() - moved.mean());
+    let spread = Cholesky::new(symmetrised(&(congruence(&back, posterior.covariance()) + still)))?;
+    let drawn = if rng.random::<f64>() < DEFENCE {
+        back * (own - moved.mean())
+    } else {
+        shift + spread.l() * SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal))
+    };
+    let offset = drawn - shift;
+    let log_root: f64 = spread.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+    let ratio = 0.5 * (drawn.norm_squared() - offset.dot(&spread.solve(&offset))) - log_root;
+    let mixed = ratio.max(0.0) + ((1.0 - DEFENCE) * ratio.min(0.0).exp() + DEFENCE * (-ratio.max(0.0)).exp()).ln();
+    mixed.is_finite().then(|| (moved.mean() + lower * drawn, -mixed))
+}
+
+impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
+    type Belief = Particles<D>;
+
+    fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
+        self.moves.clear();
+        self.bootstrap.start(rng, prior)
+    }
+
+    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Particles<D>) -> Result<(), Error> {
+        self.bootstrap.resample(rng, belief)?;
+        let columns = belief.columns();
+        let known = |i| Gaussian::from_trusted_parts(state_at(&columns, i), SMatrix::zeros());
+        self.moves.clear();
+        self.moves.extend((0..belief.len()).map(|i| motion.predict(&known(i))));
+        motion
+            .motion
+            .move_columns(rng, motion.noise_scale, belief.columns_mut());
+        Ok(())
+    }
+
+    fn update(
+        &mut self,
+        rng: &mut dyn Rng,
+        belief: &mut Particles<D>,
+        observed: &[&dyn StateLikelihood<D>],
+    ) -> Result<Info, Error> {
+        let mut next = belief.clone();
+        let mut ratios = vec![0.0; belief.len()];
+        if self.moves.len() == belief.len() && !observed.is_empty() {
+            let mut columns = next.columns_mut();
+            for (i, (moved, ratio)) in self.moves.iter().zip(&mut ratios).enumerate() {
+                let own = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
+                if let Some((state, log_ratio)) = propose(rng, &own, moved, observed) {
+                    set_state(&mut columns, i, &state);
+                    *ratio = log_ratio;
+                }
+            }
+        }
+        let info = weigh(&mut next, |states, logs| {
+            logs.iter_mut().zip(&ratios).for_each(|(log, ratio)| *log += ratio);
+            observed.add_log_likelihoods(states, logs);
+        })?;
+        *belief = next;
+        self.moves.clear();
+        Ok(info)
+    }
+}
