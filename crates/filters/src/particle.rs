@@ -182,7 +182,8 @@ impl<const D: usize> BootstrapFilter<D> {
 
     /// Resamples where it is due.
     pub(crate) fn resample(&mut self, mut rng: &mut dyn Rng, belief: &mut Particles<D>) -> Result<(), Error> {
-        Ok(self.filter.resample(&mut rng, belief, &mut self.workspace)?)
+        self.filter.resample(&mut rng, belief, &mut self.workspace)?;
+        Ok(())
     }
 }
 
