@@ -79,9 +79,12 @@ pub(crate) static FIG8: Simulated<Field, Step> = Simulated {
     about: About::of("cfwmd-fig8", "Received power, two messages a step", "CFwMD paper, figure 8"),
     caption: "Time-averaged, the order is that of the linear case. Not at every step: at first the truth sits exactly \
               on the prior mean, so that a filter that receives little is right by construction. Errors rise when the \
-              target leaves the grid.",
+              target leaves the grid. 5000 particles, where the publication has 10000.",
     pairs: &[("all", "CFwMD"), ("CFwMD", "CFoMD"), ("CFoMD", "random")],
-    setting: || Field::new(&[2.0]),
+    setting: || Field {
+        particles: 5000,
+        ..Field::new(&[2.0])
+    },
     simulate: |setting, context| setting.at_budgets(context, "", &FOUR),
     claims: |rows, claims| {
         for pair in [("all", "CFwMD"), ("CFwMD", "CFoMD")] {
@@ -187,11 +190,12 @@ pub(crate) static TABLE3: Simulated<Field, Rates> = Simulated {
     about: About::of("cfwmd-table3", "Rates among sensors of received power", "CFwMD paper, table III"),
     caption: "Mean number of messages a step. The grid is not printed; a spacing of 10 m with the truth starting on \
               the prior mean fits best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. \
-              Drawn starts run 1000 particles.",
+              2500 particles, where the publication has 10000; drawn starts run 1000.",
     pairs: &[("CFwMD2", "CFwMD")],
     references: &["rate"],
     setting: || Field {
         drawn_start: None,
+        particles: 2500,
         ..Field::new(&THREE)
     },
     simulate: |setting, context| {

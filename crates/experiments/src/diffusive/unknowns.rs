@@ -8,7 +8,7 @@ use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLi
 
 parameters! {
     pub struct Parameters {
-        trials: u64 [1..=10_000] = 50 => quick 4 => "Random layouts about the source for the comparison of rate models.",
+        trials: u64 [1..=10_000] = 30 => quick 4 => "Random layouts about the source for the comparison of rate models.",
         nodes: Vec<usize> [1..=100; 1..] = vec![6, 20] => "Nodes of a layout.",
         radius: f64 [1.0..=1000.0] = 25.0 => "Radius of a layout, m.",
     }

@@ -10,7 +10,7 @@ use std::f64::consts::LN_10;
 
 parameters! {
     pub struct Parameters {
-        trials: u64 [2..=100_000] = 200 => quick 4 => "Worlds.",
+        trials: u64 [2..=100_000] = 120 => quick 4 => "Worlds.",
     }
     cost |p| Cost::new(0.1 * p.trials as f64, 5e3 * p.trials as f64);
 }
@@ -55,7 +55,7 @@ pub struct Fig6 {
 
 const fn about(id: &'static str, title: &'static str) -> About {
     About::of(id, title, "compressed particle filter, Section 6, Figure 6").showing(
-        "Bounds on the error after t lossy hand-overs in 200 worlds. The ML bound grows in proportion to time, those of KL and L1 exponentially; \
+        "Bounds on the error after t lossy hand-overs in 120 worlds. The ML bound grows in proportion to time, those of KL and L1 exponentially; \
          the DR bounds (ours) hold for every data sequence and stay below what is trivial.",
     )
 }

@@ -14,7 +14,7 @@ parameters! {
     pub struct Parameters {
         components: usize [1..=100] = 5 => "Components sent.",
         points: usize [2..=2000] = 250 => "Points of the reference at which densities are compared.",
-        trials: u64 [2..=100_000] = 250 => quick 4 => "Worlds.",
+        trials: u64 [2..=100_000] = 150 => quick 4 => "Worlds.",
     }
     cost |p| Cost::new(0.2 * p.trials as f64, 2e3 * p.trials as f64);
 }
@@ -152,7 +152,7 @@ impl Rows {
 
 impl Figure for Fig6c {
     figure!(Parameters => Rows, "handoff-fig6c", "The actual error", "compressed particle filter, Section 6, Figure 6(c)",
-        "KL from a reference filter of 2000 particles, less that to an independent copy of it, in 250 worlds. The three criteria are \
+        "KL from a reference filter of 2000 particles, less that to an independent copy of it, in 150 worlds. The three criteria are \
          close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {

@@ -10,7 +10,7 @@ use fewbits_pf_mpa::{IntervalRule, Velocity};
 parameters! {
     pub struct Parameters {
         particles: usize [3..=1000] = 40 => "Particles.",
-        trials: u64 [2..=100_000] = 100 => quick 4 => "Trajectories.",
+        trials: u64 [2..=100_000] = 60 => quick 4 => "Trajectories.",
     }
 }
 

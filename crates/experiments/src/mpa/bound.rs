@@ -7,7 +7,7 @@ use fewbits_pf_mpa::{CramerRao, Target, position_information};
 
 parameters! {
     pub struct Parameters {
-        trials: u64 [2..=100_000] = 200 => quick 10 => "Free trajectories.",
+        trials: u64 [2..=100_000] = 120 => quick 10 => "Free trajectories.",
     }
 }
 

@@ -8,7 +8,7 @@ use fewbits_pf_mpa::Encoder;
 
 parameters! {
     pub struct Parameters {
-        trials: u64 [2..=100_000] = 100 => quick 6 => "Trajectories.",
+        trials: u64 [2..=100_000] = 60 => quick 6 => "Trajectories.",
     }
 }
 

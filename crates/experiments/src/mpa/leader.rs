@@ -10,7 +10,7 @@ use fewbits_pf_mpa::{Reports, Target, Tracker};
 
 parameters! {
     pub struct Parameters {
-        trials: u64 [2..=100_000] = 160 => quick 3 => "Trajectories of 25 steps.",
+        trials: u64 [2..=100_000] = 100 => quick 3 => "Trajectories of 25 steps.",
     }
 }
 

@@ -6,9 +6,9 @@ use fewbits_pf_mpa::{Reports, Target};
 
 parameters! {
     pub struct Effort {
-        pub(super) trials: u64 [2..=100_000] = 200 => quick 8 => "Trajectories of every tracker but message passing with particles.",
+        pub(super) trials: u64 [2..=100_000] = 120 => quick 8 => "Trajectories of every tracker but message passing with particles.",
         /// Trajectories of message passing with particles, and of the finest grid and largest clouds; the first of the others'.
-        pub(super) message_trials: u64 [2..=100_000] = 60 => quick 3,
+        pub(super) message_trials: u64 [2..=100_000] = 40 => quick 3,
     }
 }
 

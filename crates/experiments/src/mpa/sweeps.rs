@@ -214,8 +214,8 @@ impl Figure for Fig35 {
 
     fn defaults(&self) -> Effort {
         Effort {
-            trials: 100,
-            message_trials: 40,
+            trials: 60,
+            message_trials: 25,
         }
     }
 

@@ -7,7 +7,7 @@ use crate::prelude::*;
 parameters! {
     pub struct Parameters {
         slots: usize [40..=100_000] = 300 => quick 60 => "Slots of a run.",
-        trials: u64 [2..=100_000] = 8 => quick 2 => "Runs of each scheme.",
+        trials: u64 [2..=100_000] = 6 => quick 2 => "Runs of each scheme.",
     }
     cost |p| Cost::new(2e-2 * (p.trials * p.slots as u64) as f64, 1e8);
 }
