@@ -267,7 +267,7 @@ fn rotating<const M: usize>() -> Filter<M> {
 /// Averages over 40 steps of one run: trace of the exact covariance, squared distance of the filter's mean from the exact one,
 /// and normalised error. The exact posterior is that of Rao-Blackwellised particles.
 fn vector_run<const M: usize>(filter: &Filter<M>, at_once: bool, start: Gaussian<2>, stream: Stream) -> [f64; 3] {
-    let (burn, steps, particles) = (15, 40, 1000);
+    let (burn, steps, particles) = (15, 40, 600);
     let mut rng = stream.fast_rng();
     let mut belief = start;
     // Two clouds that draw independently: the product of their distances from the filter's mean has no share of their own noise.
