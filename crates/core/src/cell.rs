@@ -77,6 +77,7 @@ struct Ends {
     #[serde(default, with = "fewbits_numerics::stored")]
     upper: Option<f64>,
 }
+
 impl From<Cell> for Ends {
     fn from(cell: Cell) -> Self {
         let end = |x: f64| x.is_finite().then_some(x);
@@ -86,6 +87,7 @@ impl From<Cell> for Ends {
         }
     }
 }
+
 impl TryFrom<Ends> for Cell {
     type Error = ArgumentError;
 

@@ -168,6 +168,7 @@ impl Gaussian<1> {
         Ok(Self::from_trusted_parts(SVector::from([mean]), SMatrix::from([[variance]])))
     }
 }
+
 stored! { #[serde(rename = "Gaussian")] [const D: usize] Gaussian as Moments {
     #[serde(with = "fewbits_numerics::stored")]
     mean: SVector<f64, D>,

@@ -33,6 +33,7 @@ pub struct Levels {
     upper: f64,
     bits: u32,
 }
+
 stored! { Levels as Numbers { #[serde(with = "fewbits_numerics::stored")] lower: f64, #[serde(with = "fewbits_numerics::stored")] upper: f64, bits: u32 } => Levels::new(lower, upper, bits), ArgumentError }
 
 impl Levels {

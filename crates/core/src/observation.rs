@@ -80,6 +80,7 @@ pub struct Link {
     #[serde(with = "fewbits_numerics::stored")]
     crossover: f64,
 }
+
 stored! { Link as Numbers { #[serde(with = "fewbits_numerics::stored")] loss: f64, #[serde(default, with = "fewbits_numerics::stored")] erasure: f64, #[serde(with = "fewbits_numerics::stored")] crossover: f64 } =>
 Link::new(loss, crossover)?.with_erasure(erasure), ArgumentError }
 

@@ -89,17 +89,23 @@ pub trait Tracker {
     }
 }
 
-/// What one step of a [`GaussianTracker`] is given: step `k` of the target, the belief before it, and what was observed after it.
+/// What one step of a [`GaussianTracker`] is given.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Step<'a> {
-    pub(crate) target: &'a Target,
-    pub(crate) k: usize,
-    pub(crate) belief: &'a Gaussian<4>,
-    pub(crate) observed: &'a [Ranged],
+    /// The target, which moves before it is observed.
+    pub target: &'a Target,
+    /// Which step of the target this is.
+    pub k: usize,
+    /// The belief before the step.
+    pub belief: &'a Gaussian<4>,
+    /// The ranges observed after the target has moved.
+    pub observed: &'a [Ranged],
 }
 
 impl Step<'_> {
-    pub(crate) fn predicted(&self, manoeuvres: Manoeuvres) -> Gaussian<4> {
+    /// The belief after the target has moved, before it is observed.
+    pub fn predicted(&self, manoeuvres: Manoeuvres) -> Gaussian<4> {
         self.target.predict(self.belief, self.k, manoeuvres)
     }
 }

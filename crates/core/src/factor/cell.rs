@@ -31,6 +31,7 @@ pub struct InCell {
     share: f64,
     log_share: f64,
 }
+
 stored! { InCell as Numbers |factor| {
     cell: Cell = factor.cell,
     #[serde(with = "fewbits_numerics::stored")]

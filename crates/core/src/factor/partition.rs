@@ -24,6 +24,7 @@ pub struct Partition {
     deviation: f64,
     variance: f64,
 }
+
 stored! { Partition as Numbers |factor| {
     #[serde(with = "fewbits_numerics::stored")]
     edges: Vec<f64> = factor.edges,

@@ -19,9 +19,10 @@ pub(super) const THRESHOLDS: usize = 7;
 const NODES: usize = 4096;
 /// Distance of the rates, in their logarithm, at which the likelihood of words is averaged: below the least width that words leave.
 const RATE_STEP: f64 = 0.027;
-/// Sensors after which a cell may be given up, and by how much its logarithm must then be below that of the best.
+/// Sensors between two tests whether a cell still matters.
 const BLOCK: usize = 8;
-const HOPELESS: f64 = 60.0;
+/// A cell whose log likelihood is below that of the best by more than this has no weight.
+const NEGLIGIBLE: f64 = 60.0;
 
 /// What a concentration becomes: noise, and the thresholds of words.
 pub(super) struct Instrument {
@@ -175,7 +176,7 @@ fn of_words(
     let (mut best, mut logs) = ((f64::NEG_INFINITY, 0, 1.0), vec![f64::NEG_INFINITY; responses[0].len()]);
     for (mut bound, cell, mut terms) in open {
         let mut done = first;
-        while done < rows.len() && bound > best.0 - HOPELESS {
+        while done < rows.len() && bound > best.0 - NEGLIGIBLE {
             let next = (done + BLOCK).min(rows.len());
             bound = add(&mut terms, cell, done..next);
             done = next;
@@ -204,4 +205,48 @@ fn of_words(
         variance += readings.len() as f64 * (entropy.iter().map(|e| e[1]).sum::<f64>() - first * first);
     }
     (logs, (mean - log) / variance.max(f64::MIN_POSITIVE).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Cells are left out only where the sum over all sensors and rates is negligible; all others have that sum.
+    #[test]
+    fn cells_that_are_left_out_have_no_weight() {
+        let thresholds = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
+        let instrument = Instrument::new(0.05, thresholds, 3.0);
+        let (cells, rates) = (60_u32, [0.5, 1.5]);
+        let distance = |sensor: u32, cell: u32| f64::from(sensor * 3) - f64::from(cell);
+        let response = |sensor| (0..cells).map(move |cell| 1.0 / (1.0 + 0.02 * distance(sensor, cell).powi(2)));
+        let responses: Vec<Vec<f64>> = (0..20).map(|sensor| response(sensor).collect()).collect();
+        let readings: Vec<Vec<f64>> = responses.iter().map(|a| vec![0.9 * a[31]; 3]).collect();
+        let (logs, _) = of_words(&instrument, rates, &responses, &readings);
+        let count = ((rates[1] / rates[0]).ln() / RATE_STEP).ceil() as usize;
+        let brute = |cell: usize| {
+            let terms = (0..count).map(|k| {
+                let rate = rates[0] * (rates[1] / rates[0]).powf((k as f64 + 0.5) / count as f64);
+                let of = |(a, y): (&Vec<f64>, &Vec<f64>)| -> f64 {
+                    let row = |y: &f64| instrument.look_up(&instrument.table[instrument.word(*y)], rate * a[cell]);
+                    y.iter().map(row).sum()
+                };
+                responses.iter().zip(&readings).map(of).sum::<f64>() + rate.ln()
+            });
+            log_sum_exp(&terms.collect::<Vec<f64>>())
+        };
+        let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        assert_eq!(logs[31], largest);
+        let mut left_out = 0;
+        for (cell, log) in logs.iter().enumerate() {
+            let exact = brute(cell);
+            if *log == f64::NEG_INFINITY {
+                left_out += 1;
+                assert!(exact < largest - 50.0, "cell {cell}: {exact} of {largest}");
+            } else {
+                assert!((log - exact).abs() < 1e-9, "cell {cell}: {log} for {exact}");
+            }
+        }
+        assert!(left_out > 10 && left_out < 59, "{left_out}");
+    }
 }

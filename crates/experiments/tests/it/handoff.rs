@@ -56,29 +56,28 @@ fn start() -> Lattice {
     normalised(places.map(|place| (place, density(place))).collect())
 }
 
+/// The least and the greatest of these along both axes.
+fn corners<'a>(all: impl Iterator<Item = &'a [i64; 2]>) -> [[i64; 2]; 2] {
+    all.fold([[i64::MAX; 2], [i64::MIN; 2]], |[least, greatest], at| {
+        [
+            [least[0].min(at[0]), least[1].min(at[1])],
+            [greatest[0].max(at[0]), greatest[1].max(at[1])],
+        ]
+    })
+}
+
 /// The belief after a step and a reading.
 fn advanced(lattice: &Lattice, law: &[([i64; 2], f64)], reading: &Reading) -> Lattice {
-    let end = |of: fn(i64, i64) -> i64| {
-        let along = |d: usize| {
-            let (places, moves) = (lattice.keys().map(|place| place[d]), law.iter().map(|(step, _)| step[d]));
-            places.reduce(of).unwrap() + moves.reduce(of).unwrap()
-        };
-        [along(0), along(1)]
-    };
-    let (low, high) = (end(i64::min), end(i64::max));
-    let size = [0, 1].map(|d| (high[d] - low[d] + 1) as usize);
+    let (places, moves) = (corners(lattice.keys()), corners(law.iter().map(|(step, _)| step)));
+    let low = [0, 1].map(|d| places[0][d] + moves[0][d]);
+    let size = [0, 1].map(|d| (places[1][d] + moves[1][d] - low[d] + 1) as usize);
+    // An index of a sum is the sum of the indices, counted from the least place and the least move.
+    let index = |at: &[i64; 2], least: &[i64; 2]| (at[0] - least[0]) as usize * size[1] + (at[1] - least[1]) as usize;
+    let steps: Vec<_> = law.iter().map(|(step, p)| (index(step, &moves[0]), p)).collect();
     let mut mass = vec![0.0; size[0] * size[1]];
-    // `low` is the sum of the least place and the least move, so that both are counted from zero.
-    let least = |of: fn(&[i64; 2]) -> i64| law.iter().map(|(step, _)| of(step)).min().unwrap();
-    let start = [least(|step| step[0]), least(|step| step[1])];
-    let index = |[x, y]: [i64; 2]| x as usize * size[1] + y as usize;
-    let moves: Vec<_> = law
-        .iter()
-        .map(|([dx, dy], p)| (index([dx - start[0], dy - start[1]]), p))
-        .collect();
-    for ([x, y], m) in lattice {
-        let first = index([x + start[0] - low[0], y + start[1] - low[1]]);
-        for (offset, p) in &moves {
+    for (place, m) in lattice {
+        let first = index(place, &places[0]);
+        for (offset, p) in &steps {
             mass[first + offset] += *p * m;
         }
     }
