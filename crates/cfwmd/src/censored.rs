@@ -36,18 +36,18 @@ impl Missing {
     /// Moments of the innovation `nu ~ N(mu, V)` of a sensor with this rule, given that its report is missing.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if that has probability zero.
+    /// [`Error::Impossible`] if that has probability zero.
     pub(crate) fn innovation_moments<const M: usize>(
         self,
         rule: &CensoringRule<M>,
         mu: &SVector<f64, M>,
         covariance: &SMatrix<f64, M, M>,
-    ) -> Result<EllipsoidMoments<M>, fewbits_core::Error> {
+    ) -> Result<EllipsoidMoments<M>, Error> {
         let under = rule.region().under(covariance)?;
         let loss = match self {
             Self::Nothing { loss } => loss,
             Self::Lost { scale } => {
-                let mut outside = under.moments_outside(mu).ok_or(fewbits_core::Error::Impossible)?;
+                let mut outside = under.moments_outside(mu).ok_or(Error::Impossible)?;
                 outside.log_mass += scale.ln();
                 return Ok(outside);
             }
@@ -60,7 +60,7 @@ impl Missing {
                     covariance: *covariance,
                 })
             } else {
-                Err(fewbits_core::Error::Impossible)
+                Err(Error::Impossible)
             };
         };
         if loss == 0.0 {
@@ -139,19 +139,19 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
 
     /// With `nu = m + n - prediction` of covariance `S = V + R` and moments `E`, `C` given that the report is missing, `K = V S^-1`:
     /// mean `mu + K (E - E0 nu)`, covariance `(I - K) V (I - K)' + K R K' + K C K'`.
-    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, fewbits_core::Error> {
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         let spread = prior.covariance();
         let total = symmetrised(&(spread + self.noise));
         let mu = prior.mean() - self.prediction;
         let after = self.missing.innovation_moments(&self.rule, &mu, &total)?;
         let what = "the posterior of a missing report";
-        let factor = Cholesky::new(total).ok_or(fewbits_core::Error::NotANumber { what })?;
+        let factor = Cholesky::new(total).ok_or(Error::NotANumber { what })?;
         let gain = factor.solve(spread).transpose();
         let keep = SMatrix::<f64, M, M>::identity() - gain;
         let mean = prior.mean() + gain * (after.mean - mu);
         let covariance = keep * spread * keep.transpose() + gain * (self.noise + after.covariance) * gain.transpose();
         if mean.iter().chain(covariance.iter()).any(|x| !x.is_finite()) {
-            return Err(fewbits_core::Error::NotANumber { what });
+            return Err(Error::NotANumber { what });
         }
         Ok(Tilted {
             log_evidence: after.log_mass,
@@ -377,7 +377,7 @@ impl<const M: usize> Factor<M> for Censored<M> {
         }
     }
 
-    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, fewbits_core::Error> {
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         let mut tilted = match &self.kind {
             Kind::Value(factor) => factor.tilted(prior),
             Kind::Ellipsoid(factor) => factor.tilted(prior),
@@ -396,17 +396,8 @@ impl<const M: usize> Factor<M> for Censored<M> {
         tilted.log_evidence += self.log_scale;
         if !tilted.log_evidence.is_finite() {
             let what = "the evidence of a censored value";
-            return Err(fewbits_core::Error::unlikely_or_no_number(tilted.log_evidence, what));
+            return Err(Error::unlikely_or_no_number(tilted.log_evidence, what));
         }
         Ok(tilted)
-    }
-}
-
-/// A sensor's refusal to encode or a receiver's to decode, without the sensor's number.
-pub(crate) fn as_core(error: Error) -> fewbits_core::Error {
-    match error {
-        Error::Core(error) => error,
-        Error::Argument(error) => error.into(),
-        other => ArgumentError::new("report", other.to_string(), "a report that the rule sends").into(),
     }
 }

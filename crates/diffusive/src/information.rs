@@ -224,11 +224,19 @@ pub enum Unknown {
     Bias,
 }
 
+fn no_diffusivity() -> ArgumentError {
+    ArgumentError::new(
+        "unknowns",
+        "the diffusivity",
+        "a model with `diffusivity_slope`: this one has not one diffusivity",
+    )
+}
+
 /// Fisher information that nodes together hold about any of the parameters, in the order of `unknowns`. The start is differenced
 /// with a step of 1e-5 of the shortest age.
 ///
 /// # Errors
-/// If the model has no concentrations at a node, or [`Error::NoDiffusivity`].
+/// If the model has no concentrations at a node, or not one diffusivity that could be unknown.
 pub fn fisher_information(
     unknowns: &[Unknown],
     sensor: &SourceSensor,
@@ -256,7 +264,7 @@ pub fn fisher_information(
                     Unknown::Rate => at.value,
                     Unknown::Diffusivity => {
                         let slope = sensor.model().diffusivity_slope(&receptor, &place, *age);
-                        rate * slope.ok_or(Error::NoDiffusivity)?
+                        rate * slope.ok_or_else(no_diffusivity)?
                     }
                     Unknown::Start => rate * (shifted[1][j] - shifted[0][j]) / (2.0 * step),
                     Unknown::Bias => 1.0,

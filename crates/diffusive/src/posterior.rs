@@ -28,7 +28,7 @@ impl Posterior {
     /// the posterior, such as the cells of the step before.
     ///
     /// # Errors
-    /// As [`Cells::cover`]; a belief that excludes the records is [`fewbits_core::Error::Impossible`].
+    /// As [`Cells::cover`]; a belief that excludes the records is [`Error::Impossible`].
     pub fn new(
         prior: &Prior,
         likelihood: &SourceLikelihood,

@@ -155,7 +155,7 @@ impl RoundedSample {
     /// [`belief`](Self::belief): at `a = 0.9`, `gamma = 0.05` the message alone is worse than the prior alone.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if message and prior exclude each other to the last digit.
+    /// [`Error::Impossible`] if message and prior exclude each other to the last digit.
     pub fn belief_with_prior(&self, message: Multiple, prior: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
         let factor = self.meaning_of(&(), &Observation::Received(message), &Link::PERFECT)?;
         let posterior = factor.tilted(prior)?;
@@ -174,17 +174,12 @@ impl Memoryless<1> for RoundedSample {
         self.bits
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, fewbits_core::Error> {
+    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, Error> {
         Ok(Some(self.round(measurement[0])?))
     }
 
     /// Over a link that inverts bits, words of up to 12 bits.
-    fn meaning_of(
-        &self,
-        (): &(),
-        observation: &Observation<Multiple>,
-        link: &Link,
-    ) -> Result<Scalar, fewbits_core::Error> {
+    fn meaning_of(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, Error> {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };

@@ -125,7 +125,7 @@ impl ParallelFilter {
     /// the assumed-density approximation, bit after bit, for linear fusion (about 40 ns per bit).
     ///
     /// # Errors
-    /// If there is not one observation per sensor; [`fewbits_core::Error::Impossible`].
+    /// If there is not one observation per sensor; [`Error::Impossible`].
     pub fn step(
         &self,
         belief: &Gaussian<1>,

@@ -119,7 +119,7 @@ pub trait StateLikelihood<const D: usize>: Likelihood<D> {
     /// Replaces a Gaussian by that with the moments of the posterior, the sensing linearised at its mean.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if the observation has probability zero under the belief, which is then as it was.
+    /// [`Error::Impossible`] if the observation has probability zero under the belief, which is then as it was.
     fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error>;
 
     /// How likely the observation is under a Gaussian, and where it moves the measurement.
@@ -243,7 +243,7 @@ pub trait StateFilter<const D: usize> {
     /// Takes in all observations of one instant.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if they have probability zero under the belief.
+    /// [`Error::Impossible`] if they have probability zero under the belief.
     fn update(
         &mut self,
         rng: &mut dyn Rng,

@@ -202,7 +202,7 @@ impl<G> Imm<G> {
     /// Measurement update; returns `ln p(observation | past)`.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if the observation is impossible under every model; the belief is then as it was.
+    /// [`Error::Impossible`] if the observation is impossible under every model; the belief is then as it was.
     /// A model under which alone it is impossible keeps its belief and loses its probability.
     pub fn update_in_place<const D: usize, const M: usize>(
         &self,
@@ -256,7 +256,7 @@ pub(crate) fn weigh<const D: usize>(
     for (mode, p) in belief.modes.iter().zip(&belief.probabilities) {
         let (next, log_evidence) = match update(mode) {
             Ok(updated) => updated,
-            Err(Error::Core(fewbits_core::Error::Impossible)) => (*mode, f64::NEG_INFINITY),
+            Err(Error::Impossible) => (*mode, f64::NEG_INFINITY),
             Err(error) => return Err(error),
         };
         workspace.modes.push(next);
@@ -265,7 +265,7 @@ pub(crate) fn weigh<const D: usize>(
     let logs = &mut workspace.probabilities;
     let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if !peak.is_finite() {
-        return Err(fewbits_core::Error::unlikely_or_no_number(peak, "the evidence of a model").into());
+        return Err(Error::unlikely_or_no_number(peak, "the evidence of a model"));
     }
     logs.iter_mut().for_each(|log| *log = (*log - peak).exp());
     let total: f64 = logs.iter().sum();

@@ -18,7 +18,7 @@
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
 //! | the receiver of many sensors: time, presence, health, learnt noise | [`centre::FusionCentre`] | |
 //!
-//! What is impossible under the belief is [`fewbits_core::Error::Impossible`], whichever filter finds it.
+//! What is impossible under the belief is [`Error::Impossible`], whichever filter finds it.
 //!
 //! ```
 //! use fewbits_core::Gaussian;
@@ -37,7 +37,6 @@ pub mod assumed_density;
 pub mod centre;
 pub mod contract;
 pub mod cramer_rao;
-mod error;
 mod grid_filter;
 mod guided;
 mod imm;
@@ -52,7 +51,7 @@ mod steady_state;
 mod switching;
 
 pub use contract::{Info, LinearScalar, MomentFilter, StateFilter, StateLikelihood};
-pub use error::Error;
+pub use fewbits_core::Error;
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
 pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};
 pub use guided::GuidedFilter;

@@ -157,7 +157,7 @@ impl PointMassFilter {
     /// Time update.
     ///
     /// # Errors
-    /// A belief on another grid; [`fewbits_core::Error::Impossible`] if the density has left the grid.
+    /// A belief on another grid; [`Error::Impossible`] if the density has left the grid.
     pub fn predict(&self, belief: &PointMass) -> Result<PointMass, Error> {
         let mut predicted = belief.clone();
         self.predict_into(belief, &mut predicted)?;
@@ -208,7 +208,7 @@ impl PointMassFilter {
     /// `likelihoods[k]` holds `p(observed at step k + 1 after the belief | x)` at the nodes, up to a factor.
     ///
     /// # Errors
-    /// A belief on another grid, a likelihood of wrong length; [`fewbits_core::Error::Impossible`].
+    /// A belief on another grid, a likelihood of wrong length; [`Error::Impossible`].
     pub fn smooth<L: AsRef<[f64]>>(&self, filtered: &PointMass, likelihoods: &[L]) -> Result<PointMass, Error> {
         self.check(filtered)?;
         let mut message = vec![1.0; self.grid.points()];
@@ -232,7 +232,7 @@ impl PointMassFilter {
             // Only the shape counts; scaling keeps a long future from underflowing.
             let peak = message.iter().copied().fold(0.0, f64::max);
             if !(peak > 0.0 && peak.is_finite()) {
-                return Err(Error::IMPOSSIBLE);
+                return Err(Error::Impossible);
             }
             message.iter_mut().for_each(|m| *m /= peak);
         }
@@ -274,7 +274,7 @@ impl StateFilter<1> for PointMasses {
     type Belief = PointMass;
 
     fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<1>) -> Result<PointMass, Error> {
-        Ok(PointMass::normal(self.grid, prior.mean()[0], prior.covariance()[0])?)
+        PointMass::normal(self.grid, prior.mean()[0], prior.covariance()[0])
     }
 
     fn predict(&mut self, _: &mut dyn Rng, motion: Move<'_, 1>, belief: &mut PointMass) -> Result<(), Error> {

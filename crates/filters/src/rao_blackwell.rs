@@ -53,7 +53,7 @@ impl RaoBlackwellised {
     /// Resamples if due and moves every mean by the dynamics. Side rows stay as they are.
     ///
     /// # Errors
-    /// As [`ParticleFilter::resample`]; [`fewbits_core::Error::NotANumber`] if the covariance leaves the range of numbers, before anything has
+    /// As [`ParticleFilter::resample`]; [`Error::NotANumber`] if the covariance leaves the range of numbers, before anything has
     /// changed.
     pub fn predict<const D: usize, R: Rng + ?Sized>(
         &self,
@@ -65,10 +65,9 @@ impl RaoBlackwellised {
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
         let shared = kalman::predict(dynamics, &shared);
         if !shared.is_finite() {
-            return Err(fewbits_core::Error::NotANumber {
+            return Err(Error::NotANumber {
                 what: "the predicted covariance",
-            }
-            .into());
+            });
         }
         self.filter
             .resample(rng, belief.means_mut(), &mut workspace.particles)?;
@@ -84,7 +83,7 @@ impl RaoBlackwellised {
     /// Takes in what was observed of a scalar sensor.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if it is impossible for every particle. The belief is then as it was.
+    /// [`Error::Impossible`] if it is impossible for every particle. The belief is then as it was.
     pub fn update<const D: usize, R: Rng + ?Sized, F: Clone + Into<Scalar>>(
         &self,
         rng: &mut R,
@@ -203,7 +202,7 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
     type Belief = GaussianCloud<D>;
 
     fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<D>) -> Result<GaussianCloud<D>, Error> {
-        Ok(GaussianCloud::agreed(prior, self.count)?)
+        GaussianCloud::agreed(prior, self.count)
     }
 
     fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut GaussianCloud<D>) -> Result<(), Error> {

@@ -78,7 +78,7 @@ impl<R> HandoffFilter<R> {
     /// The weighted particles after receiving, predicting and updating, and the log-likelihood increment.
     ///
     /// # Errors
-    /// If there is no particle, or none has any likelihood ([`fewbits_core::Error::Impossible`]).
+    /// If there is no particle, or none has any likelihood ([`Error::Impossible`]).
     pub fn posterior<const D: usize, G: Rng + ?Sized>(
         &self,
         rng: &mut G,
@@ -108,7 +108,7 @@ impl<R> HandoffFilter<R> {
         } else {
             kept
         };
-        Ok(KernelEstimate::new(centres, kernel)?)
+        KernelEstimate::new(centres, kernel)
     }
 
     /// One leader's step: what is sent on, and what was learned.
@@ -155,5 +155,5 @@ pub fn trimmed<const D: usize>(particles: &Particles<D>, trim: f64) -> Result<Pa
         .columns()
         .map(|column| kept.iter().map(|i| column[*i]).collect());
     let logs: Vec<f64> = kept.iter().map(|i| particles.log_weights()[*i]).collect();
-    Ok(Particles::new(columns, &logs)?)
+    Particles::new(columns, &logs)
 }

@@ -72,7 +72,7 @@ impl<const D: usize> Node<D> {
     /// # Errors
     /// If the node's covariance is not positive definite: not for a node of this tree.
     pub fn component(&self) -> Result<Component<D>, Error> {
-        Ok(Component::new(self.weight, self.mean, self.covariance)?)
+        Component::new(self.weight, self.mean, self.covariance)
     }
 }
 
@@ -94,12 +94,12 @@ impl<const D: usize> Tree<D> {
     /// Builds the tree. Kernels of weight zero are left out.
     ///
     /// # Errors
-    /// Never for a valid estimate; [`fewbits_core::Error::Impossible`] if every weight is zero.
+    /// Never for a valid estimate; [`Error::Impossible`] if every weight is zero.
     pub fn new(estimate: &KernelEstimate<D>, split: Split) -> Result<Self, Error> {
         let weights = estimate.particles().weights();
         let order: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
         if order.is_empty() {
-            return Err(fewbits_core::Error::Impossible.into());
+            return Err(Error::Impossible);
         }
         let mut tree = Self {
             nodes: Vec::with_capacity(2 * order.len()),

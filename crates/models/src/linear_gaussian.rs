@@ -93,7 +93,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
     /// Doubling: after `k` rounds `P` holds the first `2^k` terms of `sum F^i Q F'^i`.
     ///
     /// # Errors
-    /// [`Error::NotStationary`] if an eigenvalue of `F` lies on or outside the unit circle; [`Error::Argument`] if the
+    /// [`Error::NoSteadyState`] if an eigenvalue of `F` lies on or outside the unit circle; [`Error::Argument`] if the
     /// covariance leaves the range of numbers.
     pub fn stationary_covariance(&self) -> Result<SMatrix<f64, D, D>, Error> {
         let mut power = self.transition;
@@ -119,7 +119,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
             let expected = "a transition whose stationary covariance is a number";
             return refuse("transition", format!("{:?}", self.transition), expected);
         }
-        Err(Error::NotStationary)
+        Err(Error::NoSteadyState)
     }
 }
 
@@ -235,7 +235,7 @@ mod tests {
         assert!((again - covariance).amax() < 1e-12 * covariance.amax());
         for scale in [1.0, 1.5] {
             let model = LinearGaussian::with_covariance(rotation(scale), q).unwrap();
-            assert_eq!(model.stationary_covariance(), Err(Error::NotStationary));
+            assert_eq!(model.stationary_covariance(), Err(Error::NoSteadyState));
         }
         // Issue: an overflow came out as NaN.
         let huge = LinearGaussian::with_covariance(Matrix2::new(0.5, 1e200, 0.0, 0.5), q).unwrap();

@@ -29,21 +29,9 @@ impl ArgumentError {
     }
 }
 
-/// Takes the errors of crates below into variants of this crate's `Error`; an argument that they refused stays one. `with Core`: so do
-/// errors of the core.
+/// Takes the errors of crates below into variants of this crate's `Error`; an argument that they refused stays one.
 #[macro_export]
 macro_rules! lift {
-    ($below:ident with Core => $variant:ident) => {
-        impl From<$below::Error> for Error {
-            fn from(error: $below::Error) -> Self {
-                match error {
-                    $below::Error::Argument(argument) => Self::Argument(argument),
-                    $below::Error::Core(error) => Self::Core(error),
-                    other => Self::$variant(other),
-                }
-            }
-        }
-    };
     ($($below:ident => $variant:ident),+ $(,)?) => {
         $(impl From<$below::Error> for Error {
             fn from(error: $below::Error) -> Self {

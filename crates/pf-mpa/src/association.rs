@@ -36,7 +36,7 @@ impl AssociationRule {
     /// `P(r = 0)` for predictions with the given mean and variance, measurement variance `r`.
     ///
     /// # Errors
-    /// If a variance is negative, `r` is not above zero, or a number is not finite; [`fewbits_core::Error::NotANumber`] if the likelihoods
+    /// If a variance is negative, `r` is not above zero, or a number is not finite; [`Error::NotANumber`] if the likelihoods
     /// of both orders leave the range of numbers.
     pub fn probability(self, targets: &[Gaussian<1>; 2], z: [f64; 2], r: f64) -> Result<f64, Error> {
         fewbits_numerics::error::all_finite("z", &z)?;
@@ -65,7 +65,7 @@ impl AssociationRule {
 /// Passes numbers on.
 fn number(value: f64, what: &'static str) -> Result<f64, Error> {
     if value.is_nan() {
-        return Err(fewbits_core::Error::NotANumber { what }.into());
+        return Err(Error::NotANumber { what });
     }
     Ok(value)
 }
@@ -204,7 +204,7 @@ impl Hypotheses {
     /// One step; returns `P(r = 0)`.
     ///
     /// # Errors
-    /// If a variance is negative or `r` is not above zero, or a number is not finite; [`fewbits_core::Error::Impossible`] if the
+    /// If a variance is negative or `r` is not above zero, or a number is not finite; [`Error::Impossible`] if the
     /// measurements are out of reach of every hypothesis. The hypotheses are then as they were.
     pub fn step(&mut self, z: [f64; 2], q: f64, r: f64) -> Result<f64, Error> {
         fewbits_numerics::error::all_finite("z", &z)?;
@@ -229,7 +229,7 @@ impl Hypotheses {
             .all(|h| !h.0.is_nan() && h.1.iter().all(Gaussian::is_finite));
         if !(finite && largest.is_finite()) {
             let what = "the hypotheses (from the targets or the measurements)";
-            return Err(fewbits_core::Error::unlikely_or_no_number(largest, what).into());
+            return Err(Error::unlikely_or_no_number(largest, what));
         }
         let total: f64 = next.iter().map(|h| (h.0 - largest).exp()).sum();
         let straight: f64 = next.iter().step_by(2).map(|h| (h.0 - largest).exp()).sum();

@@ -1,9 +1,9 @@
 //! Who leads the next step, what is handed over, and what both cost.
 
 use crate::Error;
-use crate::error::refuse;
 use fewbits_core::{BitReader, BitWriter, CodecError, Gaussian, Message, NumberFormat};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::refuse;
 use nalgebra::{Matrix4, SMatrix, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 

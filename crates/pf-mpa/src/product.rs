@@ -66,7 +66,7 @@ fn check<const D: usize>(factors: &[&Mixture<D>]) -> Result<SVector<f64, D>, Err
 ///
 /// # Errors
 /// If there is no factor, there are more than [`MOST_TERMS`] choices, or every weight underflows
-/// ([`fewbits_core::Error::Impossible`]: factors that contradict each other astronomically).
+/// ([`Error::Impossible`]: factors that contradict each other astronomically).
 pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<D>, Error> {
     let origin = check(factors)?;
     let terms = factors
@@ -110,7 +110,7 @@ pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<D>, Erro
     }
     let largest = gaussians.iter().fold(f64::NEG_INFINITY, |m, g| m.max(g.0));
     if !largest.is_finite() {
-        return Err(Error::IMPOSSIBLE);
+        return Err(Error::Impossible);
     }
     let total: f64 = gaussians.iter().map(|g| (g.0 - largest).exp()).sum();
     let components = gaussians.into_iter().map(|(log, mean, covariance)| {

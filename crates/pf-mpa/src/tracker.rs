@@ -2,13 +2,13 @@
 
 use crate::Error;
 use crate::encoder::Encoder;
-use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::RangeSensor;
 use crate::target::{Manoeuvres, Target};
 use fewbits_core::{Gaussian, Observed};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::refuse;
 use nalgebra::Vector2;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -60,7 +60,7 @@ pub trait Tracker {
     /// Step `k`, counted from zero: time update and what was observed.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if what was observed is impossible under the belief; the belief is then as it was.
+    /// [`Error::Impossible`] if what was observed is impossible under the belief; the belief is then as it was.
     fn step_in_place<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -123,7 +123,7 @@ pub trait GaussianTracker {
         Ok(())
     }
 
-    /// The belief after a step. A mean or covariance that is no number is [`fewbits_core::Error::Impossible`].
+    /// The belief after a step. A mean or covariance that is no number is [`Error::Impossible`].
     ///
     /// # Errors
     /// As [`Tracker::step_in_place`].
@@ -165,7 +165,7 @@ impl<T: GaussianTracker> Tracker for T {
         };
         let (next, info) = self.advance(rng, step, workspace)?;
         if !next.is_finite() {
-            return Err(Error::IMPOSSIBLE);
+            return Err(Error::Impossible);
         }
         *belief = next;
         Ok(info)

@@ -50,8 +50,12 @@ impl From<Error> for fewbits_core::Error {
     fn from(error: Error) -> Self {
         match error {
             Error::Argument(argument) => Self::Argument(argument),
-            Error::NotConverged { iterations, .. } => Self::NotConverged {
-                evaluations: iterations,
+            Error::NotConverged {
+                algorithm, iterations, ..
+            } => Self::NotConverged {
+                what: algorithm,
+                steps: iterations,
+                unit: "iterations",
             },
             Error::NotOptimal { cell, levels, .. } => ArgumentError::new(
                 "levels",

@@ -1,6 +1,5 @@
 //! Who is in range of whom.
 
-use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, refuse};
 use nalgebra::Vector2;
@@ -20,7 +19,7 @@ impl Graph {
     ///
     /// # Errors
     /// If a coordinate is not finite, `range` is not a positive number, or there are 2^32 nodes or more.
-    pub fn within(positions: &[Vector2<f64>], range: f64) -> Result<Self, Error> {
+    pub fn within(positions: &[Vector2<f64>], range: f64) -> Result<Self, ArgumentError> {
         positive("range", range)?;
         let count = u32::try_from(positions.len())
             .map_err(|_| ArgumentError::new("positions", positions.len(), "fewer than 2^32 nodes"))?;
@@ -63,7 +62,7 @@ impl Graph {
     ///
     /// # Errors
     /// If a node of a pair does not exist, or is joined to itself.
-    pub fn of_edges(nodes: usize, edges: impl IntoIterator<Item = (u32, u32)>) -> Result<Self, Error> {
+    pub fn of_edges(nodes: usize, edges: impl IntoIterator<Item = (u32, u32)>) -> Result<Self, ArgumentError> {
         let mut lists = vec![Vec::new(); nodes];
         for (a, b) in edges {
             if a == b {
@@ -71,7 +70,7 @@ impl Graph {
             }
             for (from, to) in [(a, b), (b, a)] {
                 let node = from as usize;
-                lists.get_mut(node).ok_or(Error::NoSuchNode { node, nodes })?.push(to);
+                lists.get_mut(node).ok_or_else(|| no_such_node(node, nodes))?.push(to);
             }
         }
         let (mut starts, mut neighbours) = (vec![0], Vec::new());
@@ -109,14 +108,18 @@ impl Graph {
 
     /// # Errors
     /// If `node` does not exist.
-    pub(crate) fn check(&self, node: usize) -> Result<(), Error> {
+    pub(crate) fn check(&self, node: usize) -> Result<(), ArgumentError> {
         let nodes = self.len();
         if node < nodes {
             Ok(())
         } else {
-            Err(Error::NoSuchNode { node, nodes })
+            Err(no_such_node(node, nodes))
         }
     }
+}
+
+pub(crate) fn no_such_node(node: usize, nodes: usize) -> ArgumentError {
+    ArgumentError::new("node", node, format!("an index below {nodes}, the number of nodes"))
 }
 
 /// Nodes sorted by the grid cell they stand in.

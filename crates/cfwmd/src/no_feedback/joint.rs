@@ -130,7 +130,7 @@ impl<const D: usize> JointBelief<D> {
         let (h, own) = (sensor.matrix(), i + 1);
         let rows = self.rows(h, 0);
         let covariance = symmetrised(&(&rows * rows.transpose() + sensor.noise_covariance()));
-        let factor = Cholesky::new(covariance).ok_or(Error::IMPOSSIBLE)?;
+        let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
         let innovation = value - h * self.block_mean(0);
         let gains = (factor.solve(&(&rows * self.root.transpose()))).transpose();
         let noise = semidefinite_factor("noise_covariance", sensor.noise_covariance())?;
@@ -185,7 +185,7 @@ impl<const D: usize> JointBelief<D> {
         let (h, own) = (sensor.matrix(), i + 1);
         let rows = self.rows(h, 0) - self.rows(h, own);
         let covariance = symmetrised(&(&rows * rows.transpose() + sensor.noise_covariance()));
-        let factor = Cholesky::new(covariance).ok_or(Error::IMPOSSIBLE)?;
+        let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
         let mu = h * (self.block_mean(0) - self.block_mean(own));
         let after = after(&mu, &covariance)?;
         let mut gains: Gains<M> = (factor.solve(&(&rows * self.root.transpose()))).transpose();
@@ -215,8 +215,8 @@ impl<const D: usize> JointBelief<D> {
 /// ```
 ///
 /// # Errors
-/// [`Error::ObservationCount`]; if a value is not finite; [`fewbits_core::Error::Impossible`];
-/// [`Error::ProtocolViolation`] where the sensor's prediction is known exactly.
+/// If there is not one observation per sensor, or a value is not finite; [`Error::Impossible`];
+/// if the rule would not have sent a value, where the sensor's prediction is known exactly.
 pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
     network: &Network<S, D, M>,
     dynamics: &impl LinearDynamics<D>,
@@ -242,13 +242,13 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
             Observation::Received(_) => continue,
         };
         info.log_likelihood +=
-            next.withhold(sensor, step, i, |mu, covariance| Ok(missing.innovation_moments(rule, mu, covariance)?))?;
+            next.withhold(sensor, step, i, |mu, covariance| missing.innovation_moments(rule, mu, covariance))?;
     }
     next.shorten();
     let mut numbers = next.mean.iter().chain(next.root.iter());
     if !(info.log_likelihood.is_finite() && numbers.all(|x| x.is_finite())) {
         let what = "the joint belief (from the models or the reports)";
-        return Err(fewbits_core::Error::unlikely_or_no_number(info.log_likelihood, what).into());
+        return Err(Error::unlikely_or_no_number(info.log_likelihood, what));
     }
     Ok((next, info))
 }

@@ -48,11 +48,11 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64], volume: f64) -> Result<f
     let sum = logs.iter().zip(&*density).map(product).sum::<f64>();
     let no_number = logs.iter().zip(&*density).any(|(l, p)| *p > 0.0 && l.is_nan());
     if no_number || peak == f64::INFINITY {
-        return Err(fewbits_core::Error::NotANumber { what: "the likelihood" }.into());
+        return Err(Error::NotANumber { what: "the likelihood" });
     }
     // A peak of `-inf` leaves a sum that is no number.
     if !(sum > 0.0 && sum.is_finite()) {
-        return Err(fewbits_core::Error::Impossible.into());
+        return Err(Error::Impossible);
     }
     for (p, l) in density.iter_mut().zip(logs) {
         *p = product((l, p)) / sum / volume;
@@ -64,7 +64,7 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64], volume: f64) -> Result<f
 pub(crate) fn normalise(density: &mut [f64], volume: f64) -> Result<(), Error> {
     let total = density.iter().sum::<f64>() * volume;
     if !(total > 0.0 && total.is_finite()) {
-        return Err(fewbits_core::Error::Impossible.into());
+        return Err(Error::Impossible);
     }
     density.iter_mut().for_each(|p| *p /= total);
     Ok(())
@@ -74,7 +74,7 @@ impl PointMass {
     /// The density proportional to `exp(log_density(x))`.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if that is zero at every node.
+    /// [`Error::Impossible`] if that is zero at every node.
     pub fn new(grid: UniformGrid, log_density: impl Fn(f64) -> f64) -> Result<Self, Error> {
         let mut mass = Self {
             grid,
@@ -87,7 +87,7 @@ impl PointMass {
     /// A normal density.
     ///
     /// # Errors
-    /// A variance that is not positive; [`fewbits_core::Error::Impossible`] if it lies off the grid.
+    /// A variance that is not positive; [`Error::Impossible`] if it lies off the grid.
     pub fn normal(grid: UniformGrid, mean: f64, variance: f64) -> Result<Self, Error> {
         finite("mean", mean)?;
         positive("variance", variance)?;
@@ -124,7 +124,7 @@ impl PointMass {
     /// Bayes' rule with any likelihood; returns `ln p(observed | past)`.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if the product with the belief is zero at every node; the belief is then as before.
+    /// [`Error::Impossible`] if the product with the belief is zero at every node; the belief is then as before.
     pub fn update(&mut self, observed: &(impl Likelihood<1> + ?Sized)) -> Result<f64, Error> {
         let nodes: Vec<f64> = self.grid.nodes().collect();
         let mut logs = vec![0.0; nodes.len()];
@@ -145,16 +145,16 @@ impl PointMass {
     /// units of that factor. Prefer [`PointMass::update`] where the likelihood may underflow.
     ///
     /// # Errors
-    /// A table of wrong length; [`fewbits_core::Error::Impossible`], which leaves the belief as it was.
+    /// A table of wrong length; [`Error::Impossible`], which leaves the belief as it was.
     pub fn reweight(&mut self, likelihood: &[f64]) -> Result<f64, Error> {
         entries("likelihood", likelihood.len(), self.density.len())?;
         let sum: f64 = self.density.iter().zip(likelihood).map(|(p, l)| p * l).sum();
         let evidence = sum * self.grid.spacing();
         if !evidence.is_finite() {
-            return Err(fewbits_core::Error::NotANumber { what: "the likelihood" }.into());
+            return Err(Error::NotANumber { what: "the likelihood" });
         }
         if evidence <= 0.0 {
-            return Err(fewbits_core::Error::Impossible.into());
+            return Err(Error::Impossible);
         }
         for (p, l) in self.density.iter_mut().zip(likelihood) {
             *p *= l / evidence;
@@ -165,7 +165,7 @@ impl PointMass {
     /// Writes a new density through `fill`, node by node, and scales it to integrate to one.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if nothing is left; the density is then uniform.
+    /// [`Error::Impossible`] if nothing is left; the density is then uniform.
     pub fn refill(&mut self, fill: impl FnOnce(&mut [f64])) -> Result<(), Error> {
         fill(&mut self.density);
         normalise(&mut self.density, self.grid.spacing()).inspect_err(|_| {

@@ -187,7 +187,7 @@ impl<const D: usize> Particles<D> {
     /// `ln sum_i exp(log weight_i)` after the change: the log-likelihood estimate if log likelihoods were added.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if no weight is left, [`fewbits_core::Error::NotANumber`] if one is NaN or infinite; the belief is
+    /// [`Error::Impossible`] if no weight is left, [`Error::NotANumber`] if one is NaN or infinite; the belief is
     /// then as it was before.
     pub fn reweigh(&mut self, change: impl FnOnce(Columns<'_, D>, &mut [f64])) -> Result<f64, Error> {
         self.scratch.clear();

@@ -85,7 +85,7 @@ impl Outcome {
 /// Failures of a belief that end a search; others are errors.
 pub(super) fn failure(error: &Error) -> Option<Status> {
     match error {
-        Error::Core(fewbits_core::Error::Impossible) => Some(Status::BeliefMiss),
+        Error::Impossible => Some(Status::BeliefMiss),
         Error::Unresolved { .. } => Some(Status::Unresolved),
         Error::Argument(_) => Some(Status::BeliefMiss),
         _ => None,

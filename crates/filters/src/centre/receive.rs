@@ -15,7 +15,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Takes in what was observed at the present instant.
     ///
     /// # Errors
-    /// If a sensor is unknown or bits do not decode; [`fewbits_core::Error::Impossible`] if the observations are impossible together, in
+    /// If a sensor is unknown or bits do not decode; [`Error::Impossible`] if the observations are impossible together, in
     /// which case the caller may drop them or start anew.
     pub fn receive(&mut self, rng: &mut dyn Rng, slots: &[Slot]) -> Result<Received, Error> {
         let predicted = self.estimate();
@@ -123,7 +123,7 @@ impl<const D: usize> Member<D> {
     fn evidence(&self, slot: &Slot, working: f64, belief: &Gaussian<D>) -> Result<Option<Evidence>, Error> {
         match self.sensor.evidence(slot, working, belief) {
             Ok(found) => Ok(Some(found)),
-            Err(Error::Core(fewbits_core::Error::Impossible)) => Ok(None),
+            Err(Error::Impossible) => Ok(None),
             Err(error) => Err(error),
         }
     }

@@ -158,7 +158,7 @@ impl GridFilter {
     /// reads them.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if the observation has probability zero under the prediction, or so little that its density
+    /// [`Error::Impossible`] if the observation has probability zero under the prediction, or so little that its density
     /// underflows; [`Error::Unresolved`] if the posterior has fewer than 1.5 nodes per deviation; if `axes` are not different
     /// coordinates of the state, their covariance is singular, or the likelihood is NaN at every node.
     pub fn update<const D: usize, const K: usize>(
@@ -193,7 +193,7 @@ impl GridFilter {
         let mean = predicted.mean() + gain * (prior.lower * posterior.mean);
         let updated = Gaussian::from_trusted_parts(mean, congruence(&keep, predicted.covariance()) + moved);
         if !updated.is_finite() {
-            return Err(Error::IMPOSSIBLE);
+            return Err(Error::Impossible);
         }
         Ok((updated, info))
     }
@@ -239,7 +239,7 @@ impl GridFilter {
             .iter()
             .fold(f64::NEG_INFINITY, |peak, piece| peak.max(piece.log_evidence));
         if peak == f64::NEG_INFINITY {
-            return Err(Error::IMPOSSIBLE);
+            return Err(Error::Impossible);
         }
         let shares = || {
             workspace
@@ -269,7 +269,9 @@ impl GridFilter {
 
 fn unresolved<const K: usize>(found: &pass::Found<K>) -> Error {
     Error::Unresolved {
-        nodes_per_deviation: found.nodes_per_deviation(),
+        value: found.nodes_per_deviation(),
+        unit: "nodes per deviation",
+        expected: "at least 1.5",
     }
 }
 

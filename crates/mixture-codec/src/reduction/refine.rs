@@ -50,7 +50,7 @@ pub fn refine<const D: usize>(
         let covariance = white.lower * p.covariance() * white.lower.transpose();
         Component::new(p.weight(), white.lower * p.mean() + origin, symmetrised(&covariance))
     });
-    Ok(Mixture::new(back.collect::<Result<_, _>>()?)?)
+    Mixture::new(back.collect::<Result<_, _>>()?)
 }
 
 /// Points of a block: what a block needs stays in the nearest cache.
@@ -238,5 +238,5 @@ fn moments<const D: usize>(part: &Component<D>, sums: &Sums<D>) -> Result<Compon
         }
     }
     let covariance = raised(covariance, &SVector::repeat(1.0));
-    Ok(Component::new(weight, part.mean() + shift, covariance)?)
+    Component::new(weight, part.mean() + shift, covariance)
 }

@@ -1,10 +1,10 @@
 //! How fast Gibbs sweeps over the labels of a product forget where they began, exactly.
 
 use crate::Error;
-use crate::error::refuse;
 use crate::product;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::refuse;
 use nalgebra::DMatrix;
 
 /// The chain of label choices of a product of mixtures under systematic sweeps, as a matrix.

@@ -1,7 +1,7 @@
 //! The message of a range over the plane: what a ring of uniform bearings gets wrong, exactly.
 
 use crate::Error;
-use crate::error::refuse;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{finite, positive};
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
