@@ -77,13 +77,10 @@ macro_rules! failed {
     };
 }
 failed!(
-    fewbits_binary_patterns::Error,
     fewbits_core::CodecError,
     fewbits_core::Error,
     fewbits_diffusion::Error,
     fewbits_network::Error,
     fewbits_numerics::ArgumentError,
-    fewbits_quantizer_design::Error,
     fewbits_quantizers::Error,
-    fewbits_sensor_assignment::Error,
 );

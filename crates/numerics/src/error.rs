@@ -29,21 +29,6 @@ impl ArgumentError {
     }
 }
 
-/// Takes the errors of crates below into variants of this crate's `Error`; an argument that they refused stays one.
-#[macro_export]
-macro_rules! lift {
-    ($($below:ident => $variant:ident),+ $(,)?) => {
-        $(impl From<$below::Error> for Error {
-            fn from(error: $below::Error) -> Self {
-                match error {
-                    $below::Error::Argument(argument) => Self::Argument(argument),
-                    other => Self::$variant(other),
-                }
-            }
-        })+
-    };
-}
-
 /// Refuses an argument in the words of any crate's error.
 pub fn refuse<T, E: From<ArgumentError>>(
     name: &'static str,
