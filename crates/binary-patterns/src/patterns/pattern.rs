@@ -201,7 +201,7 @@ mod tests {
         // Independent over GF(2), yet cells 5 and 6 carry the same column.
         let patterns = [pattern("00001111"), pattern("00110000"), pattern("01000000")];
         assert!(
-            matches!(check_separation(&patterns), Err(Error::Argument(e)) if e.value == "the same in cells 5 and 6")
+            matches!(check_separation(&patterns), Err(Error::Argument(e)) if e.value == "the same in cells 2 and 3")
         );
         let natural = [pattern("00001111"), pattern("00110011"), pattern("01010101")];
         assert_eq!(check_separation(&natural), Ok(()));
