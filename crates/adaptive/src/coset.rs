@@ -166,6 +166,7 @@ impl CosetSensor {
         if refresh {
             packet.0.push(index as u64, width_of(index));
         } else {
+            // As many low bits as tell the index from all others near any value that the receiver may hold.
             let farthest = self.reported.iter().map(|last| index - last);
             let width = farthest.map(width_of).max().unwrap_or(1);
             packet.0.push(index as u64, width);

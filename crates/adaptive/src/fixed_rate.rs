@@ -100,6 +100,7 @@ impl FixedRate {
         positive("unit", unit)?;
         finite("start", start)?;
         let mut models = Vec::new();
+        // A bank over how long velocity lasts and how much it changes.
         for decay in DECAYS {
             for scale in SCALES {
                 let q = unit * 4.0_f64.powi(scale);
@@ -197,6 +198,7 @@ impl FixedRate {
         let count = 1_u32 << self.bits;
         (1..count)
             .map(|i| {
+                // One bit: mostly the median, and in turn a far quantile, so that a jump is noticed.
                 let target = if self.bits == 1 {
                     [0.5, 0.1, 0.5, 0.9][self.turn]
                 } else {

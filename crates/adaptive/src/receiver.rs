@@ -172,6 +172,7 @@ impl Receiver {
             self.synchronised = true;
             return Ok(replica.value());
         };
+        // The bank is restored if the stream turns out to be damaged: a failed call leaves the receiver as it was.
         let saved = *replica.bank();
         let slot = replica.predict(elapsed);
         let outcome = stream.get(replica, &slot).and_then(|content| match content {

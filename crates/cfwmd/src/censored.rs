@@ -44,6 +44,7 @@ impl Missing {
         covariance: &SMatrix<f64, M, M>,
     ) -> Result<EllipsoidMoments<M>, fewbits_core::Error> {
         let under = rule.region().under(covariance)?;
+        // A silence is either a censored measurement or a lost report.
         let loss = match self {
             Self::Nothing { loss } => loss,
             Self::Lost { scale } => {
@@ -328,9 +329,11 @@ impl<const M: usize> Censored<M> {
     ) -> Result<Self, ArgumentError> {
         let cell = levels.cell(value)?;
         let (low, high) = rule.interval(prediction);
+        // A level whose cell crosses the silent interval leaves two pieces, or one, or none.
         let below = Cell::new(cell.lower(), cell.upper().min(low));
         let above = Cell::new(cell.lower().max(high), cell.upper());
         let factor: Scalar = match (below, above) {
+            // The rule censors nothing: the whole cell can have been sent.
             _ if low >= high => InCell::new(cell, noise_variance, 0.0, arrival)?.into(),
             (Ok(below), Ok(above)) => {
                 let edges = [below.lower(), below.upper(), above.lower(), above.upper()];

@@ -162,6 +162,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
                     push(single);
                 }
             }
+            // Scalar values of sensors of one kind are combined into one factor; the first of the kind carries it.
             if M == 1 && plain && self.identical[i] == i {
                 let like = |j: usize| self.identical[j] == i;
                 let received = |j: usize| observations[j].received().filter(|_| like(j)).copied();

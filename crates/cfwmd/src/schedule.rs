@@ -37,6 +37,7 @@ where
             truth = dynamics.propagate(rng, &truth);
             let predicted = kalman::predict(dynamics, &belief);
             *sum += predicted.covariance();
+            // One step of the system with covariance feedback, whose predicted covariances are averaged over runs.
             let rules = network.rules_under(&predicted)?;
             let measurements: Vec<_> = network.sensors().iter().map(|s| s.sample(rng, &truth)).collect();
             let (observations, _) = network.transmit(rng, &rules, predicted.mean(), &measurements)?;

@@ -254,6 +254,7 @@ impl<'a> BitReader<'a> {
         }
         let (rest, skipped) = (&self.message.bytes[self.position / 8..], self.position % 8);
         self.position += width as usize;
+        // Eight bytes at once; near the end of the message the missing ones count as zero.
         let word = match rest.first_chunk() {
             Some(bytes) => u64::from_be_bytes(*bytes),
             None => (0..)
@@ -262,6 +263,7 @@ impl<'a> BitReader<'a> {
                 .fold(0, |word, (i, byte)| word | u64::from(*byte) << (56 - i)),
         };
         let mut field = word << skipped;
+        // A field that begins within a byte can reach into a ninth one.
         if skipped + width as usize > 64 {
             field |= u64::from(rest[8]) >> (8 - skipped);
         }

@@ -278,6 +278,7 @@ impl<const D: usize> FactoredGaussian<D> {
         for (start, logs) in (0..).step_by(BLOCK).zip(logs.chunks_mut(BLOCK)) {
             let count = logs.len();
             square.fill(0.0);
+            // Forward substitution with the Cholesky factor, a row for all states of the block at a time.
             for i in 0..D {
                 let (solved, rest) = white.split_at_mut(i);
                 let Some(row) = rest.first_mut() else { break };
@@ -294,6 +295,7 @@ impl<const D: usize> FactoredGaussian<D> {
                     *square += *x * *x;
                 }
             }
+            // A state at infinity gives `inf - inf`; the scalar path tells such a state from one that is no number.
             if square[..count].iter().any(|q| q.is_nan()) {
                 for (i, q) in square[..count].iter_mut().enumerate().filter(|(_, q)| q.is_nan()) {
                     *q = out_of_range(&states.map(|column| column[start + i]));

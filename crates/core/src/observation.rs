@@ -212,6 +212,7 @@ impl Link {
             return Ok(Observation::Nothing);
         };
         let sent = report.to_bits(format)?;
+        // One draw decides between loss without a trace, a loss that the receiver notices, and arrival.
         let missing = self.loss + self.erasure;
         if missing > 0.0 {
             let u = rng.random::<f64>();
@@ -223,6 +224,7 @@ impl Link {
                 });
             }
         }
+        // Inverted bits that form no report of this format are noticed by the receiver.
         let received = self.flip(rng, sent);
         Ok(M::from_bits(format, &received).map_or(Observation::Lost, Observation::Received))
     }

@@ -123,6 +123,7 @@ impl Domain {
         if free.is_empty() {
             return Err(Error::NoFreeCell);
         }
+        // Only free cells are unknowns. Each has a number, and each pair of neighbours a face.
         let mut numbers = vec![BLOCKED; cells.len()];
         for (number, cell) in free.iter().enumerate() {
             numbers[*cell] = number;
@@ -138,6 +139,7 @@ impl Domain {
                     (Some(_), _) => None,
                     (None, _) => Some(sides[axis][usize::from(upper)]),
                 };
+                // Behind the last free cell there are two more numbers, for what has left and for what an inflow brings.
                 let (other, other_half) = match (boundary, next) {
                     (None, Some(next)) => (numbers[grid.index(next)], 0.5 * grid.width(axis, next[axis])),
                     _ => (free.len() + usize::from(boundary == Some(Boundary::Inflow)), 0.0),
@@ -157,6 +159,7 @@ impl Domain {
                     boundary,
                 };
                 match boundary {
+                    // An inner face is met from both sides and is kept once.
                     None if upper => faces.push(face),
                     None | Some(Boundary::Closed) => {}
                     Some(_) => edge.push(face),
@@ -299,6 +302,7 @@ impl Domain {
             }
             reached[seed] = true;
             let (mut part, mut next) = (vec![(seed, None)], 0);
+            // Breadth first over the connected part of the seed.
             while let Some((cell, _)) = part.get(next).copied() {
                 next += 1;
                 let at = self.grid.place(self.free[cell]);

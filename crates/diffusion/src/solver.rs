@@ -84,6 +84,7 @@ impl Solver {
         if psi.is_none() {
             places.extend(cells().map(|[low, high]| Pair::new(low, high)));
         }
+        // With a potential the rates are symmetric after scaling: Cholesky serves, at half the cost of LU.
         let pattern = SymbolicSparseColMat::try_new_from_indices(count, count, &places);
         let (pattern, order) = pattern.map_err(|_| failed(count, false))?;
         let symbolic = match psi {

@@ -192,6 +192,7 @@ impl<'a> Transient<'a> {
         let unit = common_unit(instants);
         for end in instants {
             let source = source(now)?;
+            // A new source changes the solution fast at first: the step begins small again.
             if before.as_ref() != Some(&source) {
                 state.wanted = self.first_step(&state.concentration, &source);
             }

@@ -23,6 +23,7 @@ pub(crate) fn best_fit(target: &Target<'_>, likelihood: &SourceLikelihood, searc
     let most = PER_AXIS * PER_AXIS;
     let mut centres = lattice(&search.lower, &search.upper, width, most).ok()?;
     let mut best: Option<f64> = None;
+    // Coarse to fine: the best cells of a level are divided. Scores blur the density over a cell.
     for _ in 0..LEVELS {
         let count = centres[0].len();
         let (mut logs, mut scores) = (vec![0.0; count], vec![0.0; count]);

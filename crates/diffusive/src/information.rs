@@ -237,6 +237,7 @@ pub fn fisher_information(
     rate: f64,
 ) -> Result<DMatrix<f64>, Error> {
     let step = 1e-5 * sensor.shortest_age();
+    // The derivative by the start of the release is a central difference; all others are exact.
     let earlier = sensor.clone().with_start(sensor.start() - step)?;
     let later = sensor.clone().with_start(sensor.start() + step)?;
     let place = sensor.source_at(source);

@@ -77,6 +77,7 @@ impl SourceLikelihood {
                 None => (record.sums(position), 1.0),
             };
             match self.rate {
+                // One rate for all samples: their sums add up and are visited once, at the end.
                 RateModel::Known(_) | RateModel::Joint(_) => {
                     (blurred, all) = (blurred.plus(&sums.discounted(share)), all.plus(&sums));
                 }

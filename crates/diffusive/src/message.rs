@@ -195,6 +195,7 @@ impl Message for Packet {
             Self::Belief(belief) => {
                 writer.write_bit(true);
                 writer.write(belief.components as u64, COUNT_BITS)?;
+                // 31 stands for a mixture without polynomials.
                 writer.write(belief.degree.map_or(31, |d| d as u64), COUNT_BITS)?;
                 writer.write_bit(belief.with_rate);
                 for number in &belief.numbers {

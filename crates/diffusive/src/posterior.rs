@@ -36,6 +36,7 @@ impl Posterior {
         near: Option<SearchBox>,
         options: &CellOptions,
     ) -> Result<Self, Error> {
+        // Where to look: the whole search area at first, then about the belief that was received.
         let (around, per_axis) = match (prior, near) {
             (Prior::Exact(_), None) => (*search, WIDE),
             (Prior::Exact(_), Some(near)) => (near, NARROW),

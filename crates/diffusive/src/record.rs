@@ -78,6 +78,7 @@ impl Record {
         positive("noise", noise)?;
         let homogeneous = sensor.homogeneous();
         let receptor = sensor.receptor(node)?;
+        // In a homogeneous model only the offset from the node matters: the receptor moves to the origin.
         let (receptor, origin) = match homogeneous {
             Some(_) => (sensor.receptor(&Vector2::zeros())?, *node),
             None => (receptor, Vector2::zeros()),

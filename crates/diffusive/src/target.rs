@@ -316,6 +316,7 @@ impl Target<'_> {
                 }
             }
         };
+        // Scores with likelihoods widened to the size of a cell decide which cells are worth the exact value.
         evaluate(&all, 1, &blurred, scores);
         let floor = floor.max(largest(scores) - log_noise - DROPPED);
         scores.iter_mut().for_each(|score| *score -= log_noise);

@@ -96,6 +96,7 @@ impl Leader for SourceChain {
         let own = self.samples.get(node as usize);
         let own = own.ok_or_else(|| format!("node {node} has no samples in slot {slot}"))?;
         known.push((node as usize, own.clone()));
+        // The search is computed again from the raw records, so that nothing is lost on the way.
         let (outcome, next) = self.repeat(&known)?;
         let estimate = outcome.estimate().ok_or("the step gave no estimate")?;
         Ok(Lead {

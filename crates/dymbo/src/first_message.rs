@@ -198,6 +198,7 @@ impl Memoryless<1> for RoundedSample {
         }
         let (least, most) = self.range();
         let edges = (least..most).map(|k| self.resolution * (k as f64 + 0.5)).collect();
+        // Two's complement of `bits` bits, as the words travel.
         let mask = (1_u64 << self.bits) - 1;
         let word = |k: i64| k as u64 & mask;
         let sent = |k: i64| arrives * link.word_probability(word(k), word(multiple.0), self.bits);

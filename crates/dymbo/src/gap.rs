@@ -141,6 +141,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
             for (gap, lag) in gaps.iter_mut().zip(lags) {
                 let now = then + lag;
                 let mut estimate = beliefs[now];
+                // Backward pass of the smoother from `now` to `then`, over the stored filter beliefs.
                 for belief in beliefs[then..now].iter().rev() {
                     estimate = smooth_step(self.filter.plant().dynamics(), belief, &estimate)?;
                 }

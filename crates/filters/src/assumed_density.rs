@@ -116,9 +116,11 @@ fn update_at<const D: usize, const M: usize>(
     matrix: &SMatrix<f64, M, D>,
     factor: &impl Factor<M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
+    // The factor reads only `y = H x`. Its posterior moments are found in the space of `y`.
     let cross = times_transposed(belief.covariance(), matrix);
     let prior = measured(predicted, matrix, &cross)?;
     let tilted = factor.tilted(&prior)?;
+    // Given `y`, the state is linear in it: `x = mean + gain (y - predicted)`, with a residual that the factor cannot change.
     let correction = tilted.mean - prior.mean();
     let gain = solve_semidefinite(prior.covariance(), &cross.transpose())?.transpose();
     let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());

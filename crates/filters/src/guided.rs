@@ -103,6 +103,8 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
     ) -> Result<Info, Error> {
         let mut next = belief.clone();
         let mut ratios = vec![0.0; belief.len()];
+        // Particles that were predicted in this step are drawn again from a proposal that has seen the observations. The ratio of the
+        // target to the proposal goes into their weights.
         if self.moves.len() == belief.len() && !observed.is_empty() {
             let mut columns = next.columns_mut();
             for (i, (moved, ratio)) in self.moves.iter().zip(&mut ratios).enumerate() {

@@ -229,8 +229,10 @@ pub(crate) fn mix<const D: usize>(
     workspace.modes.clear();
     workspace.probabilities.clear();
     for j in 0..n {
+        // Joint probability of having been in mode i and being in mode j.
         let joint = |i: usize| belief.probabilities[i] * transition[i * n + j];
         let c: f64 = (0..n).map(joint).sum();
+        // Each mode starts from the moments of all modes that lead to it; one that nothing leads to keeps its own.
         let mixed = if c > 0.0 {
             moments((0..n).map(|i| (joint(i) / c, &belief.modes[i])))
         } else {
@@ -256,6 +258,7 @@ pub(crate) fn weigh<const D: usize>(
     for (mode, p) in belief.modes.iter().zip(&belief.probabilities) {
         let (next, log_evidence) = match update(mode) {
             Ok(updated) => updated,
+            // A mode under which the observation is impossible loses its probability; only if all do so is it an error.
             Err(Error::Core(fewbits_core::Error::Impossible)) => (*mode, f64::NEG_INFINITY),
             Err(error) => return Err(error),
         };

@@ -122,6 +122,7 @@ impl ParticleFilter {
         observed: &(impl Likelihood<D> + ?Sized),
         workspace: &mut Workspace<D>,
     ) -> Result<Info, Error> {
+        // All happens in a second buffer: the belief is unchanged if a later part fails.
         let Workspace { ancestors, next } = workspace;
         let next = next.get_or_insert_with(|| belief.clone());
         if self.schedule.is_due(belief.effective_sample_size(), belief.len()) {

@@ -62,6 +62,7 @@ impl RaoBlackwellised {
         belief: &mut GaussianCloud<D>,
         workspace: &mut CloudWorkspace<D>,
     ) -> Result<(), Error> {
+        // All particles share one covariance: the Riccati recursion does not depend on the data.
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
         let shared = kalman::predict(dynamics, &shared);
         if !shared.is_finite() {
@@ -158,6 +159,7 @@ impl RaoBlackwellised {
         mut draw: impl FnMut(&mut R, &FactoredGaussian<M>, &SVector<f64, M>, &mut [f64]) -> (SVector<f64, M>, f64),
     ) -> Result<(), Error> {
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
+        // One Kalman gain serves all particles.
         let (updated, info) = kalman::update_by(matrix, noise_covariance, &shared, &SVector::zeros())?;
         let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
             .factored()
@@ -167,6 +169,8 @@ impl RaoBlackwellised {
         for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
             let mean = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
             let predicted = matrix * mean;
+            // The measurement behind the report is drawn given the report, and then used as if it had been received. The weight gains the
+            // probability of the report.
             let (z, increment) = draw(rng, &innovation, &predicted, &mut side[i * width..(i + 1) * width]);
             *log_weight += increment;
             set_state(&mut columns, i, &(mean + info.gain * (z - predicted)));
@@ -300,6 +304,7 @@ fn choose<R: Rng + ?Sized>(
 ) -> (f64, f64) {
     let mut chosen = 0;
     if pieces.len() > 1 {
+        // A piece of share zero is never chosen, even if rounding leaves some of the uniform draw at the end.
         let mut left = rng.random::<f64>();
         for (i, term) in log_shares(pieces, predicted, deviation).enumerate() {
             let share = (term - total).exp();

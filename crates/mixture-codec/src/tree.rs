@@ -196,6 +196,7 @@ impl<const D: usize> Tree<D> {
                 .sum::<f64>()
                 / total
         };
+        // The axis to cut across.
         let direction: SVector<f64, D> = match split.axis {
             Axis::Widest => {
                 let spread: [f64; D] = std::array::from_fn(|d| moment(d, d, own));
@@ -215,6 +216,7 @@ impl<const D: usize> Tree<D> {
                 .map(|d| direction[d] * columns[d][*i])
                 .sum();
         }
+        // Ties go by index: the order does not depend on the sorting algorithm.
         own.sort_by(|a, b| keys[*a].total_cmp(&keys[*b]).then(a.cmp(b)));
         let left = match split.at {
             At::CountMedian => own.len().div_ceil(2),

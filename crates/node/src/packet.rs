@@ -59,6 +59,7 @@ pub static TENS: [f64; 16] = [
 pub fn push_number(packet: &mut Packet, value: f64) {
     let size = value.abs();
     for (decimals, ten) in (0..).zip(TENS.iter().copied()) {
+        // The shortest decimal that is exactly this number; otherwise all 64 bits.
         let digits = crate::math::round(size * ten);
         if digits >= 9e15 || digits / ten != size {
             continue;

@@ -213,6 +213,7 @@ impl Hypotheses {
         let mut next = Vec::with_capacity(2 * self.kept.len());
         for (log, targets) in &self.kept {
             let targets = predicted(targets, q);
+            // Every hypothesis branches in two: which measurement belongs to which target.
             for order in [[z[0], z[1]], [z[1], z[0]]] {
                 let fit =
                     |i: usize| normal::log_pdf_with(order[i], targets[i].mean()[0], targets[i].covariance()[0] + r);
@@ -232,6 +233,7 @@ impl Hypotheses {
             return Err(fewbits_core::Error::unlikely_or_no_number(largest, what).into());
         }
         let total: f64 = next.iter().map(|h| (h.0 - largest).exp()).sum();
+        // Before the list is shortened: even entries have the measurements in the order given.
         let straight: f64 = next.iter().step_by(2).map(|h| (h.0 - largest).exp()).sum();
         next.sort_by(|a, b| b.0.total_cmp(&a.0));
         next.truncate(self.most);

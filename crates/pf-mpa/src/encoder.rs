@@ -120,6 +120,7 @@ impl Encoder {
                 max_speed,
                 normalisation,
             } => Self::normaliser(target, noise, max_speed, normalisation, centre),
+            // As wide as the innovation: deviation of the predicted range and noise together.
             Self::Adaptive { loading } => {
                 let row = sensor.jacobian(about.mean());
                 let spread = (row * about.covariance() * row.transpose())[0].max(0.0);

@@ -71,6 +71,7 @@ impl GuidedGaussian {
         for buffer in places.iter_mut().chain([&mut *logs, weights]) {
             buffer.resize(self.draws, 0.0);
         }
+        // Importance sampling of the position: draws from a wide Gaussian about the guide, weighed by prior and likelihood.
         for i in 0..self.draws {
             let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
             let place = proposal.mean() + proposal.lower() * z;
@@ -88,6 +89,7 @@ impl GuidedGaussian {
         if size.is_nan() || size < LEAST {
             return Ok(None);
         }
+        // Moments with the correction for a finite effective sample.
         weights.iter_mut().for_each(|w| *w /= total);
         let mean = Vector2::new(kernels::dot(weights, &places[0]), kernels::dot(weights, &places[1]));
         let spread = |a: usize, b: usize| {

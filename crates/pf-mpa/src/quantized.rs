@@ -240,6 +240,7 @@ impl Memoryless<1> for QuantizedRange {
             let expected = format!("a symbol below {}", self.labelling.symbols());
             return Err(ArgumentError::new("symbol", symbol.0, expected).into());
         };
+        // Inverted bits: any level can have been sent, with the probability that its word became the received one.
         let given = |level: usize| {
             let sent = word(level).unwrap_or(received);
             arrives * link.word_probability(sent, received, self.bits())

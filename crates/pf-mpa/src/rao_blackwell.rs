@@ -115,6 +115,7 @@ impl Tracker for RaoBlackwellGuided {
         workspace: &mut VelocityWorkspace,
     ) -> Result<StepInfo, Error> {
         let (ts, q, s) = (target.interval(), target.noise_variance(), belief.velocity_variance);
+        // Velocity is Gaussian given position and manoeuvre. Its variance and the gain are the same for all particles.
         let spread = ts * ts * s + 0.25 * ts.powi(4) * q;
         let cross = ts * s + 0.5 * ts.powi(3) * q;
         let gain = if spread > 0.0 { cross / spread } else { 0.0 };
@@ -130,6 +131,7 @@ impl Tracker for RaoBlackwellGuided {
             let velocity = Vector2::new(state[2], state[3]);
             let mean = Vector2::new(state[0], state[1]) + velocity * ts + acceleration * (0.5 * ts * ts);
             let (place, increment) = propose(rng, &mean, spread, observed);
+            // What the new position says of the velocity.
             let velocity = velocity + acceleration * ts + (place - mean) * gain;
             let moved = Vector6::new(place[0], place[1], velocity[0], velocity[1], acceleration[0], acceleration[1]);
             set_state(&mut columns, i, &moved);

@@ -157,6 +157,7 @@ impl RangeSensor {
         let (sx, sy) = (self.position[0], self.position[1]);
         let count = distances.len();
         let (x, y) = (&x[..count], &y[..count]);
+        // The square overflows or underflows only at extreme coordinates; then `hypot` is used for all.
         let sound = vectorised(
             #[inline(always)]
             || {

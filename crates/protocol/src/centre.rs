@@ -332,9 +332,11 @@ impl Centre {
                 note(Note::Disagreement { slot });
             }
             Kind::Heartbeat => note(Note::Heartbeat { slot }),
+            // The order of these arms is the order of the checks: time, repetition, feedback, length.
             Kind::Report if slot != Slot::of_count(self.slot) || !self.open => return note(Note::Late { slot }),
             Kind::Report if *observed != Observation::Nothing => note(Note::Duplicate { slot }),
             Kind::Report if frame.digest != self.digests[sensor] => {
+                // The sensor spoke, but under another belief than ours: what it means cannot be known.
                 (*observed, self.unusable[sensor]) = (Observation::Lost, true);
                 note(Note::Disagreement { slot });
             }

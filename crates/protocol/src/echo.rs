@@ -60,6 +60,7 @@ pub fn reports_of(
     let mut reader = BitReader::new(echo);
     let mut observed = Vec::with_capacity(lengths.len());
     for length in lengths {
+        // Prefix code: 0 is silence, 11 a report that follows, 100 a loss that was noticed, 101 nothing to use.
         observed.push(if !reader.read_bit()? {
             Some(Observation::Nothing)
         } else if !reader.read_bit()? {

@@ -176,6 +176,7 @@ impl<'a> Frame<'a> {
         let end = bytes.len().checked_sub(CHECK_BYTES).ok_or(too_short)?;
         let header = kind.header();
         let content = bytes.get(header..end).ok_or(too_short)?;
+        // With the check on the header only, damaged bits of the payload reach the estimator, which knows the crossover of the link.
         let covered = match check {
             Check::Whole => end,
             Check::Header => header,

@@ -211,6 +211,7 @@ impl Bearer {
         if frame.kind != Kind::Handover {
             return note(Note::Unexpected { kind: frame.kind });
         }
+        // The digest names a belief: another one means that the payload was damaged.
         if digest(slot, frame.payload) != frame.digest {
             return note(Note::Disagreement { slot });
         }
@@ -218,6 +219,7 @@ impl Bearer {
         let last = if own { &mut self.taken } else { &mut self.passed };
         match *last {
             Some(seen) if seen == name => return note(Note::Duplicate { slot }),
+            // Two leaders hand over different beliefs for one slot; the first is kept.
             Some((seen, _)) if own && slot == seen => return note(Note::Disagreement { slot }),
             Some((seen, _)) if own && seen.is_after(slot) => return note(Note::Late { slot }),
             _ => *last = Some(name),

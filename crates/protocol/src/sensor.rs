@@ -293,6 +293,7 @@ impl Sensor {
             return noted(Note::Misuse);
         };
         self.stage = Stage::Idle;
+        // A long silence is broken by a heartbeat, from which the centre learns that the sensor lives.
         let Some(report) = report else {
             self.silent = self.silent.saturating_add(1);
             if self.settings.heartbeat_after == 0 || self.silent < self.settings.heartbeat_after {

@@ -34,6 +34,7 @@ pub(crate) fn reduce(worth: &[f64], axis: Axis, compositions: &Compositions, mis
                 .iter()
                 .enumerate()
             {
+                // A cell that the breakpoint does not bound has no share.
                 if c[t] != 0.0 {
                     let from = (o * above + at) * axis.inner;
                     let factor = sensors * c[t];

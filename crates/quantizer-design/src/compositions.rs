@@ -33,6 +33,7 @@ impl Compositions {
         let (mut up, mut steps) = (Vec::with_capacity(total), Vec::with_capacity(total));
         let mut vectors = vec![vec![0; parts]];
         for m in 0..total {
+            // Where each composition of `m` sensors goes when one more sensor sends symbol `t`.
             let raised = |v: &Vec<usize>, t: usize| {
                 let mut raised = v.clone();
                 raised[t] += 1;
@@ -47,6 +48,7 @@ impl Compositions {
             vectors = vectors_of(m + 1, parts);
             steps.push(vectors.iter().map(|v| Step::to(v, m + 1)).collect());
         }
+        // In logarithms: multinomial coefficients of many sensors overflow.
         let ln_factorial = |n: usize| (2..=n).map(|i| (i as f64).ln()).sum::<f64>();
         let log_multiplicity = vectors
             .iter()

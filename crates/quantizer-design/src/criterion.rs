@@ -119,6 +119,7 @@ impl Scored {
                     .filter(|(k, (w, q))| *k != best && *w * *q > 0.0)
                     .map(|(_, (w, q))| w * q * (w * q / mass).ln())
                     .sum();
+                // The favourite's term by `ln_1p`: its posterior is often within rounding of one.
                 rest + (mass - others) * (-others / mass).ln_1p()
             }
             Kind::Information => {

@@ -237,6 +237,7 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
         let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x + y).collect();
         joint = joint.iter().flat_map(|a| rows.iter().map(move |b| sum(a, b))).collect();
     }
+    // Values with correlated noise are mixtures over nodes: log-sum-exp of the nodes of each value.
     let mut out = Vec::with_capacity(joint.len() * model.values.len());
     for row in &joint {
         for feature in &model.given {

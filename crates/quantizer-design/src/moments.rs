@@ -124,6 +124,7 @@ fn descend(
             out[at] = sum;
             at += features.len();
         };
+        // Four dot products at a time read the common factor once.
         let fours = last.rows() / 4 * 4;
         for r in (0..fours).step_by(4) {
             let four = [0, 1, 2, 3].map(|i| &last.row(r + i)[range.clone()]);

@@ -75,6 +75,7 @@ impl CodedSensors {
             .iter()
             .flat_map(|&noise| Threshold::of(grid.breakpoints(), noise));
         let thresholds: Vec<Threshold> = thresholds.collect();
+        // The problem is symmetric about zero: half of the axis at twice the weight.
         let mut nodes = Nodes::adapted(&source, 0.0, half_width, &thresholds, PANEL, gauss_legendre::<12>());
         nodes.w.iter_mut().for_each(|w| *w *= 2.0);
         let probability: Vec<Vec<[Vec<f64>; 2]>> = quantizers
@@ -157,6 +158,7 @@ impl CodedSensors {
                 mass += w * (zero + one);
                 moment += w * x * (zero - one);
             }
+            // The first bit tells the sign; both of its outcomes explain the same.
             return if mass > IMPOSSIBLE {
                 2.0 * moment * moment / mass
             } else {

@@ -67,6 +67,7 @@ pub fn exchange(sensors: &CodedSensors, start: &[usize], estimator: Estimator) -
     let mut error = sensors.mse(&assignment, estimator)?;
     let mut evaluations = 1;
     loop {
+        // Steepest descent: the best of all exchanges, as long as one improves by more than rounding.
         let mut best = (error * (1.0 - IMPROVEMENT), None);
         for i in 0..assignment.len() {
             for j in i + 1..assignment.len() {

@@ -155,6 +155,7 @@ impl CostMatrix {
         let scale = self.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
         let tolerance = SLACK * scale;
         let mut columns = vec![0.0f64; n];
+        // Bellman-Ford: shortest paths in the graph of exchanges give column potentials, unless an exchange would lower the cost.
         for _ in 0..=n {
             let mut changed = false;
             for (i, row) in self.rows().enumerate() {
@@ -181,6 +182,7 @@ impl CostMatrix {
                 violation = violation.max(rows[i] + v - c);
             }
         }
+        // Weak duality: no assignment costs less than the dual value if no entry violates the potentials.
         let dual: f64 = rows.iter().sum::<f64>() + columns.iter().sum::<f64>();
         Ok(DualCertificate {
             rows,

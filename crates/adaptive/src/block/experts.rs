@@ -137,6 +137,7 @@ impl<const N: usize> LeastSquares<N> {
             }
         }
         let error = step - product(&self.coefficients, &self.regressors);
+        // Recursive least squares with forgetting.
         let inverse = 1.0 / (MEMORY + product(&gain, &self.regressors));
         let (mut largest, mut least) = (0.0_f64, f64::INFINITY);
         for i in 0..N {
@@ -150,6 +151,7 @@ impl<const N: usize> LeastSquares<N> {
             }
             (largest, least) = (largest.max(row[i]), least.min(row[i]));
         }
+        // The recursion forgets exponentially, so that a direction never excited grows without bound: it starts again before it overflows.
         if !(largest < LARGEST_VARIANCE && least > 0.0) {
             self.covariance = Self::ignorant();
             if !self.coefficients.iter().all(|c| c.abs() < LARGEST_VARIANCE) {

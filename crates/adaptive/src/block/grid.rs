@@ -71,6 +71,7 @@ impl Grid {
         }
         let mut all = samples.iter().filter_map(|x| digits(*x, ten));
         let origin = all.next()?;
+        // Values that are all multiples of a larger unit (an ADC step in millivolts) are counted in it.
         let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
         if unit <= 1 {
             return Some(Self::Decimal {
@@ -260,6 +261,7 @@ impl Grid {
             Self::Circle { period, cells } => {
                 let turned = sample.rem_euclid(*period);
                 let index = whole(turned / (period / *cells as f64))?;
+                // The turn nearest to the index before: a bearing that passes north goes on counting.
                 let around = (index - near).rem_euclid(*cells);
                 let shortest = if 2 * around > *cells { around - cells } else { around };
                 near.checked_add(shortest)

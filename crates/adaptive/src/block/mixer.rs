@@ -99,6 +99,7 @@ impl Mixer {
         self.class = class;
         let far = (node >> 4).wrapping_mul(0x9E37_79B1);
         let (mut places, mut checks) = ([0; CONTEXTS], [0; CONTEXTS]);
+        // All addresses first, then all loads: the loads overlap instead of waiting for each other.
         for c in 0..CONTEXTS {
             let hash = (self.contexts[c] ^ far).wrapping_mul(0x85EB_CA6B);
             let hash = hash ^ hash >> 15;
@@ -112,6 +113,7 @@ impl Mixer {
         }
         for c in 0..CONTEXTS {
             let (a, b, check) = (first[c], second[c], checks[c]);
+            // Two slots a bucket. The check byte tells whose they are; of two strangers the one seen less is replaced.
             let is_second = (b & 255 == check) | ((a & 255 != check) & (seen(b) < seen(a)));
             let slot = if is_second { b } else { a };
             places[c] |= u32::from(is_second);

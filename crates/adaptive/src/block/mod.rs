@@ -152,6 +152,7 @@ impl BlockCodec {
             if self.effort == Effort::Fast {
                 keep(with_counts(&grid, &indices, &exceptions)?, &mut best);
             }
+            // On coarse lattices the models win by far; only where a sample takes many bits is the general coder tried.
             if best.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8) {
                 let mut bytes = Vec::new();
                 write_head(&grid, Coding::Pco, false, &exceptions, &mut bytes);

@@ -270,6 +270,8 @@ impl Model {
             let half = 1 << (grid.k - level - 1);
             let (a, b) = (self.tails(grid, index), self.tails(grid, index + half));
             let c = self.tails(grid, index + 2 * half);
+            // Probabilities of the upper and lower half from each expert's distribution. In the upper tail they come from the survival
+            // function, which keeps its digits there.
             let (mut upper, mut lower) = (less(c.below, b.below), less(b.below, a.below));
             let (above, beneath) = (less(b.above, c.above), less(a.above, b.above));
             for e in 0..EXPERTS {

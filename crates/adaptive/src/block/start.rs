@@ -167,6 +167,7 @@ impl BlockCodec {
         let is_fine = found
             .first()
             .is_none_or(|block| block.bytes.len() > super::FINE * samples.len() / 8);
+        // A start that does not fit the block loses to a block of its own.
         if is_fine || !self.grid(samples).is_some_and(|grid| grid.is_like(&start.grid)) {
             let alone = self.encode_with(samples, others)?;
             found.push(StartedBlock {

@@ -143,6 +143,7 @@ impl Bank {
                 impossible.push(index);
             }
         });
+        // Outcomes whose probability underflows are computed in logarithms, which costs more.
         if !impossible.is_empty() {
             let logs = self.log_rows(&nodes.x);
             let mut counts = Vec::new();
@@ -227,6 +228,7 @@ impl Bank {
             .map(|index| {
                 self.counts_at(index, &mut counts);
                 self.log_likelihood(&logs, &counts, &mut score);
+                // Logarithm of the prior probability of the cell; the score is then its posterior but for a constant.
                 for (s, cell) in score.iter_mut().zip(&cells) {
                     *s += log(cell.mass);
                 }

@@ -160,6 +160,7 @@ pub fn check_separation(patterns: &[Pattern]) -> Result<(), Error> {
     let mut columns: Vec<(Vec<bool>, usize)> = (0..first.cells())
         .map(|cell| (patterns.iter().map(|p| p.bits[cell]).collect(), cell))
         .collect();
+    // Two cells with the same bits of all sensors cannot be told apart; sorting brings them together.
     columns.sort();
     match columns.windows(2).find(|w| w[0].0 == w[1].0) {
         None => Ok(()),

@@ -115,6 +115,7 @@ impl Tree<'_> {
         for bit in [false, true] {
             let sign = if bit { 1.0 } else { -1.0 };
             let (above, below) = self.levels.split_at_mut(depth + 1);
+            // Joint density of the unknown and the bits so far, at the nodes.
             for ((child, w), x) in below[0].iter_mut().zip(&above[depth]).zip(&self.nodes.x) {
                 *child = w * cdf(sign * (x - threshold) / self.noise_deviation);
             }
@@ -135,6 +136,7 @@ impl Tree<'_> {
         let w = &self.levels[self.history.len()];
         match self.rule {
             AdaptiveRule::VariableStep { factor, .. } => {
+                // Adaptive delta modulation: equal bits lengthen the step, different ones shorten it.
                 let step = match (self.history.len(), repeated) {
                     (1, _) => step,
                     (_, true) => step * factor,

@@ -41,6 +41,7 @@ impl Luo {
         };
         let bits = bits_in_range(bits)?;
         let noise_deviation = positive("noise_deviation", noise_deviation)?;
+        // Half of the sensors for the first bit, a quarter for the second, and so on; the rest for the last.
         let mut allocation: Vec<usize> = (1..bits).map(|b| sensors.checked_shr(b as u32).unwrap_or(0)).collect();
         allocation.push(sensors - allocation.iter().sum::<usize>());
         if allocation.contains(&0) {

@@ -275,6 +275,7 @@ impl OutcomeTree {
                 self.value[depth].fill(0.0);
                 return 0.0;
             }
+            // Leaf: the posterior mean explains `first^2 / mass`. Its derivative by the joint density at x is `estimate (2 x - estimate)`.
             let estimate = first / mass;
             for (v, x) in self.value[depth].iter_mut().zip(&self.nodes.x) {
                 *v = estimate * (2.0 * x - estimate);
@@ -294,6 +295,7 @@ impl OutcomeTree {
             }
             let p = &self.p[depth][bit];
             let slope = &mut self.slope[depth][bit];
+            // Reverse mode: derivatives of the leaves are carried up, and those by the bit probabilities are collected.
             for i in 0..p.len() {
                 own[depth][i] += p[i] * child[0][i];
                 slope[i] += self.weight[depth][i] * child[0][i];

@@ -107,6 +107,8 @@ impl Candidates {
                 let at = |outcome: usize, k: usize| outcome * rows + first + 2 * k;
                 let here = at(outcome, k);
                 let (mut mass, mut moment) = (sums[here], sums[here + 1]);
+                // By symmetry only half of the axis is integrated. The other half is the mirrored outcome with the sign of the moment
+                // changed.
                 if self.folded {
                     let there = at(image, if self.flips[candidate] { count - k } else { k });
                     mass += sums[there];

@@ -42,6 +42,7 @@ pub(super) fn with_one_mode(
     mut visit: impl FnMut(f64, f64),
 ) {
     let node = |(theta, w): (f64, f64)| visit(theta, w);
+    // Fixed rules where the integrand is smooth; elsewhere panels about the mode.
     if tame(variances, means, eta, NEAR) {
         return panel(-FRAC_PI_2, FRAC_PI_2).for_each(node);
     }
@@ -49,6 +50,7 @@ pub(super) fn with_one_mode(
         return gauss_legendre::<40>().on(-FRAC_PI_2, FRAC_PI_2).for_each(node);
     }
     let (mode, peak) = golden::maximum(&f, -FRAC_PI_2, FRAC_PI_2, 1e-12);
+    // Bisection for the place at which the integrand has fallen to nothing.
     let end = |outer: f64| {
         let (mut inside, mut outside) = (mode, outer);
         for _ in 0..30 {

@@ -68,6 +68,7 @@ pub(super) fn log_mass(side: Side, variances: &[f64], means: &[f64], eta: f64) -
     let (Some((w, inner)), Some((b, inner_means))) = (variances.split_first(), means.split_first()) else {
         return side.of_point(true);
     };
+    // The least variance is negligible: that coordinate is known, and uses up its share of the radius.
     if let (Some((last_w, rest)), Some((last_b, rest_means))) = (variances.split_last(), means.split_last())
         && *last_w <= KNOWN * eta
     {
@@ -81,11 +82,13 @@ pub(super) fn log_mass(side: Side, variances: &[f64], means: &[f64], eta: f64) -
             return tame_plane([*w, *inner_w], [*b, *inner_b], eta);
         }
         (Side::Inside, ..) => {}
+        // Outside: the two tails of the first coordinate, and below the part within its radius.
         (Side::Outside, ..) => {
             sum.add(normal::log_cdf((-radius - b) / deviation));
             sum.add(normal::log_cdf((b - radius) / deviation));
         }
     }
+    // Given the first coordinate, the others lie in an ellipsoid of what is left of the radius: recursion over dimensions.
     if !inner.is_empty() {
         let leading = leading(*w, *b, eta);
         let integrand = |theta: f64| {

@@ -183,6 +183,7 @@ impl<const D: usize> JointBelief<D> {
         after: impl FnOnce(&SVector<f64, M>, &SMatrix<f64, M, M>) -> Result<EllipsoidMoments<M>, Error>,
     ) -> Result<f64, Error> {
         let (h, own) = (sensor.matrix(), i + 1);
+        // The innovation of the sensor under its own estimate is a linear function of the joint state of centre and sensor.
         let rows = self.rows(h, 0) - self.rows(h, own);
         let covariance = symmetrised(&(&rows * rows.transpose() + sensor.noise_covariance()));
         let factor = Cholesky::new(covariance).ok_or(Error::IMPOSSIBLE)?;
@@ -193,6 +194,7 @@ impl<const D: usize> JointBelief<D> {
         self.shift(&gains, &(after.mean - mu));
         self.detach(&gains, &rows);
         let residual = columns(&gains * noise);
+        // The sensor itself has used its measurement: its block moves by its own gain.
         let mut mean = self.mean.fixed_rows_mut::<D>(own * D);
         mean += step.gain * after.mean;
         let mut absorbed = gains.fixed_rows_mut::<D>(own * D);
@@ -229,6 +231,7 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
     next.predict(dynamics)?;
     let link = network.link();
     let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
+    // Values first: their update is exact, and what silence means is then computed under the better belief.
     for (i, ((sensor, step), observation)) in sensors() {
         if let Observation::Received(value) = observation {
             info.log_likelihood += link.of_received()?.ln() + next.receive(sensor, step, i, value)?;

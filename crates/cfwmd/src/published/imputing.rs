@@ -95,6 +95,7 @@ where
     let (link, loss) = (network.link(), network.link().loss());
     let mut log_weights = vec![0.0; next.cloud.means().len()];
     let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
+    // Values first, so that what silence imputes is drawn given them.
     for received in [true, false] {
         for (i, ((sensor, (step, rule)), observation)) in sensors().filter(|s| s.1.1.received().is_some() == received) {
             let mut contradicted = 0;

@@ -200,6 +200,7 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
         let (prediction, r) = (self.sensing.mean(broadcast)[0], self.sensing.noise_covariance_at(broadcast)[0]);
         finite("prediction", prediction)?;
         let y = self.trigger.precision;
+        // The probability of silence is a Gaussian bump of precision `y` without normalisation: `exp(-y (z - prediction)^2 / 2)`.
         let log_scale = 0.5 * (std::f64::consts::TAU.ln() - y.ln());
         Ok(match observation {
             Observation::Received(z) => {

@@ -183,10 +183,12 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         const MOST_NODES: usize = 128;
         const NEGLIGIBLE: f64 = 34.0;
         let finest = features.iter().map(|f| f.1).fold(1.0, f64::min);
+        // A likelihood that changes far out, or over less than .3 prior deviations, needs the adaptive rule.
         if features.iter().any(|(at, _)| at.abs() > 6.0) || finest < 0.3 {
             return None;
         }
         let step = 0.5 * finest;
+        // Most posteriors lie within `NEAR` prior deviations; nodes beyond are evaluated only if the integrand has not fallen there.
         let near = 4 * (NEAR / (4.0 * step)).ceil() as usize;
         let most = near + 8 * ((REACH - step * near as f64) / (8.0 * step)).ceil() as usize;
         let (mut nodes, mut logs, mut weights) = ([0.0; MOST_NODES], [0.0; MOST_NODES], [0.0; MOST_NODES]);
@@ -212,6 +214,8 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         };
         let (nodes, weights) = (&nodes[from..to], &mut weights[from..to]);
         kernels::exp_minus(&logs[from..to], peak, weights);
+        // The sum over every second node is the same rule at twice the step. Their difference estimates the error of the coarser rule,
+        // which is far above that of the finer one.
         let (mut all, mut even) = ([0.0; 3], [0.0; 3]);
         for (i, (t, p)) in nodes.iter().zip(&*weights).enumerate() {
             for (k, term) in [*p, p * t, p * t * t].into_iter().enumerate() {
@@ -225,6 +229,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         if (0..3).any(|k| (all[k] - even[k]).abs() > 1e-3 * scales[k]) {
             return None;
         }
+        // The variance is summed about the mean, since the difference of raw moments would cancel for a narrow posterior.
         let shift = all[1] / all[0];
         let spread = |(t, p): (&f64, &f64)| p * (t - shift) * (t - shift);
         let second = nodes.iter().zip(&*weights).map(spread).sum::<f64>() / all[0];
@@ -242,8 +247,10 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
     /// Golden-section search around a candidate that is no worse than its neighbours, until the posterior is flat between
     /// them: panels do the rest.
     fn maximum(&mut self, mut left: (f64, f64), mut best: (f64, f64), mut right: (f64, f64)) -> (f64, f64) {
+        // Golden section: the probe divides the longer part, so that each step shrinks the bracket by at least .618.
         const SHARE: f64 = 0.381_966_011_250_105_2;
         for _ in 0..SEARCH {
+            // Less than one nat over the bracket: the quadrature resolves the rest.
             let flat = best.1 - left.1.min(right.1) < 1.0;
             if flat || right.0 - left.0 <= 1e-15 * (left.0.abs() + right.0.abs()) {
                 break;
@@ -333,6 +340,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         }
         let mut logs = [0.0; COARSE + FINE];
         self.logs(&nodes, &mut logs);
+        // Moments about the mode, and densities relative to the peak: neither overflows nor cancels.
         let sums = |range: std::ops::Range<usize>| {
             let mut sums = [0.0; 3];
             for i in range {

@@ -137,6 +137,7 @@ fn add_cell(means: &[f64], lower: f64, upper: f64, scale: f64, p: f64, probabili
     if lower == f64::NEG_INFINITY && upper == f64::INFINITY {
         pairs.for_each(|(sum, _)| *sum += p);
     } else if lower == f64::NEG_INFINITY || upper == f64::INFINITY {
+        // One edge at infinity: a single distribution function, mirrored where the cell lies below its edge.
         let (edge, scale) = if upper == f64::INFINITY {
             (lower, scale)
         } else {

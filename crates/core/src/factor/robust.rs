@@ -72,9 +72,11 @@ impl<const M: usize, F: Factor<M>> Factor<M> for Robust<F> {
             Err(error) => return Err(error),
         };
         let log_evidence = self.mixed(own.log_evidence);
+        // Posterior probability that the report is genuine. Otherwise it says nothing, and the prior remains.
         let share = (own.log_evidence + self.log_genuine - log_evidence).exp();
         let offset = own.mean - prior.mean();
         let mean = prior.mean() + offset * share;
+        // Moments of the mixture of both cases; the last term is the spread between their means.
         let covariance = own.covariance * share
             + prior.covariance() * (1.0 - share)
             + offset * offset.transpose() * (share * (1.0 - share));

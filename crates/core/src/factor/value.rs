@@ -110,6 +110,7 @@ impl<const M: usize> Factor<M> for Value<M> {
         let squared = innovation.dot(&factor.solve(&innovation));
         let log_evidence = -0.5 * squared - log_root_determinant - M as f64 * fewbits_numerics::normal::LN_SQRT_2PI;
         let mean = prior.mean() + gain * innovation;
+        // Joseph form: stays positive semidefinite under rounding.
         let covariance = keep * spread * keep.transpose() + gain * noise * gain.transpose();
         let finite = log_evidence.is_finite() && mean.iter().chain(covariance.iter()).all(|x| x.is_finite());
         if !finite {

@@ -52,6 +52,7 @@ pub fn density_integrates_to_one<const D: usize, R: Rng + ?Sized>(
 ) -> Result<(), Violation> {
     let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| vec![0.0; draws]);
     proposal.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
+    // Sweeps add to what is there: a start that is not zero shows one that overwrites.
     let mut logs = vec![0.25; draws];
     belief.add_log_densities(&columns.each_ref().map(Vec::as_slice), &mut logs);
     let mut ratios = Vec::with_capacity(draws);

@@ -24,6 +24,7 @@ pub fn stretches_compose<const D: usize>(
         let middle = first.mean(state);
         let (mean, expected) = (both.mean(state), second.mean(&middle));
         let jacobian = second.jacobian(&middle);
+        // Noise of the first stretch is carried through the second by the Jacobian at its start.
         let composed =
             jacobian * first.noise_covariance_at(state) * jacobian.transpose() + second.noise_covariance_at(&middle);
         let covariance = both.noise_covariance_at(state);

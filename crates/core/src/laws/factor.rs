@@ -64,6 +64,7 @@ pub fn tilted_is_quadrature(
     let (centre, variance) = (prior.mean()[0], prior.covariance()[0]);
     let step = 2.0 * reach / (points - 1) as f64;
     let nodes = || (0..points).map(|i| -reach + step * i as f64);
+    // The trapezoidal rule over the likelihood times the prior, relative to the peak.
     let log = |t: f64| factor.log_likelihood(&[centre + t].into()) - 0.5 * t * t / variance;
     let logs: Vec<f64> = nodes().map(log).collect();
     let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -134,6 +134,7 @@ where
     S::Report: PartialEq,
 {
     let observations = reports.into_iter().map(Observation::Received);
+    // All outcomes but `Lost` are compared with their own likelihoods; `Lost` must have what is left of one.
     let mut left = 1.0;
     for expected in observations.chain([Observation::Nothing]) {
         let factor = failed(HONEST, scheme.factor(feedback, &expected, link))?;

@@ -34,6 +34,7 @@ fn kernel_sums<const D: usize, const P: usize>(
     points: &[[f64; D]; P],
     offset: f64,
 ) -> [f64; P] {
+    // Several partial sums a point: additions of different lanes do not wait for each other.
     let mut lane = [[0.0; LANES]; P];
     let whole = weights.len() / LANES * LANES;
     for from in (0..whole).step_by(LANES) {

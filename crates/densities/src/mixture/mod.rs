@@ -199,6 +199,7 @@ fn log_sum_rows(terms: &[f64], out: &mut [f64]) {
             let n = out.len();
             let mut largest = [f64::MIN; BLOCK];
             let mut total = [0.0; BLOCK];
+            // Log-sum-exp of each column in two passes: the largest term, then the sum relative to it.
             for row in terms.chunks_exact(BLOCK) {
                 for (l, x) in largest[..n].iter_mut().zip(row) {
                     *l = if *x > *l { *x } else { *l };

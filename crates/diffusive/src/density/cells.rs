@@ -103,6 +103,7 @@ impl<const D: usize> Cells<D> {
         let (mut logs, mut scores, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         let mut before: Option<(f64, f64)> = None;
         let mut evaluations = 0;
+        // Each level halves the width of the cells that are kept.
         for _ in 0..DEEPEST {
             let count = centres[0].len();
             logs.clear();
@@ -124,6 +125,7 @@ impl<const D: usize> Cells<D> {
                 let (mean, covariance) = moments(&centres, &weights, total);
                 let variances = symmetric_eigen(covariance).0;
                 let (determinant, narrowest) = (variances.product(), variances.min().max(0.0).sqrt());
+                // Done when evidence and covariance no longer change with the cell width, and cells are small beside the posterior.
                 let settled = before.is_some_and(|(evidence, size)| {
                     (log_evidence - evidence).abs() < options.evidence_tolerance
                         && (determinant / size - 1.0).abs() < options.determinant_tolerance
@@ -151,6 +153,7 @@ impl<const D: usize> Cells<D> {
                 before = Some((log_evidence, determinant));
             }
             let threshold = best_score - options.keep;
+            // Counted before they are made, so that a density too thin for the limit needs no memory.
             let kept = scores.iter().filter(|score| **score > threshold).count();
             if kept << D > options.most_cells {
                 return Err(Error::Unresolved { cells: kept << D });

@@ -143,6 +143,7 @@ struct Part<const D: usize> {
 impl<const D: usize> Cloud<'_, D> {
     fn part(&self, order: &[u32], from: usize, to: usize) -> Part<D> {
         let members = &order[from..to];
+        // Relative to a member: sums of squares about the origin of the coordinates would cancel.
         let origin = SVector::<f64, D>::from_fn(|d, _| self.columns[d][members[0] as usize]);
         let (mut weight, mut first, mut second) = (0.0, SVector::<f64, D>::zeros(), SMatrix::<f64, D, D>::zeros());
         let mut own = SVector::<f64, D>::zeros();
@@ -169,6 +170,7 @@ impl<const D: usize> Cloud<'_, D> {
             from,
             to,
             axis,
+            // The part with the largest weighted variance along its axis is split next.
             urgency: if members.len() > 1 {
                 weight * variance.max(0.0)
             } else {

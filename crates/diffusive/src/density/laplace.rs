@@ -57,11 +57,13 @@ impl<const D: usize> Peak<D> {
             let Some((step, definite)) = ascent(&gradient, &hessian, &extent) else {
                 return no_peak("a derivative is not finite");
             };
+            // Rise that the quadratic model promises.
             let gain = 0.5 * gradient.dot(&step);
             if definite && gain < SETTLED.max(1e-15 * height.abs()) {
                 return Self::at(log_density, x, height, extent);
             }
             let mut share = 1.0;
+            // The step is halved until it leads upwards.
             let climbed = (0..40).find_map(|_| {
                 let next = x + step * share;
                 let level = log_density(&next);
@@ -73,6 +75,7 @@ impl<const D: usize> Peak<D> {
                 None if definite && gain < 1e-6 => return Self::at(log_density, x, height, extent),
                 None => return no_peak("no step leads upwards"),
             }
+            // Differences are taken over the width of the peak, which is now known better.
             if definite && let Some(inverse) = (-hessian).cholesky() {
                 extent = inverse.inverse().diagonal().map(f64::sqrt);
             }

@@ -67,6 +67,7 @@ impl<const D: usize> Clumps<D> {
                 .enumerate()
                 .min_by(|a, b| a.1.weight.total_cmp(&b.1.weight))
                 .map(|(at, c)| (at, c.weight));
+            // A component of little weight is removed, and the others are fitted again.
             match least {
                 Some((at, weight)) if weight < options.least_weight && fitted.len() > 1 => {
                     components = fitted;

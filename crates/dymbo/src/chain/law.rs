@@ -98,6 +98,7 @@ impl MessageLaw {
             p = filtered_variance(p, r, FRAC_2_PI);
             let mut longer = Self::empty();
             for (threshold, (_, string)) in law.corrections.iter().zip(&law.factors) {
+                // Each string of bits branches in two. The next sensor compares with the estimate that the string has led to.
                 for bit in BITS {
                     let mut string = string.clone();
                     string.push(scheme.factor(threshold, &Observation::Received(bit), &Link::PERFECT)?);

@@ -189,6 +189,7 @@ impl ErrorChain {
             .nodes()
             .map(|e| {
                 let (mut first, mut end) = (self.grid.points(), 0);
+                // The error after a message of this correction, moved by the plant: a normal kernel about `a (e - correction)`.
                 for (probability, correction) in law.messages(e) {
                     let centre = a * (e - correction);
                     column.add_kernel(centre, unit * probability);
@@ -225,6 +226,7 @@ impl ErrorChain {
                     *n += w * p;
                 }
             }
+            // Truncated kernels lose a little mass in each step; it is given back.
             let total = next.iter().sum::<f64>() * self.grid.spacing();
             let mut change = 0.0;
             for (n, p) in next.iter_mut().zip(&self.density) {

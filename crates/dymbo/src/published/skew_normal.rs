@@ -33,6 +33,7 @@ pub fn distance_from_normal(prior_variance: f64, measurement_variance: f64) -> R
         (exact - log_pdf_with(theta, mean, variance).exp()).abs()
     };
     let at = |i: usize| s * 12.0 * (2.0 * i as f64 / SCAN as f64 - 1.0);
+    // The difference has several peaks: a scan finds the highest, golden section refines it.
     let best = (1..SCAN)
         .max_by(|&i, &j| difference(at(i)).total_cmp(&difference(at(j))))
         .unwrap_or(1);

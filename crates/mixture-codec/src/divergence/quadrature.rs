@@ -89,6 +89,7 @@ impl<const D: usize> QuadratureGrid<D> {
         }
         let (mut log_p, mut log_q) = (vec![0.0; row], vec![0.0; row]);
         let mut total = [0.0; 4];
+        // The number of the row, in mixed radix, names the coordinates that are constant along it.
         for r in 0..rows {
             let mut rest = r;
             for d in (0..D - 1).rev() {
@@ -102,6 +103,7 @@ impl<const D: usize> QuadratureGrid<D> {
             let mut sums = [0.0; 4];
             for (lp, lq) in log_p.iter().zip(&log_q) {
                 let (a, b) = (lp.exp(), lq.exp());
+                // Where p underflows, its term of the divergence has the limit zero.
                 if a > 0.0 {
                     sums[0] += a * (lp - lq);
                 }

@@ -112,6 +112,7 @@ fn pairwise<const D: usize>(
         }
     }
     let mut alive = vec![true; n];
+    // For each part the cheapest partner after it. A merge changes few of these, so that a step costs O(n), not O(n^2).
     let cheapest = |i: usize, costs: &[f64], alive: &[bool]| -> (f64, usize) {
         let mut best = (f64::INFINITY, usize::MAX);
         for j in i + 1..n {
@@ -137,6 +138,7 @@ fn pairwise<const D: usize>(
             costs[low * n + high] = cost(&parts[low], &parts[high]);
         }
         for k in (0..n).filter(|k| alive[*k]) {
+            // The cheapest partner has changed or is gone: look again. Otherwise only the merged part can have become cheaper.
             let stale = k == i || best[k].1 == i || best[k].1 == j;
             if stale {
                 best[k] = cheapest(k, &costs, &alive);

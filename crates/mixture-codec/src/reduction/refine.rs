@@ -33,6 +33,7 @@ pub fn refine<const D: usize>(
     let points = Points::new(estimate, rule);
     let origin = estimate.particles().mean();
     let white = estimate.kernel_factor();
+    // In coordinates in which the kernel of the estimate is the unit Gaussian.
     let mut parts: Vec<Component<D>> = mixture
         .components()
         .iter()
@@ -146,6 +147,7 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Component<D>>) -> Re
                         total[j] += shares[j];
                     }
                 }
+                // Far from all parts the densities underflow: such points are computed relative to their own largest term.
                 if total.iter().any(|t| *t < TINY) {
                     far_shares(parts, &heights, columns, &mut gaps, &mut shares, &mut total);
                 }
@@ -162,6 +164,7 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Component<D>>) -> Re
             }
         },
     );
+    // A part that no point belongs to is dropped.
     let mut next = Vec::with_capacity(parts.len());
     for (part, sums) in parts.iter().zip(&sums) {
         if folded(sums.share) > f64::MIN_POSITIVE {

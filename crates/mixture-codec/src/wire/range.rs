@@ -87,6 +87,7 @@ pub(super) trait Coder {
                     return Err(refuse());
                 };
                 let first = centre - i64::from(half);
+                // Numbers outside the table take the escape digit and follow as 32 plain bits.
                 let index = wanted.map(|n| u32::try_from((n >> low) - first).map_or(escape, |index| index.min(escape)));
                 let index = self.digit(table, index)?;
                 if index < escape {
@@ -131,6 +132,7 @@ impl Writer {
         let high = low + u128::from(state.range().get());
         let mut length = 0;
         let mut point = 0;
+        // The shortest binary fraction whose whole interval lies within the coder's: any bits may follow it.
         for bits in 0..=64 {
             let unit = WHOLE >> bits;
             point = low.div_ceil(unit) * unit;

@@ -221,6 +221,7 @@ fn cholesky<const D: usize>(
     for i in 1..D {
         for j in 0..i {
             let target = wanted.map(|l| l[(i, j)] / l[(i, i)] / scales.ratio_step);
+            // Entries left of the diagonal travel relative to it: their steps are fractions of the row's deviation.
             let ratio = scales.ratio_step * symbols.next(&law, target)? as f64;
             lower[(i, j)] = ratio * lower[(i, i)];
         }

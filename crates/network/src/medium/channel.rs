@@ -121,8 +121,10 @@ impl Channel {
         for _ in 0..1 + usize::from(twice) {
             let mut delay = self.delay.value();
             if self.jitter > Seconds::ZERO {
+                // An exponential delay by inversion; `ln_1p(-u)` keeps u near zero exact.
                 delay -= self.jitter.value() * (-rng.random::<f64>()).ln_1p();
             }
+            // A held copy lets later ones overtake it.
             if self.reordering > 0.0 && rng.random::<f64>() < self.reordering {
                 delay += self.held.value();
             }

@@ -48,6 +48,7 @@ impl Field {
     pub fn from_csv(links: &str) -> Result<Self, Error> {
         let mut lengths = BTreeMap::new();
         for (number, line) in (1..).zip(links.lines().map(str::trim)) {
+            // The first line may be a heading.
             if line.is_empty() || number == 1 && !line.starts_with(|c: char| c.is_ascii_digit()) {
                 continue;
             }
@@ -61,6 +62,7 @@ impl Field {
                 .ok()
                 .filter(|metres| metres.is_finite() && *metres > 0.0 && cells.next().is_none());
             let metres = metres.ok_or_else(|| refused("metres above 0 as its third and last cell"))?;
+            // Links have no direction: the smaller number comes first in the key, and a link given twice is refused.
             if a == b || lengths.insert((a.min(b), a.max(b)), metres).is_some() {
                 return Err(refused("each link once, between two nodes").into());
             }

@@ -96,6 +96,8 @@ impl Loss {
         else {
             return (self.probability(distance), None);
         };
+        // The two-state Markov chain in continuous time (Gilbert-Elliott). Since the last look the memory of its state has decayed
+        // exponentially towards the stationary share.
         let share = mean_bad.value() / (mean_good.value() + mean_bad.value());
         let chance = burst().map_or(share, |before| {
             let elapsed = (now.since_start() - before.at.since_start()).value();

@@ -91,6 +91,7 @@ impl<L: Leader> Walk<L> {
 
     fn carry_out(&self, node: &mut WalkNode, context: &mut Context<'_>, mut errands: Vec<Errand>) -> Result<(), Error> {
         let now = context.now().0;
+        // Each errand can lead to others; they are done in rounds until none is left.
         while !errands.is_empty() {
             let mut next = Vec::new();
             for errand in errands {

@@ -63,6 +63,7 @@ impl SimulatorCore {
 
     /// Sends once. True if a receiver listened.
     pub(super) fn attempt(&mut self, attempt: &Attempt<'_>) -> bool {
+        // Buffers of past transmissions are used again: most runs allocate nothing per frame.
         let mut pool = std::mem::take(&mut self.pool);
         let mut receptions = self.draw(attempt, &mut pool);
         let listened = !receptions.is_empty();
@@ -135,9 +136,11 @@ impl SimulatorCore {
             });
             return;
         }
+        // Every pair of transmission and receiver has a stream of its own: a change elsewhere does not alter what happens here.
         let stream = self.air.indexed(u64::from(from.0)).indexed(sent);
         let mut rng = stream.indexed(u64::from(to.0)).indexed(purpose).fast_rng();
         let lost = self.loss_now(&mut rng, from, to, &loss);
+        // A message of several link frames is lost if any of them is.
         let any_lost = match link_frames {
             1 => lost,
             several => 1.0 - (1.0 - lost).powf(several as f64),

@@ -148,6 +148,7 @@ impl SimulatorCore {
             Some(to) => self.field.check_link(from, to).is_ok(),
             None => known(from),
         };
+        // A stored state is not trusted: an index beyond the nodes would panic much later.
         let consistent = state.ledger.accounts.len() == nodes
             && state.alive.len() == nodes
             && (0..nodes).all(|node| state.alive[node] == state.ledger.accounts[node].died.is_none())
@@ -186,6 +187,7 @@ impl SimulatorCore {
         let Some(rate) = self.setup.drift.get(&node) else {
             return local;
         };
+        // Division and rounding may miss by a tick: `local` decides.
         let mut time = Instant((local.0 as f64 / (1.0 + rate)) as u64);
         while time.0 > 0 && self.local(node, Instant(time.0 - 1)) >= local {
             time.0 -= 1;
@@ -258,6 +260,7 @@ impl SimulatorCore {
         match fault.kind {
             FaultKind::Death => self.kill(fault.node, self.state.now),
             FaultKind::Outage(duration) => {
+                // Outages that overlap last until the later end.
                 let until = self.state.now.after(duration);
                 let out = &mut self.state.out_until[fault.node.index()];
                 *out = until.max(*out);
@@ -304,6 +307,7 @@ impl SimulatorCore {
     fn exhaust(&mut self, node: SensorId, overspent: Joules) {
         let radio = self.setup.radio_of(node);
         let idle = (radio.baseline + radio.sleep).value();
+        // The overspent energy at the idle rate is the time that has passed since the battery was empty.
         let since = if idle > 0.0 { overspent.value() / idle } else { 0.0 };
         let now = self.state.now.since_start().value();
         self.kill(node, Instant::default().after(Seconds::trusted((now - since).max(0.0))));

@@ -161,6 +161,7 @@ impl<P: Protocol> Simulator<P> {
             self.core.state.ledger.faults.lost += 1;
             return Ok(());
         }
+        // The radio acknowledges an intact frame before the protocol looks at it.
         if let Some(frame) = answer {
             self.core.answer(frame, id, from);
         }

@@ -181,6 +181,7 @@ impl Setup {
         for (node, radio) in &self.radios {
             field.check(*node)?;
             radio.checked()?;
+            // Receivers charge the time of a frame as its sender computed it: all must compute the same.
             if !radio.understands(&self.radio) {
                 let expected = "bit rate, preamble, header, acknowledgement and mtu of the others";
                 return refuse("radios", format!("another radio at {node}"), expected);

@@ -35,6 +35,7 @@ impl SimulatorCore {
                 .chain([&bits])
                 .map(|f| f.bits() as u64 + LENGTH_BITS)
                 .sum();
+            // A batch that would need a second link frame saves nothing: what waits is sent first.
             if radio.link_frames(Bits(together)) > 1 {
                 self.send_batch(from, to);
             }
@@ -47,6 +48,7 @@ impl SimulatorCore {
                 ..Batch::default()
             };
             self.state.batches.insert((from, to), batch);
+            // The first frame of a batch starts its timer.
             let at = self.state.now.after(batching.hold);
             self.schedule(at, from, EventKind::Flush(number));
         }
@@ -99,6 +101,7 @@ impl SimulatorCore {
             true => self.state.now,
             false => self.book(from, size.air, acknowledged),
         };
+        // The common case of a free medium needs no entry among the outgoing frames.
         if !contends && !acknowledged && start == self.state.now {
             self.attempt(&Attempt {
                 from,

@@ -130,6 +130,7 @@ impl Bank {
                 ahead.with_family(family, |shape| update_each(shape, step, [x, v, w], |w| total += w));
             }
         }
+        // Each model keeps a least share, from which it can come back.
         let inverse = (1.0 - SWITCHING) / total;
         for w in &mut self.w {
             *w = *w * inverse + SWITCHING / MODELS as f32;

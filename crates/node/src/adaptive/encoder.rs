@@ -132,6 +132,7 @@ impl Encoder {
         }
         self.slot = self.slot.wrapping_add(1);
         let slot = self.replica.predict(elapsed);
+        // Within the accuracy of the prediction: silence says it.
         let Some(content) = Content::of(&self.replica, &slot, sample) else {
             self.replica.silent(&slot);
             return Ok(None);

@@ -187,6 +187,7 @@ impl<'a> Law<'a> {
         let [a, b, _] = replica.coders.map(|weight| (weight * WEIGHTS as f32) as u32);
         let a = a.min(WEIGHTS);
         let b = b.min(WEIGHTS - a);
+        // Mixture of the three coders in integers: sensor and receiver must agree to the last bit.
         let mixed = [(a, bank), (b, residuals), (WEIGHTS - a - b, values)];
         let share: u64 = mixed
             .iter()
@@ -212,6 +213,7 @@ impl<'a> Law<'a> {
         let start = self.cumulative(middle);
         let upwards = start <= quantile;
         *(if upwards { &mut low } else { &mut high }) = (middle, start);
+        // Most symbols lie near the middle: steps double until the quantile is passed, then the interval is halved.
         let mut step = 1;
         while high.0 - low.0 > 1 {
             let probe = if step < high.0 - low.0 {

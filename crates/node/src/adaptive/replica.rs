@@ -168,6 +168,7 @@ impl Replica {
             let found = [from_bank, from_residuals, from_values];
             spread(&mut self.coders, found, CODER_SWITCHING);
         }
+        // A predictor that was right keeps its weight; one that was wrong is weighed by how probable its error was.
         let mut factors = [1.0; PREDICTORS];
         let predictors = slot.candidates.iter().zip(&mut self.residuals);
         for (factor, (candidate, residuals)) in factors.iter_mut().zip(predictors) {
@@ -181,6 +182,7 @@ impl Replica {
         self.values.add(name, if reported { REPORTED } else { 1 });
         (self.before, self.last, self.gap) = (self.last, j, slot.ahead.slots);
         if let (Some(cells), true) = (self.lattice.cells(), j.abs() > TURN) {
+            // Whole turns are taken off before the index grows large.
             let turns = j - j.checked_rem_euclid(cells).unwrap_or(0);
             self.last -= turns;
             self.before -= turns;

@@ -127,6 +127,7 @@ impl<const D: usize> KernelMessage<D> {
         let count = self.len();
         let largest = kernels::largest(&self.log_weights);
         let mut fallbacks = 0;
+        // All weights zero: equal ones replace them, and the fallback is counted.
         if !largest.is_finite() {
             self.log_weights.fill(0.0);
             fallbacks = 1;

@@ -129,6 +129,7 @@ impl MessagePassing {
         let law = target.chain().law(k);
         let values = target.chain().values();
         for i in 0..n {
+            // Position and velocity share one acceleration and one noise per axis.
             for axis in 0..2 {
                 let a = draw(rng, &law, &values);
                 let noise = deviation * rng.sample::<f64, _>(StandardNormal);
@@ -145,6 +146,7 @@ impl MessagePassing {
             .for_each(|(to, from)| to.copy_from_slice(from));
         message.log_weights.fill(0.0);
         let spread = half * half * target.noise_variance();
+        // Only as printed: one draw from each component is an exact stratified sample and needs no weight (erratum `mpa-4`).
         if self.dynamics_weight == DynamicsWeight::PrintedRatio && spread > 0.0 {
             let log_density = |i: usize, j: usize| {
                 let (dx, dy) = (states[0][i] - means[0][j], states[1][i] - means[1][j]);
@@ -190,6 +192,7 @@ impl MessagePassing {
         let (at, noise) = (range.sensing.position(), range.factor.noise());
         let offset = predicted - at;
         let distance = offset.norm();
+        // Draws all round the sensor, or only on the arc that the prediction reaches.
         let (bearing, half) = match self.ring {
             Ring::Full => (0.0, PI),
             Ring::Local => {
@@ -210,6 +213,7 @@ impl MessagePassing {
             message.points[0][i] = at[0] + d * angle.cos();
             message.points[1][i] = at[1] + d * angle.sin();
             message.log_weights[i] = match self.ring_weight {
+                // A draw uniform in range and angle has a density that falls with the distance; the weight undoes it.
                 RingWeight::Jacobian => d.abs().max(1e-9 * upper).ln(),
                 RingWeight::Uniform | RingWeight::PrintedRatio => 0.0,
             };

@@ -130,6 +130,7 @@ fn gibbs<const D: usize, R: Rng + ?Sized>(
     let Some(first) = messages.first() else {
         return refuse("messages", 0, "at least one");
     };
+    // About a point of the first message, so that products of large coordinates do not cancel.
     let origin = first.point(0);
     let ProductWorkspace {
         logs, labels, parts, ..
@@ -153,6 +154,7 @@ fn gibbs<const D: usize, R: Rng + ?Sized>(
         if alone {
             continue;
         }
+        // For the conditional of one label given the others: the product of their kernels is one Gaussian of covariance `rest`.
         part.rest = inverse(&(total - part.precision))?;
         part.whitener = whitener(&(part.rest + message.kernel))?;
         for i in 0..message.len() {
@@ -167,6 +169,7 @@ fn gibbs<const D: usize, R: Rng + ?Sized>(
             labels.push(label);
             shift += part.precision * message.point(label);
         }
+        // Sweeps over the labels, each drawn given all others.
         for _ in 0..if alone { 0 } else { sweeps } {
             for (l, (message, part)) in messages.iter().zip(parts.iter()).enumerate() {
                 shift -= part.precision * message.point(labels[l]);
@@ -258,6 +261,7 @@ fn importance<const D: usize, R: Rng + ?Sized>(
         let z = SVector::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
         places[n] = first.point(chosen[n]) + spread * z;
     }
+    // Draws from the first message, weighed by the densities of the others.
     for message in others {
         let white = whitener(&message.kernel)?;
         logs.resize(message.len(), 0.0);
@@ -273,6 +277,7 @@ fn importance<const D: usize, R: Rng + ?Sized>(
         return Err(Error::IMPOSSIBLE);
     }
     let total: f64 = log_weights.iter().map(|l| (l - largest).exp()).sum();
+    // Systematic resampling of the draws by these weights.
     let (step, mut cumulative, mut n) = (total / out.labels.len() as f64, (log_weights[0] - largest).exp(), 0);
     let offset: f64 = rng.random();
     for k in 0..out.labels.len() {

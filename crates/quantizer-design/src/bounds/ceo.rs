@@ -200,6 +200,7 @@ impl Ceo {
             gradient[i] = 1.0 / r[i];
             hessian[(i, i)] = 1.0 / (r[i] * r[i]);
         }
+        // Barrier: the logarithm of the slack of every subset constraint of the rate region.
         for subset in 0..1 << n {
             let (value, slope, bend, inside) = self.constraint(subset, r);
             let slack = value - tau;
@@ -220,6 +221,7 @@ impl Ceo {
             change: 1.0 / weight,
         };
         let step = hessian.cholesky().ok_or(stalled)?.solve(&gradient);
+        // The Newton decrement bounds how far the barrier function is from its maximum.
         let decrement = step.dot(&gradient);
         Ok((step, decrement))
     }

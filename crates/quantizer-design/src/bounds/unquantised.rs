@@ -28,6 +28,7 @@ pub fn unquantised(model: &ObservationModel, criterion: Criterion) -> Result<Opt
     if !(deviation > 0.0 && count * values.len() as f64 <= MAX_TERMS) {
         return Ok(None);
     }
+    // The weighted mean of all samples is a sufficient statistic: one integral over it.
     let (step, mean) = (STEP * deviation, model.sample_mean());
     let (mut explained, mut information, mut correct) = (0.0, 0.0, 0.0);
     for i in 0..=count as usize {

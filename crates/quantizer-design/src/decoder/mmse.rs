@@ -139,6 +139,7 @@ impl MmseDecoder {
                     return refuse("symbol", symbol.0, format!("a number below {}", symbols.rows()));
                 }
                 product.iter_mut().zip(symbols.row(symbol.0)).for_each(|(p, s)| *p *= s);
+                // Scaled after each factor: the product of many probabilities underflows.
                 let largest = product.iter().copied().fold(0.0, f64::max);
                 if largest > 0.0 {
                     product.iter_mut().for_each(|p| *p /= largest);

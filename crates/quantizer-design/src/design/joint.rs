@@ -90,6 +90,8 @@ pub(crate) fn joint_until(
         && let Some((group, opposed)) = steepest.filter(|(_, opposed)| opposed.curvature > 0.0)
     {
         let length = STEP_OFF * breakpoint_scale(&design.system, &[group]);
+        // At a saddle the sensors of a group gain by differing: the group is halved along the direction of ascent, and both halves are
+        // optimised.
         let Ok(apart) = halved(&design.system, group, &opposed.direction, length) else {
             break;
         };
@@ -149,6 +151,7 @@ fn optimise_until(
     }
     let designed = problem.system_at(&found.point)?;
     let unit = problem.unit(found.value);
+    // A maximum among equal quantizers can be a saddle once they may differ: that curvature is checked, too.
     let (steepest, scope) = steepest_opposed(&designed, active, criterion)?;
     let largest_curvature = steepest
         .iter()
@@ -216,6 +219,7 @@ pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &N
                 return refuse("system", format!("{} sensors in group {g}", group.sensors().len()), "single sensors");
             }
             sensors.push(group.sensors()[0]);
+            // Sensors before this one keep their design; only the last is optimised.
             let designed = stages.last().and_then(|d| d.system.groups().get(stage));
             quantizers.push(designed.unwrap_or(group).quantizer().clone());
             channels.push(group.channel().clone());
@@ -248,6 +252,7 @@ pub fn multi_start(
         };
         let better = match &best {
             Ok(design) => {
+                // A maximum is preferred to a saddle, whatever their values.
                 let saddle = (design.is_saddle(), candidate.is_saddle());
                 criterion.sense() * (candidate.value - design.value) > 0.0 && saddle != (false, true)
                     || saddle == (true, false)

@@ -96,6 +96,7 @@ impl ObservationModel {
     }
 
     fn resolved(prior: Prior, noise: Noise, resolution: Resolution) -> Result<Self, Error> {
+        // Products over many sensors are narrower than one: nodes come closer with the root of their number.
         let crowd = (noise.sensors().max(2) as f64 / 2.0).sqrt();
         let narrowest = (0..noise.sensors())
             .map(|n| noise.deviation(n))

@@ -48,6 +48,7 @@ impl Prior {
         let values: Vec<f64> = (0..=count as usize).map(|i| low + i as f64 * step).collect();
         let mut weights = vec![0.0; values.len()];
         for (weight, centre, deviation) in bells {
+            // Beyond `REACH` deviations a component adds nothing to the sum.
             let first = ((centre - REACH * deviation - low) / step).max(0.0) as usize;
             let last = ((centre + REACH * deviation - low) / step).ceil() as usize;
             let range = first..(last + 1).min(values.len());

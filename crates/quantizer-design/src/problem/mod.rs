@@ -90,6 +90,7 @@ impl<'a> Problem<'a> {
             if scored.has_separable_entropy() {
                 constant += entry.group.sensors().len() as f64 * negative_entropy(&symbols, &model.mass.weights);
             }
+            // Groups that stay as they are enter through the probabilities of their reports.
             fixed.push(reports);
             log_multiplicity = sums(&log_multiplicity, &entry.compositions.log_multiplicity);
         }

@@ -151,6 +151,7 @@ impl Problem<'_> {
         let mut gradient = DVector::zeros(n);
         let mut hessian = DMatrix::zeros(n, n);
         let mut worth = vec![0.0; nodes];
+        // A breakpoint moves probability from one cell to its neighbour: `exchange` has the sign for each symbol.
         for i in 0..n {
             worth.fill(0.0);
             for (t, c) in a.exchange[i].iter().enumerate().filter(|(_, c)| **c != 0.0) {

@@ -85,6 +85,7 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
                 labels: quantizer.labels().to_vec(),
             });
         }
+        // Breakpoints are compared only while the cells keep their labels.
         let moved = if old.labels() == quantizer.labels() {
             let pairs = old.breakpoints().iter().zip(quantizer.breakpoints());
             pairs.fold(0.0, |m, (a, b)| f64::max(m, (a - b).abs()))

@@ -49,6 +49,7 @@ pub(super) fn level_gains<'a>(
             }
         }
     }
+    // What a level is worth: the mean over the symbols that the channel makes of it.
     let mut gains = vec![0.0; channel.inputs() * nodes];
     for (z, row) in gains.chunks_exact_mut(nodes).enumerate() {
         for (t, symbol) in per_symbol.chunks_exact(nodes).enumerate() {

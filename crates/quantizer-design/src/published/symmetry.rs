@@ -21,6 +21,7 @@ pub fn symmetry_breaking(
     criterion: Criterion,
     family: impl Fn(f64) -> Result<System, Error>,
 ) -> Result<f64, Error> {
+    // The largest eigenvalue of the Hessian at the symmetric design: positive where leaving it pays.
     let curvature = |parameter: f64| -> Result<f64, Error> {
         let found = family(parameter)?.derivatives(criterion)?;
         Ok(SymmetricEigen::new(found.hessian * criterion.sense()).eigenvalues.max())

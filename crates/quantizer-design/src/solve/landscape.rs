@@ -231,6 +231,8 @@ impl Landscape {
     ) -> Option<Block> {
         let mut total: Vec<f64> = Vec::new();
         for (s, scenario) in self.scenarios.iter().enumerate() {
+            // Sums over every outcome of the other sensors times every cell of this one: after that, words of cells are evaluated by
+            // adding.
             let others = symbols
                 .iter()
                 .enumerate()
@@ -284,6 +286,7 @@ impl Landscape {
         let (width, count) = (self.width(), law.words);
         let mut outcome = vec![0.0; width];
         let mut value = 0.0;
+        // Outcome by outcome of the other sensors: the link mixes the levels to symbols, and each symbol has its value.
         for other in levels.chunks_exact(count * width) {
             for t in 0..law.outputs {
                 outcome.fill(0.0);
@@ -341,6 +344,7 @@ impl Landscape {
                 for (w, level) in own.chunks_exact(width).enumerate() {
                     add_scaled(&mut outcome, law.probability(t, w), level);
                 }
+                // For a fixed decoder the criterion is linear in the outcome: its slope is what a cell is worth for each symbol.
                 self.scored.slope(&outcome, 0.0, slope);
             }
             let cells = &block.moments[other * block.cells * width..(other + 1) * block.cells * width];

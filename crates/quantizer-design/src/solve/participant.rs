@@ -123,6 +123,7 @@ pub(super) fn system_of(
 ) -> Result<System, Error> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for n in 0..participants.len() {
+        // Sensors of one design, one link and one noise form a group, whose outcomes are counts.
         let alike = groups.iter_mut().find(|group| {
             let first = group[0];
             !apart
@@ -158,6 +159,7 @@ fn parts_of(
         labels.push(at);
     }
     let mut breakpoints = cells.breakpoints.clone();
+    // A quantizer has at least two cells: a sensor that says nothing gets two of the same word.
     if used.len() == 1 {
         used.push(used[0]);
         (labels, breakpoints) = (vec![0, 1], vec![model.sample_mean()]);

@@ -160,11 +160,13 @@ pub(super) fn climb(
     let mut value = landscape.total(&grids, &words, &symbols, deadline)?;
     for _ in 0..MAX_ROUNDS {
         let before = value;
+        // One sensor at a time, given all others; a round cannot lower the value.
         for n in 0..grids.len() {
             let block = control
                 .step()
                 .then(|| landscape.block(n, &grids[n], &symbols, deadline))
                 .flatten();
+            // Out of time or steps: what was reached so far is a valid design.
             let Some(block) = block else {
                 return Some(Point { grids, words, value });
             };
@@ -205,6 +207,7 @@ pub(super) fn refine(
         for b in &cells.breakpoints {
             edges.extend((-FINER..=FINER).map(|i| b + *spacing * f64::from(i) / f64::from(FINER)));
         }
+        // Neighbouring breakpoints can have the same candidates.
         edges.sort_by(f64::total_cmp);
         edges.dedup_by(|b, a| *b - *a < 1e-3 * *spacing);
         if edges.is_empty() {
@@ -326,6 +329,7 @@ impl Sensor<'_> {
                     if !used[a] && !used[b] || self.deadline.is_over() {
                         continue;
                     }
+                    // Two words change places if that raises the value: over a noisy link the distance between words matters.
                     renamed.swap(a, b);
                     let value = self
                         .landscape

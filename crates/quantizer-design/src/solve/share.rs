@@ -33,6 +33,7 @@ pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Contro
         values: BTreeMap::new(),
     };
     let (mut bits, mut value) = (vec![0; sensors], f64::NEG_INFINITY);
+    // Greedy: each bit goes where it helps most.
     for _ in 0..total {
         let more: Vec<Vec<u32>> = (0..sensors)
             .filter(|n| bits[*n] < MAX_BITS)
@@ -43,6 +44,7 @@ pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Contro
             None => (value, moved(&bits, None, next_sensor(request, &bits))),
         };
     }
+    // Then bits move from one sensor to another while that helps.
     for _ in 0..MAX_MOVES {
         let pairs = (0..sensors).flat_map(|from| (0..sensors).map(move |to| (from, to)));
         let exchanged: Vec<Vec<u32>> = pairs

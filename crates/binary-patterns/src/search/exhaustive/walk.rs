@@ -88,6 +88,7 @@ impl<'a> Walk<'a> {
         let leaves = (0..search.sensors)
             .map(|r| candidates.integrands(tables.iter().map(|t| &t[r])))
             .collect();
+        // Sensors that patterns from j on must still get: branches that cannot serve them are cut.
         let mut forced_from = vec![0; kinds + 1];
         for j in (0..kinds).rev() {
             forced_from[j] = forced_from[j + 1] + search.forced[j];
@@ -119,6 +120,7 @@ impl<'a> Walk<'a> {
             let needed = self.search.forced[j].max(1);
             for m in needed..left {
                 let next = span.with(j as Mask + 1);
+                // Each sensor left can raise the rank by one at most.
                 let possible = !self.search.full_rank || next.rank() + (left - m) >= self.search.bits;
                 if possible && left - m >= self.forced_from[j + 1] && j + 1 < self.tables.len() {
                     steps.push((j, m, next));
@@ -134,6 +136,7 @@ impl<'a> Walk<'a> {
             let level = level.with(&self.tables[j][m - 1], self.candidates.flips[j]);
             self.branch(j + 1, left - m, next, &chosen, level)
         };
+        // Merged in the order of the branches: the result does not depend on the number of threads.
         if chosen.len() < PARALLEL_LEVELS {
             let parts: Vec<Top> = steps.par_iter().map(descend).collect();
             parts.into_iter().fold(found, Top::merge)
@@ -165,6 +168,7 @@ impl<'a> Walk<'a> {
         };
         let rows_each = (left + 1) * 2;
         let rows = (until - from) * rows_each;
+        // All candidates for the last pattern in one matrix product.
         let sums = level.integrals(&self.leaves[left - 1].rows(from * rows_each, rows));
         for j in (from..until).filter(|&j| allowed(j)) {
             let at = [rows, (j - from) * rows_each];

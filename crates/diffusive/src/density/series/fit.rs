@@ -54,6 +54,7 @@ impl<const D: usize> Lpg<D> {
         mut inner: impl FnMut(&Self, &Term<D>, usize, f64, &mut [f64]) -> bool,
     ) -> Result<LpgFit<D>, Error> {
         let belief = Self::skeleton(gaussians, degree)?;
+        // Coefficients solve `G c = b`: `G` has the inner products of the basis, `b` those of the density with it.
         let gram = belief.gram()?;
         let mut b = DVector::zeros(gram.nrows());
         let mut products = vec![0.0; belief.indices.len()];

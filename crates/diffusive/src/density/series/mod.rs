@@ -216,6 +216,7 @@ impl<const D: usize> Lpg<D> {
                 values.iter().zip(&term.coefficients).map(|(v, c)| v * c).sum::<f64>()
             };
             let product = at(&self.terms[l], ul) * at(&self.terms[m], um);
+            // Each pair of terms is visited once; pairs of different terms count twice.
             let w = weight * product * if l == m { 1.0 } else { 2.0 };
             let d = x - origin;
             mass += w;

@@ -40,6 +40,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                 Action::Predict { slot } if slot > u64::from(slots) => {}
                 Action::Predict { slot } => match predict_and_ask(&mut centre.receiver, &self.members, slot) {
                     Ok((feedback, state)) => {
+                        // The machine answers a prediction with frames and timers, which are carried out before the next action.
                         let mut sent = Vec::new();
                         centre.machine.on_predicted(&feedback, state.as_ref(), &mut sent);
                         self.carry_out(centre, context, sent)?;

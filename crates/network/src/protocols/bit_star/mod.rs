@@ -201,6 +201,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
     /// [`Error::Disconnected`] if a sensor does not reach the centre; [`Error::SlotTooShort`] if a slot has no time for a report of every sensor.
     pub fn simulate_on(self, field: Field, setup: Setup) -> Result<Simulator<Self>, Error> {
         let sensors = 1..=self.members.len() as u32;
+        // Without routes every sensor must hear the centre itself.
         let hops = match self.routes {
             Some(_) => {
                 field.routes(CENTRE)?;
@@ -237,6 +238,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             })));
         }
         let first = self.clock.start(1);
+        // Sensors that keep time themselves start on their own; the others wait for the centre.
         let clocked = |(_, member): &(usize, &Member)| member.feedback == Feedback::Clock;
         let clocked = self.members.iter().enumerate().filter(clocked);
         let starts: Vec<_> = clocked
@@ -281,11 +283,13 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             .filter(|(member, _)| member.feedback == Feedback::Told)
             .map(|(_, told)| (8 * Kind::Feedback.overhead() + told.bits()) as u64)
             .collect();
+        // The same message to all is broadcast once.
         if bodies.len() == told.len() && told.windows(2).all(|pair| pair[0] == pair[1]) {
             bodies.truncate(1);
         }
         bodies.extend(state.map(|_| (8 * Kind::Echo.overhead() + told.len()) as u64));
         let (report, relayed) = (8 * Kind::Report.overhead() as u64, 8 * Kind::Handover.overhead() as u64);
+        // A report travels every hop again, with the header of a relayed frame if there is more than one.
         for hops in hops.iter().copied() {
             bodies.extend(std::iter::repeat_n(report + if hops > 1 { relayed } else { 0 }, hops));
         }
