@@ -1,4 +1,4 @@
-//! Real signals within a guaranteed error, in as few bits as they deserve.
+//! Coding of real signals within a guaranteed error.
 //!
 //! A sensor and its receiver run the same bank of models of the signal and hold the same frequencies of past reports. Silence means
 //! that the sample is within `delta` of what both predict, and costs nothing; otherwise the residual is coded under the law that

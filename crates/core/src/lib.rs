@@ -1,10 +1,10 @@
-//! The words of estimation under communication constraints, and the laws that their implementations obey.
+//! The shared types and traits of estimation under communication constraints, and the laws that their implementations obey.
 //!
 //! > The **world** moves (dynamics) and is **sensed** (sensing). A sensor **reports** little (scheme: report, perhaps silence).
 //! > The report crosses a **link** at a price in bits. Whoever receives it knows how likely that observation was for each
 //! > noise-free measurement (**factor**) and updates a **belief**, which may itself travel on as a message.
 //!
-//! | word | item |
+//! | concept | item |
 //! |---|---|
 //! | how the world moves | [`Dynamics`], [`GaussianDynamics`], [`LinearDynamics`]; over any time: [`Evolution`] |
 //! | how it is sensed | [`Sensing`], [`LinearSensing`]; of which coordinates: [`OnAxes`] |

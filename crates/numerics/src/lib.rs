@@ -15,8 +15,8 @@
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
 //!
 //! The central choice: **probabilities of intervals live in the log domain, and nowhere else is one formed.** It costs an
-//! `erfcx` and an `exp` where `1 - cdf` would do in the middle of the bell, and it is why no filter in this workspace divides
-//! by zero when a bit is surprising.
+//! `erfcx` and an `exp` where `1 - cdf` would do in the middle of the distribution. Therefore no filter in this workspace divides
+//! by zero when a report was very improbable.
 //!
 //! ```
 //! use fewbits_numerics::normal;

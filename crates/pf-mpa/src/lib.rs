@@ -6,9 +6,10 @@
 //!
 //! The central choice: **a level is a factor, in closed form** ([`RangeFactor`]), and not a ring of particles under kernels. What a
 //! level says about a position is `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))`, at the *hypothesised* distance `d`; whoever has it needs no
-//! kernel, no weights and no Jacobian. From it every filter of the library follows, and the recommended one, [`GridFilter`]: a
-//! Gaussian in, its product with all factors on a grid of 15 x 15 nodes that follows the posterior, a Gaussian out, no random numbers. It is a third below Gaussian message
-//! passing and improved particle message passing, at a tenth of the latter's cost. What it gives up is any belief that is no bell.
+//! kernel, no weights and no Jacobian. Every filter of the library takes such a factor. The recommended one is [`GridFilter`]: it
+//! multiplies a Gaussian belief with all factors on a grid of 15 x 15 nodes that follows the posterior, and returns the Gaussian of the
+//! same moments, without random numbers. Its mean squared error is a third below those of Gaussian message passing and of improved
+//! particle message passing, at a tenth of the latter's cost. The price: it cannot represent a belief with several modes.
 //!
 //! | task | item |
 //! |---|---|

@@ -1,7 +1,7 @@
 //! Which sensor sends which bit: unequal sensors share the bits of one Gray-coded cell index.
 //!
 //! A uniform source on `[-V, V]` is divided into `2^N` cells; their reflected Gray code has `N` bits, and each of `N` sensors,
-//! of different noise, sends one. Coarse bits matter more but have few edges; fine bits have many and are the first to drown.
+//! of different noise, sends one. A wrong coarse bit costs more, but coarse bits have few edges; fine bits have many, and noise inverts them first.
 //! Which assignment is best is a linear assignment problem as long as bit errors are rare enough not to meet
 //! ([`pair_costs`], equation 6.6); the exact error of a given assignment costs `O(N)` a node for the decoder that takes
 //! the cell's centre ([`CodedSensors::centre_mse`]) and `2^N` for the posterior mean ([`CodedSensors::mmse`]).
