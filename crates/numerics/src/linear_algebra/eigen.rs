@@ -2,9 +2,10 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations: for the two or three dimensions of a
-/// measurement as fast as anything, exact in small eigenvalues, and free of the dimension arithmetic that nalgebra's own
-/// solver would impose on every caller.
+/// Eigenvalues and eigenvectors (columns, in the order of the eigenvalues) of a symmetric matrix, by Jacobi rotations.
+///
+/// Suited to the two or three dimensions of a measurement. Small eigenvalues keep their relative accuracy, and callers need none of the
+/// bounds on dimensions that nalgebra's solver requires.
 pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
     let mut vectors = SMatrix::<f64, M, M>::identity();
     for _sweep in 0..32 {
@@ -37,7 +38,9 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
     (a.diagonal(), vectors)
 }
 
-/// A covariance whose eigenvalues, in coordinates where the given variances are one, are at least one.
+/// Raises the eigenvalues of `covariance` to at least one, in coordinates scaled so that the variances `least` are one. Returns
+/// `covariance`
+/// unchanged if all are at least one already, or if an entry of `least` is not positive.
 pub fn raised<const D: usize>(covariance: SMatrix<f64, D, D>, least: &SVector<f64, D>) -> SMatrix<f64, D, D> {
     if least.iter().any(|v| *v <= 0.0) {
         return covariance;
