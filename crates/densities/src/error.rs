@@ -2,14 +2,14 @@
 
 use fewbits_numerics::ArgumentError;
 
-/// Why a density could not be formed or changed.
+/// Why a density could not be created or changed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
-    /// An error of the core: [`fewbits_core::Error::Impossible`] where no probability is left.
+    /// An error of the core; [`fewbits_core::Error::Impossible`] if no probability is left.
     #[error(transparent)]
     Core(#[from] fewbits_core::Error),
 }

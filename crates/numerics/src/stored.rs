@@ -203,10 +203,9 @@ pub fn deserialize<'de, T: Floats, D: Deserializer<'de>>(deserializer: D) -> Res
 }
 
 /// Implements serde for a type whose constructor checks its arguments: lists the fields of the stored form, each with its type and its
-/// value,
-/// and the constructor that reads them. The type itself has the attribute `#[serde(try_from = "Form", into = "Form")]`. In the second
-/// form of the macro the fields have no values: the type is written by its own derive, `into` is left out, and the form and its fields may
-/// have serde attributes. A type with a dimension is written `[const D: usize] Type as Form`; its form is then `Form<D>`.
+/// value, and the constructor that reads them. The type itself has the attribute `#[serde(try_from = "Form", into = "Form")]`. In the
+/// second form of the macro the fields have no values: the type is written by its own derive, `into` is left out, and the form and its
+/// fields may have serde attributes. A type with a dimension is written `[const D: usize] Type as Form`; its form is then `Form<D>`.
 ///
 /// ```
 /// use fewbits_numerics::{ArgumentError, error::positive, stored};

@@ -6,10 +6,10 @@ use crate::columns::state_at;
 use crate::gaussian::FactoredGaussian;
 use rand::Rng;
 
-/// Draws have the belief's mean and covariance, entry by entry within four standard errors; draws into columns of unequal lengths are NaN.
+/// Draws have the belief's mean and covariance, each entry within four standard errors. Draws into columns of unequal lengths are NaN.
 ///
 /// # Errors
-/// The entry that disagrees.
+/// The entry that differs by more.
 pub fn samples_have_the_moments<const D: usize, R: Rng + ?Sized>(
     belief: &impl Belief<D>,
     rng: &mut R,
@@ -39,8 +39,8 @@ fn not_a_number<'a>(law: &'static str, mut numbers: impl Iterator<Item = &'a f64
     }
 }
 
-/// The density integrates to one, by importance sampling from `proposal` (which should be wider than the belief), within four
-/// standard errors; and the sweep adds what the scalar function returns, or NaN where lengths differ.
+/// The density integrates to one within four standard errors, by importance sampling from `proposal`, which should be wider than the
+/// belief. The sweep adds what the scalar function returns, and writes NaN if lengths differ.
 ///
 /// # Errors
 /// The integral found, or the state at which the sweep disagrees.

@@ -5,8 +5,8 @@ use crate::dynamics::{Dynamics as _, GaussianDynamics};
 use crate::evolution::Evolution;
 use nalgebra::SVector;
 
-/// For linear evolutions: the mean and covariance after `a + b` seconds are those after `a` and then `b`, and nothing changes over 0
-/// seconds, to `tolerance` relative to the deviations.
+/// For linear evolutions: mean and covariance after `a + b` seconds equal those after `a` and then `b` seconds, and 0 seconds change
+/// nothing. Compared to `tolerance`, relative to the standard deviations.
 ///
 /// # Errors
 /// If a step is refused, or the entry that disagrees.

@@ -39,8 +39,7 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
 }
 
 /// Raises the eigenvalues of `covariance` to at least one, in coordinates scaled so that the variances `least` are one. Returns
-/// `covariance`
-/// unchanged if all are at least one already, or if an entry of `least` is not positive.
+/// `covariance` unchanged if all are at least one already, or if an entry of `least` is not positive.
 pub fn raised<const D: usize>(covariance: SMatrix<f64, D, D>, least: &SVector<f64, D>) -> SMatrix<f64, D, D> {
     if least.iter().any(|v| *v <= 0.0) {
         return covariance;

@@ -15,7 +15,7 @@ pub fn symmetrised<const D: usize>(m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D>
     m.zip_map(&m.transpose(), |a, b| if a == b { a } else { 0.5 * a + 0.5 * b })
 }
 
-/// `a b'`. Zeros of `b`, of which the matrices of models are full, cost nothing.
+/// `a b'`. Zeros of `b`, which are frequent in matrices of models, are skipped.
 #[inline(always)]
 pub fn times_transposed<const M: usize, const K: usize, const N: usize>(
     a: &SMatrix<f64, M, K>,
@@ -67,8 +67,7 @@ pub(crate) fn agree(below: f64, above: f64, row: f64, column: f64) -> bool {
 }
 
 /// A symmetric positive definite matrix, made symmetric to the last bit, with its lower Cholesky factor. Draws with the factor and
-/// densities
-/// with the matrix then use the same covariance.
+/// densities with the matrix then use the same covariance.
 ///
 /// # Errors
 /// If `m` has an entry that is not finite, is not symmetric (by the deviations of row and column), or is not positive definite.

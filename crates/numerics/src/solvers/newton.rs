@@ -7,8 +7,7 @@ const MOST_MIDDLES: usize = 60;
 const MOST_STEPS: usize = 200;
 
 /// The root of an increasing function between `lower` and `upper`. Newton's method from `start`; a step that would leave the current
-/// bracket
-/// is replaced by a bisection, so that the method always converges.
+/// bracket is replaced by a bisection, so that the method always converges.
 ///
 /// `f` returns the value and the derivative. The iteration ends when a step is at most `tolerance`. If `f` does not change its
 /// sign, the result is the end of the bracket nearest to a root. A value of NaN is treated as positive (too far right).
