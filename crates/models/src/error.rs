@@ -4,13 +4,13 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] fewbits_numerics::ArgumentError),
-    /// A coefficient outside `[-1, 1]` where the state would grow without bound.
+    /// A coefficient outside `[-1, 1]`, with which the state would grow without bound.
     #[error("the coefficient is {coefficient}: the state grows without bound unless it lies in [-1, 1]")]
     UnstablePlant {
-        /// The offending coefficient.
+        /// The coefficient that was given.
         coefficient: f64,
     },
     /// The dynamics have no stationary distribution.
