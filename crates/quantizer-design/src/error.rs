@@ -2,37 +2,37 @@
 
 use fewbits_numerics::ArgumentError;
 
-/// Why a model, system, design, decoder or bound was refused.
+/// Why a model, system, design, decoder or bound could not be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
-    /// A quantizer or channel was refused.
+    /// An error of the quantizers crate.
     #[error(transparent)]
     Quantizer(fewbits_quantizers::Error),
-    /// An iteration stopped at its limit before its tolerance was met.
+    /// An iteration reached its limit before it converged.
     #[error("{algorithm} did not converge in {iterations} iterations: the last change was {change:e}")]
     NotConverged {
-        /// Which iteration.
+        /// Name of the iteration.
         algorithm: &'static str,
-        /// Iterations spent.
+        /// Number of iterations done.
         iterations: usize,
-        /// Size of the last change, in the units of the stop rule.
+        /// Size of the last change, in the units of the stopping rule.
         change: f64,
     },
-    /// A table would be larger than the caller allows.
+    /// A table would have more entries than the caller allows.
     #[error("{table} would need {needed} entries: at most {limit} are allowed")]
     TooLarge {
-        /// Which table.
+        /// Name of the table.
         table: &'static str,
-        /// Entries needed, saturated at `u64::MAX`.
+        /// Number of entries needed; larger numbers are given as `u64::MAX`.
         needed: u64,
-        /// Entries allowed.
+        /// Number of entries allowed.
         limit: u64,
     },
-    /// The noise of three sensors or more needs more than one shared factor.
+    /// The noise of three or more sensors is not independent noise plus one shared factor.
     #[error(
         "unsupported correlation: the noise of these {sensors} sensors is not independent noise plus one shared factor"
     )]
@@ -40,25 +40,25 @@ pub enum Error {
         /// Number of sensors.
         sensors: usize,
     },
-    /// A design drives a cell out of existence: fewer levels serve as well.
+    /// A cell becomes empty during the design: fewer levels are as good.
     #[error(
         "cell {cell} of quantizer {quantizer} vanishes (its probability falls to {probability:e}): design fewer levels"
     )]
     VanishingCell {
-        /// Which quantizer of the system.
+        /// Index of the quantizer in the system.
         quantizer: usize,
-        /// Which of its cells.
+        /// Index of its cell.
         cell: usize,
         /// Its probability when the design stopped.
         probability: f64,
     },
-    /// The best cells of a level are not one interval, and a contiguous quantizer was asked for.
+    /// The best cells of a level are not one interval, but a contiguous quantizer was asked for.
     #[error("the best cells are labelled {labels:?}: no contiguous quantizer is a fixed point here")]
     NotContiguous {
         /// Labels of the best cells from left to right.
         labels: Vec<usize>,
     },
-    /// Symbols arrived together that cannot do so under the model.
+    /// The symbols received together have probability zero under the model.
     #[error("these symbols cannot be received together under the model: nothing follows from them")]
     ImpossibleOutcome,
 }
@@ -67,7 +67,7 @@ fewbits_numerics::lift!(fewbits_quantizers => Quantizer);
 
 pub(crate) use fewbits_numerics::error::refuse;
 
-/// Accepts a table of so many entries up to a limit.
+/// An error if a table needs more entries than the limit.
 pub(crate) fn at_most(table: &'static str, needed: u64, limit: u64) -> Result<(), Error> {
     if needed > limit {
         return Err(Error::TooLarge { table, needed, limit });
@@ -75,7 +75,7 @@ pub(crate) fn at_most(table: &'static str, needed: u64, limit: u64) -> Result<()
     Ok(())
 }
 
-/// A stored number that is a size: not negative, but for rounding, and finite.
+/// Reads a stored size: finite, and not negative except for rounding.
 pub(crate) fn stored_size<'de, D: serde::Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     let size = <f64 as serde::Deserialize>::deserialize(source)?;
     if size.is_finite() && size >= -1e-9 {
