@@ -2,41 +2,41 @@
 
 use fewbits_numerics::ArgumentError;
 
-/// Why a pattern, bank, decoder, search or bound was refused.
+/// Why a pattern, bank, decoder, search or bound could not be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
-    /// A Lloyd-Max quantizer was refused.
+    /// An error of the quantizers crate.
     #[error(transparent)]
     Quantizer(fewbits_quantizers::Error),
-    /// An iteration stopped at its limit before its tolerance was met.
+    /// An iteration reached its limit before it converged.
     #[error("{algorithm} did not converge in {iterations} iterations: the last change was {change:e}")]
     NotConverged {
-        /// Which iteration.
+        /// Name of the iteration.
         algorithm: &'static str,
-        /// Iterations spent.
+        /// Number of iterations done.
         iterations: usize,
-        /// Size of the last change, in the units of the stop rule.
+        /// Size of the last change, in the units of the stopping rule.
         change: f64,
     },
-    /// A pattern whose bit is the same in every cell tells nothing.
+    /// The bit of a pattern is the same in every cell, so it carries no information.
     #[error("the pattern gives the same bit in all {cells} cells: expected at least one 0 and one 1")]
     ConstantPattern {
         /// Number of cells of the pattern.
         cells: usize,
     },
-    /// A pattern and a grid disagree about the number of cells.
+    /// A pattern and a grid have different numbers of cells.
     #[error("the pattern has {pattern} bits and the grid {grid} cells: expected as many bits as cells")]
     PatternLength {
-        /// Bits of the pattern.
+        /// Number of bits of the pattern.
         pattern: usize,
-        /// Cells of the grid.
+        /// Number of cells of the grid.
         grid: usize,
     },
-    /// Two cells get the same bit from every sensor, so that no decoder can tell them apart.
+    /// Two cells get the same bit from every sensor, so that no decoder can distinguish them.
     #[error(
         "cells {first} and {second} get the same bits from every sensor: expected patterns that separate all cells"
     )]
@@ -46,25 +46,25 @@ pub enum Error {
         /// Index of the other cell, from 0.
         second: usize,
     },
-    /// Masks that do not span all linear patterns where full rank was asked for.
+    /// The masks do not span all linear patterns, but full rank was asked for.
     #[error("{sensors} masks of rank {rank}: expected rank {expected}")]
     RankDeficient {
-        /// Number of masks, one a sensor.
+        /// Number of masks, one per sensor.
         sensors: usize,
-        /// Rank over GF(2) that is present, or possible.
+        /// Rank over GF(2) of the masks, or the largest possible rank.
         rank: usize,
-        /// Rank asked for.
+        /// Rank that was asked for.
         expected: usize,
     },
-    /// A table that would not fit into memory.
+    /// A table would be too large for memory.
     #[error("{outcomes} outcomes: expected at most {limit}")]
     TooManyOutcomes {
-        /// Number of distinguishable outcomes, saturated.
+        /// Number of outcomes; larger numbers are given as `u128::MAX`.
         outcomes: u128,
         /// Largest number accepted.
         limit: u128,
     },
-    /// A count beyond 128 bits.
+    /// A count exceeds 128 bits.
     #[error("the number of {what} exceeds 128 bits")]
     CountOverflow {
         /// What was counted.
@@ -75,7 +75,7 @@ pub enum Error {
 fewbits_numerics::lift!(fewbits_quantizers => Quantizer);
 
 impl From<Error> for fewbits_core::Error {
-    /// What a scheme reports; only arguments can be at fault there.
+    /// The core's argument error: in a scheme only arguments can be wrong.
     fn from(error: Error) -> Self {
         match error {
             Error::Argument(argument) => Self::Argument(argument),
@@ -85,7 +85,7 @@ impl From<Error> for fewbits_core::Error {
     }
 }
 
-/// Accepts so many outcomes up to a limit.
+/// An error if there are more outcomes than the limit.
 pub(crate) fn at_most(outcomes: u128, limit: u128) -> Result<(), Error> {
     if outcomes > limit {
         return Err(Error::TooManyOutcomes { outcomes, limit });

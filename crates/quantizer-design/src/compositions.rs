@@ -129,8 +129,7 @@ fn vectors_of(total: usize, parts: usize) -> Vec<Vec<usize>> {
     let mut vector = vec![0; parts];
     vector[0] = total;
     let mut all = vec![vector.clone()];
-    // The next vector: move one report from the last non-empty place before the end to the place after it, together with all reports of the
-    // end.
+    // Next vector: one report moves from the last non-empty place before the end to the place after it, and so do all reports of the end.
     while let Some(i) = (0..parts - 1).rev().find(|i| vector[*i] > 0) {
         let end = std::mem::take(&mut vector[parts - 1]);
         vector[i] -= 1;

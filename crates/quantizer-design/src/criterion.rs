@@ -29,7 +29,7 @@ pub enum AllowedCells {
     /// One interval for each level or word.
     #[default]
     Intervals,
-    /// Several intervals for one: folded cells.
+    /// Any number of intervals for each (folded cells).
     Any,
 }
 

@@ -145,9 +145,9 @@ fn limit(rate: f64) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FalseAlarms {
-    /// Rate of false alarms of the whole centre, per instant.
+    /// Rate of false alarms of one sensor, per observation.
     pub sensor: f64,
-    /// Alarms of the whole per instant.
+    /// Rate of false alarms of the whole centre, per instant.
     pub centre: f64,
 }
 

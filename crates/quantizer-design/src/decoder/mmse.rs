@@ -113,8 +113,8 @@ impl MmseDecoder {
         self.entries.len()
     }
 
-    /// The estimate of every joint outcome, `None` for one that cannot be received. Outcomes are in the order of
-    /// [`JointTable::outcome`]: the first group slowest, and sensors that are alone in their groups by their symbols.
+    /// The estimate of every joint outcome; `None` for an outcome of probability zero. The order is that of
+    /// [`JointTable::outcome`]: the first group varies slowest, and groups of one sensor are ordered by symbol.
     pub fn estimates(&self) -> impl ExactSizeIterator<Item = Option<Estimate>> + '_ {
         self.entries.iter().map(|entry| Self::estimate(*entry).ok())
     }

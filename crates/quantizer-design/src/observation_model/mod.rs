@@ -56,7 +56,7 @@ pub struct ObservationModel {
     /// Values of `X` and their probabilities.
     pub(crate) values: Vec<f64>,
     pub(crate) weights: Vec<f64>,
-    /// Given a node the sensors are independent: sensor `n` has mean `base + loading_n * factor`.
+    /// Given a node the sensors are independent, and sensor `n` has mean `base + loading_n * factor`.
     nodes: Vec<Node>,
     /// `P(node | x_k)`.
     pub(crate) given: Vec<Feature>,
