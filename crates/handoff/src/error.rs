@@ -1,13 +1,13 @@
 //! Errors of this crate.
 
-/// What a hand-over refuses.
+/// Errors of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] fewbits_numerics::ArgumentError),
-    /// No particle agrees with the measurement, or particles could not be formed.
+    /// The measurement has probability zero for every particle, or particles could not be formed.
     #[error(transparent)]
     Density(#[from] fewbits_densities::Error),
     /// The belief could not be reduced or coded.

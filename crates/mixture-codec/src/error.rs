@@ -3,17 +3,17 @@
 use fewbits_core::CodecError;
 use fewbits_numerics::ArgumentError;
 
-/// Why a mixture could not be reduced, measured, coded or decoded.
+/// Why a mixture could not be reduced, compared, encoded or decoded.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
-    /// An error of the core: [`fewbits_core::Error::Impossible`] where no probability is left.
+    /// An error of the core; [`fewbits_core::Error::Impossible`] if no probability is left.
     #[error(transparent)]
     Core(#[from] fewbits_core::Error),
-    /// A mixture that does not fit its wire format, or bits that are no mixture.
+    /// A mixture does not fit its wire format, or bits are not an encoded mixture.
     #[error(transparent)]
     Codec(#[from] CodecError),
     /// Another error of the densities.

@@ -1,30 +1,30 @@
 //! The error of this crate.
 
-/// Why a network, cost matrix or assignment was refused.
+/// Why a network, cost matrix or assignment was not accepted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] fewbits_numerics::ArgumentError),
-    /// The sensors' patterns were refused.
+    /// An error of the binary-patterns crate.
     #[error(transparent)]
     Patterns(fewbits_binary_patterns::Error),
-    /// The design of the cells was refused.
+    /// An error of the quantizer-design crate.
     #[error(transparent)]
     Design(fewbits_quantizer_design::Error),
-    /// A cost matrix that is not square.
+    /// A cost matrix is not square.
     #[error("the cost matrix has {entries} entries: expected {size} x {size}")]
     NotSquare {
-        /// Entries given.
+        /// Number of entries that were given.
         entries: usize,
-        /// Rows expected.
+        /// Number of rows that was expected.
         size: usize,
     },
-    /// An assignment that does not use each sensor once.
+    /// An assignment does not use each sensor once.
     #[error("the assignment {given:?} is not a permutation of 0..{size}")]
     NotAPermutation {
-        /// The offending assignment.
+        /// The assignment that was given.
         given: Vec<usize>,
         /// Its expected length.
         size: usize,

@@ -161,7 +161,7 @@ impl Tree<'_> {
         (mass > IMPOSSIBLE).then(|| (first / mass, squared_error(w, &self.nodes.x, first / mass) / mass))
     }
 
-    /// `sum_bit M1^2/M0` after a bit with threshold `t`: its maximum is the least expected variance.
+    /// `sum_bit M1^2/M0` after a bit with threshold `t`. The threshold that maximises it minimises the expected posterior variance.
     fn explained(&self, w: &[f64], t: f64) -> f64 {
         let mut sums = [(0.0, 0.0); 2];
         for (w, x) in w.iter().zip(&self.nodes.x) {

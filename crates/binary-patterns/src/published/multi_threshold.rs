@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 const THRESHOLDS: usize = 401;
 /// Noise standard deviations by which the thresholds extend beyond the support.
 const MARGIN: f64 = 2.0;
-/// The iteration stops if the derivative of no threshold exceeds the weighted mean of all by more than this, relative.
+/// The iteration stops once the relative gap, which bounds the distance from the optimum, is below this.
 const GAP: f64 = 3e-4;
 /// Largest number of multiplicative updates.
 const MAX_UPDATES: usize = 200_000;
