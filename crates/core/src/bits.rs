@@ -45,7 +45,7 @@ pub enum CodecError {
         /// Width of the field in bits.
         width: u32,
     },
-    /// The bits are no message of this type.
+    /// The bits do not encode a message of this type.
     #[error("{what} is {value}: expected {expected}")]
     Invalid {
         /// Name of the decoded field.

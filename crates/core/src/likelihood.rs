@@ -10,9 +10,8 @@ use nalgebra::SVector;
 /// A sensing model and a [`Factor`] together make one ([`Observed`]). A slice is the product of independent observations at one instant.
 ///
 /// Laws ([`crate::laws::likelihood`]): the result is finite or `-inf` for a finite state. If the state has a NaN, it is NaN or at most the
-/// smallest value at any state of numbers. `add_log_likelihoods` adds what `log_likelihood` returns, up to rounding; if lengths differ, all
-/// of
-/// `log_weights` becomes NaN ([`crate::columns::lengths_agree`]).
+/// smallest value at any state of numbers. `add_log_likelihoods` adds what `log_likelihood` returns, up to rounding. If lengths differ,
+/// all of `log_weights` becomes NaN ([`crate::columns::lengths_agree`]).
 pub trait Likelihood<const D: usize> {
     /// `ln p(observed | state)`.
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64;

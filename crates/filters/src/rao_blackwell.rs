@@ -115,6 +115,7 @@ impl RaoBlackwellised {
         let log_weights = &mut workspace.log_weights;
         log_weights.clear();
         log_weights.resize(belief.means().len(), 0.0);
+        // Impute one measurement per observation, one after the other; each adds to the log weights.
         let log_scale: f64 = observed.iter().map(|one| one.log_scale).sum();
         for one in observed {
             let imputation = Imputation::new(one.factor);
@@ -135,6 +136,7 @@ impl RaoBlackwellised {
                 .zip(&*log_weights)
                 .for_each(|(log, added)| *log += added);
         })?;
+        // Everything has succeeded: the new belief replaces the old one.
         std::mem::swap(belief, next);
         let log_likelihood = info.log_likelihood + log_scale;
         Ok(Info { log_likelihood, ..info })

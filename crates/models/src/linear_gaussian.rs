@@ -169,6 +169,7 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
                 || {
                     for (d, next) in next.iter_mut().enumerate() {
                         let next = &mut next[..length];
+                        // Row d of `F x + G u` for all states of the block; the columns still hold the old states.
                         next.fill(0.0);
                         for (u, draw) in draws.iter().enumerate() {
                             add_multiple(next, self.noise_factor[(d, u)], &draw[..length]);

@@ -81,6 +81,7 @@ impl<const D: usize> Switching<D> {
         };
         let mut transition = DMatrix::identity(n, n);
         if changes > 0.0 {
+            // Over the short interval: Poisson-weighted powers of the chain that changes at a common rate, up to a factor.
             let mean = changes * 0.5_f64.powi(doublings);
             let asked = DMatrix::identity(n, n) + &self.rates / rate;
             let mut term = DMatrix::identity(n, n);
@@ -89,6 +90,7 @@ impl<const D: usize> Switching<D> {
                 transition += &term;
             }
             normalise(&mut transition);
+            // Double the interval: the transition matrix is squared.
             for _ in 0..doublings {
                 transition = &transition * &transition;
                 normalise(&mut transition);

@@ -79,6 +79,7 @@ impl Channel {
                 limit: MAX_ENTRIES,
             });
         }
+        // Fill the table, then check that entries are probabilities and columns sum to one.
         let transition: Vec<f64> = (0..outputs)
             .flat_map(|t| (0..inputs).map(move |z| (t, z)))
             .map(|(t, z)| p(t, z))

@@ -67,6 +67,7 @@ impl Labelling {
             return refuse("words", format!("{levels} words"), "at least two words");
         }
         let mut symbols = vec![u32::MAX; 1 << bits];
+        // Invert the map from levels to words; a word that is too large or used twice is an error.
         for (symbol, word) in words.iter().enumerate() {
             match symbols.get_mut(*word as usize) {
                 Some(slot) if *slot == u32::MAX => *slot = symbol as u32,
@@ -74,6 +75,7 @@ impl Labelling {
                 None => return refuse("words", word, format!("words below 2^{bits}")),
             }
         }
+        // Words without a level become the symbols after the levels.
         for (word, slot) in symbols.iter_mut().enumerate() {
             if *slot == u32::MAX {
                 *slot = words.len() as u32;

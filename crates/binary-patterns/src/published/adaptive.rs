@@ -74,6 +74,7 @@ pub fn adaptive(
             return refuse("factor", factor, "a finite number, 1 or above");
         }
     }
+    // The tree is expanded depth first; one buffer of node weights per depth is enough.
     let nodes = source.nodes(2.0 * noise_deviation, gauss_legendre::<12>());
     let mut tree = Tree {
         source,

@@ -121,6 +121,7 @@ impl Descent {
         extra: usize,
         allowed: impl Fn(&[usize]) -> bool,
     ) -> Result<Descended, Error> {
+        // Descend from each given and each random start; keep the best allowed result, by its exact error on fine nodes.
         let kernel = Kernel::new(self);
         let sensors = self.noise.len();
         let kinds = self.candidates.len();
@@ -170,6 +171,7 @@ impl<'a> Kernel<'a> {
                 })
             })
             .collect();
+        // Tabulate every candidate's bit probabilities for each distinct noise, and their rows of the matrix product.
         let candidates = Candidates::new(&descent.source, &descent.candidates, &noises);
         let of_noise = |noise: &f64| -> Vec<Vec<[f64; 2]>> {
             let quantizers = descent.candidates.iter();

@@ -105,6 +105,7 @@ pub fn honesty<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
         let observation = failed(HONEST, link.transmit(rng, report.as_ref(), &format))?;
         hits += usize::from(event(&observation));
     }
+    // Standard error of a binomial frequency; the small constant forgives rounding if it is zero.
     let share = hits as f64 / draws as f64;
     let error = (probability * (1.0 - probability) / draws as f64).max(0.0).sqrt();
     if (share - probability).abs() <= STANDARD_ERRORS * error + 1e-12 {

@@ -5,7 +5,7 @@
 //!
 //! | sequence | what changes its mean |
 //! |---|---|
-//! | surprise: how far `ln p(o)` is below its mean, in deviations; for values `(NIS - 1) / sqrt 2` | wrong noise or process noise, outlier |
+//! | surprise: how far `ln p(o)` is below its mean, in deviations; for values `(NIS - 1) / sqrt 2` | wrong noise variance, outliers |
 //! | residual: correction by the observation, divided by its deviation | a biased sensor, a wrong initial state |
 //! | product of successive residuals of one sensor | process noise too small (residuals repeat) or too large (they alternate), lost track |
 //!

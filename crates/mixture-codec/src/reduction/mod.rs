@@ -105,6 +105,7 @@ impl Reduction {
             Self::Pipeline { cut, iterations } => {
                 let tree = Tree::new(estimate, Split::PRINCIPAL)?;
                 let errors = NodeErrors::new(estimate, &tree, Criterion::LogDeterminant)?;
+                // Cut to an intermediate number of components, merge pairs to the final number, then fit to the whole estimate.
                 let coarse = greedy(&tree, &errors, cut.max(components))?.mixture(&tree)?;
                 let merged = merge(&coarse, components, MergeCost::Runnalls)?.mixture;
                 let rule = if D <= 3 {

@@ -12,12 +12,12 @@
 //! | index of the resolution in the format | 1 | uniform |
 //! | `ln L_ii - ln unit` of the overall Gaussian, within 8 nepers | `r/2` | uniform |
 //! | `L_ij / L_ii`, `j < i` | `r` | logistic(0, 0.5) |
-//! | overall mean, within the field | `r L_ii / 2`; `r L_ii` if `K = 1` | uniform |
+//! | overall mean, within the format's range | `r L_ii / 2`; `r L_ii` if `K = 1` | uniform |
 //! | weights in decreasing order: `f_i = w_i / rest`, `g = ln((f - lo)/(1 - f))`, `lo = 0.98/(K - i)` | `2 r` | logistic(-1.2, 0.8) |
 //! | for each component, in coordinates `L^-1 (x - mean)`: `ln l_ii` | `r` | logistic(-0.62, 0.42) |
 //! | `l_ij / l_ii` | `r` | logistic(0, 0.3) |
 //! | mean | `1.4 r l_ii` | logistic(0, 0.55) |
-//! | mean of the last component; prediction: the weighted means sum to the overall mean | `1.4 r l_ii` | logistic(prediction, `0.35 l_ii + 0.05`) |
+//! | mean of the last, predicted from the overall mean and the other means | `1.4 r l_ii` | logistic(prediction, `0.35 l_ii + 0.05`) |
 //!
 //! Every logistic distribution is mixed 99:1 with one eight times as wide, and has an escape symbol for values outside its table, so every
 //! finite mixture within the range can be encoded. For any bits, decoding gives a mixture with positive definite covariances or a typed

@@ -126,7 +126,7 @@ impl Table {
 
     /// The symbol of a quantile, the cumulative frequency below it, and its frequency.
     pub(super) fn find(&self, quantile: u32) -> (u32, u32, NonZeroU32) {
-        // Brackets the last index whose cumulative frequency does not exceed the quantile, in growing strides from the guess.
+        // Brackets the last index whose cumulative frequency does not exceed the quantile, with growing steps from the guess.
         let count = self.count();
         let guess = self.guess(quantile);
         let (mut low, mut high) = (guess, guess);

@@ -164,6 +164,7 @@ pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
 /// `ln sum exp(logs[i])` without overflow. `-inf` if the slice is empty or all entries are `-inf`; `+inf` if an entry is `+inf`; NaN if
 /// an entry is NaN.
 pub fn log_sum_exp(logs: &[f64]) -> f64 {
+    // The largest entry is subtracted, so that the largest exponential is 1.
     let offset = largest(logs);
     if !offset.is_finite() {
         return if logs.iter().any(|x| x.is_nan()) {

@@ -17,6 +17,7 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
                 if entry == 0.0 {
                     continue;
                 }
+                // The rotation in the plane (p, q) that makes the entry zero; the smaller of the two possible angles.
                 let half = (a[(q, q)] - a[(p, p)]) / (2.0 * entry);
                 let tangent = half.signum() / (half.abs() + half.hypot(1.0));
                 let cosine = 1.0 / tangent.hypot(1.0);
@@ -31,6 +32,7 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
                 vectors *= turn;
             }
         }
+        // All entries off the diagonal were exactly zero in this sweep.
         if off == 0.0 {
             break;
         }

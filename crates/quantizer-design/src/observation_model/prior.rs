@@ -84,6 +84,7 @@ impl TryFrom<Shape> for Prior {
 
     fn try_from(mut shape: Shape) -> Result<Self, Error> {
         let mut fit = None;
+        // Check the parts of each shape, and compute its mean and standard deviation.
         let (mean, deviation) = match &mut shape {
             Shape::Gaussian { mean, deviation } => (finite("mean", *mean)?, *deviation),
             Shape::Uniform { low, high } => {

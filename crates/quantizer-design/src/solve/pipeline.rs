@@ -48,6 +48,7 @@ impl Request<'_> {
         if let Some(bits) = bits.iter().find(|b| **b > MAX_BITS) {
             return refuse("bits", bits, format!("at most {MAX_BITS} bits per sensor"));
         }
+        // The words of a given start must fit the bits of their sensors.
         for (bits, cells) in bits.iter().zip(self.start.iter().flatten()) {
             if let Some(word) = cells.words.iter().find(|w| **w >= 1 << bits) {
                 return refuse("word", word, format!("a word of {bits} bits"));

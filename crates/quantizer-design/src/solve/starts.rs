@@ -203,6 +203,7 @@ impl Search<'_> {
         shown_as: Option<Stage>,
     ) -> Vec<Point> {
         let unit = size_of(landscape, &points);
+        // Refine the grids of each different point in turn; afterwards points that have become equal are dropped again.
         let points = best_of(points, SAME * unit);
         let parts = points.len() * refinements;
         let mut refined = Vec::new();
@@ -328,6 +329,7 @@ fn folded_starts(
         let levels = 1usize << participant.bits;
         let turn = 2 * levels - 2;
         let sample = landscape.sample(folded);
+        // Evenly spaced cells over the range; the levels repeat cyclically, or go up and down.
         for cells in levels + 1..=2 * levels + 1 {
             let share = |cut: usize| 2.0 * cut as f64 / cells as f64 - 1.0;
             let breakpoints: Vec<f64> = (1..cells)
