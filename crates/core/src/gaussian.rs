@@ -142,7 +142,7 @@ impl<const D: usize> Gaussian<D> {
     /// Kullback-Leibler divergence `KL(self || other)` in nats.
     ///
     /// # Errors
-    /// If either covariance is singular, or the divergence leaves the range of numbers.
+    /// If either covariance is singular, or the divergence overflows.
     pub fn kl_divergence(&self, other: &Self) -> Result<f64, ArgumentError> {
         let (own, reference) = (self.cholesky()?, other.cholesky()?);
         let log_ratio: f64 = reference

@@ -9,7 +9,7 @@ use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// How a number is encoded. Both ends know the format; it costs no bits itself.
+/// The encoding of a number. Both ends know the format; it costs no bits itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NumberFormat {

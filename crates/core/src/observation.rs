@@ -172,7 +172,7 @@ impl Link {
         }
     }
 
-    /// What multiplies `p(spoke | m)` in the factor of [`Observation::Lost`]: the erasure, or 1 where that is 0.
+    /// Factor of `p(spoke | m)` in the likelihood of [`Observation::Lost`]: the erasure, or 1 if the erasure is 0.
     ///
     /// `Lost` observed over a link with erasure 0 contradicts the link model, not the sensor. The factor is then conditioned on the loss
     /// and is `p(spoke | m)` alone. This choice does not change the posterior, since a positive erasure cancels from it.

@@ -46,7 +46,7 @@ pub trait Scheme<const M: usize> {
     /// The report of the sensor for a measurement. `None` is silence, which sends zero bits.
     ///
     /// # Errors
-    /// If the measurement or the feedback is not finite; the state is then as it was.
+    /// If the measurement or the feedback is not finite; the state is then unchanged.
     fn encode<R: Rng + ?Sized>(
         &self,
         rng: &mut R,

@@ -17,7 +17,7 @@ pub trait SensorNode<const M: usize> {
     /// What the sensor sends in this slot. `None` is silence, which sends zero bits. Only randomised schemes draw from `rng`.
     ///
     /// # Errors
-    /// If the measurement is not finite or the bits are no feedback of the scheme; the sensor's memory is then as it was.
+    /// If the measurement is not finite or the bits do not encode feedback of the scheme; the sensor's memory is then unchanged.
     fn report(
         &mut self,
         rng: &mut dyn Rng,

@@ -12,7 +12,7 @@ use rand::Rng;
 ///
 /// ```text
 /// predict:  w <- (1 - e) w + e / M, beliefs mixed; filter j moves with its own scale of the noise
-/// update:   each filter takes in the observations; w_j times its evidence, normalised
+/// update:   each filter updates with the observations; w_j is multiplied by its evidence, then normalised
 /// ```
 /// Scales multiply the covariance of the process noise: 4 doubles its deviation. Choose neighbours that differ by a factor of 4 or less. A
 /// step costs as much as one step of each of the `M` filters. A centre's own [noise scale](crate::centre::FusionCentre::noise_scale)

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// sample size between the two are therefore those of the weighted particles, without the noise that resampling adds.
 ///
 /// ```text
-/// predict:  if the effective sample size is due: ancestors ~ resampling law, equal weights
+/// predict:  if the effective sample size is below the threshold: ancestors by the resampling law, equal weights
 ///           x_i ~ p(x_k | x_{k-1} = x_i)
 /// update:   ln w_i += ln p(observed | x_i)
 ///           log-likelihood increment = ln sum_i w_i;  normalise
@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 pub struct ParticleFilter {
     /// The law that draws ancestors.
     pub resampling: Resampling,
-    /// When to draw them.
+    /// When to resample.
     pub schedule: Schedule,
 }
 
@@ -50,7 +50,7 @@ impl ParticleFilter {
     /// Resamples if the schedule says so. Returns whether it did.
     ///
     /// # Errors
-    /// None in practice: the weights of [`Particles`] are always normalised.
+    /// Not in practice: the weights of [`Particles`] are always normalised.
     pub fn resample<const D: usize, R: Rng + ?Sized>(
         &self,
         rng: &mut R,

@@ -21,10 +21,10 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```text
 /// cumulative = running sum of the weights
-/// for each point u_1 <= u_2 <= ... <= u_M of the law, in units of the total weight:
+/// for each point u_1 <= u_2 <= ... <= u_M of the method, as fractions of the total weight:
 ///     ancestor = first i with u < cumulative_i
 /// systematic:  u_m = (m - 1 + U) / M, one U          stratified: u_m = (m - 1 + U_m) / M
-/// multinomial: order statistics of M uniforms        residual:   floor(M w_i) copies, then multinomial on what is left
+/// multinomial: order statistics of M uniforms        residual:   floor(M w_i) copies, then multinomial for the remainders
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -94,7 +94,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
     ///
     /// # Errors
     /// [`Error::NotStationary`] if an eigenvalue of `F` lies on or outside the unit circle; [`Error::Argument`] if the
-    /// covariance leaves the range of numbers.
+    /// covariance overflows.
     pub fn stationary_covariance(&self) -> Result<SMatrix<f64, D, D>, Error> {
         let mut power = self.transition;
         let mut sum = self.noise_covariance;

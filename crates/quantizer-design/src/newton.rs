@@ -127,9 +127,9 @@ pub(crate) struct Stationary {
 ///     g, H     <- gradient and Hessian at b;  H = V diag(lambda) V'
 ///     step     <- V diag(1 / max(|lambda|, 1e-10 max |lambda|)) V' g       # ascent even where H is not negative definite
 ///     shorten so that no entry exceeds max_step
-///     halve until b + step is in order and the objective does not fall
+///     halve until b + step is increasing and the objective does not decrease
 ///     b        <- b + step
-/// until |step| <= tolerance; at a saddle step off along the top eigenvector and go on
+/// until |step| <= tolerance; at a saddle step off along the eigenvector of the largest eigenvalue and continue
 /// ```
 pub(crate) fn climb(
     objective: &impl Objective,

@@ -83,7 +83,7 @@ impl CostMatrix {
     /// for each row
     ///     slack_j <- c_ij - u_i - v_j along paths from that row that alternate between free and matched entries
     ///     repeat
-    ///         raise the duals of what is reached until another column has slack 0
+    ///         change the duals of the reached rows and columns until another column has slack 0
     ///     until that column is free
     ///     exchange matched and free entries along the path to it
     /// ```

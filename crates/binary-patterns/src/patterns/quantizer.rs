@@ -24,7 +24,7 @@ pub struct BinaryQuantizer {
 }
 
 impl BinaryQuantizer {
-    /// From strictly increasing finite breakpoints, at least one.
+    /// A quantizer with strictly increasing finite breakpoints, at least one.
     ///
     /// # Errors
     /// If there is no breakpoint, one is not finite, or they do not increase strictly.

@@ -169,7 +169,7 @@ mod tests {
         assert_relative_eq!(found.bound, 400.0 * std::f64::consts::FRAC_PI_2 / 4.0, max_relative = 2e-3);
     }
 
-    /// What the last update left open is an error, not a bound.
+    /// If the last update leaves a larger gap than allowed, the result is an error, not a bound.
     #[test]
     fn an_open_gap_is_an_error() {
         let stopped = optimum(&Source::uniform(1.0).unwrap(), 0.3, 10, 3);

@@ -16,7 +16,7 @@ pub struct Feature {
     pub width: f64,
 }
 
-/// Where the log posterior is below its peak by more than this, it is left out of the integral.
+/// Where the log posterior is further below its peak than this, it is left out of the integral.
 const DROP: f64 = 46.0;
 /// Largest number of steps of a search for the mode between two candidates.
 const SEARCH: usize = 80;

@@ -9,7 +9,7 @@ use rand::Rng;
 /// Draws have the belief's mean and covariance, each entry within four standard errors. Draws into columns of unequal lengths are NaN.
 ///
 /// # Errors
-/// The entry that differs by more.
+/// If an entry differs by more; the violation names it.
 pub fn samples_have_the_moments<const D: usize, R: Rng + ?Sized>(
     belief: &impl Belief<D>,
     rng: &mut R,
@@ -43,7 +43,7 @@ fn not_a_number<'a>(law: &'static str, mut numbers: impl Iterator<Item = &'a f64
 /// belief. The sweep adds what the scalar function returns, and writes NaN if lengths differ.
 ///
 /// # Errors
-/// The integral found, or the state at which the sweep disagrees.
+/// If the integral is not one, or the sweep disagrees at a state; the violation names either.
 pub fn density_integrates_to_one<const D: usize, R: Rng + ?Sized>(
     belief: &impl Density<D>,
     proposal: &FactoredGaussian<D>,

@@ -10,7 +10,7 @@ use nalgebra::SVector;
 /// the smallest value at the others.
 ///
 /// # Errors
-/// The first measurement at which the law fails.
+/// If the law fails at a measurement; the violation names the first one.
 pub fn is_a_number<const M: usize>(factor: &impl Factor<M>, measurements: &[SVector<f64, M>]) -> Result<(), Violation> {
     let mut least = f64::INFINITY;
     for m in measurements {
@@ -31,7 +31,7 @@ pub fn is_a_number<const M: usize>(factor: &impl Factor<M>, measurements: &[SVec
 /// Law 2: the sweep adds what the scalar function returns, also at measurements with a NaN. If lengths differ it writes NaN everywhere.
 ///
 /// # Errors
-/// The first measurement at which the law fails.
+/// If the law fails at a measurement; the violation names the first one.
 pub fn sweep_is_scalar<const M: usize>(
     factor: &impl Factor<M>,
     measurements: &[SVector<f64, M>],

@@ -8,7 +8,7 @@ use nalgebra::SVector;
 /// sweep adds what the scalar function returns, and writes NaN everywhere if lengths differ.
 ///
 /// # Errors
-/// The first state at which a law fails.
+/// If a law fails at a state; the violation names the first one.
 pub fn sweep_is_scalar<const D: usize>(
     likelihood: &impl Likelihood<D>,
     states: &[SVector<f64, D>],

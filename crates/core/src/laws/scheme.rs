@@ -15,7 +15,7 @@ const HONEST: &str = "reports have the frequencies that their factors say";
 /// the sensor spoke.
 ///
 /// # Errors
-/// If `factor` fails, or the measurement at which the law fails.
+/// If `factor` fails, or at the first measurement at which the law fails.
 pub fn total_probability<const M: usize, S: Scheme<M>>(
     scheme: &S,
     feedback: &S::Feedback,
@@ -66,7 +66,7 @@ pub fn total_probability_with<const M: usize, S: Scheme<M>>(
 /// link ([`Link::delivery`]) sum to one. If the link has no known losses, `Lost` has the factor 1 and is left out of the sum.
 ///
 /// # Errors
-/// The sum found.
+/// If the sum is not one.
 pub fn link_delivers_once(link: &Link) -> Result<(), Violation> {
     const LAW: &str = "a report arrives, is lost, or is known to be lost";
     let of = |observation| link.delivery::<()>(&observation);
@@ -151,7 +151,7 @@ where
 
 /// The law of [`Deterministic`]: two sensors with differently seeded random sources send the same report, and neither source is drawn from.
 ///
-/// # Errors
+/// If encoding fails, or at the first measurement at which the law fails.
 /// If encoding fails, or the measurement at which the law fails.
 pub fn deterministic<const M: usize, S: Deterministic<M>, R: Rng + Clone + PartialEq>(
     scheme: &S,

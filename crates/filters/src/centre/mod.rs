@@ -61,11 +61,11 @@ struct Member<const D: usize> {
 /// A belief that is predicted over time, and the sensors that report to the centre.
 ///
 /// ```text
-/// advance(t):  belief = predict(over(t - now), noise scale);  every sensor may have failed meanwhile
-/// feedback(i): what sensor i is told, from the belief now
+/// advance(t):  belief = predict(over(t - now), noise scale);  the failure probability of every sensor grows
+/// feedback(i): bits for sensor i, from the present belief
 /// receive:     likelihoods of all slots of one instant, each with the probability that its sensor works
 ///              presence, residuals and their tests, from the belief before;  belief = update(likelihoods)
-/// late(t):     back to the last belief before t;  all that came since, and the late slots, in order of time
+/// late(t):     go back to the last belief before t;  repeat all later updates, the late slots included, in the order of time
 /// ```
 /// A call that fails leaves the centre unchanged.
 pub struct FusionCentre<const D: usize, F: StateFilter<D>> {

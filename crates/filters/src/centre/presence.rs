@@ -1,15 +1,15 @@
 //! The probability that a silent sensor still works.
 //!
 //! ```text
-//! alone        probability to work before the slot if sensors fail one by one; over dt seconds  alone <- alone exp(-rate dt)
-//! struck       the same if a common failure has struck, which takes each sensor with probability 1/2
-//! b            probability that it has; over dt seconds  b <- b + (1 - b) (1 - exp(-rate dt))
+//! alone        probability that the sensor works if sensors fail one by one; over dt seconds  alone <- alone exp(-rate dt)
+//! struck       the same if a common failure has occurred, in which each sensor fails with probability 1/2
+//! b            probability of a common failure; over dt seconds  b <- b + (1 - b) (1 - exp(-rate dt))
 //! silence      w <- w E / (w E + 1 - w) for both,   E = p(nothing arrives | works) under the belief without this observation
-//! a report     both <- 1
+//! a report     alone, struck <- 1
 //! b's odds     times the product over the sensors of p(observed | struck) / p(observed | alone)
 //! working      (1 - b) alone + b struck
 //! R            (1 + R) / E after silence, 0 after a report: the Shiryaev-Roberts statistic
-//! named dead   when R reaches 1 / (rate of false alarms)
+//! named dead   when R reaches 1 / (rate of false alarms): the sensor is declared dead
 //! ```
 //! `R` minus the number of slots is a martingale while the sensor works. A working sensor is therefore declared dead less than once in
 //! `1 / rate` slots on average (Pollak 1985), for every scheme, threshold and loss.

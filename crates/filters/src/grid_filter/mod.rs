@@ -48,8 +48,8 @@ const DROPPED: f64 = 14.0;
 /// ```text
 /// m, L L'     mean and covariance of those coordinates;  u = L^-1 (x - m) is standard normal
 /// grid:       centre c, orthogonal axes with deviations d;  n^K nodes over +-reach deviations;  first c = 0, d = 1
-/// pass:       w = exp(b (ln N(u; 0, I) + ln p(observed | x)));  b = 1 if w then is of at least 3^K effective nodes,
-///             otherwise the b that gives so many;  moments of u under w
+/// pass:       w = exp(b (ln N(u; 0, I) + ln p(observed | x)));  b = 1 if w then has at least 3^K effective nodes,
+///             otherwise the b that gives about 3^K;  moments of u under w
 ///             done if b = 1, the posterior has 1.5 nodes per deviation and lies inside the grid
 ///             otherwise: next grid along the principal axes of these moments, over +-reach of its deviations
 /// split:      if layers of nodes across the longest axis are empty between two modes: a grid for each side

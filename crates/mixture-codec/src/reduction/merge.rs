@@ -264,7 +264,7 @@ mod tests {
                 let pairs = fast.0.iter().zip(&slow.0);
                 assert!(fast.0.len() == slow.0.len() && pairs.clone().all(|(a, b)| a.mean == b.mean));
             }
-            // What no price can buy stays apart.
+            // A pair whose merging costs infinity is not merged.
             let (kept, total) = pairwise(parts, 3, |_, _| f64::INFINITY);
             assert_eq!((kept.len(), total), (14, 0.0));
         }

@@ -121,7 +121,7 @@ pub fn log_interval(a: f64, b: f64) -> f64 {
     log_interval_of::<false, false>(a, b)
 }
 
-/// The same result to the bit. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
+/// As [`log_interval`], with the same bits. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
 #[inline(always)]
 pub fn log_interval_wide(a: f64, b: f64) -> f64 {
     log_interval_of::<true, false>(a, b)
@@ -141,7 +141,7 @@ pub fn interval(a: f64, b: f64) -> f64 {
     interval_of::<false, false>(a, b)
 }
 
-/// The same result to the bit. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
+/// As [`interval`], with the same bits. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
 #[inline(always)]
 pub fn interval_wide(a: f64, b: f64) -> f64 {
     interval_of::<true, false>(a, b)

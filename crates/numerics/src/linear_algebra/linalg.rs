@@ -132,7 +132,7 @@ pub fn semidefinite_factor<const D: usize>(
     for column in 0..D {
         let (pivot, variance) = rest.diagonal().argmax();
         if variance <= SEMIDEFINITE_TOLERANCE {
-            // What is left must be zero up to rounding, negative pivots included.
+            // The remainder must be zero up to rounding, negative pivots included.
             if rest.amax() > 10.0 * SEMIDEFINITE_TOLERANCE {
                 return Err(indefinite());
             }
@@ -297,7 +297,7 @@ mod tests {
         assert!(refused(&Matrix3::from_diagonal(&Vector3::new(1.0, -1e-300, 1.0))));
         // A correlation of 1.5 between the small coordinates.
         assert!(refused(&Matrix3::new(1e-8, 1.5e-8, 0.0, 1.5e-8, 1e-8, 0.0, 0.0, 0.0, 1e10)));
-        // What is known exactly varies with nothing.
+        // A coordinate of variance zero has no covariance with any other.
         assert!(refused(&Matrix3::new(0.0, 1e-9, 0.0, 1e-9, 1.0, 0.0, 0.0, 0.0, 1.0)));
         assert!(refused(&Matrix3::from_element(f64::NAN)));
     }

@@ -56,7 +56,7 @@ pub fn log_pdf_with(x: f64, mean: f64, variance: f64) -> f64 {
 /// Positive and decreasing; `+inf` below `x = -26.62`, `~ 1/(x sqrt(pi))` for large `x`. NaN in, NaN out.
 #[inline]
 pub fn erfcx(x: f64) -> f64 {
-    // The same bits as the branch-free form; what that would discard is not computed.
+    // The same bits as the branch-free form, without computing the forms that it discards.
     if x >= 0.0 {
         2.0 * scaled_tail(std::f64::consts::SQRT_2 * x)
     } else {
@@ -71,7 +71,7 @@ pub fn cdf(x: f64) -> f64 {
 
 /// `ln Phi(x)`, within six units in the last place; finite down to `x = -1.8e154`, where the square overflows.
 pub fn log_cdf(x: f64) -> f64 {
-    // The same bits as the branch-free form; what that would discard is not computed.
+    // The same bits as the branch-free form, without computing the forms that it discards.
     if x <= 0.0 {
         ln_corrected(scaled_tail(-x), 0.0) - 0.5 * x * x
     } else {

@@ -78,7 +78,7 @@ pub fn one_sided_variance(x: f64) -> f64 {
 /// The variance by its formula, for a cut left of the mean.
 #[inline]
 fn variance_with_mean(x: f64, mean: f64) -> f64 {
-    // Where the mean has underflowed, x may be infinite, and their product is 0 all the same.
+    // If the mean has underflowed, x may be infinite; their product is 0 in the limit.
     if mean == 0.0 { 1.0 } else { 1.0 - mean * (mean + x) }
 }
 

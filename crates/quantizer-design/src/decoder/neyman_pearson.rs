@@ -149,7 +149,7 @@ mod tests {
         assert!(NeymanPearson::new(&system, 1.0).is_err());
     }
 
-    /// Where the wrong value's probability is among the smallest numbers, its share of the entropy is nothing, not infinite.
+    /// If the probability of the wrong value is among the smallest numbers, its term of the entropy is zero, not infinite.
     #[test]
     fn equivocation_is_finite_where_probabilities_are_subnormal() {
         for tenth in 700..800 {

@@ -237,7 +237,7 @@ pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &N
 /// group's sample, from a random stream fixed by (`seed`, `i`). Starts that do not converge are left out.
 ///
 /// # Errors
-/// The error of the first start if none converged.
+/// If no start converged; the error is that of the first.
 pub fn multi_start(
     system: &System,
     criterion: Criterion,

@@ -4,7 +4,7 @@
 //! b <- initial breakpoints;  I_old <- I(b)
 //! repeat
 //!     score(t, x) <- ln p(t | x) / p(t) under b                       # the decoder for the present cells
-//!     D_z(y)      <- E[ sum_t C[t, z] score(t', t, X) ; Y = y ]       # what reporting y as z is worth
+//!     D_z(y)      <- E[ sum_t C[t, z] score(t', t, X) ; Y = y ]       # gain of reporting y as z
 //!     cells       <- { y : argmax_z D_z(y) }                          # edges to machine precision
 //!     I_new       <- I(b)
 //! until |I_new - I_old| <= tolerance * I_new and no breakpoint moved by more than breakpoint_tolerance

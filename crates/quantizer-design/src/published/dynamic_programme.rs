@@ -4,7 +4,7 @@
 //! programming over the right edge of the last cell:
 //!
 //! ```text
-//! v(a, b)   <- worth of the cell (e_a, e_b]
+//! v(a, b)   <- contribution of the cell [e_a, e_b)
 //! V_1(b)    <- v(0, b)
 //! V_l(b)    <- max over a < b of V_{l-1}(a) + v(a, b)      for l = 2..L
 //! partition <- trace back from V_L(end)

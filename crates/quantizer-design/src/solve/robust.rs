@@ -137,7 +137,7 @@ pub struct Minimax {
 ///     design  <- best against the mixture of models, from the last design
 ///     errors  <- of that design in each model
 ///     weights <- weights * exp(rate * (error / mean error - 1)), normalised
-/// answer  <- the design with the least largest error
+/// answer  <- the design with the smallest maximum error
 /// ```
 ///
 /// # Errors

@@ -4,13 +4,13 @@
 //! for each start
 //!     repeat
 //!         for each sensor
-//!             block <- moments of its grid cells, the other sensors as they are
+//!             block <- moments of its grid cells, with the other sensors fixed
 //!             repeat
-//!                 words of the cells <- best for the decoder as it is          # cells merge where they should
-//!                 an unused word enters wherever it is worth it
-//!                 two words are exchanged if that is better
+//!                 words of the cells <- best for the present decoder           # neighbours with the same word become one cell
+//!                 insert an unused word if that is better
+//!                 exchange two words if that is better
 //!     until a round over the sensors gains nothing
-//! for the best few results: finer grids about their breakpoints, and again
+//! for the best few results: the same on finer grids around their breakpoints
 //! ```
 //!
 //! A step is taken only if it raises the criterion. A word that is the best one for no cell is not used. The search

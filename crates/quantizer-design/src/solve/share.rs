@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! bits <- 0 for every sensor
-//! repeat until all are given
-//!     one bit more to the sensor where the design gains most
+//! repeat until all bits are distributed
+//!     one bit more to the sensor for which the design gains most
 //! repeat while that gains
-//!     one bit from one sensor to another
+//!     move one bit from one sensor to another
 //! ```
 //!
 //! Each step is a short search over all sensors. If the time for this stage is over, each remaining bit goes to the sensor

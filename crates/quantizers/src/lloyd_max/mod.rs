@@ -14,7 +14,7 @@
 //!                          and  dc_i/db_{i-1} = p(b_{i-1}) (c_i - b_{i-1}) / P_i
 //!     step <- J^-1 F, halved until b - step is increasing and |F| falls
 //!     b    <- b - step
-//! until the step is so small against the narrowest cell that the next one is below rounding
+//! until the step is so small compared with the narrowest cell that the next one is below rounding
 //! ```
 //!
 //! The solution is unique only if the logarithm of the density is concave. Other densities are also solved from the best partition on a
@@ -238,7 +238,7 @@ mod tests {
             let exact = gaussian(levels).unwrap().mean_squared_error();
             assert!((q.mean_squared_error() / exact - 1.0).abs() < 1e-12, "{levels}");
         }
-        // Where the numbers cannot hold the breakpoints apart, that is an error.
+        // An error if the breakpoints are equal after rounding.
         assert!(design(&Normal::with_deviation(1e17, 1.0).unwrap(), 8).is_err());
         assert!(gaussian(8).unwrap().affine(1e17, 1.0).is_err());
     }
