@@ -414,7 +414,7 @@ mod tests {
         assert!(UniformGrid::new(1.0, 0.0, 0.1).is_err());
         assert!(UniformGrid::new(0.0, 1.0, 1e-9).is_err());
         assert!(UniformGrid::symmetric(f64::NAN, 1.0).is_err());
-        // Defect: variances over such nodes, and densities at such nodes, were infinite.
+        // Variances and densities over such nodes must stay finite.
         assert!(UniformGrid::new(0.0, 1e301, 1e300).is_err() && UniformGrid::new(0.0, 1e-310, 5e-324).is_err());
         let grid = UniformGrid::symmetric(5.0, 0.25).unwrap();
         assert_eq!((grid.points(), grid.node(20)), (41, 0.0));

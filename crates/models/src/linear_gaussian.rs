@@ -238,7 +238,7 @@ mod tests {
             let model = LinearGaussian::with_covariance(rotation(scale), q).unwrap();
             assert_eq!(model.stationary_covariance(), Err(Error::NotStationary));
         }
-        // Issue: an overflow came out as NaN.
+        // An overflow must not give NaN.
         let huge = LinearGaussian::with_covariance(Matrix2::new(0.5, 1e200, 0.0, 0.5), q).unwrap();
         assert!(matches!(huge.stationary_covariance(), Err(Error::Argument(_))));
     }

@@ -165,7 +165,7 @@ mod tests {
         ] {
             assert!(LinearSensor::new(Matrix2::identity(), bad).is_err());
         }
-        // Defect: a large entry elsewhere hid the asymmetry.
+        // A large entry elsewhere must not hide the asymmetry.
         let hidden = Matrix3::new(1.0, 0.9, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1e10);
         assert!(LinearSensor::new(Matrix3::identity(), hidden).is_err());
     }

@@ -35,7 +35,7 @@ pub enum SampleSize {
 pub enum Shape {
     /// Diagonal, from the weighted standard deviation of each axis.
     Diagonal,
-    /// Proportional to the weighted covariance. The estimate then transforms with linear maps of the state.
+    /// Proportional to the weighted covariance. All error measures are then invariant under linear maps of the state.
     Full,
 }
 

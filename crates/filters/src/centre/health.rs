@@ -222,14 +222,14 @@ mod tests {
     fn a_bit_is_a_word_of_two() {
         for (share, correction) in [(0.5, 0.3), (0.1, 2.0), (0.9, -0.2), (0.999, 1e-3)] {
             let other: f64 = 1.0 - share;
-            // Corrections average to nothing.
+            // Corrections have mean zero.
             let words = [(f64::ln(share), correction), (other.ln(), -correction * share / other)];
             let (bit, word) = (Residual::of_bit(share, correction).unwrap(), Residual::of_word(&words, 0).unwrap());
             assert!((bit.residual - word.residual).abs() < 1e-9, "{bit:?} {word:?}");
             assert!((bit.surprise - word.surprise).abs() < 1e-9, "{bit:?} {word:?}");
         }
         assert!(Residual::of_bit(0.5, 0.0).is_none() && Residual::of_bit(0.0, 1.0).is_none());
-        // A bit that hardly ever comes is a surprise, however rare.
+        // A bit of small probability has a large surprise, however rare it is.
         assert!(Residual::of_bit(1e-12, 1.0).unwrap().surprise > 1e5);
     }
 }

@@ -87,9 +87,9 @@ fn variance_with_mean(x: f64, mean: f64) -> f64 {
 pub struct OneSided {
     /// `ln Phi(x)`, as [`log_cdf`](super::log_cdf) gives it, to rounding.
     pub log_probability: f64,
-    /// Mean of `X`, `phi(x)/Phi(x)`, as [`inverse_mills`] gives it.
+    /// Mean of `X` given the event, `phi(x)/Phi(x)`, as [`inverse_mills`] gives it.
     pub mean: f64,
-    /// Variance of `X`, as [`one_sided_variance`] gives it.
+    /// Variance of `X` given the event, as [`one_sided_variance`] gives it.
     pub variance: f64,
 }
 

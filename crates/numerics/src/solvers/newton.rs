@@ -82,7 +82,7 @@ mod tests {
             assert!((increasing(f, -0.3, 5.0, start, 1e-14) - 3f64.ln()).abs() < 1e-15);
             assert!(calls <= most, "{calls} from {start}");
         }
-        // The tolerance is about the step, and what is asked for loosely is found at once.
+        // The tolerance limits the step, so a large tolerance ends at once.
         let mut calls = 0;
         let loose = increasing(
             |x| {
