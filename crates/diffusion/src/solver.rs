@@ -39,7 +39,7 @@ pub(crate) struct Factor<'a> {
 
 /// Largest range of the potential of a scaling: its exponentials and their products must not overflow.
 const MAX_SPREAD: f64 = 800.0;
-/// Largest sum of the potential differences around a loop. The relative error of an entry is a tenth of it.
+/// Largest sum of potential differences around a loop that counts as zero. The relative error of an entry is a tenth of it.
 const MAX_MISFIT: f64 = 1e-11;
 
 /// The potential `psi` with `rate upwards / rate downwards = exp(psi below - psi above)` at every face, if there is one: then

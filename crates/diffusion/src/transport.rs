@@ -32,7 +32,7 @@ fn bernoulli(x: f64) -> f64 {
 }
 
 impl Scheme {
-    /// Coefficients of the upwind and the downwind concentration in the flux through a face with Peclet number `p`.
+    /// Coefficients of the concentrations below and above a face in the upward flux. The Peclet number `p` is positive for upward flow.
     fn weights(self, p: f64) -> [f64; 2] {
         match self {
             Self::ExponentialFitting => [bernoulli(-p), bernoulli(p)],
