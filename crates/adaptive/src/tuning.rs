@@ -73,8 +73,8 @@ const AROUND: [(i32, f64); 2] = [(24, 0.012), (8, 0.001)];
 /// The configuration of least error among those that cost at most `most`, and its replay.
 ///
 /// A bisection of the logarithm of `delta` finds approximately where the price meets `most`. Of values near it, and of those that fit the
-/// steps of the instrument ([`own_steps`]), the best is kept, because neither price nor error is a smooth function of `delta` if the signal is
-/// quantised. If nothing meets `most`, `delta` is the range of the samples; if they are constant, it is that of `config`.
+/// steps of the instrument ([`own_steps`]), the best is kept, because neither price nor error is a smooth function of `delta` if the signal
+/// is quantised. If nothing meets `most`, `delta` is the range of the samples; if they are constant, it is that of `config`.
 ///
 /// # Errors
 /// If a sample is not finite, the range of the samples overflows, or `price` fails.

@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// Decimals of a tick for UTC, and for tables that cannot be read twice.
 pub(crate) const NANOSECONDS: u8 = 9;
 
-/// Description of an invalid time: what is wrong, and what is expected.
+/// Description of an invalid time: what is wrong, and what the user can do.
 pub(crate) type Problem = (&'static str, &'static str);
 
 const NO_TIME: Problem = (
