@@ -25,7 +25,7 @@ impl SourceChain {
     /// A chain over a deployment. `samples` has one list per node: what the node measures when it is asked, kg/m^3.
     ///
     /// # Errors
-    /// If there is not one list of samples per node, or the form of the search is not [`Form::Raw`](crate::Form::Raw).
+    /// If there is not one list of samples per node, or the form of the search is not [`Form::Raw`].
     pub fn new(
         search: Search,
         sensor: SourceSensor,
