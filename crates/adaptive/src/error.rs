@@ -1,16 +1,16 @@
-//! What this crate refuses.
+//! Errors of the adaptive codec.
 
-/// Errors of this crate. A failed call leaves sensor and receiver as they were.
+/// Errors of this crate. After a failed call sensor and receiver are unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// If an argument is out of range.
     #[error(transparent)]
     Argument(#[from] fewbits_numerics::ArgumentError),
-    /// A packet or stream that the scheme cannot have sent.
+    /// A packet or stream that no sensor of this configuration can have sent.
     #[error(transparent)]
     Codec(#[from] fewbits_core::CodecError),
-    /// A word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
+    /// An error of the core types; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
     #[error(transparent)]
     Core(#[from] fewbits_core::Error),
     /// A filter failed.

@@ -1,57 +1,57 @@
-//! Errors of this crate.
+//! Errors of censoring sensors and their fusion centre.
 
-/// What a censoring sensor or its fusion centre refuses, or finds impossible. A failed step leaves the belief as it was.
+/// Errors of this crate. After a failed step the belief is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// If an argument is out of range.
     #[error(transparent)]
     Argument(#[from] fewbits_numerics::ArgumentError),
-    /// [`fewbits_core::Error::Impossible`] for an observation of probability zero under the belief.
+    /// An error of the core types; [`fewbits_core::Error::Impossible`] for an observation of probability zero under the belief.
     #[error(transparent)]
     Core(fewbits_core::Error),
     /// A filter refused a step.
     #[error(transparent)]
     Filter(fewbits_filters::Error),
-    /// A model refused its parameters.
+    /// A dynamics or sensor model refused its parameters.
     #[error(transparent)]
     Model(#[from] fewbits_models::Error),
     /// The number of observations differs from the number of sensors.
     #[error("{observations} observations were handed over: expected {sensors}, one per sensor")]
     ObservationCount {
-        /// Observations handed over.
+        /// Number of observations passed.
         observations: usize,
-        /// Sensors of the network.
+        /// Number of sensors of the network.
         sensors: usize,
     },
     /// A report names a sensor that does not exist.
     #[error("a report came from sensor {sensor}: expected an index below {sensors}")]
     UnknownSensor {
-        /// Index in the report.
+        /// Index of the sensor, counted from zero.
         sensor: usize,
-        /// Sensors of the network.
+        /// Number of sensors of the network.
         sensors: usize,
     },
-    /// A received value that the sensor, had it followed the rule, would not have sent.
+    /// A received value has a normalised innovation below the threshold: a sensor that follows the rule would not have sent it.
     #[error(
         "sensor {sensor} sent a measurement with normalised innovation squared {statistic}: expected at least the threshold {threshold}"
     )]
     ProtocolViolation {
         /// Index of the sensor.
         sensor: usize,
-        /// `nu' S^-1 nu` of what it sent.
+        /// Normalised innovation squared `nu' S^-1 nu` of the value.
         statistic: f64,
         /// The threshold it should have reached.
         threshold: f64,
     },
-    /// A measurement that says nothing about the state (`s = r`), for which the divergence rule is undefined.
+    /// The measurement does not depend on the state (`s = r`), so the divergence rule is undefined.
     #[error(
         "the innovation variance {innovation_variance} does not exceed the noise variance {noise_variance}: expected an informative measurement"
     )]
     Uninformative {
-        /// `s`.
+        /// Innovation variance `s`.
         innovation_variance: f64,
-        /// `r`.
+        /// Noise variance `r`.
         noise_variance: f64,
     },
 }

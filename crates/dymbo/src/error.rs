@@ -1,41 +1,41 @@
-//! What the filters refuse, and what can go wrong with a belief.
+//! Errors of the one-bit filters.
 
 /// Errors of this crate. A failed step leaves the old belief as it was.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// If an argument is out of range.
     #[error(transparent)]
     Argument(#[from] fewbits_numerics::ArgumentError),
-    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
+    /// An error of the core types; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
     #[error(transparent)]
     Core(fewbits_core::Error),
     /// A report that does not fit its format.
     #[error(transparent)]
     Codec(#[from] fewbits_core::CodecError),
-    /// A model refused its parameters.
+    /// A dynamics or sensor model refused its parameters.
     #[error(transparent)]
     Model(fewbits_models::Error),
-    /// A filter below failed.
+    /// A filter of `fewbits_filters` failed.
     #[error(transparent)]
     Filter(fewbits_filters::Error),
-    /// No quantizer table.
+    /// A quantizer could not be made.
     #[error(transparent)]
     Quantizer(#[from] fewbits_quantizers::Error),
-    /// No root of a steady-state equation.
+    /// A steady-state equation has no root, or none was found.
     #[error(transparent)]
     Root(#[from] fewbits_numerics::roots::RootError),
-    /// A plant that outruns its bits: one bit moves the estimate by a bounded step, so an error beyond `gain / (|a| - 1)`
-    /// grows for ever, although the computed variance stays finite.
+    /// The plant coefficient exceeds 1 in size. One bit moves the estimate by at most the gain. An error beyond `gain / (|a| - 1)`
+    /// therefore grows without limit, although the computed variance stays finite.
     #[error(
         "the plant coefficient is {coefficient}: expected one in [-1, 1], because a bounded correction cannot hold an \
              unstable plant (`new_unstable` accepts the risk)"
     )]
     UnstablePlant {
-        /// The offending coefficient.
+        /// The plant coefficient `a`.
         coefficient: f64,
     },
-    /// An iteration did not settle.
+    /// An iteration did not converge within its limit.
     #[error("{what} did not settle within {iterations} iterations")]
     NotConverged {
         /// What was iterated.

@@ -1,13 +1,13 @@
-//! What this crate refuses.
+//! Errors of the range trackers.
 
-/// Errors of this crate. A failed step leaves the old belief as it was.
+/// Errors of this crate. After a failed step the belief is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// If an argument is out of range.
     #[error(transparent)]
     Argument(#[from] fewbits_numerics::ArgumentError),
-    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
+    /// An error of the core types; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
     #[error(transparent)]
     Core(fewbits_core::Error),
     /// A message that does not fit its format.
@@ -25,7 +25,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// What was observed has probability zero under the belief.
+    /// The observation has probability zero under the belief.
     pub(crate) const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
 }
 

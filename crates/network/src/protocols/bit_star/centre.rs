@@ -1,4 +1,4 @@
-//! The fusion centre of a star: what its machine asks for is done on the simulated radio.
+//! The fusion centre of a star: carries out the actions of its state machine on the simulated radio.
 
 use super::super::decoded;
 use super::node::CentreNode;
