@@ -1,17 +1,17 @@
-//! What both ends agree on beforehand.
+//! Configuration that sensor and receiver must share.
 
 use fewbits_node::adaptive as node;
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
-/// The agreement of a sensor and its receiver: the accuracy, and how losses are survived. Stored (`serde`) it is checked anew;
+/// The configuration of a sensor and its receiver: the error bound, and how losses are handled. Deserialization (`serde`) checks it;
 /// [`fewbits_node::adaptive::Config`] is the same for a microcontroller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Config(pub(crate) node::Config);
 
 impl Config {
-    /// Every reconstruction is within `delta` (measurement units) of its sample, over a link that loses nothing.
+    /// Every reconstruction is within `delta` (measurement units) of its sample, on a link that loses nothing.
     ///
     /// # Errors
     /// If `delta` is not above 0 or `2 delta` not finite.
@@ -19,9 +19,9 @@ impl Config {
         Ok(Self(node::Config::new(delta)?))
     }
 
-    /// For an instrument whose samples are decimal numbers a multiple of `resolution` apart: these return exactly, to the last
-    /// bit. Other samples are reconstructed within `resolution / 2`, but cost more than with [`new`](Self::new) where they lie
-    /// half-way. Around a circle this is the same as `new(resolution / 2)`.
+    /// For an instrument whose samples are decimal numbers that are multiples of `resolution` apart: such samples are reconstructed
+    /// exactly, to the last bit. Other samples are reconstructed within `resolution / 2`; samples half-way between need more bits than with
+    /// [`new`](Self::new). On a circle this is the same as `new(resolution / 2)`.
     ///
     /// # Errors
     /// If `resolution` is not positive and finite, or half of it 0.
@@ -29,7 +29,7 @@ impl Config {
         Ok(Self(node::Config::exact(resolution)?))
     }
 
-    /// The same agreement with another bound.
+    /// The same configuration with another error bound.
     ///
     /// # Errors
     /// As [`new`](Self::new) and [`circular`](Self::circular).
@@ -37,7 +37,7 @@ impl Config {
         Ok(Self(self.0.with_delta(delta)?))
     }
 
-    /// The signal lives on a circle: samples are taken modulo `period` (360 for degrees), reconstructions lie in `[0, period)`,
+    /// The signal is periodic: samples are taken modulo `period` (360 for degrees), reconstructions lie in `[0, period)`,
     /// and `delta` bounds the error around the circle.
     ///
     /// # Errors
@@ -46,9 +46,9 @@ impl Config {
         Ok(Self(self.0.circular(period)?))
     }
 
-    /// For links that lose packets: every packet counts up a number of `sequence_bits` bits (by which the receiver notices a
-    /// loss unless a multiple of `2^sequence_bits` packets vanished in a row) and has a flag that marks a refresh; every
-    /// `refresh_every` slots, and whenever it is asked to, the sensor sends a refresh, from which a receiver can start.
+    /// For links that lose packets. Every packet has a counter of `sequence_bits` bits, and a flag that marks a refresh. The receiver
+    /// notices a loss by the counter, unless a multiple of `2^sequence_bits` packets was lost in a row. Every `refresh_every` slots, and
+    /// whenever it is asked to, the sensor sends a refresh, from which a receiver can start.
     ///
     /// # Errors
     /// If `sequence_bits` is not in `1..=16` or `refresh_every` is 0.
@@ -56,7 +56,7 @@ impl Config {
         Ok(Self(self.0.resilient(sequence_bits, refresh_every)?))
     }
 
-    /// The largest error of a reconstruction.
+    /// Largest error of a reconstruction, in measurement units.
     pub fn delta(&self) -> f64 {
         self.0.delta()
     }
@@ -65,7 +65,7 @@ impl Config {
         Self(self.0.made_exact())
     }
 
-    /// What samples are a multiple of apart, if [`exact`](Self::exact).
+    /// Distance of which the differences of samples are multiples, for [`exact`](Self::exact).
     pub fn resolution(&self) -> Option<f64> {
         self.0.resolution()
     }
@@ -80,12 +80,12 @@ impl Config {
         self.0.refresh_every()
     }
 
-    /// Bits of the counter in a packet.
+    /// Bits of the counter in a packet; 0 if there is none.
     pub fn sequence_bits(&self) -> u32 {
         self.0.sequence_bits()
     }
 
-    /// Whether packets have a counter and a flag.
+    /// Whether packets have a counter and a refresh flag.
     pub fn is_resilient(&self) -> bool {
         self.0.is_resilient()
     }

@@ -1,9 +1,9 @@
-//! Reports that survive the loss of those before them.
+//! Reports that can be decoded although earlier ones were lost.
 //!
-//! [`crate::Sensor`] codes each report under what both ends learned from all reports before: fewest bits, but one lost packet spoils
-//! all that follow until the next refresh. Here a report names the index of its sample modulo `2^b`, and the receiver takes the index
-//! of that class nearest to the last one it knows. `b` is chosen so that this is right from any of the last [`TOLERATED`] `+ 1`
-//! reports; it is not sent, for the length of a packet is known from its frame.
+//! [`crate::Sensor`] codes each report under what both ends learned from all earlier reports. That needs the fewest bits, but after one
+//! lost packet no report can be decoded until the next refresh. Here a report contains the index of its sample modulo `2^b`. The receiver
+//! takes the index of that residue class that is nearest to the last one it knows. `b` is chosen so that this is right from any of the last
+//! [`TOLERATED`] `+ 1` reports. It is not sent, because the frame tells the length of a packet.
 //!
 //! ```text
 //! lattice   x^ = 2 delta j, through zero: nothing about it can be lost
@@ -12,9 +12,9 @@
 //! refresh   counter (c bits), flag 1, j                in two's complement, as short as it fits
 //! ```
 //!
-//! A lost packet therefore costs the slots until the next one. The counter tells the receiver how many are missing; if more than
-//! [`TOLERATED`] are, it waits for a refresh. The source of the idea is the coding of a value with side information at the decoder
-//! only, in its simplest form (Wyner and Ziv 1976).
+//! A lost packet therefore affects only the slots until the next one. The counter tells the receiver how many are missing; if more than
+//! [`TOLERATED`] are, it waits for a refresh. The method is coding with side information at the decoder
+//! only (Wyner and Ziv 1976) in its simplest form.
 
 use crate::packet::Packet;
 use crate::{Error, Tracked};
@@ -23,16 +23,16 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive, within};
 use serde::{Deserialize, Serialize};
 
-/// Packets in a row whose loss the next one survives.
+/// Number of successive packets that may be lost before the next one can no longer be decoded.
 pub const TOLERATED: usize = 2;
-/// Reports that a new one must be decodable from.
+/// Number of earlier reports from any of which a new one must be decodable.
 const REMEMBERED: usize = TOLERATED + 1;
-/// Indices are smaller: multiples of the step then stay exact enough for the bound.
+/// Largest size of an index: multiples of the step are then exact enough for the bound.
 const LARGEST: i64 = 1 << 40;
-/// The step is this much shorter than `2 delta`, so that rounding never takes a reconstruction out of its bound.
+/// Share by which the step is shorter than `2 delta`, so that rounding cannot move a reconstruction out of its bound.
 const SLACK: f64 = 1.0 / (1 << 10) as f64;
 
-/// What both ends agree on.
+/// Configuration that sensor and receiver must share.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct CosetConfig {
@@ -48,8 +48,8 @@ fewbits_numerics::stored! { CosetConfig as Stored |config| {
 } => CosetConfig::new(delta.0, counter_bits, refresh_every), ArgumentError }
 
 impl CosetConfig {
-    /// Every reconstruction within `delta` of its sample while no packet is missing; a counter of `counter_bits` bits per packet,
-    /// and a refresh, from which a receiver can start, every `refresh_every` slots.
+    /// Every reconstruction is within `delta` of its sample while no packet is missing. A packet has a counter of `counter_bits` bits.
+    /// Every `refresh_every` slots the sensor sends a refresh, from which a receiver can start.
     ///
     /// The receiver notices a loss unless a multiple of `2^counter_bits` packets vanish in a row.
     ///
@@ -69,7 +69,7 @@ impl CosetConfig {
         })
     }
 
-    /// The largest error of a reconstruction.
+    /// Largest error of a reconstruction, in measurement units.
     pub fn delta(&self) -> f64 {
         self.delta
     }
@@ -98,12 +98,12 @@ fn is_index(index: &i64) -> bool {
     index.unsigned_abs() < LARGEST as u64
 }
 
-/// Bits in which a whole number fits in two's complement, at least one.
+/// Number of bits of an integer in two's complement, at least one.
 fn width_of(index: i64) -> u32 {
     u64::BITS - (index ^ index >> 63).leading_zeros() + 1
 }
 
-/// The number that `width` bits of two's complement mean.
+/// The integer whose two's complement in `width` bits is `bits`.
 fn signed(bits: u64, width: u32) -> i64 {
     let shift = u64::BITS - width;
     (bits << shift) as i64 >> shift
@@ -131,7 +131,7 @@ impl CosetSensor {
         }
     }
 
-    /// What a receiver that lost nothing believes the last sample to be; `None` before the first.
+    /// The reconstruction of the last sample at a receiver that lost nothing; `None` before the first.
     pub fn reconstruction(&self) -> Option<f64> {
         self.reported.first().map(|index| self.config.value(*index))
     }
@@ -139,7 +139,7 @@ impl CosetSensor {
     /// The packet of the next slot; `None` is silence.
     ///
     /// # Errors
-    /// If the sample is not finite, or beyond `2^40` steps of the lattice; the sensor is then as it was.
+    /// If the sample is not finite, or beyond `2^40` steps of the lattice. The sensor is then unchanged.
     pub fn encode(&mut self, sample: f64) -> Result<Option<Packet>, Error> {
         let config = self.config;
         finite("sample", sample)?;
@@ -166,6 +166,7 @@ impl CosetSensor {
         if refresh {
             packet.0.push(index as u64, width_of(index));
         } else {
+            // As many low bits as distinguish the index from all others near any index that the receiver may have.
             let farthest = self.reported.iter().map(|last| index - last);
             let width = farthest.map(width_of).max().unwrap_or(1);
             packet.0.push(index as u64, width);
@@ -195,13 +196,13 @@ fewbits_numerics::stored! { CosetSensor as StoredSensor |sensor| {
 #[serde(try_from = "StoredReceiver", into = "StoredReceiver")]
 pub struct CosetReceiver {
     config: CosetConfig,
-    /// The index of the last packet that was understood.
+    /// The index of the last decoded packet.
     index: Option<i64>,
-    /// The number that the packet after it has.
+    /// Counter of the packet after it.
     counter: u32,
-    /// Slots since the first one, at the receiver that was there from the start.
+    /// Number of slots since the first one, for a receiver that was there from the start.
     slot: u64,
-    /// Too many packets are missing: only a refresh will be understood.
+    /// Whether too many packets are missing, so that only a refresh can be decoded.
     waiting: bool,
     synchronised: bool,
 }
@@ -222,7 +223,7 @@ fewbits_numerics::stored! { CosetReceiver as StoredReceiver |receiver| {
 }, ArgumentError }
 
 impl CosetReceiver {
-    /// A receiver that is there from the sensor's first slot.
+    /// A receiver that runs from the sensor's first slot on.
     pub fn new(config: CosetConfig) -> Self {
         Self {
             config,
@@ -234,7 +235,7 @@ impl CosetReceiver {
         }
     }
 
-    /// What is known of the last sample. While synchronised, the value is within the bound unless a packet vanished since the
+    /// The reconstruction of the last sample. While it is synchronised, the value is within the bound, unless a packet was lost after the
     /// last one that arrived.
     pub fn tracked(&self) -> Tracked {
         Tracked {
@@ -243,10 +244,10 @@ impl CosetReceiver {
         }
     }
 
-    /// What arrived in the next slot. A packet that is known to be lost ends the synchronisation until the next packet arrives.
+    /// Processes what arrived in the next slot. A packet that is known to be lost ends the synchronisation until the next packet arrives.
     ///
     /// # Errors
-    /// If a packet is none that a sensor can have sent; the receiver is then as it was.
+    /// If no sensor can have sent the packet. The receiver is then unchanged.
     pub fn receive(&mut self, observation: &Observation<Packet>) -> Result<Tracked, Error> {
         let due = self.slot.is_multiple_of(self.config.refresh_every);
         match observation {
@@ -278,7 +279,7 @@ impl CosetReceiver {
         let index = if refresh {
             Some(signed(bits, width))
         } else {
-            // The index of this class nearest to the last one.
+            // The index of this residue class nearest to the last one.
             let last = self.index.filter(|_| !self.waiting && missing as usize <= TOLERATED);
             last.map(|last| last.wrapping_add(signed(bits.wrapping_sub(last as u64), width)))
         };
@@ -291,7 +292,7 @@ impl CosetReceiver {
                 self.index = Some(index);
                 (self.synchronised, self.waiting) = (true, false);
             }
-            // The counter comes round: without this a later packet would seem to follow.
+            // The counter is cyclic: without this a later packet would seem to be the next one.
             None => (self.synchronised, self.waiting) = (false, true),
         }
         Ok(())

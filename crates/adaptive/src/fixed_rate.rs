@@ -1,4 +1,4 @@
-//! The sibling with the same few bits in every slot.
+//! A scheme with the same small number of bits in every slot.
 
 use crate::Error;
 use fewbits_core::factor::InCell;
@@ -14,18 +14,18 @@ use serde::{Deserialize, Serialize};
 const DECAYS: [f64; 3] = [0.0, 0.6, 0.95];
 /// Scales of the driving noise, in powers of four of the unit.
 const SCALES: std::ops::RangeInclusive<i32> = -2..=2;
-/// Probability of a new model in a slot.
+/// Probability that the model changes in a slot.
 const SWITCHING: f64 = 0.05;
-/// Slots after which the thresholds of one bit begin anew.
+/// Number of slots after which the sequence of thresholds of one bit repeats.
 const TURNS: usize = 4;
 
-/// A word of 1 to 3 bits in every slot: the cell of the sample between quantiles of what both ends predict.
+/// Sends a word of 1 to 3 bits in every slot: the cell of the sample among quantiles of the prediction that both ends compute.
 ///
 /// Both ends run one interacting-multiple-model filter ([`Imm`]) of random walks and decaying velocities at scales
-/// `unit 4^-2 .. unit 4^2`; the cells have equal probability under its prediction (with one bit they take turns at being unequal:
-/// thresholds at one half, a tenth and nine tenths tell the scale, which a threshold at the median alone does not), a word is an [`InCell`] factor, and the
-/// estimate is the filter's mean. There is no guarantee: this is for links that carry exactly so many bits. Replicas may differ in
-/// the last place on different machines; their quantiles then do too, and words mean the same. Stored (`serde`) and read back it goes on with the
+/// `unit 4^-2 .. unit 4^2`. The cells have equal probability under its prediction. With one bit the threshold alternates between the
+/// quantiles one half, one tenth and nine tenths, because the median alone does not reveal the scale. A word is an [`InCell`] factor, and
+/// the estimate is the filter's mean. There is no error bound: the scheme is for links that carry a fixed number of bits. On different
+/// machines the states may differ in the last digit; words then still have the same meaning. A deserialized scheme continues with the
 /// same bits.
 ///
 /// ```
@@ -50,16 +50,16 @@ pub struct FixedRate {
     sensor: LinearSensor<2, 1>,
     belief: ImmBelief<2>,
     workspace: ImmWorkspace<2>,
-    /// Slots so far, modulo [`TURNS`].
+    /// Number of slots so far, modulo [`TURNS`].
     turn: usize,
 }
 
-/// A word of a [`FixedRate`] scheme: the number of the cell, from below.
+/// A word of a [`FixedRate`] scheme: the index of the cell, counted from the lowest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Word(pub u8);
 
 impl Message for Word {
-    /// Bits of a word.
+    /// Length of a word in bits.
     type Format = u32;
 
     fn encode(&self, bits: &u32, writer: &mut BitWriter) -> Result<(), CodecError> {
@@ -88,8 +88,8 @@ stored! { FixedRate as StoredFixedRate |rate| {
 }, Error }
 
 impl FixedRate {
-    /// Words of `bits` bits for a signal that starts about `start`, give or take `unit`, and typically moves by up to a few
-    /// `unit` in a slot. `unit` may be wrong by a factor of ten.
+    /// Words of `bits` bits for a signal that starts at about `start` with uncertainty `unit`, and typically changes by up to a few
+    /// `unit` per slot. `unit` may be wrong by a factor of ten.
     ///
     /// # Errors
     /// If `bits` is not 1, 2 or 3, `unit` not positive or `start` not finite.
@@ -100,6 +100,7 @@ impl FixedRate {
         positive("unit", unit)?;
         finite("start", start)?;
         let mut models = Vec::new();
+        // One model for each decay and scale.
         for decay in DECAYS {
             for scale in SCALES {
                 let q = unit * 4.0_f64.powi(scale);
@@ -137,10 +138,10 @@ impl FixedRate {
         self.belief.probabilities()
     }
 
-    /// The sensor's half.
+    /// Encodes a sample and updates the state (sensor's half).
     ///
     /// # Errors
-    /// If the sample is not finite; the state is then as it was.
+    /// If the sample is not finite. The state is then unchanged.
     pub fn encode(&mut self, sample: f64) -> Result<Word, Error> {
         finite("sample", sample)?;
         let predicted = self.predicted()?;
@@ -150,10 +151,10 @@ impl FixedRate {
         Ok(word)
     }
 
-    /// The receiver's half; returns the estimate.
+    /// Updates the state with a received word and returns the estimate (receiver's half).
     ///
     /// # Errors
-    /// If the word has more bits than agreed; the state is then as it was.
+    /// If the word has more than the configured bits. The state is then unchanged.
     pub fn receive(&mut self, word: Word) -> Result<f64, Error> {
         if u32::from(word.0) >= 1 << self.bits {
             return Err(ArgumentError::new("word", word.0, format!("a number of {} bits", self.bits)).into());
@@ -164,10 +165,10 @@ impl FixedRate {
         Ok(self.estimate())
     }
 
-    /// The slot's word is known to be lost.
+    /// Updates the state with a slot whose word is known to be lost, and returns the estimate.
     ///
     /// # Errors
-    /// If the belief would no longer be finite.
+    /// If the belief would not be finite.
     pub fn miss(&mut self) -> Result<f64, Error> {
         self.belief = self.predicted()?;
         self.turn = (self.turn + 1) % TURNS;
@@ -197,6 +198,7 @@ impl FixedRate {
         let count = 1_u32 << self.bits;
         (1..count)
             .map(|i| {
+                // One bit: mostly the median, and in turn a far quantile, which detects jumps.
                 let target = if self.bits == 1 {
                     [0.5, 0.1, 0.5, 0.9][self.turn]
                 } else {

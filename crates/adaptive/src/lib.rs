@@ -1,8 +1,8 @@
-//! Real signals within a guaranteed error, in as few bits as they deserve.
+//! Compression of real signals within a guaranteed error, sample by sample or in blocks.
 //!
 //! A sensor and its receiver run the same bank of models of the signal and hold the same frequencies of past reports. Silence means
-//! that the sample is within `delta` of what both predict, and costs nothing; otherwise the residual is coded under the law that
-//! both predict for it. Nothing is fitted beforehand, and nothing but reports travels.
+//! that the sample is within `delta` of the prediction of both. Otherwise the residual is coded under the probability law that
+//! both compute. There is no training beforehand, and only reports are sent.
 //!
 //! ```
 //! use fewbits_adaptive::{Config, Receiver, Sensor};
@@ -22,30 +22,30 @@
 //!
 //! | part | where |
 //! |---|---|
-//! | the agreement: accuracy, circle, refreshes | [`Config`] |
-//! | the two halves | [`Sensor`], [`Receiver`] |
-//! | whole bits in a slot, and a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
+//! | configuration: error bound, circle, refreshes | [`Config`] |
+//! | sensor and receiver | [`Sensor`], [`Receiver`] |
+//! | the bits of one slot, and of a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
 //! | many samples at once, each block decodable alone | [`BlockCodec`] |
-//! | what many such blocks have in common, told once | [`Start`] |
-//! | decisions of known probability as bytes | [`arithmetic`] |
-//! | links that lose packets: one lost packet costs the slots until the next | [`CosetSensor`], [`CosetReceiver`] |
-//! | a slot for other filters | [`SlotScheme`] |
+//! | what many such blocks have in common, stored once | [`Start`] |
+//! | arithmetic coding of decisions with known probabilities | [`arithmetic`] |
+//! | links that lose packets: one lost packet affects only the slots until the next | [`CosetSensor`], [`CosetReceiver`] |
+//! | reports as likelihoods for other filters | [`SlotScheme`] |
 //! | the same number of bits in every slot | [`FixedRate`] |
-//! | `delta` for a rate, on a recording | [`best_within`], [`replay`] |
+//! | choice of `delta` for a bit rate, on a recording | [`best_within`], [`replay`] |
 //!
-//! The central choice: **replicas hold integers.** Reconstructions lie on a lattice `anchor + 2 delta j` through the first sample, so
-//! that values which return are the same integer again, an instrument's own steps stay aligned, and both ends update from the same
-//! exact numbers. The cost is that the prediction is rounded to the lattice: silence is a cell of the lattice and not `+-delta` about
-//! the best prediction. On recordings the first is worth far more than the second.
+//! **Both ends are updated only by integers.** Reconstructions lie on a lattice `anchor + 2 delta j` through the first sample. Values
+//! that return are the same integer again, the steps of an instrument stay aligned, and both ends update from the same
+//! exact numbers. The cost: the prediction is rounded to the lattice, so silence means a cell of the lattice instead of `+-delta` about
+//! the best prediction. On recordings the lattice saves far more than that costs.
 //!
-//! The second choice: the bank's filters have constant gains and logistic predictive laws, where
-//! [`fewbits_filters::Imm`] would update by truncated normals. One slot costs 24 exponentials and some 600 other operations; the
-//! errors at equal bits are the same on recordings. Only arithmetic that is the same on every machine decides what is coded.
+//! The bank's filters have constant gains and logistic predictive laws; [`fewbits_filters::Imm`] would update by truncated normals
+//! instead. One slot costs 24 exponentials and about 600 other operations; the
+//! errors at equal bits are the same on recordings. All coding decisions use arithmetic that gives the same bits on every machine.
 //!
-//! The replicas and the sensor's half stand in [`fewbits_node::adaptive`], which a microcontroller runs as it is; here are the
+//! The shared state and the sensor's half are in [`fewbits_node::adaptive`], which a microcontroller runs unchanged. This crate has the
 //! receiver's half, streams, stored states and whole recordings.
 //!
-//! Not here: loss models and the energy of a radio, baselines, files.
+//! Not here: models of loss and the energy of a radio (`fewbits-network`), files (`fewbits-record`).
 
 mod block;
 mod config;

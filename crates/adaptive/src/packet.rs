@@ -1,11 +1,11 @@
-//! Packets: whole bits, at most 128.
+//! Packets: bit strings of at most 128 bits.
 
 use fewbits_core::{BitReader, BitWriter, CodecError, Message};
 use fewbits_node::adaptive::TENS;
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
-/// What a sensor sends in one slot. Its length is known from its frame, so no bit is spent on it.
+/// The bits that a sensor sends in one slot. The receiver knows their number from the frame, so it is not encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Packet(pub(crate) fewbits_node::Packet);
@@ -46,7 +46,7 @@ fn invalid(what: &'static str, value: impl std::fmt::Display, expected: &'static
 }
 
 impl Packet {
-    /// Length.
+    /// Length in bits.
     pub fn bits(&self) -> usize {
         self.0.bits() as usize
     }
@@ -59,7 +59,7 @@ impl Packet {
     }
 }
 
-/// Nothing is agreed on beforehand: a packet is its bits.
+/// A packet is encoded as its own bits; no format is needed.
 impl Message for Packet {
     type Format = ();
 
@@ -88,7 +88,7 @@ fn low_mask(width: u32) -> u64 {
     if width >= 64 { u64::MAX } else { (1 << width) - 1 }
 }
 
-/// Reads a packet from its front.
+/// Reads bits from the front of a packet.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PacketReader {
     packet: fewbits_node::Packet,
@@ -111,7 +111,7 @@ impl PacketReader {
         Ok((self.packet.word() >> self.remaining()) as u64 & low_mask(width))
     }
 
-    /// The next `width` bits without consuming them, zeros behind the end.
+    /// The next `width` bits without consuming them, zeros after the end.
     pub(crate) fn peek(&self, width: u32) -> u64 {
         let there = self.remaining().min(width);
         let bits = (self.packet.word() >> (self.remaining() - there)) as u64 & low_mask(there);

@@ -9,29 +9,29 @@ use fewbits_node::adaptive::{Lattice, MODEL_BITS, Replica, is_scheduled, next_se
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
-/// What is known of a sample.
+/// The receiver's knowledge of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Tracked {
-    /// The reconstruction; while not synchronised, the last one. `None` before the first report.
+    /// The reconstruction; the last one while not synchronised. `None` before the first report.
     pub value: Option<f64>,
-    /// Whether the receiver is in step with the sensor as far as it can know. If it is, and no packet vanished since the last that
-    /// was received, the value is within `delta` of the sample.
+    /// Whether the receiver's state equals the sensor's, as far as the receiver can know. If it does, and no packet was lost after the last
+    /// received one, the value is within `delta` of the sample.
     pub synchronised: bool,
 }
 
-/// The receiver's half: reports or silence in, reconstructions out.
+/// The receiver's half. It takes reports or silence and returns reconstructions.
 ///
-/// Over a link that loses packets ([`Config::resilient`]) a loss is noticed at the next packet, by its number, at the next
-/// scheduled refresh, if that is missing, or at once where the link says so ([`Observation::Lost`]). From the loss to the next
-/// refresh that arrives the error is not bounded; with a refresh every `R` slots that is at most `R - 1` slots plus `R` for each
-/// scheduled refresh that is lost in turn.
+/// On a link that loses packets ([`Config::resilient`]) a loss is noticed at once if the link reports it ([`Observation::Lost`]), at the
+/// next packet by its counter, or at the next scheduled refresh if that is missing. From the loss to the next
+/// refresh that arrives the error is not bounded. With a refresh every `R` slots that is at most `R - 1` slots, plus `R` for each
+/// scheduled refresh that is lost too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Receiver {
     config: Config,
     replica: Option<Replica>,
-    /// The number of the slot, where it is known.
+    /// Number of the slot, if it is known.
     slot: Option<u64>,
     sequence: u32,
     synchronised: bool,
@@ -81,7 +81,7 @@ impl TryFrom<Stored> for Receiver {
 }
 
 impl Receiver {
-    /// A receiver that is there from the sensor's first slot.
+    /// A receiver that runs from the sensor's first slot on.
     pub fn new(config: Config) -> Self {
         Self {
             config,
@@ -92,7 +92,7 @@ impl Receiver {
         }
     }
 
-    /// A receiver that joins, or lost its memory, while the sensor is running: it starts at the next refresh.
+    /// A receiver that starts, or starts again, while the sensor is running. It is synchronised from the next refresh on.
     pub fn joining(config: Config) -> Self {
         Self {
             slot: None,
@@ -100,12 +100,12 @@ impl Receiver {
         }
     }
 
-    /// The agreement with the sensor.
+    /// The configuration that the sensor has too.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// What is known of the last sample.
+    /// The knowledge of the last sample.
     pub fn tracked(&self) -> Tracked {
         Tracked {
             value: self.replica.as_ref().map(Replica::value),
@@ -120,7 +120,7 @@ impl Receiver {
             .map_or([1.0 / MODELS as f64; MODELS], |replica| replica.bank().weights().map(f64::from))
     }
 
-    /// What arrived one slot after the last.
+    /// Processes what arrived one slot after the last.
     ///
     /// # Errors
     /// As [`receive_after`](Self::receive_after).
@@ -128,11 +128,11 @@ impl Receiver {
         self.receive_after(1, observation)
     }
 
-    /// What arrived `elapsed` slots after the last.
+    /// Processes what arrived `elapsed` slots after the last.
     ///
     /// # Errors
-    /// If `elapsed` is 0, or a packet is none that the sensor can have sent; the receiver is then as it was: a packet that is
-    /// known to be damaged should be observed as [`Observation::Lost`].
+    /// If `elapsed` is 0, or no sensor can have sent the packet. The receiver is then unchanged. A packet that is
+    /// known to be damaged should be passed as [`Observation::Lost`].
     pub fn receive_after(&mut self, elapsed: u32, observation: &Observation<Packet>) -> Result<Tracked, Error> {
         if elapsed == 0 {
             return Err(ArgumentError::new("elapsed", 0, "at least 1 slot").into());
@@ -158,10 +158,10 @@ impl Receiver {
         Ok(self.tracked())
     }
 
-    /// The next sample of a stream.
+    /// Reads the next sample of a stream.
     ///
     /// # Errors
-    /// If `elapsed` is 0 or the stream is damaged; the receiver is then as it was.
+    /// If `elapsed` is 0 or the stream is damaged. The receiver is then unchanged.
     pub fn read_after(&mut self, elapsed: u32, stream: &mut StreamReader<'_>) -> Result<f64, Error> {
         if elapsed == 0 {
             return Err(ArgumentError::new("elapsed", 0, "at least 1 slot").into());
@@ -172,6 +172,7 @@ impl Receiver {
             self.synchronised = true;
             return Ok(replica.value());
         };
+        // The bank is restored if the stream is damaged: a failed call leaves the receiver unchanged.
         let saved = *replica.bank();
         let slot = replica.predict(elapsed);
         let outcome = stream.get(replica, &slot).and_then(|content| match content {

@@ -1,4 +1,4 @@
-//! From bits back to what they say: the receiver's half of `fewbits_node::adaptive::Content`.
+//! Decoding of reports: the receiver's half of `fewbits_node::adaptive::Content`.
 
 use crate::packet::{PacketReader, read_number};
 use fewbits_core::CodecError;
@@ -13,7 +13,7 @@ pub(crate) fn information(frequency: u32) -> f64 {
     f64::from(PRECISION) - f64::from(frequency).log2()
 }
 
-/// What a symbol of the law and the bits behind it say.
+/// The content that a symbol of the law and the bits after it encode.
 pub(crate) fn content(symbol: u32, rest: &mut PacketReader) -> Result<Content, CodecError> {
     if let Some(k) = Law::residual_of(symbol) {
         return Ok(Content::Near(k));
@@ -33,7 +33,7 @@ pub(crate) fn content(symbol: u32, rest: &mut PacketReader) -> Result<Content, C
     Ok(Content::Far(k))
 }
 
-/// Moves the replica to what was said.
+/// Updates the replica with the content of a report.
 pub(crate) fn apply(
     content: &Content,
     config: &Config,
@@ -49,7 +49,7 @@ pub(crate) fn apply(
     })
 }
 
-/// Reads what `fewbits_node::adaptive::push` wrote, to the packet's end.
+/// Reads what `fewbits_node::adaptive::push` wrote, up to the packet's end.
 pub(crate) fn read(law: &Law<'_>, reader: &mut PacketReader) -> Result<Content, CodecError> {
     let (symbol, place) = law.find(reader.peek(PRECISION) as u32);
     let (expected, bits) = word(&place, Law::residual_of(symbol).is_some());
@@ -66,7 +66,7 @@ pub(crate) fn read(law: &Law<'_>, reader: &mut PacketReader) -> Result<Content, 
     Ok(content)
 }
 
-/// The word of a symbol, which is the packet's last one or not.
+/// The word of a symbol; `last` says whether it ends the packet.
 fn word(place: &Place, last: bool) -> (u32, u32) {
     if last { place.last_word() } else { place.word() }
 }

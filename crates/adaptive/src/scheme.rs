@@ -1,4 +1,4 @@
-//! One slot as a [`Scheme`]: what a report, or silence, says about the noise-free measurement.
+//! One slot as a [`Scheme`]: likelihood of a report, or of silence, as a function of the noise-free measurement.
 
 use crate::packet::Packet;
 use crate::report;
@@ -11,11 +11,11 @@ use fewbits_numerics::error::{finite, positive};
 use nalgebra::{SVector, Vector1};
 use rand::Rng;
 
-/// The next slot of a sensor, for any filter of the workspace: a receiver that has a model of its own hears, beside the
+/// The next slot of a sensor, for any filter of the workspace. A receiver with its own model of the signal learns, besides the
 /// reconstruction, in which cell of width `2 delta` the noisy measurement lies.
 ///
-/// The slot is what both ends know without data; make one for each slot, from the sensor in a simulation. Signals on a circle and
-/// links that invert bits have no such factor.
+/// It contains what both ends know before the slot. Make one for each slot; in a simulation, from the sensor. Signals on a circle and
+/// links that invert bits are not supported.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlotScheme {
     sensor: Sensor,
@@ -44,12 +44,12 @@ impl SlotScheme {
         })
     }
 
-    /// The reconstruction that silence stands for.
+    /// The reconstruction for a silent slot.
     pub fn prediction(&self) -> f64 {
         self.replica.lattice().value(self.slot.prediction())
     }
 
-    /// The packet that reports the lattice point `steps` from the prediction, for tests of the laws.
+    /// The packet that reports the lattice point `steps` from the prediction. It is for tests.
     ///
     /// # Errors
     /// If `steps` is zero or beyond 4096.
@@ -64,22 +64,22 @@ impl SlotScheme {
     }
 
     fn cell(&self, j: i64) -> Result<Cell, ArgumentError> {
-        // Edges computed from their own numbers: neighbours share them to the bit.
+        // Edges are computed from their own indices, so neighbouring cells have bitwise equal edges.
         let lattice: &Lattice = self.replica.lattice();
         let edge = |j: i64| 0.5 * (lattice.value(j - 1) + lattice.value(j));
         Cell::new(edge(j), edge(j + 1))
     }
 }
 
-/// What a slot says about the noise-free measurement.
+/// Likelihood of a slot as a function of the noise-free measurement.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum SlotFactor {
     /// The measurement lies in a cell of the lattice, or nothing is known of it.
     Cells(Scalar),
-    /// The sample itself was sent and arrived, which has a probability of its own.
+    /// The sample itself was sent and arrived.
     Sample {
-        /// The sample in its noise.
+        /// Likelihood of the sample with its noise.
         value: Value<1>,
         /// `ln` of the probability that a report arrives.
         log_arrival: f64,
@@ -180,7 +180,7 @@ impl Scheme<1> for SlotScheme {
                 let cell = self.cell(self.slot.prediction() + k)?;
                 SlotFactor::Cells(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into())
             }
-            // No cell of the lattice: the sample itself.
+            // The report contains no lattice point but the sample itself.
             Content::Whole(sample) => SlotFactor::Sample {
                 value: Value::scalar(sample, self.noise_variance)?,
                 log_arrival: link.of_received()?.ln(),

@@ -9,13 +9,13 @@ use fewbits_node::adaptive::{Encoder, Lattice, Replica, Slot, header};
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
-/// What a sensor sends in one slot.
+/// The report of one slot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
-    /// The whole bits that travel.
+    /// The bits that are sent.
     pub packet: Packet,
-    /// The ideal code length in bits, `-log2` of the probability: what a stream of reports approaches.
+    /// Ideal code length in bits: `-log2` of the probability. A stream of reports approaches it.
     pub information: f64,
     /// Whether a receiver can start here.
     pub refresh: bool,
@@ -31,9 +31,9 @@ impl From<fewbits_node::adaptive::Report> for Report {
     }
 }
 
-/// The sensor's half: samples in, reports or silence out.
+/// The sensor's half. It takes samples and returns reports or silence.
 ///
-/// It allocates nothing. Stored (`serde`) and read back it goes on with the same bits. [`Encoder`] is the same for a microcontroller.
+/// It does not allocate. A deserialized sensor continues with the same bits. [`Encoder`] is the same for a microcontroller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Sensor {
@@ -82,42 +82,42 @@ impl Sensor {
         }
     }
 
-    /// The agreement with the receiver.
+    /// The configuration that the receiver has too.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// What the receiver, if it lost nothing, believes the last sample to be; `None` before the first.
+    /// The reconstruction of the last sample at a receiver that lost nothing; `None` before the first.
     pub fn reconstruction(&self) -> Option<f64> {
         self.encoder.reconstruction()
     }
 
     /// Weights of the models: random walks, then velocities that decay by 0.6, then by 0.95, each in [`SCALES`](crate::SCALES)
-    /// increasing scales. Even before the first sample.
+    /// increasing scales. All are equal before the first sample.
     pub fn model_weights(&self) -> [f64; MODELS] {
         self.encoder
             .replica()
             .map_or([1.0 / MODELS as f64; MODELS], |replica| replica.bank().weights().map(f64::from))
     }
 
-    /// Makes the next report a refresh. Without effect unless the configuration is resilient.
+    /// Makes the next report a refresh. No effect unless the configuration is resilient.
     pub fn request_refresh(&mut self) {
         self.encoder.request_refresh();
     }
 
-    /// A sample one slot after the last; `None` is silence.
+    /// Encodes a sample one slot after the last. `None` is silence.
     ///
     /// # Errors
-    /// If the sample is not finite; the sensor is then as it was.
+    /// If the sample is not finite. The sensor is then unchanged.
     pub fn encode(&mut self, sample: f64) -> Result<Option<Report>, Error> {
         self.encode_after(1, sample)
     }
 
-    /// A sample `elapsed` slots after the last. Both ends know when samples are taken: for irregular time stamps, choose a slot
-    /// no longer than the shortest gap.
+    /// Encodes a sample `elapsed` slots after the last. Both ends must know when samples are taken. For irregular times choose a slot that
+    /// is not longer than the shortest gap.
     ///
     /// # Errors
-    /// If the sample is not finite or `elapsed` is 0; the sensor is then as it was.
+    /// If the sample is not finite or `elapsed` is 0. The sensor is then unchanged.
     pub fn encode_after(&mut self, elapsed: u32, sample: f64) -> Result<Option<Report>, Error> {
         Ok(self
             .encoder
@@ -126,7 +126,7 @@ impl Sensor {
             .map(Report::from))
     }
 
-    /// A sample into a stream instead of a packet. Streams are for reliable storage: no headers, no refreshes.
+    /// Encodes a sample into a stream instead of a packet. Streams are for reliable storage: they have no headers and no refreshes.
     ///
     /// # Errors
     /// As [`encode_after`](Self::encode_after).
@@ -137,7 +137,7 @@ impl Sensor {
             .map_err(ArgumentError::from)?;
         match written {
             Some(written) => Ok(written?),
-            // The sample as the circle has it.
+            // The first sample, reduced to the circle if there is one.
             None => Ok(stream.first(Lattice::reduce(&self.config.0, sample))?),
         }
     }

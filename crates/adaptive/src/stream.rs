@@ -16,12 +16,12 @@ use std::num::NonZeroU32;
 const BITS: usize = PRECISION as usize;
 const TOTAL: u32 = 1 << PRECISION;
 
-/// How a stream tells which slots are silent.
+/// How the reader of a stream learns which slots are silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Silence {
-    /// It does not: the reader knows it, as the receiver of packets does.
+    /// The reader knows it from elsewhere, as the receiver of packets does.
     Timed,
-    /// By a coded flag in each slot: the stream is the whole recording.
+    /// By a coded flag for each slot, so the stream is complete.
     Coded,
 }
 
@@ -64,7 +64,7 @@ impl Flags {
     }
 }
 
-/// A symbol whose place is known.
+/// A symbol whose interval is known.
 #[derive(Debug, Clone, Copy)]
 struct Known(Place);
 
@@ -79,7 +79,7 @@ impl EncoderModel<BITS> for Known {
     }
 }
 
-/// What stands at a quantile.
+/// A search for the symbol at a quantile.
 struct Search<F>(F);
 
 impl<F> EntropyModel<BITS> for Search<F> {
@@ -94,7 +94,7 @@ impl<F: Fn(u32) -> (u32, Place)> DecoderModel<BITS> for Search<F> {
     }
 }
 
-/// Bits of a raw digit.
+/// Bits of an uncoded digit.
 const DIGIT: u32 = 16;
 
 fn digit(value: u32, width: u32) -> Place {
@@ -174,15 +174,15 @@ impl StreamWriter {
         Ok(())
     }
 
-    /// Bits so far, to be a whole number of 32-bit words at the end.
+    /// Bits so far. The finished stream is padded to a multiple of 32.
     pub fn bits(&self) -> usize {
         use constriction::stream::Code;
         let _ = self.encoder.state();
         self.encoder.num_bits()
     }
 
-    /// The words of the finished stream, then the number of its slots and the CRC-32 (ISO-HDLC) of all of these, little-endian: for
-    /// [`StreamReader::open`]. Of 2^32 slots and more the number is `u32::MAX`.
+    /// The words of the finished stream, then the number of its slots and the CRC-32 (ISO-HDLC) of all of these, little-endian.
+    /// [`StreamReader::open`] reads them. For 2^32 slots and more the number is `u32::MAX`.
     pub fn seal(self) -> Vec<u32> {
         let slots = self.slots;
         let mut words = self.finish();
@@ -191,21 +191,21 @@ impl StreamWriter {
         words
     }
 
-    /// The words of the finished stream. Nothing in them tells a reader their number, or that some are missing or damaged: what holds
-    /// them must, or use [`seal`](Self::seal).
+    /// The words of the finished stream. A reader cannot detect missing or damaged words: the container must,
+    /// or use [`seal`](Self::seal).
     pub fn finish(self) -> Vec<u32> {
         self.encoder.into_compressed().unwrap_infallible()
     }
 }
 
-/// Reads what a [`StreamWriter`] wrote. Total: any words give samples or errors.
+/// Reads what a [`StreamWriter`] wrote. Any words give samples or errors.
 #[derive(Debug, Clone)]
 pub struct StreamReader<'a> {
     decoder: RangeDecoder<u32, u64, constriction::backends::Cursor<u32, &'a [u32]>>,
     flags: Option<Flags>,
-    /// Silent slots, where the stream does not tell.
+    /// Whether the next slot is silent, if the stream itself does not say it.
     silent: Option<bool>,
-    /// Slots that are left to be read, if the stream says how many it has.
+    /// Number of slots left to be read, if the stream has it.
     left: Option<u32>,
 }
 
@@ -221,7 +221,7 @@ impl<'a> StreamReader<'a> {
     /// A reader at the first word.
     ///
     /// # Errors
-    /// If there is nothing to read.
+    /// If the stream is empty.
     pub fn new(words: &'a [u32], silence: Silence) -> Result<Self, CodecError> {
         Ok(Self {
             decoder: RangeDecoder::from_compressed(words).unwrap_infallible(),
@@ -231,7 +231,7 @@ impl<'a> StreamReader<'a> {
         })
     }
 
-    /// A reader of a sealed stream ([`StreamWriter::seal`]). It reads as many slots as were written and then refuses.
+    /// A reader of a sealed stream ([`StreamWriter::seal`]). After as many slots as were written it returns errors.
     ///
     /// # Errors
     /// If words are missing, too many or damaged.

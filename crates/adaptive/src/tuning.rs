@@ -1,21 +1,21 @@
-//! A recording replayed, and the choice of `delta` on it.
+//! Replay of a recording, and the choice of `delta` for it.
 
 use crate::{Config, Error, Sensor};
 use fewbits_numerics::ArgumentError;
 
-/// What became of a recording.
+/// Result of the replay of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Replay {
-    /// Reconstructions.
+    /// Reconstruction of each sample.
     pub values: Vec<f64>,
-    /// Reconstruction minus sample, around the circle if there is one.
+    /// Reconstruction minus sample for each sample, around the circle if there is one.
     pub errors: Vec<f64>,
     /// Ideal code length of each slot in bits.
     pub information: Vec<f64>,
-    /// Whole bits of all packets.
+    /// Total bits of all packets.
     pub packet_bits: usize,
-    /// Packets.
+    /// Number of packets.
     pub packets: usize,
 }
 
@@ -26,17 +26,17 @@ impl Replay {
         if worst == 0.0 {
             return 0.0;
         }
-        // In units of the worst, so that no square overflows.
+        // Errors are divided by the largest one, so that no square overflows.
         let squares: f64 = self.errors.iter().map(|e| (e / worst).powi(2)).sum();
         worst * (squares / self.errors.len() as f64).sqrt()
     }
 
-    /// Largest error.
+    /// Largest error in size.
     pub fn worst_error(&self) -> f64 {
         self.errors.iter().fold(0.0, |worst, e| worst.max(e.abs()))
     }
 
-    /// Ideal bits per sample.
+    /// Ideal bits per sample, averaged over the recording.
     pub fn rate(&self) -> f64 {
         self.information.iter().sum::<f64>() / self.information.len().max(1) as f64
     }
@@ -65,16 +65,16 @@ pub fn replay(config: Config, samples: &[f64]) -> Result<Replay, Error> {
     Ok(replay)
 }
 
-/// Bisections of the logarithm of `delta`.
+/// Number of bisections of the logarithm of `delta`.
 const BISECTIONS: usize = 12;
 /// Further values on each side, so far apart on a logarithmic scale: about where the price is met, then about the best.
 const AROUND: [(i32, f64); 2] = [(24, 0.012), (8, 0.001)];
 
 /// The configuration of least error among those that cost at most `most`, and its replay.
 ///
-/// A bisection of the logarithm of `delta` finds about where the price is met; of values near it, and those that fit the steps of
-/// the instrument ([`own_steps`]), the best is kept, for neither price nor error is a smooth function of `delta` where a signal is
-/// quantised. If nothing meets the price, `delta` is the range of the samples; if they are constant, it is that of `config`.
+/// A bisection of the logarithm of `delta` finds approximately where the price meets `most`. Of values near it, and of those that fit the
+/// steps of the instrument ([`own_steps`]), the best is kept, because neither price nor error is a smooth function of `delta` if the signal
+/// is quantised. If nothing meets `most`, `delta` is the range of the samples; if they are constant, it is that of `config`.
 ///
 /// # Errors
 /// If a sample is not finite, the range of the samples overflows, or `price` fails.

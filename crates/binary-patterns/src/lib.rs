@@ -1,14 +1,14 @@
-//! One-bit quantizers at many sensors: patterns, exact decoding, search and bounds.
+//! One-bit quantizers at many sensors: patterns, exact decoding, search for good patterns, and error bounds.
 //!
-//! A scalar `X` is seen by `N` sensors in independent normal noise; each sends one bit. The measurement axis is divided into
-//! `2^B` cells ([`CellGrid`]) and a sensor's [`Pattern`] says which bit it sends from which cell. Patterns differ between sensors,
-//! so that together they tell the cells apart; linear patterns, XORs of the binary digits of the cell's index, are named by
-//! masks ([`linear_pattern`]). A [`Bank`] puts sensors and source together and gives everything about them exactly.
+//! `N` sensors measure a scalar `X` in independent normal noise; each sends one bit. The measurement axis is divided into
+//! `2^B` cells ([`CellGrid`]), and a sensor's [`Pattern`] lists the bit for each cell. Patterns differ between sensors,
+//! so that together they distinguish the cells. Linear patterns are XORs of the binary digits of the cell's index and are given by
+//! masks ([`linear_pattern`]). A [`Bank`] is a source with its sensors; its errors are computed exactly.
 //!
-//! The central choice is to integrate, not to simulate. Given `X` the bits are independent, so the error of any decoder is a sum
-//! over outcomes of one-dimensional integrals, and equal sensors are counted instead of enumerated. A search over thousands
-//! of sets then ranks them truly, where a simulation of a thousand trials has six per cent of noise. The cost is the number of
-//! outcomes, `prod (m_i + 1)` over groups of equal sensors, limited to `2^26`.
+//! Errors are computed by integration, not by simulation. Given `X` the bits are independent, so the error of any decoder is a sum over
+//! outcomes of one-dimensional integrals; of equal sensors only the count of ones matters. A search over thousands of sets of patterns then
+//! ranks them correctly, while a simulation of a thousand trials has an error of six per cent. The cost is the number of outcomes, `prod
+//! (m_i + 1)` over groups of `m_i` equal sensors, limited to `2^26`.
 //!
 //! ```
 //! use fewbits_binary_patterns::search::LinearSearch;
@@ -25,8 +25,8 @@
 //! # Ok::<(), fewbits_binary_patterns::Error>(())
 //! ```
 //!
-//! Source: Movaghati, thesis, section 2.3, chapter 5 and appendix B; errata are numbered as in `docs/errata.md`. Searches draw their
-//! further starts from fixed streams: the same call gives the same design. Not here: other random
+//! Source: Movaghati, thesis, section 2.3, chapter 5 and appendix B; errata are numbered as in `docs/errata.md`. Searches draw
+//! additional starts from fixed random streams, so the same call gives the same design. Not in this crate: other random
 //! numbers, sources that are not symmetric about zero.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]

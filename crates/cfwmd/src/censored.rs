@@ -1,4 +1,4 @@
-//! What a censoring sensor, reporting or silent, says about its noise-free measurement.
+//! Likelihood of a censoring sensor's report or silence, as a function of its noise-free measurement.
 
 use crate::Error;
 use crate::ellipsoid::{EllipsoidMoments, GaussianInEllipsoid};
@@ -13,12 +13,12 @@ use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{Cholesky, SMatrix, SVector};
 
-/// What a missing report of a censoring sensor says about its innovation.
+/// The two ways in which a report can be missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Missing {
-    /// Nothing arrived: the innovation lies in the region of silence, or its report was lost without a trace.
+    /// Nothing arrived: the innovation lies in the region of silence, or the report was lost and the centre does not know it.
     Nothing { loss: f64 },
-    /// A report is known to be lost: the innovation lies outside. `scale` is [`Link::lost_given_sent`].
+    /// A report is known to be lost: the innovation lies outside the region of silence. `scale` is [`Link::lost_given_sent`].
     Lost { scale: f64 },
 }
 
@@ -36,7 +36,7 @@ impl Missing {
     /// Moments of the innovation `nu ~ N(mu, V)` of a sensor with this rule, given that its report is missing.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if that has probability zero.
+    /// [`Error::Impossible`] if a missing report has probability zero.
     pub(crate) fn innovation_moments<const M: usize>(
         self,
         rule: &CensoringRule<M>,
@@ -44,6 +44,7 @@ impl Missing {
         covariance: &SMatrix<f64, M, M>,
     ) -> Result<EllipsoidMoments<M>, Error> {
         let under = rule.region().under(covariance)?;
+        // A silence is either a censored measurement or a lost report.
         let loss = match self {
             Self::Nothing { loss } => loss,
             Self::Lost { scale } => {
@@ -78,8 +79,8 @@ impl Missing {
     }
 }
 
-/// No report of a sensor that is silent if its innovation lies in an ellipsoid about zero. With `s(m)` the probability
-/// `P(m + n - prediction in ellipsoid)`, `n ~ N(0, R)`:
+/// A missing report of a sensor that is silent if its innovation lies in an ellipsoid about zero. With `n ~ N(0, R)` and
+/// `s(m) = P(m + n - prediction in ellipsoid)`:
 ///
 /// `p(nothing | m) = loss + (1 - loss) s(m)` and `p(lost | m) = e (1 - s(m))`, `e` the link's [`lost_given_sent`](Link::lost_given_sent).
 #[derive(Debug, Clone, PartialEq)]
@@ -137,8 +138,9 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
         add_mapped(means, log_weights, add, |logs| mix(floor, log_share, logs));
     }
 
-    /// With `nu = m + n - prediction` of covariance `S = V + R` and moments `E`, `C` given that the report is missing, `K = V S^-1`:
-    /// mean `mu + K (E - E0 nu)`, covariance `(I - K) V (I - K)' + K R K' + K C K'`.
+    /// The posterior follows from the innovation `nu = m + n - prediction`, whose covariance is `S = V + R`. Let `E`, `C` be its mean and
+    /// covariance given that the report is missing, `E0 nu` its prior mean and `K = V S^-1`. Then the mean is `mu + K (E - E0 nu)` and the
+    /// covariance `(I - K) V (I - K)' + K R K' + K C K'`.
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         let spread = prior.covariance();
         let total = symmetrised(&(spread + self.noise));
@@ -161,7 +163,7 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
     }
 }
 
-/// `log_p` becomes `ln(floor + exp(log_share + log_p))`.
+/// Replaces each `log_p` of `logs` by `ln(floor + exp(log_share + log_p))`.
 pub(crate) fn mix(floor: f64, log_share: f64, logs: &mut [f64]) {
     logs.iter_mut().for_each(|log| *log += log_share);
     if floor > 0.0 {
@@ -171,16 +173,16 @@ pub(crate) fn mix(floor: f64, log_share: f64, logs: &mut [f64]) {
     }
 }
 
-/// How many reports of identical sensors are missing.
+/// Numbers of missing reports of identical sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MissingReports {
-    /// Sensors from which nothing arrived ([`Observation::Nothing`](fewbits_core::Observation::Nothing)).
+    /// Number of sensors from which nothing arrived ([`Observation::Nothing`](fewbits_core::Observation::Nothing)).
     pub nothing: usize,
-    /// Sensors whose report is known to be lost ([`Observation::Lost`](fewbits_core::Observation::Lost)).
+    /// Number of sensors whose report is known to be lost ([`Observation::Lost`](fewbits_core::Observation::Lost)).
     pub lost: usize,
 }
 
-/// The factor of one censoring sensor, or of several that are identical: `ln p(observation | m)`.
+/// The factor of one censoring sensor, or of several that are identical: `ln p(observation | m)`, `m` the noise-free measurement.
 ///
 /// | observation | scalar | vector |
 /// |---|---|---|
@@ -199,7 +201,7 @@ pub struct Censored<const M: usize> {
 enum Kind<const M: usize> {
     Value(Value<M>),
     Ellipsoid(Box<EllipsoidMissing<M>>),
-    /// Of the only component; `M` is 1.
+    /// A factor of the one component of a scalar measurement (`M` is 1).
     Scalar(Product),
 }
 
@@ -211,7 +213,7 @@ impl<const M: usize> Censored<M> {
         }
     }
 
-    /// An observation of the same probability whatever the measurement.
+    /// An observation that has the same probability for every measurement, so it leaves the belief as it is.
     ///
     /// # Errors
     /// If `probability` is outside `[0, 1]`.
@@ -230,7 +232,7 @@ impl<const M: usize> Censored<M> {
         })
     }
 
-    /// `values` of identical sensors, each of which arrived with probability `arrival`: by their mean,
+    /// `values` of identical sensors, each of which arrived with probability `arrival`. They act as one measurement, their mean:
     /// `prod N(z_i; m, R) = N(mean; m, R/n) exp(constant)`.
     ///
     /// # Errors
@@ -246,7 +248,7 @@ impl<const M: usize> Censored<M> {
         Ok(all)
     }
 
-    /// Nothing arrived from `count` identical sensors, each silent by `rule` about `prediction`, in noise `R`.
+    /// Nothing arrived from `count` identical sensors. Each is silent by `rule` about `prediction`; its noise covariance is `R = noise`.
     ///
     /// # Errors
     /// As [`Censored::missing`].
@@ -264,10 +266,10 @@ impl<const M: usize> Censored<M> {
         Self::missing(rule, prediction, noise, link, silent)
     }
 
-    /// The missing reports of identical sensors, each silent by `rule` about `prediction`, in noise `R`.
+    /// Missing reports of identical sensors. Each is silent by `rule` about `prediction`; its noise covariance is `R = noise`.
     ///
     /// # Errors
-    /// If a number is not finite, `R` not a covariance, no report is missing, or more than one of a vector measurement.
+    /// If a number is not finite, `R` is not a covariance, no report is missing, or several are missing and `M > 1`.
     pub fn missing(
         rule: &CensoringRule<M>,
         prediction: &SVector<f64, M>,
@@ -290,7 +292,7 @@ impl<const M: usize> Censored<M> {
         }
         fewbits_numerics::error::finite("prediction", prediction[0])?;
         let (low, high) = rule.interval(prediction[0]);
-        // No cell: everything is sent, and only the link can be to blame.
+        // No interval (threshold 0): every measurement is sent, so a missing report was lost on the link.
         let cell = Cell::new(low, high).ok();
         let mut product = Product::new();
         if reports.nothing > 0 {
@@ -314,10 +316,11 @@ impl<const M: usize> Censored<M> {
         })
     }
 
-    /// A value that arrived as one of a few levels, from a scalar sensor with this rule and prediction.
+    /// A value that arrived as one of a few levels, from a scalar sensor with this rule and prediction. The measurement lies in the
+    /// level's cell and outside the interval of silence.
     ///
     /// # Errors
-    /// If a number is not finite, or no measurement that is sent has this level.
+    /// If a number is not finite, or the level's cell lies within the interval of silence.
     pub fn level(
         value: f64,
         levels: &Levels,
@@ -328,9 +331,11 @@ impl<const M: usize> Censored<M> {
     ) -> Result<Self, ArgumentError> {
         let cell = levels.cell(value)?;
         let (low, high) = rule.interval(prediction);
+        // The cell without the interval of silence consists of two pieces, one or none.
         let below = Cell::new(cell.lower(), cell.upper().min(low));
         let above = Cell::new(cell.lower().max(high), cell.upper());
         let factor: Scalar = match (below, above) {
+            // The rule censors nothing: the whole cell can have been sent.
             _ if low >= high => InCell::new(cell, noise_variance, 0.0, arrival)?.into(),
             (Ok(below), Ok(above)) => {
                 let edges = [below.lower(), below.upper(), above.lower(), above.upper()];
@@ -390,7 +395,7 @@ impl<const M: usize> Factor<M> for Censored<M> {
                     covariance: SMatrix::repeat(tilted.covariance[0]),
                 })
             }
-            // Only a constant is a factor of a vector and none of a single component.
+            // A factor without a component is a constant: it changes only the evidence.
             Kind::Scalar(factor) => Tilted::unchanged(prior, factor.log_likelihood(&[prior.mean()[0]].into())),
         }?;
         tilted.log_evidence += self.log_scale;

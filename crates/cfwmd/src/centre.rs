@@ -1,4 +1,4 @@
-//! Censoring sensors and their fusion centre over bits: an [`Estimator`], and the sensors' halves.
+//! Censoring sensors and their fusion centre with messages as bits: an [`Estimator`], and the sensors' half.
 
 use crate::Error;
 use crate::network::Network;
@@ -17,17 +17,17 @@ use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use std::sync::Arc;
 
-/// What the fusion centre broadcasts: the prediction, with its covariance where the sensors weigh by it.
+/// What the fusion centre broadcasts: the predicted state, and its covariance if the sensors weigh their innovation with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Broadcast<const D: usize> {
-    /// The predicted mean.
+    /// The predicted mean: `D` numbers.
     Mean(SVector<f64, D>),
-    /// Mean and covariance.
+    /// The predicted mean and covariance: `D + D (D + 1)/2` numbers.
     Belief(Gaussian<D>),
 }
 
 impl<const D: usize> Message for Broadcast<D> {
-    /// How sensors weigh says whether they are told the covariance.
+    /// [`Weighing::FusionCentre`] decodes a mean and a covariance, the other variants a mean.
     type Format = Weighing;
 
     fn encode(&self, _: &Weighing, writer: &mut BitWriter) -> Result<(), CodecError> {
@@ -45,17 +45,17 @@ impl<const D: usize> Message for Broadcast<D> {
     }
 }
 
-/// Rules of all sensors, slot by slot; those of the last slot hold on.
+/// Per slot the rules of all sensors. After the last entry its rules are used for all later slots.
 type Rules<const M: usize> = Arc<Vec<Vec<CensoringRule<M>>>>;
 
-/// Censoring sensors under [`Network::fuse_asked`]: CFwMD, CFwMD2, a schedule, or all-send by a threshold of 0.
+/// Censoring sensors under [`Network::fuse_asked`]: CFwMD, CFwMD2 or a schedule. With threshold 0 every measurement is sent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CensoringEstimator<G, S, const D: usize, const M: usize> {
     network: Network<S, D, M>,
     dynamics: G,
     start: Gaussian<D>,
     weighing: Weighing,
-    /// Empty where the rules follow from the broadcast.
+    /// Rules computed beforehand; empty if they follow from the broadcast.
     rules: Rules<M>,
 }
 
@@ -64,11 +64,11 @@ where
     G: LinearDynamics<D>,
     S: LinearSensing<D, M> + Clone + PartialEq,
 {
-    /// Sensors that weigh with the covariance of their own filters (CFwMD). The rules of `slots` slots are computed beforehand; the
-    /// last holds on.
+    /// Sensors that weigh with the covariance of their own filters (CFwMD). The rules of `slots` slots are computed beforehand; later slots
+    /// use those of the last.
     ///
     /// # Errors
-    /// If there is no slot, or an innovation covariance is not positive definite.
+    /// If `slots` is zero, or an innovation covariance is not positive definite.
     pub fn own(network: Network<S, D, M>, dynamics: G, start: Gaussian<D>, slots: usize) -> Result<Self, Error> {
         at_least_one("slots", slots)?;
         let mut own = vec![OwnRecursion::new(&start); network.sensors().len()];
@@ -80,15 +80,15 @@ where
         Ok(Self::with_rules(network, dynamics, start, Weighing::OwnFilter, rules))
     }
 
-    /// Sensors that are told the covariance of the prediction (CFwMD2).
+    /// Sensors that receive the covariance of the prediction and weigh with it (CFwMD2).
     pub fn told(network: Network<S, D, M>, dynamics: G, start: Gaussian<D>) -> Self {
         Self::with_rules(network, dynamics, start, Weighing::FusionCentre, Vec::new())
     }
 
-    /// Sensors that weigh with expected predicted covariances, one for each slot; the last holds on.
+    /// Sensors that weigh with expected predicted covariances, one for each slot. Later slots use the last one.
     ///
     /// # Errors
-    /// If there is none, or an innovation covariance is not positive definite.
+    /// If `covariances` is empty, or an innovation covariance is not positive definite.
     pub fn scheduled(
         network: Network<S, D, M>,
         dynamics: G,
@@ -117,7 +117,7 @@ where
         }
     }
 
-    /// The half of a sensor. That of a sensor which does not exist refuses every measurement.
+    /// The sensor's half for sensor `sensor`. If there is no such sensor, it refuses every measurement.
     pub fn node(&self, sensor: usize) -> CensoringNode<S, D, M> {
         CensoringNode {
             network: self.network.clone(),
@@ -204,18 +204,18 @@ where
     }
 }
 
-/// The half of a sensor of a [`CensoringEstimator`]. It counts the slots where its rule depends on them.
+/// The sensor's half of a [`CensoringEstimator`]. It counts slots if its rule depends on the slot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CensoringNode<S, const D: usize, const M: usize> {
     network: Network<S, D, M>,
     weighing: Weighing,
     rules: Rules<M>,
     sensor: usize,
-    /// The last slot in which it was asked, or that it skipped.
+    /// The last slot that it took part in or skipped.
     slot: u64,
 }
 
-/// Bits of the slot in a stored sensor.
+/// Length of the slot number in the stored state of a sensor, in bits.
 const SLOT_BITS: u32 = 64;
 
 fn refused(name: &'static str, error: CodecError) -> Error {

@@ -1,14 +1,14 @@
-//! What a measurement, sent or withheld, is worth.
+//! Information of a sent or withheld measurement: divergences between the beliefs before and after, and Fisher information.
 //!
-//! For scalar measurements three sensible rules are one: send when the innovation is large (`q = nu^2/s`), when the update
-//! moves the belief far, or when it is surprising. With noise variance `r` and innovation variance `s > r`,
+//! For scalar measurements three rules are equivalent: send if the innovation is large (`q = nu^2/s`), if the update changes
+//! the belief much, or if the measurement is improbable. With noise variance `r` and innovation variance `s > r`,
 //!
 //! - `KL(prior || posterior) = 1/2 [(s/r - 1)(1 + q) - ln(s/r)]`
 //! - `KL(posterior || prior) = 1/2 [ln(s/r) - (1 - r/s) + (1 - r/s) q]`, whose mean is the mutual information `1/2 ln(s/r)`
 //! - symmetric: `(s - r)^2/(2 r s) + q (s^2 - r^2)/(2 r s)`
 //!
-//! all increase in `q`. None of them inverts a state covariance, which is singular for a known start. A constant threshold on
-//! a divergence is a threshold on `q` that varies with time and sensor. For vector measurements the equivalence fails: the
+//! all increase with `q`. None of them needs the inverse of a state covariance, which does not exist for a known start. A constant
+//! threshold on a divergence equals a threshold on `q` that varies with time and sensor. For vector measurements the rules differ: the
 //! divergence weighs the innovation by `S^-1 (S - R) R^-1`.
 
 use crate::Error;
@@ -24,11 +24,11 @@ pub enum Direction {
     PriorToPosterior,
     /// `KL(posterior || prior)`.
     PosteriorToPrior,
-    /// Their sum.
+    /// The sum of the two.
     Symmetric,
 }
 
-/// Divergence `a + b q` as a function of the normalised innovation squared.
+/// `(a, b)` of the divergence `a + b q`, `q` the normalised innovation squared.
 fn line(direction: Direction, s: f64, r: f64) -> Result<(f64, f64), Error> {
     positive("innovation_variance", s)?;
     positive("noise_variance", r)?;
@@ -63,7 +63,7 @@ pub fn divergence(
     Ok(a + b * innovation * innovation / innovation_variance)
 }
 
-/// The threshold `eta` on `nu^2/s` that equals a threshold on the divergence; at or below 0 everything is sent.
+/// The threshold `eta` on `nu^2/s` that is equivalent to a threshold on the divergence. If it is 0 or negative, everything is sent.
 ///
 /// # Errors
 /// As [`divergence`].
@@ -78,12 +78,13 @@ pub fn equivalent_threshold(
     Ok((divergence - a) / b)
 }
 
-/// Fisher information about `y = h(x)` in one step of a censoring sensor, sent or silent, at offset `mu = y - prediction`:
+/// Fisher information about `y = h(x)` in one step of a censoring sensor, averaged over reports and silences. With the offset
+/// `mu = y - prediction`, the half-width `c` of the interval of silence and noise variance `r`:
 ///
 /// `J = (1 - [pi + a phi(a) - b phi(b)])/r + (phi(b) - phi(a))^2/(r pi)`, `a = (-c - mu)/sqrt r`, `b = (c - mu)/sqrt r`,
 /// `pi = Phi(b) - Phi(a)`.
 ///
-/// Between what the values alone give and `1/r`, that of a sensor that always reports.
+/// It lies between the information of the sent values alone and `1/r`, that of a sensor that always reports.
 ///
 /// # Errors
 /// If the half-width is negative, the noise variance not positive or the offset not finite.
@@ -97,7 +98,7 @@ pub fn fisher_information(mu: f64, half_width: f64, noise_variance: f64) -> Resu
     let (a, b) = ((-half_width - mu) / deviation, (half_width - mu) / deviation);
     let cell = normal::truncated_moments(a, b)?;
     let inside = normal::interval(a, b);
-    // Inside the cell a value would tell E[x^2 | cell] pi; silence tells its mean squared.
+    // With x the noise in deviations, a value in the cell would contribute E[x^2 | cell] pi; silence contributes E[x | cell]^2 pi.
     Ok((1.0 - inside * cell.variance) / noise_variance)
 }
 

@@ -1,8 +1,8 @@
-//! Censoring sensors, and a fusion centre to which their silence is information.
+//! Sensors that send only unexpected measurements (censoring), and a fusion centre that also uses their silence.
 //!
-//! Each sensor of a network may send its measurement in full, or nothing. It sends what surprises: an innovation, weighed with
-//! its covariance, beyond a threshold that a message budget sets. The fusion centre knows the rule, so silence says that the
-//! innovation was small, and it says so for free.
+//! Each sensor of a network sends its measurement in full, or nothing. It sends if the normalised innovation squared reaches a
+//! threshold; the innovation is measurement minus prediction. The threshold follows from a budget of messages per step. The fusion
+//! centre knows the rule, so silence tells it that the innovation was small, without a message.
 //!
 //! | part | item |
 //! |---|---|
@@ -13,14 +13,14 @@
 //! | fusion with feedback: Gaussian (the default), or a likelihood for any particle or grid filter | [`Network::fuse`](network::Network::fuse), [`Network::likelihood`](network::Network::likelihood) |
 //! | fusion without feedback | [`no_feedback`] |
 //! | thresholds before deployment | [`expected_covariances`](schedule::expected_covariances) |
-//! | what a message is worth | [`information`] |
-//! | what the publications compare with | [`published`] |
+//! | information of a message or of silence | [`information`] |
+//! | comparisons of the publications | [`published`] |
 //!
-//! The central choice: **silence is a factor in closed form or by quadrature, never by sampling**, and with linear sensors
+//! **The likelihood of silence is computed in closed form or by quadrature, never by sampling.** With linear sensors
 //! the belief is the Gaussian with the exact mean and covariance after each observation
-//! ([`assumed_density`](fewbits_filters::assumed_density)). It costs a truncated normal (scalar) or 24 of them (two components)
-//! where the published filter draws a thousand samples per particle, and it is not less accurate than a thousand particles. For
-//! nonlinear sensors the same factor drives any particle filter.
+//! ([`assumed_density`](fewbits_filters::assumed_density)). This costs one truncated normal (scalar measurement) or 24 of them (two
+//! components). The published filter draws a thousand samples per particle and is not more accurate with a thousand particles. For
+//! nonlinear sensors the same likelihood drives any particle filter.
 //!
 //! ```
 //! use fewbits_cfwmd::network::Network;
@@ -53,7 +53,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: the radio, the truth, and design of the quantizer behind a value.
+//! Not here: the radio (`fewbits-network`), and the design of a quantizer for the values (`fewbits-quantizer-design`).
 
 pub mod censored;
 pub mod centre;

@@ -1,4 +1,4 @@
-//! A network of censoring sensors with feedback, as its fusion centre knows it.
+//! Model of a network of censoring sensors with feedback, as its fusion centre knows it, and the fusion step.
 
 use crate::Error;
 use crate::censored::{Censored, MissingReports};
@@ -11,29 +11,29 @@ use fewbits_numerics::error::{at_least_one, entries, non_negative};
 use nalgebra::SVector;
 use rand::Rng;
 
-/// What the fusion centre knows of the network: the sensors, the threshold `eta` of all, the links and how values travel.
+/// The sensors, their common threshold `eta`, the links, and the format of the values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network<S, const D: usize, const M: usize> {
     sensors: Vec<S>,
-    /// For each sensor the first one that is identical with it.
+    /// For each sensor the index of the first sensor that is identical with it.
     identical: Vec<usize>,
     threshold: f64,
     link: Link,
     format: NumberFormat,
 }
 
-/// What a step of fusion learned.
+/// Likelihood and received values of one fusion step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct FusionInfo {
-    /// `ln p(all observations | those of the past)`: densities of the values, probabilities of the silences. For the
-    /// assumed-density filter an approximation, as its belief is.
+    /// `ln p(all observations | those of the past)`: densities of the values, probabilities of the silences. It is an approximation for
+    /// the assumed-density filter, because its belief is one.
     pub log_likelihood: f64,
     /// Number of values received.
     pub received: usize,
 }
 
-/// What arrives of each sensor's measurement, and how many reports were sent.
+/// One observation per sensor, and the number of reports that were sent.
 pub type Transmitted<const M: usize> = (Vec<Observation<SVector<f64, M>>>, usize);
 
 impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
@@ -66,23 +66,23 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         &self.sensors
     }
 
-    /// `eta`.
+    /// Threshold `eta` on the normalised innovation squared.
     pub fn threshold(&self) -> f64 {
         self.threshold
     }
 
-    /// What is known of the links.
+    /// The links' probabilities of loss and of inversion that the fusion centre assumes.
     pub fn link(&self) -> &Link {
         &self.link
     }
 
-    /// How values travel.
+    /// Number format of the sent values.
     pub fn format(&self) -> NumberFormat {
         self.format
     }
 
-    /// The rule of sensor `i` weighed with `S = R + H P H'`, `P` the fusion centre's (or a scheduled) predicted covariance and
-    /// `H` the Jacobian at the prediction.
+    /// The rule of sensor `i` for the predicted belief of the fusion centre, or a scheduled one: the innovation is weighed with
+    /// `S = R + H P H'`, `P` the predicted covariance and `H` the Jacobian at the predicted mean.
     ///
     /// # Errors
     /// If there is no sensor `i`, or `S` is not positive definite.
@@ -98,18 +98,18 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     /// [`Network::rule_under`] for every sensor.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Network::rule_under`].
     pub fn rules_under(&self, predicted: &Gaussian<D>) -> Result<Vec<CensoringRule<M>>, Error> {
         (0..self.sensors.len()).map(|i| self.rule_under(i, predicted)).collect()
     }
 
-    /// Sensor `i` in a slot with this rule.
+    /// The scheme of sensor `i` in a slot with this rule.
     fn scheme(&self, i: usize, rule: &CensoringRule<M>) -> Result<Censoring<S, D, M>, Error> {
         Censoring::new(self.sensors[i].clone(), rule.clone(), self.format)
     }
 
-    /// One slot of all sensors: each compares its measurement with the broadcast, and what it sends crosses its link. Returns
-    /// what arrives and how many reports were sent.
+    /// Simulates one slot of all sensors. Each compares its measurement with the broadcast; what it sends crosses its link. `rules` and
+    /// `measurements` have one entry per sensor.
     ///
     /// # Errors
     /// If the numbers of rules or measurements are wrong or a number is not finite.
@@ -137,8 +137,8 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         Ok(entries("observations", observations, self.sensors.len())?)
     }
 
-    /// What was observed, as a likelihood for particle and grid filters: one entry per group of identical scalar sensors that
-    /// sent a value, one per group whose reports are missing under the same rule, one per sensor otherwise.
+    /// The observations as a likelihood for particle and grid filters. There is one entry per group of identical scalar sensors that
+    /// sent a value, one per group of identical scalar sensors whose reports are missing under the same rule, and one per other sensor.
     ///
     /// # Errors
     /// If the numbers of rules or observations are wrong, a number is not finite, or a value violates its rule.
@@ -159,6 +159,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
                     push(single);
                 }
             }
+            // Scalar values of identical sensors are combined into one factor; the first sensor of the group carries it.
             if M == 1 && plain && self.identical[i] == i {
                 let like = |j: usize| self.identical[j] == i;
                 let received = |j: usize| observations[j].received().filter(|_| like(j)).copied();
@@ -176,7 +177,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     }
 
     /// The missing reports that share the factor of sensor `i`: its own and, for scalar measurements, those of later identical
-    /// sensors under the same rule. `None` if its report arrived, or an earlier sensor's factor includes it.
+    /// sensors under the same rule. `None` if the report of `i` arrived, or the factor of an earlier sensor includes it.
     fn missing_together(
         &self,
         rules: &[CensoringRule<M>],
@@ -198,10 +199,10 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
 }
 
 impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
-    /// One update of the Gaussian fusion centre: values, then missing reports. `broadcast` is the state prediction that the sensors
-    /// compared with; without rounding it is the mean of `predicted`.
+    /// One update of the Gaussian fusion centre: received values first, then missing reports. `broadcast` is the predicted state that the
+    /// sensors compared with: the mean of `predicted`, rounded to the format.
     ///
-    /// Missing reports of identical scalar sensors are fused together and exactly; of distinct or vector ones one after the other.
+    /// Missing reports of identical scalar sensors are fused in one exact step, those of other sensors one after the other.
     ///
     /// # Errors
     /// As [`Network::likelihood`]; [`Error::Impossible`] if the observations have probability zero.
@@ -216,8 +217,8 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         self.fuse_observed(predicted, rules, broadcast, |i| Some(observations[i]))
     }
 
-    /// As [`fuse`](Self::fuse), where `None` is a sensor without observation: it was not asked, or what it did cannot be used. Neither its
-    /// value nor its silence enters.
+    /// As [`fuse`](Self::fuse). `None` stands for a sensor without observation: it was not asked, or its report cannot be used. Neither
+    /// its value nor its silence is fused.
     ///
     /// # Errors
     /// As [`fuse`](Self::fuse).
@@ -256,7 +257,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
             if matches!(self.format, NumberFormat::Fixed(_)) {
                 info.log_likelihood += update(&mut belief, i, &scheme.received(i, broadcast, &value, &self.link)?)?;
             } else {
-                // The factor of a value: the closed form of its update.
+                // A received value: a Kalman update, which is the closed form for its factor.
                 scheme.check_value(i, &sensor.mean(broadcast), &value, &self.link)?;
                 let (next, step) = kalman::update(sensor, &belief, &value)?;
                 belief = next;

@@ -1,4 +1,4 @@
-//! The censoring rule, and where its innovation covariance comes from.
+//! The censoring rule, and the innovation covariance that it uses.
 
 use crate::Error;
 use crate::ellipsoid::Ellipsoid;
@@ -13,22 +13,22 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weighing {
-    /// That of the sensor's own Kalman filter, as if it used all its own measurements (the paper's CFwMD). Needs no covariance
-    /// feedback and no data, but the rate of messages is off by up to a quarter.
+    /// That of the sensor's own Kalman filter, which uses all its measurements (the paper's CFwMD). It needs no covariance
+    /// feedback and no data, but the rate of messages differs from the budget by up to a quarter.
     #[default]
     OwnFilter,
-    /// `R + H P H'` with the fusion centre's predicted covariance (the paper's CFwMD2): the rate is met, at the price of a
-    /// covariance in every broadcast.
+    /// `R + H P H'` with the fusion centre's predicted covariance (the paper's CFwMD2). The rate meets the budget, but every broadcast
+    /// contains a covariance.
     FusionCentre,
-    /// A sequence computed before deployment, the expected covariance at the fusion centre: the rate is met without covariance
-    /// feedback, and the error is that of [`FusionCentre`](Self::FusionCentre).
+    /// `R + H P H'` with a sequence of expected covariances at the fusion centre, computed before deployment. The rate meets the budget
+    /// without covariance feedback, and the error is that of [`FusionCentre`](Self::FusionCentre).
     Scheduled,
 }
 
-/// `send iff nu' S^-1 nu >= eta`, `nu = z - prediction`; a tie is sent.
+/// Send if and only if `nu' S^-1 nu >= eta`, with the innovation `nu = z - prediction`.
 ///
-/// For the measurement of a scalar sensor this is also the rule that sends whatever moves the posterior far in
-/// Kullback-Leibler divergence; see [`information`](crate::information).
+/// For scalar measurements this rule is equivalent to one that sends if the posterior's Kullback-Leibler divergence is large; see
+/// [`information`](crate::information).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Ellipsoid<M>", into = "Ellipsoid<M>")]
 pub struct CensoringRule<const M: usize> {
@@ -61,38 +61,38 @@ impl<const M: usize> CensoringRule<M> {
         Ok(Ellipsoid::new(innovation_covariance, threshold)?.into())
     }
 
-    /// `eta`.
+    /// Threshold `eta`.
     pub fn threshold(&self) -> f64 {
         self.region.threshold()
     }
 
-    /// Where the innovation of a silent sensor lies.
+    /// The ellipsoid in which the innovation of a silent sensor lies.
     pub fn region(&self) -> &Ellipsoid<M> {
         &self.region
     }
 
-    /// `nu' S^-1 nu`.
+    /// Normalised innovation squared `nu' S^-1 nu`.
     #[inline]
     pub fn statistic(&self, innovation: &SVector<f64, M>) -> f64 {
         self.region.statistic(innovation)
     }
 
-    /// Whether a sensor with this innovation reports.
+    /// Whether a sensor with this innovation sends.
     #[inline]
     pub fn sends(&self, innovation: &SVector<f64, M>) -> bool {
         if M == 1 {
-            // The fusion centre works with this very interval.
+            // The scalar rule compares with the half-width, because the fusion centre uses the same interval.
             fewbits_node::censor::reaches(innovation[0], self.half_width)
         } else {
             self.statistic(innovation) >= self.threshold()
         }
     }
 
-    /// Refuses an innovation that the rule would not have sent; rounding of 1e-9 relative is forgiven, and up to
-    /// `rounding` in each component (how far the format moved it).
+    /// Checks that the rule would have sent this innovation. Deviations by a relative 1e-9 are accepted, and by up to `rounding` in each
+    /// component, the largest error of the number format.
     ///
     /// # Errors
-    /// If so; it names `sensor`.
+    /// If the rule would not have sent it; the error names `sensor`.
     pub fn check(&self, sensor: usize, innovation: &SVector<f64, M>, rounding: &SVector<f64, M>) -> Result<(), Error> {
         let statistic = self.statistic(innovation);
         let slack: f64 = (0..M)
@@ -113,7 +113,7 @@ impl<const M: usize> CensoringRule<M> {
         Ok(())
     }
 
-    /// Ends of the interval of silence about a prediction of the first component.
+    /// Lower and upper end of the interval of silence about a prediction of the first component.
     pub(crate) fn interval(&self, prediction: f64) -> (f64, f64) {
         (prediction - self.half_width, prediction + self.half_width)
     }
@@ -122,8 +122,8 @@ impl<const M: usize> CensoringRule<M> {
 impl CensoringRule<1> {
     /// `c = sqrt(eta s)`: a silent innovation lies in `(-c, c)`.
     ///
-    /// The root covers `eta s` only; the paper's printed formulas let it cover the offset `mu` of the prediction too, which is
-    /// NaN for `mu > eta s` (erratum `cfwmd-1`).
+    /// The root is taken of `eta s` only. The formulas printed in the paper also put the offset `mu` of the prediction under the root,
+    /// which is NaN for `mu > eta s` (erratum `cfwmd-1`).
     pub fn half_width(&self) -> f64 {
         self.half_width
     }
@@ -139,8 +139,8 @@ impl CensoringRule<1> {
 }
 
 impl<const M: usize> CensoringRule<M> {
-    /// The rule weighed with a fed-back belief (the paper's CFwMD2): `S = R + H (F P F' + Q) H'`, the dynamics linearised at
-    /// the belief's mean and the sensing at its prediction.
+    /// The rule for a broadcast belief with covariance `P` (the paper's CFwMD2): `S = R + H (F P F' + Q) H'`. The dynamics are linearised
+    /// at the belief's mean, the sensing at its prediction.
     ///
     /// # Errors
     /// If `S` is not positive definite or the threshold negative.
@@ -157,8 +157,8 @@ impl<const M: usize> CensoringRule<M> {
 
 /// The covariance recursion of one sensor's own (extended) Kalman filter, which uses all its own measurements.
 ///
-/// It needs no data in a linear model, and the fed-back estimate to linearise about in a nonlinear one; either way sensor and
-/// fusion centre run the same recursion and agree on `S`.
+/// A linear model needs no data for it, a nonlinear one needs the broadcast estimate as the point of linearisation. In both cases sensor
+/// and fusion centre run the same recursion and get the same `S`.
 ///
 /// ```text
 /// P = F P F' + Q, linearised at the last estimate
@@ -183,10 +183,10 @@ impl<const D: usize> From<OwnRecursion<D>> for Gaussian<D> {
     }
 }
 
-/// What one step of [`OwnRecursion`] gives.
+/// Covariances and gain of one step of [`OwnRecursion`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OwnStep<const D: usize, const M: usize> {
-    /// `S`.
+    /// Innovation covariance `S = R + H P H'`.
     pub innovation_covariance: SMatrix<f64, M, M>,
     /// Gain `W = P H' S^-1` of the sensor's own filter.
     pub gain: SMatrix<f64, D, M>,
@@ -195,7 +195,7 @@ pub struct OwnStep<const D: usize, const M: usize> {
 }
 
 impl<const D: usize> OwnRecursion<D> {
-    /// The recursion from an initial covariance.
+    /// The recursion from the covariance of `start`.
     pub fn new(start: &Gaussian<D>) -> Self {
         Self {
             covariance: *start.covariance(),
@@ -207,7 +207,7 @@ impl<const D: usize> OwnRecursion<D> {
         &self.covariance
     }
 
-    /// One step. `estimate` is the state the models are linearised about, of the step before; linear models ignore it.
+    /// One step. `estimate` is the state of the step before, at which the models are linearised; linear models ignore it.
     ///
     /// # Errors
     /// If an innovation covariance is not positive definite.
@@ -221,7 +221,7 @@ impl<const D: usize> OwnRecursion<D> {
         let predicted = assumed_density::predict(dynamics, &before);
         let at = predicted.mean();
         let tangent = LinearSensor::new(sensing.jacobian(at), sensing.noise_covariance_at(at))?;
-        // Only covariances matter, which no measurement changes.
+        // The value of the measurement is irrelevant: only covariances are used.
         let (after, info) = kalman::update(&tangent, &predicted, &(tangent.matrix() * at))?;
         self.covariance = *after.covariance();
         Ok(OwnStep {
@@ -235,7 +235,7 @@ impl<const D: usize> OwnRecursion<D> {
 /// One step of the cross-covariance of the prediction errors of two sensors' own filters:
 /// `C <- (1 - W_i H_i) C (1 - W_j H_j)'`, then `F C F' + Q`.
 ///
-/// All sensors share the start: the recursion begins with `F P0 F' + Q`, not with `Q` alone unless the start is known exactly
+/// All sensors share the start, so the recursion begins with `F P0 F' + Q`. It begins with `Q` alone only if the start is known exactly
 /// (erratum `cfwmd-5`).
 pub fn cross_covariance_step<const D: usize, const M: usize>(
     dynamics: &impl LinearDynamics<D>,

@@ -1,4 +1,4 @@
-//! Scheduled thresholds: the rate of covariance feedback without feeding a covariance back.
+//! Innovation covariances computed before deployment: the rate of covariance feedback without sending a covariance.
 
 use crate::Error;
 use crate::network::Network;
@@ -8,15 +8,15 @@ use fewbits_numerics::error::at_least_one;
 use nalgebra::SMatrix;
 use rand::Rng;
 
-/// Expected predicted covariance `E[P_{k|k-1}]` at the fusion centre for `steps` steps, by simulating the network with
-/// covariance feedback `runs` times. A few hundred runs are enough; the sensors are given the result once.
+/// Expected predicted covariance `E[P_{k|k-1}]` at the fusion centre for `k = 1..=steps`. The network with covariance feedback is
+/// simulated `runs` times; a few hundred runs are enough. The sensors receive the result once.
 ///
 /// ```text
 /// repeat: truth from the start belief; each step: P_k += P, rules from P, values and silences, assumed-density update
 /// ```
 ///
 /// # Errors
-/// If `steps` or `runs` is zero; arguments that the network refuses.
+/// If `steps` or `runs` is zero, or the network refuses an argument.
 pub fn expected_covariances<const D: usize, const M: usize, S, R: Rng + ?Sized>(
     rng: &mut R,
     network: &Network<S, D, M>,
@@ -37,6 +37,7 @@ where
             truth = dynamics.propagate(rng, &truth);
             let predicted = kalman::predict(dynamics, &belief);
             *sum += predicted.covariance();
+            // One step with covariance feedback.
             let rules = network.rules_under(&predicted)?;
             let measurements: Vec<_> = network.sensors().iter().map(|s| s.sample(rng, &truth)).collect();
             let (observations, _) = network.transmit(rng, &rules, predicted.mean(), &measurements)?;

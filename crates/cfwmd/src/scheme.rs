@@ -1,4 +1,4 @@
-//! Censoring sensors with feedback, both halves: the sensor's, and what its reports and its silence mean.
+//! Censoring sensors with feedback: the sensor's half, and the likelihood of its reports and silences.
 
 use crate::Error;
 use crate::censored::{Censored, MissingReports};
@@ -9,11 +9,11 @@ use fewbits_numerics::error::{all_finite, non_negative};
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
 
-/// A sensor that compares its measurement with the broadcast state prediction, under a rule that both ends know: the rule of
+/// A sensor that compares its measurement with the broadcast predicted state, under a rule that both ends know. The rule of
 /// this slot comes from the sensor's own covariance recursion (the paper's CFwMD) or from a schedule.
 ///
-/// It decides on the measurement as it was taken; what it sends is rounded to the format. Both ends use the broadcast as it
-/// travelled.
+/// The sensor decides on the unrounded measurement and sends it rounded to the format. Both ends use the broadcast as it was rounded for
+/// sending.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Censoring<S, const D: usize, const M: usize> {
     sensing: S,
@@ -25,8 +25,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
     /// The scheme of one sensor in one slot.
     ///
     /// # Errors
-    /// If `format` is one of a few levels and the measurement a vector: the cell of a rounded vector, cut by an ellipsoid, has
-    /// no closed form.
+    /// If `format` is one of a few levels and `M > 1`: the cell of a rounded vector without an ellipsoid has no closed form.
     pub fn new(sensing: S, rule: CensoringRule<M>, format: NumberFormat) -> Result<Self, Error> {
         if M > 1 && matches!(format, NumberFormat::Fixed(_)) {
             return Err(ArgumentError::new("format", format!("{format:?}"), "floating point for vectors").into());
@@ -39,7 +38,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         &self.rule
     }
 
-    /// The factor of the missing reports of sensors identical with this one (of one, for vectors).
+    /// The factor of the missing reports of sensors identical with this one; for vector measurements of one report.
     ///
     /// # Errors
     /// If the broadcast is not finite; as [`Censored::missing`].
@@ -54,11 +53,11 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         Ok(Censored::missing(&self.rule, &prediction, &noise, link, reports)?)
     }
 
-    /// The factor of a received value; `sensor` is named if the rule would not have sent it.
+    /// The factor of a received value. `sensor` is the index that an error names.
     ///
     /// # Errors
-    /// If a number is not finite, the rule would not have sent the value, or bits may be inverted on the
-    /// way: a value wants a checksum, and a report that fails it is [`Observation::Lost`].
+    /// If a number is not finite, the value violates the rule, or the link may invert bits. Over such a link
+    /// a value needs a checksum; a report that fails it is [`Observation::Lost`].
     pub fn received(
         &self,
         sensor: usize,
@@ -81,8 +80,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         Ok(Censored::value(value, &noise, arrival)?)
     }
 
-    /// Refuses a value that is no number, or that the rule would not have sent against this prediction, or that the link may have
-    /// inverted.
+    /// Checks a received value: it is finite, the rule would have sent it against this prediction, and the link inverts no bits.
     pub(crate) fn check_value(
         &self,
         sensor: usize,
@@ -91,7 +89,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         link: &Link,
     ) -> Result<(), Error> {
         finite_over(link, value, prediction)?;
-        // Half the spacing of single precision.
+        // Relative rounding error of single precision, half the spacing of its numbers.
         let share = if self.format == NumberFormat::Single { 6e-8 } else { 0.0 };
         self.rule
             .check(sensor, &(value - prediction), &value.map(|z| z.abs() * share))
@@ -109,7 +107,7 @@ fn finite_over<const M: usize>(
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>> Memoryless<M> for Censoring<S, D, M> {
-    /// The state prediction of the fusion centre.
+    /// The predicted state of the fusion centre.
     type Feedback = SVector<f64, D>;
     type Report = SVector<f64, M>;
     type Factor = Censored<M>;
@@ -146,7 +144,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Memoryless<M> for Censori
     }
 }
 
-/// The rounded measurement, if the rule sends it.
+/// The rounded measurement; `None` if the rule does not send it.
 pub(crate) fn send_if<const M: usize>(
     rule: &CensoringRule<M>,
     measurement: &SVector<f64, M>,
@@ -164,8 +162,8 @@ pub(crate) fn send_if<const M: usize>(
     Ok(Some(report))
 }
 
-/// A sensor that is also told the covariance of the prediction and weighs its innovation with `S = R + H P H'` (the paper's
-/// CFwMD2): the message budget is met, at the price of a covariance in every broadcast.
+/// A sensor that also receives the covariance of the prediction and weighs its innovation with `S = R + H P H'` (the paper's
+/// CFwMD2). The message budget is met, but every broadcast contains a covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CovarianceFeedback<S, const D: usize, const M: usize> {
     sensing: S,
@@ -188,7 +186,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> CovarianceFeedbac
         })
     }
 
-    /// What the sensor does under this broadcast.
+    /// The scheme of the slot with this broadcast.
     ///
     /// # Errors
     /// If `R + H P H'` is not positive definite.
@@ -210,14 +208,14 @@ pub(crate) fn rule_under<const D: usize, const M: usize>(
     CensoringRule::new(&symmetrised(&innovation), threshold)
 }
 
-/// Of linear sensors, whose noise is the same at every state.
+/// For linear sensors, whose noise does not depend on the state.
 impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M> for Censoring<S, D, M> {
     fn noise_covariance_at(&self, _: &SVector<f64, M>) -> SMatrix<f64, M, M> {
         *self.sensing.noise_covariance()
     }
 }
 
-/// Of linear sensors, whose noise is the same at every state.
+/// For linear sensors, whose noise does not depend on the state.
 impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M> for CovarianceFeedback<S, D, M> {
     fn noise_covariance_at(&self, _: &SVector<f64, M>) -> SMatrix<f64, M, M> {
         *self.sensing.noise_covariance()

@@ -6,7 +6,7 @@ use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::{newton, normal, stored};
 use serde::{Deserialize, Serialize};
 
-/// How often the network may report: `messages` per step on average, from `sensors` sensors (the paper's `l` of `N`).
+/// How many reports the network may send: `messages` per step on average, from `sensors` sensors (the paper's `l` of `N`).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct Budget {
@@ -21,7 +21,7 @@ impl Budget {
     /// A budget of `messages` in `(0, sensors]`.
     ///
     /// # Errors
-    /// If there is no sensor, or the budget is outside the range.
+    /// If `sensors` is zero, or `messages` is outside `(0, sensors]`.
     pub fn new(messages: f64, sensors: usize) -> Result<Self, Error> {
         at_least_one("sensors", sensors)?;
         if messages > 0.0 && messages <= sensors as f64 {
@@ -36,7 +36,7 @@ impl Budget {
         self.messages / self.sensors as f64
     }
 
-    /// The threshold `eta` of a normalised innovation squared with `dimension` degrees of freedom.
+    /// The threshold `eta` on a normalised innovation squared of `dimension` components that meets the budget.
     ///
     /// # Errors
     /// If `dimension` is zero.
@@ -45,7 +45,7 @@ impl Budget {
     }
 }
 
-/// The `eta` that a chi-square variable of `dimension` degrees of freedom reaches with probability `rate`.
+/// The `eta` that a chi-square variable of `dimension` degrees of freedom exceeds with probability `rate`.
 ///
 /// One degree: `(Phi^-1(rate/2))^2`. Two: `-2 ln rate`. More: Newton's method on the upper tail of the chi-square law.
 ///
@@ -64,13 +64,13 @@ pub fn threshold(rate: f64, dimension: usize) -> Result<f64, Error> {
     })
 }
 
-/// `P(chi^2 > x)` and its density at `x > 0`: finite sums of positive terms,
+/// `P(chi^2 > x)` and the density, at `x > 0`. The probability is a finite sum of positive terms:
 ///
 /// `P(n + 2 degrees) = P(n degrees) + (x/2)^(n/2) exp(-x/2) / Gamma(n/2 + 1)`, from `2 Phi(-sqrt x)` at one degree and
 /// `exp(-x/2)` at two.
 fn chi_square_upper_tail(x: f64, dimension: usize) -> (f64, f64) {
     let half = 0.5 * x;
-    // The density at the first number of degrees, then at two more each time.
+    // Start at one or two degrees of freedom; each step adds two.
     let (mut tail, mut density, mut degrees) = if dimension % 2 == 1 {
         (2.0 * normal::cdf(-x.sqrt()), normal::pdf(x.sqrt()) / x.sqrt(), 1)
     } else {

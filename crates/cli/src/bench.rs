@@ -1,7 +1,7 @@
 //! `fewbits bench`: sizes and speeds of several codecs on a table, in one run.
 //!
-//! Lossy columns are compared at equal guaranteed error: pco gets the indices of a lattice of `2 delta`. zstd has no bound and is
-//! given the doubles.
+//! Lossy columns are compared at equal guaranteed error: pco gets the indices of a lattice of step `2 delta`. zstd has no error bound and
+//! gets the doubles.
 
 use crate::arguments::BenchOptions;
 use crate::error::Error;
@@ -15,13 +15,13 @@ use serde::Serialize;
 use std::io::Cursor;
 use std::time::Instant;
 
-/// The table's finite samples in doubles.
+/// Bits of an uncompressed sample.
 const RAW_BITS: f64 = 64.0;
 
 #[derive(Serialize)]
 struct Line {
     codec: &'static str,
-    /// What its restored values promise.
+    /// The error bound of its restored values.
     promise: &'static str,
     bytes: usize,
     bits_per_sample: f64,
@@ -164,7 +164,7 @@ pub(crate) fn run(options: &BenchOptions) -> Result<Ending, Error> {
 
 #[cfg(feature = "zstd")]
 fn zstandard(columns: &[Vec<f64>], samples: usize) -> std::io::Result<Line> {
-    /// The level of the references in `docs/record.md`.
+    /// Compression level of the zstd references in `docs/record.md`.
     const LEVEL: i32 = 19;
     let raw: Vec<u8> = columns.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
     let start = Instant::now();

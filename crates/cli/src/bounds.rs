@@ -1,4 +1,4 @@
-//! `--bound`: from text to columns with promises.
+//! Parsing of `--bound`: from text to columns with error bounds.
 
 use crate::error::Error;
 use crate::numbers::exact;
@@ -7,14 +7,14 @@ use fewbits_record::{Bound, Column};
 const EXPECTED: &str =
     "`±0.1`, `1%`, `decimals:3` or `lossless`, on a circle with `@360` behind it; for one column as `column=bound`";
 
-/// What the text says of one column.
+/// The bound of one column as the text states it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spec {
     pub(crate) bound: Bound,
     pub(crate) period: Option<f64>,
 }
 
-/// What an option says of each column: `column=value,...`, `*=value` or only `value` for all others.
+/// Values of an option per column: `column=value,...`, with `*=value` or only `value` for all others.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PerColumn<T> {
     named: Vec<(String, T)>,
@@ -22,7 +22,7 @@ pub(crate) struct PerColumn<T> {
 }
 
 impl<T> PerColumn<T> {
-    /// `others`: what holds of columns of which the text says nothing.
+    /// Parses the text. `others` is the value of columns that the text does not name.
     pub(crate) fn parse(text: &str, others: T, parse_one: impl Fn(&str) -> Result<T, Error>) -> Result<Self, Error> {
         let mut found = Self {
             named: Vec::new(),
@@ -38,13 +38,13 @@ impl<T> PerColumn<T> {
         Ok(found)
     }
 
-    /// What holds of a column.
+    /// The value for a column.
     pub(crate) fn of(&self, name: &str) -> &T {
         let named = self.named.iter().find(|(known, _)| known == name);
         named.map_or(&self.others, |(_, value)| value)
     }
 
-    /// Refuses names that are no columns of a table.
+    /// Checks that all names are columns of the table.
     pub(crate) fn check(&self, names: &[String], file: &str) -> Result<(), Error> {
         match self.named.iter().find(|(name, _)| !names.contains(name)) {
             None => Ok(()),
@@ -70,7 +70,7 @@ fn refused(value: &str) -> Error {
     }
 }
 
-/// One bound, perhaps on a circle.
+/// Parses one bound, possibly on a circle.
 pub(crate) fn parse_one(text: &str) -> Result<Spec, Error> {
     let (bound, period) = match text.split_once('@') {
         None => (text, None),
@@ -90,14 +90,14 @@ pub(crate) fn parse_one(text: &str) -> Result<Spec, Error> {
     Ok(Spec { bound, period })
 }
 
-/// The bound of each column, in their order. `file` is for messages.
+/// The bound of each column, in their order. `file` appears in error messages.
 pub(crate) fn parse(text: &str, names: &[String], file: &str) -> Result<Vec<Spec>, Error> {
     let specs = PerColumn::parse(text, LOSSLESS, parse_one)?;
     specs.check(names, file)?;
     Ok(names.iter().map(|name| *specs.of(name)).collect())
 }
 
-/// Columns with their promises; `ranges` are known for files that were read once before.
+/// Columns with their bounds. `ranges` are known if the file was read once before.
 pub(crate) fn columns(
     names: &[String],
     specs: &[Spec],
@@ -124,7 +124,7 @@ pub(crate) fn columns(
     columns.collect()
 }
 
-/// A bound as `--bound` takes it.
+/// A bound in the syntax of `--bound`.
 pub(crate) fn shown(bound: Bound, period: Option<f64>) -> String {
     let bound = match bound {
         Bound::Lossless => "lossless".to_owned(),

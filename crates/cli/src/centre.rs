@@ -22,17 +22,17 @@ use std::num::NonZeroU64;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// `centre.toml`.
+/// Content of `centre.toml`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Configuration {
-    /// Address and port, or broker or endpoint and fleet.
+    /// Address and port to listen at, or broker or endpoint with fleet.
     listen: String,
-    /// Seconds of a slot; the same at all sensors that report by the clock.
+    /// Length of a slot in seconds. All sensors that report by the clock must have the same.
     period: f64,
-    /// File in which the state survives the process.
+    /// File that stores the state between runs.
     state: Option<PathBuf>,
-    /// Wait for the disk at every step.
+    /// Whether every write waits for the disk.
     #[serde(default)]
     durable: bool,
     #[serde(default)]
@@ -74,9 +74,9 @@ struct Prior {
 struct Sensor {
     number: u32,
     key: String,
-    /// Address, where it is known beforehand.
+    /// Address of the sensor, if it is known beforehand.
     address: Option<String>,
-    /// The coordinate of the state that it reads.
+    /// Index of the coordinate of the state that the sensor measures.
     #[serde(default)]
     reads: usize,
     /// Standard deviation of its measurement noise.
@@ -106,7 +106,7 @@ pub(crate) fn run(options: &CentreOptions) -> Result<Ending, Error> {
     }
 }
 
-/// Runs it over the transport that `open` gives once everything else is known to be right.
+/// Runs the task over the transport that `open` returns. It is called after everything else has been checked.
 fn over<T: Transport>(
     options: &CentreOptions,
     given: &Configuration,
@@ -246,7 +246,7 @@ fn serve<R: Receiver, T: Transport>(
         let _ = write!(head, ",mean{i},deviation{i}");
     }
     writeln!(sink, "{head}").map_err(&failed)?;
-    // What may not have been written before the process was stopped.
+    // The last step may not have been written before the process was stopped.
     if let Some(step) = station.last_step() {
         writeln!(sink, "{}", row(step)).map_err(&failed)?;
     }

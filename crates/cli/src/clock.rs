@@ -4,10 +4,10 @@ use crate::error::Error;
 use fewbits_record::{TimeBase, TimeFormat};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Decimals of a tick where the table cannot be read twice, and for UTC.
+/// Decimals of a tick for UTC, and for tables that cannot be read twice.
 pub(crate) const NANOSECONDS: u8 = 9;
 
-/// What is wrong with a time.
+/// Description of an invalid time: what is wrong, and what the user can do.
 pub(crate) type Problem = (&'static str, &'static str);
 
 const NO_TIME: Problem = (
@@ -18,7 +18,7 @@ const TOO_LARGE: Problem = ("is too large for a time", "subtract a constant, or 
 const TOO_FINE: Problem =
     ("has more decimals than a tick", "allow an error of times with --time ±2ns, or write fewer decimals");
 
-/// A plain decimal number: sign, digits before and behind the point.
+/// A plain decimal number: sign, digits before and after the point.
 struct Digits<'a> {
     negative: bool,
     whole: &'a str,
@@ -48,7 +48,7 @@ fn plain(text: &str) -> Result<String, Problem> {
     }
 }
 
-/// How a time is written; `None` if it is no time.
+/// The format of a time; `None` if the text is not a time.
 pub(crate) fn format_of(text: &str) -> Option<TimeFormat> {
     if plain(text).is_ok() {
         Some(TimeFormat::Seconds)
@@ -120,7 +120,7 @@ pub(crate) fn shown(tick: i64, time: TimeBase) -> String {
     };
     if let (TimeFormat::Utc, Ok(nanoseconds)) = (format, u64::try_from(tick)) {
         let time = SystemTime::checked_add(&UNIX_EPOCH, Duration::from_nanos(nanoseconds));
-        // Beyond the year 9999 no such text exists; a tick of 64 bits ends in 2262.
+        // RFC 3339 has no years beyond 9999, but a tick of 64 bits ends in 2262.
         return time.map_or(tick.to_string(), |time| humantime::format_rfc3339(time).to_string());
     }
     let size = tick.unsigned_abs();
@@ -136,7 +136,7 @@ pub(crate) fn shown(tick: i64, time: TimeBase) -> String {
     }
 }
 
-/// `exact` or `±10ms`: the tolerance in nanoseconds.
+/// The tolerance in nanoseconds from `exact` or text like `±10ms`.
 pub(crate) fn tolerance(text: &str) -> Result<u64, Error> {
     if text == "exact" {
         return Ok(0);

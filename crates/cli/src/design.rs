@@ -64,7 +64,7 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     Ok(prior)
 }
 
-/// Two numbers with `..` between them.
+/// Parses an interval: two numbers with `..` between them.
 fn interval(option: &'static str, whole: &str, text: &str, expected: &'static str) -> Result<(f64, f64), Error> {
     let ends = text
         .split_once("..")
@@ -109,7 +109,7 @@ fn bits(text: &str) -> Result<BitBudget, Error> {
     })
 }
 
-/// The link of each sensor.
+/// The model of each sensor's link.
 fn links(options: &DesignOptions) -> Result<Vec<Link>, Error> {
     let sensors = options.noise.len();
     let of = |option: &'static str, all: &[f64], sensor: usize| match all {
@@ -134,7 +134,7 @@ fn adc(text: &str) -> Result<Adc, Error> {
     Adc::new(bits.trim().parse().map_err(|_| refused())?, low..=high).map_err(Error::refused("--adc"))
 }
 
-/// Searches, with a bar on a terminal.
+/// Searches for the design, with a progress bar on a terminal.
 fn solve(options: &DesignOptions, model: ObservationModel) -> Result<Solution, Error> {
     let failed = Error::refused("no design");
     let link = Link::PERFECT;
@@ -151,7 +151,7 @@ fn solve(options: &DesignOptions, model: ObservationModel) -> Result<Solution, E
     if let Some(limit) = options.time_limit {
         request = request.with_time_limit(limit);
     }
-    // A bar of this crate hides itself where standard error is no terminal.
+    // The bar hides itself if standard error is not a terminal.
     let bar = ProgressBar::new(1);
     let style = ProgressStyle::with_template("{bar:30} {msg} {elapsed}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -203,7 +203,7 @@ pub(crate) fn run(options: &DesignOptions) -> Result<Ending, Error> {
     Ok(Ending::Good)
 }
 
-/// The design in the form that was asked for.
+/// The design in the requested form.
 fn written(options: &DesignOptions, solution: &Solution, rounded: Option<&Rounded>) -> Result<String, Error> {
     let form = if options.json { Form::Json } else { options.form };
     if form == Form::Table {
@@ -231,7 +231,7 @@ fn written(options: &DesignOptions, solution: &Solution, rounded: Option<&Rounde
     })
 }
 
-/// A row of boxes per sensor over the range of its samples; boxes of one word have one colour.
+/// A row of boxes per sensor over the range of its samples. Boxes of the same word have the same colour.
 fn picture(solution: &Solution) -> Picture {
     let prior = solution.system().model().prior();
     let (mean, reach) = (prior.mean(), 3.5 * prior.deviation());

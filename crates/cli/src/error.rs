@@ -1,4 +1,4 @@
-//! What the command refuses. Every message says where and what to do.
+//! Errors of the command. Every message says where the error is and what to do.
 
 use std::io;
 
@@ -44,11 +44,11 @@ pub(crate) enum Error {
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// Parquet was asked for, and this program was built without it.
+    /// A Parquet file was given, but this program was built without Parquet.
     #[cfg(not(feature = "parquet"))]
     #[error("{file}: this program was built without Parquet: build it with `--features parquet`, or use CSV")]
     NoParquet { file: String },
-    /// A row of a table could not be taken apart.
+    /// A row of a table could not be parsed.
     #[error("{file}: row {row}: {problem}: {mend}")]
     Line {
         file: String,
@@ -56,17 +56,17 @@ pub(crate) enum Error {
         problem: String,
         mend: &'static str,
     },
-    /// A table without columns or rows.
+    /// A table has no columns or no rows.
     #[error("{file}: no {what}: the first line names the columns, rows follow")]
     Empty { file: String, what: &'static str },
-    /// A column was asked for that the table does not have.
+    /// The table has no column of this name.
     #[error("{file}: no column `{column}`: there are {existing}")]
     NoColumn {
         file: String,
         column: String,
         existing: String,
     },
-    /// A cell is no number.
+    /// A cell is not a number.
     #[error("{file}: row {row}, column `{column}`: `{cell}` {problem}: {mend}")]
     Cell {
         file: String,
@@ -76,17 +76,17 @@ pub(crate) enum Error {
         problem: &'static str,
         mend: &'static str,
     },
-    /// An option could not be understood.
+    /// The value of an option could not be parsed.
     #[error("{option}: `{value}` is not understood: expected {expected}")]
     Option {
         option: &'static str,
         value: String,
         expected: &'static str,
     },
-    /// A number is missing that cannot be found from the table.
+    /// A value is needed that the table does not determine.
     #[error("{option} is needed: {reason}")]
     Needed { option: &'static str, reason: &'static str },
-    /// A row could not be used by what it was given to.
+    /// A row was refused by the recorder, filter or encoder.
     #[error("{file}: row {row}")]
     Row {
         file: String,
@@ -94,14 +94,14 @@ pub(crate) enum Error {
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// Options do not make a model, a sensor or a design.
+    /// The options do not give a valid model, sensor or design.
     #[error("{what}")]
     Refused {
         what: &'static str,
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// Binary data would go to a terminal.
+    /// Binary data would be written to a terminal.
     #[error("standard output is a terminal: name a file with --output, or redirect")]
     Terminal,
     /// The two files of a comparison do not have the same rows.
@@ -115,10 +115,10 @@ pub(crate) enum Error {
         #[source]
         source: io::Error,
     },
-    /// A configuration, or what was read with it, has a value that cannot be used.
+    /// A configuration file, or a file that it names, has an invalid value.
     #[error("{file}: {reason}")]
     Configuration { file: String, reason: String },
-    /// A centre or a sensor cannot go on.
+    /// A centre or a sensor cannot continue.
     #[error(transparent)]
     Link(#[from] fewbits_link::Error),
     /// JSON could not be written.
@@ -185,7 +185,7 @@ impl Error {
         }
     }
 
-    /// Whether nobody reads the output any more.
+    /// Whether the error is that the reader of the output has closed the pipe.
     pub(crate) fn is_closed_pipe(&self) -> bool {
         let kind = match self {
             Self::File { source, .. } => source.kind(),

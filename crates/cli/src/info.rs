@@ -1,4 +1,4 @@
-//! `fewbits info`: what a recording holds.
+//! `fewbits info`: describes a recording.
 
 use crate::arguments::InfoOptions;
 use crate::error::Error;
@@ -33,7 +33,7 @@ struct ColumnInfo {
     gaps: u64,
 }
 
-/// Runs the task: decodes everything once, so that what it says was seen.
+/// Runs the task. It decodes everything once, so that what it reports was verified.
 pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
     let file = options.file.display().to_string();
     let mut playback = Playback::open(&options.file).map_err(Error::recording(&file))?;

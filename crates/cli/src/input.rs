@@ -8,20 +8,20 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
 use std::io::{IsTerminal, Read, Seek};
 
-/// A row: its tick, or `None` where rows are numbered, and its cells.
+/// A row: its tick (`None` if rows are numbered) and its cells.
 pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
 
 /// A column of cells for each name.
 pub(crate) type Cells = Vec<Vec<Option<f64>>>;
 
-/// Cells that mean that there is no sample.
+/// Cells that mean a missing sample.
 const GAPS: [&str; 8] = ["", "NA", "N/A", "n/a", "null", "NULL", "None", "?"];
-/// Names of a first column that is a time.
+/// Names of a first column that is taken as time.
 const TIME_NAMES: [&str; 6] = ["time", "timestamp", "datetime", "date", "seconds", "t"];
-/// Whole numbers up to this size are doubles.
+/// Integers up to this size are exact doubles.
 const MAX_WHOLE: u64 = 1 << 53;
 
-/// What a table is read from.
+/// Source of a table.
 enum Source {
     Csv(Box<csv::Reader<Box<dyn Read + Send>>>),
     #[cfg(feature = "parquet")]
@@ -31,10 +31,10 @@ enum Source {
 /// The first bytes of a Parquet file.
 const PARQUET: [u8; 4] = *b"PAR1";
 
-/// Whether a file begins as Parquet does; it is then read from its beginning.
+/// Whether a file is a Parquet file. The position is set back to the beginning.
 fn is_parquet(file: &mut File) -> std::io::Result<bool> {
     let mut first = Vec::new();
-    // A pipe cannot be rewound, and Parquet not be read from one.
+    // A pipe cannot be rewound, and Parquet needs random access.
     if !file.metadata()?.is_file() {
         return Ok(false);
     }
@@ -81,7 +81,7 @@ impl Source {
         Ok((Self::Csv(Box::new(reader)), names))
     }
 
-    /// The next row; whether there was one.
+    /// Reads the next row. Returns whether there was one.
     fn read(&mut self, record: &mut csv::StringRecord, file: &str) -> Result<bool, Error> {
         match self {
             Self::Csv(reader) => reader.read_record(record).map_err(Error::table(file)),
@@ -96,27 +96,27 @@ pub(crate) struct Table {
     file: String,
     source: Source,
     record: csv::StringRecord,
-    /// Index of the time's column and of the columns of values.
+    /// Indices of the column of times and of the columns of values.
     time_column: Option<usize>,
     columns: Vec<usize>,
-    /// Index of a column of names.
+    /// Index of the column of sensor names.
     label_column: Option<usize>,
     pub(crate) names: Vec<String>,
     all_names: Vec<String>,
     rows: u64,
-    /// The first row, if it was looked at.
+    /// Whether the first row was read ahead.
     peeked: bool,
 }
 
-/// What one reading of a whole table tells.
+/// Results of reading a whole table once.
 pub(crate) struct Survey {
-    /// Ends of each column's finite values.
+    /// Smallest and largest finite value of each column.
     pub(crate) ends: Vec<Option<(f64, f64)>>,
-    /// Most decimals of a time.
+    /// Largest number of decimals of a time.
     pub(crate) decimals: u8,
 }
 
-/// A bar that counts bytes, on a terminal only.
+/// A progress bar that counts bytes; visible only on a terminal.
 pub(crate) fn progress(bytes: Option<u64>) -> ProgressBar {
     match bytes {
         Some(bytes) if std::io::stderr().is_terminal() => {
@@ -173,17 +173,17 @@ impl Table {
         })
     }
 
-    /// What messages call the table.
+    /// The name of the table in messages.
     pub(crate) fn file(&self) -> &str {
         &self.file
     }
 
-    /// Number of the row that was read last, counted from 1 behind the names.
+    /// Number of the last row read, counted from 1 after the line of names.
     pub(crate) fn row(&self) -> u64 {
         self.rows
     }
 
-    /// Takes a first column whose name says that it is the time as such, unless the caller named one.
+    /// Uses a first column whose name says that it is a time as the column of times, unless the user named one.
     pub(crate) fn find_time(&mut self) {
         let first = self.all_names[0].to_lowercase();
         if self.time_column.is_none() && TIME_NAMES.contains(&first.as_str()) {
@@ -206,13 +206,13 @@ impl Table {
         Ok(self)
     }
 
-    /// Does not read a column as numbers.
+    /// Excludes a column from the columns of numbers.
     fn without(&mut self, column: usize) {
         self.columns.retain(|other| *other != column);
         self.names = self.columns.iter().map(|i| self.all_names[*i].clone()).collect();
     }
 
-    /// The name in the row that was read last.
+    /// The name in the last row read.
     pub(crate) fn label(&self) -> &str {
         let column = self.label_column.and_then(|column| self.record.get(column));
         column.unwrap_or_default()
@@ -238,7 +238,7 @@ impl Table {
         }
     }
 
-    /// How times of the table are kept: looks at the first row.
+    /// The time base for the times of the table, from its first row.
     pub(crate) fn time_base(&mut self, options: &TableOptions, survey: Option<&Survey>) -> Result<TimeBase, Error> {
         let Some(column) = self.time_column else {
             return Ok(TimeBase::Numbered);
@@ -270,13 +270,13 @@ impl Table {
         let scale = 10_u64.pow(u32::from(clock::NANOSECONDS.saturating_sub(decimals)));
         Ok(TimeBase::Clock {
             decimals,
-            // One tick of it is kept for decimals beyond a tick, which are cut off.
+            // One tick of the tolerance is reserved for decimals beyond a tick, which are cut off.
             tolerance: (nanoseconds / scale).saturating_sub(1),
             format,
         })
     }
 
-    /// The next row; `None` behind the last.
+    /// The next row; `None` after the last.
     pub(crate) fn next(&mut self, time: TimeBase) -> Result<Option<Row>, Error> {
         if !self.read_record()? {
             return Ok(None);

@@ -13,23 +13,23 @@ use std::net::UdpSocket;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Instant;
 
-/// Rows that are read ahead.
+/// Number of rows that are read ahead.
 const AHEAD: usize = 1024;
-/// The largest datagram.
+/// Largest length of a datagram in bytes.
 const MAX_DATAGRAM: usize = 1 << 16;
 
 /// Sends one frame.
 type Post = Box<dyn FnMut(&[u8]) -> std::io::Result<()>>;
 
-/// Where frames go.
+/// Destination of frames.
 enum Way {
-    /// A stream that keeps order and loses nothing: the header once, then frames. It is a recording without an index.
+    /// A stream without losses: the header once, then frames. It is a recording without an index.
     Stream {
         sink: Box<dyn Write>,
         name: String,
         begun: bool,
     },
-    /// Frames one by one, any of which may be lost: the header in pieces before every so many.
+    /// Single frames that may be lost: the header in pieces before every group of frames.
     Frames {
         post: Post,
         address: String,
@@ -111,7 +111,7 @@ fn way(options: &SendOptions) -> Result<Way, Error> {
     Ok(frames(
         address,
         Box::new(move |frame: &[u8]| match socket.send(frame) {
-            // Nobody listens yet: as lost as any other datagram.
+            // No receiver is listening: the datagram is lost, like any other.
             Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => Ok(()),
             outcome => outcome.map(drop),
         }),
@@ -126,7 +126,7 @@ pub(crate) fn send(options: &SendOptions) -> Result<Ending, Error> {
     let mut writer = FrameWriter::new(schema, options.max_bytes).map_err(&failed)?;
     let mut way = way(options)?;
     let (sender, rows) = sync_channel::<Result<Row, Error>>(AHEAD);
-    // Reading blocks, and the deadline does not wait for it: a thread of its own reads.
+    // Reading blocks and would delay the deadline: a thread of its own reads.
     let reader = std::thread::spawn(move || {
         loop {
             let row = match table.next(time) {
@@ -168,7 +168,7 @@ pub(crate) fn send(options: &SendOptions) -> Result<Ending, Error> {
     Ok(Ending::Good)
 }
 
-/// The next row, or a timeout when the oldest waiting row must go.
+/// The next row, or a timeout when the oldest waiting row must be sent.
 fn wait(
     rows: &Receiver<Result<Row, Error>>,
     options: &SendOptions,
@@ -203,7 +203,7 @@ pub(crate) fn receive(options: &ReceiveOptions) -> Result<Ending, Error> {
     }
 }
 
-/// A file or standard input, and its name for messages.
+/// Opens a file or standard input. Returns its name for messages too.
 fn open(file: &str) -> Result<(Box<dyn Read + Send>, &str), Error> {
     Ok(match file {
         "-" => (Box::new(std::io::stdin()), "standard input"),
@@ -217,7 +217,7 @@ fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
     let (columns, names) = all_columns(blocks.schema());
     let mut writer = Writer::new(options.output.as_deref(), Shape::Csv, blocks.schema(), &names)?;
     let mut ending = Ending::Good;
-    // One block at a time, so that rows are out as soon as they are in.
+    // Flush after each block, so that rows are written as soon as they arrive.
     for block in blocks {
         let one = write_blocks(std::iter::once(block), &mut writer, (i64::MIN, i64::MAX), &columns, name)?;
         if one == Ending::Failed {
@@ -243,7 +243,7 @@ fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, 
     })
 }
 
-/// Writes the rows of frames as they come, until there is none. Failed if the header never came whole.
+/// Writes the rows of frames as they arrive, until there are no more. The result is a failure if the header never became complete.
 fn receive_frames(
     options: &ReceiveOptions,
     address: &str,

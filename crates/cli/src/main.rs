@@ -1,7 +1,7 @@
 //! The command `fewbits`: recordings and telemetry within guaranteed errors.
 //!
 //! Each task is a module with a function `run`. Results go to `--output` or standard output, everything else to standard error.
-//! Exit codes: 0 done, 1 a promise failed or a part was damaged, 2 refused.
+//! Exit codes: 0 done, 1 an error bound is violated or a part is damaged, 2 refused.
 
 mod arguments;
 mod bench;
@@ -36,16 +36,16 @@ use clap::Parser;
 use std::error::Error as _;
 use std::process::ExitCode;
 
-/// How a task ended that was not refused.
+/// The end of a task that was not refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ending {
     Good,
-    /// A promise does not hold, or a part could not be read.
+    /// An error bound is violated, or a part could not be read.
     Failed,
 }
 
 impl Ending {
-    /// Of a link on which nothing whole came.
+    /// The end of a task that received no complete frame.
     pub(crate) fn no_frame(name: &str) -> Self {
         eprintln!("error: {name}: no whole frame came: use the sender's link, options and baud rate, and wait longer");
         Self::Failed
@@ -72,7 +72,7 @@ fn main() -> ExitCode {
     match done {
         Ok(Ending::Good) => ExitCode::SUCCESS,
         Ok(Ending::Failed) => ExitCode::FAILURE,
-        // Who reads the other end of the pipe has seen enough.
+        // The reader of the output has closed the pipe: not an error.
         Err(error) if error.is_closed_pipe() => ExitCode::SUCCESS,
         Err(error) => {
             eprint!("error: {error}");

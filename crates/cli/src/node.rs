@@ -11,10 +11,10 @@ use fewbits_core::{BitString, Message, Observation};
 use fewbits_protocol::{Check, Frame, Kind, Payload, digest};
 use fewbits_record::Bound;
 
-/// A slot further on than this is that of a sensor that began again, not that of one that was silent.
+/// Largest number of silent slots. A larger jump means that the sensor started again.
 const MAX_SILENCE: u64 = 1 << 16;
 
-/// The agreement with the sensor. Refreshes need not be known: the first that comes is where reconstruction begins.
+/// The configuration of the sensor. Its refresh interval need not be known: reconstruction begins with the first refresh.
 pub(crate) fn config(bound: &str, sequence_bits: u32) -> Result<Config, Error> {
     const OPTION: &str = "--sensor";
     let refused = || Error::option(OPTION, bound, "`±0.05`, on a circle `±2@360`");
@@ -30,8 +30,8 @@ pub(crate) fn config(bound: &str, sequence_bits: u32) -> Result<Config, Error> {
     config.map_err(Error::refused(OPTION))
 }
 
-/// Writes a row per slot, `slot,value`, until there is no frame. From a loss that is noticed to the next refresh there are gaps.
-/// Failed if none was a frame of such a sensor.
+/// Writes a row `slot,value` per slot, until there are no more frames. From a detected loss to the next refresh there are gaps.
+/// The result is a failure if no frame was of such a sensor.
 pub(crate) fn receive(
     options: &ReceiveOptions,
     config: Config,
@@ -62,16 +62,16 @@ pub(crate) fn receive(
     })
 }
 
-/// Count and value of a slot.
+/// Count of a slot, and its value.
 type Row = (u64, Option<f64>);
 
-/// From frames to slots. Frames arrive in order; slots without a frame were silent if no frame was lost.
+/// Conversion of frames to slots. Frames arrive in order; a slot without a frame was silent if no frame was lost.
 struct Slots {
     config: Config,
     receiver: Receiver,
-    /// Count of the last slot that is known.
+    /// Count of the last known slot.
     last: Option<u64>,
-    /// The number that the next packet has if none is lost.
+    /// Counter of the next packet if none is lost.
     sequence: Option<u32>,
 }
 
@@ -85,13 +85,13 @@ impl Slots {
         }
     }
 
-    /// The slots that are known by this frame: those since the last frame, and its own. A report that vanished without a trace is noticed by
-    /// the number of the next one.
+    /// The slots that become known by this frame: those since the last frame, and its own. The loss of a report is detected by the counter
+    /// of the next one.
     fn frame(&mut self, bytes: &[u8]) -> Result<Vec<Row>, String> {
         let frame = match Frame::decode(bytes, Check::Whole) {
             Ok(frame) => frame,
             Err(error) => {
-                // It may have been a report.
+                // The damaged frame may have been a report.
                 self.receive(&Observation::Lost)?;
                 return Err(error.to_string());
             }
@@ -104,7 +104,7 @@ impl Slots {
         }
         let count = frame.slot.nearest_count(self.last.unwrap_or(0));
         let silent = match self.last.map(|last| count.checked_sub(last)) {
-            // The heartbeat of a slot that reported, or a frame that was sent again.
+            // A heartbeat in a slot with a report, or a repeated frame.
             Some(Some(0)) => return Ok(Vec::new()),
             Some(Some(steps)) if steps <= MAX_SILENCE => steps - 1,
             Some(_) => {
@@ -126,7 +126,7 @@ impl Slots {
         Ok(rows)
     }
 
-    /// The value of a slot with a report. If a packet was lost before it, the values of the slots before are not known.
+    /// The value of a slot with a report. If a packet was lost before it, the values of the slots between are unknown.
     fn report(&mut self, frame: &Frame<'_>, rows: &mut [Row]) -> Result<Option<f64>, String> {
         let bits = BitString::from(frame.payload);
         let packet = Packet::from_bits(&(), &bits).map_err(|error| error.to_string())?;
@@ -137,7 +137,7 @@ impl Slots {
         }
         self.sequence = Some((sequence + 1) & ((1 << self.config.sequence_bits()) - 1));
         match self.receive(&Observation::Received(packet)) {
-            // A packet that no such sensor sent: the two ends have other configurations.
+            // No sensor of this configuration sent the packet: the two ends have different configurations.
             Err(reason) => {
                 eprintln!("warning: a packet was refused: {reason}");
                 self.receive(&Observation::Lost)
@@ -146,7 +146,7 @@ impl Slots {
         }
     }
 
-    /// One slot; its value if it is known to be within the bound.
+    /// Processes one slot. Returns its value if it is known to be within the bound.
     fn receive(&mut self, observation: &Observation<Packet>) -> Result<Option<f64>, String> {
         let tracked = self.receiver.receive(observation).map_err(|error| error.to_string())?;
         Ok(tracked.value.filter(|_| tracked.synchronised))

@@ -1,8 +1,8 @@
-//! Numbers in options.
+//! Parsing and printing of numbers in options.
 
 use crate::error::Error;
 
-/// A finite number.
+/// Parses a finite number.
 pub(crate) fn number(option: &'static str, text: &str, expected: &'static str) -> Result<f64, Error> {
     let number: Option<f64> = text.trim().parse().ok();
     number
@@ -10,7 +10,7 @@ pub(crate) fn number(option: &'static str, text: &str, expected: &'static str) -
         .ok_or_else(|| Error::option(option, text, expected))
 }
 
-/// A number above 0.
+/// Parses a positive number.
 pub(crate) fn above_zero(option: &'static str, text: &str, expected: &'static str) -> Result<f64, Error> {
     let found = number(option, text, expected)?;
     if found > 0.0 {
@@ -20,7 +20,7 @@ pub(crate) fn above_zero(option: &'static str, text: &str, expected: &'static st
     }
 }
 
-/// `20±5`.
+/// Parses mean and standard deviation in the form `20±5`.
 pub(crate) fn mean_and_deviation(option: &'static str, text: &str) -> Result<(f64, f64), Error> {
     const EXPECTED: &str = "a mean and a standard deviation above 0, as `20±5`";
     let (mean, deviation) = text
@@ -30,7 +30,7 @@ pub(crate) fn mean_and_deviation(option: &'static str, text: &str) -> Result<(f6
     Ok((number(option, mean, EXPECTED)?, above_zero(option, deviation, EXPECTED)?))
 }
 
-/// All digits of a number, with an exponent where they would be many zeros.
+/// A number with all its digits, with an exponent instead of many zeros.
 pub(crate) fn exact(number: f64) -> String {
     if number == 0.0 || (1e-7..1e16).contains(&number.abs()) {
         format!("{number}")
@@ -39,7 +39,7 @@ pub(crate) fn exact(number: f64) -> String {
     }
 }
 
-/// A size in as few digits as say it, four at most.
+/// A number with at most four digits, for sizes in messages.
 pub(crate) fn short(number: f64) -> String {
     if number == 0.0 || (1e-4..1e7).contains(&number.abs()) {
         let digits = if number == 0.0 {

@@ -1,4 +1,4 @@
-//! Tables as output: rows of recordings, and of whatever else a task finds.
+//! Output of tables: rows of recordings and of other results.
 
 use crate::clock;
 use crate::error::Error;
@@ -7,10 +7,10 @@ use std::fs::File;
 use std::io::{BufWriter, IsTerminal, Write};
 use std::path::Path;
 
-/// What messages call standard output.
+/// Name of standard output in messages.
 pub(crate) const STANDARD_OUTPUT: &str = "standard output";
 
-/// A file, or standard output; its name for messages.
+/// Opens a file, or standard output. Returns its name for messages too.
 pub(crate) fn open(path: Option<&Path>) -> Result<(Box<dyn Write>, String), Error> {
     match path {
         Some(path) => {
@@ -48,12 +48,12 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
 pub(crate) enum Cell {
     Text(String),
     Whole(i64),
-    /// `None` is a gap.
+    /// A number; `None` is a gap.
     Number(Option<f64>),
 }
 
 impl Cell {
-    /// As text: the shortest that reads back as the same number; empty for a gap.
+    /// The cell as text: the shortest that reads back as the same number; empty for a gap.
     fn text(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -77,7 +77,7 @@ impl Cell {
     }
 }
 
-/// What rows look like.
+/// Format of the rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shape {
     Csv,
@@ -143,12 +143,12 @@ impl Sheet {
     }
 }
 
-/// Whether a file is to be Parquet: its name ends so.
+/// Whether the file name has the extension of Parquet files.
 pub(crate) fn is_parquet(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "parquet")
 }
 
-/// Writes rows of a recording, as Parquet if the file's name ends so.
+/// Writes rows of a recording, as Parquet if the file name has that extension.
 pub(crate) enum Writer {
     Sheet {
         sheet: Sheet,
@@ -160,7 +160,7 @@ pub(crate) enum Writer {
 }
 
 impl Writer {
-    /// Rows of these columns. Row numbers of a recording without times are written as JSON and Parquet only.
+    /// A writer for these columns. For a recording without times, only JSON and Parquet contain row numbers.
     pub(crate) fn new(path: Option<&Path>, shape: Shape, schema: &Schema, names: &[String]) -> Result<Self, Error> {
         if let Some(path) = path.filter(|path| is_parquet(path)) {
             #[cfg(feature = "parquet")]
@@ -198,7 +198,7 @@ impl Writer {
         }
     }
 
-    /// Rows so far are out, where the form allows it.
+    /// Writes out all rows so far, if the format allows it.
     pub(crate) fn flush(&mut self) -> Result<(), Error> {
         match self {
             Self::Sheet { sheet, .. } => sheet.flush(),
@@ -207,7 +207,7 @@ impl Writer {
         }
     }
 
-    /// Writes what the end of a file needs.
+    /// Completes the file.
     pub(crate) fn finish(mut self) -> Result<(), Error> {
         match &mut self {
             Self::Sheet { sheet, .. } => sheet.flush(),

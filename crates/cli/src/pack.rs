@@ -1,4 +1,4 @@
-//! `fewbits pack`: a table into a recording.
+//! `fewbits pack`: converts a table to a recording.
 
 use crate::arguments::{BoundOptions, PackOptions, TableOptions};
 use crate::error::Error;
@@ -8,7 +8,7 @@ use fewbits_record::{Bound, Effort, Recorder, Schema};
 use serde::Serialize;
 use std::io::{Write, stderr};
 
-/// What was packed.
+/// Summary of what was packed.
 #[derive(Serialize)]
 struct Done {
     rows: u64,
@@ -16,7 +16,7 @@ struct Done {
     bits_per_sample: f64,
 }
 
-/// The schema of a table, and the table at its first row. A file is read twice where a range or the decimals of times are needed.
+/// The schema of a table, and the table at its first row. A file is read twice if ranges or the decimals of times are needed.
 pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Table, Schema), Error> {
     let mut open = Table::open(table)?;
     let specs = bounds::parse(&options.bound, &open.names, open.file())?;
@@ -112,7 +112,7 @@ fn size_of(file: &mut std::fs::File) -> Result<u64, fewbits_record::Error> {
     size.map_err(|source| fewbits_record::Error::Io { action: "read", source })
 }
 
-/// A sink that counts.
+/// A sink that counts the bytes written.
 pub(crate) struct Counted<W> {
     pub(crate) sink: W,
     pub(crate) bytes: u64,

@@ -1,4 +1,4 @@
-//! Parquet in and out, through Arrow record batches.
+//! Reading and writing of Parquet through Arrow record batches.
 
 use crate::clock;
 use crate::error::Error;
@@ -15,9 +15,9 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Rows of a batch.
+/// Number of rows per batch.
 const ROWS: usize = 1 << 14;
-/// Ticks of timestamps as text.
+/// Time base in which timestamps are converted to text.
 const NANOSECONDS: TimeBase = TimeBase::Clock {
     decimals: 9,
     tolerance: 0,
@@ -32,12 +32,12 @@ fn refused<E: std::error::Error + Send + Sync + 'static>(file: &str) -> impl Fn(
     }
 }
 
-/// Rows of a Parquet file as text, as those of a CSV are.
+/// Rows of a Parquet file as text, like those of a CSV file.
 pub(crate) struct Rows {
     reader: ParquetRecordBatchReader,
     /// Names of the columns.
     pub(crate) names: Vec<String>,
-    /// Cells of the batch, by column, and the next row of it.
+    /// Cells of the present batch, by column, and the index of its next row.
     cells: Vec<Vec<String>>,
     row: usize,
     file: String,
@@ -61,7 +61,7 @@ impl Rows {
         })
     }
 
-    /// The next row into `record`; whether there was one.
+    /// Reads the next row into `record`. Returns whether there was one.
     pub(crate) fn read(&mut self, record: &mut csv::StringRecord) -> Result<bool, Error> {
         while self.cells.first().is_none_or(|cells| self.row >= cells.len()) {
             let Some(batch) = self.reader.next() else {
@@ -78,14 +78,15 @@ impl Rows {
     }
 }
 
-/// The cells of a batch as a CSV would have them. What is no number, time or text says its type, and is refused where it is used.
+/// The cells of a batch as text. A cell of a type other than number, time or text contains the name of its type, and is refused when it is
+/// used.
 fn texts(batch: &RecordBatch) -> Vec<Vec<String>> {
     let column = |(field, array): (&Arc<Field>, &ArrayRef)| -> Vec<String> {
         let name = field.name();
         if let Some(texts) = array.as_string_opt::<i32>() {
             return texts.iter().map(|text| text.unwrap_or_default().to_owned()).collect();
         }
-        // Ticks of seconds say how many decimals they have.
+        // Ticks of seconds have their number of decimals in the metadata.
         let decimals = field
             .metadata()
             .get("decimals")
@@ -174,7 +175,7 @@ impl Sink {
         self.writer.write(&batch).map_err(refused(&self.file))
     }
 
-    /// Writes the rest and the end of the file, without which nobody can read it.
+    /// Writes the remaining rows and the end of the file, without which it cannot be read.
     pub(crate) fn finish(&mut self) -> Result<(), Error> {
         self.write_batch()?;
         self.writer.finish().map(drop).map_err(refused(&self.file))

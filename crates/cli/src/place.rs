@@ -1,4 +1,4 @@
-//! Where a centre and its sensors meet, as their files say it.
+//! Addresses in the configuration files of centres and sensors.
 
 #[cfg(feature = "mqtt")]
 use fewbits_link::mqtt::rumqttc::MqttOptions;
@@ -39,19 +39,19 @@ impl<'a> Place<'a> {
     }
 }
 
-/// How to reach a broker: `[user:password@]host[:port]`.
+/// Options for a broker given as `[user:password@]host[:port]`.
 #[cfg(feature = "mqtt")]
 pub(crate) fn mqtt(broker: &str) -> Result<MqttOptions, String> {
     let (login, address) = match broker.rsplit_once('@') {
         Some((login, address)) => (Some(login), address),
         None => (None, broker),
     };
-    // The colons of an address of version 6 stand in brackets.
+    // The colons of an IPv6 address are in brackets.
     let (host, port) = match address.rsplit_once(':').filter(|(_, port)| !port.ends_with(']')) {
         Some((host, port)) => (host, port.parse().map_err(|_| format!("broker {address}: no port"))?),
         None => (address, 1883),
     };
-    // Without a name the broker gives one, so that no two ends have the same.
+    // With an empty name the broker assigns a unique one.
     let mut options = MqttOptions::new("", host.trim_matches(['[', ']']), port);
     if let Some((user, password)) = login.map(|login| login.split_once(':').unwrap_or((login, ""))) {
         options.set_credentials(user, password);
@@ -59,7 +59,7 @@ pub(crate) fn mqtt(broker: &str) -> Result<MqttOptions, String> {
     Ok(options)
 }
 
-/// A session that listens at `endpoint`, `host:port`, or connects to it as soon as somebody listens there.
+/// A session that listens at `endpoint` (`host:port`), or connects to it as soon as it is listened at.
 #[cfg(feature = "zenoh")]
 pub(crate) fn zenoh(endpoint: &str, listens: bool) -> Result<Session, Box<dyn std::error::Error>> {
     let endpoint = format!("[{:?}]", format!("tcp/{endpoint}"));

@@ -1,4 +1,4 @@
-//! `fewbits plan`: what a table would cost.
+//! `fewbits plan`: bits that a table would need.
 
 use crate::arguments::PlanOptions;
 use crate::error::Error;
@@ -9,9 +9,9 @@ use crate::{Ending, output};
 use fewbits_record::{Bound, Column, Recorder, Schema, TimeBase};
 use serde::Serialize;
 
-/// Bounds that are tried, in percent of the range.
+/// Error bounds that are tried, in percent of the range.
 const PERCENTS: [f64; 7] = [0.01, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0];
-/// Rows that are looked at.
+/// Largest number of rows that are examined.
 const MAX_ROWS: usize = 1 << 17;
 /// The range, decimals and steps of a column, and bits per sample at some bounds.
 #[derive(Serialize)]
@@ -21,7 +21,7 @@ struct ColumnPlan {
     gaps: usize,
     min: Option<f64>,
     max: Option<f64>,
-    /// Steps that the samples may have been quantised with.
+    /// Steps with which the samples may have been quantised.
     steps: Vec<f64>,
     lossless_bits: f64,
     /// Percent of the range, the bound, bits per sample.
@@ -31,13 +31,13 @@ struct ColumnPlan {
 #[derive(Serialize)]
 struct Plan {
     rows: usize,
-    /// Whether the table has more rows than were looked at.
+    /// Whether the table has more rows than were examined.
     cut: bool,
     time: Option<TimePlan>,
     columns: Vec<ColumnPlan>,
 }
 
-/// What one time costs, exactly and within some tolerances.
+/// Bits that times need, exact and with some tolerances.
 #[derive(Serialize)]
 struct TimePlan {
     exact_bits: f64,
@@ -45,7 +45,7 @@ struct TimePlan {
     tolerances: Vec<(u64, f64)>,
 }
 
-/// Bytes of a recording of one column.
+/// Length in bytes of a recording of one column.
 fn size(
     column: Column,
     time: TimeBase,
@@ -163,7 +163,7 @@ pub(crate) fn run(options: &PlanOptions) -> Result<Ending, Error> {
     Ok(Ending::Good)
 }
 
-/// Bits against the bound, a line per column.
+/// Bits per sample against the bound, one line per column.
 fn picture(file: &str, plan: &Plan) -> Picture {
     let line = |(colour, column): (usize, &ColumnPlan)| Layer::Line {
         points: column.bounds.iter().map(|bound| (bound.0.log10(), bound.2)).collect(),

@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, IntoFont, RGBColor, TextStyle};
 use std::path::Path;
 
-/// Colours that colour-blind readers can tell apart (Okabe and Ito).
+/// Colours that readers with colour blindness can distinguish (Okabe and Ito).
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -23,16 +23,16 @@ const COLOURS: [RGBColor; 8] = [
 ];
 /// Width and height in pixels.
 const SIZE: (u32, u32) = (900, 540);
-/// Points that a line keeps; every second one is dropped beyond.
+/// Largest number of points of a line. Beyond it every second one is dropped.
 const MAX_POINTS: usize = 4096;
 
-/// Fewer dots than these are drawn larger.
+/// If there are fewer dots than these, they are drawn larger.
 const FEW: usize = 50;
 
 /// A pair of coordinates.
 pub(crate) type Point = (f64, f64);
 
-/// A part of a picture. Numbers of colours may be any.
+/// A part of a picture. Colour numbers beyond the list start again.
 pub(crate) enum Layer {
     /// The area between two lines, given from left to right.
     Band {
@@ -62,19 +62,19 @@ pub(crate) enum Layer {
     },
 }
 
-/// A picture: what is drawn first lies below.
+/// A picture. Layers are drawn in order, later ones on top.
 pub(crate) struct Picture {
     pub(crate) title: String,
     pub(crate) x: String,
     pub(crate) y: String,
-    /// Labels of the horizontal axis are powers of ten of its numbers.
+    /// Whether the labels of the horizontal axis are powers of ten of its numbers.
     pub(crate) is_log: bool,
-    /// A unit is as long upwards as sideways.
+    /// Whether both axes have the same scale.
     pub(crate) is_map: bool,
     pub(crate) layers: Vec<Layer>,
 }
 
-/// Keeps a picture small however long a table is: points that come one by one, thinned out.
+/// Points that are thinned out as they come, so that a picture stays small for a table of any length.
 pub(crate) struct Thinned<T> {
     kept: Vec<T>,
     step: usize,
@@ -170,7 +170,7 @@ impl Picture {
     /// Writes the picture.
     pub(crate) fn save(&self, path: &Path) -> Result<(), Error> {
         let mut svg = String::new();
-        // The only failure of this back end is a file, and this one has none.
+        // This back end can fail only at a file, and it has none.
         let drawn = self.draw(&mut svg);
         drawn.map_err(Error::refused("the picture cannot be drawn"))?;
         // Width and height are those of the window, not of the drawing.

@@ -1,4 +1,4 @@
-//! How a sensor reports, and configuration files.
+//! Kinds of reports of a sensor, and reading of configuration files.
 
 use crate::error::Error;
 use fewbits_cfwmd::scheme::CovarianceFeedback;
@@ -9,11 +9,11 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// How a sensor reports; the same in the files of sensor and centre.
+/// Kind of a sensor's reports. The files of sensor and centre must state the same.
 #[derive(Deserialize, Clone, Copy)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub(crate) enum Report {
-    /// One bit: whether the sample is at or above what was predicted.
+    /// One bit: whether the sample is at or above the prediction.
     Sign,
     /// The cell of the innovation, in 2 to 4 bits.
     Word {
@@ -22,7 +22,7 @@ pub(crate) enum Report {
     },
     /// Every sample, in double precision.
     Value,
-    /// The sample if its innovation exceeds so many standard deviations, otherwise silence.
+    /// The sample if its innovation reaches `threshold` standard deviations, otherwise silence.
     Censored {
         /// Standard deviations.
         threshold: f64,

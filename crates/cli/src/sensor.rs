@@ -17,7 +17,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
-/// `sensor.toml`.
+/// Content of `sensor.toml`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Configuration {
@@ -25,17 +25,17 @@ struct Configuration {
     centre: String,
     number: u32,
     key: String,
-    /// File in which the counter of envelopes survives the process. Without it the centre takes a restarted sensor for a replay.
+    /// File that stores the counter of envelopes between runs. Without it the centre refuses a restarted sensor as a replay.
     state: Option<PathBuf>,
     /// Standard deviation of the measurement noise.
     deviation: f64,
     report: Report,
-    /// Coordinates of the centre's model, and which is read: for censored reports only.
+    /// Number of coordinates of the centre's state, and index of the measured one. For censored reports only.
     #[serde(default = "one")]
     coordinates: usize,
     #[serde(default)]
     reads: usize,
-    /// After so many silent slots a heartbeat is sent; 0: never.
+    /// Number of silent slots after which a heartbeat is sent; 0: never.
     #[serde(default)]
     heartbeat_after: u32,
     #[serde(default)]
@@ -118,7 +118,7 @@ fn node(file: &Path, given: &Configuration) -> Result<Node, Error> {
     }
 }
 
-/// Samples as they are read, one per line, so that a slot never waits for one.
+/// Reads samples, one per line, in a thread, so that a slot never waits for one.
 fn lines() -> Receiver<(u64, std::io::Result<String>)> {
     let (sender, receiver) = sync_channel(1024);
     std::thread::spawn(move || {
@@ -146,7 +146,7 @@ impl Samples {
 }
 
 impl Program for Samples {
-    /// One line per slot. An empty line, or none that is there yet, is no measurement: silence.
+    /// Takes one line per slot. An empty line, or a line that has not come yet, is a missing measurement: silence.
     fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
         let (number, line) = match self.lines.try_recv() {
             Ok((number, Ok(line))) => (number, line),
@@ -157,7 +157,7 @@ impl Program for Samples {
         let cell = line.trim();
         let sample = match cell.parse::<f64>() {
             Ok(sample) if sample.is_finite() => sample,
-            // A line of names may go before.
+            // The first line may be a name.
             Err(_) if cell.is_empty() || number == 1 => return ControlFlow::Continue(None),
             _ => {
                 let reason = format!("line {number}: `{cell}` is no finite number");

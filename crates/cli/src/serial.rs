@@ -1,5 +1,5 @@
-//! Frames on a serial line: each in consistent-overhead byte stuffing (Cheshire and Baker 1999), ended by a zero byte, so that a
-//! receiver that begins in the middle, or after noise, finds the next frame.
+//! Frames on a serial line. Each is encoded by consistent-overhead byte stuffing (Cheshire and Baker 1999) and ends with a zero byte. A
+//! receiver that starts in the middle, or after noise, therefore finds the next frame.
 
 use crate::error::Error;
 use std::fs::{File, OpenOptions};
@@ -8,11 +8,11 @@ use std::process::Command;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
-/// Longest frame that is put together; what is longer is noise.
+/// Largest length of a frame in bytes. Anything longer is noise.
 const MAX_FRAME: usize = 1 << 16;
 /// Chunks that are read ahead.
 const CHUNKS: usize = 64;
-/// Pause before a line without bytes is read again.
+/// Pause before a line without data is read again.
 const PAUSE: Duration = Duration::from_millis(20);
 
 fn refused(device: &str, action: &'static str) -> impl Fn(std::io::Error) -> Error + use<> {
@@ -23,7 +23,7 @@ fn refused(device: &str, action: &'static str) -> impl Fn(std::io::Error) -> Err
 pub(crate) fn open(device: &str, baud: u32) -> Result<File, Error> {
     let line = OpenOptions::new().read(true).write(true).open(device);
     let line = line.map_err(refused(device, "open"))?;
-    // Anything else (a named pipe) has no speed.
+    // A named pipe has no speed.
     if line.is_terminal() {
         let settings = ["raw", "-echo", "clocal", "min", "0", "time", "1"];
         let set = Command::new("stty")
@@ -50,24 +50,24 @@ pub(crate) fn write(line: &mut File, frame: &[u8]) -> std::io::Result<()> {
 pub(crate) struct Frames {
     chunks: Receiver<std::io::Result<Vec<u8>>>,
     timeout: Option<Duration>,
-    /// Bytes that are no whole frame yet.
+    /// Bytes of an incomplete frame.
     collected: Vec<u8>,
 }
 
 impl Frames {
-    /// Of a line: it is read again where it has no bytes, until nothing came for the timeout.
+    /// Frames from a line. If it has no data, it is read again until the timeout.
     pub(crate) fn of_line(line: File, timeout: Option<Duration>) -> Self {
         Self::new(line, timeout, Some(PAUSE))
     }
 
-    /// Of a stream, which ends.
+    /// Frames from a stream, which ends.
     pub(crate) fn of_stream(source: impl Read + Send + 'static) -> Self {
         Self::new(source, None, None)
     }
 
     fn new(mut source: impl Read + Send + 'static, timeout: Option<Duration>, pause: Option<Duration>) -> Self {
         let (sender, chunks) = sync_channel(CHUNKS);
-        // Reading blocks, and the timeout does not wait for it. The thread ends with the process.
+        // Reading blocks and would delay the timeout: a thread reads. It ends with the process.
         std::thread::spawn(move || {
             let mut buffer = [0; 4096];
             loop {
@@ -96,7 +96,7 @@ impl Frames {
         }
     }
 
-    /// The next frame; `None` if nothing came for the timeout, or at the end of a stream.
+    /// The next frame; `None` after the timeout, or at the end of a stream.
     pub(crate) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
         loop {
             if let Some(end) = self.collected.iter().position(|byte| *byte == 0) {

@@ -1,4 +1,4 @@
-//! `fewbits unpack` and `fewbits cat`: a recording as CSV or JSON lines.
+//! `fewbits unpack` and `fewbits cat`: convert a recording to CSV or JSON lines.
 
 use crate::arguments::{CatOptions, UnpackOptions};
 use crate::error::Error;
@@ -20,7 +20,7 @@ impl UnpackOptions {
     }
 }
 
-/// Which rows, which columns.
+/// The selected rows and columns.
 struct Selection {
     from: i64,
     to: i64,
@@ -56,7 +56,7 @@ fn selection(options: &CatOptions, schema: &Schema) -> Result<Selection, Error> 
     })
 }
 
-/// Writes the rows; damaged parts are told on standard error.
+/// Writes the rows. Damaged parts are reported on standard error.
 pub(crate) fn write_blocks(
     blocks: impl Iterator<Item = Result<Block, fewbits_record::Error>>,
     writer: &mut Writer,

@@ -1,4 +1,4 @@
-//! `fewbits verify`: does a recording keep its promises to its table?
+//! `fewbits verify`: checks a recording against its table and error bounds.
 
 use crate::arguments::VerifyOptions;
 use crate::error::Error;
@@ -7,7 +7,7 @@ use crate::{Ending, bounds, clock, numbers, output};
 use fewbits_record::Playback;
 use serde::Serialize;
 
-/// Failures of a column that are shown.
+/// Largest number of failures of a column that are shown.
 const SHOWN: usize = 3;
 
 #[derive(Serialize)]

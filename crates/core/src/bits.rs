@@ -1,7 +1,7 @@
-//! Messages as real bits.
+//! Messages as sequences of bits.
 //!
-//! What a sensor says is written bit by bit, so that its cost is counted and never claimed. Bits are packed most significant
-//! first; the last byte is padded with zeros.
+//! Every report is encoded bit by bit, so that the cost that is reported is the length of an encoding that exists. Bits are packed most
+//! significant first; the last byte is padded with zeros.
 //!
 //! ```
 //! use fewbits_core::bits::{BitReader, BitWriter};
@@ -31,7 +31,7 @@ pub enum CodecError {
         /// Bits that were left.
         available: usize,
     },
-    /// A field wider than a machine word.
+    /// A field wider than 64 bits.
     #[error("field of {width} bits: expected at most 64")]
     FieldTooWide {
         /// Requested width.
@@ -45,17 +45,17 @@ pub enum CodecError {
         /// Width of the field in bits.
         width: u32,
     },
-    /// The bits are no message of this type.
+    /// The bits do not encode a message of this type.
     #[error("{what} is {value}: expected {expected}")]
     Invalid {
-        /// The decoded field.
+        /// Name of the decoded field.
         what: &'static str,
-        /// Its value.
+        /// The value that was decoded.
         value: String,
         /// What would have been accepted.
         expected: &'static str,
     },
-    /// Bits were left over behind a complete message.
+    /// Bits were left after a complete message.
     #[error("{left} bits are left over behind the message")]
     TrailingBits {
         /// Bits that were not read.
@@ -63,7 +63,7 @@ pub enum CodecError {
     },
 }
 
-/// A finished sequence of bits; up to 16 bytes need no memory of the heap. Stored as its bytes and the number of bits.
+/// A finished sequence of bits. Up to 16 bytes need no heap memory. Serialised as its bytes and the number of bits.
 #[derive(Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "(Vec<u8>, usize)", into = "(Vec<u8>, usize)")]
 pub struct BitString {
@@ -82,7 +82,7 @@ impl Clone for BitString {
 }
 
 impl BitString {
-    /// The first `bits` bits of `bytes`. What lies behind them is dropped, so that messages of equal bits are equal.
+    /// The first `bits` bits of `bytes`. Later bits are dropped, so that messages of equal bits are equal values.
     ///
     /// # Errors
     /// If `bytes` is too short.
@@ -102,7 +102,7 @@ impl BitString {
         Ok(Self { bytes, bits })
     }
 
-    /// Length in bits: the price of the message.
+    /// Length in bits: the cost of the message.
     pub fn bits(&self) -> usize {
         self.bits
     }
@@ -112,7 +112,7 @@ impl BitString {
         &self.bytes
     }
 
-    /// The same message with bit `index` inverted, as a noisy link would deliver it; unchanged beyond the end.
+    /// The same message with bit `index` inverted, as a noisy link may deliver it. Unchanged if `index` is not below the length.
     pub fn with_flipped(mut self, index: usize) -> Self {
         if index < self.bits {
             self.bytes[index / 8] ^= 0x80 >> (index % 8);
@@ -135,7 +135,8 @@ impl From<BitString> for (Vec<u8>, usize) {
     }
 }
 
-/// Appends fields of 0 to 64 bits. Allocates at most once a message if made [`with_capacity`](Self::with_capacity).
+/// Writes fields of 0 to 64 bits one after the other. Allocates at most once if made with enough capacity
+/// ([`with_capacity`](Self::with_capacity)).
 #[derive(Debug, Clone, Default)]
 pub struct BitWriter {
     message: BitString,
@@ -174,7 +175,7 @@ impl BitWriter {
         if width < 64 && value >> width != 0 {
             return Err(CodecError::ValueTooLarge { value, width });
         }
-        // The field behind the bits that the last byte holds already.
+        // The new field is placed behind the bits that the last byte holds already.
         let (bytes, held) = (&mut self.message.bytes, self.message.bits % 8);
         let end = held + width as usize;
         self.message.bits += width as usize;
@@ -216,7 +217,7 @@ impl BitWriter {
     }
 }
 
-/// Reads fields back. Total: any bits give a value or a [`CodecError`].
+/// Reads fields in the order in which they were written. Any bits give a value or a [`CodecError`], never a panic.
 #[derive(Debug, Clone)]
 pub struct BitReader<'a> {
     message: &'a BitString,
@@ -254,6 +255,7 @@ impl<'a> BitReader<'a> {
         }
         let (rest, skipped) = (&self.message.bytes[self.position / 8..], self.position % 8);
         self.position += width as usize;
+        // Eight bytes at once; near the end of the message the missing ones count as zero.
         let word = match rest.first_chunk() {
             Some(bytes) => u64::from_be_bytes(*bytes),
             None => (0..)
@@ -262,6 +264,7 @@ impl<'a> BitReader<'a> {
                 .fold(0, |word, (i, byte)| word | u64::from(*byte) << (56 - i)),
         };
         let mut field = word << skipped;
+        // A field that begins within a byte can reach into a ninth one.
         if skipped + width as usize > 64 {
             field |= u64::from(rest[8]) >> (8 - skipped);
         }
@@ -284,7 +287,7 @@ impl<'a> BitReader<'a> {
         Ok(writer.finish())
     }
 
-    /// Moves bits to a writer: whole bytes where both stand at the beginning of one.
+    /// Copies bits to a writer, whole bytes if both are at the beginning of a byte.
     fn read_into(&mut self, bits: usize, writer: &mut BitWriter) -> Result<(), CodecError> {
         let (first, whole) = (self.position / 8, bits / 8);
         let mut left = bits;

@@ -1,4 +1,4 @@
-//! Intervals of measurements.
+//! Intervals ("cells") of the measurement axis.
 
 use crate::sign::Sign;
 use fewbits_numerics::error::{self, ArgumentError};
@@ -33,7 +33,7 @@ impl Cell {
         }
     }
 
-    /// The half-line that a sign bit at `threshold` announces.
+    /// The half-line in which a measurement with this sign relative to `threshold` is: `[threshold, inf)` for `Above`.
     ///
     /// # Errors
     /// If the threshold is not finite.
@@ -61,14 +61,14 @@ impl Cell {
         self.lower <= value && value < self.upper
     }
 
-    /// `ln P(mean + noise in cell)` for zero-mean normal noise of the given standard deviation.
+    /// `ln P(mean + n in cell)` for noise `n ~ N(0, standard_deviation^2)`.
     #[inline]
     pub fn log_probability(&self, mean: f64, standard_deviation: f64) -> f64 {
         normal::log_interval((self.lower - mean) / standard_deviation, (self.upper - mean) / standard_deviation)
     }
 }
 
-/// The stored form: an end that is left out is infinite, since JSON has no infinity.
+/// The serialised form. An infinite end is left out, since JSON has no infinity.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Ends {

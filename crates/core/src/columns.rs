@@ -1,14 +1,14 @@
-//! States side by side: one contiguous column a coordinate, so that inner loops vectorise.
+//! States in columns: one contiguous slice per coordinate, so that inner loops run in vector registers.
 
 use nalgebra::SVector;
 
-/// Borrowed structure-of-arrays states: `columns[d][i]` is coordinate `d` of state `i`.
+/// Borrowed states: `columns[d][i]` is coordinate `d` of state `i`.
 pub type Columns<'a, const D: usize> = [&'a [f64]; D];
 
-/// Mutable structure-of-arrays states.
+/// The same, mutable.
 pub type ColumnsMut<'a, const D: usize> = [&'a mut [f64]; D];
 
-/// State `i` of a structure of arrays.
+/// State `i` of the columns.
 #[inline]
 pub fn state_at<const D: usize>(columns: &Columns<'_, D>, i: usize) -> SVector<f64, D> {
     SVector::from_fn(|d, _| columns[d][i])
@@ -22,10 +22,10 @@ pub fn set_state<const D: usize>(columns: &mut ColumnsMut<'_, D>, i: usize, stat
     }
 }
 
-/// Whether a sweep from `columns` to `out` may run: all are of one length.
+/// Whether all slices have one length, so that a sweep from `columns` to `out` may run. If not, all of `out` is set to NaN.
 ///
-/// The one rule for sweeps over slices of unequal lengths: nothing is truncated and nothing panics, but all of `out` becomes NaN, which
-/// whoever weighs refuses ([`crate::Error::NotANumber`]). Every sweep begins with this check.
+/// All sweeps treat slices of unequal lengths in this way: nothing is truncated and nothing panics. The NaN then becomes
+/// [`crate::Error::NotANumber`] when weights are formed. Every sweep begins with this check.
 #[inline]
 pub fn lengths_agree<const D: usize>(columns: &Columns<'_, D>, out: &mut [f64]) -> bool {
     let agree = columns.iter().all(|column| column.len() == out.len());
@@ -35,7 +35,7 @@ pub fn lengths_agree<const D: usize>(columns: &Columns<'_, D>, out: &mut [f64]) 
     agree
 }
 
-/// The same for a sweep over the states of `columns` in place.
+/// As [`lengths_agree`], for a sweep that changes the states of `columns` in place.
 #[inline]
 pub fn columns_agree<const D: usize>(columns: &mut ColumnsMut<'_, D>) -> bool {
     let agree = columns.windows(2).all(|pair| pair[0].len() == pair[1].len());
@@ -45,7 +45,7 @@ pub fn columns_agree<const D: usize>(columns: &mut ColumnsMut<'_, D>) -> bool {
     agree
 }
 
-/// Changes every state of a cloud, the first first; NaN where columns differ in length ([`columns_agree`]).
+/// Applies a function to every state in place, in order. Writes NaN everywhere if columns differ in length ([`columns_agree`]).
 #[inline]
 pub fn change_each<const D: usize>(
     mut columns: ColumnsMut<'_, D>,
@@ -59,7 +59,7 @@ pub fn change_each<const D: usize>(
     }
 }
 
-/// As [`lengths_agree`] for a sweep from states to measurements.
+/// As [`lengths_agree`], for a sweep from states to measurements.
 #[inline]
 pub fn measurements_agree<const D: usize, const M: usize>(
     states: &Columns<'_, D>,

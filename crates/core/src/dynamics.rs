@@ -1,7 +1,7 @@
-//! How the world moves.
+//! How the state changes from one time step to the next.
 //!
-//! Three traits, each a refinement of the one before: anything that can be drawn from, Gaussian noise about a smooth mean,
-//! and linear Gaussian. An estimator asks for the least that it needs.
+//! Three traits, each a special case of the one before: Markov dynamics that can be sampled, Gaussian noise about a differentiable mean,
+//! and linear Gaussian dynamics. An estimator requires the most general of them that it can work with.
 
 use crate::columns::{ColumnsMut, change_each};
 use nalgebra::{SMatrix, SVector};
@@ -18,7 +18,8 @@ pub trait Dynamics<const D: usize> {
     /// Draws `x_k` given `x_{k-1}`.
     fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, D>;
 
-    /// Propagates a whole cloud in place; NaN where columns differ in length ([`crate::columns::columns_agree`]). Override where a loop over columns is faster.
+    /// Propagates all states in place. Writes NaN everywhere if columns differ in length ([`crate::columns::columns_agree`]). Override it
+    /// if a loop over columns is faster than single calls.
     fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
         change_each(states, |state| self.propagate(rng, &state));
     }
@@ -29,7 +30,7 @@ pub trait GaussianDynamics<const D: usize>: Dynamics<D> {
     /// Jacobian of [`Dynamics::mean`] at `state`.
     fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, D, D>;
 
-    /// Covariance of the process noise out of `state`, possibly singular.
+    /// Covariance `Q(state)` of the process noise in the step from `state`; may be singular.
     fn noise_covariance_at(&self, state: &SVector<f64, D>) -> SMatrix<f64, D, D>;
 }
 

@@ -1,4 +1,4 @@
-//! What can go wrong with an estimate: one error for the words of this crate, densities, models and filters.
+//! The error type of this crate, and of densities, models, filters and estimators.
 
 use crate::bits::CodecError;
 use fewbits_numerics::ArgumentError;
@@ -8,23 +8,22 @@ use fewbits_numerics::roots::RootError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     /// A message that does not fit its format, or bits that are no message.
     #[error(transparent)]
     Codec(#[from] CodecError),
-    /// What was observed has probability zero under the belief.
+    /// The observation has probability zero under the belief.
     #[error("the observation is impossible under the belief")]
     Impossible,
-    /// A NaN (or an infinite likelihood) came out of what the caller handed over: a likelihood, a model, a belief, a filter. The
-    /// observation is not to blame.
+    /// A likelihood, model, belief or filter of the caller gave NaN (or an infinite likelihood). The observation itself may be correct.
     #[error("{what} is no number: expected numbers from the caller's likelihood and models")]
     NotANumber {
-        /// What is no number.
+        /// Name of the quantity that is NaN or infinite.
         what: &'static str,
     },
-    /// An integral or an iteration did not reach its accuracy.
+    /// An integral or an iteration did not reach the required accuracy.
     #[error("{what} did not converge within {steps} {unit}")]
     NotConverged {
         /// What was computed.
@@ -59,7 +58,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// What a result that is not finite means: probability zero if its log evidence is `-inf`, otherwise `what` is no number.
+    /// The error for an update whose result is not finite: `Impossible` if `log_evidence` is `-inf`, otherwise `NotANumber` with `what`.
     pub fn unlikely_or_no_number(log_evidence: f64, what: &'static str) -> Self {
         if log_evidence == f64::NEG_INFINITY {
             Self::Impossible

@@ -1,9 +1,9 @@
-//! Dynamics over any stretch of time.
+//! Dynamics in continuous time.
 
 use crate::dynamics::GaussianDynamics;
 use fewbits_numerics::ArgumentError;
 
-/// A world that moves in continuous time: its dynamics over any number of seconds, so that irregular samples are the normal case.
+/// Dynamics in continuous time: gives the discrete dynamics over any number of seconds, so that samples need not be regular.
 ///
 /// Laws ([`crate::laws::evolution`]): `over(a + b)` has the mean and covariance of `over(a)` followed by `over(b)`; `over(0)` is the
 /// identity.
@@ -14,6 +14,6 @@ pub trait Evolution<const D: usize> {
     /// The dynamics over `seconds`.
     ///
     /// # Errors
-    /// If the time is negative or not finite, or so long that the state leaves the range of numbers.
+    /// If the time is negative or not finite, or so long that a number overflows.
     fn over(&self, seconds: f64) -> Result<Self::Step, ArgumentError>;
 }

@@ -1,4 +1,4 @@
-//! The scheme that saves nothing: every measurement travels as a number.
+//! The scheme without compression: every measurement is sent as a number.
 
 use crate::error::Error;
 use crate::factor::{Constant, Factor, Scalar, Tilted, Value};
@@ -11,16 +11,16 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive, within};
 use nalgebra::{Matrix1, SVector, Vector1};
 
-/// A sensor that sends its scalar measurement as a number, in 64 bits or another format: what a Kalman filter receives.
+/// A sensor that sends its scalar measurement as a number, by default in 64 bits. A Kalman filter receives such values.
 ///
-/// A value wants a checksum: over a link that inverts bits it has no factor.
+/// There is no factor for a link that inverts bits: a value with inverted bits has no useful likelihood. Protect it by a checksum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullValue {
     noise_variance: f64,
     format: NumberFormat,
 }
 
-/// What a sensor that always sends its value says: the value, which arrived with some probability, or a constant.
+/// The factor of a sensor that always sends its value: a [`Value`] times the probability of arrival, or a constant if nothing arrived.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SentValue {
     value: Option<Value<1>>,
@@ -28,7 +28,7 @@ pub struct SentValue {
 }
 
 impl FullValue {
-    /// A sensor with this noise variance, whose values travel in 64 bits.
+    /// A sensor with this noise variance that sends 64-bit values.
     ///
     /// # Errors
     /// If the variance is not above 0.
@@ -39,7 +39,7 @@ impl FullValue {
         })
     }
 
-    /// The same with values that are rounded to a format.
+    /// The same sensor with values rounded to `format`.
     #[must_use]
     pub fn with_format(self, format: NumberFormat) -> Self {
         Self { format, ..self }

@@ -1,4 +1,4 @@
-//! The Gaussian belief.
+//! The Gaussian distribution as a belief.
 
 use crate::belief::{Belief, Density};
 use crate::columns::{Columns, ColumnsMut, change_each, lengths_agree};
@@ -11,10 +11,10 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-/// A normal distribution over a state of `D` coordinates: the belief of every Kalman-like estimator.
+/// A normal distribution over a state of `D` coordinates. All Kalman-like estimators use it.
 ///
-/// The covariance is symmetric and positive semidefinite by construction; a singular one (a known start, a rank-1 process
-/// noise) is a valid belief, though it has no density.
+/// The covariance is symmetric and positive semidefinite by construction. It may be singular (a state known exactly, process noise of rank
+/// one); such a belief has no density.
 ///
 /// ```
 /// use fewbits_core::Gaussian;
@@ -47,7 +47,7 @@ impl<const D: usize> Gaussian<D> {
         })
     }
 
-    /// The same without the checks, for updates that preserve them by construction. The covariance is symmetrised.
+    /// As [`new`](Self::new) without the checks, for updates that preserve them by construction. The covariance is symmetrised.
     pub fn from_trusted_parts(mean: SVector<f64, D>, covariance: SMatrix<f64, D, D>) -> Self {
         Self {
             mean,
@@ -55,7 +55,8 @@ impl<const D: usize> Gaussian<D> {
         }
     }
 
-    /// The same for a covariance that is symmetric to the last bit, as [`fewbits_numerics::linalg::congruence`] makes it.
+    /// As [`new`](Self::new) without the checks, for a covariance that is symmetric to the last bit, as from
+    /// [`fewbits_numerics::linalg::congruence`].
     #[inline]
     pub fn from_symmetric_parts(mean: SVector<f64, D>, covariance: SMatrix<f64, D, D>) -> Self {
         Self { mean, covariance }
@@ -76,7 +77,7 @@ impl<const D: usize> Gaussian<D> {
         &self.covariance
     }
 
-    /// Whether all numbers are finite: an update may run out of range.
+    /// Whether all numbers are finite; an update may overflow.
     #[inline]
     pub fn is_finite(&self) -> bool {
         // Without an early end it is a few vector instructions.
@@ -112,7 +113,7 @@ impl<const D: usize> Gaussian<D> {
         })
     }
 
-    /// `ln N(x; mean, covariance)`. See [`Gaussian::factored`] for many.
+    /// `ln N(x; mean, covariance)`. For many points use [`Gaussian::factored`].
     ///
     /// # Errors
     /// If the covariance is singular.
@@ -141,7 +142,7 @@ impl<const D: usize> Gaussian<D> {
     /// Kullback-Leibler divergence `KL(self || other)` in nats.
     ///
     /// # Errors
-    /// If either covariance is singular, or the divergence leaves the range of numbers.
+    /// If either covariance is singular, or the divergence overflows.
     pub fn kl_divergence(&self, other: &Self) -> Result<f64, ArgumentError> {
         let (own, reference) = (self.cholesky()?, other.cholesky()?);
         let log_ratio: f64 = reference
@@ -185,8 +186,8 @@ impl<const D: usize> Belief<D> for Gaussian<D> {
         self.covariance
     }
 
-    /// Singular covariances are fine. One that is no covariance (only [`Gaussian::from_trusted_parts`] can hold it) is replaced by
-    /// its diagonal.
+    /// Singular covariances are allowed. A matrix that is not positive semidefinite (possible only through
+    /// [`Gaussian::from_trusted_parts`]) is replaced by its diagonal.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
         let factor = semidefinite_factor("covariance", &self.covariance)
             .unwrap_or_else(|_| SMatrix::from_diagonal(&self.standard_deviations()));
@@ -205,7 +206,7 @@ fn sample_normals<const D: usize, R: Rng + ?Sized>(
     change_each(states, |_| mean + factor * normals());
 }
 
-/// A [`Gaussian`] of positive definite covariance with its Cholesky factor, for repeated densities and draws.
+/// A [`Gaussian`] of positive definite covariance `P` with its Cholesky factor, for repeated densities and draws.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FactoredGaussian<const D: usize> {
     gaussian: Gaussian<D>,
@@ -214,7 +215,7 @@ pub struct FactoredGaussian<const D: usize> {
     log_peak: f64,
 }
 
-/// The squared distance of a state for which it came out as NaN: infinite, as differences of infinities are, unless the state itself is NaN.
+/// Replaces a squared distance of NaN: infinite if the state has no NaN (it came from a difference of infinities), else NaN.
 #[cold]
 fn out_of_range(x: &[f64]) -> f64 {
     if x.iter().any(|x| x.is_nan()) {
@@ -225,7 +226,7 @@ fn out_of_range(x: &[f64]) -> f64 {
 }
 
 impl<const D: usize> FactoredGaussian<D> {
-    /// The plain belief.
+    /// The Gaussian without the factor.
     pub fn gaussian(&self) -> &Gaussian<D> {
         &self.gaussian
     }
@@ -245,7 +246,7 @@ impl<const D: usize> FactoredGaussian<D> {
         self.log_peak
     }
 
-    /// Squared Mahalanobis distance of `x` from the mean; infinite where it leaves the range of numbers.
+    /// Squared Mahalanobis distance of `x` from the mean; infinite if it overflows.
     #[inline]
     pub fn squared_distance(&self, x: &SVector<f64, D>) -> f64 {
         let mut white = x - self.gaussian.mean;
@@ -268,7 +269,7 @@ impl<const D: usize> FactoredGaussian<D> {
 }
 
 impl<const D: usize> FactoredGaussian<D> {
-    /// Adds `ln N(x; mean, covariance)` of every state to `logs`: blocks of columns through the forward substitution.
+    /// Adds `ln N(x; mean, covariance)` of every state to `logs`. Solves with the Cholesky factor for blocks of columns.
     pub(crate) fn add_log_pdfs(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
         const BLOCK: usize = 64;
         if !lengths_agree(states, logs) {
@@ -278,6 +279,7 @@ impl<const D: usize> FactoredGaussian<D> {
         for (start, logs) in (0..).step_by(BLOCK).zip(logs.chunks_mut(BLOCK)) {
             let count = logs.len();
             square.fill(0.0);
+            // Forward substitution with the Cholesky factor, one row at a time for all states of the block.
             for i in 0..D {
                 let (solved, rest) = white.split_at_mut(i);
                 let Some(row) = rest.first_mut() else { break };
@@ -294,6 +296,7 @@ impl<const D: usize> FactoredGaussian<D> {
                     *square += *x * *x;
                 }
             }
+            // A state at infinity gives `inf - inf`; the scalar function distinguishes it from a state of NaN.
             if square[..count].iter().any(|q| q.is_nan()) {
                 for (i, q) in square[..count].iter_mut().enumerate().filter(|(_, q)| q.is_nan()) {
                     *q = out_of_range(&states.map(|column| column[start + i]));

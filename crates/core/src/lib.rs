@@ -1,25 +1,25 @@
-//! The words of estimation under communication constraints, and the laws that their implementations obey.
+//! The shared types and traits of estimation under communication constraints, and the laws that their implementations obey.
 //!
-//! > The **world** moves (dynamics) and is **sensed** (sensing). A sensor **reports** little (scheme: report, perhaps silence).
-//! > The report crosses a **link** at a price in bits. Whoever receives it knows how likely that observation was for each
-//! > noise-free measurement (**factor**) and updates a **belief**, which may itself travel on as a message.
+//! > The **world** moves (dynamics) and is measured (**sensing**). A sensor **reports** a few bits, or is silent, by a rule (**scheme**).
+//! > The report crosses a **link**, at a cost in bits. The receiver knows how likely each observation is for each
+//! > noise-free measurement (**factor**) and updates a **belief**, which may itself be sent on as a message.
 //!
-//! | word | item |
+//! | concept | item |
 //! |---|---|
-//! | how the world moves | [`Dynamics`], [`GaussianDynamics`], [`LinearDynamics`]; over any time: [`Evolution`] |
-//! | how it is sensed | [`Sensing`], [`LinearSensing`]; of which coordinates: [`OnAxes`] |
-//! | what travels, as real bits | [`Message`], [`bits`], [`NumberFormat`] |
-//! | the sensor's half, and what its reports mean | [`Scheme`]; what runs on the sensor: [`SensorNode`] |
-//! | what is observed, and through what | [`Observation`], [`Link`] |
+//! | how the state moves | [`Dynamics`], [`GaussianDynamics`], [`LinearDynamics`]; in continuous time: [`Evolution`] |
+//! | how it is measured | [`Sensing`], [`LinearSensing`]; of which coordinates: [`OnAxes`] |
+//! | what is sent, encoded in bits | [`Message`], [`bits`], [`NumberFormat`] |
+//! | how a sensor makes its reports, and their likelihoods | [`Scheme`]; what runs on the sensor: [`SensorNode`] |
+//! | what the receiver observes, and the channel | [`Observation`], [`Link`] |
 //! | `p(observation | noise-free measurement)` | [`Factor`] and its kinds |
 //! | `p(observed | state)` | [`Likelihood`], [`Observed`] |
-//! | what is known | [`Belief`], [`Density`], [`Gaussian`] |
-//! | what implementations must obey | [`laws`] |
+//! | the estimate, a distribution | [`Belief`], [`Density`], [`Gaussian`] |
+//! | checks for implementations of these traits | [`laws`] |
 //!
-//! The central choice is the [`Factor`]: one small type for each kind of observation, with its logarithm for
-//! particle and grid filters and its posterior moments for Gaussian ones. A new scheme writes its factor once and has every
-//! filter. The price is that a factor knows the noise-free measurement only; what depends on more of the state (a nuisance that
-//! must be integrated out) implements [`Likelihood`] itself.
+//! The main type is the [`Factor`]: one small type for each kind of observation, with its logarithm for
+//! particle and grid filters and its posterior moments for Gaussian ones. A new scheme defines its factor once and works with every
+//! filter. A factor depends on the noise-free measurement only. An observation that depends on more of the state (such as a nuisance
+//! parameter that must be integrated out) implements [`Likelihood`] itself.
 //!
 //! ```
 //! use fewbits_core::factor::{Factor, InCell};
@@ -38,7 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: any particular model, filter or experiment.
+//! This crate contains no particular model, filter or experiment.
 
 pub mod belief;
 pub mod bits;

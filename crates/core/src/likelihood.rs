@@ -1,22 +1,22 @@
-//! How likely what was observed is, for each state.
+//! The likelihood of an observation as a function of the state.
 
 use crate::columns::{Columns, lengths_agree, state_at};
 use crate::factor::Factor;
 use crate::sensing::Sensing;
 use nalgebra::SVector;
 
-/// `ln p(observed | x)`: what any particle or grid filter needs.
+/// `ln p(observed | x)`, as particle and grid filters need it.
 ///
-/// A sensing model and a [`Factor`] compose into one ([`Observed`]); observations of one instant multiply (slices).
+/// A sensing model and a [`Factor`] together make one ([`Observed`]). A slice is the product of independent observations at one instant.
 ///
-/// Laws ([`crate::laws::likelihood`]): finite or `-inf`, never NaN for a finite state; where the state is NaN it is NaN, or no more than
-/// at any state of numbers; `add_log_likelihoods` adds what `log_likelihood` returns, to rounding, and where lengths differ all of
-/// `log_weights` becomes NaN ([`crate::columns::lengths_agree`]).
+/// Laws ([`crate::laws::likelihood`]): the result is finite or `-inf` for a finite state. If the state has a NaN, it is NaN or at most the
+/// smallest value at any state of numbers. `add_log_likelihoods` adds what `log_likelihood` returns, up to rounding. If lengths differ,
+/// all of `log_weights` becomes NaN ([`crate::columns::lengths_agree`]).
 pub trait Likelihood<const D: usize> {
     /// `ln p(observed | state)`.
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64;
 
-    /// Adds the log likelihood of every state of a cloud to `log_weights`. Override where a sweep is faster.
+    /// Adds the log likelihood of every state to `log_weights`. Override it if a sweep over columns is faster than single calls.
     fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
         if lengths_agree(&states, log_weights) {
             for (i, log_weight) in log_weights.iter_mut().enumerate() {
@@ -36,7 +36,7 @@ impl<const D: usize, L: Likelihood<D> + ?Sized> Likelihood<D> for &L {
     }
 }
 
-/// Independent observations of one instant: log likelihoods add.
+/// Independent observations at one instant: log likelihoods add.
 impl<const D: usize, L: Likelihood<D>> Likelihood<D> for [L] {
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
         self.iter().map(|observed| observed.log_likelihood(state)).sum()
@@ -51,7 +51,7 @@ impl<const D: usize, L: Likelihood<D>> Likelihood<D> for [L] {
     }
 }
 
-/// Independent observations of one instant: log likelihoods add.
+/// Independent observations at one instant: log likelihoods add.
 impl<const D: usize, L: Likelihood<D>> Likelihood<D> for Vec<L> {
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
         self.as_slice().log_likelihood(state)
@@ -62,23 +62,23 @@ impl<const D: usize, L: Likelihood<D>> Likelihood<D> for Vec<L> {
     }
 }
 
-/// A factor seen through a sensing model: `p(observation | x) = p(observation | m = h(x))`.
+/// A factor composed with a sensing model `h`: `p(observation | x) = p(observation | m = h(x))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observed<S, F, const M: usize> {
     /// The sensing model, `h`.
     pub sensing: S,
-    /// What was observed of `h(x)`.
+    /// The likelihood of the observation as a function of `h(x)`.
     pub factor: F,
 }
 
 impl<S, F, const M: usize> Observed<S, F, M> {
-    /// `factor` seen through `sensing`.
+    /// The likelihood of `factor` at the noise-free measurement of `sensing`.
     pub fn new(sensing: S, factor: F) -> Self {
         Self { sensing, factor }
     }
 }
 
-/// States swept at once, so that their measurements stay in the nearest cache.
+/// Number of states that are processed together, so that their measurements stay in the first-level cache.
 const BLOCK: usize = 256;
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<D> for Observed<S, F, M> {

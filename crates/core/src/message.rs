@@ -1,16 +1,16 @@
-//! Messages: what travels, as real bits.
+//! Messages with a bit encoding.
 
 use crate::bits::{BitReader, BitString, BitWriter, CodecError};
 
-/// Something that travels, with a real bit encoding: a report, a broadcast, a belief.
+/// A value that can be sent, with its encoding in bits: a report, a broadcast, a belief.
 ///
 /// Laws, checked by [`crate::laws::message`] for every implementation:
 /// 1. decoding what was encoded gives the message back and leaves no bit over;
 /// 2. decoding arbitrary bits gives a message or an error, never a panic.
 ///
-/// Fields that both ends know beforehand (the width of a word, a code book) are the `Format`.
+/// What both ends know beforehand (the width of a word, a code book) is the `Format` and costs no bits.
 pub trait Message: Sized {
-    /// What both ends agreed on beforehand.
+    /// What sender and receiver agreed on beforehand.
     type Format;
 
     /// Appends the message's bits.
@@ -25,7 +25,7 @@ pub trait Message: Sized {
     /// If the bits are no message of this format.
     fn decode(format: &Self::Format, reader: &mut BitReader<'_>) -> Result<Self, CodecError>;
 
-    /// The message alone, as it would travel.
+    /// Encodes the message alone.
     ///
     /// # Errors
     /// As [`Message::encode`].
@@ -35,7 +35,7 @@ pub trait Message: Sized {
         Ok(writer.finish())
     }
 
-    /// The message that `bits` hold, to the last bit.
+    /// Decodes a message that consists of all of `bits`.
     ///
     /// # Errors
     /// As [`Message::decode`], or if bits are left over.
@@ -47,8 +47,7 @@ pub trait Message: Sized {
     }
 }
 
-/// Nothing to say: zero bits.
-/// One bit.
+/// Encoded as one bit.
 impl Message for bool {
     type Format = ();
 
@@ -61,6 +60,7 @@ impl Message for bool {
     }
 }
 
+/// The empty message, of zero bits.
 impl Message for () {
     type Format = ();
 

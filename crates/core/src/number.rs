@@ -1,4 +1,4 @@
-//! Numbers as messages: how many bits a value costs, and which value arrives.
+//! Numbers as messages: the bits that a number takes, and the rounded value that arrives.
 
 use crate::bits::{BitReader, BitWriter, CodecError};
 use crate::cell::Cell;
@@ -9,7 +9,7 @@ use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// How a number travels. Both ends know it; it costs no bits itself.
+/// The encoding of a number. Both ends know the format; it costs no bits itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NumberFormat {
@@ -18,12 +18,12 @@ pub enum NumberFormat {
     Double,
     /// 32-bit floating point.
     Single,
-    /// One of evenly spaced levels.
+    /// The index of one of `2^bits` evenly spaced levels.
     Fixed(Levels),
 }
 
-/// `2^bits` evenly spaced levels from `lower` to `upper`, ends included. A value takes the nearest; beyond the ends it
-/// saturates.
+/// `2^bits` evenly spaced levels from `lower` to `upper`, ends included. A value is rounded to the nearest level; values beyond the ends
+/// are rounded to the ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct Levels {
@@ -40,7 +40,7 @@ impl Levels {
     /// The levels from `lower` to `upper` (measurement units), `bits` of 1 to 32.
     ///
     /// # Errors
-    /// Ends that are not finite or not increasing, bits outside 1 to 32.
+    /// If an end is not finite, `lower < upper` does not hold, or `bits` is outside 1 to 32.
     pub fn new(lower: f64, upper: f64, bits: u32) -> Result<Self, ArgumentError> {
         finite("lower", lower)?;
         finite("upper", upper)?;
@@ -69,13 +69,13 @@ impl Levels {
         (share * self.top()).round().clamp(0.0, self.top()) as u64
     }
 
-    /// The level of an index.
+    /// The level with an index.
     fn level(&self, index: u64) -> f64 {
         let share = index as f64 / self.top();
         self.lower * (1.0 - share) + self.upper * share
     }
 
-    /// The values that are sent as `level`: half a step to either side, unbounded at the ends.
+    /// The cell of values that are rounded to `level`: half a step to either side, unbounded at the first and last level.
     ///
     /// # Errors
     /// If `level` is NaN.
@@ -94,7 +94,7 @@ impl Levels {
 }
 
 impl NumberFormat {
-    /// `2^bits` evenly spaced levels.
+    /// The format of `2^bits` evenly spaced levels from `lower` to `upper`.
     ///
     /// # Errors
     /// As [`Levels::new`].

@@ -1,4 +1,4 @@
-//! What is observed of a sensor in one slot, and the link that it crosses.
+//! What a receiver observes of a sensor in one slot, and the link between them.
 
 use crate::bits::BitString;
 use crate::error::Error;
@@ -8,7 +8,7 @@ use fewbits_numerics::stored;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// What arrives at the receiver in one slot from one sensor that was asked.
+/// What a receiver observes, in one slot, of one sensor that was asked to report.
 ///
 /// With `s(m)` the probability that the sensor is silent, and a [`Link`] of loss `l` and erasure `e`:
 ///
@@ -26,8 +26,8 @@ pub enum Observation<R> {
     Received(R),
     /// Nothing arrived: the sensor was silent, or its report was lost without a trace. The [`Link`] says how likely each is.
     Nothing,
-    /// A report is known to have been sent and was not understood (a gap in sequence numbers, a failed checksum). It says that the
-    /// sensor spoke: `p(spoke | m)`, which is 1 only for sensors that always speak.
+    /// A report was sent but not understood (a gap in sequence numbers, a failed checksum). The receiver learns only that the sensor
+    /// was not silent: `p(spoke | m)`, which is 1 for sensors that always report.
     Lost,
 }
 
@@ -40,7 +40,7 @@ impl<R> Observation<R> {
         }
     }
 
-    /// The same observation of a translated report.
+    /// The same observation, with `f` applied to the report.
     pub fn map<T>(self, f: impl FnOnce(R) -> T) -> Observation<T> {
         match self {
             Self::Received(report) => Observation::Received(f(report)),
@@ -51,13 +51,13 @@ impl<R> Observation<R> {
 }
 
 impl<R> From<Option<R>> for Observation<R> {
-    /// What a perfect link delivers: silence is observed as [`Observation::Nothing`].
+    /// The observation over a perfect link: silence becomes [`Observation::Nothing`].
     fn from(report: Option<R>) -> Self {
         report.map_or(Self::Nothing, Self::Received)
     }
 }
 
-/// What a receiver knows of the channel: the only place where these numbers live.
+/// The receiver's model of the channel: the probabilities of loss, erasure and bit errors.
 ///
 /// A report that was sent vanishes without a trace with probability `loss`, is known to be lost with probability `erasure`, and
 /// arrives otherwise. Each bit of a report that arrives is inverted with probability `crossover`, independently (a binary symmetric
@@ -94,8 +94,8 @@ impl Link {
 
     /// A link that loses a report without a trace with probability `loss` and inverts a bit with probability `crossover`.
     ///
-    /// With `loss` 1 nothing ever arrives: to its receiver a dead sensor is such a link. A report that arrives all the same is
-    /// impossible.
+    /// With `loss` 1 nothing ever arrives; a receiver can describe a dead sensor by such a link. A report that arrives all the same is
+    /// [`Error::Impossible`].
     ///
     /// # Errors
     /// If `loss` is outside `[0, 1]` or `crossover` outside `[0, 1/2]` (beyond one half, the receiver inverts all bits).
@@ -113,10 +113,10 @@ impl Link {
         })
     }
 
-    /// The same link, where a report is also known to be lost with probability `erasure`.
+    /// The same link, on which the receiver also notices the loss of a report with probability `erasure`.
     ///
     /// # Errors
-    /// If `erasure` is negative, or above one together with the loss.
+    /// If `erasure` is negative, or if `loss + erasure` exceeds one.
     pub fn with_erasure(self, erasure: f64) -> Result<Self, ArgumentError> {
         if erasure >= 0.0 && self.loss + erasure <= 1.0 {
             return Ok(Self { erasure, ..self });
@@ -161,7 +161,7 @@ impl Link {
         (1.0 - (self.loss + self.erasure)).max(0.0)
     }
 
-    /// [`Link::arrival`] as part of the factor of a report that did arrive.
+    /// [`Link::arrival`], as a factor of the likelihood of a report that did arrive.
     ///
     /// # Errors
     /// [`Error::Impossible`] if nothing arrives over this link.
@@ -172,10 +172,10 @@ impl Link {
         }
     }
 
-    /// What multiplies `p(spoke | m)` in the factor of [`Observation::Lost`]: the erasure, or 1 where that is 0.
+    /// Factor of `p(spoke | m)` in the likelihood of [`Observation::Lost`]: the erasure, or 1 if the erasure is 0.
     ///
-    /// A loss that is known over a link without known losses contradicts the link, not the sensor. It is therefore conditioned on:
-    /// its factor is `p(spoke | m)` alone. The posterior does not depend on this choice, since a positive erasure cancels from it.
+    /// `Lost` observed over a link with erasure 0 contradicts the link model, not the sensor. The factor is then conditioned on the loss
+    /// and is `p(spoke | m)` alone. This choice does not change the posterior, since a positive erasure cancels from it.
     pub fn lost_given_sent(&self) -> f64 {
         if self.erasure > 0.0 { self.erasure } else { 1.0 }
     }
@@ -190,15 +190,15 @@ impl Link {
         }
     }
 
-    /// `p(word received | word sent, a word arrived)` for words of `bits` bits: `e^d (1 - e)^(bits - d)` with `d` bits
-    /// different.
+    /// `p(word received | word sent, a word arrived)` for words of `bits` bits: `c^d (1 - c)^(bits - d)` with crossover `c` and `d`
+    /// different bits.
     pub fn word_probability(&self, sent: u64, received: u64, bits: u32) -> f64 {
         let different = (sent ^ received).count_ones().min(bits);
         self.crossover.powi(different as i32) * (1.0 - self.crossover).powi((bits - different) as i32)
     }
 
-    /// Sends a report through the link: its bits, lost or inverted as the link's law says. Bits that no longer are a report
-    /// arrive as [`Observation::Lost`] (see law 3 of [`Scheme`](crate::Scheme)); silence arrives as [`Observation::Nothing`].
+    /// Sends a report through the link at random: it is lost, or each of its bits may be inverted. Bits that do not decode to a report
+    /// arrive as [`Observation::Lost`] (law 3 of [`Scheme`](crate::Scheme)); silence arrives as [`Observation::Nothing`].
     ///
     /// # Errors
     /// If the report does not fit its format.
@@ -212,6 +212,7 @@ impl Link {
             return Ok(Observation::Nothing);
         };
         let sent = report.to_bits(format)?;
+        // One draw decides between loss without a trace, a loss that the receiver notices, and arrival.
         let missing = self.loss + self.erasure;
         if missing > 0.0 {
             let u = rng.random::<f64>();
@@ -223,6 +224,7 @@ impl Link {
                 });
             }
         }
+        // Inverted bits that form no report of this format are noticed by the receiver.
         let received = self.flip(rng, sent);
         Ok(M::from_bits(format, &received).map_or(Observation::Lost, Observation::Received))
     }

@@ -1,4 +1,4 @@
-//! A sensing model told which coordinates of a larger state it reads.
+//! A sensing model applied to chosen coordinates of a larger state.
 
 use crate::columns::{Columns, ColumnsMut};
 use crate::sensing::Sensing;
@@ -8,8 +8,8 @@ use rand::Rng;
 
 /// Sensing of `K` coordinates as sensing of a state of `D`: the model's coordinate `k` is coordinate `axes[k]` of the state.
 ///
-/// Models keep their coordinates in different orders: `[x, vx, y, vy]` or `[x, y, vx, vy]`. A model of sensing that reads a position
-/// does not know where the state has it, so it is said here, once, and checked.
+/// Models order their coordinates differently: `[x, vx, y, vy]` or `[x, y, vx, vy]`. A sensing model that reads a position does not
+/// know where it is in the state. This type states it once and checks it.
 ///
 /// Law: `mean`, `jacobian` and noise are those of the model at `[state[axes[0]], .., state[axes[K-1]]]`; the Jacobian is zero elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +32,7 @@ impl<S, const D: usize, const K: usize> OnAxes<S, D, K> {
         Ok(Self { sensing, axes })
     }
 
-    /// The model of the `K` coordinates.
+    /// The sensing model of the `K` coordinates.
     pub fn sensing(&self) -> &S {
         &self.sensing
     }

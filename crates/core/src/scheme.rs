@@ -1,4 +1,4 @@
-//! A way of reporting little: the sensor's half and what its reports mean, in one place.
+//! Rules by which sensors report a few bits, together with the likelihoods of the reports.
 
 use crate::error::Error;
 use crate::factor::Factor;
@@ -7,46 +7,46 @@ use crate::observation::{Link, Observation};
 use nalgebra::SVector;
 use rand::Rng;
 
-/// A scheme by which sensors with `M`-dimensional measurements report, and what their reports mean.
+/// A rule by which sensors with `M`-dimensional measurements report, and the likelihood of what is then observed.
 ///
-/// Whatever both ends know is the scheme itself or its `Feedback`: the feedback is broadcast and costs its bits; what both
-/// compute without data (a schedule of thresholds, an innovation covariance) goes into the scheme, one value a slot. What
-/// only the sensor knows is its `State`.
+/// What both ends know is part of the scheme or of its `Feedback`. The feedback is broadcast to the sensor and costs its bits. What both
+/// ends compute without data (a schedule of thresholds, an innovation covariance) is part of the scheme, one value per slot. What only the
+/// sensor knows is its `State`.
 ///
-/// The noise of the measurement belongs to the scheme, since what a report says about the noise-free measurement depends on
-/// it; a scheme whose noise depends on the measurement knows how.
+/// The scheme contains the measurement noise, since the likelihood of a report depends on it.
 ///
 /// Laws ([`crate::laws::scheme`]):
 /// 1. total probability: for every noise-free measurement, feedback and link, the probabilities of all observations sum
 ///    (integrate) to one, [`Observation::Lost`] included. Where `Lost` cannot occur (no known losses, all words decode), its factor
 ///    is `p(the sensor spoke | m)`, see [`Link::lost_given_sent`];
-/// 2. honesty: what `encode` reports of `m + noise`, sent through [`Link::transmit`], has the frequencies that `factor` says;
+/// 2. honesty: the reports of `encode` at measurements `m + noise`, sent through [`Link::transmit`], have the frequencies that `factor`
+///    states;
 /// 3. words that are no report: over a link that inverts bits, either all words of the report's format decode, or `factor` adds the
 ///    probability of those that do not, computed from the code book, to that of `Lost`, or it refuses such a link. Laws 1 and 2
 ///    together check it: `transmit` delivers such words as `Lost`.
 pub trait Scheme<const M: usize> {
-    /// What the sensor remembers from slot to slot; `()` for most.
+    /// What the sensor remembers from slot to slot; `()` if it needs no memory.
     type State;
-    /// What the sensor is told before it measures; `()` without feedback.
+    /// What the sensor is told before it measures; `()` if it is told nothing.
     type Feedback: Message;
-    /// What the sensor may report.
+    /// What the sensor sends.
     type Report: Message;
-    /// What an observation says about the noise-free measurement.
+    /// The likelihood of an observation as a function of the noise-free measurement.
     type Factor: Factor<M>;
 
     /// The sensor's memory before its first measurement.
     fn start(&self) -> Self::State;
 
-    /// How a feedback travels.
+    /// The format of the feedback's encoding.
     fn feedback_format(&self) -> <Self::Feedback as Message>::Format;
 
-    /// How a report travels.
+    /// The format of the report's encoding.
     fn report_format(&self) -> <Self::Report as Message>::Format;
 
-    /// The sensor's half. `None` is silence: zero bits on air.
+    /// The report of the sensor for a measurement. `None` is silence, which sends zero bits.
     ///
     /// # Errors
-    /// If the measurement or the feedback is not finite; the state is then as it was.
+    /// If the measurement or the feedback is not finite; the state is then unchanged.
     fn encode<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -55,10 +55,10 @@ pub trait Scheme<const M: usize> {
         feedback: &Self::Feedback,
     ) -> Result<Option<Self::Report>, Error>;
 
-    /// The receiver's half: `p(observation | h(x) = m)`, by the table of [`Observation`].
+    /// The likelihood at the receiver: `p(observation | h(x) = m)`, by the table of [`Observation`].
     ///
     /// # Errors
-    /// If the feedback is not finite, or the report is none that the scheme can send.
+    /// If the feedback is not finite, or if the scheme cannot send such a report.
     fn factor(
         &self,
         feedback: &Self::Feedback,
@@ -70,12 +70,12 @@ pub trait Scheme<const M: usize> {
 /// A scheme whose sensor draws no random numbers, so that it reports without a random source
 /// ([`SchemeNode::answer`](crate::SchemeNode::answer)).
 ///
-/// Law ([`crate::laws::scheme::deterministic`]): `encode` draws nothing, and says the same again.
+/// Law ([`crate::laws::scheme::deterministic`]): `encode` draws nothing, and the same input gives the same report.
 pub trait Deterministic<const M: usize>: Scheme<M> {}
 
 /// A [`Scheme`] whose sensor remembers nothing and draws no random numbers.
 ///
-/// Such a scheme says how a sample becomes a report, or silence, and what an observation means; it is then a [`Scheme`] and
+/// It defines only the report of a sample (or silence) and the likelihood of an observation. Every such type is also a [`Scheme`] and
 /// [`Deterministic`].
 pub trait Memoryless<const M: usize> {
     /// [`Scheme::Feedback`].

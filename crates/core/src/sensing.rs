@@ -1,4 +1,4 @@
-//! How the world is sensed.
+//! How the state is measured.
 
 use crate::columns::{Columns, ColumnsMut, count, measurements_agree, set_state, state_at};
 use nalgebra::{SMatrix, SVector};
@@ -21,8 +21,8 @@ pub trait Sensing<const D: usize, const M: usize> {
     /// Draws a measurement of `state`.
     fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M>;
 
-    /// Writes the noise-free measurement of every state to `means`; NaN where lengths differ
-    /// ([`crate::columns::measurements_agree`]). Override where a loop over columns is faster.
+    /// Writes the noise-free measurement of every state to `means`. Writes NaN everywhere if lengths differ
+    /// ([`crate::columns::measurements_agree`]). Override it if a loop over columns is faster than single calls.
     fn mean_columns(&self, states: &Columns<'_, D>, mut means: ColumnsMut<'_, M>) {
         if measurements_agree(states, &mut means) {
             for i in 0..count(&means) {

@@ -1,4 +1,4 @@
-//! The sensor's half of a scheme over bits: what runs on the sensor.
+//! The part of a scheme that runs on the sensor, with feedback and reports as bits.
 
 use crate::bits::BitString;
 use crate::error::Error;
@@ -9,15 +9,15 @@ use nalgebra::SVector;
 use rand::{Rng, TryRng};
 use std::convert::Infallible;
 
-/// A sensor as it sees itself: a measurement and the feedback's bits in, a report's bits or silence out. It needs no belief and no
-/// model of the world. Object-safe, so that sensors of any kind stand in one list.
+/// A sensor: takes a measurement and the bits of the feedback, and returns the bits of a report, or silence. It needs no belief and no
+/// model of the state. The trait is object-safe, so that sensors of different kinds can be in one list.
 ///
-/// Any [`Scheme`] has one: [`SchemeNode`].
+/// [`SchemeNode`] implements it for any [`Scheme`].
 pub trait SensorNode<const M: usize> {
-    /// What the sensor sends in this slot. `None` is silence: zero bits on air. `rng` is drawn from by randomised schemes only.
+    /// What the sensor sends in this slot. `None` is silence, which sends zero bits. Only randomised schemes draw from `rng`.
     ///
     /// # Errors
-    /// If the measurement is not finite or the bits are no feedback of the scheme; the sensor's memory is then as it was.
+    /// If the measurement is not finite or the bits do not encode feedback of the scheme; the sensor's memory is then unchanged.
     fn report(
         &mut self,
         rng: &mut dyn Rng,
@@ -25,25 +25,25 @@ pub trait SensorNode<const M: usize> {
         feedback: &BitString,
     ) -> Result<Option<BitString>, Error>;
 
-    /// Slots have passed in which the sensor was not asked. A sensor whose rule depends on the slot counts them; others do nothing.
+    /// Tells the sensor that `slots` slots passed in which it was not asked. Only sensors whose rule depends on the slot number use it.
     fn skip(&mut self, _slots: u64) {}
 
-    /// What the sensor remembers, for a driver that stores it. `None` if this kind of sensor cannot be stored.
+    /// The sensor's memory, so that it can be stored. `None` if this kind of sensor cannot be stored.
     fn stored(&self) -> Option<BitString> {
         None
     }
 
-    /// Goes on from what [`stored`](Self::stored) returned.
+    /// Restores the memory that [`stored`](Self::stored) returned.
     ///
     /// # Errors
-    /// If this kind of sensor cannot be stored, or the bits are no memory of it.
+    /// If this kind of sensor cannot be stored, or the bits do not encode its memory.
     fn restore(&mut self, memory: &BitString) -> Result<(), Error> {
         let expected = "a kind of sensor that can be stored";
         Err(ArgumentError::new("memory", format!("{} bits", memory.bits()), expected).into())
     }
 }
 
-/// The sensor's half of a scheme, with its memory.
+/// A sensor that reports by a scheme, with its memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SchemeNode<C: Scheme<M>, const M: usize> {
     scheme: C,
@@ -62,7 +62,7 @@ impl<C: Scheme<M>, const M: usize> SchemeNode<C, M> {
         &self.memory
     }
 
-    /// The same sensor with a memory that was stored.
+    /// The same sensor with a memory that was stored earlier.
     #[must_use]
     pub fn with_memory(self, memory: C::State) -> Self {
         Self { memory, ..self }
@@ -73,13 +73,13 @@ impl<C: Deterministic<M>, const M: usize> SchemeNode<C, M> {
     /// [`SensorNode::report`] without a random source.
     ///
     /// # Errors
-    /// As there.
+    /// As [`SensorNode::report`].
     pub fn answer(&mut self, measurement: &SVector<f64, M>, feedback: &BitString) -> Result<Option<BitString>, Error> {
         self.report(&mut Undrawn, measurement, feedback)
     }
 }
 
-/// The random source of those that draw nothing.
+/// A random source for schemes that draw nothing.
 struct Undrawn;
 
 impl TryRng for Undrawn {
@@ -115,7 +115,7 @@ impl<C: Scheme<M>, const M: usize> SensorNode<M> for SchemeNode<C, M> {
             .map_err(|error| ArgumentError::new("report", error, "a report that fits its format"))?)
     }
 
-    /// No bits, for a scheme without memory; `None` for others.
+    /// No bits for a scheme without memory; `None` for others.
     fn stored(&self) -> Option<BitString> {
         (size_of::<C::State>() == 0).then(BitString::default)
     }

@@ -1,4 +1,4 @@
-//! One bit.
+//! A sign bit.
 
 use crate::bits::{BitReader, BitWriter, CodecError};
 use crate::message::Message;

@@ -1,7 +1,7 @@
 //! Probability densities over a `D`-dimensional state: particles, Gaussian mixtures, kernel estimates and grids.
 //!
-//! Every density here is a plain value. It can be stored, compared and restored. The filters of `fewbits-filters` are functions from one
-//! density to the next.
+//! Every density here is a plain value that can be stored, compared and restored. The filters of `fewbits-filters` compute one density from
+//! the previous one.
 //!
 //! | density | use it when | value `p(x)` |
 //! |---|---|---|
@@ -22,14 +22,14 @@
 //! # Ok::<(), fewbits_densities::Error>(())
 //! ```
 //!
-//! Coordinates of particles are columns and weights are logarithms. Filters sweep over all particles, so each sweep runs in vector
-//! registers. The price is that one particle is spread over `D + 1` slices: a program that moves single particles pays for it.
+//! The coordinates of particles are stored in columns and the weights as logarithms. Filters loop over all particles, and such loops run in
+//! vector registers. In exchange, one particle is spread over `D + 1` slices, so moving single particles is slow.
 //!
 //! Not here: dynamics, measurements and resampling (`fewbits-filters`); the reduction of a density to a few Gaussians, divergences
 //! and the code of a mixture in a few bytes (`fewbits-mixture-codec`); products of mixtures (`fewbits-pf-mpa`); adaptive cells and
 //! Hermite series (`fewbits-diffusive`).
 
-/// [`Belief::mean`](fewbits_core::Belief::mean) and `covariance` by the type's own functions of these names.
+/// Implements [`Belief::mean`](fewbits_core::Belief::mean) and `covariance` by the type's own functions of these names.
 macro_rules! own_moments {
     () => {
         fn mean(&self) -> SVector<f64, D> {
@@ -42,7 +42,7 @@ macro_rules! own_moments {
     };
 }
 
-/// [`Density`](fewbits_core::Density) by the type's own `log_pdf` and `log_pdf_columns`.
+/// Implements [`Density`](fewbits_core::Density) by the type's own `log_pdf` and `log_pdf_columns`.
 macro_rules! own_log_pdf {
     () => {
         fn log_density(&self, state: &SVector<f64, D>) -> f64 {

@@ -1,73 +1,73 @@
-//! Which cells are free, and what bounds them.
+//! The domain: which cells of a grid are free, and the boundary conditions at their faces.
 
 use crate::grid::LARGEST;
 use crate::{Error, Grid};
 use fewbits_numerics::error::{refuse, within};
 
-/// What happens to the substance at a face between a free cell and what is not free.
+/// Boundary condition at a face between a free cell and a wall or the outside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Boundary {
-    /// Nothing passes.
+    /// Nothing passes: zero flux.
     Closed,
-    /// Everything that arrives is taken away: `c = 0` on the face.
+    /// The substance is absorbed: `c = 0` on the face.
     Absorbing,
     /// `-D dc/dn = leak c`, with the leak velocity in m/s.
     Leaking(f64),
-    /// Open to clean air, from which wind enters: `c = 0` on the face.
+    /// An opening to clean air through which wind enters: `c = 0` on the face.
     Inflow,
-    /// Open, and wind leaves: `dc/dn = 0` on the face. Without any wind in the domain `c = 0`.
+    /// An opening through which wind leaves: `dc/dn = 0` on the face. Without any wind in the domain `c = 0`.
     Outflow,
 }
 
-/// What a cell of the grid is.
+/// Kind of a cell of the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cell {
-    /// Air. Its faces on the edge of the grid have the boundary of that side.
+    /// Air. Faces on the edge of the grid have the boundary condition of that side.
     Free,
-    /// Air. Its faces on the edge of the grid have this boundary.
+    /// Air. Faces on the edge of the grid have this boundary condition.
     Open(Boundary),
-    /// Something solid. All its faces to air have this boundary.
+    /// Solid. All its faces to air have this boundary condition.
     Blocked(Boundary),
 }
 
 /// A face of a free cell that is not closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Face {
-    /// Numbers of the free cells below and above. What is outside counts as two more cells: the last behind inflows, the other elsewhere.
+    /// Numbers of the cells below and above. The outside counts as two further cells: the last for inflows, the other for all else.
     pub(crate) cells: [usize; 2],
     pub(crate) axis: usize,
     pub(crate) area: f64,
     /// Distances of both centres from the face, m; 0 outside.
     pub(crate) halves: [f64; 2],
-    /// `None` between two free cells.
+    /// Boundary condition; `None` between two free cells.
     pub(crate) boundary: Option<Boundary>,
 }
 
-/// Number of cells that what is outside counts as.
+/// Number of further cells that represent the outside.
 pub(crate) const OUTSIDE: usize = 2;
 
 impl Face {
-    /// The side of a free cell: 0 below, 1 above. 0 between two free cells.
+    /// On which side of the face its free cell is: 0 below, 1 above. 0 if both cells are free.
     #[inline]
     pub(crate) fn side(&self) -> usize {
         usize::from(self.cells[1] < self.cells[0])
     }
 
-    /// Number of the free cell on that side.
+    /// Number of the free cell on [`side`](Self::side).
     #[inline]
     pub(crate) fn cell(&self) -> usize {
         self.cells[self.side()]
     }
 
-    /// Whether wind passes.
+    /// Whether wind can pass the face.
     pub(crate) fn is_open(&self) -> bool {
         matches!(self.boundary, None | Some(Boundary::Inflow | Boundary::Outflow))
     }
 }
 
-/// The free cells of a grid, their faces, and the boundary at each face that leads out.
+/// The free cells of a grid, their faces, and the boundary condition at each face to a wall or the outside.
 ///
-/// Two free cells that touch at an edge or a corner only do not exchange anything.
+/// Two free cells that touch only at an edge or a corner exchange nothing.
 ///
 /// ```
 /// use fewbits_diffusion::{Boundary, Cell, Domain, Grid};
@@ -81,11 +81,11 @@ impl Face {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Domain {
     grid: Grid,
-    /// Free cells, increasing.
+    /// Grid numbers of the free cells, increasing.
     free: Vec<usize>,
-    /// Number among the free cells, or `BLOCKED`, for each cell of the grid.
+    /// For each cell of the grid its number among the free cells, or `BLOCKED`.
     numbers: Vec<usize>,
-    /// Faces between free cells, then those that lead out.
+    /// Faces between free cells, then faces to the outside or to walls that are not closed.
     pub(crate) faces: Vec<Face>,
     /// Number of faces between free cells.
     pub(crate) inner: usize,
@@ -93,15 +93,15 @@ pub struct Domain {
 
 const BLOCKED: usize = usize::MAX;
 
-/// Cells with their shares, which sum to one: a source that releases uniformly in them, or a sensor that measures the mean over them.
+/// Free cells with shares that sum to one: a source that releases uniformly in them, or a sensor that measures the mean over them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Patch {
-    /// Numbers of free cells, and shares.
+    /// Number of each free cell, and its share.
     pub(crate) shares: Vec<(usize, f64)>,
 }
 
 impl Domain {
-    /// The domain of a grid whose cells are given in the grid's order; `sides[axis]` are the boundaries of its lower and upper end.
+    /// The domain of a grid. `cells` are in the grid's order; `sides[axis]` are the boundary conditions at its lower and upper end.
     ///
     /// # Errors
     /// If the number of cells is not that of the grid, a leak is negative or above 1e30 m/s, or [`Error::NoFreeCell`].
@@ -123,6 +123,7 @@ impl Domain {
         if free.is_empty() {
             return Err(Error::NoFreeCell);
         }
+        // Only free cells are unknowns. Each has a number, and each pair of neighbours a face.
         let mut numbers = vec![BLOCKED; cells.len()];
         for (number, cell) in free.iter().enumerate() {
             numbers[*cell] = number;
@@ -138,6 +139,7 @@ impl Domain {
                     (Some(_), _) => None,
                     (None, _) => Some(sides[axis][usize::from(upper)]),
                 };
+                // Two further numbers represent the outside: one for outflow and walls, one for inflow.
                 let (other, other_half) = match (boundary, next) {
                     (None, Some(next)) => (numbers[grid.index(next)], 0.5 * grid.width(axis, next[axis])),
                     _ => (free.len() + usize::from(boundary == Some(Boundary::Inflow)), 0.0),
@@ -157,6 +159,7 @@ impl Domain {
                     boundary,
                 };
                 match boundary {
+                    // An inner face is visited from both cells and stored once.
                     None if upper => faces.push(face),
                     None | Some(Boundary::Closed) => {}
                     Some(_) => edge.push(face),
@@ -176,11 +179,11 @@ impl Domain {
 
     /// Multiplies the leak of each face by `|normal . face|`, with the unit normal of the true wall at the centre of the face.
     ///
-    /// A curved or slanting wall is a staircase on the grid, whose area is too large (by 4/pi for a disc, 3/2 for a ball). Without this
-    /// correction a leaking one does not converge to the truth; absorbing and closed walls do.
+    /// On the grid a curved or slanting wall is a staircase, whose area is too large (by 4/pi for a disc, 3/2 for a ball). Without this
+    /// correction the solution with a leaking wall does not converge to the exact one. Absorbing and closed walls need no correction.
     ///
     /// # Errors
-    /// If a normal is not of length one.
+    /// If a normal does not have length one.
     pub fn with_wall_normals(mut self, normal: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, Error> {
         for k in self.inner..self.faces.len() {
             let face = self.faces[k];
@@ -203,37 +206,37 @@ impl Domain {
         &self.grid
     }
 
-    /// Free cells, as numbers of the grid, increasing. Fields are given in this order where they are "per free cell".
+    /// Grid numbers of the free cells, increasing. Fields "per free cell" are in this order.
     pub fn free(&self) -> &[usize] {
         &self.free
     }
 
-    /// Number of a cell of the grid among the free cells; `None` if it is blocked.
+    /// Number among the free cells of a cell of the grid; `None` if it is blocked.
     #[inline]
     pub fn number(&self, cell: usize) -> Option<usize> {
         self.numbers.get(cell).copied().filter(|number| *number != BLOCKED)
     }
 
-    /// Volume of each free cell.
+    /// Volume of each free cell, m^3.
     pub fn volumes(&self) -> Vec<f64> {
         self.free.iter().map(|cell| self.grid.volume(*cell)).collect()
     }
 
-    /// A function's values at the centres of the free cells.
+    /// The values of a function of the point (m) at the centres of the free cells.
     pub fn sample(&self, f: impl Fn([f64; 3]) -> f64) -> Vec<f64> {
         self.free.iter().map(|cell| f(self.grid.centre(*cell))).collect()
     }
 
-    /// A field per free cell as one over the whole grid, with `elsewhere` in blocked cells.
+    /// Converts a field per free cell to one over the whole grid, with `elsewhere` in blocked cells.
     pub fn spread(&self, field: &[f64], elsewhere: f64) -> Vec<f64> {
         let value = |number: &usize| field.get(*number).copied().unwrap_or(elsewhere);
         self.numbers.iter().map(value).collect()
     }
 
-    /// The free cell that holds a point, by its number among the free cells.
+    /// Number among the free cells of the cell that contains a point, m.
     ///
     /// # Errors
-    /// [`Error::Outside`] the grid; [`Error::Blocked`] in a blocked cell, with the nearest free one.
+    /// [`Error::Outside`] if the point is outside the grid; [`Error::Blocked`], with the nearest free cell, if it is in a blocked cell.
     pub fn locate(&self, point: [f64; 3]) -> Result<usize, Error> {
         let cell = self.grid.cell_at(point).ok_or(Error::Outside { point })?;
         self.number(cell).ok_or_else(|| {
@@ -247,7 +250,7 @@ impl Domain {
         })
     }
 
-    /// The cell that holds a point.
+    /// The cell that contains a point, m, as a patch.
     ///
     /// # Errors
     /// As [`Domain::locate`].
@@ -276,7 +279,7 @@ impl Domain {
         Ok(Patch { shares })
     }
 
-    /// The number of the connected part that each free cell belongs to, and how many parts there are.
+    /// Number of the connected part of each free cell, and the number of parts.
     pub fn parts(&self) -> (Vec<usize>, usize) {
         let (mut number, parts) = (vec![0; self.free.len()], self.walk());
         for (k, part) in parts.iter().enumerate() {
@@ -285,7 +288,7 @@ impl Domain {
         (number, parts.len())
     }
 
-    /// For each connected part its cells, each with the face that leads to it from a cell before it; none leads to the first.
+    /// The cells of each connected part in the order of a search. Each has the face from which it was reached; the first has none.
     pub(crate) fn walk(&self) -> Vec<Vec<(usize, Option<usize>)>> {
         let mut above = vec![[0; 3]; self.free.len()];
         for (k, face) in self.faces[..self.inner].iter().enumerate() {
@@ -299,6 +302,7 @@ impl Domain {
             }
             reached[seed] = true;
             let (mut part, mut next) = (vec![(seed, None)], 0);
+            // Breadth first over the connected part of the seed.
             while let Some((cell, _)) = part.get(next).copied() {
                 next += 1;
                 let at = self.grid.place(self.free[cell]);
@@ -323,12 +327,12 @@ impl Domain {
         centre
     }
 
-    /// Column, line and layer of a free cell, as errors name it.
+    /// Column, line and layer of a free cell, for error messages.
     pub(crate) fn place(&self, number: usize) -> [usize; 3] {
         self.grid.place(self.free[number])
     }
 
-    /// Refuses a list that has not one entry for each free cell.
+    /// Checks that a list has one entry per free cell.
     pub(crate) fn check_count(&self, name: &'static str, found: usize) -> Result<(), Error> {
         if found != self.free.len() {
             return refuse(name, format!("{found} entries"), format!("{}, one for each free cell", self.free.len()));

@@ -1,13 +1,13 @@
-//! What this crate refuses.
+//! Errors of the diffusion solver.
 
 use fewbits_numerics::ArgumentError;
 use thiserror::Error as ThisError;
 
-/// Errors of this crate. Cells are named by column, line and layer; points by their coordinates in metres.
+/// Errors of this crate. Cells are given by column, line and layer, points by their coordinates in metres.
 #[derive(Debug, Clone, PartialEq, ThisError)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// If an argument is out of range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     /// A source or a sensor is outside the grid.
@@ -40,7 +40,7 @@ pub enum Error {
         /// Largest flow through a face, m^3/s.
         largest: f64,
     },
-    /// A connected part has neither an exit nor decay, so that it has no steady state.
+    /// A connected part has neither an exit nor decay, so it has no steady state.
     #[error("nothing can leave the part of cell {cell:?} and nothing decays there: it has no steady state")]
     NoSink {
         /// A cell of the part.
@@ -49,7 +49,7 @@ pub enum Error {
     /// No connected part touches an inflow and an outflow.
     #[error("no connected part touches both an inflow and an outflow: no potential flow passes")]
     NoPassage,
-    /// Wind enters through an outflow, whose law (no diffusive flux) does not say what it carries.
+    /// Wind enters through an outflow. Its boundary condition (no diffusive flux) does not define the incoming concentration.
     #[error("wind enters through the outflow at cell {cell:?} ({flow} m^3/s outwards): declare an inflow there")]
     Backflow {
         /// The cell inside the face.
@@ -65,7 +65,7 @@ pub enum Error {
         /// Whether the matrix is singular; otherwise memory ran out.
         singular: bool,
     },
-    /// The time step that the tolerance asks for is below the resolution of time.
+    /// The tolerance requires a time step below the resolution of time.
     #[error("a time step of {step} s does not reach the tolerance")]
     StepTooSmall {
         /// The smallest step tried, s.

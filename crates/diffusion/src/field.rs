@@ -1,4 +1,4 @@
-//! What sensors measure of a source anywhere in the domain: the form that estimators take.
+//! Responses of sensors to a source anywhere in the domain, in the form that estimators use.
 
 use crate::{Domain, Error, Patch, Steady, StepControl, Transient, Transport};
 use fewbits_models::nalgebra::Vector3;
@@ -6,12 +6,12 @@ use fewbits_models::{Receptor, SourceGradient, SourceModel};
 use fewbits_numerics::error::{refuse, within};
 use std::sync::Arc;
 
-/// Adjoint solutions of several sensors: the concentration that each measures, per unit rate, of a source at any place and of several
-/// ages.
+/// Adjoint solutions of several sensors: the concentration that each measures, per unit rate, as a function of the place of the source and
+/// of its age (the time since it began to release).
 ///
 /// A sensor measures the mean over its cell. Between the centres of cells values are interpolated linearly along each axis. A blocked
-/// corner takes the value of the corners on the near side, so that nothing is interpolated across a wall. Between two ages, and
-/// between age 0 and the first, values are interpolated linearly; beyond the last age its values stand. A steady field has one value for
+/// corner takes the value of a corner on the near side, so that nothing is interpolated across a wall. Between two ages, and
+/// between age 0 and the first, values are interpolated linearly. Beyond the last age they are constant. A steady field has one value for
 /// all ages above 0.
 ///
 /// ```
@@ -30,18 +30,18 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorField {
     domain: Arc<Domain>,
-    /// Free cell of each sensor.
+    /// Number of the free cell of each sensor.
     sensors: Vec<usize>,
-    /// Increasing; one infinite age if the field is steady.
+    /// Ages in increasing order, s; one infinite age if the field is steady.
     ages: Vec<f64>,
-    /// For each age, for each sensor, the response per free cell.
+    /// Per age and sensor the response for each free cell.
     responses: Vec<Vec<Vec<f64>>>,
 }
 
-/// A free cell, and the weights of its mean in a value and in a gradient.
+/// A free cell, its weight in a value, and its weights in a gradient.
 type Corner = (usize, f64, Vector3<f64>);
 
-/// Responses above this, kg/m^3 per kg/s, have no gradient in the range of numbers.
+/// Largest response, kg/m^3 per kg/s: the gradient of a larger one could overflow.
 const LARGEST_RESPONSE: f64 = 1e240;
 
 impl SensorField {
@@ -99,12 +99,13 @@ impl SensorField {
         &self.domain
     }
 
-    /// Response of a sensor, by its place in the list, at the `age`-th age, per free cell, kg/m^3 per kg/s. `None` if there is none.
+    /// Response of the sensor of this index at the age of this index, per free cell, kg/m^3 per kg/s. `None` if there is no such sensor or
+    /// age.
     pub fn response(&self, sensor: usize, age: usize) -> Option<&[f64]> {
         Some(self.responses.get(age)?.get(sensor)?)
     }
 
-    /// The places of the two ages about an age, with their weights; nothing before age 0.
+    /// Indices of the two ages around an age, with their weights; weight zero before age 0.
     fn about(&self, age: f64) -> [(usize, f64); 2] {
         let next = self.ages.partition_point(|known| *known < age);
         let before = next.saturating_sub(1);
@@ -120,8 +121,8 @@ impl SensorField {
         }
     }
 
-    /// Free cells whose means stand for the corners of the box of cell centres about a point, with their weights in the value and in the
-    /// gradient. `None` if the point is not in a free cell.
+    /// Free cells and weights of the interpolation at a point. The corners of the interpolation box are cell centres; a free cell may
+    /// represent a blocked corner. `None` if the point is not in a free cell.
     fn stencil(&self, point: &[f64; 3]) -> Option<([Corner; 8], usize)> {
         let (grid, axes) = (self.domain.grid(), self.domain.grid().dimension());
         let own = grid.cell_at(*point)?;
@@ -136,12 +137,13 @@ impl SensorField {
                 position[axis] = (point[axis] - centre[axis]).abs() / widths[axis];
             }
         }
-        // A corner counts if it is free and joined to the own cell through free corners; otherwise another corner stands for it.
+        // A corner is used if it is free and connected to the point's own cell through free corners. Otherwise another corner represents
+        // it.
         let mut joined = [true, false, false, false, false, false, false, false];
         for corner in 0..1_usize << axes {
             let beyond = |axis: usize| corner >> axis & 1 == 1;
             let moved = || (0..axes).filter(|axis| beyond(*axis));
-            // Prefer a corner with a value of its own: along a wall the field is that of the near side.
+            // Prefer a corner with its own value: along a wall the field is then that of the near side.
             let near = moved()
                 .map(|axis| corner ^ (1 << axis))
                 .rfind(|without| joined[*without]);
@@ -178,7 +180,7 @@ impl SensorField {
         let mut before = ([(0, 0.0); 2], nothing);
         for (k, age) in ages.iter().enumerate() {
             let about = self.about(*age);
-            // Otherwise the field stands between both ages: a steady one, or after the last age.
+            // Otherwise the value of the age before applies again: the field is steady, or both ages are after the last.
             if let Some((corners, count)) = stencil.as_ref().filter(|_| about != before.0) {
                 let mut result = nothing;
                 for (known, share) in about.into_iter().filter(|pair| pair.1 > 0.0) {
@@ -188,14 +190,14 @@ impl SensorField {
                         result.gradient += share * field[*cell] * slopes;
                     }
                 }
-                // Steps in time may leave an error below zero.
+                // Time steps may leave small negative values: set them to zero.
                 before = (about, if result.value < 0.0 { nothing } else { result });
             }
             f(k, before.1);
         }
     }
 
-    /// First and last place along each axis of the cells that the horizontal square of a half width about a source meets, with `margin`
+    /// First and last index along each axis of the cells that a horizontal square about a source touches, with `margin`
     /// more on each side. `None` if the square is outside the grid.
     fn square(&self, source: &Vector3<f64>, half_width: f64, margin: usize) -> Option<[(usize, usize); 3]> {
         let (grid, mut places) = (self.domain.grid(), [(0, 0); 3]);
@@ -214,7 +216,7 @@ impl SensorField {
 }
 
 impl SourceModel for SensorField {
-    /// The sensor in the same cell.
+    /// The sensor whose cell contains the place.
     fn receptor(&self, place: &Vector3<f64>) -> Result<Receptor, fewbits_models::Error> {
         let cell = self.domain.locate((*place).into()).ok();
         match self.sensors.iter().position(|sensor| Some(*sensor) == cell) {
@@ -230,7 +232,7 @@ impl SourceModel for SensorField {
         self.source_gradient(receptor, source, age).value
     }
 
-    /// One stencil for all ages, one value for all of a steady field.
+    /// The interpolation weights are computed once for all ages; a steady field gives one value.
     fn concentrations(&self, receptor: &Receptor, source: &Vector3<f64>, ages: &[f64], out: &mut [f64]) {
         let count = ages.len().min(out.len());
         self.interpolate(receptor.index, source, &ages[..count], |k, found| out[k] = found.value);
@@ -245,7 +247,7 @@ impl SourceModel for SensorField {
         found
     }
 
-    /// From the range of the response over the cells of the square and one more on each side; within a cell, its share of that.
+    /// The range of the response over the cells of the square and one more on each side. Within a single cell, a share of that.
     fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
         let Some(places) = self
             .square(source, half_width, 1)
@@ -266,7 +268,7 @@ impl SourceModel for SensorField {
         (most - least).max(0.0) * if share < 1.0 { share.max(0.0) } else { 1.0 }
     }
 
-    /// True if the square holds a part of a free cell.
+    /// Whether the square touches a free cell.
     fn admits(&self, source: &Vector3<f64>, half_width: f64) -> bool {
         let places = self.square(source, half_width, 0);
         places.is_some_and(|places| {

@@ -1,28 +1,28 @@
-//! Wind as flows through the faces of a domain.
+//! Wind as volume flows through the faces of a domain.
 
 use crate::domain::{Face, OUTSIDE};
 use crate::{Domain, Error};
 use fewbits_numerics::error::refuse;
 
-/// Flow of air through each face that is not closed, m^3/s (m^2/s in a plane). Nothing flows through walls.
+/// Flow of air through each face that is not closed, m^3/s (m^2/s in a plane). The flow through walls is zero.
 ///
-/// What flows into a cell flows out of it: a uniform concentration stays uniform.
+/// Inflow and outflow of each cell are equal, so a uniform concentration stays uniform.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flow {
-    /// Upwards, through each face of the domain.
+    /// Flow from the lower to the upper cell of each face of the domain.
     pub(crate) upwards: Vec<f64>,
 }
 
-/// Net flow out of a cell that is accepted, relative to the largest flow through a face.
+/// Largest accepted net flow out of a cell, relative to the largest flow through a face.
 pub(crate) const MAX_DIVERGENCE: f64 = 1e-10;
 
 impl Flow {
-    /// No wind.
+    /// No wind: zero flow through all faces.
     pub fn still(domain: &Domain) -> Self {
         Self::through(domain, |_| 0.0)
     }
 
-    /// The flow of each face that wind can pass.
+    /// The flow `upwards(face)` of each face that wind can pass; zero for the others.
     pub(crate) fn through(domain: &Domain, upwards: impl Fn(&Face) -> f64) -> Self {
         let passing = |face: &Face| if face.is_open() { upwards(face) } else { 0.0 };
         Self {
@@ -45,7 +45,7 @@ impl Flow {
         self.upwards.iter().fold(0.0, |most, flow| flow.abs().max(most))
     }
 
-    /// Refuses a wind of another domain or with divergence.
+    /// Checks that the flow belongs to this domain and has no divergence.
     pub(crate) fn check(&self, domain: &Domain) -> Result<(), Error> {
         let (found, expected) = (self.upwards.len(), domain.faces.len());
         if found != expected {

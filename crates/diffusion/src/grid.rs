@@ -3,14 +3,14 @@
 use crate::Error;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 
-/// Largest coordinate, diffusivity, velocity and decay in SI units, and the reciprocal of the smallest width and diffusivity: what is
-/// formed of them stays far from the ends of the range of numbers.
+/// Largest coordinate, diffusivity, velocity and decay in SI units, and reciprocal of the smallest width and diffusivity. Products of such
+/// numbers do not overflow.
 pub(crate) const LARGEST: f64 = 1e30;
 
-/// Boxes of any widths side by side along one, two or three axes.
+/// A rectilinear grid: boxes of any widths along one, two or three axes.
 ///
-/// Cells are numbered with the first axis fastest. A missing axis has one cell from 0 to 1 m, so that amounts in a plane are per metre
-/// of height, and coordinates along it are ignored.
+/// Cells are numbered with the first axis fastest. A missing axis has one cell from 0 to 1 m: amounts in a plane are per metre
+/// of height, and coordinates along that axis are ignored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     edges: [Vec<f64>; 3],
@@ -18,7 +18,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A grid from the edges of its cells, m, along one to three axes: one more edge than cells, increasing.
+    /// A grid from the increasing edges of its cells, m, along one to three axes. An axis has one edge more than cells.
     ///
     /// # Errors
     /// If there are not one to three axes, an axis has fewer than two edges, an edge is beyond 1e30 m, or edges do not increase by at
@@ -39,7 +39,7 @@ impl Grid {
         })
     }
 
-    /// Equal cells of the given width, m, from the origin on: a count of cells for each of one to three axes.
+    /// A grid of equal cells of the given width, m, with one corner at the origin. `counts` has the number of cells of one to three axes.
     ///
     /// # Errors
     /// If there are not one to three counts, one is zero, or `width` is not a positive number.
@@ -101,7 +101,7 @@ impl Grid {
         self.across(self.place(cell), None)
     }
 
-    /// Product of a cell's widths along all axes but one: the area of its faces across that axis.
+    /// Product of a cell's widths along all axes except `without`: the area of its faces across that axis.
     pub(crate) fn across(&self, at: [usize; 3], without: Option<usize>) -> f64 {
         let axes = (0..3).filter(|axis| Some(*axis) != without);
         axes.map(|axis| self.width(axis, at[axis])).product()
@@ -120,7 +120,7 @@ impl Grid {
         lines.flat_map(move |[j, k]| (x.0..=x.1).map(move |i| self.index([i, j, k])))
     }
 
-    /// Place along an axis of the cells that hold a coordinate: of two cells that share it, the upper one; at the end of the grid the last.
+    /// Index along an axis of the cell that contains a coordinate. On a face it is the upper cell, at the end of the grid the last one.
     pub(crate) fn along(&self, axis: usize, coordinate: f64) -> Option<usize> {
         if axis >= self.dimension {
             return Some(0);

@@ -1,21 +1,22 @@
-//! Concentration of a substance that diffuses, drifts and decays in any geometry: rooms, walls, openings, wind.
+//! Concentration of a substance that diffuses, is carried by wind and decays, in any geometry: rooms, walls, openings.
 //!
 //! ```text
 //! dc/dt + div(v c - D grad c) + decay c = source,   div v = 0,   no wind through walls
 //! ```
 //!
-//! Finite volumes on a rectilinear [`Grid`] in one, two or three dimensions; sparse factorisations by `faer`, one thread.
+//! The method is finite volumes on a rectilinear [`Grid`] in one, two or three dimensions, with sparse factorisations by `faer` on one
+//! thread.
 //!
 //! | question | answer |
 //! |---|---|
-//! | which cells are air, what bounds them | [`Plan`] (text, PBM), [`Domain`] |
+//! | which cells are air, and the boundary conditions | [`Plan`] (text, PBM), [`Domain`] |
 //! | the wind: potential flow, a function, measured velocities | [`PotentialFlow`], [`Flow`] |
-//! | diffusivity, decay, the matrix, where the substance goes | [`Transport`], [`Budget`] |
+//! | diffusivity, decay, the matrix, and where the substance goes | [`Transport`], [`Budget`] |
 //! | the concentration that sources cause: steady, in time | [`Steady::concentration`], [`Transient::run`] |
 //! | what a sensor measures of a source **anywhere** | [`SensorField`], [`Steady::adjoint`], [`Transient::step_responses`] |
 //!
-//! The central choice is the adjoint. A search for a source asks what few sensors measure of a source in each of many cells. One
-//! solution with the transposed matrix per sensor answers that for all cells at once, with one factorisation for all sensors.
+//! **Sensor responses are adjoint solutions.** A search for a source needs the response of a few sensors to a source in each of many
+//! cells. One solution with the transposed matrix per sensor gives it for all cells at once, with one factorisation for all sensors.
 //!
 //! ```
 //! use fewbits_diffusion::{PotentialFlow, Plan, Scheme, Source, Steady, Transport};
@@ -32,12 +33,12 @@
 //! # Ok::<(), fewbits_diffusion::Error>(())
 //! ```
 //!
-//! Accuracy: the error falls with the square of the width of cells in boxes, ducts and slabs, with its power 4/3 where walls have corners
-//! (the solution is singular there), in proportion to it for [`Scheme::Upwind`], at the ends of openings within a flat wall, and for
-//! staircases. Solve on two widths and extrapolate to see which.
+//! Accuracy, with cell width `h`: in boxes, ducts and slabs the error falls as `h^2`. At corners of walls, where the solution is
+//! singular, it falls as `h^(4/3)`. With [`Scheme::Upwind`], at the ends of openings within a flat wall, and for staircases it falls as
+//! `h`. To estimate it, solve with two widths.
 //!
 //! Not here: turbulence, buoyancy, pressure; the closed forms of a half-space (`fewbits_models::diffusion`); estimation
-//! (`fewbits_diffusive`).
+//! of the source (`fewbits_diffusive`).
 
 mod domain;
 mod error;

@@ -3,7 +3,7 @@
 use crate::{Boundary, Cell, Domain, Error, Grid};
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 
-/// A floor plan: one character per square.
+/// A floor plan as text: one character per square.
 ///
 /// | character | meaning |
 /// |---|---|
@@ -14,7 +14,8 @@ use fewbits_numerics::error::{at_least_one, positive, refuse};
 /// | `I` | air whose faces on the plan's edge are an inflow |
 /// | `O` | air whose faces on the plan's edge are an outflow |
 ///
-/// Line `r` is `y` from `r h` to `(r + 1) h`, column `i` is `x` from `i h` to `(i + 1) h`. The edge of the plan is closed elsewhere.
+/// With squares of width `h`, line `r` is `y` from `r h` to `(r + 1) h` and column `i` is `x` from `i h` to `(i + 1) h`. Other parts of the
+/// plan's edge are closed.
 ///
 /// ```
 /// use fewbits_diffusion::Plan;
@@ -25,15 +26,15 @@ use fewbits_numerics::error::{at_least_one, positive, refuse};
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Plan {
-    /// Characters of the table; lines have one length.
+    /// Characters of the table. All lines have the same length.
     lines: Vec<Vec<char>>,
 }
 
 impl Plan {
-    /// Reads a plan: empty lines are skipped, and blanks that begin every line.
+    /// Reads a plan. Empty lines are skipped, and spaces with which every line begins are removed.
     ///
     /// # Errors
-    /// If a character has no meaning or lines differ in length; [`Error::NoFreeCell`] if there is no line.
+    /// If a character is not in the table or lines differ in length; [`Error::NoFreeCell`] if there is no line.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let lines = || text.lines().filter(|line| !line.trim().is_empty());
         let indents = lines().map(|line| line.len() - line.trim_start().len());
@@ -47,7 +48,7 @@ impl Plan {
     /// the picture's edge is closed there; use [`Plan::with`] for openings.
     ///
     /// # Errors
-    /// If the text is no such picture.
+    /// If the text is not such a picture.
     pub fn from_pbm(text: &str) -> Result<Self, Error> {
         let uncommented = text.lines().map(|line| line.split('#').next().unwrap_or(""));
         let mut words = uncommented.flat_map(str::split_ascii_whitespace);
@@ -68,7 +69,7 @@ impl Plan {
     /// The plan with another character in some squares, given by column and line.
     ///
     /// # Errors
-    /// If it has no meaning or a square is outside the plan.
+    /// If the character is not in the table, or a square is outside the plan.
     pub fn with(mut self, character: char, squares: impl IntoIterator<Item = [usize; 2]>) -> Result<Self, Error> {
         for [column, line] in squares {
             match self.lines.get_mut(line).and_then(|line| line.get_mut(column)) {
@@ -94,7 +95,7 @@ impl Plan {
         Ok(self)
     }
 
-    /// The plan's domain: squares of `width` metres in `split` by `split` cells each; leaking walls take `leak` m/s.
+    /// The domain of the plan. A square has `width` metres and `split` by `split` cells. `leak` is the leak velocity of leaking walls, m/s.
     ///
     /// # Errors
     /// If `width` is not positive, `split` is zero, `leak` is negative, or all squares are walls.

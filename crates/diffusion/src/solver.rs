@@ -1,7 +1,7 @@
 //! Sparse factorisations of exchange matrices.
 //!
-//! An exchange matrix is `diag(d) - rates`: what leaves a cell through a face arrives in the neighbour. It is factored by Cholesky if
-//! a diagonal scaling makes it symmetric (half the work and memory), by LU otherwise.
+//! An exchange matrix is `diag(d) - rates`: what leaves a cell through a face enters the neighbour. If a diagonal scaling makes it
+//! symmetric, it is factored by Cholesky (half the work and memory), otherwise by LU.
 
 use crate::{Domain, Error};
 use faer::linalg::solvers::{Solve, SolveCore};
@@ -23,10 +23,10 @@ enum Symbolic {
     Lu(SymbolicLu<usize>),
 }
 
-/// The structure of a matrix, ordered once for all factorisations.
+/// The sparsity structure of a matrix, ordered once for all factorisations.
 pub(crate) struct Solver {
     pattern: SymbolicSparseColMat<usize>,
-    /// From diagonal, rates upwards and rates downwards (not with Cholesky) to the pattern.
+    /// Position in the pattern of each entry: diagonal, rates upwards, and (only for LU) rates downwards.
     order: Argsort<usize>,
     symbolic: Symbolic,
 }
@@ -37,9 +37,9 @@ pub(crate) struct Factor<'a> {
     numeric: Box<dyn SolveCore<f64> + Send + Sync>,
 }
 
-/// Largest spread of the potential of a scaling: its exponentials, and their products, stay far from overflow.
+/// Largest range of the potential of a scaling: its exponentials and their products must not overflow.
 const MAX_SPREAD: f64 = 800.0;
-/// Largest amount by which the potential may fail to close around a loop. A tenth of it is the relative error of an entry.
+/// Largest sum of potential differences around a loop that counts as zero. The relative error of an entry is a tenth of it.
 const MAX_MISFIT: f64 = 1e-11;
 
 /// The potential `psi` with `rate upwards / rate downwards = exp(psi below - psi above)` at every face, if there is one: then
@@ -70,7 +70,7 @@ fn potential(domain: &Domain, rates: &[[f64; 2]]) -> Option<Vec<f64>> {
         let [low, high] = domain.faces[face].cells;
         (psi[low] - psi[high] - fall(face)).abs()
     };
-    // Not a number, if a rate is zero.
+    // The comparison is false for NaN, which a rate of zero causes.
     (0..domain.inner).all(|face| misfit(face) <= MAX_MISFIT).then_some(psi)
 }
 
@@ -84,6 +84,7 @@ impl Solver {
         if psi.is_none() {
             places.extend(cells().map(|[low, high]| Pair::new(low, high)));
         }
+        // With a potential the scaled rates are symmetric: Cholesky is possible.
         let pattern = SymbolicSparseColMat::try_new_from_indices(count, count, &places);
         let (pattern, order) = pattern.map_err(|_| failed(count, false))?;
         let symbolic = match psi {
@@ -99,7 +100,7 @@ impl Solver {
         })
     }
 
-    /// Whether Cholesky serves.
+    /// Whether the matrix is factored by Cholesky.
     pub(crate) fn is_symmetric(&self) -> bool {
         matches!(self.symbolic, Symbolic::Cholesky(..))
     }
@@ -143,7 +144,7 @@ fn failed(unknowns: usize, singular: bool) -> Error {
 impl Factor<'_> {
     /// Solves for every column in place.
     pub(crate) fn solve(&self, direction: Direction, columns: &mut Mat<f64>) {
-        // exp(h) A exp(-h) = S: the adjoint has the scaling reversed.
+        // exp(h) A exp(-h) = S: for the transposed matrix the scaling is reversed.
         let forward = direction == Direction::Forward;
         self.rescale(columns, forward);
         match direction {

@@ -5,7 +5,7 @@ use crate::{Error, Patch, Transport};
 use faer::Mat;
 use fewbits_numerics::error::all_finite;
 
-/// A source: a patch and its rate, kg/s.
+/// A source: where it releases, and at which rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
     /// Where it releases.
@@ -14,29 +14,29 @@ pub struct Source {
     pub rate: f64,
 }
 
-/// A factored transport without time.
+/// The factored matrix of a transport in steady state.
 pub struct Steady<'a> {
     transport: &'a Transport,
     factor: Factor<'a>,
 }
 
-/// Columns that are solved together: enough to use the factor well, few enough that scratch memory stays below that of the factor.
+/// Number of columns solved together: many make good use of the factor, few keep the buffers smaller than the factor.
 const COLUMNS: usize = 32;
-/// Share of the largest concentration that rounding may leave below zero.
+/// Negative concentrations up to this share of the largest one are taken as rounding errors.
 const ROUNDING: f64 = 1e-9;
 
 impl<'a> Steady<'a> {
     /// Factors the transport.
     ///
     /// # Errors
-    /// [`Error::NoSink`] if a part has no steady state; [`Error::Factorisation`] if memory runs out.
+    /// [`Error::NoSink`] if a connected part has no steady state; [`Error::Factorisation`] if memory runs out.
     pub fn new(transport: &'a Transport) -> Result<Self, Error> {
         transport.check_sinks()?;
         let factor = transport.factor(0.0, 1.0)?;
         Ok(Self { transport, factor })
     }
 
-    /// The concentration in each free cell, kg/m^3, with all sources on.
+    /// The concentration in each free cell, kg/m^3, caused by all sources together.
     ///
     /// # Errors
     /// If a rate is not finite, a patch is of another domain, or [`Error::Factorisation`].
@@ -59,7 +59,8 @@ impl<'a> Steady<'a> {
         checked(columns.col_as_slice(0), releases.iter().all(|release| *release >= 0.0))
     }
 
-    /// For each sensor the concentration that it measures, kg/m^3 per kg/s, of a source in each free cell: one adjoint solution.
+    /// For each sensor the concentration that it measures, kg/m^3 per kg/s, for a source in each free cell: one adjoint solution per
+    /// sensor.
     ///
     /// # Errors
     /// If a patch is of another domain, a response is not finite, or [`Error::Factorisation`].
@@ -76,7 +77,7 @@ impl<'a> Steady<'a> {
     }
 }
 
-/// A field of numbers. In one that cannot be negative, what rounding left below zero becomes zero, and more than that is refused.
+/// Checks that a field is finite. If `positive`, negative values up to rounding become zero, and larger ones are an error.
 fn checked(field: &[f64], positive: bool) -> Result<Vec<f64>, Error> {
     all_finite("concentration", field)?;
     if !positive {

@@ -1,34 +1,35 @@
-//! One step in time of a transport, with its error.
+//! One time step of a transport, with an error estimate.
 
 use crate::solver::{Direction, Factor};
 use crate::{Error, Transport};
 use faer::{Mat, Scale};
 
-/// How a step in time is made. Both methods damp what a sudden start excites.
+/// Method of a time step. Both damp the fast components that a sudden start excites.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Trapezoidal rule, then a backward difference (TR-BDF2): second order, with an embedded error of third order. Concentrations may
-    /// fall below zero by the error: [`Snapshot::lowest`](crate::Snapshot::lowest) says how far.
+    /// Trapezoidal rule, then a backward difference (TR-BDF2): second order, with an embedded error estimate of third order. Its errors may
+    /// make concentrations slightly negative; [`Snapshot::lowest`](crate::Snapshot::lowest) has the lowest.
     #[default]
     TrBdf2,
-    /// Two implicit Euler steps of half the length; their difference from one whole step is the error. First order, never negative.
+    /// Two implicit Euler steps of half the length. The error estimate is their difference from one whole step. First order, never
+    /// negative.
     ImplicitEuler,
 }
 
-/// Factorisations that are kept.
+/// Largest number of factorisations that are kept.
 const MAX_FACTORS: usize = 16;
-/// `2 - sqrt 2`: the share of the step at which the trapezoidal rule ends, so that both stages have one matrix.
+/// `2 - sqrt 2`: the share of the step at which the trapezoidal rule ends. With this value both stages have the same matrix.
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
 const HALF_GAMMA: f64 = 0.5 * GAMMA;
-/// Weight of the first two slopes.
+/// Weight of the first two slopes in the step.
 const WEIGHT: f64 = 0.25 * std::f64::consts::SQRT_2;
-/// Weights of the third-order formula less those of the method (Hosea and Shampine, Applied Numerical Mathematics 20 (1996) 21).
+/// Weights of the third-order formula minus those of the method (Hosea and Shampine, Applied Numerical Mathematics 20 (1996) 21).
 const ERROR: [f64; 3] = [
     (1.0 - WEIGHT) / 3.0 - WEIGHT,
     (3.0 * WEIGHT + 1.0) / 3.0 - WEIGHT,
     HALF_GAMMA / 3.0 - HALF_GAMMA,
 ];
-/// Makes steps in time, and keeps the factors of the last lengths of step.
+/// Makes time steps, and keeps the factors for the last step lengths.
 pub(crate) struct Stepper<'a> {
     pub(crate) transport: &'a Transport,
     pub(crate) method: Method,
@@ -88,7 +89,7 @@ impl<'a> Stepper<'a> {
                 let slopes = Scale(step * WEIGHT) * (&first + &second) + Scale(weight) * source;
                 let next = solved(factor, amounts(now) + slopes);
                 let third = slope(&next);
-                // Solving with the matrix once more keeps the estimate bounded for stiff parts.
+                // One more solution with the matrix keeps the estimate bounded for stiff components.
                 let error = Scale(ERROR[0]) * first + Scale(ERROR[1]) * second + Scale(ERROR[2]) * third;
                 let error = solved(factor, Scale(step) * error);
                 let dose = Scale(step * WEIGHT) * (now + middle) + Scale(weight) * &next;
@@ -113,7 +114,7 @@ impl<'a> Stepper<'a> {
     }
 }
 
-/// Columns that evolve together.
+/// Columns that are advanced together.
 pub(crate) struct State {
     pub(crate) concentration: Mat<f64>,
     pub(crate) dose: Mat<f64>,
@@ -124,7 +125,7 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// Columns before their first step, without any dose.
+    /// Columns before their first step; the dose is zero.
     pub(crate) fn new(concentration: Mat<f64>) -> Self {
         let dose = Mat::zeros(concentration.nrows(), concentration.ncols());
         Self {
@@ -136,7 +137,7 @@ impl State {
         }
     }
 
-    /// Takes over the columns after a step, and adds what the step adds to the dose.
+    /// Replaces the columns by those after a step, and adds the step's dose.
     pub(crate) fn accept(&mut self, next: Mat<f64>, dose: Mat<f64>) {
         self.dose += dose;
         for j in 0..next.ncols() {

@@ -8,12 +8,13 @@ use crate::{Error, Patch, Transport};
 use faer::Mat;
 use fewbits_numerics::error::{all_finite, at_least_one, positive, refuse};
 
-/// How long steps are.
+/// Control of the step lengths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepControl {
-    /// The estimated error of a step, relative to the largest concentration, stays below this number. Steps change by factors of two.
+    /// The estimated error of a step, relative to the largest concentration, stays below this number. Step lengths change by factors of
+    /// two.
     Tolerance(f64),
-    /// So many equal steps in every interval between two instants that matter.
+    /// This many equal steps in every interval between successive starts, stops and output times.
     Equal(usize),
 }
 
@@ -43,9 +44,9 @@ pub struct Snapshot {
     pub time: f64,
     /// Concentration in each free cell, kg/m^3.
     pub concentration: Vec<f64>,
-    /// Its integral over time since 0, kg s/m^3: [`Transport::budget`] of it says what has left, and how.
+    /// Integral of the concentration over time since 0, kg s/m^3. [`Transport::budget`] of it says how much has left, and how.
     pub dose: Vec<f64>,
-    /// The lowest concentration so far; below 0 by an error in time only.
+    /// The lowest concentration so far. It is negative only by errors of the time steps.
     pub lowest: f64,
     /// Steps so far.
     pub steps: usize,
@@ -63,13 +64,13 @@ pub struct Transient<'a> {
     control: StepControl,
 }
 
-/// A step this far below the interval does not change the time any more.
+/// Steps shorter than `2^-45` of the interval no longer change the time.
 const MIN_SHARE_EXPONENT: i32 = -45;
-/// Most steps of an interval: rounding may keep the error just below the tolerance however short the steps are.
+/// Largest number of steps of an interval: rounding may keep the error just below the tolerance however short the steps are.
 const MAX_STEPS: usize = 200_000;
-/// Most common units of all intervals together: steps are counted in shares of it.
+/// Largest number of common units in all intervals together.
 const MAX_UNITS: f64 = 65536.0;
-/// A step is doubled if its error is below the tolerance over this: the error grows eightfold, and half of that is margin.
+/// A step is doubled if its error is below the tolerance divided by this: doubling multiplies the error by eight, and two is a margin.
 const DOUBLING_MARGIN: f64 = 16.0;
 
 impl<'a> Transient<'a> {
@@ -81,14 +82,14 @@ impl<'a> Transient<'a> {
         }
     }
 
-    /// With another method.
+    /// The same solver with another method.
     #[must_use]
     pub fn with_method(mut self, method: Method) -> Self {
         self.stepper.method = method;
         self
     }
 
-    /// With another control of the steps.
+    /// The same solver with another step control.
     ///
     /// # Errors
     /// If the tolerance is not a positive number, or the number of steps is zero.
@@ -100,7 +101,7 @@ impl<'a> Transient<'a> {
         Ok(Self { control, ..self })
     }
 
-    /// The field at the given instants (s, increasing, after 0), from the given concentrations at time 0 on.
+    /// The field at the given times (s, increasing, after 0), starting from the concentrations `initial` at time 0.
     ///
     /// # Errors
     /// If `initial` has not one number for each free cell, instants do not increase from above 0, a rate is not finite, a release stops
@@ -153,8 +154,8 @@ impl<'a> Transient<'a> {
         Ok(snapshots)
     }
 
-    /// For each age (s, increasing, above 0) and each sensor the concentration that the sensor measures, kg/m^3 per kg/s, of a source
-    /// in each free cell that has released for that age.
+    /// The concentration that a sensor measures, kg/m^3 per kg/s, for a source in each free cell that has released for a given time (age).
+    /// Indices of the result: age (s, increasing, above 0), sensor, free cell.
     ///
     /// These are adjoint steps: with [`StepControl::Equal`] they agree with [`Transient::run`] to rounding. A release from `start` to
     /// `stop` causes the difference of the responses at `time - start` and `time - stop`.
@@ -179,7 +180,8 @@ impl<'a> Transient<'a> {
         Ok(responses)
     }
 
-    /// Moves columns on from time 0; `source` from an instant to the next; calls `visit` at each instant.
+    /// Advances columns from time 0 through the instants. `source(t)` is the constant source from `t` to the next instant. `visit` is
+    /// called at each instant.
     fn march(
         &mut self,
         direction: Direction,
@@ -192,6 +194,7 @@ impl<'a> Transient<'a> {
         let unit = common_unit(instants);
         for end in instants {
             let source = source(now)?;
+            // A new source causes fast changes at first: start again with a small step.
             if before.as_ref() != Some(&source) {
                 state.wanted = self.first_step(&state.concentration, &source);
             }
@@ -206,7 +209,7 @@ impl<'a> Transient<'a> {
         Ok(())
     }
 
-    /// A small share of the time in which a cell that holds or receives something loses it.
+    /// Length of the first step: a small share of the shortest decay time among cells that hold or receive something.
     fn first_step(&self, concentration: &Mat<f64>, source: &Mat<f64>) -> f64 {
         let StepControl::Tolerance(tolerance) = self.control else {
             return f64::INFINITY;
@@ -221,7 +224,7 @@ impl<'a> Transient<'a> {
         shortest * tolerance.cbrt()
     }
 
-    /// Moves the columns on by `duration` with a constant source.
+    /// Advances the columns by `duration` with a constant source.
     fn advance(
         &mut self,
         direction: Direction,
@@ -241,7 +244,7 @@ impl<'a> Transient<'a> {
                 return Ok(());
             }
         };
-        // `left` steps of `base 2^level` make up what remains of the interval.
+        // The rest of the interval is `left` steps of `base 2^level`.
         let base = unit.unwrap_or(duration);
         let (mut left, mut level) = ((duration / base).round() as u64, 0_i32);
         let length = |level: i32| base * 2.0_f64.powi(level);
@@ -283,8 +286,8 @@ fn check_instants(name: &'static str, instants: &[f64]) -> Result<(), Error> {
     }
 }
 
-/// The longest time of which all intervals are multiples, if the shortest interval has at most 64 of them and all have at most
-/// [`MAX_UNITS`]: steps then have few lengths.
+/// The longest time of which all intervals are multiples, so that few step lengths occur. `None` if the shortest interval has more than 64
+/// of them, or all together more than [`MAX_UNITS`].
 fn common_unit(instants: &[f64]) -> Option<f64> {
     let last = *instants.last()?;
     let (mut unit, mut shortest, mut before) = (0.0_f64, f64::INFINITY, 0.0);
@@ -299,6 +302,6 @@ fn common_unit(instants: &[f64]) -> Option<f64> {
             }
         }
     }
-    // An interval that counts as zero has no multiple.
+    // An interval that is rounded to zero is no multiple.
     (unit > shortest / 64.0 && unit < 1.5 * shortest && last < MAX_UNITS * unit).then_some(unit)
 }

@@ -15,11 +15,11 @@ pub enum Scheme {
     /// cell is below about 3.
     #[default]
     ExponentialFitting,
-    /// The wind carries the concentration that it comes from. First order: adds the diffusivity `v h / 2`.
+    /// The flux uses the concentration of the upwind cell. First order: it adds the numerical diffusivity `v h / 2`.
     Upwind,
 }
 
-/// `x / (exp(x) - 1)`, with `B(-x) = B(x) + x` to rounding.
+/// The Bernoulli function `x / (exp(x) - 1)`. `B(-x) = B(x) + x` holds to rounding.
 fn bernoulli(x: f64) -> f64 {
     let size = x.abs();
     let positive = if size < 1e-3 {
@@ -32,7 +32,7 @@ fn bernoulli(x: f64) -> f64 {
 }
 
 impl Scheme {
-    /// Factors of the concentrations on both sides of a face with Peclet number `p`, where the air comes from first.
+    /// Coefficients of the concentrations below and above a face in the upward flux. The Peclet number `p` is positive for upward flow.
     fn weights(self, p: f64) -> [f64; 2] {
         match self {
             Self::ExponentialFitting => [bernoulli(-p), bernoulli(p)],
@@ -44,7 +44,7 @@ impl Scheme {
 /// A value for every free cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PerCell {
-    /// The same in all.
+    /// The same value in all cells.
     Constant(f64),
     /// One for each free cell, in the order of [`Domain::free`]. [`Domain::sample`] makes them from a function.
     Each(Vec<f64>),
@@ -69,44 +69,44 @@ impl From<Vec<f64>> for PerCell {
 /// flux through a face from L to R = area / h D (B(-p) c_L - B(p) c_R),   p = v h / D,   D harmonic mean
 /// ```
 ///
-/// Columns of `A` sum to what leaves the domain and decays: mass is kept to rounding. Off-diagonals are not positive and column sums
-/// not negative, so that steady solutions and implicit Euler steps are never negative.
+/// The columns of `A` sum to what leaves the domain and decays, so mass is conserved to rounding. Off-diagonal entries are not positive and
+/// column sums not negative. Therefore steady solutions and implicit Euler steps are never negative.
 pub struct Transport {
     domain: Arc<Domain>,
     pub(crate) volumes: Vec<f64>,
     decay: Vec<f64>,
-    /// Amount per concentration through each face of the domain, upwards and downwards.
+    /// Amount per concentration that crosses each face of the domain, upwards and downwards.
     rates: Vec<[f64; 2]>,
     pub(crate) diagonal: Vec<f64>,
     solver: OnceLock<Solver>,
 }
 
-/// Where a substance goes: amounts per second, or amounts.
+/// Where a substance goes: amounts per second of a concentration, or amounts of a dose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Budget {
     /// Integral of the field, kg (kg s for a dose).
     pub mass: f64,
-    /// What decays.
+    /// Amount that decays.
     pub decayed: f64,
-    /// What absorbing walls take.
+    /// Amount that absorbing walls take up.
     pub absorbed: f64,
-    /// What leaks through walls.
+    /// Amount that leaks through walls.
     pub leaked: f64,
-    /// What leaves through inflows, against the wind.
+    /// Amount that leaves through inflows by diffusion, against the wind.
     pub inflow: f64,
-    /// What leaves through outflows.
+    /// Amount that leaves through outflows.
     pub outflow: f64,
 }
 
 impl Budget {
-    /// All that leaves or decays.
+    /// Sum of all that leaves or decays.
     pub fn removed(&self) -> f64 {
         self.decayed + self.absorbed + self.leaked + self.inflow + self.outflow
     }
 }
 
 impl Transport {
-    /// The transport with the given diffusivity (m^2/s) and decay (1/s) in the free cells, by the given wind.
+    /// A transport with the given diffusivity (m^2/s) and decay (1/s) in the free cells and the given wind.
     ///
     /// # Errors
     /// If a diffusivity is not in `[1e-30, 1e30]`, a decay not in `[0, 1e30]`, their number or the flow is not that of the domain,
@@ -124,12 +124,12 @@ impl Transport {
         let decay = values("decay", decay.into(), &domain, 0.0)?;
         let volumes = domain.volumes();
         let mut diagonal: Vec<f64> = decay.iter().zip(&volumes).map(|(decay, v)| decay * v).collect();
-        // Outside there is no half cell, whatever its diffusivity.
+        // The outside has half width zero, so any diffusivity serves.
         diffusivity.extend([1.0; OUTSIDE]);
         diagonal.extend([0.0; OUTSIDE]);
         let (largest, mut rates) = (flow.largest(), Vec::with_capacity(domain.faces.len()));
         for (face, flow) in domain.faces.iter().zip(&flow.upwards) {
-            // Two half cells in series.
+            // Resistance of the two half cells in series.
             let [below, above] = [0, 1].map(|side| face.halves[side] / diffusivity[face.cells[side]]);
             let conductance = face.area / (below + above);
             let outwards = if face.side() == 0 { *flow } else { -flow };
@@ -139,7 +139,7 @@ impl Transport {
                 Some(Boundary::Leaking(leak)) => [face.area / (leak.recip() + (below + above)); 2],
                 Some(Boundary::Absorbing) => [conductance; 2],
                 Some(Boundary::Outflow) if largest == 0.0 => [conductance; 2],
-                // Rounding may leave a flow just below zero.
+                // A flow slightly below zero is a rounding error.
                 Some(Boundary::Outflow) if outwards >= -1e-10 * largest => [outwards.max(0.0); 2],
                 Some(Boundary::Outflow) => {
                     let cell = domain.place(face.cell());
@@ -167,7 +167,7 @@ impl Transport {
         &self.domain
     }
 
-    /// The ordering of the matrix, made when it is first needed.
+    /// The ordering of the matrix, computed at its first use.
     fn solver(&self) -> Result<&Solver, Error> {
         if let Some(solver) = self.solver.get() {
             return Ok(solver);
@@ -184,7 +184,7 @@ impl Transport {
             .factor(diagonal, &self.rates[..self.domain.inner], weight)
     }
 
-    /// Whether the matrix is symmetric after scaling (no wind, or potential flow with one diffusivity), so that Cholesky serves.
+    /// Whether the scaled matrix is symmetric (no wind, or potential flow with one diffusivity), so that Cholesky is used.
     ///
     /// # Errors
     /// If memory runs out.
@@ -192,7 +192,7 @@ impl Transport {
         Ok(self.solver()?.is_symmetric())
     }
 
-    /// Writes `A x`, or `A' x`, to `out`.
+    /// Writes `A x`, or `A' x` for the adjoint direction, to `out`.
     pub(crate) fn apply(&self, direction: Direction, x: &[f64], out: &mut [f64]) {
         for ((out, x), diagonal) in out.iter_mut().zip(x).zip(&self.diagonal) {
             *out = diagonal * x;
@@ -218,7 +218,7 @@ impl Transport {
         Ok(out)
     }
 
-    /// What the inflows bring into each free cell if the air outside has the given concentration, kg/s.
+    /// The amount that inflows bring into each free cell, kg/s, if the air outside has the given concentration, kg/m^3.
     pub fn inflow(&self, outside: f64) -> Vec<f64> {
         let mut source = vec![0.0; self.diagonal.len()];
         for (face, rate) in self.edge().filter(|edge| edge.0.boundary == Some(Boundary::Inflow)) {
@@ -227,15 +227,15 @@ impl Transport {
         source
     }
 
-    /// Faces that lead out, with their rates upwards and downwards.
+    /// Faces to the outside and to walls that are not closed, with their rates upwards and downwards.
     fn edge(&self) -> impl Iterator<Item = (&Face, &[f64; 2])> {
         self.domain.faces.iter().zip(&self.rates).skip(self.domain.inner)
     }
 
-    /// Mass, and what leaves per second, of a concentration; or of a dose (kg s/m^3), all that has left.
+    /// Mass, and amounts that leave per second, for a concentration (kg/m^3); or the amounts that have left, for a dose (kg s/m^3).
     ///
     /// # Errors
-    /// If there is not one number for each free cell, or mass or the sum of what leaves is beyond the range of numbers.
+    /// If there is not one number per free cell, or mass or the sum of what leaves overflows.
     pub fn budget(&self, concentration: &[f64]) -> Result<Budget, Error> {
         self.check_field("concentration", concentration)?;
         let contents = || self.volumes.iter().zip(concentration).map(|(volume, c)| volume * c);
@@ -258,13 +258,13 @@ impl Transport {
         Ok(budget)
     }
 
-    /// Refuses a field that has not one finite number for each free cell.
+    /// Checks that a field has one finite number per free cell.
     pub(crate) fn check_field(&self, name: &'static str, field: &[f64]) -> Result<(), Error> {
         self.domain.check_count(name, field.len())?;
         Ok(all_finite(name, field)?)
     }
 
-    /// Refuses a domain with a part that nothing leaves and where nothing decays.
+    /// Checks that every connected part has an exit or decay.
     pub(crate) fn check_sinks(&self) -> Result<(), Error> {
         let mut drained: Vec<bool> = self.decay.iter().map(|decay| *decay > 0.0).collect();
         for (face, rate) in self.edge() {
@@ -291,7 +291,7 @@ impl Transport {
         Ok(())
     }
 
-    /// A column of shares for each sensor.
+    /// One column per sensor with the shares of its cells.
     pub(crate) fn columns(&self, sensors: &[Patch]) -> Result<Mat<f64>, Error> {
         let mut columns = Mat::zeros(self.volumes.len(), sensors.len());
         for (j, sensor) in sensors.iter().enumerate() {

@@ -7,12 +7,12 @@ use crate::{Boundary, Domain, Error, Flow, Scheme, Transport};
 use faer::Mat;
 use fewbits_numerics::error::{positive, within};
 
-/// What is done with a wind that is not free of divergence on the grid.
+/// Treatment of a wind that is not free of divergence on the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Divergence {
-    /// It is refused: concentration would pile up or thin out where air seems to vanish or appear.
+    /// It is an error: concentration would accumulate or vanish in cells.
     Refuse,
-    /// The nearest wind without divergence is taken: the gradient of a potential, zero at inflows and outflows, is subtracted.
+    /// It is replaced by the nearest wind without divergence: the gradient of a potential, zero at inflows and outflows, is subtracted.
     Project,
 }
 
@@ -21,7 +21,7 @@ pub enum Divergence {
 pub struct PotentialFlow {
     /// The flow.
     pub flow: Flow,
-    /// Potential in each free cell, m^2/s: `v = -grad potential`. Zero on all outflows, and in parts without any opening.
+    /// Potential in each free cell, m^2/s: `v = -grad potential`. It is zero on all outflows, and in parts without any opening.
     pub potential: Vec<f64>,
     /// Potential on all inflows, m^2/s.
     pub difference: f64,
@@ -44,8 +44,8 @@ impl Flow {
         Self::through(domain, flow).treated(domain, divergence)
     }
 
-    /// The wind measured as mean velocities in the free cells, m/s, such as from a file: at a face the mean of both cells, weighted
-    /// by nearness.
+    /// The wind from mean velocities in the free cells, m/s, for example from a file. The velocity at a face is the mean of both cells,
+    /// weighted by nearness.
     ///
     /// # Errors
     /// If there is not one velocity for each free cell, one is not finite, or as [`Flow::from_velocity`].
@@ -73,7 +73,7 @@ impl Flow {
                 .iter_mut()
                 .zip(correction)
                 .for_each(|(flow, change)| *flow += change);
-            // Nothing but rounding is left of a wind that cannot blow at all.
+            // Only rounding errors remain if the domain has no passage for wind.
             if self.largest() <= MAX_DIVERGENCE * before {
                 self = Self::still(domain);
             }
@@ -84,8 +84,8 @@ impl Flow {
 }
 
 impl PotentialFlow {
-    /// The flow `v = -grad phi` with one potential on all inflows, 0 on all outflows and no flow through walls, scaled so that `total`
-    /// (m^3/s; m^2/s in a plane) passes.
+    /// The flow `v = -grad phi` with one potential on all inflows, 0 on all outflows and no flow through walls. It is scaled so that
+    /// `total` (m^3/s; m^2/s in a plane) passes.
     ///
     /// # Errors
     /// If `total` is not a positive number up to 1e90; [`Error::NoPassage`] if no connected part touches both.
@@ -103,7 +103,7 @@ impl PotentialFlow {
         let passing: f64 = inflows()
             .map(|face| conductance(face) * (1.0 - potential[face.cell()]))
             .sum();
-        // A part with inflows only has potential one but for rounding.
+        // In a part with inflows only the potential is one everywhere, up to rounding.
         if passing.is_nan() || passing <= 1e-12 * inflows().map(conductance).sum::<f64>() {
             return Err(Error::NoPassage);
         }
@@ -123,16 +123,16 @@ fn conductance(face: &Face) -> f64 {
     face.area / (face.halves[0] + face.halves[1])
 }
 
-/// The flow down a potential that is 0 on outflows and `difference` on inflows.
+/// The flow for a potential that is 0 on outflows and `difference` on inflows.
 fn fall(domain: &Domain, potential: &[f64], difference: f64) -> Flow {
     let everywhere = [potential, &[0.0, difference]].concat();
     Flow::through(domain, |face| conductance(face) * (everywhere[face.cells[0]] - everywhere[face.cells[1]]))
 }
 
-/// The potential whose flow out of each free cell is `supply`, zero on inflows and outflows. A part without opening has potential zero
-/// near one of its cells; its supplies must sum to zero.
+/// The potential for which the flow out of each free cell is `supply`, with potential zero on inflows and outflows. In a part without
+/// opening the potential is fixed to zero near one cell, and the supplies must sum to zero.
 fn solve_potential(domain: &Domain, supply: Vec<f64>) -> Result<Vec<f64>, Error> {
-    // A steady concentration at diffusivity one, with other walls closed.
+    // It equals a steady concentration with diffusivity one and all other walls closed.
     let mut open = domain.clone();
     open.faces.retain(Face::is_open);
     let still = Flow::still(&open);
@@ -150,7 +150,7 @@ fn solve_potential(domain: &Domain, supply: Vec<f64>) -> Result<Vec<f64>, Error>
     let mut columns = Mat::from_fn(supply.len(), 1, |i, _| supply[i]);
     factor.solve(Direction::Forward, &mut columns);
     let mut potential = columns.col_as_slice(0).to_vec();
-    // One step of refinement: flows are differences of the potential.
+    // One step of iterative refinement, because flows are differences of the potential.
     for (i, supply) in supply.into_iter().enumerate() {
         columns[(i, 0)] = supply - transport.diagonal[i] * potential[i];
     }

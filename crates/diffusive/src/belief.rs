@@ -1,4 +1,4 @@
-//! Beliefs that travel, apart from raw records, and what an update starts from.
+//! Beliefs that nodes send to each other (other than raw records), and the prior of an update.
 
 use crate::density::Lpg;
 use crate::rate::RateRange;
@@ -6,12 +6,12 @@ use fewbits_core::{Belief, Density, Gaussian};
 use fewbits_densities::{Component, Mixture};
 use nalgebra::SVector;
 
-/// A Gaussian ends here, in standard deviations.
+/// Half width, in standard deviations, of the box that is taken to contain a Gaussian.
 const ENDS: f64 = 6.5;
-/// A polynomial of the degrees in use reaches a little farther than its Gaussian: as one of this many times the variance.
+/// A Gaussian times a polynomial is wider: its box is that of a Gaussian with this many times the variance.
 const LPG_REACH: f64 = 1.7;
 
-/// Box that contains the source, m. The first cells cover it, and later cells are cut to it.
+/// Box that contains the source, m. The first cells cover it; later cells are limited to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchBox {
     /// Lower corner.
@@ -21,7 +21,7 @@ pub struct SearchBox {
 }
 
 impl SearchBox {
-    /// The part that lies within another box; the nearest corner of the other, if none does.
+    /// The intersection with another box. If it is empty, the corner of the other box that is nearest.
     pub(crate) fn within(&self, other: &Self) -> Self {
         let lower: [f64; 2] = std::array::from_fn(|d| self.lower[d].max(other.lower[d]));
         let upper: [f64; 2] = std::array::from_fn(|d| self.upper[d].min(other.upper[d]));
@@ -33,7 +33,7 @@ impl SearchBox {
     }
 }
 
-/// A belief that travels, apart from raw records.
+/// A belief that is sent to the next node, other than raw records.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SentBelief<const D: usize> {
     /// A Gaussian mixture.
@@ -51,15 +51,15 @@ pub type JointBelief = SentBelief<3>;
 /// Prior of an update over cells.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Prior {
-    /// A position prior and all records at once: nothing approximated.
+    /// A position prior; the likelihood holds all records. Nothing is approximated.
     Exact(Gaussian<2>),
-    /// A position belief that was sent on.
+    /// A belief of the position, received from the node before.
     Position(PositionBelief),
-    /// A belief over position and rate that was sent on, and the range of the rate.
+    /// A belief of position and rate, received from the node before, and the range of the rate.
     WithRate(JointBelief, RateRange),
 }
 
-/// The box of all Gaussians' first two coordinates, their variances taken `widening` times.
+/// The box of the first two coordinates of all Gaussians. Their variances are multiplied by `widening`.
 fn bounds<'a, const D: usize>(parts: impl Iterator<Item = &'a Component<D>>, widening: f64) -> SearchBox {
     let mut hull = SearchBox {
         lower: [f64::INFINITY; 2],

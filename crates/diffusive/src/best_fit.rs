@@ -1,4 +1,4 @@
-//! The best fit that any position allows, without its posterior.
+//! The position that fits the samples best, without the posterior.
 
 use crate::SourceLikelihood;
 use crate::belief::SearchBox;
@@ -7,22 +7,22 @@ use crate::fit::Fit;
 use crate::target::Target;
 use nalgebra::Vector2;
 
-/// Cells along the longer side of the box to begin with.
+/// Number of cells along the longer side of the box at the start.
 const PER_AXIS: usize = 64;
-/// Cells kept at each level.
+/// Number of cells kept at each level.
 const KEPT: usize = 64;
-/// Levels of halving: the cells are then 2^-44 of the first.
+/// Number of halvings: the last cells are 2^-44 of the first.
 const LEVELS: usize = 44;
 
-/// The best fit that any position of the box allows, up to the prior: the cells of best score are split again and again, without
-/// regard to how many others are as good. Finds one point of a ring that is too thin to be covered. `None` if no position has any
-/// likelihood.
+/// The fit of the best position in the box. At each level only the cells of best score are split, however many others are nearly as
+/// good. This finds one point of a ring that is too thin to be covered by cells. `None` if the likelihood is zero everywhere.
 pub(crate) fn best_fit(target: &Target<'_>, likelihood: &SourceLikelihood, search: &SearchBox) -> Option<Fit> {
     let sides: [f64; 2] = std::array::from_fn(|d| search.upper[d] - search.lower[d]);
     let mut width = sides[0].max(sides[1]) / PER_AXIS as f64;
     let most = PER_AXIS * PER_AXIS;
     let mut centres = lattice(&search.lower, &search.upper, width, most).ok()?;
     let mut best: Option<f64> = None;
+    // Coarse to fine: the best cells of a level are divided. A score is the density averaged over its cell.
     for _ in 0..LEVELS {
         let count = centres[0].len();
         let (mut logs, mut scores) = (vec![0.0; count], vec![0.0; count]);

@@ -1,4 +1,4 @@
-//! The region in which the concentration exceeds a threshold, with probabilities under the belief.
+//! The region in which the concentration exceeds a threshold, with its probability under the belief.
 
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
@@ -10,17 +10,17 @@ use fewbits_numerics::golden::maximum;
 use fewbits_numerics::normal::interval;
 use nalgebra::Vector2;
 
-/// Cells that stand for the posterior; more add nothing to quantiles.
+/// Largest number of cells that represent the posterior; more do not change the quantiles.
 const MOST: usize = 1500;
-/// Bisections of a quantile.
+/// Number of bisections for a quantile.
 const BISECTIONS: usize = 60;
 
-/// Distances at which the highest concentration along a ray is looked for, and steps of its refinement.
+/// Number of distances at which the concentration along a ray is evaluated to find its maximum.
 const DISTANCES: usize = 128;
-/// Share of the bracket to which the distance of the highest concentration is found.
+/// Relative tolerance of the distance of the maximum.
 const PEAK_TOLERANCE: f64 = 1e-8;
 
-/// A posterior over position and rate, asked about concentrations at the height of the sensors, in their medium.
+/// Concentrations at the height of the sensors, as predicted by a posterior over position and rate.
 #[derive(Debug, Clone)]
 pub struct Envelope {
     sensor: SourceSensor,
@@ -34,7 +34,7 @@ struct Point {
     rate: Rate,
 }
 
-/// Normal of this mean and deviation, cut to an interval; a known rate is both ends.
+/// A normal of this mean and deviation, truncated to an interval. For a known rate both ends are equal.
 #[derive(Debug, Clone, Copy)]
 struct Rate {
     mean: f64,
@@ -64,10 +64,10 @@ impl Rate {
 }
 
 impl Envelope {
-    /// The envelope of a posterior; `likelihood` holds the records that it was formed from, and what was assumed of the rate.
+    /// The envelope of a posterior. `likelihood` holds the records that it was formed from and the model of the rate.
     ///
     /// # Errors
-    /// If the rate was redrawn for each node or sample: it then has no posterior.
+    /// If the rate is redrawn for each node or sample: then it has no posterior.
     pub fn new(posterior: &Posterior, likelihood: &SourceLikelihood) -> Result<Self, Error> {
         let sensor = likelihood.records().first().map(|r| r.sensor().clone());
         let Some(sensor) = sensor else {
@@ -75,7 +75,7 @@ impl Envelope {
         };
         let [x, y] = posterior.cells.columns();
         let weights = posterior.cells.weights();
-        // Cells at equal steps of the cumulative weight, along the order in which the cells were split: near ones stand together.
+        // Cells at equal steps of the cumulative weight. Neighbours in the order of splitting are near each other in space.
         let order = systematic(weights, weights.len().min(MOST), 0.5);
         let mut points = Vec::with_capacity(order.len());
         let share = 1.0 / order.len().max(1) as f64;
@@ -90,7 +90,7 @@ impl Envelope {
                 },
                 RateModel::Joint(range) => {
                     let sums = likelihood.sums(&position);
-                    // No response at all leaves the uniform prior: a normal far wider than the range.
+                    // Response zero leaves the uniform prior: a normal much wider than the range.
                     let a = sums.response.max(1e-12 / (range.high() * range.high()));
                     Rate {
                         mean: if sums.response > 0.0 {
@@ -116,8 +116,8 @@ impl Envelope {
         Ok(Self { sensor, points })
     }
 
-    /// `P(c > threshold)` (kg/m^3) at a place, `age` seconds after the release began: the posterior average of the probability that
-    /// the rate exceeds what that concentration takes.
+    /// `P(c > threshold)` (kg/m^3) at a place, `age` seconds after the release began: the posterior mean of the probability that
+    /// the rate exceeds the one that causes `threshold` there.
     ///
     /// # Errors
     /// If `threshold` is not a positive number, `age` is NaN, or the model has no concentrations at the place.
@@ -132,9 +132,9 @@ impl Envelope {
         Ok(self.points.iter().map(at).sum())
     }
 
-    /// Quantile of how far the area above the threshold reaches from `origin` along the direction (radians from the x axis), m:
-    /// of `(source - origin) . e + R`, with `R` the largest distance along `e` from the source at which the threshold is exceeded.
-    /// `None` if it is exceeded nowhere on that ray with probability `level` or more.
+    /// Quantile `level` of how far the area above the threshold reaches from `origin` in the direction `e` at `angle` (radians from the
+    /// x axis), m. The distance is `(source - origin) . e + R`, `R` the largest distance from the source along `e` at which the threshold
+    /// is exceeded. `None` if with probability `level` or more it is exceeded nowhere on that ray.
     ///
     /// # Errors
     /// If `threshold` is not a positive number, `angle` is not finite, `age` is NaN, `level` is outside `[0, 1]`, or
@@ -159,7 +159,7 @@ impl Envelope {
         let along = |p: &Point| (p.position - origin).dot(&ray);
         let widest = self.widest(&medium, threshold);
         let along_ray = AlongRay::new(&self.sensor, &ray, age, widest)?;
-        // Beyond `reach` with probability: sum of those whose threshold is exceeded at or beyond it.
+        // P(distance > reach): sum over the sources for which the threshold is exceeded at or beyond it.
         let beyond = |reach: f64| -> f64 {
             let at = |p: &Point| p.exceeds(along_ray.highest_beyond(reach - along(p)), threshold);
             self.points.iter().map(at).sum()
@@ -183,7 +183,7 @@ impl Envelope {
         Ok(Some(0.5 * (low + high)))
     }
 
-    /// No concentration exceeds the threshold farther from the source: in the steady state over impermeable ground it is
+    /// Distance beyond which no concentration exceeds the threshold: in the steady state over impermeable ground the concentration is
     /// `mu / (2 pi kappa R)`.
     fn widest(&self, medium: &Homogeneous, threshold: f64) -> f64 {
         let largest = self.points.iter().map(|p| p.rate.high);
@@ -192,7 +192,7 @@ impl Envelope {
 }
 
 impl Point {
-    /// Share of this point's weight with which the rate makes a concentration per unit rate exceed the threshold.
+    /// Weight of this point times the probability that a concentration of `response` per unit rate exceeds the threshold.
     fn exceeds(&self, response: f64, threshold: f64) -> f64 {
         if response > 0.0 {
             self.weight * self.rate.exceeds(threshold / response)
@@ -208,7 +208,7 @@ struct AlongRay<'a> {
     receptor: Receptor,
     ray: &'a Vector2<f64>,
     age: f64,
-    /// Distance and value of the highest concentration. At the source unless sensor and source stand at different heights: a plume comes down.
+    /// Distance and value of the highest concentration. It is not at the source if sensor and source have different heights.
     peak: (f64, f64),
 }
 
@@ -225,7 +225,7 @@ impl<'a> AlongRay<'a> {
         if sensor.height_difference() == 0.0 {
             return Ok(along);
         }
-        // Distances in even ratios over six decades; then the golden section between the neighbours of the best.
+        // Distances in geometric progression over six decades; then golden section between the neighbours of the best.
         let distance = |i: usize| widest * 1e-6_f64.powf(1.0 - i as f64 / (DISTANCES - 1) as f64);
         let mut best = 0;
         for i in 0..DISTANCES {
@@ -257,7 +257,7 @@ impl<'a> AlongRay<'a> {
     }
 }
 
-/// Any number, infinities included.
+/// Checks that a number is not NaN; infinities are allowed.
 fn number(name: &'static str, value: f64) -> Result<f64, ArgumentError> {
     if value.is_nan() {
         return Err(ArgumentError::new(name, value, "a number"));

@@ -1,22 +1,22 @@
-//! Goodness of fit: whether the samples are what the model says they are.
+//! Goodness of fit: whether the samples are consistent with the model.
 
 use fewbits_numerics::normal::quantile;
 use serde::{Deserialize, Serialize};
 
 /// Sum of squared residuals over the noise variance, averaged over the posterior.
 ///
-/// If the model is right, source and samples are one draw of the prior and the model, and a draw of the posterior has the same law
-/// together with these samples. A single draw's sum is then chi-squared with one degree of freedom per sample, and the average over
-/// the posterior has the same mean and less spread. Averaging over the posterior counts no parameters and needs no Gaussian belief.
+/// If the model is right, a draw of the posterior has, together with these samples, the same distribution as the true source. The sum
+/// for one draw is then chi-squared with one degree of freedom per sample. Its average over the posterior has the same mean and a
+/// smaller variance. No number of fitted parameters and no Gaussian belief is needed.
 ///
-/// Where a mixture of Gaussians was received, the distance of the position from it counts as two numbers more: its samples are gone, but
-/// a belief that every node moves far is wrong. The squared distance from the nearest Gaussian, in its deviations, is no larger than
-/// chi-squared with two degrees of freedom if belief and model are right.
+/// If a mixture of Gaussians was received, the distance of the position from it counts as two samples more: the samples behind the
+/// mixture are not available, but a belief that every node moves far is wrong. If belief and model are right, the squared distance from
+/// the nearest Gaussian, in its standard deviations, is at most chi-squared with two degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
-    /// The sum. About `samples` if the model is right.
+    /// Sum of squared residuals over the noise variance. It is about `samples` if the model is right.
     pub chi_squared: f64,
-    /// Number of samples, and two for every mixture that was received.
+    /// Number of samples, plus two for every mixture that was received.
     pub samples: usize,
 }
 
@@ -30,16 +30,16 @@ impl Fit {
         }
     }
 
-    /// Whether the sum is above the quantile that a chi-squared variable exceeds with probability `level` (Wilson and Hilferty 1931:
-    /// its cube root is nearly normal, within one per cent of the quantile from five samples on).
+    /// Whether the sum exceeds the quantile that a chi-squared variable exceeds with probability `level`. The quantile is that of Wilson
+    /// and Hilferty (1931): the cube root is nearly normal. From five samples on it is accurate to one per cent.
     pub fn is_refused(&self, level: f64) -> bool {
         let spread = 2.0 / (9.0 * self.samples as f64);
         let limit = (1.0 - spread + quantile(1.0 - level) * spread.sqrt()).max(0.0).powi(3);
-        // A sum that is not a number fits nothing.
+        // A sum that is NaN counts as refused.
         self.per_sample().is_nan() || self.per_sample() > limit
     }
 
-    /// Both together.
+    /// The sum of two fits.
     pub(crate) fn plus(&self, other: &Self) -> Self {
         Self {
             chi_squared: self.chi_squared + other.chi_squared,

@@ -1,4 +1,4 @@
-//! How much the samples of a node would tell: mutual information, bounds of it, and Fisher information.
+//! The information that the samples of a node would bring: mutual information, bounds of it, and Fisher information.
 
 use crate::{Error, SourceSensor};
 use fewbits_models::Receptor;
@@ -9,7 +9,7 @@ use fewbits_numerics::normal::INV_SQRT_2PI;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
-/// A discrete belief as the noise-free samples it predicts, in units of the noise: one row a support point.
+/// A discrete belief by its predicted noise-free samples, in units of the noise: one row per support point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Predictions {
     means: DMatrix<f64>,
@@ -25,12 +25,12 @@ pub struct Bounds {
     pub upper: f64,
 }
 
-/// Spacing and reach of the two-dimensional rule, in noise standard deviations.
+/// Spacing of the two-dimensional quadrature rule, in noise standard deviations.
 const SPACING: f64 = 0.4;
 const REACH: f64 = 8.0;
 
 impl Predictions {
-    /// Predicted samples of each support point (one list each, kg/m^3), their weights, and the standard deviation of the noise.
+    /// Predicted samples of each support point (one list each, kg/m^3), the points' weights, and the noise's standard deviation.
     ///
     /// # Errors
     /// If there is no point, lists differ in length or are empty, a number is not finite, the weights are no probabilities, or
@@ -51,7 +51,7 @@ impl Predictions {
         })
     }
 
-    /// Predictions over the noise, of equal lengths, with weights that sum to one.
+    /// From predictions divided by the noise, of equal lengths, and weights that sum to one.
     pub(crate) fn in_units_of_noise(means: &[DVector<f64>], weights: Vec<f64>) -> Self {
         let samples = means.first().map_or(0, DVector::len);
         Self {
@@ -96,7 +96,7 @@ impl Predictions {
         Bounds { lower, upper }
     }
 
-    /// `(1/2) ln det(I + Cov / sigma^2)`: the mutual information if the predictions were Gaussian, and an upper bound of it, nats.
+    /// `(1/2) ln det(I + Cov / sigma^2)`, nats: the mutual information if the predictions were Gaussian. It is an upper bound.
     pub fn gaussian_bound(&self) -> f64 {
         half_log_det_plus_one(self.covariance())
     }
@@ -115,8 +115,8 @@ impl Predictions {
         covariance
     }
 
-    /// The mutual information, nats, by quadrature of the mixture's entropy: exact for one or two samples; for more, predictions
-    /// are projected on their two principal directions, which hold all but 4e-5 of their variance in this problem.
+    /// The mutual information, nats, by quadrature of the mixture's entropy. Exact for one or two samples. For more, predictions
+    /// are projected on their two principal directions, which contain all but 4e-5 of their variance in this problem.
     pub fn exact(&self) -> f64 {
         if self.means.ncols() == 1 {
             return self.exact_on_the_line();
@@ -138,7 +138,7 @@ impl Predictions {
         for (own, weight) in points.iter().zip(&self.weights).filter(|(_, w)| **w > 0.0) {
             let near = points.iter().zip(&self.weights).map(|(p, w)| (p - own, *w));
             let near = near.filter(|(p, w)| *w > 0.0 && p.norm() < 3.0 * REACH);
-            // The density of the mixture over that of its component, at every y: products of a function of each axis.
+            // Ratio of the mixture's density to that of its component at every node: a sum of products of functions of each axis.
             let mut ratios = vec![0.0; axis.len() * axis.len()];
             for (p, w) in near {
                 let [rows, columns] = [0, 1].map(|d| {
@@ -190,7 +190,7 @@ pub(crate) fn half_log_det_plus_one(m: DMatrix<f64>) -> f64 {
     }
 }
 
-/// Fisher information that the samples of a receptor hold about (x, y, rate) of a source at `source` with release rate `rate`:
+/// Fisher information of the samples at a receptor about (x, y, rate) of a source at `source` with release rate `rate`:
 /// `sum_j grad(mu a_j) grad(mu a_j)' / sigma^2`.
 pub(crate) fn information_at(
     sensor: &SourceSensor,
@@ -232,8 +232,8 @@ fn no_diffusivity() -> ArgumentError {
     )
 }
 
-/// Fisher information that nodes together hold about any of the parameters, in the order of `unknowns`. The start is differenced
-/// with a step of 1e-5 of the shortest age.
+/// Fisher information of all nodes together about the parameters `unknowns`, in this order. The derivative by the start of the release
+/// is a finite difference with a step of 1e-5 of the shortest age.
 ///
 /// # Errors
 /// If the model has no concentrations at a node, or not one diffusivity that could be unknown.
@@ -245,6 +245,7 @@ pub fn fisher_information(
     rate: f64,
 ) -> Result<DMatrix<f64>, Error> {
     let step = 1e-5 * sensor.shortest_age();
+    // The derivative by the start is a central difference; all others are exact.
     let earlier = sensor.clone().with_start(sensor.start() - step)?;
     let later = sensor.clone().with_start(sensor.start() + step)?;
     let place = sensor.source_at(source);

@@ -1,28 +1,28 @@
-//! Finding a diffusing source by a belief that travels from sensor to sensor.
+//! Search for a diffusing source: a belief of its position is updated by one sensor after another.
 //!
-//! A substance is released at an unknown place, at an unknown rate. Sensors sample its concentration a few times. There is no fusion
-//! centre: a node updates a belief about the source with its own samples, chooses the neighbour whose samples would tell most, and
-//! sends the belief on, until the belief is sharp ([`Search`]).
+//! A substance is released at an unknown place and rate. Sensors sample its concentration a few times. There is no fusion
+//! centre. A node updates a belief of the source with its own samples, chooses the neighbour whose samples would bring the most
+//! information, and sends the belief to it. The search ends when the covariance of the position is small ([`Search`]).
 //!
 //! | question | answer |
 //! |---|---|
 //! | what sensors sample, and in which medium | [`SourceSensor`], any [`SourceModel`](fewbits_models::SourceModel) |
-//! | how likely samples are for a position, the rate integrated out | [`SourceLikelihood`], [`RateModel`], [`RateSums`] |
-//! | where the source is, exactly | [`Posterior`]: small cells, refined until evidence and determinant have settled |
-//! | what travels: samples, a Gaussian, a mixture, polynomial Gaussians | [`Form`], [`project`] |
-//! | as which bits | [`message`]: the next node knows what it decodes and nothing else |
-//! | which node is asked next | [`SelectionRule`], [`Selector`], [`information`] |
-//! | whether the model fits the samples at all | [`Fit`], [`Status::Misfit`] |
+//! | likelihood of the samples for a position, the rate integrated out | [`SourceLikelihood`], [`RateModel`], [`RateSums`] |
+//! | exact posterior of the position | [`Posterior`]: cells, refined until evidence and determinant have converged |
+//! | form of the messages: samples, a Gaussian, a mixture, polynomial Gaussians | [`Form`], [`project`] |
+//! | messages as bits | [`message`]: the next node knows only what it decodes |
+//! | choice of the next node | [`SelectionRule`], [`Selector`], [`information`] |
+//! | whether the model fits the samples | [`Fit`], [`Status::Misfit`] |
 //! | wind or diffusivity known up to a few candidates | [`ModelGrid`], [`Search::run_models`] |
 //! | where the concentration exceeds a threshold | [`Envelope`] |
 //!
-//! The central choice is that the posterior of every update is **exact**, over cells, and that a form is fitted to it afterwards. After
-//! the first node the belief is a ring about that node, metres wide in theory and decimetres wide in fact. Filters that start from a
-//! Gaussian there report convergence in the wrong place. The price is some thousand likelihoods per node, so a record tabulates what
-//! it needs once and a likelihood costs two polynomials.
+//! **The posterior of every update is exact**, over cells; the form of the message is fitted to it afterwards. After
+//! the first node the posterior is a ring about that node: its radius is metres, its width decimetres. Filters that start there from
+//! a Gaussian converge to wrong places. Exact posteriors cost some thousand likelihoods per node. Each record therefore tabulates its
+//! sums once, and a likelihood costs two polynomials.
 //!
-//! A sharp belief is no evidence that the model is right. A search in a box that does not hold the source, or with a wrong range of
-//! the rate, becomes as sharp as any other. The residuals tell: at its end every search compares them with the noise.
+//! A small covariance does not show that the model is right. If the source is outside the search box or the range of the rate is wrong,
+//! the covariance becomes as small. Therefore every search at its end compares the residuals with the noise.
 //!
 //! ```
 //! use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SourceSensor, Status};
@@ -57,7 +57,7 @@
 //! ```
 //!
 //! Not here: several sources, sources that start and stop at unknown times, the medium itself
-//! ([`fewbits_models::diffusion`]), losses and delays of the radio.
+//! ([`fewbits_models::diffusion`]), losses and delays of the radio (`fewbits-network`).
 
 mod belief;
 mod best_fit;

@@ -1,4 +1,4 @@
-//! How likely the samples of the visited nodes are for each position of the source.
+//! Likelihood of the samples of the visited nodes as a function of the position of the source.
 
 use crate::rate::{Intervals, RateModel, RateSums};
 use crate::{Error, Record};
@@ -18,7 +18,7 @@ impl SourceLikelihood {
     /// The likelihood of the given records.
     ///
     /// # Errors
-    /// If there is none, or a known rate is not positive.
+    /// If there is no record, or a known rate is not positive.
     pub fn new(records: Vec<Record>, rate: RateModel) -> Result<Self, Error> {
         rate.check()?;
         if records.is_empty() {
@@ -59,10 +59,10 @@ impl SourceLikelihood {
             .any(|record| record.sensor().homogeneous().is_none())
     }
 
-    /// Calls `visit` with the sums of samples that share one rate, first with the information that a cell of the given half width
-    /// leaves, then in full: once for all samples, for each node, or for each sample.
+    /// Calls `visit` with the sums of each group of samples that share one rate: all samples, those of a node, or a single one. The first
+    /// argument has the information reduced for a cell of the given half width, the second is in full.
     ///
-    /// The normalisation of the noise is not discounted: it would favour cells where the response is steep.
+    /// The normalisation of the noise is not reduced: it would favour cells in which the response is steep.
     #[inline]
     fn each_group(
         &self,
@@ -77,6 +77,7 @@ impl SourceLikelihood {
                 None => (record.sums(position), 1.0),
             };
             match self.rate {
+                // One rate for all samples: their sums add up and are visited once, at the end.
                 RateModel::Known(_) | RateModel::Joint(_) => {
                     (blurred, all) = (blurred.plus(&sums.discounted(share)), all.plus(&sums));
                 }
@@ -91,7 +92,7 @@ impl SourceLikelihood {
         }
     }
 
-    /// Expected sum over all samples of the squared residual over the noise variance, with the source at `position`, over the rate
+    /// Expected sum of squared residuals over the noise variance, with the source at `position`. The expectation is over the rate
     /// given the position and these records.
     pub fn chi_squared(&self, position: &Vector2<f64>) -> f64 {
         let mut total = 0.0;
@@ -104,9 +105,9 @@ impl SourceLikelihood {
         self.records.iter().map(|record| record.samples().len()).sum()
     }
 
-    /// Over a run of cells of the given half width: writes the log likelihood blurred over each cell to `blurred`. Where that plus
-    /// `priors` exceeds `floor`, or the largest of them less `dropped`, writes the log likelihood itself to `logs`; elsewhere the
-    /// blurred one stands for both if one rate is shared by all samples.
+    /// For a run of cells of the given half width, writes the log likelihood averaged over each cell to `blurred`. If its sum with `priors`
+    /// exceeds `floor`, or the largest such sum minus `dropped`, it writes the log likelihood at the centre to `logs`. For other cells
+    /// the average stands for both, if all samples share one rate.
     pub(crate) fn blurred(
         &self,
         centres: &Columns<'_, 2>,
@@ -132,7 +133,7 @@ impl SourceLikelihood {
             .iter()
             .zip(priors)
             .fold(f64::NEG_INFINITY, |best, (b, p)| best.max(b + p));
-        // Where the rate is known or redrawn, the log likelihood is written everywhere.
+        // If the rate is known or redrawn, the log likelihood is written for all cells.
         let floor = match self.rate {
             RateModel::Joint(_) => floor.max(best - dropped),
             _ => f64::NEG_INFINITY,

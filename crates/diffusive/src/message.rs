@@ -12,24 +12,24 @@ use fewbits_numerics::error::{entries, non_negative, within};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// How samples travel: evenly spaced levels, `step` noise standard deviations apart.
+/// Code of a sample: evenly spaced levels, `step` noise standard deviations apart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SampleCode {
-    /// Bits of a sample.
+    /// Bits per sample.
     pub bits: u32,
     /// Spacing of the levels in noise standard deviations.
     pub step: f64,
 }
 
-/// Levels below zero, in parts of all levels: samples scatter around zero far from the source.
+/// Share of the levels that are below zero: far from the source samples scatter around zero.
 const BELOW: f64 = 1.0 / 16.0;
 
-/// How beliefs and records are encoded. Positions of nodes are known everywhere: a node travels as its index.
+/// How beliefs and records are encoded. All nodes know the positions of all nodes, so a node is sent as its index.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Wire {
-    /// Numbers of a belief.
+    /// Format of the numbers of a belief.
     pub numbers: NumberFormat,
-    /// Samples of raw records: quantised, or double precision.
+    /// Code of the samples of raw records; `None` for double precision.
     pub samples: Option<SampleCode>,
     /// Bits of a node's index.
     pub index_bits: u32,
@@ -64,7 +64,7 @@ impl Wire {
         }
     }
 
-    /// The record as it arrives: samples rounded, their noise widened by that of rounding, `step^2 / 12`.
+    /// The record as the receiver decodes it: samples rounded, and `step^2 / 12` added to the noise variance for the rounding.
     ///
     /// # Errors
     /// As [`Wire::sample_format`].
@@ -90,28 +90,28 @@ pub enum Packet {
     Belief(PackedBelief),
 }
 
-/// A belief as it travels.
+/// A belief as numbers, before encoding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PackedBelief {
     /// Number of components.
     pub components: usize,
-    /// Degree of the polynomials, for polynomial Gaussians.
+    /// Degree of the polynomials; `None` for a mixture.
     pub degree: Option<usize>,
     /// Whether the rate is the third coordinate.
     pub with_rate: bool,
-    /// Weights (all but the last), means, lower Cholesky factors, coefficients.
+    /// Weights (of a mixture, all but the first), means and lower Cholesky factors, coefficients.
     pub numbers: Vec<f64>,
-    /// The sum of squared residuals so far, in single precision.
+    /// Sum of squared residuals so far, rounded to single precision.
     pub chi_squared: f64,
-    /// The samples in that sum.
+    /// Number of samples in that sum.
     pub samples: usize,
 }
 
-/// Components and degrees fit into this many bits.
+/// Bits of the number of components, and of the degree.
 const COUNT_BITS: u32 = 5;
-/// The most records of a message.
+/// Bits of the number of records of a message.
 const RECORD_COUNT_BITS: u32 = 10;
-/// Samples of all nodes so far fit into this many bits; more are sent as the most.
+/// Bits of the number of samples so far; a larger number is sent as the largest.
 const SAMPLE_COUNT_BITS: u32 = 16;
 
 impl Packet {
@@ -138,7 +138,7 @@ impl Packet {
             degree,
             with_rate: matches!(belief, Travelling::WithRate(_)),
             numbers: round(numbers)?,
-            // A sum beyond single precision is refused as well as the largest number is.
+            // A sum beyond single precision is sent as the largest number: both lead to refusal.
             chi_squared: NumberFormat::Single.rounded(fit.chi_squared.min(f64::from(f32::MAX)))?,
             samples: fit.samples.min((1 << SAMPLE_COUNT_BITS) - 1),
         }))
@@ -147,7 +147,7 @@ impl Packet {
     /// The belief that a packet of numbers holds, and the fit so far; `None` for raw records.
     ///
     /// # Errors
-    /// If the numbers are no belief.
+    /// If the numbers are not a valid belief.
     pub fn belief(&self) -> Result<Option<(Travelling, Fit)>, Error> {
         let Self::Belief(packed) = self else { return Ok(None) };
         let belief = if packed.with_rate {
@@ -166,11 +166,11 @@ impl Packet {
 /// Format that both ends of a link agree on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contract {
-    /// The encoding.
+    /// Encoding of beliefs and records.
     pub wire: Wire,
     /// Standard deviation of the sensors' noise.
     pub noise: f64,
-    /// Samples a node takes.
+    /// Number of samples per node.
     pub samples: usize,
 }
 
@@ -195,6 +195,7 @@ impl Message for Packet {
             Self::Belief(belief) => {
                 writer.write_bit(true);
                 writer.write(belief.components as u64, COUNT_BITS)?;
+                // 31 stands for a mixture without polynomials.
                 writer.write(belief.degree.map_or(31, |d| d as u64), COUNT_BITS)?;
                 writer.write_bit(belief.with_rate);
                 for number in &belief.numbers {

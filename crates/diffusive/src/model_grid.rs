@@ -1,9 +1,9 @@
-//! Several models of the medium, of which one is right: winds or diffusivities on a small grid.
+//! Several models of the medium, of which one is right: for example winds or diffusivities on a small grid.
 
 use crate::{Error, SourceSensor};
 use fewbits_numerics::error::{entries, probabilities, refuse};
 
-/// Sensors in several models of the medium, with the models' prior probabilities.
+/// One sensor model per model of the medium, with the models' prior probabilities.
 ///
 /// ```
 /// use fewbits_diffusive::{ModelGrid, SourceSensor};
@@ -26,7 +26,7 @@ pub struct ModelGrid {
 }
 
 impl ModelGrid {
-    /// The models of the given prior probabilities. The sensors differ in the model of the medium (and what follows from it), and
+    /// The models with the prior probabilities `weights`. The sensors may differ in the model of the medium and what follows from it, but
     /// sample at the same instants.
     ///
     /// # Errors

@@ -8,10 +8,10 @@ use crate::{Error, SourceLikelihood};
 use fewbits_core::{Belief, Gaussian};
 use nalgebra::{Vector2, Vector3};
 
-/// Posterior over cells, with the rate given each cell where it is unknown and carried.
+/// Posterior over cells. If the rate is unknown and part of the belief, it has the rate's moments in each cell.
 #[derive(Debug, Clone)]
 pub struct Posterior {
-    /// The position.
+    /// The posterior of the position.
     pub cells: Cells<2>,
     /// Mean and variance of the rate in each cell.
     pub rates: Option<(Vec<f64>, Vec<f64>)>,
@@ -24,11 +24,11 @@ const WIDE: usize = 90;
 const NARROW: usize = 44;
 
 impl Posterior {
-    /// Multiplies a prior by the likelihood of records and covers the product with cells. `near` is a box that is known to hold
-    /// the posterior, such as the cells of the step before.
+    /// Multiplies a prior by the likelihood of records and covers the product with cells. `near` is a box that is known to contain
+    /// the posterior, for example the cells of the step before.
     ///
     /// # Errors
-    /// As [`Cells::cover`]; a belief that excludes the records is [`Error::Impossible`].
+    /// As [`Cells::cover`]; [`Error::Impossible`] if the records have probability zero under the belief.
     pub fn new(
         prior: &Prior,
         likelihood: &SourceLikelihood,
@@ -36,6 +36,7 @@ impl Posterior {
         near: Option<SearchBox>,
         options: &CellOptions,
     ) -> Result<Self, Error> {
+        // Region of the first cells: the whole search box at first, later the surroundings of the received belief.
         let (around, per_axis) = match (prior, near) {
             (Prior::Exact(_), None) => (*search, WIDE),
             (Prior::Exact(_), Some(near)) => (near, NARROW),
@@ -71,7 +72,7 @@ impl Posterior {
         clumps.with_least_variances(Vector2::new(least, least))
     }
 
-    /// Position and rate as clumps; a known rate has no spread.
+    /// Position and rate as clumps. If the rate is known, its variance is zero.
     ///
     /// # Errors
     /// If `count` is zero.
@@ -90,13 +91,13 @@ impl Posterior {
         clumps.with_least_variances(Vector3::new(least, least, 0.0))
     }
 
-    /// The square of half a cell: the evidence of a narrower ridge would not have settled, and under no Gaussian this wide are sums
-    /// over cells more than 3 per cent above integrals.
+    /// The square of half a cell. A narrower ridge would not have let the evidence converge. For Gaussians at least this wide, sums
+    /// over cells exceed integrals by at most 3 per cent.
     fn least_variance(&self) -> f64 {
         0.25 * self.cells.width() * self.cells.width()
     }
 
-    /// Share of the mass within a cell or two standard deviations of the border of the search box: a source outside shows here.
+    /// Share of the mass within one cell or two standard deviations of the border of the search box. It is large if the source is outside.
     pub fn mass_at_border(&self, search: &SearchBox) -> f64 {
         let [x, y] = self.cells.columns();
         let edge = self
@@ -112,7 +113,7 @@ impl Posterior {
             .sum()
     }
 
-    /// The box of the cells with a margin, within which the next posterior lies if all records stay in use.
+    /// The box of the cells with a margin. It contains the next posterior if all records stay in use.
     pub fn around(&self, search: &SearchBox) -> SearchBox {
         let (lower, upper) = self.cells.bounds();
         let margin = |d: usize| 0.1 * (upper[d] - lower[d]) + 4.0 * self.cells.width();

@@ -1,4 +1,4 @@
-//! From an exact posterior to what travels on.
+//! Approximation of the exact posterior by the belief that is sent to the next node.
 
 use crate::belief::{JointBelief, PositionBelief};
 use crate::density::LpgFit;
@@ -11,32 +11,32 @@ use fewbits_densities::{Component, Mixture, systematic};
 use fewbits_numerics::error::{at_least_one, refuse};
 use serde::{Deserialize, Serialize};
 
-/// Clumps that a mixture is fitted to.
+/// Number of clumps that a mixture is fitted to.
 const CLUMPS: usize = 200;
-/// Widening of the Gaussians under polynomial Gaussians: their tails must reach beyond the posterior's.
+/// Factor of the covariances of the Gaussians of [`Form::Lpg`]: their tails must extend beyond the posterior's.
 const LPG_WIDENING: f64 = 1.3;
 
 /// Form of the messages between nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Form {
-    /// The samples of every node visited: nothing is lost.
+    /// The samples of every node visited. Nothing is lost.
     Raw,
-    /// Mean and covariance.
+    /// A Gaussian: mean and covariance.
     Gaussian,
-    /// A Gaussian mixture of at most so many components.
+    /// A Gaussian mixture of at most this many components.
     Mixture(usize),
-    /// Polynomial Gaussians.
+    /// Gaussians times polynomials ([`Lpg`]).
     Lpg {
-        /// The most components.
+        /// Largest number of components.
         components: usize,
         /// Highest degree of the polynomials.
         degree: usize,
     },
-    /// Equally weighted points under one Gaussian kernel.
+    /// This many equally weighted points with one Gaussian kernel.
     Particles(usize),
-    /// Mode and inverse curvature, with mean and covariance instead where there is no peak. Reports convergence in the wrong place
-    /// when it starts from a ring; here to show it.
+    /// Mode and inverse curvature, or mean and covariance if there is no peak. If it starts from a ring, the search converges to a wrong
+    /// place; the form exists to show that.
     Laplace,
 }
 
@@ -57,7 +57,7 @@ impl Form {
         Ok(())
     }
 
-    /// Numbers that one message of this form holds, apart from raw records.
+    /// How many numbers one message of this form has; `None` for raw records.
     pub fn scalars(&self, rate: &RateModel) -> Option<usize> {
         let carried = matches!(rate, RateModel::Joint(_));
         match *self {
@@ -99,10 +99,10 @@ impl Travelling {
     }
 }
 
-/// Approximates a posterior by what travels on. Raw records are not projected: `None`.
+/// Approximates a posterior by a belief of the given form. `None` for raw records, which are not projected.
 ///
 /// # Errors
-/// If the posterior has no spread in some direction.
+/// If the covariance of the posterior is singular.
 pub fn project(posterior: &Posterior, form: Form, rate: &RateModel) -> Result<Option<Travelling>, Error> {
     let carried = matches!(rate, RateModel::Joint(_));
     let components = match form {
@@ -143,7 +143,7 @@ fn lpg(posterior: &Posterior, components: usize, degree: usize, rate: &RateModel
     Ok(Travelling::Position(PositionBelief::Lpg(fit.belief)))
 }
 
-/// Polynomial Gaussians about the components of a mixture, widened; about fewer where these are too much alike.
+/// Polynomial Gaussians about the widened components of a mixture. If these are nearly linearly dependent, it uses fewer.
 fn about_components<const D: usize>(
     clumps: &Clumps<D>,
     components: usize,
@@ -163,8 +163,8 @@ fn about_components<const D: usize>(
     })
 }
 
-/// Points at equal steps of the cumulative weight along the cells' order, under a Gaussian kernel of the normal-reference width;
-/// points are drawn in towards the mean, so that the covariance is kept.
+/// Points at equal steps of the cumulative weight in the order of the cells, with a Gaussian kernel of the normal-reference width. The
+/// points are moved towards the mean, so that the covariance is unchanged.
 fn particles(posterior: &Posterior, count: usize) -> Result<Travelling, Error> {
     let clumps = posterior.clumps(count)?;
     let g = posterior.gaussian();

@@ -1,4 +1,4 @@
-//! The release rate, known or integrated out.
+//! The release rate: known, or integrated out.
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative, positive, within};
@@ -6,7 +6,7 @@ use fewbits_numerics::kernels;
 use fewbits_numerics::normal::{LN_SQRT_2PI, log_interval, truncated_moments};
 use serde::{Deserialize, Serialize};
 
-/// Largest rate, and largest sample and response over the noise: products of their squares are finite.
+/// Largest rate, and largest sample and response in units of the noise: products of their squares are then finite.
 const LARGEST: f64 = 1e60;
 
 /// A uniform prior of the release rate, kg/s.
@@ -21,7 +21,7 @@ impl RateRange {
     /// Rates between `low` and `high`, kg/s.
     ///
     /// # Errors
-    /// If `low` is negative, or `high` is not above it or beyond 1e60.
+    /// If `low` is negative, or `high` is not above `low` or exceeds 1e60.
     pub fn new(low: f64, high: f64) -> Result<Self, ArgumentError> {
         non_negative("low", low)?;
         within("high", high, 0.0, LARGEST)?;
@@ -66,12 +66,12 @@ impl From<RateRange> for (f64, f64) {
 pub enum RateModel {
     /// The rate is known, kg/s.
     Known(f64),
-    /// One unknown rate for all nodes: the truth, and the default.
+    /// One unknown rate for all nodes: the correct model, and the default.
     Joint(RateRange),
-    /// A new unknown rate for every node: independent nodes, too wide a belief.
+    /// A new unknown rate for every node: nodes are independent, and the belief is too wide.
     NodeWise(RateRange),
-    /// A new unknown rate for every sample, equations (13) and (18) of the paper with the sign of (13) mended. Inconsistent: it
-    /// pushes the source as far away as the largest rate allows.
+    /// A new unknown rate for every sample: equations (13) and (18) of the paper, the sign in (13) corrected. Inconsistent: the estimate
+    /// moves as far away as the largest rate allows.
     SampleWise(RateRange),
 }
 
@@ -85,7 +85,7 @@ impl RateModel {
         }
     }
 
-    /// The rates that are possible; both ends are the known one.
+    /// The range of the possible rates. For a known rate both ends are equal.
     fn range(&self) -> RateRange {
         match self {
             Self::Known(rate) => RateRange {
@@ -101,13 +101,13 @@ impl RateModel {
         self.range().high
     }
 
-    /// A rate to start from.
+    /// A rate to start an iteration from.
     pub(crate) fn typical(&self) -> f64 {
         self.range().middle()
     }
 
-    /// `ln p(samples | position)` of samples that share one rate, less the logarithm of the standard normal's share between the two
-    /// numbers, if they cut anything off.
+    /// `ln p(samples | position)` of samples that share one rate, without the term `ln(Phi(b) - Phi(a))` of the truncation to the range.
+    /// The second value is `(a, b)`; `None` if the truncation removes nothing.
     #[inline]
     pub(crate) fn log_uncut(&self, sums: &RateSums) -> (f64, Option<(f64, f64)>) {
         match self {
@@ -139,13 +139,13 @@ pub struct RateSums {
     pub log_noise: f64,
 }
 
-/// Beyond this many standard deviations on both sides nothing is cut off.
+/// A normal truncated at this many standard deviations or more on both sides counts as untruncated.
 const UNCUT: f64 = 8.5;
-/// A response below this (times the square of the largest rate) says nothing about the rate.
+/// If the response times the square of the largest rate is below this, the samples do not depend on the rate.
 const SILENT: f64 = 1e-12;
 
 impl RateSums {
-    /// The sums of samples `y` (without bias) and responses `a` under noise of standard deviation `noise`.
+    /// The sums of samples `y` (bias subtracted) and responses `a` with noise of standard deviation `noise`.
     ///
     /// # Errors
     /// If the lengths differ or are zero, `noise` is not positive, or a sample or response is not finite or beyond 1e60 `noise`.
@@ -173,7 +173,7 @@ impl RateSums {
         Ok(sums)
     }
 
-    /// The sums of both.
+    /// The sums of both together.
     pub fn plus(&self, other: &Self) -> Self {
         Self {
             response: self.response + other.response,
@@ -183,7 +183,7 @@ impl RateSums {
         }
     }
 
-    /// The sums with a share of the information, and the full normalisation of the noise.
+    /// The sums with only the share `share` of the information; the normalisation of the noise is unchanged.
     #[inline]
     pub(crate) fn discounted(&self, share: f64) -> Self {
         Self {
@@ -201,16 +201,16 @@ impl RateSums {
     }
 
     /// `ln p(samples | position)` with one rate, uniform over the range, integrated out:
-    /// `-(C - B^2/A)/2 + ln sqrt(2 pi / A) - ln(high - low) + ln[Phi((high - B/A) sqrt A) - Phi((low - B/A) sqrt A)]`. Of a single
-    /// sample it is equation (13) of the paper with its distribution functions in the right order.
+    /// `-(C - B^2/A)/2 + ln sqrt(2 pi / A) - ln(high - low) + ln[Phi((high - B/A) sqrt A) - Phi((low - B/A) sqrt A)]`. For a single
+    /// sample it is equation (13) of the paper with its distribution functions in the correct order.
     #[inline]
     pub fn log_marginal(&self, range: &RateRange) -> f64 {
         let (log, cut) = self.log_uncut(range);
         log + cut.map_or(0.0, |(from, to)| log_interval(from, to))
     }
 
-    /// [`log_marginal`](Self::log_marginal) less the logarithm of the standard normal's share between the two numbers, if they
-    /// cut anything off.
+    /// [`log_marginal`](Self::log_marginal) without the term `ln(Phi(b) - Phi(a))`, and `(a, b)` as in
+    /// [`RateModel::log_uncut`].
     #[inline]
     fn log_uncut(&self, range: &RateRange) -> (f64, Option<(f64, f64)>) {
         let (a, b) = (self.response, self.correlation);
@@ -230,7 +230,7 @@ impl RateSums {
         (self.energy - mean * (2.0 * self.correlation - mean * self.response) + variance * self.response).max(0.0)
     }
 
-    /// Mean and variance of the rate given the position: `N(B/A, 1/A)` cut to the range.
+    /// Mean and variance of the rate given the position: `N(B/A, 1/A)` truncated to the range.
     pub fn rate_given_position(&self, range: &RateRange) -> (f64, f64) {
         if self.response * range.high * range.high < SILENT {
             return uniform(range);
@@ -244,7 +244,7 @@ fn uniform(range: &RateRange) -> (f64, f64) {
     (range.middle(), width * width / 12.0)
 }
 
-/// Mean and variance of `N(mean, variance)` cut to a range.
+/// Mean and variance of `N(mean, variance)` truncated to a range.
 #[inline]
 pub(crate) fn cut_normal(mean: f64, variance: f64, range: &RateRange) -> (f64, f64) {
     let deviation = variance.sqrt();
@@ -258,7 +258,7 @@ pub(crate) fn cut_normal(mean: f64, variance: f64, range: &RateRange) -> (f64, f
     }
 }
 
-/// The ends of a range in standard deviations of `N(mean, variance)`, if they cut anything off.
+/// The ends of a range in standard deviations of `N(mean, variance)`; `None` if the truncation removes nothing.
 #[inline]
 pub(crate) fn ends_about(mean: f64, variance: f64, range: &RateRange) -> Option<(f64, f64)> {
     let deviation = variance.sqrt();
@@ -270,7 +270,7 @@ fn ends(from: f64, to: f64) -> Option<(f64, f64)> {
     (from >= -UNCUT || to <= UNCUT).then_some((from, to))
 }
 
-/// Intervals whose logarithms are still to be added to numbers of a list: collected, they are computed in one sweep.
+/// Terms `ln(Phi(b) - Phi(a))` that are to be added to entries of a list. They are collected and evaluated together.
 #[derive(Debug, Default)]
 pub(crate) struct Intervals {
     place: Vec<usize>,
@@ -279,7 +279,7 @@ pub(crate) struct Intervals {
 }
 
 impl Intervals {
-    /// Notes that `ln(Phi(to) - Phi(from))` belongs to the number at `place`, if anything is cut off.
+    /// Records that `ln(Phi(to) - Phi(from))` belongs to the entry `place`; nothing for `None`.
     #[inline]
     pub(crate) fn push(&mut self, place: usize, cut: Option<(f64, f64)>) {
         if let Some((from, to)) = cut {
@@ -289,7 +289,7 @@ impl Intervals {
         }
     }
 
-    /// Adds what was noted, and forgets it.
+    /// Adds the recorded terms to `numbers` and clears the list.
     pub(crate) fn add_to(&mut self, numbers: &mut [f64]) {
         kernels::log_interval(&mut self.from, &self.to);
         for (place, log) in self.place.iter().zip(&self.from) {

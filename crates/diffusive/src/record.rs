@@ -1,4 +1,4 @@
-//! The samples of one node, with tabulated responses for quick likelihoods.
+//! The samples of one node, with tabulated responses for fast likelihoods.
 
 use crate::rate::RateSums;
 use crate::{Error, SourceSensor};
@@ -8,26 +8,26 @@ use fewbits_numerics::error::{all_finite, entries, positive};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::Vector2;
 
-/// More panels than this are not tabulated.
+/// A table with more panels than this is not made.
 const MOST_PANELS: f64 = 2000.0;
-/// Panels of a finer table.
+/// Number of panels of a finer table.
 const PANELS: f64 = 32.0;
-/// The finest panels are this share of the widest. Heights below a hundred-thousandth of a diffusion length bend nothing that is
-/// above the rounding of the widest panels.
+/// Smallest width of a panel as a share of the widest. Height differences below 1e-5 of a diffusion length change the responses by less
+/// than the rounding of the widest panels.
 const MOST_HALVINGS: f64 = 1e-5;
-/// Instants whose concentrations are asked for together.
+/// Number of instants whose concentrations are computed together.
 const TOGETHER: usize = 16;
 
-/// The samples of one node, bias removed, with what is needed to say how likely they are for each position of the source.
+/// The samples of one node, bias subtracted, with what the likelihood of a source position needs.
 ///
-/// Where nothing changes along the ground, the responses depend on the horizontal distance alone, times
-/// `exp((v . d - V rho) / 2 kappa)` with wind. The sums over the instants are then tabulated over the distance once: every look-up
-/// costs two polynomials however many samples there are. Other models are asked for every position.
+/// In a medium that is homogeneous along the ground, the responses depend only on the horizontal distance; with wind they have the
+/// further factor `exp((v . d - V rho) / 2 kappa)`. The sums over the instants are then tabulated over the distance once. A look-up
+/// costs two polynomials for any number of samples. Other models are evaluated at every position.
 #[derive(Debug, Clone)]
 pub struct Record {
     sensor: SourceSensor,
-    /// The receptor that the model is asked about, and where its coordinates begin. Where nothing changes along the ground the
-    /// sensor is at the origin: offsets keep their digits.
+    /// The receptor of the model, and the origin of its coordinates. In a homogeneous medium the sensor is at the origin, so that
+    /// small offsets keep their digits.
     receptor: Receptor,
     origin: Vector2<f64>,
     node: Vector2<f64>,
@@ -35,7 +35,7 @@ pub struct Record {
     noise: f64,
     energy: f64,
     log_noise: f64,
-    /// Set if nothing changes along the ground.
+    /// Tables; only in a homogeneous medium.
     along: Option<Along>,
 }
 
@@ -43,14 +43,15 @@ pub struct Record {
 #[derive(Debug, Clone, PartialEq)]
 struct Along {
     wind: Vector2<f64>,
-    /// `wind` is not zero.
+    /// Whether there is wind.
     tilted: bool,
     diffusivity: f64,
     closest: f64,
-    /// `r^2 sum f_j^2 / sigma^2` and `r sum f_j y_j / sigma^2` straight downwind over the horizontal distance, with `r` the distance
-    /// in space; by finer to coarser tables: each serves where the one before has ended.
+    /// `r^2 sum f_j^2 / sigma^2` and `r sum f_j y_j / sigma^2` downwind, as functions of the horizontal distance; `r` is the distance
+    /// in space. From finer to coarser tables: each begins where the one before ends.
     tables: Vec<Profile<2>>,
-    /// Largest `|y|` (at least the noise), and largest `|y| 2 / (4 kappa t)`, both over the noise: how fast the response changes.
+    /// Largest `|y|` (at least the noise) and largest `2 |y| / (4 kappa t)`, both divided by the noise: they bound how fast
+    /// the response changes.
     steepness: [f64; 2],
     /// Wind speed over diffusivity, 1/m.
     drift: f64,
@@ -78,6 +79,7 @@ impl Record {
         positive("noise", noise)?;
         let homogeneous = sensor.homogeneous();
         let receptor = sensor.receptor(node)?;
+        // In a homogeneous model only the offset from the node matters: the receptor moves to the origin.
         let (receptor, origin) = match homogeneous {
             Some(_) => (sensor.receptor(&Vector2::zeros())?, *node),
             None => (receptor, Vector2::zeros()),
@@ -121,7 +123,7 @@ impl Record {
     }
 
     fn tabulate(&self, homogeneous: &Homogeneous) -> Result<Vec<Profile<2>>, Error> {
-        // A quarter of the shortest diffusion length.
+        // Widest panels: a quarter of the shortest diffusion length.
         let widest = 0.25 * (4.0 * homogeneous.diffusivity * self.sensor.shortest_age()).sqrt();
         if self.sensor.reach() / widest > MOST_PANELS {
             return Ok(Vec::new());
@@ -129,7 +131,7 @@ impl Record {
         let downwind = homogeneous.wind.try_normalize(0.0).unwrap_or_else(Vector2::x);
         let table = |end: f64, width: f64| {
             Profile::new(end, width, |distance| {
-                // With a height between them sensor and source are never closest: a kink would spoil the first panel.
+                // With a height difference the lower limit `closest` is not needed, and its kink would spoil the first panel.
                 let apart = self.sensor.height_difference() > 0.0;
                 let rho = if apart {
                     distance
@@ -141,14 +143,14 @@ impl Record {
                 [r * r * a, r * b]
             })
         };
-        // Source and image lie at these heights from the sensor: the responses bend over such distances.
+        // Heights of source and image relative to the sensor: the responses vary over such distances.
         let heights = [
             self.sensor.height_difference(),
             self.sensor.source_height() + self.sensor.sensor_height(),
         ];
         let least = heights.into_iter().filter(|h| *h > 0.0).fold(f64::INFINITY, f64::min);
         let (mut tables, mut width) = (Vec::new(), (0.25 * least).max(MOST_HALVINGS * widest));
-        // Beyond some panels of a width the distance itself is the scale: wider panels serve.
+        // Beyond some panels of one width the distance itself is the scale: use wider panels.
         while width < widest && PANELS * width < self.sensor.reach() {
             tables.push(table(PANELS * width, width)?);
             width *= 2.0;
@@ -167,7 +169,7 @@ impl Record {
         &self.samples
     }
 
-    /// Standard deviation of their noise, kg/m^3.
+    /// Standard deviation of the samples' noise, kg/m^3.
     pub fn noise(&self) -> f64 {
         self.noise
     }
@@ -177,7 +179,7 @@ impl Record {
         &self.sensor
     }
 
-    /// The sums that say how likely the samples are with the source at `position`.
+    /// The sums for the likelihood of the samples, with the source at `position`.
     #[inline]
     pub fn sums(&self, position: &Vector2<f64>) -> RateSums {
         let [response, correlation] = match &self.along {
@@ -241,8 +243,8 @@ impl Record {
         [a, b]
     }
 
-    /// The sums, and by which share the information of the samples is discounted over a cell of the given half width: the noise
-    /// variance is raised by the square of the change of the response across the cell. `rate` is the largest that is possible.
+    /// The sums, and the share of the samples' information that is kept for a cell of the given half width: the square of the change of
+    /// the response across the cell is added to the noise variance. `rate` is the largest possible one.
     #[inline]
     pub(crate) fn blurred_sums(&self, position: &Vector2<f64>, half_width: f64, rate: f64) -> (RateSums, f64) {
         let Some(along) = &self.along else {

@@ -1,4 +1,4 @@
-//! Which node is asked next.
+//! Choice of the next node.
 
 use crate::density::{Clump, Clumps};
 use crate::information::{Predictions, half_log_det_plus_one, information_at};
@@ -13,30 +13,30 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum SelectionRule {
-    /// The largest mutual information of samples and (position, rate), by its Gaussian bound `(1/2) ln det(I + Cov / sigma^2)`.
+    /// The largest mutual information between samples and (position, rate), by its Gaussian bound `(1/2) ln det(I + Cov / sigma^2)`.
     #[default]
     MutualInformation,
-    /// The largest pairwise lower bound of the same information. Ranks better than the Gaussian bound where the belief has several
-    /// peaks, at some twenty times the cost of the samples' covariance.
+    /// The largest pairwise lower bound of that information. If the belief has several peaks, it ranks nodes better than the Gaussian
+    /// bound, at about twenty times the cost.
     PairwiseInformation,
-    /// The largest mutual information by quadrature, over fewer points: tens of milliseconds for each candidate.
+    /// The largest mutual information by quadrature, over fewer points. It takes tens of milliseconds per candidate.
     ExactInformation,
-    /// The smallest posterior Cramer-Rao bound (equations 40 to 44, conditional on the belief): the expected Fisher information is
-    /// added to that of the belief, and the rate eliminated by a Schur complement afterwards.
+    /// The smallest posterior Cramer-Rao bound (equations 40 to 44, conditional on the belief). The expected Fisher information is
+    /// added to that of the belief; then the rate is eliminated by a Schur complement.
     CramerRao,
-    /// The smallest Mahalanobis distance to the estimate (equation 45). Can lock on nodes that tell nothing new.
+    /// The smallest Mahalanobis distance to the estimate (equation 45). It can repeatedly choose nodes that bring no new information.
     Mahalanobis,
-    /// The smallest determinant of the covariance after samples that the estimate predicts.
+    /// The smallest determinant of the covariance after the samples that the estimate predicts.
     Covariance,
 }
 
-/// Clumps that stand for the belief, and for the quadrature.
+/// Number of clumps that represent the belief.
 const CLUMPS: usize = 96;
 const FEW_CLUMPS: usize = 48;
-/// A clump whose rate moves the samples by more than this share of the noise variance becomes two points.
+/// If the uncertainty of the rate moves a clump's samples by more than this share of the noise variance, the clump becomes two points.
 const SPLIT: f64 = 0.05;
 
-/// A belief, ready to score candidates.
+/// A belief, prepared for scoring candidates.
 #[derive(Debug, Clone)]
 pub struct Selector {
     rule: SelectionRule,
@@ -46,7 +46,7 @@ pub struct Selector {
 }
 
 impl Selector {
-    /// A selector for a posterior and the Gaussian that summarises what travels on.
+    /// A selector for a posterior and the Gaussian of the belief that is sent on.
     ///
     /// # Errors
     /// If the covariance of the estimate is singular.
@@ -69,7 +69,7 @@ impl Selector {
         })
     }
 
-    /// The best of the candidates, the first among equals; `None` of none.
+    /// The candidate of highest score, the first in a tie; `None` if there is no candidate.
     pub fn best(&self, sensor: &SourceSensor, candidates: &[(usize, Vector2<f64>)]) -> Option<usize> {
         let mut best: Option<(f64, usize)> = None;
         for (index, node) in candidates {
@@ -81,7 +81,7 @@ impl Selector {
         best.map(|(_, index)| index)
     }
 
-    /// How good a node is: the larger the better. `-inf` where the model has no concentrations.
+    /// Score of a node; larger is better. `-inf` if the model has no concentrations there.
     pub fn score(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
         let Ok(receptor) = sensor.receptor(node) else {
             return f64::NEG_INFINITY;
@@ -113,7 +113,7 @@ impl Selector {
         half_log_det_plus_one(second)
     }
 
-    /// The samples that clumps predict; a clump of uncertain rate is two points, one deviation on either side.
+    /// The samples that the clumps predict. A clump with an uncertain rate gives two points, one standard deviation on either side.
     fn predictions(&self, sensor: &SourceSensor, receptor: &Receptor) -> Predictions {
         let (mut means, mut weights) = (Vec::new(), Vec::new());
         for clump in self.clumps.clumps() {
@@ -132,7 +132,7 @@ impl Selector {
         Predictions::in_units_of_noise(&means, weights)
     }
 
-    /// Responses in units of the noise.
+    /// Predicted responses divided by the noise.
     fn predicted(&self, sensor: &SourceSensor, receptor: &Receptor, source: &Vector2<f64>) -> DVector<f64> {
         DVector::from_vec(sensor.responses_at(receptor, source)) / sensor.noise()
     }

@@ -9,16 +9,16 @@ use rand_distr::StandardNormal;
 use std::fmt::{Debug, Formatter};
 use std::sync::Arc;
 
-/// The sensors of a network, all of one kind, and the medium between them and the source:
+/// The sensors of a network, all alike, and the medium between them and the source:
 /// `y_j = mu a_j(theta) + bias + e_j`, `e_j ~ N(0, sigma^2)`, with `a_j` the concentration per unit rate at instant `t_j`.
 ///
-/// Sensors and source stand at known heights; the position searched for is horizontal. The model says how the substance spreads:
-/// [`Air`](fewbits_models::diffusion::Air) has closed forms, any other [`SourceModel`] serves as well. Clones share it.
+/// Sensors and source are at known heights; the unknown position is horizontal. The model describes how the substance spreads:
+/// [`Air`](fewbits_models::diffusion::Air) has closed forms; any other [`SourceModel`] may be used. Clones share it.
 #[derive(Clone)]
 pub struct SourceSensor {
     model: Arc<dyn SourceModel + Send + Sync>,
     instants: Vec<f64>,
-    /// `instants` less `start`.
+    /// Seconds from `start` to each of `instants`.
     ages: Vec<f64>,
     start: f64,
     noise: f64,
@@ -37,8 +37,8 @@ impl Debug for SourceSensor {
 }
 
 impl SourceSensor {
-    /// Sensors on the ground that sample at the given instants (s) with noise of the given standard deviation (kg/m^3); a source
-    /// on the ground that began at time 0, no bias.
+    /// Sensors on the ground that sample at the given instants (s) with noise of the given standard deviation (kg/m^3). The source is
+    /// on the ground and began to release at time 0; there is no bias.
     ///
     /// # Errors
     /// If there is no instant, one is not finite or none is after 0, or `noise` is not a positive number.
@@ -60,7 +60,7 @@ impl SourceSensor {
         sensor.with_start(0.0)
     }
 
-    /// With a known bias, kg/m^3.
+    /// The same sensors with a known bias, kg/m^3.
     ///
     /// # Errors
     /// If it is not finite.
@@ -69,7 +69,7 @@ impl SourceSensor {
         Ok(Self { bias, ..self })
     }
 
-    /// With a release that began at `start`, s.
+    /// The same sensors with a release that began at `start`, s.
     ///
     /// # Errors
     /// If it is not finite, or no instant of sampling is after it.
@@ -82,7 +82,7 @@ impl SourceSensor {
         Ok(Self { ages, start, ..self })
     }
 
-    /// With source and sensors at the given heights, m.
+    /// The same sensors with source and sensors at the given heights above the ground, m.
     ///
     /// # Errors
     /// If one is negative or not finite.
@@ -96,7 +96,7 @@ impl SourceSensor {
         })
     }
 
-    /// With responses tabulated up to `reach` metres from a sensor (250 unless told); beyond, the model is evaluated. Without
+    /// Sets the distance up to which responses are tabulated, m (250 by default); beyond it the model is evaluated. It has no
     /// effect on a model that is not [`Homogeneous`].
     ///
     /// # Errors
@@ -192,7 +192,7 @@ impl SourceSensor {
         out
     }
 
-    /// The response at instant `j` and its gradient with respect to the position of the source; at no instant zero.
+    /// The response at instant `j` and its gradient with respect to the position of the source; zero if there is no such instant.
     pub(crate) fn response_gradient_at(&self, j: usize, receptor: &Receptor, source: &Vector2<f64>) -> SourceGradient {
         let age = self.ages.get(j).copied().unwrap_or(0.0);
         self.model.source_gradient(receptor, &self.source_at(source), age)
@@ -206,7 +206,7 @@ impl SourceSensor {
         Ok(self.responses_at(&self.receptor(node)?, source))
     }
 
-    /// Draws what a node samples of a source that releases at `rate`, kg/s.
+    /// Draws the samples of a node, kg/m^3, with a source at `source` that releases at `rate`, kg/s.
     ///
     /// # Errors
     /// As [`receptor`](Self::receptor).

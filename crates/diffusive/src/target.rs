@@ -1,4 +1,4 @@
-//! A belief times the likelihood of records, cell by cell.
+//! The product of a belief and the likelihood of records, evaluated on cells.
 
 use crate::belief::{JointBelief, PositionBelief, Prior};
 use crate::density::{CellTarget, Cells, Slice};
@@ -8,7 +8,7 @@ use fewbits_core::Columns;
 use fewbits_numerics::{LogSum, kernels::largest, normal::log_interval};
 use nalgebra::{Matrix2, Vector2};
 
-/// A Gaussian over the plane, ready to be blurred over cells of any width.
+/// A Gaussian over the plane, prepared for averages over cells of any width.
 #[derive(Debug, Clone, Copy)]
 struct Lobe {
     log_scale: f64,
@@ -28,7 +28,7 @@ impl Lobe {
         }
     }
 
-    /// Log density, the variances raised if another precision than its own is given.
+    /// Log density at `offset` from the mean, with its own precision or that of raised variances.
     #[inline]
     fn log_at(&self, precision: &[f64; 3], offset: &Vector2<f64>) -> f64 {
         self.log_scale - 0.5 * quadratic(precision, offset)
@@ -47,7 +47,7 @@ fn quadratic(p: &[f64; 3], d: &Vector2<f64>) -> f64 {
     p[0] * d.x * d.x + 2.0 * p[1] * d.x * d.y + p[2] * d.y * d.y
 }
 
-/// The rate given the position, in one lobe of a belief over both.
+/// The rate given the position, in one Gaussian of a belief over both.
 #[derive(Debug, Clone, Copy)]
 struct Conditional {
     mean: f64,
@@ -87,7 +87,7 @@ impl<'a> Target<'a> {
                     let lobe = Lobe::new(c.weight(), Vector2::new(c.mean()[0], c.mean()[1]), position);
                     let p = lobe.precision;
                     let gain = Vector2::new(p[0] * cross.x + p[1] * cross.y, p[1] * cross.x + p[2] * cross.y);
-                    // A Cholesky factor exists, so that the Schur complement is positive; rounding may bring it to zero.
+                    // The Schur complement is positive; rounding may make it zero or negative.
                     let variance = (s[(2, 2)] - gain.dot(&cross)).max(1e-14 * s[(2, 2)]);
                     lobes.push(lobe);
                     conditionals.push(Conditional {
@@ -106,11 +106,11 @@ impl<'a> Target<'a> {
         })
     }
 
-    /// Expected squared distance of the position from the nearest Gaussian of a mixture that was received, in its deviations, and the
-    /// number of coordinates: how far these samples move the belief. Nothing for other priors.
+    /// Expected squared distance of the position from the nearest Gaussian of a received mixture, in its standard deviations, and the
+    /// number of coordinates. It measures how far these samples move the belief. Zero for other priors.
     ///
-    /// If the belief and the model are right, the position is one draw of the mixture: the distance from its own Gaussian is
-    /// chi-squared with two degrees of freedom, and the nearest is no farther.
+    /// If belief and model are right, the position is a draw of the mixture. Its squared distance from its own Gaussian is then
+    /// chi-squared with two degrees of freedom, and the nearest Gaussian is at most as far.
     pub(crate) fn conflict(&self, cells: &Cells<2>) -> (f64, usize) {
         if matches!(self.prior, Prior::Exact(_)) || self.lobes.is_empty() {
             return (0.0, 0);
@@ -129,7 +129,7 @@ impl<'a> Target<'a> {
         (sum, 2)
     }
 
-    /// Mean and variance of the rate at every cell, where it is unknown and shared, and the expected sum of squared residuals over
+    /// Mean and variance of the rate in every cell, if it is unknown and shared, and the expected sum of squared residuals over
     /// the noise variance.
     pub(crate) fn rates_and_fit(&self, cells: &Cells<2>) -> (Option<RateMoments>, f64) {
         let [x, y] = cells.columns();
@@ -166,7 +166,7 @@ impl<'a> Target<'a> {
             let d = at - lobe.mean;
             let log = lobe.log_at(&lobe.precision, &d);
             let (evidence, mean, variance) = updated(given, &d, [sums.response, sums.correlation, sums.energy]);
-            // The evidence is at most zero, and the cut takes more off.
+            // The evidence is at most zero, and truncation only lowers it: this lobe cannot matter.
             if log + evidence < best - FAINT {
                 continue;
             }
@@ -198,8 +198,8 @@ impl<'a> Target<'a> {
     }
 }
 
-/// Log evidence of sums `[A, B, C]` under a Gaussian rate (without the constant of the cut prior and of the noise, and without
-/// what the cut takes off), and the updated mean and variance.
+/// Log evidence of the sums `[A, B, C]` under a Gaussian rate, and the updated mean and variance. The constants of truncation and noise
+/// and the effect of truncation are left out.
 #[inline]
 fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3]) -> (f64, f64, f64) {
     let (m, v) = (given.mean + given.gain.dot(d), given.variance);
@@ -211,7 +211,7 @@ fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3]) -> (f64, 
     (log, mean, variance)
 }
 
-/// Cells of a run: their numbers stay in the nearest caches.
+/// Number of cells that are processed together: their numbers fit into the fastest caches.
 const RUN: usize = 1024;
 
 impl CellTarget<2> for Target<'_> {
@@ -222,7 +222,7 @@ impl CellTarget<2> for Target<'_> {
             .iter()
             .map(|l| [l.precision, precision(&l.covariance, extra)])
             .collect();
-        // Cells that score far below the best so far will be dropped: their log density need not be exact.
+        // Cells that score far below the best so far will be dropped: their exact log density is not needed.
         let mut floor = f64::NEG_INFINITY;
         let mut scratch = Vec::new();
         let walls = self.likelihood.has_walls();
@@ -262,13 +262,13 @@ impl CellTarget<2> for Target<'_> {
     }
 }
 
-/// Cells this far below the best, in nats, are dropped by any cover; their mass is nothing.
+/// Cells this many nats below the best are dropped by every cover; their mass is negligible.
 const DROPPED: f64 = 26.0;
-/// Lobes this far below another, in nats, do not count.
+/// Lobes this many nats below another are negligible.
 const FAINT: f64 = 30.0;
 
 impl Target<'_> {
-    /// Excludes cells in which no source can be, and centres at which none can be.
+    /// Sets cells in which no source can be, and centres at which none can be, to probability zero.
     fn exclude_walls(&self, centres: &[&[f64]; 2], half: f64, logs: &mut [f64], scores: &mut [f64]) {
         for (i, (log, score)) in logs.iter_mut().zip(scores).enumerate() {
             let at = Vector2::new(centres[0][i], centres[1][i]);
@@ -316,6 +316,7 @@ impl Target<'_> {
                 }
             }
         };
+        // Scores with likelihoods widened to the size of a cell decide which cells are worth the exact value.
         evaluate(&all, 1, &blurred, scores);
         let floor = floor.max(largest(scores) - log_noise - DROPPED);
         scores.iter_mut().for_each(|score| *score -= log_noise);
@@ -325,8 +326,8 @@ impl Target<'_> {
         kept.iter().for_each(|i| logs[*i] -= log_noise);
     }
 
-    /// Writes `ln sum over lobes` of the chosen cells to `out`: of every cell the nearest lobe first, then those that can still
-    /// matter beside it. Cuts of the rate are computed in sweeps.
+    /// Writes `ln sum over lobes` of the chosen cells to `out`. For every cell the nearest lobe is evaluated first, then those that are not
+    /// negligible beside it. Truncation terms of the rate are evaluated together.
     fn log_sums(
         &self,
         cells: &[usize],
@@ -354,7 +355,7 @@ impl Target<'_> {
             first.push(term(best, &(x - self.lobes[best].mean), *cell, place, &mut intervals));
         }
         intervals.add_to(&mut first);
-        // The evidence is at most zero: lobes that cannot matter are not evaluated.
+        // The evidence is at most zero: lobes that are then negligible are not evaluated.
         let (mut others, mut terms) = (Vec::new(), Vec::new());
         for (place, cell) in cells.iter().enumerate() {
             let x = at(*cell);
@@ -382,7 +383,7 @@ impl Target<'_> {
     }
 }
 
-/// Log density of a mixture and of the same blurred.
+/// Log density of a mixture, and that of its average over the cell.
 #[inline]
 fn log_mixture(lobes: &[Lobe], precisions: &[[[f64; 3]; 2]], at: &Vector2<f64>) -> (f64, f64) {
     let mut results = [LogSum::default(), LogSum::default()];

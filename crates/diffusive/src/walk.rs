@@ -1,4 +1,4 @@
-//! The chain of a search over a network: what travels from node to node.
+//! The search as a protocol between nodes.
 
 use crate::message::{Contract, Packet};
 use crate::{Form, Outcome, Search, SourceSensor, Status};
@@ -10,8 +10,8 @@ use fewbits_protocol::{BoxError, Lead, Leader};
 use fewbits_topology::{Deployment, Graph};
 use std::cell::Cell;
 
-/// The chain of [`Search`] with raw records: whoever receives them repeats the search so far, adds its own, and asks the next
-/// node.
+/// [`Search`] with raw records as a protocol. The node that receives the records repeats the search so far, adds its own samples, and
+/// sends all to the next node.
 #[derive(Debug, Clone)]
 pub struct SourceChain {
     search: Search,
@@ -22,10 +22,10 @@ pub struct SourceChain {
 }
 
 impl SourceChain {
-    /// A chain over a deployment; `samples` has what each node samples when it is asked.
+    /// A chain over a deployment. `samples` has one list per node: what the node measures when it is asked, kg/m^3.
     ///
     /// # Errors
-    /// If there is not one list of samples for each node, or what travels is not raw records.
+    /// If there is not one list of samples per node, or the form of the search is not [`Form::Raw`].
     pub fn new(
         search: Search,
         sensor: SourceSensor,
@@ -49,7 +49,7 @@ impl SourceChain {
         })
     }
 
-    /// The search from its first node over `known` records, and which node it would ask after them.
+    /// Repeats the search over the `known` records. Returns its outcome and the node that it asks next.
     fn repeat(&self, known: &[(usize, Vec<f64>)]) -> Result<(Outcome, Option<usize>), BoxError> {
         let first = known.first().map_or(0, |(node, _)| *node);
         let run = |most: usize, asked: &Cell<Option<usize>>| {
@@ -60,7 +60,7 @@ impl SourceChain {
                     Some((_, samples)) => samples.clone(),
                     None => {
                         asked.set(Some(node));
-                        // Whoever it is will sample itself; here it only matters that it was asked.
+                        // The samples of the node that is asked do not matter here: it only counts which node it is.
                         self.samples.get(first).cloned().unwrap_or_default()
                     }
                 })
@@ -96,6 +96,7 @@ impl Leader for SourceChain {
         let own = self.samples.get(node as usize);
         let own = own.ok_or_else(|| format!("node {node} has no samples in slot {slot}"))?;
         known.push((node as usize, own.clone()));
+        // Raw records lose nothing, so the search is repeated from its beginning.
         let (outcome, next) = self.repeat(&known)?;
         let estimate = outcome.estimate().ok_or("the step gave no estimate")?;
         Ok(Lead {

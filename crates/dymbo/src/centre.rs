@@ -1,6 +1,5 @@
-//! The filters at a fusion centre over bits: [`Estimator`]s, which [`OverBits`](fewbits_protocol::OverBits) makes receivers.
-//!
-//! The sensors' half is [`SchemeNode`](fewbits_core::SchemeNode) of the filter's scheme.
+//! [`Estimator`]s of the scalar one-bit filters. [`OverBits`](fewbits_protocol::OverBits) turns them into fusion centres that
+//! receive frames of bits. The sensors' half is [`SchemeNode`](fewbits_core::SchemeNode) of the filter's scheme.
 
 use crate::filter::ScalarFilter;
 use crate::parallel::ParallelFilter;
@@ -11,13 +10,13 @@ use fewbits_protocol::{BoxError, Estimator, moments};
 /// One sensor under a [`ScalarFilter`]: one bit per sample, or several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScalarEstimator<F> {
-    /// The filter, with what it knows of the link.
+    /// The filter. It knows the link's loss and crossover.
     pub filter: F,
-    /// What is known before the first slot.
+    /// Prior belief of the state, before the first slot.
     pub start: Gaussian<1>,
 }
 
-/// What both estimators share: a Gaussian belief of a scalar, in double precision on its way.
+/// The parts of [`Estimator`] that both estimators implement alike: the belief is a scalar Gaussian and is sent in double precision.
 macro_rules! scalar_belief {
     () => {
         type Belief = Gaussian<1>;
@@ -74,7 +73,7 @@ impl<F: ScalarFilter> Estimator for ScalarEstimator<F> {
     }
 }
 
-/// `K` one-bit sensors that are told one threshold: [`ParallelFilter`]. Each sensor's half is that of [`scheme`](Self::scheme).
+/// `K` one-bit sensors that are sent the same threshold, under a [`ParallelFilter`]. Each sensor runs [`scheme`](Self::scheme).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParallelEstimator {
     filter: ParallelFilter,
@@ -83,7 +82,7 @@ pub struct ParallelEstimator {
 }
 
 impl ParallelEstimator {
-    /// The filter, with what it knows of the links, and what is known before the first slot.
+    /// The estimator with `filter` and the prior belief `start` of the state.
     ///
     /// # Errors
     /// None for a plant that [`ParallelFilter`] accepted.
@@ -92,7 +91,7 @@ impl ParallelEstimator {
         Ok(Self { filter, scheme, start })
     }
 
-    /// What each sensor does.
+    /// The scheme of every sensor: one sign bit per sample.
     pub fn scheme(&self) -> SignBit {
         self.scheme
     }
@@ -115,7 +114,8 @@ impl Estimator for ParallelEstimator {
         Ok(predicted.mean()[0])
     }
 
-    /// A sensor without observation counts as [`Observation::Lost`]: these sensors always speak, so that it says nothing of the state.
+    /// A sensor without an entry counts as [`Observation::Lost`]: these sensors send a bit in every slot, so a missing one tells nothing
+    /// about the state.
     fn update(
         &self,
         _: u64,

@@ -17,29 +17,29 @@ use std::f64::consts::LN_2;
 pub struct StepInfo {
     /// Predicted mean and variance, before the observation.
     pub predicted: Gaussian<1>,
-    /// Correction of the estimate.
+    /// Change of the estimate, in state units.
     pub correction: f64,
     /// `ln p(observation | past)`, the increment of the log-likelihood of the data.
     pub log_likelihood: f64,
-    /// Fraction of the variance reduction of the unquantized measurement that the observation brought. Negative where it
-    /// raised the variance, as a surprising bit through a noisy link may.
+    /// Variance reduction divided by that of the unquantized measurement. Negative if the observation raised the variance, as an
+    /// unlikely bit from a noisy link may.
     pub information: f64,
-    /// Bits received.
+    /// Number of bits received in this step.
     pub bits: u32,
 }
 
-/// A filter whose sensors are asked about its own prediction: what a closed loop needs of it.
+/// A scalar filter that broadcasts its prediction, or what follows from it, and receives reports relative to it.
 pub trait ScalarFilter {
-    /// What its sensors do.
+    /// The sensor's scheme: how a sample becomes a report.
     type Scheme: Scheme<1, State = (), Factor = Scalar>;
 
     /// The plant.
     fn plant(&self) -> &ScalarPlant;
 
-    /// What is known of the link.
+    /// The link's probabilities of loss and of inversion that the filter assumes.
     fn link(&self) -> &Link;
 
-    /// The sensor's half.
+    /// The sensor's scheme, as the filter assumes it.
     fn scheme(&self) -> Self::Scheme;
 
     /// Mean fraction of a full measurement's information that a report brings when it arrives.
@@ -48,25 +48,25 @@ pub trait ScalarFilter {
     /// What to broadcast, given a predicted belief.
     fn feedback(&self, predicted: &Gaussian<1>) -> <Self::Scheme as Scheme<1>>::Feedback;
 
-    /// Corrects a predicted belief with what was observed of a sensor that was sent its [`feedback`](Self::feedback).
-    /// Call it once per sensor, the feedback refreshed each time, where several report one after the other.
+    /// Corrects a predicted belief with the observation of a sensor that was sent [`feedback`](Self::feedback) of this belief. If
+    /// several sensors report one after the other, call it once per sensor and compute the feedback anew for each.
     ///
     /// # Errors
-    /// [`Error::Impossible`] for nothing from a link that loses nothing, or if the estimate overflows.
+    /// [`Error::Impossible`] if nothing arrived although the link loses nothing, or if the estimate overflows.
     fn update(
         &self,
         predicted: &Gaussian<1>,
         observation: &Observation<<Self::Scheme as Scheme<1>>::Report>,
     ) -> Result<(Gaussian<1>, StepInfo), Error>;
 
-    /// Time update.
+    /// The belief one slot later, before any observation.
     #[inline]
     fn predict(&self, belief: &Gaussian<1>) -> Gaussian<1> {
         self.plant().predict(belief)
     }
 
-    /// One slot: predict, then correct with what was observed. Both ends must know of a report that was lost, or what they
-    /// compute drifts apart.
+    /// One slot: predict, then correct with the observation. If sensor and centre both run the filter, both must know which reports were
+    /// lost; otherwise their beliefs diverge.
     ///
     /// # Errors
     /// As [`ScalarFilter::update`].
@@ -97,7 +97,7 @@ pub trait ScalarFilter {
     }
 }
 
-/// The filter at the fusion centre.
+/// The fusion centre's filter for one sign bit per sample.
 ///
 /// ```text
 /// predict   mean = a mean,  P = a^2 P + sigma_u^2
@@ -107,9 +107,9 @@ pub trait ScalarFilter {
 ///           P = P (sigma^2 + (1 - 2/pi) P)/(P + sigma^2)
 /// ```
 ///
-/// It is the assumed-density filter of a [`SignBit`] at the prediction, in closed form. The variance does not depend on the
-/// bits. The correction has the same size for both: its square is the variance that the bit removed, at every step. Over a
-/// link of crossover `eps` the correction shrinks by `1 - 2 eps`, the information by its square.
+/// It is the assumed-density filter of a [`SignBit`] with the threshold at the prediction, in closed form. The variance does not
+/// depend on the bits. The square of the correction equals the variance that the bit removes. Over a link of crossover `eps` the
+/// correction is multiplied by `1 - 2 eps`, and the removed variance by its square.
 ///
 /// ```
 /// use fewbits_core::{Gaussian, Observation, Sign};
@@ -139,23 +139,22 @@ impl DymboFilter {
         }
     }
 
-    /// The same for another link.
+    /// The same filter for a link with loss or crossover.
     #[must_use]
     pub fn with_link(self, link: Link) -> Self {
         Self { link, ..self }
     }
 
-    /// The threshold to broadcast for the next sample, given the present belief: the prediction.
+    /// The threshold to broadcast for the next sample, given the present filtered belief: the predicted mean.
     #[inline]
     pub fn threshold(&self, belief: &Gaussian<1>) -> f64 {
         self.plant.coefficient() * belief.mean()[0]
     }
 
-    /// Size of the correction when every bit arrives and the variance has settled. At `a = 1` over a link that inverts no bit
-    /// it is `sigma_u`.
+    /// Size of the correction at the steady variance, if every bit arrives. At `a = 1` over a link that inverts no bit it is `sigma_u`.
     ///
     /// # Errors
-    /// If the variance has no finite steady state, or leaves the range of numbers.
+    /// If the variance has no finite steady state, or the correction overflows.
     pub fn steady_step(&self) -> Result<f64, Error> {
         Ok(finite("steady step", self.gain(self.plant.steady_state(self.information())?.predicted_variance))?)
     }
@@ -201,7 +200,7 @@ impl ScalarFilter for DymboFilter {
             return without_report(predicted, observation, &self.link);
         };
         let p = predicted.covariance()[0];
-        // Both bits are equally likely at the prediction, whatever the crossover.
+        // With the threshold at the prediction both bits have probability 1/2, for any crossover.
         let log_likelihood = -LN_2 + self.link.arrival().ln();
         let report = Report {
             correction: bit.value() * self.gain(p),
@@ -214,7 +213,7 @@ impl ScalarFilter for DymboFilter {
     }
 }
 
-/// What a received report says.
+/// The effect of one received report on the belief.
 pub(crate) struct Report {
     pub(crate) correction: f64,
     pub(crate) variance: f64,
@@ -224,7 +223,7 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// The corrected belief, if its numbers are numbers.
+    /// The corrected belief; impossible if a number is not finite.
     #[inline]
     pub(crate) fn correct(self, predicted: &Gaussian<1>) -> Result<(Gaussian<1>, StepInfo), Error> {
         let mean = predicted.mean()[0] + self.correction;
@@ -242,7 +241,7 @@ impl Report {
     }
 }
 
-/// What an observation without a report leaves: the prediction.
+/// The result of an observation without a report (lost or nothing): the prediction, and the probability that nothing arrived.
 pub(crate) fn without_report<R>(
     predicted: &Gaussian<1>,
     observation: &Observation<R>,

@@ -1,4 +1,4 @@
-//! How the filter starts without a belief: from a finely rounded first sample, and perhaps a prior.
+//! How the filter starts without a belief: the first sample is sent finely rounded, and a prior may be combined with it.
 
 use crate::Error;
 use crate::plant::scalar;
@@ -10,7 +10,7 @@ use fewbits_numerics::stored;
 use nalgebra::Vector1;
 use serde::{Deserialize, Serialize};
 
-/// The first message: which multiple of the resolution is nearest.
+/// The first message: the integer multiple of the resolution that is nearest to the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Multiple(pub i64);
@@ -63,14 +63,14 @@ stored! { RoundedSample as Numbers |scheme| {
     bits: u32 = scheme.bits,
 } => RoundedSample::new(noise_variance, resolution)?.with_bits(bits), Error }
 
-/// Longest word whose cells are enumerated, as a link that inverts bits asks for.
+/// Largest word length whose cells are enumerated. A link that inverts bits needs the likelihood of every cell.
 const LONGEST_NOISY: u32 = 12;
 
 impl RoundedSample {
     /// A sensor with measurement variance `sigma^2 > 0`, resolution `tau > 0` in measurement units and words of 16 bits.
     ///
     /// # Errors
-    /// If one is not positive.
+    /// If either is not positive and finite.
     pub fn new(noise_variance: f64, resolution: f64) -> Result<Self, Error> {
         Ok(Self {
             noise_variance: positive("noise_variance", noise_variance)?,
@@ -82,23 +82,23 @@ impl RoundedSample {
     /// The same with words of 1 to 32 bits.
     ///
     /// # Errors
-    /// Any other word length.
+    /// If `bits` is outside `1..=32`.
     pub fn with_bits(self, bits: u32) -> Result<Self, Error> {
         within("bits", f64::from(bits), 1.0, 32.0)?;
         Ok(Self { bits, ..self })
     }
 
-    /// `tau`.
+    /// Resolution `tau`, in measurement units.
     pub fn resolution(&self) -> f64 {
         self.resolution
     }
 
-    /// Word length: the format of the reports.
+    /// Word length in bits, which is the format of the reports.
     pub fn bits(&self) -> u32 {
         self.bits
     }
 
-    /// Smallest and largest multiple.
+    /// Smallest and largest multiple that the word can hold.
     fn range(&self) -> (i64, i64) {
         let half = 1_i64 << (self.bits - 1);
         (-half, half - 1)
@@ -114,13 +114,13 @@ impl RoundedSample {
         Ok(Multiple(multiple.clamp(least, most)))
     }
 
-    /// The value that a multiple stands for.
+    /// The reconstructed sample: the multiple times `tau`.
     #[inline]
     pub fn value(&self, multiple: Multiple) -> f64 {
         self.resolution * multiple.0 as f64
     }
 
-    /// The cell of samples that a multiple stands for.
+    /// The interval of samples that are rounded to this multiple.
     ///
     /// # Errors
     /// If the multiple does not fit the word, or is so large that neighbouring cells coincide.
@@ -141,21 +141,21 @@ impl RoundedSample {
 
     /// The belief about the state after a first message and no other knowledge: `theta_hat(0) = m(0)`, variance `sigma^2 + tau^2/12`.
     ///
-    /// The bound of Proposition 2, `(sigma + tau/2)^2`, is no variance to start from: it is up to twice too large and makes
-    /// the filter over-cautious (erratum `dymbo-7`).
+    /// The bound of Proposition 2, `(sigma + tau/2)^2`, must not serve as the start variance: it is up to twice too large, and the
+    /// filter's first gains are then too large (erratum `dymbo-7`).
     ///
     /// # Errors
-    /// If mean or variance leave the range of numbers.
+    /// If mean or variance overflow.
     pub fn belief(&self, message: Multiple) -> Result<Gaussian<1>, Error> {
         let variance = self.noise_variance + self.resolution * self.resolution / 12.0;
         Ok(scalar(finite("message", self.value(message))?, finite("resolution^2", variance)?))
     }
 
-    /// The belief after a first message that meets a prior for `theta(0)`. Where the prior is real information, this is far better than
-    /// [`belief`](Self::belief): at `a = 0.9`, `gamma = 0.05` the message alone is worse than the prior alone.
+    /// The belief after a first message combined with a prior for `theta(0)`. If the prior is informative, this is far better than
+    /// [`belief`](Self::belief): at `a = 0.9`, `gamma = 0.05` the message alone has a larger error than the prior alone.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if message and prior exclude each other to the last digit.
+    /// [`Error::Impossible`] if the message has probability zero under the prior.
     pub fn belief_with_prior(&self, message: Multiple, prior: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
         let factor = self.meaning_of(&(), &Observation::Received(message), &Link::PERFECT)?;
         let posterior = factor.tilted(prior)?;
@@ -178,7 +178,7 @@ impl Memoryless<1> for RoundedSample {
         Ok(Some(self.round(measurement[0])?))
     }
 
-    /// Over a link that inverts bits, words of up to 12 bits.
+    /// Over a link that inverts bits only words of up to 12 bits are accepted.
     fn meaning_of(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, Error> {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
@@ -193,6 +193,7 @@ impl Memoryless<1> for RoundedSample {
         }
         let (least, most) = self.range();
         let edges = (least..most).map(|k| self.resolution * (k as f64 + 0.5)).collect();
+        // Two's complement of `bits` bits, as the words travel.
         let mask = (1_u64 << self.bits) - 1;
         let word = |k: i64| k as u64 & mask;
         let sent = |k: i64| arrives * link.word_probability(word(k), word(multiple.0), self.bits);
@@ -200,21 +201,21 @@ impl Memoryless<1> for RoundedSample {
     }
 }
 
-/// What a fine first message brings on average, and what it costs.
+/// Expected variance after a first message, and the message's entropy.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FirstMessageValue {
-    /// `E var(theta(0) | m(0))` in state units squared.
+    /// `E var(theta(0) | m(0))`, the mean posterior variance in state units squared.
     pub expected_variance: f64,
-    /// Entropy of the message in bits, the price of an ideal code for it.
+    /// Entropy of the message in bits: the mean length of an ideal code for it.
     pub entropy_bits: f64,
 }
 
 /// Cells are counted out to this many standard deviations of the sample; the rest has probability below 1e-32.
 const REACH: f64 = 12.0;
-/// More cells than this are not a first message but a measurement.
+/// Limit on the number of cells that are summed.
 const MOST_CELLS: f64 = 1e6;
 
-/// Averages the prior-aware first message over all messages.
+/// Averages [`RoundedSample::belief_with_prior`] over all messages that the prior can cause.
 ///
 /// # Errors
 /// If more than a million cells are within reach of the prior.
@@ -238,11 +239,11 @@ pub fn first_message_value(scheme: &RoundedSample, prior: &Gaussian<1>) -> Resul
     Ok(value)
 }
 
-/// Below this ratio of resolution to the sample's standard deviation the Fourier series of the error converges fast.
+/// Below this ratio of the resolution to the sample's standard deviation the Fourier series of the error is used; nine terms suffice.
 const SERIES_RATIO: f64 = 6.0;
 
-/// Exact `E (m(0) - theta)^2` of a fine first message over `theta ~ N(mean, variance)`; variance 0 fixes `theta = mean`. The
-/// word must be long enough for the sample.
+/// Exact `E (m(0) - theta)^2` of a first message for `theta ~ N(mean, variance)`. With variance 0 the state is `mean`. The word is
+/// assumed to be long enough for the sample: saturation is ignored.
 ///
 /// With `q_k = exp(-2 pi^2 k^2 (sigma^2 + variance)/tau^2)` it is
 /// `sigma^2 + tau^2/12 + sum_k (-1)^k cos(2 pi k mean/tau) q_k [4 sigma^2 + tau^2/(pi k)^2]`, largest at `mean = tau/2`. Coarse
@@ -262,7 +263,7 @@ pub fn first_message_mse(scheme: &RoundedSample, theta: &Gaussian<1>) -> f64 {
         // At the largest ratio the ninth term has decayed to exp(-44).
         return r + tau * tau / 12.0 + (1..=9).map(term).sum::<f64>();
     }
-    // theta given x is normal around mean + rho (x - mean) with variance rho r; average the rest over each cell.
+    // Given the sample x, theta is normal with mean `mean + rho (x - mean)` and variance rho r. Sum over the cells of x.
     let rho = spread / total;
     let deviation = total.sqrt();
     let reach = REACH * deviation + tau;

@@ -1,4 +1,4 @@
-//! A scalar filter beside the exact posterior of the same reports, on simulated runs: what a better estimator could gain.
+//! A scalar filter and the exact posterior of the same reports, on simulated runs. The difference bounds what a better estimator gains.
 
 use crate::{Error, ScalarFilter, ScalarPlant};
 use fewbits_core::{Belief, Dynamics, Factor, Gaussian, Observation, Scheme, Sensing};
@@ -9,10 +9,10 @@ use std::f64::consts::FRAC_2_PI;
 
 /// Grid spacing as a share of the smaller noise deviation.
 const SPACING: f64 = 0.4;
-/// Deviations that the grid covers.
+/// Half width of the grid in standard deviations of the state.
 const REACH: f64 = 8.5;
 
-/// The exact filter of a plant, on a grid wide enough for runs of `steps` from the steady variance of one-bit filters.
+/// The exact filter of a plant, on a grid that is wide enough for runs of `steps` slots from the steady variance of one-bit filters.
 ///
 /// # Errors
 /// If the plant is unstable, or its process noise too small for a grid.
@@ -27,7 +27,7 @@ pub fn exact_filter(plant: &ScalarPlant, steps: usize) -> Result<PointMassFilter
     PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(REACH * widest.sqrt(), spacing)?)
 }
 
-/// One simulated run: the state, the filter's belief and the exact density given the same reports.
+/// One simulated run: the true state, the filter's belief, and the exact density given the same reports.
 #[derive(Debug, Clone)]
 pub struct Twin<'a, F> {
     filter: F,
@@ -40,7 +40,7 @@ pub struct Twin<'a, F> {
 }
 
 impl<'a, F: ScalarFilter> Twin<'a, F> {
-    /// A run that starts from a normal belief of the filter's steady variance, the state drawn from it.
+    /// A run that starts from `N(0, V)`, `V` the filter's steady filtered variance. The state is drawn from it.
     ///
     /// # Errors
     /// If the filter has no steady state.
@@ -59,7 +59,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
         })
     }
 
-    /// Moves the state, sends a report through the filter's link, and lets both fuse it.
+    /// One slot: moves the state, sends a report through the filter's link, and updates the filter's belief and the exact density with it.
     ///
     /// # Errors
     /// If the exact density leaves its grid.
@@ -91,13 +91,14 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
         &self.density
     }
 
-    /// Squared distance of the filter's estimate from the exact posterior mean: what it adds to the minimum error.
+    /// Squared difference between the filter's estimate and the exact posterior mean. Its mean is the filter's excess over the minimum
+    /// mean squared error.
     pub fn excess(&self) -> f64 {
         (self.belief.mean()[0] - self.density.mean()).powi(2)
     }
 
-    /// Mean of [`Twin::excess`] over `measured` steps, after `burn` steps in which the start is forgotten: one draw of the
-    /// steady gap to the exact posterior.
+    /// Mean of [`Twin::excess`] over `measured` slots, after `burn` slots that are not counted: one random estimate of the filter's
+    /// steady excess.
     ///
     /// # Errors
     /// As [`Twin::step`].
@@ -111,8 +112,8 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
         Ok(sum / measured as f64)
     }
 
-    /// Follows the run on and smooths `anchors` states, `stride` steps apart, from each of the `lags`: the mean of the exact
-    /// smoother's variance, and of the squared distance of the Rauch-Tung-Striebel estimate from the exact smoothed mean.
+    /// Continues the run and smooths `anchors` states, `stride` slots apart, with each of the `lags` (slots). Per lag: the mean of the
+    /// exact smoother's variance, and the mean squared difference between the Rauch-Tung-Striebel estimate and the exact smoothed mean.
     ///
     /// # Errors
     /// As [`Twin::step`].
@@ -141,6 +142,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
             for (gap, lag) in gaps.iter_mut().zip(lags) {
                 let now = then + lag;
                 let mut estimate = beliefs[now];
+                // Backward pass of the smoother from `now` to `then`, over the stored filter beliefs.
                 for belief in beliefs[then..now].iter().rev() {
                     estimate = smooth_step(self.filter.plant().dynamics(), belief, &estimate)?;
                 }
@@ -153,13 +155,13 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
     }
 }
 
-/// One draw of the steady gap of the fixed-lag smoother to the exact one.
+/// Averages of [`Twin::smoothed`] for one lag.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct SmoothedGap {
     /// Variance of the exact smoother: its mean squared error.
     pub exact_variance: f64,
-    /// Squared distance of the smoothed estimates: what Rauch-Tung-Striebel smoothing adds.
+    /// Mean squared difference of the smoothed estimates: the excess of Rauch-Tung-Striebel smoothing.
     pub excess: f64,
 }
 

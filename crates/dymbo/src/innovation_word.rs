@@ -1,4 +1,4 @@
-//! Several bits a sample: the cell of the normalised innovation.
+//! Several bits per sample: the index of the quantizer cell of the normalised innovation.
 
 use crate::Error;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
@@ -24,7 +24,7 @@ pub struct Prediction {
     pub deviation: f64,
 }
 
-/// Of the predicted measurement, noise included.
+/// The prediction of the measurement from a belief of the measurement: mean and standard deviation. The noise must be included.
 impl From<&Gaussian<1>> for Prediction {
     fn from(measurement: &Gaussian<1>) -> Self {
         Self {
@@ -98,7 +98,7 @@ impl InnovationWord {
         })
     }
 
-    /// Word length: the format of the reports.
+    /// Word length in bits, which is the format of the reports.
     pub fn bits(&self) -> u32 {
         self.bits
     }
@@ -122,14 +122,14 @@ impl InnovationWord {
     /// The cell of a word, in measurement units around a prediction.
     ///
     /// # Errors
-    /// If the index is beyond the last cell, the prediction is none, or is so large that rounding closes the cell.
+    /// If the index is beyond the last cell, the prediction is not a valid one, or its mean is so large that the cell's ends coincide.
     pub fn cell(&self, index: CellIndex, prediction: &Prediction) -> Result<Cell, ArgumentError> {
         let (edges, at) = (self.edges(prediction)?, self.index(index)?);
         let lower = if at == 0 { f64::NEG_INFINITY } else { edges[at - 1] };
         Cell::new(lower, edges.get(at).copied().unwrap_or(f64::INFINITY))
     }
 
-    /// The place of a word in the quantizer's tables.
+    /// The word as an index into the quantizer's tables; an error beyond the last cell.
     pub(crate) fn index(&self, index: CellIndex) -> Result<usize, ArgumentError> {
         let at = usize::from(index.0);
         if at < self.quantizer.centroids().len() {

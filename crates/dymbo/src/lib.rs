@@ -1,29 +1,28 @@
-//! Kalman-like filters fed with one sign bit a sample.
+//! Kalman-like filters that receive one sign bit per sample.
 //!
-//! A sensor that may send a single bit is asked the one question whose answer says most: *is your sample above what we
-//! expect it to be?* The fusion centre broadcasts its prediction, the sensor answers with a sign, and the estimate moves by
-//! a fixed step in that direction. The posterior is nearly normal, so two numbers describe it, and the recursion is a Kalman
-//! filter in which the information of a measurement is multiplied by `2/pi` (Ribeiro, Giannakis and Roumeliotis call it the
-//! sign-of-innovations filter; here it is Dymbo).
+//! The fusion centre broadcasts its prediction of the next sample. The sensor answers with one bit: is the sample at or above the
+//! prediction? The estimate then moves by a known step in that direction. The posterior is nearly normal, so a mean and a variance
+//! describe it. The recursion is a Kalman filter in which the information of a measurement is multiplied by `2/pi`. Ribeiro, Giannakis
+//! and Roumeliotis call it the sign-of-innovations filter; the paper that this crate follows calls it Dymbo.
 //!
-//! The central choice is to keep **two numbers and closed forms**: no particle, no grid, no table at run time, and variances
-//! that do not depend on the data. Its cost is that the belief is the normal density of the right moments and not the exact
-//! posterior; [`chain`] and [`tree`] compute exactly what that costs (0.02 % of the mean squared error where the paper looks,
-//! 0.14 % at worst for `|a| <= 1`, `gamma <= 1`), so nothing better is worth building from the same bits.
+//! The filters keep **a mean and a variance and use closed forms**: no particles, no grid, no table. The variances do not depend on
+//! the data. The cost: the belief is a normal density with the posterior's moments, not the exact posterior. [`chain`] and [`tree`]
+//! compute what that adds to the mean squared error: 0.02 % for the paper's parameters, at most 0.14 % for `|a| <= 1`, `gamma <= 1`. A
+//! better estimator from the same bits can gain no more.
 //!
 //! | task | item |
 //! |---|---|
 //! | the sensors' schemes | [`SignBit`] (any threshold), [`InnovationWord`], [`RoundedSample`] |
 //! | the filter, one bit | [`DymboFilter`] |
-//! | more bits, more sensors, vectors | [`MultibitFilter`], [`ParallelFilter`], [`SignFilter`] |
-//! | a closed loop in one call | [`ScalarFilter::exchange`] |
-//! | what to expect | [`steady`] (closed forms, loss, contours), [`chain`] and [`tree`] (exact errors), [`gap`] (beside the exact posterior) |
+//! | several bits per sample, several sensors, vector states | [`MultibitFilter`], [`ParallelFilter`], [`SignFilter`] |
+//! | one slot of sensor, link and filter in one call | [`ScalarFilter::exchange`] |
+//! | expected errors | [`steady`] (closed forms, contours), [`chain`] and [`tree`] (exact errors), [`gap`] (beside the exact posterior) |
 //! | comparisons of the publications: how normal the posterior is, successive bits of one sample | [`published`] |
 //!
-//! What a report says is a [`Factor`](fewbits_core::Factor), whatever the threshold and the [`Link`](fewbits_core::Link):
-//! `fewbits_filters::assumed_density::update` turns it into the moments of any Gaussian belief, and the filters here are its
-//! closed forms. Reports known to be lost are [`Observation::Lost`](fewbits_core::Observation::Lost). Smoothing is that of
-//! `fewbits_filters`, applied to the beliefs of any filter here.
+//! The likelihood of a report is a [`Factor`](fewbits_core::Factor), for any threshold and any [`Link`](fewbits_core::Link).
+//! `fewbits_filters::assumed_density::update` applies it to a Gaussian belief; the filters here are closed forms of that update. A
+//! report that is known to be lost is [`Observation::Lost`](fewbits_core::Observation::Lost). For smoothing, apply the smoothers of
+//! `fewbits_filters` to the beliefs of any filter here.
 //!
 //! ```
 //! use fewbits_core::{Observation, Sign};
@@ -43,7 +42,7 @@
 //! # Ok::<(), fewbits_dymbo::Error>(())
 //! ```
 //!
-//! Not here: energy (`fewbits-network`), the true state, any choice of which sensor reports.
+//! Not here: energy and radio (`fewbits-network`), and the choice of which sensor reports (`fewbits-sensor-assignment`).
 
 mod centre;
 pub mod chain;

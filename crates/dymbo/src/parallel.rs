@@ -1,8 +1,9 @@
-//! Several one-bit sensors in one slot, all at the same threshold.
+//! Several one-bit sensors that answer the same threshold in one slot.
 //!
-//! Refreshing the threshold after each bit is better and needs nothing new: predict once, then
-//! [`ScalarFilter::update`](crate::ScalarFilter::update) for each sensor. The filter here serves sensors that must answer at the
-//! same time. They share one prediction error, so their bits are correlated and the number of `+1` is sufficient.
+//! If the sensors can answer one after the other, do not use this filter: predict once, then call
+//! [`ScalarFilter::update`](crate::ScalarFilter::update) for each sensor with a refreshed threshold, which is more accurate. This
+//! filter is for sensors that must answer at the same time. They share one prediction error, so their bits are correlated, and the
+//! number of `+1` is a sufficient statistic.
 
 use crate::filter::{Report, StepInfo};
 use crate::plant::{innovation_gain, scalar};
@@ -21,19 +22,19 @@ use std::f64::consts::FRAC_2_PI;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CountFusion {
-    /// The best linear function of the bits, from the arcsine law of their correlation. Cheap; it saturates as sensors are
-    /// added, at a variance of `P (1 - rho/asin rho)` with `rho = P/(P + sigma^2)`.
+    /// The best linear function of the bits; the arcsine law gives their correlation. Cheap. With many sensors its variance does
+    /// not fall below `P (1 - rho/asin rho)`, `rho = P/(P + sigma^2)`.
     #[default]
     Linear,
-    /// Posterior mean and variance given the very bits: the assumed-density update with the product of their factors. Better
-    /// by 2.6 % at ten sensors.
+    /// Posterior mean and variance given the bits: the assumed-density update with the product of their factors. At ten sensors
+    /// its error is 2.6 % smaller.
     Exact,
 }
 
-/// Most sensors of one slot.
+/// Largest number of sensors.
 pub const MOST_SENSORS: usize = 1000;
 
-/// The filter for `K` sensors that answer the same question at once.
+/// The filter for `K` sensors that answer the same threshold at once.
 ///
 /// Linear fusion: `mean = mean + G sum_i b_i` and `P = P - G sqrt(2/pi) (P/s) K`, with `s^2 = P + sigma^2`,
 /// `D = 1 + (K-1)(2/pi) asin rho`, `G = sqrt(2/pi) (P/s)/D`; over a link of crossover `eps` each `sqrt(2/pi)` shrinks by
@@ -58,7 +59,7 @@ impl ParallelFilter {
     /// The filter for 1 to 1000 sensors over perfect links.
     ///
     /// # Errors
-    /// Any other number.
+    /// If `sensors` is outside `1..=1000`.
     pub fn new(plant: ScalarPlant, sensors: usize, fusion: CountFusion) -> Result<Self, Error> {
         within("sensors", sensors as f64, 1.0, MOST_SENSORS as f64)?;
         Ok(Self {
@@ -69,7 +70,7 @@ impl ParallelFilter {
         })
     }
 
-    /// The same for other links, all alike.
+    /// The same filter for other links. All sensors have the same link.
     #[must_use]
     pub fn with_link(self, link: Link) -> Self {
         Self { link, ..self }
@@ -80,22 +81,22 @@ impl ParallelFilter {
         &self.plant
     }
 
-    /// `K`.
+    /// Number of sensors `K`.
     pub fn sensors(&self) -> usize {
         self.sensors
     }
 
-    /// What is known of the links.
+    /// The links' probabilities of loss and of inversion that the filter assumes.
     pub fn link(&self) -> &Link {
         &self.link
     }
 
-    /// The threshold to broadcast for the next slot: the prediction.
+    /// The threshold to broadcast for the next slot, given the present filtered belief: the predicted mean.
     pub fn threshold(&self, belief: &Gaussian<1>) -> f64 {
         self.plant.coefficient() * belief.mean()[0]
     }
 
-    /// `G` and the variance left by linear fusion of `count` bits.
+    /// Linear fusion of `count` bits: the gain `G`, and the variance after the update.
     fn linear(&self, p: f64, count: usize) -> (f64, f64) {
         let (r, count) = (self.plant.measurement_variance(), count as f64);
         let (rho, clean) = (p / (p + r), 1.0 - 2.0 * self.link.crossover());
@@ -105,7 +106,7 @@ impl ParallelFilter {
         (scale * innovation_gain(p, r) / inflation, left)
     }
 
-    /// Corrections for `0..=K` bits of `+1` of `K` that arrived, in state units, and the average variance after them.
+    /// If all `K` bits arrive: the corrections for `0..=K` bits of `+1`, in state units, and the mean variance after them.
     pub fn table(&self, predicted_variance: f64) -> (Vec<f64>, f64) {
         let (k, p) = (self.sensors, predicted_variance);
         match self.fusion {
@@ -121,11 +122,11 @@ impl ParallelFilter {
         }
     }
 
-    /// One slot: predict, then correct with what was observed of the sensors. The log-likelihood is exact for exact fusion, and to
-    /// the assumed-density approximation, bit after bit, for linear fusion (about 40 ns per bit).
+    /// One slot: predict, then correct with one observation per sensor. The log-likelihood is exact for [`CountFusion::Exact`]. For
+    /// [`CountFusion::Linear`] it is that of assumed-density updates with one bit after the other (about 40 ns per bit).
     ///
     /// # Errors
-    /// If there is not one observation per sensor; [`Error::Impossible`].
+    /// If the number of observations is not the number of sensors; [`Error::Impossible`].
     pub fn step(
         &self,
         belief: &Gaussian<1>,
@@ -134,7 +135,7 @@ impl ParallelFilter {
         self.update(&self.plant.predict(belief), observations)
     }
 
-    /// Corrects a predicted belief with what was observed of the sensors, whose threshold was the mean of that belief.
+    /// Corrects a predicted belief with one observation per sensor. The sensors' threshold was the mean of this belief.
     ///
     /// # Errors
     /// As [`step`](Self::step).
@@ -151,7 +152,7 @@ impl ParallelFilter {
         let (mean, p) = (predicted.mean()[0], predicted.covariance()[0]);
         let received = || observations.iter().filter_map(Observation::received);
         let bits = received().count();
-        // A missing bit says nothing about the state, but has its probability.
+        // A missing bit tells nothing about the state, but the probability of its loss enters the likelihood.
         let missing = observations
             .iter()
             .filter(|observation| observation.received().is_none());
@@ -193,10 +194,10 @@ impl ParallelFilter {
     }
 }
 
-/// Standard deviations over which the prediction error is integrated.
+/// Half width of the integration range in standard deviations of the prediction error.
 const REACH: f64 = 9.0;
 
-/// For `0..=k` bits of `+1` among `k`: probability, and mean of the prediction error `e ~ N(0, p)`.
+/// For each number `0..=k` of `+1` among `k` bits: its probability, and the mean of the prediction error `e ~ N(0, p)` given it.
 fn count_moments(k: usize, p: f64, r: f64, link: &Link) -> Vec<(f64, f64)> {
     let (deviation, sigma) = (p.sqrt(), r.sqrt());
     let (floor, share) = (link.crossover(), 1.0 - 2.0 * link.crossover());
@@ -207,8 +208,8 @@ fn count_moments(k: usize, p: f64, r: f64, link: &Link) -> Vec<(f64, f64)> {
             (floor + share * normal::cdf(z)).ln()
         }
     };
-    // Beyond some deviations of the noise all bits agree, and only the prior varies; within, the narrowest feature is the
-    // posterior, about sqrt(r/k) wide.
+    // Where |e| exceeds 9 noise deviations all bits agree, and only the prior varies: wide panels suffice there. Within, the narrowest
+    // feature is the posterior, about sqrt(r/k) wide.
     let inner = REACH * deviation.min(sigma);
     let width = (r / k as f64).sqrt().min(deviation);
     let fine = ((2.0 * inner / (3.0 * width).max(f64::MIN_POSITIVE)).ceil() as usize).max(6);

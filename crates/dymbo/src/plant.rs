@@ -1,4 +1,4 @@
-//! The scalar plant that one-bit sensors watch.
+//! The scalar linear model: an autoregressive state and noisy samples of it.
 
 use crate::Error;
 use fewbits_core::Gaussian;
@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 
 /// A first-order autoregression `theta(n) = a theta(n-1) + u(n)` sensed as `x(n) = theta(n) + w(n)`.
 ///
-/// Everything scales: with measurement standard deviation `sigma` all variances are `sigma^2` times those of unit noise at
-/// the same coefficient and the same [`noise_ratio`](Self::noise_ratio).
+/// With measurement standard deviation `sigma`, all variances are `sigma^2` times those for unit noise at the same coefficient and
+/// [`noise_ratio`](Self::noise_ratio).
 ///
-/// A stored plant is read through [`ScalarPlant::new`], so an unstable one is refused.
+/// Deserialization calls [`ScalarPlant::new`], so it refuses an unstable plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers", into = "Numbers")]
 pub struct ScalarPlant {
@@ -40,10 +40,10 @@ impl ScalarPlant {
         Self::of(Ar1::new(coefficient, process_variance)?, measurement_variance)
     }
 
-    /// The same for any finite coefficient: the opt-in to a plant that one bit a sample cannot hold for certain.
+    /// As [`new`](Self::new) for any finite coefficient. With `|a| > 1` one bit per sample cannot keep the error bounded for certain.
     ///
     /// # Errors
-    /// [`Error::Argument`].
+    /// [`Error::Argument`] if an argument is not finite or a variance is out of range.
     pub fn new_unstable(coefficient: f64, process_variance: f64, measurement_variance: f64) -> Result<Self, Error> {
         Self::of(Ar1::new_unstable(coefficient, process_variance)?, measurement_variance)
     }
@@ -71,35 +71,35 @@ impl ScalarPlant {
         })
     }
 
-    /// The dynamics.
+    /// The model of the state: an AR(1) process.
     pub fn dynamics(&self) -> &Ar1 {
         &self.dynamics
     }
 
-    /// The sensor.
+    /// The model of the sample: the state plus noise.
     pub fn sensor(&self) -> &LinearSensor<1, 1> {
         &self.sensor
     }
 
-    /// `a`.
+    /// Coefficient `a`.
     #[inline]
     pub fn coefficient(&self) -> f64 {
         self.dynamics.coefficient()
     }
 
-    /// `sigma_u^2`.
+    /// Process variance `sigma_u^2`.
     #[inline]
     pub fn process_variance(&self) -> f64 {
         self.dynamics.noise_variance()
     }
 
-    /// `sigma^2`.
+    /// Measurement variance `sigma^2`.
     #[inline]
     pub fn measurement_variance(&self) -> f64 {
         self.sensor.noise_variance()
     }
 
-    /// `gamma = sigma_u^2 / sigma^2`, besides `a` the only parameter of the plant that is not a scale.
+    /// `gamma = sigma_u^2 / sigma^2`. Besides `a` it is the only parameter that is not a scale.
     pub fn noise_ratio(&self) -> f64 {
         self.process_variance() / self.measurement_variance()
     }
@@ -110,17 +110,17 @@ impl ScalarPlant {
         scalar(self.coefficient() * belief.mean()[0], self.dynamics.predict_variance(belief.covariance()[0]))
     }
 
-    /// Where the variances settle when each message brings the fraction `information` of a full measurement.
+    /// The steady predicted and filtered variances if each message brings the fraction `information` of a full measurement's information.
     ///
     /// # Errors
-    /// An information outside `[0, 1]`; no finite steady state.
+    /// If `information` is outside `[0, 1]`, or there is no finite steady state.
     pub fn steady_state(&self, information: f64) -> Result<ScalarSteadyState, Error> {
         scalar_steady_state(self.coefficient(), self.process_variance(), self.measurement_variance(), information)
     }
 }
 
-/// Variance after a message that brings the fraction `information` of what the measurement itself would bring:
-/// `P - c P^2/(P + sigma^2)`, in the form that does not cancel.
+/// Variance after a message with the fraction `c = information` of a full measurement's information:
+/// `P - c P^2/(P + sigma^2)`, evaluated in a form without cancellation.
 #[inline]
 pub fn filtered_variance(predicted_variance: f64, noise_variance: f64, information: f64) -> f64 {
     let (p, r) = (predicted_variance, noise_variance);
@@ -133,7 +133,7 @@ pub fn innovation_gain(predicted_variance: f64, noise_variance: f64) -> f64 {
     predicted_variance / (predicted_variance + noise_variance).sqrt()
 }
 
-/// A scalar belief from numbers already known to be sound.
+/// A scalar belief without checks: the caller guarantees a finite mean and a valid variance.
 #[inline]
 pub(crate) fn scalar(mean: f64, variance: f64) -> Gaussian<1> {
     Gaussian::from_trusted_parts([mean].into(), SMatrix::from([[variance]]))

@@ -1,4 +1,4 @@
-//! One bit a sample: is it at or above the broadcast threshold?
+//! One bit per sample: is the sample at or above the broadcast threshold?
 
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::{Constant, InCell, Scalar};
@@ -10,10 +10,10 @@ use nalgebra::{Matrix1, Vector1};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 
-/// A sensor that reports whether its sample reached the broadcast threshold.
+/// A sensor that reports whether its sample is at or above the broadcast threshold.
 ///
-/// Any threshold will do; that of the Dymbo filter is the prediction `a theta_hat(n-1)` of the present state, the best one
-/// for a single step ([`expected_information`]). Equation (14) of the paper prints `theta_hat(n-1)` (erratum `dymbo-1`).
+/// Any threshold is allowed. The Dymbo filter broadcasts the prediction `a theta_hat(n-1)` of the present state, the best threshold for
+/// a single step ([`expected_information`]). Equation (14) of the paper prints `theta_hat(n-1)` (erratum `dymbo-1`).
 ///
 /// ```
 /// use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme, Sign};
@@ -45,14 +45,14 @@ impl SignBit {
         })
     }
 
-    /// The sensor of a plant.
+    /// The scheme with the measurement variance of `plant`.
     pub(crate) fn of(plant: &ScalarPlant) -> Self {
         Self {
             noise_variance: plant.measurement_variance(),
         }
     }
 
-    /// `sigma^2`.
+    /// Measurement variance `sigma^2`.
     pub fn noise_variance(&self) -> f64 {
         self.noise_variance
     }
@@ -94,15 +94,15 @@ impl Memoryless<1> for SignBit {
     }
 }
 
-/// Fraction of a full measurement's information that a bit at the prediction brings when it arrives:
+/// Information of a bit with the threshold at the prediction, divided by a full measurement's, if the bit arrives:
 /// `(2/pi)(1 - 2 eps)^2` with the link's crossover `eps`.
 pub fn information(link: &Link) -> f64 {
     let clean = 1.0 - 2.0 * link.crossover();
     FRAC_2_PI * clean * clean
 }
 
-/// The same averaged over both bits when the threshold lies `offset` innovation standard deviations from the prediction:
-/// `(1 - 2 eps)^2 phi(z)^2/(p_+ p_-)`. Largest at `offset = 0`: thresholding at the prediction is the best single step.
+/// The information averaged over both bits if the threshold is `z = offset` innovation standard deviations from the prediction:
+/// `(1 - 2 eps)^2 phi(z)^2/(p_+ p_-)`, `p_+` and `p_-` the probabilities of the bits. It is largest at `offset = 0`.
 ///
 /// # Errors
 /// If the offset is not finite.

@@ -1,4 +1,4 @@
-//! Where the filters settle, and what the missing bits cost: closed forms and contours.
+//! Steady-state variances, and the loss against the Kalman filter: closed forms and contours.
 
 use crate::plant::filtered_variance;
 use crate::{Error, ScalarPlant};
@@ -8,13 +8,14 @@ use fewbits_numerics::error::{ArgumentError, at_least_one, finite};
 use fewbits_numerics::roots::bracketed;
 use std::f64::consts::FRAC_2_PI;
 
-/// Ratio of the steady filtered variances of the sign-bit filter and of the Kalman filter on the same plant: at least 1,
-/// increasing in `|a|` and in `gamma`.
+/// Steady filtered variance of the sign-bit filter divided by that of the Kalman filter on the same plant. It is at least 1 and
+/// increases with `|a|` and with `gamma`.
 ///
-/// The paper prints the inverse (erratum `dymbo-3`) and calls it below 2 for every `gamma < 1` (`dymbo-4`: it is, for `|a| <= 0.979`).
+/// The paper prints the inverse (erratum `dymbo-3`). It also states that the ratio is below 2 for every `gamma < 1`; that holds for
+/// `|a| <= 0.979` (`dymbo-4`).
 ///
 /// # Errors
-/// No process noise, for which both variances vanish or neither settles at a rate of its own.
+/// If the process noise is zero: both variances then vanish, or neither reaches a steady state.
 pub fn loss(plant: &ScalarPlant) -> Result<f64, Error> {
     let dymbo = plant.steady_state(FRAC_2_PI)?.filtered_variance;
     let kalman = plant.steady_state(1.0)?.filtered_variance;
@@ -25,10 +26,10 @@ pub fn loss(plant: &ScalarPlant) -> Result<f64, Error> {
     }
 }
 
-/// The noise ratio `gamma` at which [`loss`] reaches `level` for the given coefficient; `None` where it never does.
+/// The noise ratio `gamma` at which [`loss`] reaches `level` for the given coefficient; `None` if it never does.
 ///
 /// # Errors
-/// A level of 1 or below, `|a| > 1`.
+/// If `level` is 1 or less, or `|a| > 1`.
 pub fn noise_ratio_at_loss(level: f64, coefficient: f64) -> Result<Option<f64>, Error> {
     check_level(level)?;
     let at = |log_gamma: f64| loss(&ScalarPlant::with_noise_ratio(coefficient, log_gamma.exp())?);
@@ -38,7 +39,7 @@ pub fn noise_ratio_at_loss(level: f64, coefficient: f64) -> Result<Option<f64>, 
 /// The coefficient `|a|` at which [`loss`] reaches `level` for the given noise ratio; `None` where it never does in `[0, 1]`.
 ///
 /// # Errors
-/// A level of 1 or below, a noise ratio that is not positive.
+/// If `level` is 1 or less, or `noise_ratio` is not positive.
 pub fn coefficient_at_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, Error> {
     check_level(level)?;
     crossing(level, (0.0, 1.0), |a| loss(&ScalarPlant::with_noise_ratio(a, noise_ratio)?))
@@ -76,11 +77,11 @@ pub(crate) fn crossing(
     failure.map_or_else(|| Ok(Some(root?)), Err)
 }
 
-/// Upper bound on the mean filtered variance when each bit is lost independently with the link's probability, known to both
-/// ends: the steady state with information `(1 - p) 2/pi`, less what the crossover takes.
+/// Upper bound on the mean filtered variance if each bit is lost independently with the link's probability `p`, and both ends know
+/// which bits are lost: the steady state with information `(1 - p)(2/pi)(1 - 2 eps)^2`, `eps` the crossover.
 ///
-/// One step of the variance is concave in the variance and linear in whether the bit arrives, so averaging inside can only
-/// raise it (Jensen). Tight to 0.4 % in the paper's range.
+/// One step of the variance is concave in the variance and linear in the indicator of arrival. By Jensen's inequality, averaging the
+/// indicator first gives an upper bound. It is within 0.4 % in the paper's range.
 ///
 /// # Errors
 /// If there is no finite bound.
@@ -88,8 +89,8 @@ pub fn erasure_bound(plant: &ScalarPlant, link: &Link) -> Result<ScalarSteadySta
     plant.steady_state(crate::sign_bit::information(link) * link.arrival())
 }
 
-/// The fixed point of a slot's variance recursion: `slot` maps a predicted variance to the filtered one, is increasing and
-/// concave, and at least as good as one sign bit through the link.
+/// The fixed point of a variance recursion. `slot` maps a predicted variance to the filtered one. It must be increasing and concave, and
+/// remove at least as much variance as one sign bit through the link.
 ///
 /// # Errors
 /// If the plant is unstable, or the recursion has no finite fixed point.
@@ -109,7 +110,7 @@ pub(crate) fn settle(plant: &ScalarPlant, link: &Link, slot: impl Fn(f64) -> f64
     })
 }
 
-/// Steady state with `sensors >= 1` sign bits a slot, the threshold refreshed after each bit.
+/// Steady state with `sensors >= 1` sign bits per slot. The threshold is refreshed after each bit.
 ///
 /// # Errors
 /// If there is no sensor, or the plant is unstable.

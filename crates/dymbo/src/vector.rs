@@ -1,8 +1,8 @@
 //! Vector states: the sign-of-innovations filter.
 //!
-//! A bit of the sign of `x - h' prediction` moves the estimate along `P h`. It does what a Kalman step does whose noise
-//! variance is `(pi/2)(h'Ph + sigma^2) - h'Ph`. Several sensors of a slot report one after the other, each against the refreshed
-//! prediction, or all at once.
+//! The bit is the sign of `x - h' prediction`; it moves the estimate along `P h`. The update equals a Kalman update with noise variance
+//! `(pi/2)(h'Ph + sigma^2) - h'Ph`. The sensors of a slot report one after the other, each against the refreshed prediction, or
+//! all at once against the same one.
 
 use crate::plant::scalar;
 use crate::sign_bit::SignBit;
@@ -16,14 +16,14 @@ use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::LN_2;
 
-/// What an update reveals besides the new belief.
+/// Likelihood and bits of one update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct VectorInfo {
-    /// `ln p(observations | past)`, the increment of the log-likelihood of the data; for several bits at once to the
-    /// assumed-density approximation, bit after bit.
+    /// `ln p(observations | past)`, the increment of the log-likelihood of the data. For several bits at once it is the
+    /// approximation by assumed-density updates with one bit after the other.
     pub log_likelihood: f64,
-    /// Bits received.
+    /// Number of bits received in this update.
     pub bits: u32,
 }
 
@@ -65,18 +65,18 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         }
     }
 
-    /// The same for other links, all alike.
+    /// The same filter for other links. All sensors have the same link.
     #[must_use]
     pub fn with_link(self, link: Link) -> Self {
         Self { link, ..self }
     }
 
-    /// The dynamics.
+    /// The model of the state.
     pub fn dynamics(&self) -> &F {
         &self.dynamics
     }
 
-    /// The sensors.
+    /// The sensors, in the order of the observations.
     pub fn sensors(&self) -> &[ScalarSensor<D>; M] {
         &self.sensors
     }
@@ -86,7 +86,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         self.sensors.get(sensor).ok_or_else(refusal)
     }
 
-    /// Time update.
+    /// The belief one slot later, before any observation.
     #[inline]
     pub fn predict(&self, belief: &Gaussian<D>) -> Gaussian<D> {
         kalman::predict(&self.dynamics, belief)
@@ -95,16 +95,16 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
     /// The threshold to broadcast to a sensor: its predicted measurement under the belief so far.
     ///
     /// # Errors
-    /// If there is no such sensor.
+    /// If `sensor` is not below `M`.
     #[inline]
     pub fn threshold(&self, predicted: &Gaussian<D>, sensor: usize) -> Result<f64, Error> {
         Ok(self.sensor(sensor)?.direction().dot(predicted.mean()))
     }
 
-    /// Corrects with what was observed of one sensor, whose threshold was [`SignFilter::threshold`] of this very belief.
+    /// Corrects a belief with the observation of one sensor. Its threshold was [`SignFilter::threshold`] of the same belief.
     ///
     /// # Errors
-    /// If there is no such sensor; [`Error::Impossible`].
+    /// If `sensor` is not below `M`; [`Error::Impossible`].
     #[inline]
     pub fn update(
         &self,
@@ -130,7 +130,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         let variance = sensor.direction().dot(&cross) + sensor.noise_variance();
         let step = cross * (clean * SQRT_2_OVER_PI / variance.sqrt());
         let mean = predicted.mean() + step * bit.value();
-        // Both bits are equally likely at the prediction, whatever the crossover.
+        // With the threshold at the prediction both bits have probability 1/2, for any crossover.
         let info = VectorInfo {
             log_likelihood: -LN_2 + self.link.of_received()?.ln(),
             bits: 1,
@@ -144,12 +144,12 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         Ok((posterior, info))
     }
 
-    /// Corrects with what was observed of all sensors, whose thresholds were those of this belief: the best linear function of
-    /// the bits. Their covariance is `(2/pi) asin(correlation of the innovations)` (arcsine law), theirs with the state
-    /// `sqrt(2/pi) P H' D^(-1/2)`, shrunk by the crossovers.
+    /// Corrects a belief with the observations of all sensors, whose thresholds were those of this belief. The update is the best linear
+    /// function of the bits. The covariance of two bits is `(2/pi) asin(correlation of the innovations)` (arcsine law). Their covariance
+    /// with the state is `sqrt(2/pi) P H' D^(-1/2)`, `D` the innovation variances. Crossovers shrink both.
     ///
     /// # Errors
-    /// If the belief is no covariance; [`Error::Impossible`]; [`Error::NotANumber`].
+    /// If the belief's covariance is not positive semidefinite; [`Error::Impossible`]; [`Error::NotANumber`].
     pub fn update_parallel(
         &self,
         predicted: &Gaussian<D>,
@@ -162,8 +162,8 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
             log_likelihood: 0.0,
             bits: observations.iter().filter(|o| o.received().is_some()).count() as u32,
         };
-        // The likelihood takes in one bit after the other: the assumed-density update of what the sensors measure, without the state. A bit
-        // leaves a third of a variance, so that no difference cancels.
+        // Likelihood: assumed-density updates with one bit after the other, on the noise-free measurements instead of the state.
+        // A bit leaves at least a third of a variance, so no difference cancels.
         let mut mean = SVector::<f64, M>::zeros();
         for (i, (sensor, observation)) in self.sensors.iter().zip(observations).enumerate() {
             let seen = (spread[(i, i)] - sensor.noise_variance()).max(0.0);
@@ -185,7 +185,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         Ok((posterior, info))
     }
 
-    /// Covariances of the innovations with the state, and with one another.
+    /// Covariance of each innovation with the state, and the covariance matrix of the innovations.
     fn innovations(&self, predicted: &Gaussian<D>) -> ([SVector<f64, D>; M], SMatrix<f64, M, M>) {
         let crosses = self.sensors.map(|sensor| predicted.covariance() * sensor.direction());
         let spread = SMatrix::from_fn(|i, j| {
@@ -195,7 +195,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         (crosses, spread)
     }
 
-    /// Gain and posterior covariance; sensors that were not received have no gain.
+    /// Gain and posterior covariance. Sensors that were not received have gain zero.
     fn parallel_gain(
         &self,
         predicted: &Gaussian<D>,
@@ -216,7 +216,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
                 0.0
             }
         });
-        // asin near 1 would turn a rounding error of 1e-16 into 1e-8.
+        // The diagonal is set to 1 directly: near 1, asin would turn a rounding error of 1e-16 into 1e-8.
         let mut bits = SMatrix::<f64, M, M>::identity();
         for (i, j) in (0..M).flat_map(|i| (0..i).map(move |j| (i, j))) {
             if received(i) && received(j) {
@@ -225,7 +225,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
                 bits[(j, i)] = bits[(i, j)];
             }
         }
-        // Bits of sensors whose noise is nothing beside the prediction's are the same bit: their covariance is singular.
+        // Sensors whose noise is negligible beside the prediction's variance send equal bits: the covariance of the bits is singular.
         let gain = solve_semidefinite(&bits, &with_state.transpose())?.transpose();
         let covariance = predicted.covariance() - gain * with_state.transpose();
         if covariance.iter().any(|v| !v.is_finite()) {
@@ -238,7 +238,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
     /// Steady covariances with the threshold refreshed after every sensor, in the order of the sensors, when every bit arrives.
     ///
     /// # Errors
-    /// [`Error::NotConverged`].
+    /// [`Error::NotConverged`] if the recursion does not converge.
     pub fn sequential_steady_state(&self) -> Result<SteadyState<D>, Error> {
         let bit = Observation::Received(Sign::Above);
         self.settle(|predicted| {
@@ -250,7 +250,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
     /// Steady covariances with all thresholds at the prediction, when every bit arrives.
     ///
     /// # Errors
-    /// [`Error::NotConverged`].
+    /// [`Error::NotConverged`] if the recursion does not converge.
     pub fn parallel_steady_state(&self) -> Result<SteadyState<D>, Error> {
         let bits = [Observation::Received(Sign::Above); M];
         self.settle(|predicted| {
@@ -285,9 +285,9 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
     }
 }
 
-/// Riccati steps after which a recursion is given up.
+/// Limit on the steps of the covariance recursion.
 const MOST_STEPS: usize = 100_000;
-/// Relative change at which a covariance has settled.
+/// Relative change of the covariance below which the recursion has converged.
 const SETTLED: f64 = 1e-15;
 
 #[cfg(test)]

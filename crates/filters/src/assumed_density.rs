@@ -1,30 +1,31 @@
-//! The assumed-density filter: one update for every factor.
+//! The assumed-density filter: a Gaussian belief, updated by any factor.
 
 use crate::Error;
 use fewbits_core::{Factor, Gaussian, GaussianDynamics, Observed, Sensing};
 use fewbits_numerics::linalg::{congruence, congruence_of, solve_semidefinite, times_transposed};
 use nalgebra::{SMatrix, SVector};
 
-/// What an update reveals besides the new belief.
+/// Results of an update other than the new belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct UpdateInfo<const D: usize, const M: usize> {
     /// `ln p(observation | past)`, the increment of the log-likelihood of the data.
     pub log_likelihood: f64,
-    /// Mean of the noise-free measurement after the observation, minus before.
+    /// Posterior mean minus prior mean of the noise-free measurement.
     pub correction: SVector<f64, M>,
     /// Regression of the state on the noise-free measurement, `G = P H' (H P H')^-1`.
     pub gain: SMatrix<f64, D, M>,
 }
 
-/// Time update about the mean: `f(m)`, `F P F' + Q` with `F` the Jacobian at `m`.
+/// Time update, linearised at the mean `m`: mean `f(m)`, covariance `F P F' + Q` with `F` the Jacobian at `m`.
 pub fn predict<const D: usize>(dynamics: &impl GaussianDynamics<D>, belief: &Gaussian<D>) -> Gaussian<D> {
     let jacobian = dynamics.jacobian(belief.mean());
     let covariance = congruence(&jacobian, belief.covariance()) + dynamics.noise_covariance_at(belief.mean());
     Gaussian::from_trusted_parts(dynamics.mean(belief.mean()), covariance)
 }
 
-/// Gaussian update through a linear sensor: what the factor says about `m = H x`, `x` follows by regression.
+/// Measurement update for a linear sensor. The factor gives the posterior of `m = H x`; the posterior of `x` follows by linear regression
+/// on `m`.
 ///
 /// ```text
 /// m ~ N(H mean, V),  V = H P H'
@@ -33,12 +34,12 @@ pub fn predict<const D: usize>(dynamics: &impl GaussianDynamics<D>, belief: &Gau
 /// mean = mean + G (T.mean - H mean)
 /// P = (I - G H) P (I - G H)' + G T.covariance G'
 /// ```
-/// The new mean and covariance are the exact ones of the posterior; the Gaussian shape is the assumption. With a value it is
-/// the Kalman filter, with a sign bit the vector filter of Dymbo, with silence that of CFwMD.
+/// Mean and covariance of the new belief are those of the exact posterior; only its shape is assumed to be Gaussian. With a value it is
+/// the Kalman filter, with a sign bit the vector Dymbo filter, with silence the CFwMD filter.
 ///
 /// # Errors
 /// [`Error::Impossible`] if the observation has probability zero under the belief;
-/// [`Error::NotANumber`] if the belief, the model or the factor leaves the range of numbers.
+/// [`Error::NotANumber`] if a number of the belief, the model or the factor overflows or is NaN.
 pub fn update<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     matrix: &SMatrix<f64, M, D>,
@@ -47,7 +48,7 @@ pub fn update<const D: usize, const M: usize>(
     update_at(belief, matrix * belief.mean(), matrix, factor)
 }
 
-/// The same through any sensor, linearised at the belief's mean: `m = h(mean) + H (x - mean)`. With a value it is the extended
+/// As [`update`] for any sensor, linearised at the belief's mean: `m = h(mean) + H (x - mean)`. With a value it is the extended
 /// Kalman filter.
 ///
 /// # Errors
@@ -73,7 +74,7 @@ pub fn step<const D: usize, const M: usize>(
     update_through(&predict(dynamics, belief), observed)
 }
 
-/// `ln p(observation | past)` and the mean of the noise-free measurement after the observation, minus before: [`update_through`] without
+/// `ln p(observation | past)`, and the posterior minus the prior mean of the noise-free measurement: [`update_through`] without
 /// the posterior of the state.
 ///
 /// # Errors
@@ -94,7 +95,7 @@ pub fn evidence_through<const D: usize, const M: usize>(
     Ok((tilted.log_evidence, correction))
 }
 
-/// The law of the noise-free measurement, from `P H'`.
+/// The distribution of the noise-free measurement, from `P H'`.
 #[inline]
 fn measured<const D: usize, const M: usize>(
     predicted: SVector<f64, M>,
@@ -116,9 +117,11 @@ fn update_at<const D: usize, const M: usize>(
     matrix: &SMatrix<f64, M, D>,
     factor: &impl Factor<M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
+    // The factor depends only on `y = H x`, so its posterior moments are computed for `y`.
     let cross = times_transposed(belief.covariance(), matrix);
     let prior = measured(predicted, matrix, &cross)?;
     let tilted = factor.tilted(&prior)?;
+    // Given `y`, the state is `x = mean + gain (y - predicted)` plus a residual that is independent of `y`.
     let correction = tilted.mean - prior.mean();
     let gain = solve_semidefinite(prior.covariance(), &cross.transpose())?.transpose();
     let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());

@@ -1,7 +1,7 @@
-//! The contract of filters at a receiver: a time update, and one measurement update for all that was observed at one instant.
+//! Traits of filters at a receiver: a time update, and one measurement update for all observations of one instant.
 //!
-//! Models, sensors and observations are object-safe, so that any kinds stand in one list.
-//! The table of the [crate] says which filter is for what.
+//! Models, sensors and observations are object-safe, so that different kinds can be in one list.
+//! The table of the [crate] lists the filters by task.
 
 use crate::{Error, assumed_density};
 use fewbits_core::factor::Scalar;
@@ -10,20 +10,20 @@ use fewbits_numerics::linalg::congruence;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
-/// Dynamics over a fixed time as a filter sees them: [`GaussianDynamics`] without their types.
+/// Dynamics over a fixed time as filters use them: an object-safe form of [`GaussianDynamics`].
 ///
-/// `noise_scale` multiplies the covariance of the process noise; 1 is the model as it was stated.
+/// `noise_scale` multiplies the covariance of the process noise; with 1 the model is used as stated.
 pub trait Motion<const D: usize> {
     /// Mean of the next state.
     fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, D>;
 
-    /// Moves a Gaussian: `f(m)`, `F P F' + noise_scale Q` with `F` and `Q` at the mean.
+    /// Time update of a Gaussian: mean `f(m)`, covariance `F P F' + noise_scale Q` with `F` and `Q` at the mean `m`.
     fn predict(&self, belief: &Gaussian<D>, noise_scale: f64) -> Gaussian<D>;
 
-    /// Moves every state of a cloud by a draw of its own.
+    /// Replaces every state by an independent draw of its next state.
     fn move_columns(&self, rng: &mut dyn Rng, noise_scale: f64, states: ColumnsMut<'_, D>);
 
-    /// The motions between which this one switches; empty for most.
+    /// The models of a switching motion; empty for all others.
     fn modes(&self) -> &[Box<dyn Motion<D>>] {
         &[]
     }
@@ -46,7 +46,7 @@ impl<const D: usize, G: GaussianDynamics<D>> Motion<D> for G {
             self.propagate_columns(rng, states);
             return;
         }
-        // What a draw adds to the mean is stretched.
+        // The deviation of the draw from the mean is multiplied by the root of `noise_scale`.
         let stretch = noise_scale.sqrt();
         for i in 0..fewbits_core::columns::count(&states) {
             let state = SVector::<f64, D>::from_fn(|d, _| states[d][i]);
@@ -57,12 +57,12 @@ impl<const D: usize, G: GaussianDynamics<D>> Motion<D> for G {
     }
 }
 
-/// A motion whose process noise has its covariance multiplied by `noise_scale`.
+/// A motion, with a factor of its process-noise covariance.
 #[derive(Clone, Copy)]
 pub struct Move<'a, const D: usize> {
-    /// The motion as it was stated.
+    /// The motion with its stated process noise.
     pub motion: &'a dyn Motion<D>,
-    /// Factor of the covariance of the process noise; 1 is the motion as it was stated.
+    /// Factor of the covariance of the process noise; 1 for the motion as stated.
     pub noise_scale: f64,
 }
 
@@ -72,13 +72,13 @@ impl<'a, const D: usize> Move<'a, D> {
         Self { motion, noise_scale }
     }
 
-    /// Moves a Gaussian.
+    /// Time update of a Gaussian.
     pub fn predict(&self, belief: &Gaussian<D>) -> Gaussian<D> {
         self.motion.predict(belief, self.noise_scale)
     }
 }
 
-/// A world that moves in continuous time as a filter sees it: [`Evolution`] without its types.
+/// Dynamics in continuous time as filters use them: an object-safe form of [`Evolution`].
 pub trait Evolving<const D: usize> {
     /// The motion over `seconds`.
     ///
@@ -96,12 +96,12 @@ where
     }
 }
 
-/// What one observation says about the model.
+/// Result of one observation, for tests of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
     /// `ln p(observation | past)`.
     pub log_likelihood: f64,
-    /// Mean of the first component of the noise-free measurement after the observation, minus before.
+    /// Posterior minus prior mean of the first component of the noise-free measurement.
     pub correction: f64,
 }
 
@@ -114,41 +114,41 @@ impl Evidence {
     }
 }
 
-/// What one observation says about the state: weighs clouds and grids ([`Likelihood`]), conditions Gaussians.
+/// The likelihood of one observation. It weighs particles and grids (as a [`Likelihood`]) and updates Gaussians.
 pub trait StateLikelihood<const D: usize>: Likelihood<D> {
-    /// Replaces a Gaussian by that with the moments of the posterior, the sensing linearised at its mean.
+    /// Replaces a Gaussian by the one with the moments of the posterior. The sensing model is linearised at its mean.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if the observation has probability zero under the belief, which is then as it was.
+    /// [`Error::Impossible`] if the observation has probability zero under the belief, which is then unchanged.
     fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error>;
 
-    /// How likely the observation is under a Gaussian, and where it moves the measurement.
+    /// Log likelihood of the observation under a Gaussian, and the correction of the measurement.
     ///
     /// # Errors
     /// As [`condition`](Self::condition).
     fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error>;
 
-    /// `ln p(observation)`, if it is the same for every state: a loss, a silence that says nothing.
+    /// `ln p(observation)`, if it is the same for every state (a loss, a silence without information); otherwise `None`.
     fn as_constant(&self) -> Option<f64>;
 
-    /// Whether the likelihood depends on this coordinate, near this state.
+    /// Whether the likelihood depends on the coordinate `axis` in a neighbourhood of `state`.
     fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool;
 
-    /// As a scalar factor seen through a linear sensor, times `exp` of a number: what filters need that impute measurements. `None` if
+    /// The likelihood as a scalar factor of a linear measurement times a constant. Filters that impute measurements need it. `None` if
     /// the sensor is not linear about `state`, or the factor is of another kind.
     fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>>;
 }
 
-/// A scalar factor of `z = h x + w`, `w ~ N(0, r)`, times `exp(log_scale)`.
+/// The likelihood `exp(log_scale) factor(h x)`, where the factor is that of a measurement `z = h x + w`, `w ~ N(0, r)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearScalar<const D: usize> {
-    /// `h`.
+    /// Direction `h`.
     pub matrix: SMatrix<f64, 1, D>,
-    /// `r`.
+    /// Noise variance `r`.
     pub noise_covariance: SMatrix<f64, 1, 1>,
     /// What was observed of `z`.
     pub factor: Scalar,
-    /// What multiplies the factor.
+    /// Logarithm of the constant that multiplies the factor.
     pub log_scale: f64,
 }
 
@@ -193,16 +193,16 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
     }
 }
 
-/// `h(x) - h'(x) x`, relative to `h(x)` and the noise's deviation, that counts as rounding of a linear sensor.
+/// Largest `h(x) - h'(x) x`, relative to `h(x)` and the noise deviation, that is treated as rounding of a linear sensor.
 const OFFSET: f64 = 1e-9;
 
-/// What an update reveals besides the new belief.
+/// Results of an update other than the new belief.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Info {
     /// `ln p(all observations of the instant | past)`.
     pub log_likelihood: f64,
-    /// Effective sample size, of particles.
+    /// Effective sample size, of filters with particles.
     pub effective_sample_size: Option<f64>,
 }
 
@@ -215,9 +215,9 @@ impl Info {
     }
 }
 
-/// A filter as a receiver needs it. Both updates work in place; one that fails leaves the belief as it was.
+/// A filter for a receiver. Both updates work in place; one that fails leaves the belief unchanged.
 pub trait StateFilter<const D: usize> {
-    /// What the filter knows.
+    /// Representation of the belief.
     type Belief: Belief<D> + Clone;
 
     /// The belief before the first update.
@@ -226,7 +226,7 @@ pub trait StateFilter<const D: usize> {
     /// If the prior cannot be represented.
     fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Self::Belief, Error>;
 
-    /// The belief before the first update after `lost` has been given up. What `lost` has learnt of the model may be kept.
+    /// The belief for a new start after the track of `lost` was given up. What `lost` has learnt about the model may be kept.
     ///
     /// # Errors
     /// As [`start`](Self::start).
@@ -237,13 +237,13 @@ pub trait StateFilter<const D: usize> {
     /// Time update.
     ///
     /// # Errors
-    /// Those of the filter.
+    /// If the filter cannot represent the prediction.
     fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Self::Belief) -> Result<(), Error>;
 
-    /// Takes in all observations of one instant.
+    /// Measurement update with all observations of one instant.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if they have probability zero under the belief.
+    /// [`Error::Impossible`] if they have probability zero together under the belief.
     fn update(
         &mut self,
         rng: &mut dyn Rng,
@@ -251,9 +251,9 @@ pub trait StateFilter<const D: usize> {
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error>;
 
-    /// The belief of these moments, if conditioning on one observation after the other ([`StateLikelihood::condition`]) is all that
-    /// [`update`](Self::update) does. `None` for other filters. A centre conditions to judge each observation by those before it, and
-    /// then need not do so twice.
+    /// The belief with these moments, if [`update`](Self::update) does no more than [`StateLikelihood::condition`] on one observation after
+    /// the other. `None` for other filters. A centre conditions on the observations in any case, to test each given those before it; with
+    /// this function it need not do so twice.
     fn of_moments(&self, _: &Gaussian<D>) -> Option<Self::Belief> {
         None
     }
@@ -261,7 +261,7 @@ pub trait StateFilter<const D: usize> {
     /// One step from a belief to the next: [`predict`](Self::predict), then [`update`](Self::update).
     ///
     /// # Errors
-    /// As the two.
+    /// If [`predict`](Self::predict) or [`update`](Self::update) fails.
     fn step(
         &mut self,
         rng: &mut dyn Rng,
@@ -276,8 +276,8 @@ pub trait StateFilter<const D: usize> {
     }
 }
 
-/// The filter of [`assumed_density`]: with values it is the extended Kalman filter. Observations of one instant are taken in one
-/// after the other.
+/// The filter of [`assumed_density`]; with values it is the extended Kalman filter. Observations of one instant are processed one after
+/// the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MomentFilter;
 

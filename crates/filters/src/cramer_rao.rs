@@ -1,9 +1,9 @@
 //! Posterior Cramer-Rao recursions: a lower bound on the mean squared error of any filter.
 //!
-//! Tichavsky, Muravchik and Nehorai (1998) give the bound's inverse recursively. In information form, for any dynamics with a
-//! density, `J_k = D22 - D21 (J_{k-1} + D11)^-1 D12` ([`information_step`]). With linear dynamics and a Fisher information
-//! of what is heard, `I_k = E[-d^2 ln p(heard | x) / dx^2]`, the same recursion runs on the bound itself and needs no
-//! inverse of the process noise, which may then be singular ([`covariance_step`]).
+//! Tichavsky, Muravchik and Nehorai (1998) compute the inverse of the bound recursively. For dynamics with a
+//! density, `J_k = D22 - D21 (J_{k-1} + D11)^-1 D12` ([`information_step`]). For linear dynamics and observations of Fisher information
+//! `I_k = E[-d^2 ln p(observed | x) / dx^2]`, the same recursion is done on the bound itself ([`covariance_step`]). It needs no
+//! inverse of the process noise, which may then be singular.
 
 use crate::Error;
 use fewbits_core::LinearDynamics;
@@ -13,10 +13,10 @@ use nalgebra::{Cholesky, SMatrix};
 
 /// One step of the bound: `P = F P F' + Q`, then `P - P L (1 + L' P L)^-1 L' P` with `L L' = information`.
 ///
-/// `information` is the expected Fisher information of everything heard in this step about the state.
+/// `information` is the expected Fisher information about the state in all observations of this step.
 ///
 /// # Errors
-/// A matrix that is not symmetric positive semidefinite.
+/// If a matrix is not symmetric positive semidefinite.
 pub fn covariance_step<const D: usize>(
     dynamics: &impl LinearDynamics<D>,
     bound: &SMatrix<f64, D, D>,
@@ -36,7 +36,7 @@ pub fn covariance_step<const D: usize>(
 /// `-ln p(x_k | x_{k-1}) - ln p(heard_k | x_k)`: `D11` in `x_{k-1}` twice, `D12` mixed, `D22` in `x_k` twice.
 ///
 /// # Errors
-/// `J + D11` not positive definite.
+/// If `J + D11` is not positive definite.
 pub fn information_step<const D: usize>(
     information: &SMatrix<f64, D, D>,
     d11: &SMatrix<f64, D, D>,

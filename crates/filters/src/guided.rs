@@ -1,4 +1,4 @@
-//! Particles that move towards what was observed.
+//! A particle filter whose proposal depends on the observations.
 
 use crate::Error;
 use crate::contract::{Info, Move, StateFilter, StateLikelihood};
@@ -11,10 +11,10 @@ use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-/// Share of draws that are taken from the motion itself.
+/// Fraction of particles that keep the draw from the dynamics.
 const DEFENCE: f64 = 0.1;
 
-/// A particle filter whose particles are drawn with a look at what was observed, for likelihoods that are sharp against the process
+/// A particle filter whose particles are drawn given the observations, for likelihoods that are sharp compared with the process
 /// noise.
 ///
 /// ```text
@@ -23,12 +23,13 @@ const DEFENCE: f64 = 0.1;
 ///           nine times in ten: u ~ N(d, S)          otherwise: as predicted
 ///           w *= p(observed | x') N(u; 0, I) / (.9 N(u; d, S) + .1 N(u; 0, I))
 /// ```
-/// The draws from the motion bound the weight by ten times the likelihood, however light the tails of `N(d, S)` may be. Exact for every
-/// sensor: linearisation shapes the proposal only. `Q` may be singular. An update must follow its own predict; a second one weighs only.
+/// The fraction drawn from the dynamics bounds the weight by ten times the likelihood, even if the tails of `N(d, S)` are light. The filter
+/// is exact for every sensor: linearisation changes the proposal only. `Q` may be singular. An update draws new particles only if it
+/// directly follows a `predict`; a second update only weighs.
 #[derive(Debug, Clone)]
 pub struct GuidedFilter<const D: usize> {
     bootstrap: BootstrapFilter<D>,
-    /// `N(f, Q)` of each particle since the last predict.
+    /// `N(f, Q)` of each particle since the last `predict`.
     moves: Vec<Gaussian<D>>,
 }
 
@@ -36,7 +37,7 @@ impl<const D: usize> GuidedFilter<D> {
     /// The filter with `count` particles.
     ///
     /// # Errors
-    /// If there is none.
+    /// If `count` is zero.
     pub fn new(filter: ParticleFilter, count: usize) -> Result<Self, Error> {
         Ok(Self {
             bootstrap: BootstrapFilter::new(filter, count)?,
@@ -45,8 +46,8 @@ impl<const D: usize> GuidedFilter<D> {
     }
 }
 
-/// A particle under its proposal, and `ln` of the motion's density over the proposal's there. The predicted particle if the
-/// observations have no moments under its motion.
+/// A particle drawn from its proposal, and `ln` of the ratio of the dynamics' density to the proposal's there. `None` if the
+/// observations cannot update the Gaussian of its motion; the predicted particle is then kept.
 fn propose<const D: usize>(
     rng: &mut dyn Rng,
     own: &SVector<f64, D>,
@@ -61,6 +62,7 @@ fn propose<const D: usize>(
     let lower = semidefinite_factor("noise_covariance", moved.covariance()).ok()?;
     let back = solve_semidefinite(moved.covariance(), &lower).ok()?.transpose();
     let still = SMatrix::<f64, D, D>::identity() - symmetrised(&(back * lower));
+    // The proposal N(shift, spread) of u; u itself is standard normal under the dynamics.
     let shift = back * (posterior.mean() - moved.mean());
     let spread = Cholesky::new(symmetrised(&(congruence(&back, posterior.covariance()) + still)))?;
     let drawn = if rng.random::<f64>() < DEFENCE {
@@ -70,6 +72,7 @@ fn propose<const D: usize>(
     };
     let offset = drawn - shift;
     let log_root: f64 = spread.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+    // ratio = ln N(u; shift, spread) / N(u; 0, I); `mixed` adds the fraction drawn from the dynamics.
     let ratio = 0.5 * (drawn.norm_squared() - offset.dot(&spread.solve(&offset))) - log_root;
     let mixed = ratio.max(0.0) + ((1.0 - DEFENCE) * ratio.min(0.0).exp() + DEFENCE * (-ratio.max(0.0)).exp()).ln();
     mixed.is_finite().then(|| (moved.mean() + lower * drawn, -mixed))
@@ -103,6 +106,8 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
     ) -> Result<Info, Error> {
         let mut next = belief.clone();
         let mut ratios = vec![0.0; belief.len()];
+        // Particles predicted in this step are drawn again from a proposal that depends on the observations. The ratio of the
+        // target to the proposal is part of their weights.
         if self.moves.len() == belief.len() && !observed.is_empty() {
             let mut columns = next.columns_mut();
             for (i, (moved, ratio)) in self.moves.iter().zip(&mut ratios).enumerate() {

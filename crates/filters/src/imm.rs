@@ -1,4 +1,4 @@
-//! The interacting-multiple-model filter: several models of one world, and any factor.
+//! The interacting-multiple-model (IMM) filter: one of several models holds at a time; any factor.
 
 use crate::{Error, assumed_density};
 use fewbits_core::columns::change_each;
@@ -10,10 +10,10 @@ use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// A filter for a world that moves by one of several models at a time and switches between them as a Markov chain.
+/// A filter for dynamics that follow one of several models at a time and switch between them as a Markov chain.
 ///
-/// Each model has its Gaussian belief and its probability. A slot (Blom and Bar-Shalom 1988; the measurement update is that of
-/// [`assumed_density`], so the observation may be a value, a sign bit, a cell, silence: any [`Factor`]):
+/// Each model has a Gaussian belief and a probability. The steps of a slot (Blom and Bar-Shalom 1988; the measurement update is that of
+/// [`assumed_density`], so the observation may be a value, a sign bit, a cell or silence: any [`Factor`]):
 ///
 /// ```text
 /// c_j = sum_i w_i T_ij                              predicted probability of model j
@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 /// ```
 ///
 /// With one model it is the assumed-density filter. Without mixing (`T` the identity) it is a bank of independent filters, whose
-/// probabilities are exact Bayes factors. The mixture of `K^n` histories is kept as `K` Gaussians: that is the approximation.
+/// probabilities are exact Bayes factors. The approximation is that the mixture over `K^n` histories is kept as `K` Gaussians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Imm<G> {
     models: Vec<G>,
@@ -31,7 +31,7 @@ pub struct Imm<G> {
     transition: Vec<f64>,
 }
 
-/// What an [`Imm`] knows: a Gaussian and a probability for each model.
+/// The belief of an [`Imm`]: a Gaussian and a probability for each model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored<D>")]
 pub struct ImmBelief<const D: usize> {
@@ -50,7 +50,7 @@ impl<const D: usize> ImmBelief<D> {
     /// A belief with a probability and a Gaussian for each model.
     ///
     /// # Errors
-    /// If the numbers differ, or the probabilities do not sum to one.
+    /// If the two lists differ in length, or the probabilities do not sum to one.
     pub fn new(probabilities_: Vec<f64>, modes: Vec<Gaussian<D>>) -> Result<Self, ArgumentError> {
         probabilities("probabilities", &probabilities_)?;
         if modes.len() != probabilities_.len() {
@@ -63,7 +63,7 @@ impl<const D: usize> ImmBelief<D> {
         })
     }
 
-    /// `count` models of equal probability that agree on the state.
+    /// A belief of `count` models with equal probability and the same Gaussian.
     ///
     /// # Errors
     /// If `count` is 0.
@@ -80,18 +80,18 @@ impl<const D: usize> ImmBelief<D> {
         &self.probabilities
     }
 
-    /// Belief under each model.
+    /// The Gaussian of each model.
     pub fn modes(&self) -> &[Gaussian<D>] {
         &self.modes
     }
 
-    /// Mean and covariance as one Gaussian.
+    /// The Gaussian of the same mean and covariance as the mixture.
     pub fn moment_matched(&self) -> Gaussian<D> {
         moments(self.probabilities.iter().copied().zip(&self.modes))
     }
 }
 
-/// Moments of a mixture whose weights sum to one, the spread about the mean as a sum of squares.
+/// Mean and covariance of a mixture whose weights sum to one. The covariance of the means is computed as a sum of squares.
 pub(crate) fn moments<'a, const D: usize>(parts: impl Iterator<Item = (f64, &'a Gaussian<D>)> + Clone) -> Gaussian<D> {
     let mean = parts.clone().fold(SVector::zeros(), |sum, (w, g)| sum + g.mean() * w);
     let covariance = parts.fold(SMatrix::zeros(), |sum, (w, g)| {
@@ -116,14 +116,14 @@ impl<const D: usize> Belief<D> for ImmBelief<D> {
     }
 }
 
-/// Buffers kept from step to step.
+/// Buffers reused from step to step.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ImmWorkspace<const D: usize> {
     modes: Vec<Gaussian<D>>,
     probabilities: Vec<f64>,
 }
 
-/// Transition probabilities, row by row, of a model that is drawn anew, evenly, with probability `switching`.
+/// Transition probabilities, row by row: with probability `switching` the next model is drawn uniformly from all models, else it stays.
 pub(crate) fn evenly(models: usize, switching: f64) -> Result<Vec<f64>, ArgumentError> {
     within("switching", switching, 0.0, 1.0)?;
     let entry = |at: usize| {
@@ -158,7 +158,7 @@ impl<G> Imm<G> {
         })
     }
 
-    /// The filter whose model is drawn anew, evenly, with probability `switching` in each slot.
+    /// The filter whose model, with probability `switching` in each slot, is drawn anew uniformly from all models.
     ///
     /// # Errors
     /// If there is no model, or `switching` is outside `[0, 1]`.
@@ -186,7 +186,7 @@ impl<G> Imm<G> {
     /// Mixing and time update.
     ///
     /// # Errors
-    /// If the belief is of another number of models.
+    /// If the belief has another number of models.
     pub fn predict_in_place<const D: usize>(
         &self,
         belief: &mut ImmBelief<D>,
@@ -202,8 +202,8 @@ impl<G> Imm<G> {
     /// Measurement update; returns `ln p(observation | past)`.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if the observation is impossible under every model; the belief is then as it was.
-    /// A model under which alone it is impossible keeps its belief and loses its probability.
+    /// [`Error::Impossible`] if the observation has probability zero under every model; the belief is then unchanged.
+    /// If it is impossible under some models only, these keep their Gaussian and get probability zero.
     pub fn update_in_place<const D: usize, const M: usize>(
         &self,
         belief: &mut ImmBelief<D>,
@@ -218,7 +218,7 @@ impl<G> Imm<G> {
     }
 }
 
-/// Mixes the modes by `transition` (row by row) and moves each: `predict(j, mixed)` is the time update of model `j`.
+/// Mixes the modes by `transition` (row by row) and predicts each: `predict(j, mixed)` is the time update of model `j`.
 pub(crate) fn mix<const D: usize>(
     belief: &mut ImmBelief<D>,
     transition: &[f64],
@@ -229,8 +229,10 @@ pub(crate) fn mix<const D: usize>(
     workspace.modes.clear();
     workspace.probabilities.clear();
     for j in 0..n {
+        // Joint probability of having been in mode i and being in mode j.
         let joint = |i: usize| belief.probabilities[i] * transition[i * n + j];
         let c: f64 = (0..n).map(joint).sum();
+        // Mode j starts from the moments of the mixture of all modes that lead to it. If none does, it keeps its own.
         let mixed = if c > 0.0 {
             moments((0..n).map(|i| (joint(i) / c, &belief.modes[i])))
         } else {
@@ -244,8 +246,8 @@ pub(crate) fn mix<const D: usize>(
     Ok(())
 }
 
-/// Updates each mode and weighs it by its evidence; returns `ln p(observation | past)`. A mode under which the observation is impossible
-/// keeps its belief and loses its probability.
+/// Updates each mode and multiplies its probability by its evidence; returns `ln p(observation | past)`. A mode under which the observation
+/// is impossible keeps its Gaussian and gets probability zero.
 pub(crate) fn weigh<const D: usize>(
     belief: &mut ImmBelief<D>,
     workspace: &mut ImmWorkspace<D>,
@@ -256,6 +258,7 @@ pub(crate) fn weigh<const D: usize>(
     for (mode, p) in belief.modes.iter().zip(&belief.probabilities) {
         let (next, log_evidence) = match update(mode) {
             Ok(updated) => updated,
+            // A mode under which the observation is impossible gets probability zero. It is an error only if all modes do.
             Err(Error::Impossible) => (*mode, f64::NEG_INFINITY),
             Err(error) => return Err(error),
         };

@@ -1,4 +1,4 @@
-//! The Kalman filter: the assumed-density update with a value, in its own closed form.
+//! The Kalman filter.
 
 use crate::Error;
 use fewbits_core::{Gaussian, LinearDynamics, LinearSensing};
@@ -7,11 +7,11 @@ use fewbits_numerics::linalg::{congruence, congruence_of, times_transposed};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
 
-/// What an update reveals besides the new belief.
+/// Results of an update other than the new belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct KalmanInfo<const D: usize, const M: usize> {
-    /// Measurement minus its prediction.
+    /// Innovation: measurement minus its prediction.
     pub innovation: SVector<f64, M>,
     /// Covariance `S = H P H' + R` of the innovation.
     pub innovation_covariance: SMatrix<f64, M, M>,
@@ -19,7 +19,7 @@ pub struct KalmanInfo<const D: usize, const M: usize> {
     pub gain: SMatrix<f64, D, M>,
     /// `ln N(innovation; 0, S)`, the increment of the log-likelihood of the data.
     pub log_likelihood: f64,
-    /// `innovation' S^-1 innovation / M`: expectation 1 for a consistent filter.
+    /// Normalised innovation squared, `innovation' S^-1 innovation / M`: expectation 1 for a consistent filter.
     pub normalised_innovation_squared: f64,
 }
 
@@ -43,8 +43,8 @@ pub fn predict<const D: usize>(dynamics: &impl LinearDynamics<D>, belief: &Gauss
 /// ```
 ///
 /// # Errors
-/// A measurement that is not finite; [`Error::SingularInnovation`]; [`Error::NotANumber`] if the belief or the model leaves
-/// the range of numbers.
+/// If the measurement is not finite; [`Error::SingularInnovation`]; [`Error::NotANumber`] if a number of the belief or the
+/// model overflows or is NaN.
 pub fn update<const D: usize, const M: usize>(
     sensing: &impl LinearSensing<D, M>,
     belief: &Gaussian<D>,
@@ -53,7 +53,7 @@ pub fn update<const D: usize, const M: usize>(
     update_by(sensing.matrix(), sensing.noise_covariance(), belief, measurement)
 }
 
-/// [`update`] with `H` and `R`.
+/// [`update`] with the matrices `H` and `R`.
 #[inline(always)]
 pub(crate) fn update_by<const D: usize, const M: usize>(
     matrix: &SMatrix<f64, M, D>,
@@ -76,8 +76,8 @@ pub(crate) fn update_by<const D: usize, const M: usize>(
         congruence(&keep, belief.covariance()) + congruence(&gain, noise)
     };
     let squared = innovation.dot(&over(&innovation.transpose(), &lower).transpose());
-    // No entry of the posterior is above this sum (Cauchy and Schwarz). Zero times a number is zero, so that the range of the root, which its
-    // logarithm asks for anyway, is one test of them all.
+    // No entry of the posterior exceeds this sum (Cauchy and Schwarz), and zero times a number is zero. The range check of the root, which
+    // its logarithm needs in any case, therefore tests all entries at once.
     let root: f64 = roots.iter().product();
     let numbers = 0.0 * (squared + belief.mean().abs().sum() + belief.covariance().trace());
     let log_root_determinant = if (root + numbers).is_normal() {
@@ -95,7 +95,7 @@ pub(crate) fn update_by<const D: usize, const M: usize>(
     Ok((Gaussian::from_symmetric_parts(belief.mean() + gain * innovation, covariance), info))
 }
 
-/// `ln` of a product of positive numbers that is out of range, or what else was: `numbers` is zero, or no number.
+/// `ln` of a product of positive numbers that overflows or underflows. `numbers` is zero or NaN; NaN gives an error.
 #[cold]
 fn log_product(factors: &[f64], numbers: f64, measurement: &[f64]) -> Result<f64, Error> {
     all_finite("measurement", measurement)?;
@@ -107,7 +107,7 @@ fn log_product(factors: &[f64], numbers: f64, measurement: &[f64]) -> Result<f64
     Err(Error::NotANumber { what })
 }
 
-/// `a (l l')^-1` of a lower triangular `l`, with one division for each of its columns.
+/// `a (l l')^-1` for a lower triangular `l`, with one division per column of `l`.
 #[inline(always)]
 fn over<const D: usize, const M: usize>(a: &SMatrix<f64, D, M>, l: &SMatrix<f64, M, M>) -> SMatrix<f64, D, M> {
     let mut out = *a;
@@ -131,10 +131,10 @@ fn over<const D: usize, const M: usize>(a: &SMatrix<f64, D, M>, l: &SMatrix<f64,
     out
 }
 
-/// What `det S / det R` may be for `P - K S K'` to lose no more than two digits of any variance: no direction shrinks by more.
+/// Largest `det S / det R` for which `P - K S K'` loses at most two digits of any variance.
 const MILD: f64 = 100.0;
 
-/// Whether one or two measurements say little enough beside what was known; `roots` is the diagonal of the factor of `S`.
+/// Whether one or two measurements reduce the variances little enough for this; `roots` is the diagonal of the factor of `S`.
 fn is_mild<const M: usize>(roots: &[f64], noise: &SMatrix<f64, M, M>) -> bool {
     let noise = match M {
         1 => noise[(0, 0)],
@@ -145,7 +145,7 @@ fn is_mild<const M: usize>(roots: &[f64], noise: &SMatrix<f64, M, M>) -> bool {
     root * root < MILD * noise
 }
 
-/// `p - a b'` of a symmetric result, symmetric to the last bit.
+/// `p - a b'` for a symmetric result, symmetric to the last bit.
 #[inline(always)]
 fn less_product<const D: usize, const M: usize>(
     p: &SMatrix<f64, D, D>,
@@ -163,7 +163,7 @@ fn less_product<const D: usize, const M: usize>(
     out
 }
 
-/// One cycle of the Kalman filter: [`predict`], then [`update`].
+/// One step of the Kalman filter: [`predict`], then [`update`].
 ///
 /// # Errors
 /// As [`update`].

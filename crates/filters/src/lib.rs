@@ -1,10 +1,10 @@
-//! Filters that take in any observation through its factor or likelihood.
+//! Filters that accept any observation with a factor or a likelihood.
 //!
-//! Every filter has the contract of [`contract`]: `predict` moves a belief by any motion, `update` takes in all that was observed at one
-//! instant, both in place. A belief is a value: it can be stored, sent, compared and replayed; a step that fails leaves it as it was.
-//! The filters behind the contract have functions of their own for types known at compile time.
+//! Every filter implements the traits of [`contract`]: `predict` advances a belief by any motion, `update` processes all observations of
+//! one instant, both in place. A belief is a value that can be stored, sent, compared and replayed; a step that fails leaves it unchanged.
+//! The filters also have functions of their own for types that are known at compile time.
 //!
-//! | task | item | under the contract |
+//! | task | item | as a [`contract::StateFilter`] |
 //! |---|---|---|
 //! | a Gaussian belief and any factor | [`assumed_density`] | [`MomentFilter`] |
 //! | linear Gaussian filtering of values | [`kalman`] (Joseph form) | [`MomentFilter`] |
@@ -16,9 +16,9 @@
 //! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel) | |
 //! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
-//! | the receiver of many sensors: time, presence, health, learnt noise | [`centre::FusionCentre`] | |
+//! | a receiver of many sensors: prediction over time, failed sensors, tests of the model, learnt noise | [`centre::FusionCentre`] | |
 //!
-//! What is impossible under the belief is [`Error::Impossible`], whichever filter finds it.
+//! An observation of probability zero under the belief gives [`Error::Impossible`] in every filter.
 //!
 //! ```
 //! use fewbits_core::Gaussian;
@@ -31,7 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: the schemes of any one paper, and time-varying models (pass another model at each step).
+//! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
 
 pub mod assumed_density;
 pub mod centre;

@@ -1,4 +1,4 @@
-//! Filters that differ in the scale of the process noise or in the model, weighed by evidence.
+//! Filters that differ in the scale of the process noise or in the model, weighted by evidence.
 
 use crate::contract::{Info, Move, StateFilter, StateLikelihood};
 use crate::imm::{ImmWorkspace, evenly, mix, weigh};
@@ -7,20 +7,21 @@ use fewbits_core::Gaussian;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 use rand::Rng;
 
-/// A bank of filters whose models differ in the scale of their process noise, weighed by evidence and mixed as in
+/// A bank of filters whose models differ in the scale of their process noise. They are weighted by evidence and mixed as in
 /// [`Imm`](crate::Imm).
 ///
 /// ```text
 /// predict:  w <- (1 - e) w + e / M, beliefs mixed; filter j moves with its own scale of the noise
-/// update:   each filter takes in the observations; w_j times its evidence, normalised
+/// update:   each filter updates with the observations; w_j is multiplied by its evidence, then normalised
 /// ```
-/// Scales multiply the covariance of the process noise: 4 is twice the deviation. Neighbours that differ by a factor of 4 or less cost little; a
-/// step costs as much as its `M` filters. A centre's own [noise scale](crate::centre::FusionCentre::noise_scale) multiplies all of them.
-/// A [`Switching`](crate::Switching) world with as many models as there are scales gives each filter a model of its own.
+/// Scales multiply the covariance of the process noise: 4 doubles its deviation. Choose neighbours that differ by a factor of 4 or less. A
+/// step costs as much as one step of each of the `M` filters. A centre's own [noise scale](crate::centre::FusionCentre::noise_scale)
+/// multiplies all of them. With a [`Switching`](crate::Switching) motion of as many models as scales, each filter has a model of its own.
 ///
-/// `e` is how often the scale may change: with 0 the bank settles on one scale for good. Words of 2 bits and more tell the scale by
-/// evidence. A single bit at the prediction of the only filter has probability 1/2 whatever the scale, and tells nothing
-/// (use [`NoiseLearning`](crate::centre::NoiseLearning)); in a bank it lies off the predictions of the other filters, and tells a little.
+/// `e` is the probability per step that the scale changes; with 0 the bank converges to one scale. Words of 2 bits and more identify the
+/// scale by their evidence. A single bit whose threshold is the prediction of the only filter has probability 1/2 for every scale, so it
+/// does not (use [`NoiseLearning`](crate::centre::NoiseLearning)). In a bank its threshold differs from the predictions of the other
+/// filters, which gives a little information.
 ///
 /// ```
 /// use fewbits_core::Gaussian;
@@ -39,7 +40,7 @@ pub struct NoiseBank<const D: usize, F> {
 }
 
 impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> NoiseBank<D, F> {
-    /// A bank of `filter` at these scales of the process-noise covariance; the scale changes with probability `switching` in each step.
+    /// A bank of `filter` with these scales of the process-noise covariance. The scale changes with probability `switching` in each step.
     ///
     /// # Errors
     /// If there is no scale, one is not above 0, or `switching` is outside `[0, 1]`.
@@ -61,7 +62,7 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> NoiseBank<D, F> {
         &self.scales
     }
 
-    /// The scale as the belief has it: the geometric mean under the modes' probabilities.
+    /// The estimated scale: the geometric mean of the scales, weighted by the modes' probabilities.
     pub fn scale(&self, belief: &ImmBelief<D>) -> f64 {
         let pairs = self.scales.iter().zip(belief.probabilities());
         pairs.map(|(scale, p)| p * scale.ln()).sum::<f64>().exp()

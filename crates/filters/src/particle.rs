@@ -8,34 +8,33 @@ use fewbits_numerics::error::at_least_one;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// A particle filter: a resampling law and when to apply it. The belief it works on is [`Particles`].
+/// A particle filter, given by a resampling law and the schedule of resampling. Its belief is [`Particles`].
 ///
-/// A belief leaves [`update`](Self::update) weighted; resampling is the first thing the next [`predict`](Self::predict) does.
-/// So every mean, covariance and effective sample size read between the two is that of the weighted particles, before the
-/// noise that resampling adds.
+/// [`update`](Self::update) leaves the belief weighted; the next [`predict`](Self::predict) resamples first. Mean, covariance and effective
+/// sample size between the two are therefore those of the weighted particles, without the noise that resampling adds.
 ///
 /// ```text
-/// predict:  if the effective sample size is due: ancestors ~ resampling law, equal weights
+/// predict:  if the effective sample size is below the threshold: ancestors by the resampling law, equal weights
 ///           x_i ~ p(x_k | x_{k-1} = x_i)
 /// update:   ln w_i += ln p(observed | x_i)
 ///           log-likelihood increment = ln sum_i w_i;  normalise
 /// ```
-/// The product of the increments' exponentials is an unbiased estimate of the likelihood of all that was observed, for every
+/// The product of the exponentials of all `log_likelihood`s is an unbiased estimate of the likelihood of the data, for every
 /// resampling law (Del Moral 2004, theorem 7.4.2).
 ///
-/// Source of the bootstrap filter: Gordon, Salmond and Smith (1993).
+/// The bootstrap filter is due to Gordon, Salmond and Smith (1993).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParticleFilter {
     /// The law that draws ancestors.
     pub resampling: Resampling,
-    /// When to draw them.
+    /// When to resample.
     pub schedule: Schedule,
 }
 
-/// Buffers that a filter reuses from step to step, so that a step does not allocate.
+/// Buffers that are reused from step to step, so that a step does not allocate.
 ///
-/// The next belief is built here and takes the place of the old one when the step has succeeded.
+/// The next belief is built here and replaces the old one when the step has succeeded.
 #[derive(Debug, Clone, Default)]
 pub struct Workspace<const D: usize> {
     ancestors: Vec<u32>,
@@ -48,10 +47,10 @@ impl ParticleFilter {
         Self { resampling, schedule }
     }
 
-    /// Resamples if due. Returns whether it did.
+    /// Resamples if the schedule says so. Returns whether it did.
     ///
     /// # Errors
-    /// None: the weights of [`Particles`] are normalised.
+    /// Not in practice: the weights of [`Particles`] are always normalised.
     pub fn resample<const D: usize, R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -65,7 +64,7 @@ impl ParticleFilter {
         Ok(true)
     }
 
-    /// Resamples to `count` particles, due or not.
+    /// Resamples to `count` particles, whatever the schedule.
     ///
     /// # Errors
     /// If `count` is zero.
@@ -82,7 +81,7 @@ impl ParticleFilter {
         belief.select(&workspace.ancestors)
     }
 
-    /// Resamples if due and moves every particle by the dynamics.
+    /// Resamples if the schedule says so, then draws the next state of every particle.
     ///
     /// # Errors
     /// As [`resample`](Self::resample).
@@ -98,10 +97,10 @@ impl ParticleFilter {
         Ok(())
     }
 
-    /// Weighs the belief by what was observed.
+    /// Multiplies the weights by the likelihood of the observation.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if what was observed is impossible for every particle; the belief is then as it was.
+    /// [`Error::Impossible`] if the observation has probability zero for every particle; the belief is then unchanged.
     pub fn update<const D: usize>(
         &self,
         belief: &mut Particles<D>,
@@ -113,7 +112,7 @@ impl ParticleFilter {
     /// One bootstrap step in place: [`predict`](Self::predict), then [`update`](Self::update).
     ///
     /// # Errors
-    /// As the two; the belief is then as it was before the step.
+    /// As [`predict`](Self::predict) and [`update`](Self::update); the belief is then as it was before the step.
     pub fn step_in_place<const D: usize, R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -122,6 +121,7 @@ impl ParticleFilter {
         observed: &(impl Likelihood<D> + ?Sized),
         workspace: &mut Workspace<D>,
     ) -> Result<Info, Error> {
+        // Everything happens in a second buffer, so that the belief is unchanged if a later part fails.
         let Workspace { ancestors, next } = workspace;
         let next = next.get_or_insert_with(|| belief.clone());
         if self.schedule.is_due(belief.effective_sample_size(), belief.len()) {
@@ -139,11 +139,11 @@ impl ParticleFilter {
     }
 }
 
-/// Edits the log weights and says what that tells.
+/// Edits the log weights by `change` and returns the log likelihood and the effective sample size.
 ///
 /// # Errors
-/// [`Error::NotANumber`] if a particle left the range of numbers, whatever its weight: zero times infinity is NaN in every
-/// moment. The belief is then as it was, as if [`Particles::reweigh`] fails.
+/// [`Error::NotANumber`] if a coordinate of a particle is not finite, even if its weight is zero: zero times infinity is NaN
+/// in every moment. Errors of [`Particles::reweigh`]. The belief is then unchanged.
 pub(crate) fn weigh<const D: usize>(
     belief: &mut Particles<D>,
     change: impl FnOnce(Columns<'_, D>, &mut [f64]),
@@ -159,7 +159,7 @@ pub(crate) fn weigh<const D: usize>(
     })
 }
 
-/// [`ParticleFilter`] (bootstrap) with a number of particles.
+/// [`ParticleFilter`] with dynamics as proposal (bootstrap) and a number of particles, as a [`StateFilter`].
 #[derive(Debug, Clone)]
 pub struct BootstrapFilter<const D: usize> {
     filter: ParticleFilter,
@@ -171,7 +171,7 @@ impl<const D: usize> BootstrapFilter<D> {
     /// The filter with `count` particles.
     ///
     /// # Errors
-    /// If there is none.
+    /// If `count` is zero.
     pub fn new(filter: ParticleFilter, count: usize) -> Result<Self, Error> {
         Ok(Self {
             filter,
@@ -180,7 +180,7 @@ impl<const D: usize> BootstrapFilter<D> {
         })
     }
 
-    /// Resamples where it is due.
+    /// Resamples if the schedule says so.
     pub(crate) fn resample(&mut self, mut rng: &mut dyn Rng, belief: &mut Particles<D>) -> Result<(), Error> {
         self.filter.resample(&mut rng, belief, &mut self.workspace)?;
         Ok(())

@@ -1,4 +1,4 @@
-//! The exact scalar filter on a grid: the referee of every approximate one.
+//! An exact scalar filter on a grid, the reference for approximate filters.
 
 use crate::Error;
 use crate::contract::{Info, Move, StateFilter, StateLikelihood};
@@ -10,12 +10,12 @@ use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 
-/// Standard deviations beyond which a kernel row is below rounding.
+/// Entries of the kernel at more standard deviations than this are below rounding.
 const REACH: f64 = 8.6;
-/// Widest spacing, in standard deviations of the process noise, at which the trapezoid rule is still exact to about 1e-8.
+/// Widest spacing, in standard deviations of the process noise, at which the trapezoid rule has an error of about 1e-8.
 const COARSEST: f64 = 1.0;
 
-/// Share of negative mass from which on an interpolated density counts as unresolved.
+/// If the negative mass of an interpolated density is a larger fraction than this, the grid is too coarse.
 const UNRESOLVED: f64 = 1e-6;
 
 fn too_coarse(grid: &UniformGrid, deviation: f64) -> Error {
@@ -29,10 +29,10 @@ fn sinc(t: f64) -> f64 {
     if angle.abs() < 1e-8 { 1.0 } else { angle.sin() / angle }
 }
 
-/// The exact filter of a scalar observed through any likelihood, on a fixed grid.
+/// The exact filter for a scalar state with any likelihood, on a fixed grid.
 ///
-/// The transition density is smooth, so the trapezoid rule converges spectrally: a spacing of 0.4 standard deviations of the
-/// process noise (or of the sensing noise, if that is smaller) is exact to rounding as long as the grid holds the density.
+/// The transition density is smooth, so the error of the trapezoid rule falls exponentially: with a spacing of 0.4 standard deviations of
+/// the process noise (or of the sensing noise, if that is smaller) it is exact to rounding, as long as the grid covers the density.
 ///
 /// ```text
 /// predict:  p(x) <- h sum_y N(x; a y, q) p(y)
@@ -59,16 +59,16 @@ pub struct PointMassFilter {
 }
 
 impl PointMassFilter {
-    /// The filter for any dynamics with Gaussian noise that the grid resolves.
+    /// The filter for dynamics with Gaussian noise that the grid resolves.
     ///
     /// # Errors
-    /// If the noise out of some node has a standard deviation below the spacing; see [`PointMassFilter::linear`].
+    /// If the noise at some node has a standard deviation below the spacing. For linear dynamics see [`PointMassFilter::linear`].
     pub fn new(dynamics: &impl GaussianDynamics<1>, grid: UniformGrid) -> Result<Self, Error> {
         let moved = moved(&grid, Move::new(dynamics, 1.0));
         Self::resolving(grid, &moved)
     }
 
-    /// The filter that moves node `i` to a normal of mean and deviation `moved[i]`.
+    /// The filter whose transition density from node `i` is normal with mean and deviation `moved[i]`.
     fn resolving(grid: UniformGrid, moved: &[(f64, f64)]) -> Result<Self, Error> {
         if let Some((_, deviation)) = moved.iter().find(|(_, s)| s.is_nan() || *s < COARSEST * grid.spacing()) {
             return Err(too_coarse(&grid, *deviation));
@@ -76,7 +76,7 @@ impl PointMassFilter {
         Ok(Self::from_kernel(grid, moved))
     }
 
-    /// Rows of `h N(x; f(y), Q(y))` from the `(f, sqrt Q)` of each node.
+    /// Rows of `h N(x; f(y), Q(y))`, from the pair `(f, sqrt Q)` of each node.
     fn from_kernel(grid: UniformGrid, moved: &[(f64, f64)]) -> Self {
         let mut reach = vec![(grid.points(), 0); grid.points()];
         for (j, (mean, deviation)) in moved.iter().enumerate() {
@@ -96,13 +96,13 @@ impl PointMassFilter {
         Self { grid, rows, weights }
     }
 
-    /// The filter for `x' = a x + u`, `u ~ N(0, q)`, with any noise, none included.
+    /// The filter for `x' = a x + u`, `u ~ N(0, q)`, with any `q`, zero included.
     ///
-    /// Where the noise is narrower than the spacing, `p'(x) = E p((x - u) / a) / |a|` is evaluated between the nodes by
-    /// Whittaker's cardinal series, as accurate as the trapezoid rule itself, at the price of a full kernel.
+    /// If the noise is narrower than the spacing, `p'(x) = E p((x - u) / a) / |a|` is evaluated between the nodes by
+    /// Whittaker's cardinal series. This is as accurate as the trapezoid rule, but the kernel is a full matrix.
     ///
     /// # Errors
-    /// If the next state does not depend on the present one and its noise is narrower than the spacing.
+    /// If `a` is zero and the noise is narrower than the spacing.
     pub fn linear(dynamics: &impl LinearDynamics<1>, grid: UniformGrid) -> Result<Self, Error> {
         let (a, deviation) = (dynamics.transition()[0], dynamics.noise_covariance()[0].sqrt());
         let h = grid.spacing();
@@ -114,7 +114,7 @@ impl PointMassFilter {
             return Err(too_coarse(&grid, deviation));
         }
         let (mut rows, mut weights) = (Vec::with_capacity(grid.points() + 1), Vec::new());
-        // E sinc over the noise: a sum of cosines up to the highest frequency of the grid, each damped by the noise.
+        // Expectation of sinc over the noise: a sum of cosines up to the highest frequency of the grid, each damped by the noise.
         let width = deviation / (a.abs() * h);
         let draws: Vec<(f64, f64)> = if width == 0.0 {
             vec![(0.0, 1.0)]
@@ -139,7 +139,7 @@ impl PointMassFilter {
         &self.grid
     }
 
-    /// Row `i` of the kernel and the column it starts at.
+    /// Row `i` of the kernel, and the column of its first entry.
     fn row(&self, i: usize) -> (usize, &[f64]) {
         let (column, start) = self.rows[i];
         (column, &self.weights[start..self.rows[i + 1].1])
@@ -157,14 +157,15 @@ impl PointMassFilter {
     /// Time update.
     ///
     /// # Errors
-    /// A belief on another grid; [`Error::Impossible`] if the density has left the grid.
+    /// If the belief is on another grid; [`Error::Impossible`] if no mass remains on the grid.
     pub fn predict(&self, belief: &PointMass) -> Result<PointMass, Error> {
         let mut predicted = belief.clone();
         self.predict_into(belief, &mut predicted)?;
         Ok(predicted)
     }
 
-    /// Time update into a density that exists already, without allocation. What leaves the grid is lost and the rest scaled.
+    /// As [`predict`](Self::predict), into an existing density, without allocation. Mass that leaves the grid is lost; the rest is
+    /// normalised.
     ///
     /// # Errors
     /// As [`PointMassFilter::predict`].
@@ -182,14 +183,14 @@ impl PointMassFilter {
                 overshoot += *p - value;
             }
         })?;
-        // A density that its nodes resolve interpolates without overshoot.
+        // A density that the nodes resolve is interpolated without negative values.
         if overshoot > UNRESOLVED * kept {
             return Err(too_coarse(&self.grid, belief.variance().sqrt()));
         }
         Ok(())
     }
 
-    /// One step: [`predict`](Self::predict), then Bayes' rule. Returns the new belief and `ln p(observed | past)`.
+    /// One step: [`predict`](Self::predict), then [`PointMass::update`]. Returns the new belief and `ln p(observed | past)`.
     ///
     /// # Errors
     /// As [`predict`](Self::predict) and [`PointMass::update`].
@@ -203,12 +204,12 @@ impl PointMassFilter {
         Ok((next, log_likelihood))
     }
 
-    /// The belief given what was observed later: multiplies a filtered density with the likelihood of the future.
+    /// The smoothed density: the filtered density times the likelihood of all later observations.
     ///
-    /// `likelihoods[k]` holds `p(observed at step k + 1 after the belief | x)` at the nodes, up to a factor.
+    /// `likelihoods[k]` contains `p(observed at step k + 1 after the belief | x)` at the nodes, up to a constant factor.
     ///
     /// # Errors
-    /// A belief on another grid, a likelihood of wrong length; [`Error::Impossible`].
+    /// If the belief is on another grid or a likelihood has the wrong length; [`Error::Impossible`] if the product is zero.
     pub fn smooth<L: AsRef<[f64]>>(&self, filtered: &PointMass, likelihoods: &[L]) -> Result<PointMass, Error> {
         self.check(filtered)?;
         let mut message = vec![1.0; self.grid.points()];
@@ -229,7 +230,7 @@ impl PointMassFilter {
                     *m += k * w;
                 }
             }
-            // Only the shape counts; scaling keeps a long future from underflowing.
+            // Only the ratios matter; normalisation keeps a long product from underflowing.
             let peak = message.iter().copied().fold(0.0, f64::max);
             if !(peak > 0.0 && peak.is_finite()) {
                 return Err(Error::Impossible);
@@ -242,7 +243,7 @@ impl PointMassFilter {
     }
 }
 
-/// Mean and deviation of the next state from each node.
+/// Mean and deviation of the next state, from each node.
 fn moved(grid: &UniformGrid, motion: Move<'_, 1>) -> Vec<(f64, f64)> {
     let from = |y: f64| motion.predict(&Gaussian::from_trusted_parts(Vector1::new(y), Matrix1::zeros()));
     let moves = grid.nodes().map(from);
@@ -251,7 +252,7 @@ fn moved(grid: &UniformGrid, motion: Move<'_, 1>) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// [`PointMassFilter`] of any motion that its grid resolves. The kernel is kept while the motion stays the same.
+/// [`PointMassFilter`] as a [`StateFilter`], for any motion that its grid resolves. The kernel is kept while the motion stays the same.
 #[derive(Debug, Clone)]
 pub struct PointMasses {
     grid: UniformGrid,
@@ -413,7 +414,7 @@ mod tests {
         assert!(UniformGrid::new(1.0, 0.0, 0.1).is_err());
         assert!(UniformGrid::new(0.0, 1.0, 1e-9).is_err());
         assert!(UniformGrid::symmetric(f64::NAN, 1.0).is_err());
-        // Defect: variances over such nodes, and densities at such nodes, were infinite.
+        // Variances and densities over such nodes must stay finite.
         assert!(UniformGrid::new(0.0, 1e301, 1e300).is_err() && UniformGrid::new(0.0, 1e-310, 5e-324).is_err());
         let grid = UniformGrid::symmetric(5.0, 0.25).unwrap();
         assert_eq!((grid.points(), grid.node(20)), (41, 0.0));

@@ -1,4 +1,4 @@
-//! A linear Gaussian state observed through cells, Rao-Blackwellised.
+//! A Rao-Blackwellised particle filter for linear Gaussian states and reports such as bits, cells and silence.
 
 use crate::contract::{Info, LinearScalar, Move, StateFilter, StateLikelihood};
 use crate::particle::{ParticleFilter, Workspace, weigh};
@@ -13,11 +13,11 @@ use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// A filter of linear Gaussian states that imputes what was not received: bits, cells, silence, symbols.
+/// A filter for linear Gaussian states that draws the measurements behind the reports (imputes them): bits, cells, silence, symbols.
 ///
-/// Given the measurements themselves the state is Gaussian, and its covariance does not depend on their values. So a particle
-/// is a Kalman mean with the measurements imputed to it, all particles share one covariance ([`GaussianCloud`]), and far fewer
-/// are needed than of states. A value has no freedom and leaves no noise at all: with values only this is the Kalman filter.
+/// Given the measurements the state is Gaussian, and its covariance does not depend on their values. A particle
+/// is therefore a Kalman mean with imputed measurements, and all particles share one covariance ([`GaussianCloud`]). Far fewer
+/// particles are needed than of states. An observed value needs no imputation: with values only, this is the Kalman filter.
 ///
 /// ```text
 /// update, with S = H P H' + R and K = P H' S^-1, for each particle mean m:
@@ -26,17 +26,17 @@ use serde::{Deserialize, Serialize};
 ///     m += K (z - H m)
 /// P = (I - K H) P (I - K H)' + K R K'
 /// ```
-/// For a [`Scalar`] factor, `p(observed | z)` is piecewise constant and the draw exact; any other law, and what depends on the
-/// particle's own history (its side row), enters through [`impute`](Self::impute). (Chen and Liu 2000, mixture Kalman
-/// filters; here with imputation from the optimal proposal.)
+/// For a [`Scalar`] factor, `p(observed | z)` is piecewise constant and the draw is exact. Other likelihoods, and those that depend on the
+/// particle's own history (its auxiliary row), use [`impute`](Self::impute). (Mixture Kalman filters: Chen and Liu 2000; here
+/// the imputation is drawn from the optimal proposal.)
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct RaoBlackwellised {
-    /// Resampling law of the conditional means and when to apply it.
+    /// How and when the conditional means are resampled.
     pub filter: ParticleFilter,
 }
 
-/// Buffers that a filter reuses from step to step.
+/// Buffers that are reused from step to step.
 #[derive(Debug, Clone, Default)]
 pub struct CloudWorkspace<const D: usize> {
     particles: Workspace<D>,
@@ -45,15 +45,15 @@ pub struct CloudWorkspace<const D: usize> {
 }
 
 impl RaoBlackwellised {
-    /// A filter that resamples so.
+    /// A filter with this resampling.
     pub fn new(filter: ParticleFilter) -> Self {
         Self { filter }
     }
 
-    /// Resamples if due and moves every mean by the dynamics. Side rows stay as they are.
+    /// Resamples if the schedule says so and predicts every mean by the dynamics. Auxiliary rows are unchanged.
     ///
     /// # Errors
-    /// As [`ParticleFilter::resample`]; [`Error::NotANumber`] if the covariance leaves the range of numbers, before anything has
+    /// As [`ParticleFilter::resample`]; [`Error::NotANumber`] if the covariance overflows, before anything has
     /// changed.
     pub fn predict<const D: usize, R: Rng + ?Sized>(
         &self,
@@ -62,6 +62,7 @@ impl RaoBlackwellised {
         belief: &mut GaussianCloud<D>,
         workspace: &mut CloudWorkspace<D>,
     ) -> Result<(), Error> {
+        // All particles share one covariance, since the Riccati recursion does not depend on the data.
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
         let shared = kalman::predict(dynamics, &shared);
         if !shared.is_finite() {
@@ -80,10 +81,10 @@ impl RaoBlackwellised {
         Ok(())
     }
 
-    /// Takes in what was observed of a scalar sensor.
+    /// Updates with an observation of a scalar sensor.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if it is impossible for every particle. The belief is then as it was.
+    /// [`Error::Impossible`] if it has probability zero for every particle. The belief is then unchanged.
     pub fn update<const D: usize, R: Rng + ?Sized, F: Clone + Into<Scalar>>(
         &self,
         rng: &mut R,
@@ -113,6 +114,7 @@ impl RaoBlackwellised {
         let log_weights = &mut workspace.log_weights;
         log_weights.clear();
         log_weights.resize(belief.means().len(), 0.0);
+        // Impute one measurement per observation, one after the other; each adds to the log weights.
         let log_scale: f64 = observed.iter().map(|one| one.log_scale).sum();
         for one in observed {
             let imputation = Imputation::new(one.factor);
@@ -133,20 +135,21 @@ impl RaoBlackwellised {
                 .zip(&*log_weights)
                 .for_each(|(log, added)| *log += added);
         })?;
+        // Everything has succeeded: the new belief replaces the old one.
         std::mem::swap(belief, next);
         let log_likelihood = info.log_likelihood + log_scale;
         Ok(Info { log_likelihood, ..info })
     }
 
-    /// The core of an update, for any linear sensor `z = H x + w`, `w ~ N(0, R)`, and any law of what was observed: imputes a measurement
-    /// to every particle, conditions the cloud on it and adds the log importance weights to `log_weights`, one per particle, with which
-    /// the caller reweighs when all sensors are in.
+    /// The core of an update, for any linear sensor `z = H x + w`, `w ~ N(0, R)`, and any likelihood: imputes a measurement
+    /// for every particle, updates each mean with it, and adds the log importance weights to `log_weights`, one per particle. The caller
+    /// reweighs when all sensors have been processed.
     ///
-    /// `draw(rng, innovation, predicted, side)` gets `N(0, S)`, a particle's `H m` and its side row, which it may change. It
-    /// returns a measurement `z` drawn from some law `q` and `ln (N(z; H m, S) p(observed | z) / q(z))`.
+    /// `draw(rng, innovation, predicted, row)` is given `N(0, S)`, a particle's `H m` and its auxiliary row, which it may change. It
+    /// returns a measurement `z` drawn from some density `q`, and `ln (N(z; H m, S) p(observed | z) / q(z))`.
     ///
     /// # Errors
-    /// [`Error::SingularInnovation`]; the cloud is then as it was.
+    /// [`Error::SingularInnovation`] if `S` is singular; the belief is then unchanged.
     pub fn impute<const D: usize, const M: usize, R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -157,6 +160,7 @@ impl RaoBlackwellised {
         mut draw: impl FnMut(&mut R, &FactoredGaussian<M>, &SVector<f64, M>, &mut [f64]) -> (SVector<f64, M>, f64),
     ) -> Result<(), Error> {
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
+        // One Kalman gain for all particles.
         let (updated, info) = kalman::update_by(matrix, noise_covariance, &shared, &SVector::zeros())?;
         let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
             .factored()
@@ -166,6 +170,8 @@ impl RaoBlackwellised {
         for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
             let mean = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
             let predicted = matrix * mean;
+            // The measurement is drawn given the report and then used as if it had been received. The weight is multiplied by the
+            // probability of the report.
             let (z, increment) = draw(rng, &innovation, &predicted, &mut side[i * width..(i + 1) * width]);
             *log_weight += increment;
             set_state(&mut columns, i, &(mean + info.gain * (z - predicted)));
@@ -175,8 +181,8 @@ impl RaoBlackwellised {
     }
 }
 
-/// [`RaoBlackwellised`] with a number of particles. Refuses observations that are no [`Scalar`] factor through a linear sensor; a motion
-/// that is not linear is taken as linear about the mean.
+/// [`RaoBlackwellised`] with a number of particles, as a [`StateFilter`]. Returns an error for observations that are not a [`Scalar`]
+/// factor of a linear measurement. A motion that is not linear is linearised at the mean.
 #[derive(Debug, Clone)]
 pub struct CloudFilter<const D: usize> {
     filter: RaoBlackwellised,
@@ -188,7 +194,7 @@ impl<const D: usize> CloudFilter<D> {
     /// The filter with `count` particles.
     ///
     /// # Errors
-    /// If there is none.
+    /// If `count` is zero.
     pub fn new(filter: RaoBlackwellised, count: usize) -> Result<Self, Error> {
         Ok(Self {
             filter,
@@ -237,10 +243,10 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
     }
 }
 
-/// How a scalar factor imputes.
+/// How measurements are drawn for a scalar factor.
 enum Imputation {
     Value(f64),
-    /// `p(observed | z)`, piece by piece.
+    /// `p(observed | z)` as a piecewise constant function.
     Pieces(Vec<(Cell, f64)>),
 }
 
@@ -252,7 +258,7 @@ impl Imputation {
         }
     }
 
-    /// A measurement and the logarithm of the probability (density) of what was observed.
+    /// A drawn measurement, and the logarithm of the probability (density) of the observation.
     fn draw<R: Rng + ?Sized>(&self, rng: &mut R, predicted: f64, deviation: f64) -> (f64, f64) {
         match self {
             Self::Value(value) => (*value, normal::log_pdf((value - predicted) / deviation) - deviation.ln()),
@@ -262,7 +268,7 @@ impl Imputation {
                     return (predicted, total);
                 }
                 let (lower, upper) = choose(rng, pieces, predicted, deviation, total);
-                // A piece of positive mass holds numbers: it is never refused.
+                // A piece of positive probability contains numbers, so the draw cannot fail.
                 normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation)
                     .map_or((predicted, total), |z| (predicted + deviation * z, total))
             }
@@ -288,7 +294,7 @@ fn log_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
     largest + terms.map(|t| (t - largest).exp()).sum::<f64>().ln()
 }
 
-/// Ends of a piece drawn in proportion to its share; no uniform is spent where there is no choice.
+/// The ends of a piece drawn with probability proportional to its share. No random number is used if there is only one.
 #[inline]
 fn choose<R: Rng + ?Sized>(
     rng: &mut R,
@@ -299,6 +305,7 @@ fn choose<R: Rng + ?Sized>(
 ) -> (f64, f64) {
     let mut chosen = 0;
     if pieces.len() > 1 {
+        // A piece of share zero is never chosen, even if rounding leaves a rest of the uniform draw at the end.
         let mut left = rng.random::<f64>();
         for (i, term) in log_shares(pieces, predicted, deviation).enumerate() {
             let share = (term - total).exp();

@@ -1,4 +1,4 @@
-//! Resampling: from weighted particles to equally weighted ones.
+//! Resampling: replaces weighted particles by equally weighted ones.
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::{sum, vectorised};
@@ -6,13 +6,13 @@ use rand::{Rng, RngExt};
 use rand_distr::Open01;
 use serde::{Deserialize, Serialize};
 
-/// A law that draws `M` ancestors from `N` weighted particles; `M` and `N` are independent.
+/// A method that draws `M` ancestors from `N` weighted particles; `M` may differ from `N`.
 ///
-/// For every law the expected number of copies of particle `i` is `M w_i`, a particle of weight zero is never chosen, and the
-/// ancestors come out in increasing order, so that gathering them walks memory forward. They differ in the noise they add
-/// (Douc, Cappe and Moulines 2005): systematic and residual at most stratified or multinomial, multinomial the most.
+/// In every method the expected number of copies of particle `i` is `M w_i`, a particle of weight zero is never chosen, and the
+/// ancestors are in increasing order, so that copying reads memory in order. The methods differ in the variance they add
+/// (Douc, Cappe and Moulines 2005): multinomial resampling adds the most; stratified and residual resampling add at most as much.
 ///
-/// | law | uniforms drawn | copies of particle `i` |
+/// | method | uniform numbers drawn | copies of particle `i` |
 /// |---|---|---|
 /// | systematic | 1 | `floor(M w_i)` or `ceil(M w_i)` |
 /// | stratified | `M` | within 1 of `M w_i` at both ends of its interval |
@@ -21,34 +21,34 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```text
 /// cumulative = running sum of the weights
-/// for each point u_1 <= u_2 <= ... <= u_M of the law, in units of the total weight:
+/// for each point u_1 <= u_2 <= ... <= u_M of the method, as fractions of the total weight:
 ///     ancestor = first i with u < cumulative_i
 /// systematic:  u_m = (m - 1 + U) / M, one U          stratified: u_m = (m - 1 + U_m) / M
-/// multinomial: order statistics of M uniforms        residual:   floor(M w_i) copies, then multinomial on what is left
+/// multinomial: order statistics of M uniforms        residual:   floor(M w_i) copies, then multinomial for the remainders
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Resampling {
-    /// One uniform, evenly spaced points. The default: cheapest and least noisy in practice.
+    /// Evenly spaced points with one uniform offset. The default: the fastest and, in practice, the least variance.
     #[default]
     Systematic,
-    /// One uniform in each of `M` equal strata.
+    /// One uniform point in each of `M` equal strata.
     Stratified,
-    /// Whole copies first, multinomial for the fractional parts.
+    /// `floor(M w_i)` copies first, then multinomial draws for the fractional parts.
     Residual,
     /// Independent draws.
     Multinomial,
 }
 
 impl Resampling {
-    /// All four laws.
+    /// All four methods.
     pub const ALL: [Self; 4] = [Self::Systematic, Self::Stratified, Self::Residual, Self::Multinomial];
 
     /// Fills `ancestors` with indices into `weights`, in increasing order. The weights need not be normalised.
     ///
     /// # Errors
-    /// A weight that is negative or not finite, or weights that do not sum to a positive finite number. `ancestors` is then
-    /// left as it was.
+    /// If a weight is negative or not finite, or the weights do not sum to a positive finite number. `ancestors` is then
+    /// unchanged.
     pub fn ancestors<R: Rng + ?Sized>(
         self,
         rng: &mut R,
@@ -56,7 +56,7 @@ impl Resampling {
         ancestors: &mut [u32],
     ) -> Result<(), ArgumentError> {
         let (total, last) = check(weights)?;
-        // Weights so small or large that their shares leave the range of numbers are scaled first.
+        // Weights whose ratios to the total would overflow or underflow are scaled first.
         let range = 1e-290..1e290;
         if !range.contains(&total) {
             let largest = weights.iter().copied().fold(0.0, f64::max);
@@ -69,14 +69,15 @@ impl Resampling {
         Ok(())
     }
 
-    /// The same for the weights of [`Particles`](fewbits_densities::Particles), which are checked and normalised already.
+    /// As [`ancestors`](Self::ancestors), for the weights of [`Particles`](fewbits_densities::Particles), which are checked and normalised
+    /// already.
     pub(crate) fn ancestors_of_normalised<R: Rng + ?Sized>(self, rng: &mut R, weights: &[f64], ancestors: &mut [u32]) {
         if let Some(last) = weights.iter().rposition(|w| *w > 0.0) {
             self.ancestors_unchecked(rng, weights, sum(weights), last, ancestors);
         }
     }
 
-    /// The same for weights known to be non-negative with the sum `total`, the last positive one at `last`.
+    /// As [`ancestors`](Self::ancestors), for non-negative weights with the sum `total`, the last positive one at index `last`.
     fn ancestors_unchecked<R: Rng + ?Sized>(
         self,
         rng: &mut R,
@@ -102,7 +103,7 @@ impl Resampling {
 /// Sum of the weights and the index of the last positive one.
 fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
     let is_weight = |w: &f64| *w >= 0.0 && *w < f64::INFINITY;
-    // A sweep without an early end runs in vector registers.
+    // A loop without an early exit runs in vector registers.
     if !weights.iter().fold(true, |all, w| all & is_weight(w)) {
         let bad = weights.iter().find(|w| !is_weight(w)).copied().unwrap_or(f64::NAN);
         return Err(ArgumentError::new("weights", bad, "finite weights, 0 or above"));
@@ -114,17 +115,17 @@ fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
     }
 }
 
-/// Weights taken at once by [`systematic`].
+/// Weights that [`systematic`] processes together.
 const BLOCK: usize = 128;
-/// Neighbours whose running sums are formed side by side.
+/// Neighbours whose cumulative sums are computed together.
 const GROUP: usize = 8;
-/// Entries of which [`fill_up`] takes the running maximum side by side.
+/// Entries whose running maximum [`fill_up`] computes together.
 const LANES: usize = 16;
 /// `2^52`: added to a number below it, it leaves the nearest integer in the mantissa.
 const INTEGERS: f64 = 4_503_599_627_370_496.0;
 /// `1.5 * 2^52`: the same for numbers that may be below zero.
 const ROUNDER: f64 = 1.5 * INTEGERS;
-/// All bits where the element so many places before is of the same group.
+/// All bits set where the element that many places before is in the same group.
 const SAME_GROUP: [[u64; BLOCK]; 3] = [same_group(1), same_group(2), same_group(4)];
 
 const fn same_group(back: usize) -> [u64; BLOCK] {
@@ -143,11 +144,11 @@ fn integer(x: f64) -> u64 {
     (x + INTEGERS).to_bits() - INTEGERS.to_bits()
 }
 
-/// Systematic resampling without a branch that depends on the weights: particle `i` gets the places between
-/// `round(places_per_weight * cumulative_{i-1} + offset - 1/2)` and the same of `cumulative_i`.
+/// Systematic resampling without a branch that depends on the weights. Particle `i` gets the places from
+/// `round(places_per_weight * cumulative_{i-1} + offset - 1/2)` up to the same expression with `cumulative_i`.
 ///
-/// The weights become integers of 51 bits first: their running sums are exact in any order, so that they can be formed side by
-/// side, never fall, and do not move at a weight of zero. Each particle writes its index at its first place; one without a
+/// The weights are converted to integers of 51 bits first. Their cumulative sums are exact in any order, so they can be computed in
+/// parallel, never decrease, and stay equal at a weight of zero. Each particle writes its index at its first place; one without a
 /// place is overwritten by the next. A running maximum then fills the places between.
 fn systematic(offset: f64, weights: &[f64], total: f64, ancestors: &mut [u32]) {
     let scale = 0.5 * INTEGERS / total;
@@ -190,7 +191,7 @@ fn systematic(offset: f64, weights: &[f64], total: f64, ancestors: &mut [u32]) {
     );
 }
 
-/// Every entry becomes the largest up to its place.
+/// Replaces every entry by the largest up to its place.
 #[inline(always)]
 fn fill_up(entries: &mut [u32]) {
     let mut so_far = 0;
@@ -213,7 +214,7 @@ fn fill_up(entries: &mut [u32]) {
     }
 }
 
-/// The larger of each entry and of that so many places before.
+/// The larger of each entry and the entry `BACK` places before.
 #[inline(always)]
 fn raised<const BACK: usize>(x: [u32; LANES]) -> [u32; LANES] {
     std::array::from_fn(
@@ -222,7 +223,7 @@ fn raised<const BACK: usize>(x: [u32; LANES]) -> [u32; LANES] {
     )
 }
 
-/// Adds to each sum that of so many places before, within its group.
+/// Adds to each sum the one `BACK` places before, within its group.
 #[inline(always)]
 fn add_before<const BACK: usize>(sums: &mut [u64; GROUP + BLOCK], same_group: &[u64; BLOCK]) {
     let before = *sums;
@@ -246,7 +247,7 @@ fn pick(weights: &[f64], last: usize, ancestors: &mut [u32], mut point: impl FnM
     }
 }
 
-/// Whole copies `floor(w / step)`, then multinomial draws from the fractional parts, merged in one sweep.
+/// `floor(w / step)` copies, then multinomial draws from the fractional parts, merged in one pass.
 fn residual<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], step: f64, last: usize, ancestors: &mut [u32]) {
     // An exact multiple of 1/M must not lose a copy to rounding.
     let whole = |w: f64| (w / step + 1e-9).floor();
@@ -277,8 +278,8 @@ fn residual<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], step: f64, last: usiz
     ancestors[filled..].fill(last as u32);
 }
 
-/// Order statistics of independent uniforms, smallest first, without storing them: the largest of `k` uniforms is `U^(1/k)`,
-/// and what remains below it is again a sample of uniforms.
+/// Order statistics of independent uniform numbers, smallest first, without storing them: the largest of `k` uniforms is `U^(1/k)`,
+/// and the others are uniform below it.
 struct OrderedUniforms {
     left: usize,
     above: f64,
@@ -305,7 +306,7 @@ impl OrderedUniforms {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Schedule {
-    /// After every weighting.
+    /// After every update.
     #[default]
     Always,
     /// When the effective sample size falls below this fraction of the number of particles; NaN is always due.
@@ -315,12 +316,12 @@ pub enum Schedule {
 }
 
 impl Schedule {
-    /// Whether particles of this effective sample size are due.
+    /// Whether to resample at this effective sample size.
     #[expect(clippy::neg_cmp_op_on_partial_ord, reason = "NaN must be due")]
     pub fn is_due(self, effective_sample_size: f64, particles: usize) -> bool {
         match self {
             Self::Always => true,
-            // Not `<`: a threshold that is no number must not switch resampling off.
+            // Not `<`: a threshold of NaN must not switch resampling off.
             Self::Below(fraction) => !(effective_sample_size >= fraction * particles as f64),
             Self::Never => false,
         }

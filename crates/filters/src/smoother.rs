@@ -1,15 +1,15 @@
-//! Rauch-Tung-Striebel smoothing, one step back at a time: folded over a record it is the smoother of the record, over the last few
-//! beliefs that of a fixed lag.
+//! Rauch-Tung-Striebel smoothing, one backward step at a time. Applied to a whole record it is the fixed-interval smoother, applied to the
+//! last few beliefs the fixed-lag smoother.
 //!
-//! It needs nothing but the filtered beliefs and the dynamics, so it smooths the output of any filter that keeps Gaussian
-//! beliefs, whatever its messages were.
+//! It needs only the filtered beliefs and the dynamics, so it smooths the output of any filter with Gaussian
+//! beliefs, whatever was observed.
 
 use crate::{Error, kalman};
 use fewbits_core::{Gaussian, LinearDynamics};
 use fewbits_numerics::linalg::solve_semidefinite;
 use nalgebra::SMatrix;
 
-/// One backward step: the belief at `n` given the future, from the filtered belief at `n` and the smoothed belief at `n + 1`.
+/// One backward step: the smoothed belief at `n`, from the filtered belief at `n` and the smoothed belief at `n + 1`.
 ///
 /// ```text
 /// P+ = F P F' + Q
@@ -19,7 +19,7 @@ use nalgebra::SMatrix;
 /// ```
 ///
 /// # Errors
-/// A filtered covariance that is none.
+/// If a covariance is not symmetric positive semidefinite.
 pub fn smooth_step<const D: usize>(
     dynamics: &impl LinearDynamics<D>,
     filtered: &Gaussian<D>,
@@ -36,7 +36,7 @@ pub fn smooth_step<const D: usize>(
     ))
 }
 
-/// Steady variance of a scalar fixed-lag smoother: `V_0 = M`, `V_l = M + C^2 (V_{l-1} - P)` with `C = a M / P`, from the
+/// Steady-state variance of a scalar fixed-lag smoother: `V_0 = M`, `V_l = M + C^2 (V_{l-1} - P)` with `C = a M / P`, from the
 /// filter's steady predicted variance `P` and filtered variance `M`.
 pub fn scalar_fixed_lag_variance(coefficient: f64, steady: &crate::ScalarSteadyState, lag: usize) -> f64 {
     let (p, m) = (steady.predicted_variance, steady.filtered_variance);

@@ -1,4 +1,4 @@
-//! Where the Riccati recursion settles: closed form for a scalar, doubling for a vector.
+//! Fixed points of the Riccati recursion: closed form for a scalar, doubling for a vector.
 
 use crate::Error;
 use fewbits_core::{LinearDynamics, LinearSensing};
@@ -18,12 +18,12 @@ pub struct ScalarSteadyState {
 
 /// The steady state of `P = a^2 M + q`, `M = P - c P^2/(P + r)`.
 ///
-/// `information` is the fraction `c` of the variance reduction of an unquantized measurement that a message brings: 1 is the
-/// Kalman filter, `2/pi` a sign bit at the prediction, `1 - distortion` a Lloyd-Max cell. With `p = P/r` and `g = q/r` the
-/// positive root of `A p^2 + B p - g = 0`, `A = 1 - a^2 (1 - c)`, `B = 1 - g - a^2`, in the form that does not cancel.
+/// `information` is the fraction `c` of the variance reduction of an unquantized measurement that a message achieves: 1 for the Kalman
+/// filter, `2/pi` for a sign bit at the prediction, `1 - distortion` for a Lloyd-Max cell. With `p = P/r` and `g = q/r` the result is the
+/// positive root of `A p^2 + B p - g = 0`, `A = 1 - a^2 (1 - c)`, `B = 1 - g - a^2`, computed without cancellation.
 ///
 /// # Errors
-/// Arguments out of range (`q < 0`, `r <= 0`, `c` outside `[0, 1]`); [`Error::NoSteadyState`] where the recursion diverges.
+/// If `q < 0`, `r <= 0`, or `c` is outside `[0, 1]`; [`Error::NoSteadyState`] if the recursion diverges.
 pub fn scalar_steady_state(
     coefficient: f64,
     process_variance: f64,
@@ -35,7 +35,7 @@ pub fn scalar_steady_state(
     let g = non_negative("process_variance", process_variance)? / r;
     let c = within("information", information, 0.0, 1.0)?;
     let (leading, linear) = (1.0 - a * a * (1.0 - c), (1.0 - a) * (1.0 + a) - g);
-    // hypot: the square of g may overflow where the root does not.
+    // hypot: the square of g may overflow even if the root does not.
     let root = linear.hypot(2.0 * (leading.max(0.0) * g).sqrt());
     let p = if linear > 0.0 {
         2.0 * g / (linear + root)
@@ -60,15 +60,15 @@ pub struct SteadyState<const D: usize> {
     pub filtered_covariance: SMatrix<f64, D, D>,
 }
 
-/// Doublings after which a recursion that has not settled is given up: the equivalent of `2^60` Riccati steps.
+/// Largest number of doublings, equivalent to `2^60` Riccati steps.
 const DOUBLINGS: usize = 60;
-/// Relative change below which the doubling has settled.
+/// Relative change below which the doubling has converged.
 const SETTLED: f64 = 1e-15;
-/// Relative difference below which two starts have come to the same end.
+/// Relative difference below which the results from two starts are the same.
 const AGREED: f64 = 1e-9;
 
-/// The steady state of the Kalman filter, by structure-preserving doubling, from a start at which every mode is uncertain: an
-/// unstable mode settles at its stabilising root even where no noise excites it.
+/// The steady state of the Kalman filter, by structure-preserving doubling, from a start at which every mode is uncertain. An
+/// unstable mode converges to its stabilising solution even if no noise drives it.
 ///
 /// ```text
 /// A = F',  G = H' R^-1 H,  P = Q
@@ -81,8 +81,8 @@ const AGREED: f64 = 1e-9;
 /// ```
 ///
 /// # Errors
-/// [`Error::NoSteadyState`] if the recursion diverges, does not settle, or settles where it started (an unobserved mode that
-/// does not decay).
+/// [`Error::NoSteadyState`] if the recursion diverges, does not converge, or converges to a limit that depends on the start (an unobserved
+/// mode that does not decay).
 pub fn steady_state<const D: usize, const M: usize>(
     dynamics: &impl LinearDynamics<D>,
     sensing: &impl LinearSensing<D, M>,
@@ -117,12 +117,12 @@ where
         if !(low.amax().is_finite() && high.amax().is_finite()) {
             return Err(Error::NoSteadyState);
         }
-        // Relative to each pair of coordinates.
+        // Compared relative to the variances of each pair of coordinates.
         let close = |x: &SMatrix<f64, D, D>, y: &SMatrix<f64, D, D>, tolerance: f64, floor: f64| {
             let root = |k: usize| high[(k, k)].max(start[(k, k)] * floor).sqrt();
             (0..D).all(|i| (0..D).all(|j| (x[(i, j)] - y[(i, j)]).abs() <= tolerance * root(i) * root(j)))
         };
-        // A mode on the unit circle without noise decays like 1/n: after 2^60 steps it counts as gone.
+        // A mode on the unit circle without noise decays like 1/n; after 2^60 steps it is treated as zero.
         let vanished = round + 1 == DOUBLINGS && close(&low, &before[0], AGREED, 1.0);
         if vanished || close(&low, &before[0], SETTLED, SETTLED) && close(&high, &before[1], SETTLED, SETTLED) {
             let floor = if vanished { 1.0 } else { SETTLED };
@@ -140,7 +140,7 @@ where
     })
 }
 
-/// A covariance that is certain of nothing, in the units of the problem: noise plus what one measurement resolves.
+/// A large initial covariance in the units of the problem: noise plus what one measurement resolves.
 fn uncertain<const D: usize>(
     information: &SMatrix<f64, D, D>,
     process_noise: &SMatrix<f64, D, D>,

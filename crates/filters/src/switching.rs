@@ -1,4 +1,4 @@
-//! Several worlds, one at a time.
+//! Dynamics that follow one of several models at a time.
 
 use crate::Error;
 use crate::contract::{Evolving, Motion};
@@ -8,15 +8,15 @@ use fewbits_numerics::error::at_least_one;
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
 
-/// A world that moves by one of several models at a time. Through a [`NoiseBank`](crate::NoiseBank) it is the interacting-multiple-model
-/// filter over any stretch of time; to a filter of one model it is their even mixture.
+/// Dynamics that follow one of several models at a time. With a [`NoiseBank`](crate::NoiseBank) it gives an interacting-multiple-model
+/// filter over any time interval. A filter of one model sees the mixture of all models with equal weights.
 pub struct Switching<const D: usize>(Vec<Box<dyn Evolving<D>>>);
 
 impl<const D: usize> Switching<D> {
-    /// A world of these models.
+    /// Dynamics of these models.
     ///
     /// # Errors
-    /// If there is none.
+    /// If there is no model.
     pub fn new(models: Vec<Box<dyn Evolving<D>>>) -> Result<Self, Error> {
         at_least_one("models", models.len())?;
         Ok(Self(models))

@@ -1,4 +1,4 @@
-//! One leader's step.
+//! The filter step of one leader.
 
 use crate::{Error, Handover, Reducer};
 use fewbits_core::{Dynamics, Likelihood};
@@ -6,7 +6,7 @@ use fewbits_densities::{Bandwidth, KernelEstimate, Mixture, Particles, SampleSiz
 use fewbits_numerics::error::{at_least_one, non_negative};
 use rand::Rng;
 
-/// A leader-to-leader particle filter.
+/// A particle filter whose belief is handed from one leader node to the next.
 ///
 /// ```text
 /// receive a mixture q
@@ -20,32 +20,32 @@ use rand::Rng;
 /// send       reducer(estimate)
 /// ```
 ///
-/// Smoothing by the kernel widens the belief at every step; over ten steps that costs more than the reduction does. Shrinking
-/// takes the widening back at no bits. It is off in the paper and on by default here.
+/// The kernel widens the belief at every step; over ten steps this costs more accuracy than the reduction. Shrinkage
+/// removes the widening without additional bits. The paper does not use it; here it is on by default.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandoffFilter<R> {
     /// Number of particles `N`, at least one.
     pub particles: usize,
     /// Particles of weight below `trim / N` are dropped; 0 keeps all.
     pub trim: f64,
-    /// The kernel's bandwidth rule. [`SampleSize::Count`] means `N`, dropped particles included.
+    /// The bandwidth rule of the kernel. [`SampleSize::Count`] means `N`, dropped particles included.
     pub bandwidth: Bandwidth,
-    /// Whether the centres are shrunk so that the estimate has the sample's variances.
+    /// Whether the centres are moved towards the mean so that the estimate has the sample's variances.
     pub shrink: bool,
-    /// What is sent.
+    /// The reduction of the belief to what is sent.
     pub reducer: R,
 }
 
-/// What a step learned.
+/// Results of a step other than the belief that is sent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandoffInfo<const D: usize> {
-    /// Estimate of `ln p(y now | all before)`.
+    /// Estimate of `ln p(y now | all earlier y)`.
     pub log_likelihood: f64,
     /// Effective sample size after the update, before trimming.
     pub effective_sample_size: f64,
-    /// Particles that were kept.
+    /// Number of particles after trimming.
     pub kept: usize,
-    /// The estimate before it was reduced.
+    /// The kernel estimate before its reduction.
     pub estimate: KernelEstimate<D>,
 }
 
@@ -53,7 +53,7 @@ impl<R> HandoffFilter<R> {
     /// A filter with Silverman's bandwidth, a trim of 0.01, and shrinkage.
     ///
     /// # Errors
-    /// If there is no particle.
+    /// If `particles` is zero.
     pub fn new(particles: usize, reducer: R) -> Result<Self, Error> {
         Ok(Self {
             particles: at_least_one("particles", particles)?,
@@ -64,10 +64,10 @@ impl<R> HandoffFilter<R> {
         })
     }
 
-    /// The filter of the paper: no shrinkage.
+    /// The filter of the paper: without shrinkage.
     ///
     /// # Errors
-    /// If there is no particle.
+    /// If `particles` is zero.
     pub fn of_paper(particles: usize, reducer: R) -> Result<Self, Error> {
         Ok(Self {
             shrink: false,
@@ -75,10 +75,10 @@ impl<R> HandoffFilter<R> {
         })
     }
 
-    /// The weighted particles after receiving, predicting and updating, and the log-likelihood increment.
+    /// The weighted particles after receiving, predicting and updating, and the increment of the log likelihood.
     ///
     /// # Errors
-    /// If there is no particle, or none has any likelihood ([`Error::Impossible`]).
+    /// If there is no particle, or the measurement has probability zero for all ([`Error::Impossible`]).
     pub fn posterior<const D: usize, G: Rng + ?Sized>(
         &self,
         rng: &mut G,
@@ -92,7 +92,7 @@ impl<R> HandoffFilter<R> {
         Ok((particles, log_likelihood))
     }
 
-    /// The kernel estimate of weighted particles: trimmed, smoothed, shrunk.
+    /// The kernel estimate from weighted particles: trimmed, shrunk if so set, and smoothed by the kernel.
     ///
     /// # Errors
     /// If `trim` is negative, or the kept particles coincide and the bandwidth has no floor.
@@ -111,11 +111,11 @@ impl<R> HandoffFilter<R> {
         KernelEstimate::new(centres, kernel)
     }
 
-    /// One leader's step: what is sent on, and what was learned.
+    /// One leader's step: returns the belief that is sent on, and further results.
     ///
     /// # Errors
-    /// As [`posterior`](Self::posterior) and [`estimate`](Self::estimate), or if the reducer refuses. The belief that was
-    /// received is a value and stays as it was.
+    /// As [`posterior`](Self::posterior) and [`estimate`](Self::estimate), or if the reducer returns an error. The received
+    /// belief is unchanged.
     pub fn step<const D: usize, G: Rng + ?Sized>(
         &self,
         rng: &mut G,
@@ -139,7 +139,7 @@ impl<R> HandoffFilter<R> {
     }
 }
 
-/// The particles of weight at least `trim / N`, and always those of positive weight that are largest; weights sum to one again.
+/// The particles of weight at least `trim / N`. If there are none, those of largest weight. Weights are normalised again.
 ///
 /// # Errors
 /// If `trim` is negative or not finite.

@@ -1,4 +1,4 @@
-//! Leaders that hand their belief on as bits.
+//! A walk of leaders that hand over their belief as bits.
 
 use crate::{Coded, HandoffFilter};
 use fewbits_core::rand::Rng;
@@ -7,20 +7,20 @@ use fewbits_densities::Mixture;
 use fewbits_mixture_codec::wire::CodedMixture;
 use fewbits_protocol::{BoxError, Lead, Leader};
 
-/// A [`HandoffFilter`] whose belief travels as the bits of its wire format.
+/// A [`HandoffFilter`] whose belief is sent as the bits of its wire format.
 ///
-/// The readings of a slot are given for every node that may lead in it; who leads when is known beforehand.
+/// The readings of a slot are given for every node that may lead in it. The sequence of leaders is fixed beforehand.
 #[derive(Debug, Clone)]
 pub struct Leaders<const D: usize, G, L> {
     /// The filter, with its wire format.
     pub filter: HandoffFilter<Coded<D>>,
-    /// How the world moves.
+    /// Dynamics of the state.
     pub dynamics: G,
-    /// What is known before the first slot.
+    /// Belief before the first slot.
     pub start: Mixture<D>,
-    /// `readings[k][i]`: what node `i` reads in slot `k + 1`, as a likelihood.
+    /// `readings[k][i]`: the likelihood of node `i`'s measurement in slot `k + 1`.
     pub readings: Vec<Vec<L>>,
-    /// Who leads in slot `k + 1`; the walk ends with the list.
+    /// `leaders[k]`: the node that leads in slot `k + 1`. The walk ends with the list.
     pub leaders: Vec<u32>,
 }
 

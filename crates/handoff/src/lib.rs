@@ -1,13 +1,13 @@
-//! A particle filter whose belief travels.
+//! A particle filter whose belief is handed from node to node as a small message.
 //!
-//! The sensor nearest to a target leads: it alone measures, and hands what is known on to the next leader. A cloud of 500
-//! particles is 32 kbit; five Gaussians that say nearly the same are 136 bits. So every step ends in a loss, and the losses
-//! act on each other. This crate has both halves:
+//! The sensor nearest to a target leads: it alone measures, and it sends its belief to the next leader. A cloud of 500 particles is 32
+//! kbit; a mixture of five Gaussians that approximates it takes 136 bits. Every step therefore loses some information, and the losses
+//! accumulate. This crate has the filter and bounds of the accumulated loss:
 //!
-//! - [`HandoffFilter`]: one leader's step, from the mixture that was received to the one that is sent. How the belief is reduced
-//!   is a [`Reducer`]: to a number of components, to a number of bits, or a type of your own.
-//! - [`Leaders`]: the same as bits from node to node, over any network that runs the walks of `fewbits-protocol`.
-//! - [`published::bounds`]: what the losses of all steps say about the error at the end, by the bounds as printed, corrected and
+//! - [`HandoffFilter`]: one leader's step, from the received mixture to the one that is sent. A [`Reducer`] reduces the belief:
+//!   to a number of components, to a number of bits, or by a type of your own.
+//! - [`Leaders`]: the same with messages as bits from node to node, over any network that runs the walks of `fewbits-protocol`.
+//! - [`published::bounds`]: bounds of the error after the last step from the losses of all steps, as printed, corrected and
 //!   tightened.
 //!
 //! ```
@@ -32,7 +32,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: who leads (the simulated network decides), the true state, the price of energy.
+//! Not in this crate: the choice of the leader (by the simulated network), the true state, energy.
 
 mod filter;
 mod leaders;

@@ -1,46 +1,46 @@
-//! What the losses of all hand-overs say about the error at the end.
+//! Bounds of the error after several hand-overs, from the losses of each.
 
 use fewbits_mixture_codec::divergence::{Divergence, kl_from_dr, l1_from_dr};
 use fewbits_numerics::LogSum;
 
-/// Which sum stands in the exponent of the amplification `A_i = 2 sum_{j<i}`.
+/// The sum in the exponent of the amplification `A_i = 2 sum_{j<i}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Amplification {
-    /// Of ML, as printed.
+    /// The sum of ML, as printed.
     Ml,
-    /// Of DR, never larger.
+    /// The sum of DR, which is never larger.
     Dr,
 }
 
-/// Bounds on the accumulated error. Those with an amplification grow exponentially and are given as natural logarithms.
+/// Bounds of the accumulated error. Those with an amplification grow exponentially and are given as natural logarithms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
-    /// `ML <= 2 sum ml_i` (12, printed). For every data sequence.
+    /// `ML <= 2 sum ml_i` (12, printed). Holds for every data sequence.
     pub ml_printed: f64,
-    /// `ML <= 2 sum dr_i`: never worse. For every data sequence.
+    /// `ML <= 2 sum dr_i`, never larger than the printed bound. Holds for every data sequence.
     pub ml_from_dr: f64,
-    /// `ln sum exp(A_i) kl_i`, as printed for the expected KL. **False**: the accumulation it rests on fails on a coin.
+    /// `ln sum exp(A_i) kl_i`, printed as a bound of the expected KL. **False**: the inequality behind it fails for a coin.
     pub ln_kl_printed: f64,
     /// `ln sum (exp(A_i) kl_i + 2 sinh(A_i) l1_i)`, the corrected bound of the expected KL.
     pub ln_kl_corrected: f64,
-    /// `ln sum 2 exp(A_i) l1_i`, printed for the expected L1 (time subscripts corrected).
+    /// `ln sum 2 exp(A_i) l1_i`, the printed bound of the expected L1 (with time subscripts corrected).
     pub ln_l1_printed: f64,
-    /// The same with factor 1 for the last hand-over, after which no data came, and never above `ln 2`.
+    /// The same with factor 1 for the last hand-over, after which there was no data, and at most `ln 2`.
     pub ln_l1_tight: f64,
-    /// `KL <= phi(2 sum dr_i)`. For every data sequence.
+    /// `KL <= phi(2 sum dr_i)`. Holds for every data sequence.
     pub kl_from_dr: f64,
-    /// `L1 <= 2 tanh(sum dr_i / 2)`. For every data sequence.
+    /// `L1 <= 2 tanh(sum dr_i / 2)`. Holds for every data sequence.
     pub l1_from_dr: f64,
 }
 
-/// The bounds after the last of some hand-overs, given first to last: each by the errors of the mixture that was sent against the estimate
-/// it stands for. All zero (logarithms `-inf`) before the first.
+/// The bounds after the last of a sequence of hand-overs. `steps` has, for each hand-over in order, the errors of the mixture that was sent
+/// against the estimate that it replaces. Without hand-overs all bounds are zero (logarithms `-inf`).
 ///
-/// Density `p_t^i`: the first `i` hand-overs were lossy, all after them exact; `p_t^0` is exact, `p_t^t` what is really known.
+/// In density `p_t^i` the first `i` hand-overs were lossy and all later ones exact; `p_t^0` is exact, `p_t^t` is the actual belief.
 /// Every bound is on the distance from `p_t^0` to `p_t^t` after the last hand-over.
 ///
-/// If the errors are exact, so are the bounds. Plug-in errors make every bound an estimate of itself: ML and DR are suprema over all
-/// of space, and between an estimate and a wider mixture they are infinite there.
+/// With exact errors the bounds are exact. With plug-in errors every bound is an estimate only: ML and DR are suprema over all
+/// of space, which are infinite between an estimate and a wider mixture.
 pub fn bounds(steps: &[Divergence], by: Amplification) -> Bounds {
     let (mut ml, mut dr, mut exponent) = (0.0, 0.0, 0.0);
     let (mut kl_printed, mut kl_corrected) = (LogSum::default(), LogSum::default());

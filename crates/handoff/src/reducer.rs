@@ -1,4 +1,4 @@
-//! What is sent: a belief made small enough to travel.
+//! Reducers: make a belief small enough to be sent.
 
 use crate::Error;
 use fewbits_core::{BitString, CodecError, Message};
@@ -6,9 +6,9 @@ use fewbits_densities::{KernelEstimate, Mixture};
 use fewbits_mixture_codec::Reduction;
 use fewbits_mixture_codec::wire::{CodedMixture, RateControl, WireFormat};
 
-/// A belief as the next leader receives it, and the message that it was received in.
+/// A belief as the next leader receives it, and the message in which it was received.
 ///
-/// A belief that travels as bits is decoded from these bits: there is no way to hand over anything else.
+/// A belief that is sent as bits is always decoded from these bits, so that it equals what the receiver gets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Handover<const D: usize> {
     mixture: Mixture<D>,
@@ -16,12 +16,12 @@ pub struct Handover<const D: usize> {
 }
 
 impl<const D: usize> Handover<D> {
-    /// A mixture that is handed over as real numbers: no bits are counted.
+    /// A mixture that is handed over as real numbers, without counting bits.
     pub fn real(mixture: Mixture<D>) -> Self {
         Self { mixture, message: None }
     }
 
-    /// What a receiver of the message decodes.
+    /// The belief that a receiver decodes from the message.
     ///
     /// # Errors
     /// If `decode` fails.
@@ -41,12 +41,12 @@ impl<const D: usize> Handover<D> {
         Ok(Self::received(bits, decode)?)
     }
 
-    /// What the next leader knows.
+    /// The belief of the next leader.
     pub fn mixture(&self) -> &Mixture<D> {
         &self.mixture
     }
 
-    /// What the next leader knows.
+    /// The belief of the next leader.
     pub fn into_mixture(self) -> Mixture<D> {
         self.mixture
     }
@@ -62,9 +62,9 @@ impl<const D: usize> Handover<D> {
     }
 }
 
-/// A way to make a belief small enough to travel.
+/// A method that makes a belief small enough to be sent.
 pub trait Reducer<const D: usize> {
-    /// Reduces the estimate to what is sent.
+    /// Reduces the estimate to the belief that is sent.
     ///
     /// # Errors
     /// If the estimate does not fit the budget or format.
@@ -83,7 +83,7 @@ impl<const D: usize, R: Reducer<D> + ?Sized> Reducer<D> for Box<R> {
     }
 }
 
-/// The whole estimate, one component per particle: what an unlimited link would carry.
+/// No reduction: the whole estimate, one component per particle, as real numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Whole;
 
@@ -93,10 +93,10 @@ impl<const D: usize> Reducer<D> for Whole {
     }
 }
 
-/// At most so many components, as real numbers.
+/// Reduces to at most a number of components, as real numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Components {
-    /// The most components.
+    /// Largest number of components.
     pub components: usize,
     /// How the estimate is reduced.
     pub reduction: Reduction,
@@ -118,16 +118,16 @@ impl<const D: usize> Reducer<D> for Components {
     }
 }
 
-/// At most so many components, coded at one resolution of a wire format.
+/// Reduces to at most a number of components, and codes them at one resolution of a wire format.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coded<const D: usize> {
-    /// The most components.
+    /// Largest number of components.
     pub components: usize,
     /// How the estimate is reduced.
     pub reduction: Reduction,
-    /// What both ends know beforehand.
+    /// The format that sender and receiver know beforehand.
     pub format: WireFormat<D>,
-    /// Number of the resolution in the format.
+    /// Index of the resolution in the format.
     pub resolution: usize,
 }
 
@@ -139,14 +139,14 @@ impl<const D: usize> Reducer<D> for Coded<D> {
     }
 }
 
-/// The best of several sizes and resolutions within a budget of bits.
+/// The best of several numbers of components and resolutions within a number of bits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RateLimited<const D: usize> {
-    /// The choices.
+    /// The numbers of components and resolutions to try, and how to reduce.
     pub control: RateControl,
-    /// What both ends know beforehand.
+    /// The format that sender and receiver know beforehand.
     pub format: WireFormat<D>,
-    /// The most bits of a message.
+    /// Largest number of bits of a message.
     pub budget: usize,
 }
 

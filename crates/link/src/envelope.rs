@@ -1,4 +1,4 @@
-//! Frames under a key: who sent them, and that they are new. `docs/wire.md` has the format.
+//! Authenticated envelopes of frames: who sent a frame, and that it is not a repetition. `docs/wire.md` has the format.
 
 use crate::error::Error;
 use fewbits_numerics::error::refuse;
@@ -6,23 +6,23 @@ use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
 use std::fmt;
 
-/// Bytes before the frame: sensor and counter.
+/// Bytes before the frame: sensor number and counter.
 const ENVELOPE_HEADER: usize = 12;
-/// Bytes of the code behind the frame.
+/// Bytes of the authentication code after the frame.
 const TAG_BYTES: usize = 16;
-/// The shortest key.
+/// Smallest length of a key in bytes.
 const MIN_KEY_BYTES: usize = 32;
 
-/// Where an envelope goes. It is part of what is authenticated, so that an envelope cannot be sent back.
+/// Direction of an envelope. It is authenticated too, so an envelope cannot be sent back to its sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// From a sensor.
+    /// From a sensor to the centre.
     ToCentre,
-    /// From the centre.
+    /// From the centre to a sensor.
     ToSensor,
 }
 
-/// A key that one sensor shares with its centre. It is not printed.
+/// A key that one sensor shares with its centre. `Debug` does not print it.
 #[derive(Clone)]
 pub struct Key(Hmac<Sha256>);
 
@@ -33,10 +33,10 @@ impl fmt::Debug for Key {
 }
 
 impl Key {
-    /// A key of 32 bytes or more. They must come from a random source: a password is none.
+    /// A key of 32 bytes or more. The bytes must come from a random source; do not use a password.
     ///
     /// # Errors
-    /// If it is shorter.
+    /// If there are fewer than 32 bytes.
     pub fn new(bytes: &[u8]) -> Result<Self, Error> {
         match Hmac::new_from_slice(bytes) {
             Ok(code) if bytes.len() >= MIN_KEY_BYTES => Ok(Self(code)),
@@ -44,17 +44,17 @@ impl Key {
         }
     }
 
-    /// The key that a hexadecimal text states; spaces are ignored.
+    /// The key written as hexadecimal digits; spaces are ignored.
     ///
     /// # Errors
-    /// If a character is no hexadecimal digit, a digit is missing, or the key is too short.
+    /// If a character is not a hexadecimal digit, the number of digits is odd, or the key is too short.
     pub fn from_hex(text: &str) -> Result<Self, Error> {
         let digits: Option<Vec<u8>> = text
             .chars()
             .filter(|c| !c.is_whitespace())
             .map(|c| c.to_digit(16).map(|digit| digit as u8))
             .collect();
-        // The key itself is no part of the message.
+        // The message must not contain the key itself.
         let expected = "an even number of hexadecimal digits";
         let Some(digits) = digits else {
             return refuse("key", "no hexadecimal text", expected);
@@ -76,7 +76,7 @@ impl Key {
         code
     }
 
-    /// Puts a frame into an envelope.
+    /// Makes the envelope of a frame: sensor number, counter, frame, authentication code.
     pub fn seal(&self, direction: Direction, sensor: u32, counter: u64, frame: &[u8]) -> Vec<u8> {
         let mut envelope = Vec::with_capacity(ENVELOPE_HEADER + frame.len() + TAG_BYTES);
         envelope.extend(sensor.to_be_bytes());
@@ -87,15 +87,15 @@ impl Key {
         envelope
     }
 
-    /// The counter and the frame of an envelope, if the key made it.
+    /// Counter and frame of an envelope, if its code was made with this key.
     ///
     /// # Errors
-    /// [`Refusal::TooShort`], [`Refusal::Forged`].
+    /// [`Refusal::TooShort`]; [`Refusal::Forged`] if the code does not match.
     pub fn open<'a>(&self, direction: Direction, envelope: &'a [u8]) -> Result<(u64, &'a [u8]), Refusal> {
         let end = envelope.len().checked_sub(TAG_BYTES).ok_or(Refusal::TooShort)?;
         let (body, tag) = envelope.split_at(end);
         let (header, frame) = body.split_at_checked(ENVELOPE_HEADER).ok_or(Refusal::TooShort)?;
-        // Compared in a time that does not depend on where they differ.
+        // The comparison takes the same time wherever the codes differ.
         let code = self.code(direction, body);
         code.verify_truncated_left(tag).map_err(|_| Refusal::Forged)?;
         let counter = header.last_chunk().map_or(0, |bytes| u64::from_be_bytes(*bytes));
@@ -103,43 +103,43 @@ impl Key {
     }
 }
 
-/// The sensor that an envelope names, unchecked. `None` if it is too short to name one.
+/// The sensor number of an envelope, without any check. `None` if it is too short.
 pub fn sensor_of(envelope: &[u8]) -> Option<u32> {
     envelope.first_chunk().map(|bytes| u32::from_be_bytes(*bytes))
 }
 
-/// Why an envelope was refused. Refused envelopes change nothing but these counts.
+/// Why an envelope was refused. A refused envelope is only counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
     /// Too few bytes for an envelope.
     #[error("too short")]
     TooShort,
-    /// No sensor of this number is known.
+    /// The sensor number is unknown.
     #[error("unknown sensor")]
     Unknown,
-    /// The code is not that of the key.
+    /// The authentication code does not match the key.
     #[error("forged")]
     Forged,
-    /// The counter was seen before, or is too old to tell.
+    /// The counter was accepted before, or is more than 63 below the highest.
     #[error("replayed")]
     Replayed,
 }
 
-/// Counters that were seen: each is taken once, in any order within the last 64.
+/// Accepted counters. Each is accepted once; among the last 64 in any order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ReplayWindow {
-    /// The highest counter taken; 0 before the first, which is never taken.
+    /// The highest accepted counter; 0 before the first. Counter 0 itself is never accepted.
     highest: u64,
-    /// Bit `i`: whether `highest - i` was taken.
+    /// Bit `i`: whether `highest - i` was accepted.
     taken: u64,
 }
 
 impl ReplayWindow {
-    /// Takes a counter, once.
+    /// Accepts a counter if it is new.
     ///
     /// # Errors
-    /// [`Refusal::Replayed`].
+    /// [`Refusal::Replayed`] if it was accepted before or is too old.
     pub fn take(&mut self, counter: u64) -> Result<(), Refusal> {
         if counter > self.highest {
             let ahead = counter - self.highest;

@@ -1,36 +1,36 @@
-//! What can go wrong with a link.
+//! Errors of a link.
 
 use fewbits_protocol::BoxError;
 use std::path::PathBuf;
 
-/// Why a process of a link could not start or go on.
+/// Why a process of a link could not start or continue.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file could not be read or written.
     #[error("{path}")]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The system's error.
         #[source]
         source: std::io::Error,
     },
     /// A socket, a broker or a session failed.
     #[error("socket {address}")]
     Socket {
-        /// Its address.
+        /// Address of the socket, broker or session.
         address: String,
-        /// Why.
+        /// The system's error.
         #[source]
         source: std::io::Error,
     },
-    /// A stored state is none of this program, or not whole.
+    /// A stored state was not written by this program or is incomplete.
     #[error("{path} is no state of this centre: {reason}")]
     State {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What was found.
+        /// What is wrong with it.
         reason: String,
     },
     /// An argument is out of range.

@@ -1,4 +1,4 @@
-//! The mixed fusion centre of `fewbits-filters` as a receiver over bits.
+//! The fusion centre of `fewbits-filters` as a [`Receiver`] over bits.
 
 use fewbits_core::{BitString, Observation};
 use fewbits_filters::centre::{CentreState, FusionCentre, Slot};
@@ -7,15 +7,15 @@ use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{BoxError, Receiver, SensorHealth};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// A [`FusionCentre`] that advances by a period per slot. Sensors are numbered in rising order of their numbers there.
+/// A [`FusionCentre`] that advances by one period per slot. Sensors are numbered in increasing order of their numbers there.
 ///
-/// The random stream of a slot is a function of the seed and the slot, so that a stopped centre goes on with the same draws.
+/// The random stream of a slot is a function of seed and slot, so a stopped centre continues with the same draws.
 pub struct FusionReceiver<const D: usize, F: StateFilter<D>> {
     centre: FusionCentre<D, F>,
     numbers: Vec<u32>,
     period: f64,
     stream: Stream,
-    /// The slot of the prior's time: the one before the first that was predicted.
+    /// The slot at whose time the prior applies: the one before the first predicted slot.
     origin: Option<u64>,
     slot: u64,
 }
@@ -29,7 +29,8 @@ impl<const D: usize, F: StateFilter<D>> std::fmt::Debug for FusionReceiver<D, F>
 }
 
 impl<const D: usize, F: StateFilter<D>> FusionReceiver<D, F> {
-    /// The sensors that have joined, with slots of `period` seconds. The prior holds one period before the first slot that is predicted.
+    /// A receiver for all sensors that have joined `centre`, with slots of `period` seconds. The prior applies one period before the first
+    /// slot that is predicted.
     pub fn new(centre: FusionCentre<D, F>, period: f64, stream: Stream) -> Self {
         Self {
             numbers: centre.sensors().collect(),

@@ -1,22 +1,22 @@
-//! A fusion centre and its sensors as processes.
+//! A fusion centre and its sensors as processes on a network.
 //!
 //! | use | when |
 //! |---|---|
-//! | [`run_station`], [`run_sensor`] | a centre and its sensors by the clock of the machine, over a [`Transport`] |
-//! | [`Udp`] | datagrams over UDP |
-//! | `mqtt::Mqtt` (feature `mqtt`) | datagrams through a broker: sensors behind networks that let nothing in |
-//! | `zenoh::Zenoh` (feature `zenoh`) | fleets over several hosts, with or without routers |
-//! | [`Station`], [`SensorLink`] | frames under keys and a state that is stored, with sockets and clock of one's own |
-//! | [`FusionReceiver`] | the estimator is the mixed fusion centre of `fewbits-filters` |
-//! | `LivePage` (feature `live`) | people want to see a running centre |
-//! | [`Key`], [`ReplayWindow`], [`Store`] | the parts |
+//! | [`run_station`], [`run_sensor`] | a centre or a sensor runs by the clock of the machine, over a [`Transport`] |
+//! | [`Udp`] | datagrams are sent over UDP |
+//! | `mqtt::Mqtt` (feature `mqtt`) | datagrams are sent through a broker: for sensors behind networks that accept no connections |
+//! | `zenoh::Zenoh` (feature `zenoh`) | many sensors on several hosts, with or without routers |
+//! | [`Station`], [`SensorLink`] | you have your own sockets and clock, but need keys and a stored state |
+//! | [`FusionReceiver`] | the estimator is the fusion centre of `fewbits-filters` |
+//! | `LivePage` (feature `live`) | a web page is to show a running centre |
+//! | [`Key`], [`ReplayWindow`], [`Store`] | you need the parts |
 //!
-//! The machines are those of `fewbits-protocol`, which the simulated network runs too. Here are what a real network adds: others who can send, and
-//! processes that are stopped.
+//! The state machines are those of `fewbits-protocol`, which the simulated network runs too. This crate adds what a real network needs:
+//! protection against foreign senders, and states that survive the end of a process.
 //!
-//! The central choice: **every frame is authenticated, none is encrypted.** A report of one bit says nothing to whoever does not know what was asked, and
-//! what matters is that nobody else can move the estimate. The price is 28 bytes a frame, and that whoever can read the network can read the estimate's
-//! feedback. Where that matters, run the link inside a tunnel.
+//! **Every frame is authenticated, none is encrypted.** A report of one bit tells nothing to a reader who does not know the threshold.
+//! Authentication ensures that nobody else can change the estimate. It costs 28 bytes per frame. A reader of the network can read the
+//! feedback, and thereby the estimate. If that matters, run the link inside an encrypted tunnel.
 //!
 //! ```
 //! use fewbits_link::{Direction, Key, Refusal, ReplayWindow};

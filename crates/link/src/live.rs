@@ -1,6 +1,8 @@
-//! A page that shows a running centre: estimates with their band, the last reports and the health of each sensor, bits per second, refusals.
+//! A web page that shows a running centre: estimates with their band, the last reports and the health of each sensor, bits per second,
+//! refused envelopes.
 //!
-//! The page is one file without scripts from elsewhere. It is fed by server-sent events, and shows the last 300 slots to whoever opens it later.
+//! The page is one file that loads no scripts from other servers. It receives server-sent events, and shows the last 300 slots when it is
+//! opened.
 
 use crate::error::Error;
 use crate::station::{Counts, Step};
@@ -20,18 +22,18 @@ use tokio::sync::broadcast;
 use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::{Stream, StreamExt};
 
-/// Slots that are shown to whoever opens the page.
+/// Number of slots that are shown when the page is opened.
 const HISTORY: usize = 300;
 
 const PAGE: &str = include_str!("live.html");
 
-/// One slot as the page shows it.
+/// One slot, as it is sent to the page.
 #[derive(Serialize)]
 struct Shown<'a> {
     slot: u64,
     period: f64,
     estimate: &'a [(f64, f64)],
-    /// Per sensor: bits of its report, -1 for silence, -2 for lost.
+    /// Per sensor the bits of its report; -1 for nothing, -2 for lost.
     observed: Vec<i64>,
     numbers: &'a [u32],
     trouble: Option<&'a str>,
@@ -41,7 +43,7 @@ struct Shown<'a> {
 
 type Shared = Arc<(Mutex<VecDeque<String>>, broadcast::Sender<String>)>;
 
-/// A page that is served by a thread of its own.
+/// A page that a thread of its own serves.
 #[derive(Debug)]
 pub struct LivePage {
     shared: Shared,
@@ -51,10 +53,11 @@ pub struct LivePage {
 }
 
 impl LivePage {
-    /// Serves the page at this address, for these sensors and slots of `period` seconds. It has no password: bind it to a network that may see it.
+    /// Serves the page at this address, for these sensor numbers and slots of `period` seconds. The page has no password: bind it to a
+    /// trusted network.
     ///
     /// # Errors
-    /// If the address is taken or none of this machine.
+    /// If the address is in use or not an address of this machine.
     pub fn serve(address: SocketAddr, numbers: Vec<u32>, period: f64) -> Result<Self, Error> {
         let failed = |source| Error::socket(address, source);
         let listener = std::net::TcpListener::bind(address).map_err(failed)?;
@@ -73,7 +76,7 @@ impl LivePage {
         std::thread::spawn(move || {
             runtime.block_on(async move {
                 if let Ok(listener) = tokio::net::TcpListener::from_std(listener) {
-                    // Ends with the process.
+                    // The thread ends with the process.
                     let _ = axum::serve(listener, app).await;
                 }
             });
@@ -86,12 +89,12 @@ impl LivePage {
         })
     }
 
-    /// Where the page is.
+    /// Address of the page.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Shows a step. Never waits: who reads too slowly misses slots.
+    /// Shows a step. It never waits; a client that reads too slowly misses slots.
     pub fn show(&self, step: &Step, counts: Counts) {
         let observed = step.observed.iter().map(|observation| match observation {
             Observation::Received(report) => report.bits() as i64,
@@ -116,15 +119,15 @@ impl LivePage {
             history.pop_front();
         }
         history.push_back(text.clone());
-        // Nobody looks: no error.
+        // Without clients sending fails, which is no error.
         let _ = self.shared.1.send(text);
     }
 }
 
-/// What was, then what comes.
+/// The stored slots, then new ones as they come.
 async fn events(State(shared): State<Shared>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
     let (past, coming) = {
-        // Under one lock, so that no slot is missed or shown twice.
+        // Under one lock, so that no slot is missed or sent twice.
         let history = shared.0.lock().unwrap_or_else(PoisonError::into_inner);
         (history.iter().cloned().collect::<Vec<_>>(), shared.1.subscribe())
     };

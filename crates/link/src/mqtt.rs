@@ -10,16 +10,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-/// The longest message that does not end the connection. What is longer than a datagram is left alone.
+/// Longest message that is accepted without ending the connection. A message longer than a datagram is ignored.
 const MAX_MESSAGE: usize = 1 << 20;
 const CONNECT_WITHIN: Duration = Duration::from_secs(10);
 const RECONNECT_AFTER: Duration = Duration::from_secs(1);
 
-/// One end's connection to a broker. An address is the number of the sensor, at either end.
+/// The connection of one end to a broker. Addresses are sensor numbers.
 ///
-/// Sensor 3 of the fleet `plant` sends on the topic `plant/3/up` and is told on `plant/3/down`, both with quality of service 0: the protocol has
-/// its own answer to lost frames, and a frame that comes after its slot is of no use. When the connection ends a thread makes it anew, and what is
-/// sent meanwhile is lost.
+/// Sensor 3 of the fleet `plant` sends on the topic `plant/3/up` and receives on `plant/3/down`. Both have quality of service 0: the
+/// protocol itself handles lost frames, and a frame that comes after its slot is useless. If the connection ends, a thread connects again;
+/// what is sent meanwhile is lost.
 pub struct Mqtt {
     client: Arc<Client>,
     is_connected: Arc<AtomicBool>,
@@ -36,7 +36,7 @@ impl std::fmt::Debug for Mqtt {
 }
 
 impl Mqtt {
-    /// The centre of a fleet. Sizes of messages and the kind of session are set here.
+    /// The centre of a fleet. It sets the size of messages and the kind of session in `options`.
     ///
     /// # Errors
     /// If the fleet's name has an empty part or one of `+ # * $ ?`, or the broker does not answer or refuses.
@@ -65,14 +65,14 @@ impl Mqtt {
         let (client, is_connected) = (Arc::new(client), Arc::new(AtomicBool::new(false)));
         let (inlet, queue) = Queue::new(topics.clone());
         let (sender, outcome) = mpsc::channel();
-        // The thread ends with the last client: it keeps none.
+        // The thread ends when the last client is dropped, so it must not keep one.
         let (weak, connected, filter) = (Arc::downgrade(&client), is_connected.clone(), topics.from("+"));
         std::thread::spawn(move || {
             let mut must_subscribe = false;
             for event in connection.iter() {
                 match event {
                     Ok(Event::Incoming(Packet::Publish(message))) => inlet.leave(&message.topic, message.payload),
-                    // The broker keeps nothing of a session that has ended.
+                    // The broker forgets the subscriptions of an ended session.
                     Ok(Event::Incoming(Packet::ConnAck(_))) => must_subscribe = true,
                     Ok(Event::Incoming(Packet::SubAck(answer))) => {
                         let refused = answer.return_codes.contains(&SubscribeReasonCode::Failure);
@@ -94,7 +94,7 @@ impl Mqtt {
                         std::thread::sleep(RECONNECT_AFTER);
                     }
                 }
-                // If there is no place for the request, it is made after the next event.
+                // If the queue of requests is full, try again after the next event.
                 if must_subscribe && let Some(client) = weak.upgrade() {
                     must_subscribe = client.try_subscribe(&filter, QoS::AtMostOnce).is_err();
                 }
@@ -118,7 +118,7 @@ impl Transport for Mqtt {
     type Address = u32;
 
     fn send(&mut self, to: &u32, bytes: &[u8]) {
-        // What waited for a connection would come after its slot.
+        // A frame that waits for a connection would come after its slot: drop it.
         if self.is_connected.load(Ordering::Relaxed) {
             let _ = self
                 .client

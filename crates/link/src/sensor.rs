@@ -1,4 +1,4 @@
-//! A sensor behind its link: protocol and key, still without socket and clock.
+//! A sensor with protocol and key, without socket and clock.
 
 use crate::envelope::{Direction, Key, ReplayWindow, sensor_of};
 use crate::error::Error;
@@ -9,7 +9,7 @@ use fewbits_protocol::{
     Feedback, Frame, Kind, Note, Payload, Reaction, Sensor, SensorSettings, SensorTimer, Slot, Task,
 };
 
-/// Counters that are reserved at once, so that not every envelope is a write.
+/// Number of counters that are reserved by one write to the store.
 const RESERVED: u64 = 4096;
 
 /// What a sensor's program must do.
@@ -22,14 +22,15 @@ pub enum Request {
     Sample {
         /// The slot.
         slot: Slot,
-        /// The feedback as it travelled.
+        /// The feedback as it was sent.
         feedback: BitString,
     },
-    /// Write this down.
+    /// Record a note.
     Note(Note),
 }
 
-/// A sensor under its key: datagrams, time and samples in, [`Request`]s out. For sensors that are told their feedback or report by the clock.
+/// A sensor with its key. Its inputs are datagrams, time and samples, its outputs [`Request`]s. It is for sensors that are sent their
+/// feedback or report by the clock.
 #[derive(Debug)]
 pub struct SensorLink {
     sensor: Sensor,
@@ -40,13 +41,13 @@ pub struct SensorLink {
     reserved: u64,
     store: Option<Store>,
     timer: Option<(u64, SensorTimer)>,
-    /// The last report's bytes.
+    /// Bytes of the last report's frame.
     last: Vec<u8>,
     refused: u64,
 }
 
 impl SensorLink {
-    /// A sensor of this number. Its counter goes on where the store says, so that it is never used twice.
+    /// A sensor with this number. Its counter continues as stored, so that no value is used twice.
     ///
     /// # Errors
     /// If the sensor follows by echo, or the store cannot be read.
@@ -72,17 +73,17 @@ impl SensorLink {
         })
     }
 
-    /// When [`on_time`](Self::on_time) must be called next, in nanoseconds.
+    /// Time at which [`on_time`](Self::on_time) must be called next, in nanoseconds; `None` if no timer runs.
     pub fn next_timer(&self) -> Option<u64> {
         self.timer.map(|(at, _)| at)
     }
 
-    /// Datagrams that were refused: forged, replayed, or for another sensor.
+    /// Number of refused datagrams: forged, replayed, or for another sensor.
     pub fn refused(&self) -> u64 {
         self.refused
     }
 
-    /// A heartbeat, by which the centre learns where the sensor is. To be sent until a frame of the centre has come.
+    /// A heartbeat that tells the centre the sensor's address. Send it repeatedly until a frame of the centre has come.
     ///
     /// # Errors
     /// If the store cannot be written.
@@ -91,7 +92,7 @@ impl SensorLink {
         self.seal(Frame::new(Kind::Heartbeat, slot, 0, Payload::EMPTY))
     }
 
-    /// Time has passed.
+    /// The time is `now`, in nanoseconds. Timers that are due fire.
     ///
     /// # Errors
     /// If the store cannot be written.
@@ -103,7 +104,7 @@ impl SensorLink {
         Ok(())
     }
 
-    /// A datagram has come.
+    /// A datagram has arrived.
     ///
     /// # Errors
     /// If the store cannot be written.
@@ -121,7 +122,7 @@ impl SensorLink {
         self.carry_out(reaction, requests)
     }
 
-    /// The program has measured: the report, or `None` for silence.
+    /// The program has measured. `report` is `None` for silence.
     ///
     /// # Errors
     /// If the store cannot be written.
@@ -150,13 +151,13 @@ impl SensorLink {
                 requests.push(request);
             }
             Task::SendAgain => {
-                // A repeated report has a counter of its own: it is no replay.
+                // A repeated report gets a new counter: it is no replay.
                 let frame = std::mem::take(&mut self.last);
                 let request = self.envelope(&frame)?;
                 self.last = frame;
                 requests.push(request);
             }
-            // Only followers are asked to follow, and `new` takes none.
+            // Only followers are asked to follow, and `new` refuses them.
             Task::Wait | Task::Follow { .. } => {}
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! The centre behind its link: protocol, estimator, keys and store, still without socket and clock.
+//! The centre with protocol, estimator, keys and store, without socket and clock.
 
 use crate::envelope::{Direction, Key, Refusal, ReplayWindow, sensor_of};
 use crate::error::Error;
@@ -15,37 +15,37 @@ use std::fmt::Display;
 use std::net::SocketAddr;
 use std::str::FromStr;
 
-/// Envelopes of one slot that a centre can send to one sensor.
+/// Largest number of envelopes to one sensor in one slot.
 const COUNTERS_PER_SLOT: u64 = 1 << 16;
 const STATE_VERSION: u32 = 1;
 
-/// A sensor that a centre takes frames from.
+/// A sensor as its centre knows it.
 #[derive(Debug, Clone)]
 pub struct Peer<A = SocketAddr> {
-    /// Its number on the wire.
+    /// Number of the sensor in envelopes.
     pub number: u32,
     /// The key that it shares with the centre.
     pub key: Key,
-    /// Where it is, if that is known before it has sent anything.
+    /// Address of the sensor, if it is known before it has sent anything.
     pub address: Option<A>,
 }
 
-/// One slot as it ended.
+/// The result of one slot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Step {
     /// The slot.
     pub slot: u64,
-    /// What was observed of each sensor.
+    /// The observation of each sensor.
     pub observed: Vec<Observation<BitString>>,
-    /// Whether each sensor was asked, and answered what it was asked. One whose address is not known yet cannot be asked; that nothing comes
-    /// of it says nothing.
+    /// Whether each sensor was asked, and answered what it was asked. A sensor whose address is not known yet cannot be asked; its silence
+    /// is not used.
     pub asked: Vec<bool>,
-    /// Mean and standard deviation of each coordinate.
+    /// Mean and standard deviation of each coordinate of the state.
     pub estimate: Vec<(f64, f64)>,
-    /// Why the update did not use all observations.
+    /// Why the update did not use all observations; `None` if it did.
     pub trouble: Option<String>,
-    /// How each sensor is judged after it; empty if the estimator does not judge them.
+    /// The estimator's judgement of each sensor after the slot; empty if it does not judge them.
     #[serde(default)]
     pub health: Vec<SensorHealth>,
 }
@@ -63,7 +63,7 @@ impl Step {
         }
     }
 
-    /// What was observed of the sensors that were asked.
+    /// The observations of the sensors that were asked, each with its index.
     pub fn observed_when_asked(&self) -> Vec<(usize, Observation<BitString>)> {
         let all = self.observed.iter().cloned().enumerate();
         all.filter(|(sensor, _)| self.asked.get(*sensor) != Some(&false))
@@ -71,51 +71,51 @@ impl Step {
     }
 }
 
-/// What leaves a station.
+/// Outputs of a station.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Output<A = SocketAddr> {
     /// A datagram.
     Datagram {
-        /// To where.
+        /// Address of the receiver.
         to: A,
         /// An envelope.
         bytes: Vec<u8>,
     },
-    /// A slot has ended, and its outcome is stored.
+    /// A slot has ended, and its result is stored.
     Step(Step),
-    /// A slot passed without prediction.
+    /// A slot passed without update, because the prediction failed.
     Passed {
         /// The slot.
         slot: u64,
-        /// Why.
+        /// Error of the prediction.
         reason: String,
     },
-    /// Something was noticed of the sensor at this place of the list.
+    /// A note about a sensor.
     Note {
-        /// Place in the list of peers.
+        /// Index of the sensor in the list of peers.
         sensor: usize,
-        /// What was noticed.
+        /// The note.
         note: Note,
     },
 }
 
-/// How many envelopes were taken, and refused for which reason.
+/// Numbers of accepted envelopes, and of refused ones by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
-    /// Taken.
+    /// Accepted.
     pub taken: u64,
-    /// Too short.
+    /// Refused because they are too short.
     pub short: u64,
-    /// Of unknown sensors.
+    /// Refused because the sensor is unknown.
     pub unknown: u64,
-    /// Forged.
+    /// Refused because the authentication code does not match.
     pub forged: u64,
-    /// Replayed.
+    /// Refused because the counter was accepted before or is too old.
     pub replayed: u64,
 }
 
-/// What a station stores.
+/// The stored state of a station.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
@@ -124,22 +124,22 @@ struct Stored {
     /// The last slot that may have begun.
     slot: u64,
     windows: Vec<ReplayWindow>,
-    /// Where sensors were last: a centre that goes on need not wait until they speak.
+    /// Last addresses of the sensors: a restarted centre need not wait until they send.
     addresses: Vec<Option<String>>,
     receiver: BitString,
     last: Option<Step>,
 }
 
-/// A centre: datagrams and time in, [`Output`]s out.
+/// A centre. Its inputs are datagrams and time, its outputs [`Output`]s.
 ///
 /// ```text
 /// slot begins:  store (the slot has begun);  predict;  feedback under each sensor's key
 /// datagram:     known sensor, right code, new counter -> the protocol's machine
 /// deadline:     update;  store;  Step
 /// ```
-/// A step is stored before it is published, and a slot before anything of it is sent. A station that is stopped at any moment and made anew
-/// with the same store goes on from the last stored step, which it publishes again ([`Station::last_step`]); the slot in which it was stopped
-/// passes, and its reports are lost.
+/// A step is stored before it is published, and a slot before anything of it is sent. A station may be stopped at any moment. A new one
+/// with the same store continues from the last stored step and publishes it again ([`Station::last_step`]). The slot in which it was
+/// stopped passes without update, and its reports are lost.
 #[derive(Debug)]
 pub struct Station<R, A = SocketAddr> {
     centre: Centre,
@@ -147,7 +147,7 @@ pub struct Station<R, A = SocketAddr> {
     peers: Vec<Peer<A>>,
     places: HashMap<u32, usize>,
     windows: Vec<ReplayWindow>,
-    /// Envelopes sent to each sensor in this slot.
+    /// Number of envelopes sent to each sensor in this slot.
     sent: Vec<u64>,
     /// Whether each sensor was asked in this slot.
     asked: Vec<bool>,
@@ -158,11 +158,11 @@ pub struct Station<R, A = SocketAddr> {
 }
 
 impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
-    /// A centre with these sensors, in the order of the receiver's. It goes on from the store if that holds anything.
+    /// A centre with these sensors, in the order of the receiver's. It continues from the store if that holds a state.
     ///
     /// # Errors
-    /// If the numbers of sensors of settings, receiver and peers differ, a number stands twice, or the store cannot be read or is of another
-    /// centre.
+    /// If settings, receiver and peers have different numbers of sensors, a sensor number occurs twice, or the store cannot be read or is
+    /// of another centre.
     pub fn new(
         settings: CentreSettings,
         mut receiver: R,
@@ -228,30 +228,30 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
         &self.receiver
     }
 
-    /// The protocol's machine.
+    /// The state machine of the protocol.
     pub fn centre(&self) -> &Centre {
         &self.centre
     }
 
-    /// The last step: after a start from a store, the one that may not have been published.
+    /// The last step. After a start from a store it may not have been published.
     pub fn last_step(&self) -> Option<&Step> {
         self.last.as_ref()
     }
 
-    /// What was taken and refused.
+    /// Numbers of accepted and refused envelopes.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// When [`on_time`](Self::on_time) must be called next, in nanoseconds.
+    /// Time at which [`on_time`](Self::on_time) must be called next, in nanoseconds; `None` if no timer runs.
     pub fn next_timer(&self) -> Option<u64> {
         self.timers.keys().next().copied()
     }
 
-    /// Time has passed. Timers that are due fire.
+    /// The time is `now`, in nanoseconds. Timers that are due fire.
     ///
     /// # Errors
-    /// If the store cannot be written: nothing of the step has left then.
+    /// If the store cannot be written. Then nothing of the step is among the outputs.
     pub fn on_time(&mut self, now: u64, outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
         while let Some(entry) = self.timers.first_entry().filter(|entry| *entry.key() <= now) {
             for timer in entry.remove() {
@@ -263,7 +263,7 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
         Ok(())
     }
 
-    /// A datagram has come from `from`.
+    /// A datagram has arrived from the address `from`.
     ///
     /// # Errors
     /// As [`on_time`](Self::on_time). A datagram that is refused is no error: see [`counts`](Self::counts).
@@ -287,7 +287,7 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
             }
         };
         self.counts.taken += 1;
-        // Whoever has the key says where it is.
+        // An authentic datagram updates the sensor's address.
         self.peers[place].address = Some(from);
         let mut actions = Vec::new();
         self.centre.on_frame(place, frame, &mut actions);
@@ -328,10 +328,10 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
 
     fn predict(&mut self, slot: u64, outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
         self.sent.fill(0);
-        // Before anything is sent it is known that the slot has begun.
+        // Store that the slot has begun before anything is sent.
         self.save()?;
         let members = &self.centre.settings().members;
-        // A sensor that must be told something, and whose address is not known, is not asked.
+        // A sensor that needs feedback and whose address is unknown is not asked.
         let reached = members.iter().zip(&self.peers);
         self.asked = reached
             .map(|(member, peer)| member.feedback == Feedback::Clock || peer.address.is_some())
@@ -354,7 +354,7 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
         let peer = &self.peers[place];
         let Some(to) = peer.address.clone() else { return };
         self.sent[place] += 1;
-        // Slots never begin twice, so that no counter is used twice.
+        // A slot never begins twice, so no counter is used twice.
         let counter = self.centre.slot() * COUNTERS_PER_SLOT + self.sent[place].min(COUNTERS_PER_SLOT - 1);
         let bytes = peer.key.seal(Direction::ToSensor, peer.number, counter, frame);
         outputs.push(Output::Datagram { to, bytes });

@@ -1,4 +1,4 @@
-//! A file that is always whole: written beside the old one, which it then replaces.
+//! A file that is always complete: a new version is written beside the old one and then replaces it.
 
 use crate::error::Error;
 use serde::{Serialize, de::DeserializeOwned};
@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Where a process keeps what it must not lose.
+/// A file with the state that a process must not lose.
 #[derive(Debug, Clone)]
 pub struct Store {
     path: PathBuf,
@@ -14,7 +14,7 @@ pub struct Store {
 }
 
 impl Store {
-    /// A store in this file. It survives the end of the process at any moment.
+    /// A store in this file. The content survives the end of the process at any moment.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self {
             path: path.into(),
@@ -22,21 +22,21 @@ impl Store {
         }
     }
 
-    /// The same, surviving a power failure too: every write waits for the disk, which takes milliseconds.
+    /// The same store, safe against power failure too: every write waits for the disk, which takes milliseconds.
     #[must_use]
     pub fn durable(self) -> Self {
         Self { durable: true, ..self }
     }
 
-    /// The file.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Replaces the content.
+    /// Replaces the content by `value`.
     ///
     /// # Errors
-    /// If a file cannot be written. The old content stands then.
+    /// If a file cannot be written. The old content is then unchanged.
     pub fn save(&self, value: &impl Serialize) -> Result<(), Error> {
         let beside = self.path.with_extension("new");
         let failed = |path: &Path| {
@@ -56,7 +56,7 @@ impl Store {
     /// The content; `None` if there is no file yet.
     ///
     /// # Errors
-    /// If the file cannot be read or is no content of this type.
+    /// If the file cannot be read or is not of this type.
     pub fn load<T: DeserializeOwned>(&self) -> Result<Option<T>, Error> {
         let path = self.path.clone();
         match std::fs::read(&self.path) {

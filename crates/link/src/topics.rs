@@ -1,4 +1,4 @@
-//! What transports over named topics share: sensor 3 of the fleet `plant` sends on `plant/3/up` and is told on `plant/3/down`.
+//! Topic names for transports: sensor 3 of the fleet `plant` sends on `plant/3/up` and receives on `plant/3/down`.
 
 use crate::error::Error;
 use crate::transport::{Datagram, MAX_DATAGRAM};
@@ -6,20 +6,20 @@ use fewbits_numerics::error::refuse;
 use std::sync::mpsc;
 use std::time::Duration;
 
-/// Datagrams that wait to be taken. More are lost, so that a flood takes no memory.
+/// Largest number of waiting datagrams. Further ones are dropped, so that memory stays bounded.
 pub(crate) const QUEUE: usize = 4096;
 
-/// The topics of one end. An address is the number of the sensor at one end of them.
+/// The topics of one end. Addresses are sensor numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct Topics {
     fleet: String,
-    /// `None` at the centre.
+    /// Number of the sensor; `None` at the centre.
     sensor: Option<u32>,
 }
 
 impl Topics {
     /// # Errors
-    /// If the name of the fleet has an empty part or a character with which one name stands for many.
+    /// If the name of the fleet has an empty part or a wildcard character.
     pub(crate) fn new(fleet: &str, sensor: Option<u32>) -> Result<Self, Error> {
         if fleet.split('/').any(str::is_empty) || fleet.contains(|c: char| "+#*$?".contains(c) || c.is_control()) {
             return refuse("fleet", fleet, "parts separated by `/`, none empty, without `+ # * $ ?`");
@@ -40,20 +40,20 @@ impl Topics {
         format!("{}/{sensor}/{}", self.fleet, self.ways().0)
     }
 
-    /// The topics on which this end takes datagrams; `any` stands for any number.
+    /// The topics on which this end receives; `any` is the wildcard for sensor numbers.
     pub(crate) fn from(&self, any: &str) -> String {
         let sensor = self.sensor.map_or_else(|| any.to_owned(), |sensor| sensor.to_string());
         format!("{}/{sensor}/{}", self.fleet, self.ways().1)
     }
 
-    /// The sensor that a topic names on which a datagram has come.
+    /// The sensor number in the topic of a received datagram.
     fn sensor_of(&self, topic: &str) -> Option<u32> {
         let rest = topic.strip_prefix(&self.fleet)?.strip_prefix('/')?;
         rest.strip_suffix(self.ways().1)?.strip_suffix('/')?.parse().ok()
     }
 }
 
-/// Where a thread of the transport leaves datagrams.
+/// The sending end of the queue, for a thread of the transport.
 pub(crate) struct Inlet {
     topics: Topics,
     sender: mpsc::SyncSender<(u32, Vec<u8>)>,
@@ -71,7 +71,7 @@ impl Inlet {
     }
 }
 
-/// Datagrams that have come.
+/// The queue of received datagrams.
 #[derive(Debug)]
 pub(crate) struct Queue {
     receiver: mpsc::Receiver<(u32, Vec<u8>)>,

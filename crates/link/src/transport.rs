@@ -1,4 +1,4 @@
-//! What carries datagrams, and the loops that run a station or a sensor over it by the clock of the machine.
+//! The trait of transports, and the loops that run a station or a sensor over a transport by the clock of the machine.
 
 use crate::error::Error;
 use crate::sensor::{Request, SensorLink};
@@ -10,39 +10,39 @@ use std::ops::ControlFlow;
 use std::str::FromStr;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Bytes of the longest datagram.
+/// Longest datagram in bytes.
 pub(crate) const MAX_DATAGRAM: usize = 65_535;
-/// Datagrams that are taken before timers are looked at again: a flood does not hold up a slot.
+/// Largest number of datagrams that are processed before timers are checked again: many datagrams do not delay a slot.
 const BATCH: usize = 256;
-/// The longest wait: whoever watches is asked ten times a second.
+/// Longest wait: the caller is asked ten times a second whether to continue.
 const MAX_WAIT: Duration = Duration::from_millis(100);
 const HELLO_EVERY: Duration = Duration::from_secs(1);
 
-/// Where a datagram has come from, and its bytes.
+/// Address of the sender, and the bytes.
 pub type Datagram<'a, A> = (A, &'a [u8]);
 
-/// What carries datagrams between a centre and its sensors. It may lose, repeat and reorder them.
+/// A carrier of datagrams between a centre and its sensors. It may lose, repeat and reorder them.
 pub trait Transport {
-    /// Where a datagram goes, or has come from. A station stores it as text; text that is none is an address that is not known.
+    /// Address of a sender or receiver. A station stores it as text; text that does not parse counts as an unknown address.
     type Address: Clone + PartialEq + Debug + Display + FromStr;
 
-    /// Sends a datagram. Does not wait: what cannot be sent is lost.
+    /// Sends a datagram without waiting. What cannot be sent is lost.
     fn send(&mut self, to: &Self::Address, bytes: &[u8]);
 
     /// The next datagram; `None` if none comes within `wait`.
     ///
     /// # Errors
-    /// If none can come any more.
+    /// If the transport can receive no more.
     fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, Self::Address>>, Error>;
 }
 
-/// Nanoseconds since 1970.
+/// The time in nanoseconds since 1970.
 pub fn now() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Waits for datagrams until `until`, and takes those that are there.
+/// Waits for datagrams until the time `until`, and passes those that have come to `take`.
 fn receive<T: Transport>(
     transport: &mut T,
     until: u64,
@@ -62,7 +62,8 @@ fn receive<T: Transport>(
     Ok(())
 }
 
-/// Runs a station until `watch` breaks. `watch` sees every step and note once it is stored, and is asked at least ten times a second with an empty list.
+/// Runs a station until `watch` returns a break. `watch` is called with each step and note after it is stored, and at least ten times a
+/// second with an empty list.
 ///
 /// # Errors
 /// If the transport or the store fails.
@@ -88,21 +89,21 @@ pub fn run_station<R: Receiver, T: Transport>(
     }
 }
 
-/// What a sensor's program does.
+/// The program of a sensor: measures, and decides when to end.
 pub trait Program {
-    /// Measures in a slot and encodes the report; `None` is silence. Break if there is nothing more to measure.
+    /// Measures in a slot and encodes the report; `None` is silence. A break ends the sensor.
     fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>>;
 
-    /// Writes down what was noticed.
+    /// Records a note.
     fn note(&mut self, _: Note) {}
 
-    /// Asked at least ten times a second whether to go on.
+    /// Whether to continue. Called at least ten times a second.
     fn goes_on(&mut self) -> bool {
         true
     }
 }
 
-/// Runs a sensor until its program breaks. Datagrams that are not from `centre` are left alone.
+/// Runs a sensor until its program ends. Datagrams that are not from `centre` are ignored.
 ///
 /// # Errors
 /// If the transport or the store fails.
@@ -130,7 +131,7 @@ pub fn run_sensor<T: Transport>(
                             return Ok(());
                         };
                         link.on_sample(now(), report.as_ref(), &mut requests)?;
-                        // As long as the centre asks it knows where the sensor is.
+                        // While the centre asks, it knows the sensor's address: no heartbeat is needed.
                         hello_at = now() + HELLO_EVERY.as_nanos() as u64;
                     }
                 }

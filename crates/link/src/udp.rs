@@ -16,10 +16,10 @@ pub struct Udp {
 }
 
 impl Udp {
-    /// A socket bound to this address; port 0 is any that is free.
+    /// A socket bound to this address. Port 0 means any free port.
     ///
     /// # Errors
-    /// If the address is taken or none of this machine.
+    /// If the address is in use or not an address of this machine.
     pub fn bind(address: impl ToSocketAddrs + std::fmt::Display) -> Result<Self, Error> {
         let bound = UdpSocket::bind(&address).and_then(|socket| Ok((socket.local_addr()?, socket)));
         let (address, socket) = bound.map_err(|source| Error::socket(address, source))?;
@@ -31,14 +31,14 @@ impl Udp {
         })
     }
 
-    /// Where it is bound.
+    /// The address that the socket is bound to.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Waits for so long at most; not at all if that is zero.
+    /// Sets the longest wait of the next read; zero means no wait.
     fn wait(&mut self, wait: Duration) -> std::io::Result<()> {
-        // What is there is taken without waiting: a timeout is rounded up to milliseconds.
+        // With zero wait the socket is non-blocking: a timeout would be rounded up to milliseconds.
         if self.is_waiting == wait.is_zero() {
             self.is_waiting = !wait.is_zero();
             self.socket.set_nonblocking(!self.is_waiting)?;
@@ -62,9 +62,9 @@ impl Transport for Udp {
         loop {
             match self.socket.recv_from(&mut self.buffer) {
                 Ok((length, from)) => return Ok(Some((from, &self.buffer[..length]))),
-                // A sensor that is gone is refused by its machine, and the error comes back here.
+                // The machine of a sensor that has ended refuses a datagram; the error arrives here and is ignored.
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => {}
-                // Nothing is there.
+                // No datagram is waiting.
                 Err(_) => return Ok(None),
             }
         }

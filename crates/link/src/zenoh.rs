@@ -1,4 +1,4 @@
-//! Datagrams over zenoh: peers, or routers between them.
+//! Datagrams over zenoh, between peers or through routers.
 
 use crate::error::Error;
 use crate::topics::{Queue, Topics};
@@ -8,16 +8,16 @@ use ::zenoh::pubsub::Subscriber;
 use ::zenoh::{Session, Wait};
 use std::time::Duration;
 
-/// One end's session of zenoh. An address is the number of the sensor, at either end.
+/// The zenoh session of one end. Addresses are sensor numbers.
 ///
-/// Sensor 3 of the fleet `plant` sends on the key `plant/3/up` and is told on `plant/3/down`. Who connects to whom is the session's configuration:
-/// sensors that connect to a centre that listens need no router.
+/// Sensor 3 of the fleet `plant` sends on the key `plant/3/up` and receives on `plant/3/down`. The session's configuration says who
+/// connects to whom. If sensors connect to a centre that listens, no router is needed.
 #[derive(Debug)]
 pub struct Zenoh {
     session: Session,
     topics: Topics,
     queue: Queue,
-    /// Takes datagrams as long as it lives.
+    /// Receives datagrams until it is dropped.
     _subscriber: Subscriber<()>,
 }
 
@@ -58,7 +58,7 @@ impl Transport for Zenoh {
     type Address = u32;
 
     fn send(&mut self, to: &u32, bytes: &[u8]) {
-        // Dropped where the network is congested, and not held back to be sent with others.
+        // If the network is congested, drop the datagram instead of delaying it.
         let put = self.session.put(self.topics.to(*to), bytes);
         let _ = put
             .congestion_control(::zenoh::qos::CongestionControl::Drop)

@@ -9,14 +9,14 @@
 //! | few Gaussians for an estimate | [`Reduction`]; [`Reduction::default`] is the recommended method |
 //! | the message, as bits | [`wire::CodedMixture`] under a [`wire::WireFormat`] that both ends know |
 //! | the best message within a number of bits | [`wire::RateControl`] |
-//! | how far two densities are apart, estimated at points | [`plug_in`] |
+//! | the difference between two densities, estimated at points | [`plug_in`] |
 //! | the same integrated over all of space, in one to three dimensions | [`quadrature`] |
 //! | the same in closed form, and which measure bounds which | [`divergence`] |
-//! | single steps of a reduction | [`tree`], [`cut`], [`merge`], [`refine`] |
+//! | the single steps of a reduction | [`tree`], [`cut`], [`merge`], [`refine`] |
 //!
-//! The reduction has three steps. A tree over the particles is cut to 60 nodes by a closed-form bound. Pairs of nodes are merged, each
-//! time the pair with the smallest bound of the information lost. Expectation-maximisation towards the whole estimate improves the
-//! rest. The tree alone is the paper's method ([`Reduction::paper`]); it loses several times as much for as many components.
+//! The reduction has three steps. A tree over the particles is cut to 60 nodes by a bound in closed form. Pairs of nodes are merged, each
+//! time the pair with the smallest bound of the information lost. Expectation-maximisation then fits the result to the whole estimate.
+//! The tree alone is the paper's method ([`Reduction::paper`]); it loses several times as much information with as many components.
 //!
 //! ```
 //! use fewbits_core::Message;
@@ -31,7 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: the densities themselves (`fewbits-densities`), who sends a message to whom (`fewbits-handoff`).
+//! Not in this crate: the densities themselves (`fewbits-densities`), and which node sends to which (`fewbits-handoff`).
 
 pub mod divergence;
 pub mod published;

@@ -6,7 +6,7 @@ use crate::reduction::cut::{Criterion, NodeErrors};
 use crate::tree::{Split, Tree};
 use fewbits_densities::KernelEstimate;
 
-/// The paper's reductions of one estimate under its three criteria, for the price of one evaluation of the tree.
+/// The paper's reductions of one estimate under its three criteria. The errors of the tree's nodes are evaluated only once.
 #[derive(Debug, Clone)]
 pub struct PaperReductions<const D: usize> {
     /// The tree.
@@ -22,7 +22,7 @@ impl<const D: usize> PaperReductions<D> {
     /// Builds the KD-tree and its errors.
     ///
     /// # Errors
-    /// If a node's covariance is not positive definite: not for a valid estimate.
+    /// If a node's covariance is not positive definite, which cannot happen for a valid estimate.
     pub fn new(estimate: &KernelEstimate<D>) -> Result<Self, Error> {
         let tree = Tree::new(estimate, Split::KD)?;
         let plug_in = node_errors(estimate, &tree)?;

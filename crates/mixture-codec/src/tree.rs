@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Along which direction a node is split.
+/// The direction along which a node is split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Axis {
@@ -16,16 +16,16 @@ pub enum Axis {
     Widest,
     /// The principal axis of the centres, in coordinates where the kernel is isotropic.
     Principal,
-    /// The coordinate axes in turn. Much worse; kept for comparison.
+    /// The coordinate axes in turn. Gives much worse reductions; for comparison.
     Alternating,
 }
 
-/// Position along the direction at which a node is split.
+/// The position along the direction at which a node is split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum At {
     /// The left child gets the first `ceil(n/2)` kernels.
     CountMedian,
-    /// The left child gets kernels until it holds half of the weight, at least one and not all.
+    /// The left child gets kernels until it has half of the weight; it gets at least one and not all.
     WeightMedian,
 }
 
@@ -44,19 +44,19 @@ impl Split {
         axis: Axis::Widest,
         at: At::CountMedian,
     };
-    /// Principal axes at the weight median: what the recommended reduction uses.
+    /// Principal axes and weight medians, as the recommended reduction uses them.
     pub const PRINCIPAL: Self = Self {
         axis: Axis::Principal,
         at: At::WeightMedian,
     };
 }
 
-/// A node: a contiguous run of kernels (in the tree's order) and their moments.
+/// A node of a [`Tree`]: a contiguous range of kernels in the tree's order, and their moments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node<const D: usize> {
-    /// Positions in [`Tree::order`].
+    /// Range of positions in [`Tree::order`].
     pub range: Range<usize>,
-    /// Children, or `None` for a leaf.
+    /// Indices of the two children; `None` for a leaf.
     pub children: Option<[usize; 2]>,
     /// Total weight.
     pub weight: f64,
@@ -67,10 +67,10 @@ pub struct Node<const D: usize> {
 }
 
 impl<const D: usize> Node<D> {
-    /// The node's Gaussian.
+    /// The node's Gaussian, with the node's weight.
     ///
     /// # Errors
-    /// If the node's covariance is not positive definite: not for a node of this tree.
+    /// If the node's covariance is not positive definite, which cannot happen for a node of a tree.
     pub fn component(&self) -> Result<Component<D>, Error> {
         Component::new(self.weight, self.mean, self.covariance)
     }
@@ -78,9 +78,9 @@ impl<const D: usize> Node<D> {
 
 /// A binary tree over the kernels of an estimate: `2 n - 1` nodes, the root first.
 ///
-/// Moments go up by `w = w_L + w_R`, `m = (w_L m_L + w_R m_R)/w`, `S = sum_k (w_k/w)(S_k + (m_k - m)(m_k - m)')`, which never
-/// subtracts large numbers. Splitting is by position in a stable order, not by value, so duplicates of a resampled cloud do no
-/// harm. `O(n log^2 n)`.
+/// Moments are computed from the children by `w = w_L + w_R`, `m = (w_L m_L + w_R m_R)/w`, `S = sum_k (w_k/w)(S_k + (m_k - m)(m_k - m)')`,
+/// without subtraction of large numbers. Nodes are split by position in a stable order, not by value, so duplicates of a resampled cloud do
+/// no harm. `O(n log^2 n)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tree<const D: usize> {
     nodes: Vec<Node<D>>,
@@ -94,7 +94,7 @@ impl<const D: usize> Tree<D> {
     /// Builds the tree. Kernels of weight zero are left out.
     ///
     /// # Errors
-    /// Never for a valid estimate; [`Error::Impossible`] if every weight is zero.
+    /// [`Error::Impossible`] if every weight is zero, which cannot happen for a valid estimate.
     pub fn new(estimate: &KernelEstimate<D>, split: Split) -> Result<Self, Error> {
         let weights = estimate.particles().weights();
         let order: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
@@ -111,8 +111,8 @@ impl<const D: usize> Tree<D> {
         Ok(tree)
     }
 
-    /// Adds the node of `range` and all below it; returns its index. Depth is `O(log n)` at the count median and at most `n`
-    /// for wild weights, so the descent keeps its own stack.
+    /// Adds the node of `range` and all nodes below it; returns its index. The depth is `O(log n)` with count medians but can be `n`
+    /// with extreme weights, so an explicit stack is used instead of recursion.
     fn build(
         &mut self,
         estimate: &KernelEstimate<D>,
@@ -144,7 +144,7 @@ impl<const D: usize> Tree<D> {
             }
             self.nodes.push(node);
         }
-        // Children come after their parent, so going backwards meets them first.
+        // Children have larger indices than their parent, so in reverse order they come first.
         for index in (0..self.nodes.len()).rev() {
             self.fill_moments(estimate, index);
         }
@@ -196,6 +196,7 @@ impl<const D: usize> Tree<D> {
                 .sum::<f64>()
                 / total
         };
+        // The axis along which to split.
         let direction: SVector<f64, D> = match split.axis {
             Axis::Widest => {
                 let spread: [f64; D] = std::array::from_fn(|d| moment(d, d, own));
@@ -215,6 +216,7 @@ impl<const D: usize> Tree<D> {
                 .map(|d| direction[d] * columns[d][*i])
                 .sum();
         }
+        // Ties are decided by index, so that the order does not depend on the sorting algorithm.
         own.sort_by(|a, b| keys[*a].total_cmp(&keys[*b]).then(a.cmp(b)));
         let left = match split.at {
             At::CountMedian => own.len().div_ceil(2),
@@ -240,12 +242,12 @@ impl<const D: usize> Tree<D> {
         self.nodes.get(index)
     }
 
-    /// The kernels in the tree's order: those of a node are neighbours.
+    /// The kernels in the tree's order, in which those of a node are contiguous.
     pub fn order(&self) -> &[usize] {
         &self.order
     }
 
-    /// The kernels under a node, by their number in the estimate, increasing; empty for a node that is not there.
+    /// The kernels under a node, as increasing indices into the estimate; empty if there is no such node.
     pub fn members(&self, index: usize) -> Vec<usize> {
         let mut members = self
             .nodes
@@ -255,10 +257,10 @@ impl<const D: usize> Tree<D> {
         members
     }
 
-    /// Checks that `cut` holds one ancestor-or-self of every leaf.
+    /// Checks that every leaf has exactly one node of `cut` among its ancestors and itself.
     ///
     /// # Errors
-    /// If it does not.
+    /// If this is not so.
     pub fn check_cut(&self, cut: &[usize]) -> Result<(), Error> {
         let mut ranges: Vec<Range<usize>> = Vec::with_capacity(cut.len());
         for index in cut {

@@ -10,7 +10,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// `x(n) = a x(n-1) + u(n)`, `u ~ N(0, q)`: a scalar that decays towards zero and is pushed by white noise.
+/// `x(n) = a x(n-1) + u(n)`, `u ~ N(0, q)`: a scalar that decays towards zero (for `|a| < 1`) and is driven by white noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Parameters", into = "Parameters")]
 pub struct Ar1 {
@@ -40,11 +40,11 @@ impl Ar1 {
         Ok(model)
     }
 
-    /// The same for any finite coefficient. The name is the opt-in: a state that grows without bound is beyond most
-    /// estimators that receive only a few bits.
+    /// As [`new`](Self::new) for any finite coefficient. Most estimators that receive only a few bits cannot follow a state that grows
+    /// without bound, so such a model must be asked for by this name.
     ///
     /// # Errors
-    /// A coefficient that is not finite, a negative variance.
+    /// If the coefficient is not finite, or the variance is negative or not finite.
     pub fn new_unstable(coefficient: f64, noise_variance: f64) -> Result<Self, Error> {
         Ok(Self {
             transition: Matrix1::new(finite("coefficient", coefficient)?),
@@ -52,12 +52,12 @@ impl Ar1 {
         })
     }
 
-    /// `a`.
+    /// Coefficient `a`.
     pub fn coefficient(&self) -> f64 {
         self.transition[0]
     }
 
-    /// `q`.
+    /// Noise variance `q`, in state units squared.
     pub fn noise_variance(&self) -> f64 {
         self.noise_covariance[0]
     }
@@ -75,7 +75,7 @@ impl Ar1 {
     pub fn stationary_variance(&self) -> Result<f64, Error> {
         let a = self.coefficient();
         if a.abs() < 1.0 {
-            // The factored form keeps the digits of 1 - a^2 near |a| = 1.
+            // The factored form keeps the digits of 1 - a^2 for |a| near 1.
             Ok(self.noise_variance() / ((1.0 - a) * (1.0 + a)))
         } else {
             Err(Error::NoSteadyState)

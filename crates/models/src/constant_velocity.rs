@@ -1,24 +1,24 @@
-//! Constant velocity, disturbed by white-noise acceleration.
+//! Targets of nearly constant velocity: the acceleration is white noise.
 
 use crate::{Error, LinearGaussian};
 use fewbits_numerics::error::{non_negative, positive};
 use nalgebra::{Matrix2, Matrix4, Matrix4x2, SVector, Vector2};
 
-/// A target on a line: state `[position, velocity]`, `F = [[1, T], [0, 1]]`, `G = [T^2/2, T]'`, one acceleration of
-/// variance `acceleration_variance` that is constant within a step.
+/// A target on a line with state `[position, velocity]`: `x(n) = F x(n-1) + G u(n)` with `F = [[1, T], [0, 1]]`, `G = [T^2/2, T]'` and
+/// acceleration `u` of variance `acceleration_variance`, constant within a step of length `T = interval`.
 ///
-/// `interval` is in seconds, positions in any unit of length, the variance in that unit squared per second to the fourth.
+/// `interval` is in seconds. Positions may be in any unit of length; the variance is in that unit squared per second to the fourth power.
 ///
 /// # Errors
-/// An interval that is not positive, a negative variance.
+/// If the interval is not positive, or the variance is negative.
 pub fn constant_velocity_1d(interval: f64, acceleration_variance: f64) -> Result<LinearGaussian<2, 1>, Error> {
     let (transition, gain) = axis(interval)?;
     let variance = non_negative("acceleration_variance", acceleration_variance)?;
     LinearGaussian::new(transition, gain, SVector::repeat(variance))
 }
 
-/// A target in a plane: state `[x, x velocity, y, y velocity]`, each axis as in [`constant_velocity_1d`] with its own
-/// acceleration of the same variance.
+/// A target in a plane with state `[x, x velocity, y, y velocity]`. Each axis is as in [`constant_velocity_1d`]; the accelerations of the
+/// two axes are independent and of the same variance.
 ///
 /// # Errors
 /// As [`constant_velocity_1d`].
@@ -34,7 +34,7 @@ pub fn constant_velocity_2d(interval: f64, acceleration_variance: f64) -> Result
     LinearGaussian::new(transition, gain, SVector::repeat(variance))
 }
 
-/// `F` and `G` of one axis.
+/// `F` and `G` of one axis for a step of length `interval`.
 fn axis(interval: f64) -> Result<(Matrix2<f64>, Vector2<f64>), Error> {
     let interval = positive("interval", interval)?;
     Ok((Matrix2::new(1.0, interval, 0.0, 1.0), Vector2::new(0.5 * interval * interval, interval)))

@@ -1,4 +1,4 @@
-//! Linear dynamics in continuous time, over any stretch of it.
+//! Linear dynamics in continuous time, and their discrete dynamics over any interval.
 //!
 //! `dx = (A x + b) dt + dW`, `W` white noise of spectral density `Q_c`. Over `t` seconds:
 //!
@@ -7,8 +7,8 @@
 //! h = t / 2^k with |A| h <= 1/2:    F, g, Q by their Taylor series in h
 //! k doublings:    Q <- Q + F Q F',  g <- g + F g,  F <- F F
 //! ```
-//! Covariances are sums of positives throughout: nothing is inverted, and long gaps of a stable model end at its stationary law. (Van
-//! Loan's exponential of a doubled matrix holds `exp(-A t)`, which overflows there.)
+//! Covariances are sums of positive semidefinite terms: nothing is inverted, and over a long interval a stable model reaches its stationary
+//! distribution. (Van Loan's method, the exponential of a matrix of twice the size, contains `exp(-A t)`, which overflows there.)
 
 use crate::Error;
 use fewbits_core::{Belief, Dynamics, Evolution, Gaussian, GaussianDynamics};
@@ -19,9 +19,9 @@ use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// `dx = (A x + b) dt + dW`: any linear dynamics in continuous time.
+/// `dx = (A x + b) dt + dW`: linear dynamics in continuous time, driven by white noise `W`.
 ///
-/// Time is in seconds; the density has the unit of the state squared per second.
+/// Time is in seconds. The spectral density of the noise is in state units squared per second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Parameters<D>", into = "Parameters<D>")]
 pub struct ContinuousLinear<const D: usize> {
@@ -43,7 +43,7 @@ impl<const D: usize> ContinuousLinear<D> {
     /// The model with drift `A` (per second), offset `b` (state per second) and noise density `Q_c` (state squared per second).
     ///
     /// # Errors
-    /// Entries that are not finite, a density that is no covariance.
+    /// If an entry is not finite, or the density is not symmetric positive semidefinite.
     pub fn new(drift: SMatrix<f64, D, D>, offset: SVector<f64, D>, density: SMatrix<f64, D, D>) -> Result<Self, Error> {
         all_finite("drift", drift.as_slice())?;
         all_finite("offset", offset.as_slice())?;
@@ -55,17 +55,17 @@ impl<const D: usize> ContinuousLinear<D> {
         })
     }
 
-    /// `A`.
+    /// Drift `A`, per second.
     pub fn drift(&self) -> &SMatrix<f64, D, D> {
         &self.drift
     }
 
-    /// `Q_c`.
+    /// Noise density `Q_c`, in state units squared per second.
     pub fn density(&self) -> &SMatrix<f64, D, D> {
         &self.density
     }
 
-    /// The model whose drift and (diagonal) density have these entries and zeros elsewhere.
+    /// The model with these entries of drift and (diagonal) density, and zeros elsewhere.
     fn with_entries(drift: &[(usize, usize, f64)], density: &[(usize, f64)]) -> Result<Self, Error> {
         let (mut a, mut q) = (SMatrix::zeros(), SMatrix::zeros());
         drift.iter().for_each(|(i, j, x)| a[(*i, *j)] = *x);
@@ -75,8 +75,8 @@ impl<const D: usize> ContinuousLinear<D> {
 }
 
 impl ContinuousLinear<1> {
-    /// Ornstein-Uhlenbeck: `dx = -(x - mean) / time_constant dt + sqrt(2 variance / time_constant) dW`. Its stationary law is
-    /// `N(mean, variance)`, its correlation falls by `1/e` within `time_constant` seconds.
+    /// Ornstein-Uhlenbeck process: `dx = -(x - mean) / time_constant dt + sqrt(2 variance / time_constant) dW`. Its stationary distribution
+    /// is `N(mean, variance)`; its autocorrelation is `exp(-t / time_constant)`, times in seconds.
     ///
     /// # Errors
     /// If the mean is not finite, the time constant not above 0, or the variance negative.
@@ -86,7 +86,7 @@ impl ContinuousLinear<1> {
         Self::new([[-rate]].into(), [finite("mean", mean)? * rate].into(), [[density]].into())
     }
 
-    /// A random walk: variance grows by `density` per second.
+    /// A random walk: the variance grows by `density` per second.
     ///
     /// # Errors
     /// If the density is negative.
@@ -95,13 +95,13 @@ impl ContinuousLinear<1> {
     }
 }
 
-/// Coordinates of the position in the states of the plane: `[x, x velocity, y, y velocity]`, as in [`crate::constant_velocity_2d`].
+/// Indices of the position in the state of the models in a plane, `[x, x velocity, y, y velocity]`, as in [`crate::constant_velocity_2d`].
 pub const PLANE_POSITION: [usize; 2] = [0, 2];
 
 impl ContinuousLinear<2> {
-    /// Nearly constant velocity on a line, `[position, velocity]`, pushed by white acceleration of `density` (length squared per second
-    /// cubed): `Q = q [[t^3/3, t^2/2], [t^2/2, t]]`. [`crate::constant_velocity_1d`] is another model: an acceleration that is constant
-    /// within a step.
+    /// Nearly constant velocity on a line, state `[position, velocity]`, driven by white acceleration of `density` (length squared per
+    /// second cubed): `Q = q [[t^3/3, t^2/2], [t^2/2, t]]`. In [`crate::constant_velocity_1d`] the acceleration is instead constant within
+    /// a step.
     ///
     /// # Errors
     /// If the density is negative.
@@ -111,7 +111,8 @@ impl ContinuousLinear<2> {
 }
 
 impl ContinuousLinear<3> {
-    /// Nearly constant acceleration on a line, `[position, velocity, acceleration]`, pushed by white jerk of `density`.
+    /// Nearly constant acceleration on a line, state `[position, velocity, acceleration]`, driven by white jerk of `density` (length
+    /// squared per second to the fifth power).
     ///
     /// # Errors
     /// If the density is negative.
@@ -130,8 +131,8 @@ impl ContinuousLinear<4> {
         Self::with_entries(&[(0, 1, 1.0), (2, 3, 1.0)], &[(1, density), (3, density)])
     }
 
-    /// A velocity that is forgotten, on both axes of a plane, `[x, x velocity, y, y velocity]`: each velocity is Ornstein-Uhlenbeck about
-    /// 0 with deviation `speed` and correlation time `persistence`.
+    /// Velocities that decay to zero, on both axes of a plane, state `[x, x velocity, y, y velocity]`: each velocity is an
+    /// Ornstein-Uhlenbeck process of mean 0, standard deviation `speed` and correlation time `persistence` (seconds).
     ///
     /// # Errors
     /// If the speed is negative or the persistence not above 0.
@@ -151,7 +152,7 @@ impl<const D: usize> Evolution<D> for ContinuousLinear<D> {
     fn over(&self, seconds: f64) -> Result<AffineGaussian<D>, ArgumentError> {
         non_negative("seconds", seconds)?;
         let identity = SMatrix::<f64, D, D>::identity();
-        // The norm that bounds powers: the largest sum of a column.
+        // The 1-norm (largest column sum) bounds the powers of `A`.
         let norm = (0..D).map(|j| self.drift.column(j).abs().sum()).fold(0.0, f64::max) * seconds;
         finite("seconds", norm)?;
         let doublings = if norm > 0.5 {
@@ -163,6 +164,7 @@ impl<const D: usize> Evolution<D> for ContinuousLinear<D> {
 
         let (mut transition, mut offset, mut noise) = (identity, SVector::zeros(), SMatrix::zeros());
         let (mut power, mut integrand, mut spread) = (identity, self.offset * h, self.density * h);
+        // Taylor series of transition, offset and noise over the short interval h.
         for n in 1..=TERMS {
             // power = (A h)^n / n!, integrand = h (A h)^(n-1) b / n!, spread = h^n / n! (L^(n-1) Q_c) with L X = A X + X A'.
             power = self.drift * power * (h / n as f64);
@@ -173,6 +175,7 @@ impl<const D: usize> Evolution<D> for ContinuousLinear<D> {
             spread = (self.drift * spread + spread * self.drift.transpose()) * (h / (n + 1) as f64);
         }
         for _ in 0..doublings {
+            // Double the interval: x(2h) is the model applied twice.
             noise += congruence(&transition, &noise);
             offset += transition * offset;
             transition *= transition;
@@ -185,7 +188,7 @@ impl<const D: usize> Evolution<D> for ContinuousLinear<D> {
     }
 }
 
-/// `x' = F x + g + n`, `n ~ N(0, Q)`, `Q` of any rank: linear dynamics about any point.
+/// `x' = F x + g + n`, `n ~ N(0, Q)`, with `Q` of any rank.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AffineGaussian<const D: usize> {
     transition: SMatrix<f64, D, D>,
@@ -197,7 +200,7 @@ impl<const D: usize> AffineGaussian<D> {
     /// The model with transition `F`, offset `g` and noise covariance `Q`.
     ///
     /// # Errors
-    /// Entries that are not finite, a matrix that is no covariance.
+    /// If an entry is not finite, or `Q` is not symmetric positive semidefinite.
     pub fn new(
         transition: SMatrix<f64, D, D>,
         offset: SVector<f64, D>,
@@ -221,17 +224,17 @@ impl<const D: usize> AffineGaussian<D> {
         }
     }
 
-    /// `F`.
+    /// Transition `F`.
     pub fn transition(&self) -> &SMatrix<f64, D, D> {
         &self.transition
     }
 
-    /// `g`.
+    /// Offset `g`.
     pub fn offset(&self) -> &SVector<f64, D> {
         &self.offset
     }
 
-    /// `Q`.
+    /// Noise covariance `Q`, possibly singular.
     pub fn noise_covariance(&self) -> &SMatrix<f64, D, D> {
         &self.noise_covariance
     }
@@ -248,7 +251,7 @@ impl<const D: usize> Dynamics<D> for AffineGaussian<D> {
     }
 
     fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: fewbits_core::ColumnsMut<'_, D>) {
-        // A covariance of rounding errors below zero counts as its diagonal.
+        // A covariance that rounding has made indefinite is replaced by its diagonal.
         let factor = semidefinite_factor("noise_covariance", &self.noise_covariance)
             .unwrap_or_else(|_| SMatrix::from_diagonal(&self.noise_covariance.diagonal().map(|v| v.max(0.0).sqrt())));
         for i in 0..fewbits_core::columns::count(&states) {

@@ -1,26 +1,26 @@
 //! Dynamics and sensors: models of how a state moves and of what is measured of it.
 //!
-//! A model here is a checked, immutable value: the matrices of a state equation or of a sensing equation, nothing else. It
-//! can predict, draw and describe its noise; what to do with a measurement is the business of the crates above.
+//! A model is a checked, immutable value: the matrices of a state equation or of a sensing equation. It
+//! predicts, draws samples and states its noise. Estimation from measurements is in the crates above.
 //!
-//! All implement the traits of [`fewbits_core`], so any filter takes them.
+//! All models implement the traits of [`fewbits_core`], so every filter accepts them.
 //!
-//! The central choice is that process noise is stored as it is caused, `Q = G diag(q) G'` with a few independent causes `q`
-//! and their effect `G`, never as a bare `Q`. A constant-velocity target is pushed by one acceleration per axis, so its `Q`
-//! has half rank; a factorisation of `Q` would fail or invent noise, while `x' = F x + G u` draws from it exactly. The cost is
-//! a second const-generic parameter in the type, the number of causes.
+//! Process noise is stored by its causes: `Q = G diag(q) G'` with a few independent noise variances `q` and their gain `G`, not as `Q`
+//! itself. A constant-velocity target has one random acceleration per axis, so its `Q`
+//! has half rank. A Cholesky factorisation of `Q` would fail or add noise, while `x' = F x + G u` draws exactly. In exchange, the
+//! type has a second const parameter, the number of causes.
 //!
 //! | model | type |
 //! |---|---|
 //! | scalar first-order autoregression | [`Ar1`] |
 //! | linear with Gaussian noise, any dimension | [`LinearGaussian`] |
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
-//! | linear in continuous time: Ornstein-Uhlenbeck, nearly constant velocity and acceleration, random walk | [`ContinuousLinear`], over any time an [`AffineGaussian`] |
-//! | several of these, one at a time; the manoeuvring target | [`Switching`], over any time the models and transition of an IMM filter |
+//! | linear in continuous time (Ornstein-Uhlenbeck, nearly constant velocity, random walk) | [`ContinuousLinear`], [`AffineGaussian`] |
+//! | one of several models at a time, such as a manoeuvring target | [`Switching`], for an IMM filter |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
 //! | a substance that diffuses through air, ground, vessels | [`diffusion`] |
-//! | what a source causes at sensors, in any medium | [`SourceModel`] |
+//! | concentrations from a source at sensors, in any medium | [`SourceModel`] |
 //!
 //! ```
 //! use fewbits_models::{constant_velocity_1d, Ar1};
@@ -35,7 +35,7 @@
 //! # Ok::<(), fewbits_models::Error>(())
 //! ```
 //!
-//! Not here: nonlinear dynamics, time-varying matrices, estimation.
+//! Not in this crate: other nonlinear dynamics, time-varying matrices, estimation.
 
 mod ar1;
 mod constant_velocity;

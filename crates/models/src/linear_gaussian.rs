@@ -12,9 +12,9 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// `x(n) = F x(n-1) + G u(n)` with independent `u_i ~ N(0, q_i)`: `D` state coordinates, `U` causes of noise.
+/// `x(n) = F x(n-1) + G u(n)` with independent `u_i ~ N(0, q_i)`: `D` state coordinates, `U` independent noise inputs.
 ///
-/// The noise covariance `Q = G diag(q) G'` has rank at most `U`; nothing here factors or inverts it.
+/// The noise covariance `Q = G diag(q) G'` has rank at most `U`. No function factors or inverts it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Parameters<D, U>", into = "Parameters<D, U>")]
 pub struct LinearGaussian<const D: usize, const U: usize> {
@@ -39,7 +39,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
     /// The model with transition `F` (D x D), noise gain `G` (D x U) and noise variances `q` (U).
     ///
     /// # Errors
-    /// Entries that are not finite, a negative variance.
+    /// If an entry is not finite, or a variance is negative.
     pub fn new(
         transition: SMatrix<f64, D, D>,
         gain: SMatrix<f64, D, U>,
@@ -68,17 +68,17 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
         }
     }
 
-    /// `F`.
+    /// Transition `F`.
     pub fn transition(&self) -> &SMatrix<f64, D, D> {
         &self.transition
     }
 
-    /// `G`.
+    /// Noise gain `G`.
     pub fn gain(&self) -> &SMatrix<f64, D, U> {
         &self.gain
     }
 
-    /// `q`.
+    /// Noise variances `q`.
     pub fn noise_variances(&self) -> &SVector<f64, U> {
         &self.noise_variances
     }
@@ -88,17 +88,17 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
         &self.noise_covariance
     }
 
-    /// Covariance of the stationary distribution: the root of `P = F P F' + Q`.
+    /// Covariance of the stationary distribution: the solution of `P = F P F' + Q`.
     ///
-    /// Doubling: after `k` rounds `P` holds the first `2^k` terms of `sum F^i Q F'^i`.
+    /// Computed by doubling: after `k` rounds `P` holds the first `2^k` terms of `sum F^i Q F'^i`.
     ///
     /// # Errors
     /// [`Error::NoSteadyState`] if an eigenvalue of `F` lies on or outside the unit circle; [`Error::Argument`] if the
-    /// covariance leaves the range of numbers.
+    /// covariance overflows.
     pub fn stationary_covariance(&self) -> Result<SMatrix<f64, D, D>, Error> {
         let mut power = self.transition;
         let mut sum = self.noise_covariance;
-        // An eigenvalue one rounding unit inside the circle is squared away in 60 rounds.
+        // An eigenvalue one rounding unit inside the circle is negligible after 60 squarings.
         for _ in 0..64 {
             sum += power * sum * power.transpose();
             power *= power;
@@ -113,7 +113,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
                 break;
             }
         }
-        // A stable transition may still overflow on the way, a triangular one visibly so.
+        // Even a stable transition may overflow during the iteration.
         let triangular = (0..D).all(|i| (0..i).all(|j| self.transition[(i, j)] == 0.0));
         if triangular && self.transition.diagonal().amax() < 1.0 {
             let expected = "a transition whose stationary covariance is a number";
@@ -127,7 +127,7 @@ impl<const D: usize> LinearGaussian<D, D> {
     /// The model with a given noise covariance `Q`, symmetric positive semidefinite of any rank.
     ///
     /// # Errors
-    /// Entries that are not finite, a matrix that is no covariance.
+    /// If an entry is not finite, or `Q` is not symmetric positive semidefinite.
     pub fn with_covariance(
         transition: SMatrix<f64, D, D>,
         noise_covariance: SMatrix<f64, D, D>,
@@ -149,7 +149,7 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
         self.transition * state + self.noise_factor * normals
     }
 
-    /// Blocks of particles: first their normal draws, then one sweep a coordinate, which vectorises.
+    /// Per block of particles: first the normal draws, then one loop per coordinate, which runs in vector registers.
     fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
         const BLOCK: usize = 128;
         if !columns_agree(&mut states) {
@@ -169,6 +169,7 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
                 || {
                     for (d, next) in next.iter_mut().enumerate() {
                         let next = &mut next[..length];
+                        // Row d of `F x + G u` for all states of the block; the columns still hold the old states.
                         next.fill(0.0);
                         for (u, draw) in draws.iter().enumerate() {
                             add_multiple(next, self.noise_factor[(d, u)], &draw[..length]);
@@ -206,7 +207,7 @@ impl<const D: usize, const U: usize> LinearDynamics<D> for LinearGaussian<D, U> 
     }
 }
 
-/// `sum += factor x`; nothing to do for the zeros that most transitions are made of.
+/// `sum += factor x`. Skipped if `factor` is zero, as are most entries of a transition matrix.
 #[inline(always)]
 fn add_multiple(sum: &mut [f64], factor: f64, x: &[f64]) {
     if factor != 0.0 {
@@ -237,7 +238,7 @@ mod tests {
             let model = LinearGaussian::with_covariance(rotation(scale), q).unwrap();
             assert_eq!(model.stationary_covariance(), Err(Error::NoSteadyState));
         }
-        // Issue: an overflow came out as NaN.
+        // An overflow must not give NaN.
         let huge = LinearGaussian::with_covariance(Matrix2::new(0.5, 1e200, 0.0, 0.5), q).unwrap();
         assert!(matches!(huge.stationary_covariance(), Err(Error::Argument(_))));
     }

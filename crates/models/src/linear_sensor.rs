@@ -11,7 +11,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// `M` measurements of a `D`-dimensional state at once: `z = H x + w`, `w ~ N(0, R)`.
+/// `M` measurements of a `D`-dimensional state: `z = H x + w`, `w ~ N(0, R)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Parameters<D, M>", into = "Parameters<D, M>")]
 pub struct LinearSensor<const D: usize, const M: usize> {
@@ -27,14 +27,14 @@ stored! { #[serde(rename = "LinearSensor")] [const D: usize, const M: usize] Lin
     noise_covariance: SMatrix<f64, M, M> = sensor.noise_covariance,
 } => LinearSensor::new(matrix, noise_covariance), Error }
 
-/// One sensor of one number: `z = h'x + w`, `w ~ N(0, r)`.
+/// One scalar measurement: `z = h'x + w`, `w ~ N(0, r)`.
 pub type ScalarSensor<const D: usize> = LinearSensor<D, 1>;
 
 impl<const D: usize, const M: usize> LinearSensor<D, M> {
     /// The sensor with matrix `H` (M x D) and noise covariance `R` (M x M), symmetric positive definite.
     ///
     /// # Errors
-    /// Entries that are not finite, a covariance that is not symmetric (by the deviations of row and column) and positive definite.
+    /// If an entry is not finite, or the covariance is not symmetric (relative to the deviations of row and column) positive definite.
     pub fn new(matrix: SMatrix<f64, M, D>, noise_covariance: SMatrix<f64, M, M>) -> Result<Self, Error> {
         all_finite("matrix", matrix.as_slice())?;
         let (noise_covariance, noise_factor) = definite_factor("noise_covariance", &noise_covariance)?;
@@ -45,12 +45,12 @@ impl<const D: usize, const M: usize> LinearSensor<D, M> {
         })
     }
 
-    /// `H`.
+    /// Measurement matrix `H`.
     pub fn matrix(&self) -> &SMatrix<f64, M, D> {
         &self.matrix
     }
 
-    /// `R`.
+    /// Noise covariance `R`.
     pub fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
         &self.noise_covariance
     }
@@ -65,19 +65,19 @@ impl<const D: usize> ScalarSensor<D> {
     /// The sensor with direction `h` and noise variance `r > 0` (measurement units squared).
     ///
     /// # Errors
-    /// Entries that are not finite, a variance that is not positive.
+    /// If an entry is not finite, or the variance is not positive.
     pub fn scalar(direction: SVector<f64, D>, noise_variance: f64) -> Result<Self, Error> {
         let variance = positive("noise_variance", noise_variance)?;
         Self::new(direction.transpose(), SMatrix::from([[variance]]))
     }
 
-    /// `h`.
+    /// Direction `h`.
     #[inline]
     pub fn direction(&self) -> SVector<f64, D> {
         self.matrix.transpose()
     }
 
-    /// `r`.
+    /// Noise variance `r`.
     #[inline]
     pub fn noise_variance(&self) -> f64 {
         self.noise_covariance[0]
@@ -85,10 +85,10 @@ impl<const D: usize> ScalarSensor<D> {
 }
 
 impl LinearSensor<1, 1> {
-    /// Sensing of a scalar state as it is: `z = x + w`.
+    /// Measures a scalar state directly: `z = x + w`.
     ///
     /// # Errors
-    /// A variance that is not positive.
+    /// If the variance is not positive.
     pub fn direct(noise_variance: f64) -> Result<Self, Error> {
         Self::scalar(SVector::from([1.0]), noise_variance)
     }
@@ -165,7 +165,7 @@ mod tests {
         ] {
             assert!(LinearSensor::new(Matrix2::identity(), bad).is_err());
         }
-        // Defect: a large entry elsewhere hid the asymmetry.
+        // A large entry elsewhere must not hide the asymmetry.
         let hidden = Matrix3::new(1.0, 0.9, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1e10);
         assert!(LinearSensor::new(Matrix3::identity(), hidden).is_err());
     }

@@ -1,4 +1,4 @@
-//! Sensing of a source's received amplitude, which falls with distance.
+//! Measurement of a source's received amplitude, which decreases with distance.
 
 use crate::Error;
 use fewbits_core::columns::measurements_agree;
@@ -11,7 +11,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// `z = sqrt(P0 / (1 + alpha d^n)) + w`, `w ~ N(0, r)`, with `d` the distance from the sensor to a source in the plane.
+/// `z = sqrt(P0 / (1 + alpha d^n)) + w`, `w ~ N(0, r)`, where `d` is the distance from the sensor to a source in the plane.
 ///
 /// `D` is the dimension of the state and `axes` says which two coordinates are the position. `P0` is the power at distance
 /// zero (measurement units squared), `alpha` is in distance units to the power `-n`.
@@ -44,8 +44,8 @@ impl<const D: usize> ReceivedPower<D> {
     /// The sensor at `position` that senses the source at `(x[axes[0]], x[axes[1]])`.
     ///
     /// # Errors
-    /// Numbers that are not finite; power, attenuation or noise variance not positive; an exponent below 1, where the slope
-    /// is infinite at the sensor; equal axes or axes beyond the state.
+    /// If a number is not finite; power, attenuation or noise variance is not positive; the exponent is below 1, for which the slope
+    /// is infinite at the sensor; or the axes are equal or not below `D`.
     pub fn new(
         position: Vector2<f64>,
         axes: [usize; 2],
@@ -78,36 +78,36 @@ impl<const D: usize> ReceivedPower<D> {
         self.position
     }
 
-    /// `r`.
+    /// Noise variance `r`.
     pub fn noise_variance(&self) -> f64 {
         self.noise_covariance[0]
     }
 
-    /// The amplitude at squared distance `d^2`.
+    /// The amplitude as a function of the squared distance `d^2`.
     #[inline]
     fn amplitude(&self, squared_distance: f64) -> f64 {
         let spread = squared_distance.powf(0.5 * self.exponent);
         (self.power / (1.0 + self.attenuation * spread)).sqrt()
     }
 
-    /// Amplitude without noise at `(x, y)`.
+    /// Noise-free amplitude of a source at `(x, y)`.
     pub fn amplitude_at(&self, x: f64, y: f64) -> f64 {
         let (dx, dy) = (x - self.position[0], y - self.position[1]);
         self.amplitude(dx * dx + dy * dy)
     }
 
-    /// Slope `(dh/dx, dh/dy)` at `(x, y)`: `c (x - sx)`, `c (y - sy)` with
+    /// Gradient `(dh/dx, dh/dy)` of the amplitude at `(x, y)`: `c (x - sx)`, `c (y - sy)` with
     /// `c = -(1/2) sqrt(P0) alpha n d^(n-2) (1 + alpha d^n)^(-3/2)`.
     ///
-    /// At the sensor itself it is zero for `n > 1` (the limit); for `n = 1` it has no limit and zero is returned.
+    /// At the sensor itself the gradient is zero for `n > 1`. For `n = 1` it has no limit there, and zero is returned.
     pub fn slope_at(&self, x: f64, y: f64) -> Vector2<f64> {
         let offset = Vector2::new(x, y) - self.position;
         let distance = offset[0].hypot(offset[1]);
-        // Beyond the largest double the slope has vanished.
+        // If the squared distance overflows, the slope is zero.
         if distance == 0.0 || distance == f64::INFINITY {
             return Vector2::zeros();
         }
-        // `-(n/2) h(d) u/d` with `u = alpha d^n / (1 + alpha d^n)`, in which only bounded numbers meet: `d^n` may overflow.
+        // `-(n/2) h(d) u/d` with `u = alpha d^n / (1 + alpha d^n)`, which is bounded: `d^n` may overflow.
         let spread = self.attenuation * distance.powf(self.exponent);
         let share = if spread == f64::INFINITY {
             1.0
@@ -119,7 +119,7 @@ impl<const D: usize> ReceivedPower<D> {
         if steepness.is_finite() {
             return offset / distance * -steepness;
         }
-        // Only the product of enormous and vanishing numbers is left to logarithms.
+        // Logarithms are needed only for the product of a huge and a tiny number.
         let log = (0.5 * self.exponent).ln() + amplitude.ln() + share.ln() - distance.ln();
         offset / distance * -log.exp().min(f64::MAX)
     }
@@ -159,7 +159,7 @@ impl<const D: usize> Sensing<D, 1> for ReceivedPower<D> {
             let (dx, dy) = (x[i] - sx, y[i] - sy);
             dx * dx + dy * dy
         };
-        // The inverse square law needs no power function and vectorises.
+        // For n = 2 no power function is needed, and the loop vectorises.
         if self.exponent == 2.0 {
             vectorised(
                 #[inline(always)]

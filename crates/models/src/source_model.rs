@@ -1,27 +1,27 @@
-//! What a diffusing source causes at sensors: the interface between a model of the medium and an estimator.
+//! The concentrations that a diffusing source causes at sensors: the interface between a model of the medium and an estimator.
 
 use crate::Error;
 use nalgebra::{Vector2, Vector3};
 
-/// A concentration and how it changes with the place of the source.
+/// A concentration and its gradient with respect to the position of the source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SourceGradient {
     /// Concentration per unit rate, kg/m^3 per kg/s.
     pub value: f64,
-    /// Its gradient with respect to the position of the source, per metre.
+    /// Gradient of `value` with respect to the position of the source, per metre.
     pub gradient: Vector3<f64>,
 }
 
-/// A place at which a model gives concentrations. Made by [`SourceModel::receptor`].
+/// A place at which a model computes concentrations, made by [`SourceModel::receptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Receptor {
     /// Position, m.
     pub place: Vector3<f64>,
-    /// The model's own number of it, such as the index of its adjoint solution. 0 where the model needs none.
+    /// The model's own index of this place, such as the number of its adjoint solution; 0 if the model needs none.
     pub index: usize,
 }
 
-/// What a model promises whose field does not change along the ground: with `d` the horizontal offset from source to receptor,
+/// Stated by a model whose field does not change along the ground: with `d` the horizontal offset from source to receptor,
 ///
 /// `concentration = f(|d|, heights, age) exp((wind . d - |wind| |d|) / (2 diffusivity))`,
 ///
@@ -35,14 +35,14 @@ pub struct Homogeneous {
     pub wind: Vector2<f64>,
     /// Norm of the wind, its vertical part included, m/s.
     pub speed: f64,
-    /// Distances below this many metres count as this.
+    /// Shorter distances are replaced by this one, m.
     pub closest: f64,
 }
 
-/// The concentration that a point source with a constant release rate causes at sensors, in any geometry.
+/// The concentration at sensors from a point source with a constant release rate, in any geometry.
 ///
 /// A model gives concentrations **per unit rate** (kg/m^3 per kg/s) after a release of `age` seconds. The concentration of a source
-/// with rate `mu` that began at `start` is `mu` times that at `age = time - start`; one that stopped is the difference of two.
+/// with rate `mu` that began at `start` is `mu` times that at `age = time - start`; that of one that has stopped is the difference of two.
 /// A model that is computed on a grid implements [`receptor`](Self::receptor) (it refuses places without an adjoint solution),
 /// [`concentration`](Self::concentration), [`source_gradient`](Self::source_gradient), [`variation`](Self::variation),
 /// [`admits`](Self::admits), and [`concentrations`](Self::concentrations) where instants share work.
@@ -81,27 +81,27 @@ pub trait SourceModel {
     /// Concentration and its gradient with respect to the position of the source.
     fn source_gradient(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> SourceGradient;
 
-    /// By about how much the concentration at the receptor differs from that of a source at `source`, at most, while the source
-    /// is within the horizontal square of the given half width (m) about it; kg/m^3 per kg/s.
+    /// An approximate upper bound, in kg/m^3 per kg/s, of the change of the concentration at the receptor while the source moves within the
+    /// horizontal square of the given half width (m) around `source`.
     ///
-    /// An estimator widens the noise by it while its cells are coarse, so that a narrow ridge between centres is not lost. An
-    /// overestimate costs time; an underestimate by more than a factor of two may lose the ridge.
+    /// An estimator adds it to the noise while its cells are coarse, so that a narrow ridge of the likelihood between cell centres is not
+    /// missed. Too large a value costs time; a value too small by more than a factor of two may miss the ridge.
     fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64;
 
-    /// Whether a source can be somewhere in the horizontal square of the given half width (m) about `source`, at its height; with
-    /// half width 0: at `source`. False within walls and outside the model's region.
+    /// Whether some position in the horizontal square of the given half width (m) around `source`, at its height, is possible for a source.
+    /// With half width 0: whether `source` is. False within walls and outside the model's region.
     fn admits(&self, source: &Vector3<f64>, half_width: f64) -> bool {
         let _ = (source, half_width);
         true
     }
 
-    /// Set if nothing changes along the ground.
+    /// `Some` if nothing changes along the ground.
     fn homogeneous(&self) -> Option<Homogeneous> {
         None
     }
 
-    /// Derivative of the concentration with respect to the diffusivity, kg/m^3 per kg/s per m^2/s. `None` if the model has not one
-    /// diffusivity that could change.
+    /// Derivative of the concentration with respect to the diffusivity, kg/m^3 per kg/s per m^2/s. `None` if the model does not have a
+    /// single diffusivity.
     fn diffusivity_slope(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> Option<f64> {
         let _ = (receptor, source, age);
         None

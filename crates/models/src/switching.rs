@@ -1,15 +1,15 @@
-//! Several linear models in continuous time, one at a time.
+//! Several linear models in continuous time, of which one holds at a time.
 
 use crate::{AffineGaussian, ContinuousLinear, Error};
 use fewbits_core::Evolution;
 use fewbits_numerics::error::{at_least_one, finite, non_negative, refuse};
 use nalgebra::{DMatrix, SVector, Vector4};
 
-/// A world that moves by one of several models and switches between them at random instants: a Markov chain in continuous time.
+/// Dynamics that follow one of several models and switch between them at random instants, as a Markov chain in continuous time.
 ///
-/// Over `t` seconds it is what a filter of interacting multiple models takes: each model over `t`, and `exp(R t)`, the probabilities of
-/// the model at the end given the one at the beginning. Law: the probabilities over `a + b` are those over `a` times those over `b`; each
-/// model composes as [`ContinuousLinear`] does. The filter holds the model within a step: short steps are exact, long ones approximate.
+/// Over `t` seconds it gives what an interacting-multiple-model filter needs: each model over `t`, and `exp(R t)`, the probabilities of the
+/// model at the end given the one at the beginning. Law: the matrix over `a + b` is that over `a` times that over `b`; each model composes
+/// as [`ContinuousLinear`] does. The filter assumes that the model does not switch within a step, so long steps are approximate.
 ///
 /// ```
 /// use fewbits_models::Switching;
@@ -59,11 +59,11 @@ impl<const D: usize> Switching<D> {
 
     /// Every model over `seconds`, and `transition[i][j] = p(model j at the end | model i at the beginning)`.
     ///
-    /// `exp(R t)` is a sum of positives: over `h = t / 2^k` with `h max |R_ii| <= 1/2` the series of the chain that is asked to change at
-    /// a common rate, then `k` squarings; rows are scaled to sum to one.
+    /// `exp(R t)` is a sum of non-negative terms. Over `h = t / 2^k` with `h max |R_ii| <= 1/2` it is the series of `exp(r h (A - I))` with
+    /// `r = max |R_ii|` and the transition matrix `A = I + R / r` (uniformisation). `k` squarings follow. Rows are scaled to sum to one.
     ///
     /// # Errors
-    /// If the time is negative, not finite, or so long that a state leaves the range of numbers.
+    /// If the time is negative or not finite, or so long that a number overflows.
     #[allow(clippy::type_complexity)]
     pub fn over(&self, seconds: f64) -> Result<(Vec<AffineGaussian<D>>, Vec<Vec<f64>>), Error> {
         let models = self
@@ -81,6 +81,7 @@ impl<const D: usize> Switching<D> {
         };
         let mut transition = DMatrix::identity(n, n);
         if changes > 0.0 {
+            // Over the short interval: Poisson-weighted powers of the chain that changes at a common rate, up to a factor.
             let mean = changes * 0.5_f64.powi(doublings);
             let asked = DMatrix::identity(n, n) + &self.rates / rate;
             let mut term = DMatrix::identity(n, n);
@@ -89,6 +90,7 @@ impl<const D: usize> Switching<D> {
                 transition += &term;
             }
             normalise(&mut transition);
+            // Double the interval: the transition matrix is squared.
             for _ in 0..doublings {
                 transition = &transition * &transition;
                 normalise(&mut transition);
@@ -108,9 +110,10 @@ fn normalise(transition: &mut DMatrix<f64>) {
 }
 
 impl Switching<4> {
-    /// A target in a plane, `[x, x velocity, y, y velocity]`, pushed by white acceleration of `density` and by an acceleration of
-    /// `0`, `+magnitude` or `-magnitude` along each axis: nine models, the acceleration along y fastest. `[begin, end]` are the rates per
-    /// second at which an axis begins an acceleration (either way alike) and ends it.
+    /// A target in a plane, state `[x, x velocity, y, y velocity]`, driven by white acceleration of `density` and by an acceleration of
+    /// `0`, `+magnitude` or `-magnitude` along each axis. This makes nine models; the acceleration along y varies fastest in their order.
+    /// `[begin, end]` are the rates per second at which an axis begins an acceleration (in either direction with equal probability) and
+    /// ends it.
     ///
     /// # Errors
     /// If an argument is negative or not finite.

@@ -1,8 +1,8 @@
-//! The Monte-Carlo engine.
+//! The Monte-Carlo engine: runs many independent trials in parallel.
 //!
-//! Trials run in parallel in chunks of fixed size; each chunk is folded in trial order and the chunks are merged in index
-//! order, so the result is the same to the last bit on any number of threads. A trial draws only from its own [`Stream`], so
-//! one that fails can be run again alone.
+//! Trials are grouped into chunks of fixed size. Each chunk is folded in trial order, and the chunks are merged in index
+//! order, so the result is bitwise the same for any number of threads. A trial draws only from its own [`Stream`], so
+//! a failed trial can be repeated alone.
 
 use crate::parallel;
 use crate::stream::Stream;
@@ -13,7 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use thiserror::Error;
 
-/// Trials folded together before results are merged. Part of the result's definition: do not tune at run time.
+/// Number of trials per chunk. The result depends on it, so it must not be changed at run time.
 const CHUNK: u64 = 64;
 
 /// One trial: its number and its private random stream.
@@ -25,7 +25,7 @@ pub struct Trial {
     pub stream: Stream,
 }
 
-/// Why a run has no result. The failing trial of lowest index is reported, on any number of threads.
+/// Why a run has no result. Of several failed trials the one of lowest index is reported, for any number of threads.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[non_exhaustive]
@@ -50,10 +50,10 @@ pub enum MonteCarloError {
         /// The panic's message.
         message: String,
     },
-    /// The run was cancelled.
+    /// The run was cancelled ([`MonteCarlo::with_cancellation`]).
     #[error("cancelled")]
     Cancelled,
-    /// Ranks could not exchange what their trials gave.
+    /// MPI ranks could not exchange their results.
     #[cfg(feature = "mpi")]
     #[error("ranks cannot exchange results: {message}")]
     Exchange {
@@ -62,7 +62,7 @@ pub enum MonteCarloError {
     },
 }
 
-/// A number of independent trials on the streams of one experiment.
+/// Settings of a run: the number of independent trials, and the random stream of the experiment.
 ///
 /// ```
 /// use fewbits_monte_carlo::{MonteCarlo, Moments, Stream};
@@ -124,7 +124,7 @@ impl<'a> MonteCarlo<'a> {
         }
     }
 
-    /// Runs one trial alone, exactly as the full run would. Its error may be of any type that can be shown.
+    /// Runs one trial alone, exactly as in the full run. Its error may be of any type that implements `Display`.
     ///
     /// # Errors
     /// If the trial fails or panics.
@@ -172,8 +172,8 @@ impl<'a> MonteCarlo<'a> {
         )
     }
 
-    /// Folds all trials into one accumulator, in trial order within chunks and chunk order between them. Once a trial has failed, those
-    /// of higher index are not begun.
+    /// Folds all trials into one accumulator: within chunks in trial order, then the chunks in index order. After a trial has failed,
+    /// trials of higher index are not started.
     ///
     /// # Errors
     /// If a trial fails or panics, or the run is cancelled.
@@ -202,7 +202,7 @@ impl<'a> MonteCarlo<'a> {
         empty: impl Fn() -> A + Sync,
         trial: impl Fn(&mut A, Trial) -> Result<(), E> + Sync,
     ) -> Vec<Result<A, MonteCarloError>> {
-        // The lowest index that has failed so far. Trials below it still run, so that the one reported does not depend on the threads.
+        // The lowest index that has failed so far. Trials below it still run, so that the reported one does not depend on the threads.
         let failed = AtomicU64::new(u64::MAX);
         parallel::map(&chunks, |chunk| self.fold_chunk(*chunk, &failed, &empty, &trial))
     }

@@ -1,4 +1,4 @@
-//! Random streams, the Monte-Carlo engine, and statistics that carry their standard errors.
+//! Random streams, the Monte-Carlo engine, and statistics with standard errors.
 //!
 //! ```
 //! use fewbits_monte_carlo::{Moments, MonteCarlo, Stream};
@@ -13,8 +13,8 @@
 //! # Ok::<(), fewbits_monte_carlo::MonteCarloError>(())
 //! ```
 //!
-//! With feature `mpi` (needs an MPI library and libclang) `MonteCarlo::fold_over` and `MonteCarlo::run_over` spread trials over the
-//! ranks of an MPI job. Their result is the same to the last bit as that of one process.
+//! With feature `mpi` (needs an MPI library and libclang) `MonteCarlo::fold_over` and `MonteCarlo::run_over` distribute trials over the
+//! ranks of an MPI job. Their result is bitwise that of one process.
 
 pub mod engine;
 pub mod parallel;

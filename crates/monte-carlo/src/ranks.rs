@@ -1,4 +1,4 @@
-//! Trials spread over the ranks of an MPI job.
+//! Trials distributed over the ranks of an MPI job.
 
 use crate::engine::{MonteCarlo, MonteCarloError, Trial};
 use mpi::datatype::PartitionMut;
@@ -7,7 +7,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use std::fmt::Display;
 
 impl MonteCarlo<'_> {
-    /// [`MonteCarlo::run`] with the trials spread over the ranks of `ranks`; every rank returns the results of all trials. See
+    /// [`MonteCarlo::run`] with the trials distributed over the ranks of `ranks`. Every rank returns the results of all trials. See
     /// [`MonteCarlo::fold_over`].
     ///
     /// # Errors
@@ -28,11 +28,11 @@ impl MonteCarlo<'_> {
         )
     }
 
-    /// [`MonteCarlo::fold`] with the chunks of trials spread over the ranks of `ranks`. Chunk `i` is folded by rank `i` modulo their
-    /// number, on that rank's threads. All accumulators are then sent to all ranks, as CBOR, and each rank merges them in chunk order:
-    /// every rank returns what one process would, to the last bit. A chunk is 64 trials, so more than `trials / 64` ranks are no faster.
+    /// [`MonteCarlo::fold`] with the chunks of trials distributed over the ranks of `ranks`. Rank `i` modulo their number folds chunk `i`
+    /// on its threads. Then all accumulators are sent to all ranks as CBOR, and each rank merges them in chunk order. Every rank returns
+    /// bitwise the result of one process. A chunk has 64 trials, so more than `trials / 64` ranks are not faster.
     ///
-    /// Every rank must make this call with the same arguments, as any collective call of MPI. Only the calling thread calls MPI:
+    /// Every rank must make this call with the same arguments, as for any collective call of MPI. Only the calling thread calls MPI:
     /// `initialize_with_threading(Threading::Funneled)` is enough.
     ///
     /// ```no_run
@@ -54,8 +54,8 @@ impl MonteCarlo<'_> {
     /// ```
     ///
     /// # Errors
-    /// If a trial fails or panics on any rank (every rank reports the one of lowest index), the run is cancelled on any, or the
-    /// accumulators cannot be written as CBOR, are not read back, or are more than 2 GiB together.
+    /// If a trial fails or panics on any rank (every rank reports the one of lowest index), the run is cancelled on any rank, or the
+    /// accumulators cannot be written or read as CBOR or have more than 2 GiB together.
     pub fn fold_over<A: Send + Serialize + DeserializeOwned, E: Display>(
         &self,
         ranks: &impl Communicator,
@@ -68,8 +68,8 @@ impl MonteCarlo<'_> {
         let own = self.fold_chunks(own, &empty, trial);
         let mut message = Vec::new();
         if ciborium::into_writer(&own, &mut message).is_err() {
-            // No CBOR: every rank reads it in vain and stops. A rank that returned here would leave the others waiting. Not empty: the
-            // address of an empty vector is that of `MPI_IN_PLACE`.
+            // This byte is not CBOR: all ranks fail to read it and stop. If this rank returned here, the others would wait forever. The
+            // message is not empty, because the address of an empty vector equals `MPI_IN_PLACE`.
             message = vec![0xff];
         }
         let mut parts = Vec::with_capacity(size);
@@ -96,7 +96,7 @@ fn exchange(message: impl Display) -> MonteCarloError {
 fn all_gather(ranks: &impl Communicator, message: &[u8]) -> Result<Vec<Vec<u8>>, MonteCarloError> {
     let mut lengths = vec![0; ranks.size() as usize];
     ranks.all_gather_into(&(message.len() as u64), &mut lengths[..]);
-    // MPI counts bytes by `i32`. All ranks see the same lengths, so all of them stop here or none does.
+    // MPI counts bytes by `i32`. All ranks see the same lengths, so either all stop here or none.
     let mut ends = Vec::with_capacity(lengths.len());
     let mut end = 0_i32;
     for &length in &lengths {

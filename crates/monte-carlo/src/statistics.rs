@@ -3,7 +3,7 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Running count, mean and variance (Welford's recursion; merging is Chan's).
+/// Count, mean and variance, updated value by value (Welford's recursion; Chan's formula for merging).
 ///
 /// ```
 /// use fewbits_monte_carlo::Moments;
@@ -62,7 +62,7 @@ impl Moments {
         }
     }
 
-    /// Standard error of the mean of independent values; infinite for fewer than two, which say nothing about it.
+    /// Standard error of the mean of independent values. Infinite for fewer than two values.
     pub fn standard_error(&self) -> f64 {
         if self.count < 2 {
             return f64::INFINITY;
@@ -70,7 +70,7 @@ impl Moments {
         (self.variance() / self.count as f64).sqrt()
     }
 
-    /// Square root of the mean with its standard error by the delta method: an RMSE from squared errors.
+    /// Square root of the mean, with its standard error by the delta method. For squared errors it is the RMSE.
     pub fn root_mean(&self) -> Estimate {
         let root = self.mean.max(0.0).sqrt();
         Estimate {
@@ -108,12 +108,12 @@ impl FromIterator<f64> for Moments {
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
-    /// Its standard error; infinite where a single value leaves it unknown.
+    /// Standard error of the estimate; infinite if it is unknown.
     pub standard_error: f64,
 }
 
 impl Estimate {
-    /// Deviation from `truth` in standard errors; 0 if both agree exactly.
+    /// `(value - truth)` divided by the standard error; 0 if value and truth are equal.
     pub fn z_score(&self, truth: f64) -> f64 {
         let deviation = self.value - truth;
         if deviation == 0.0 {

@@ -1,9 +1,9 @@
-//! Random streams: one for each logical unit of work, never one a thread.
+//! Random streams: one for each logical unit of work, not one per thread.
 //!
-//! A [`Stream`] is a 128-bit key derived by hashing a path: seed, experiment, sweep point, trial, purpose. The same path
-//! gives the same numbers on every machine, in any order and on any number of threads; two paths that differ anywhere give
-//! independent numbers. So schemes can be compared on common random numbers (same path for truth and noise) while their own
-//! draws stay apart (another purpose).
+//! A [`Stream`] is a 128-bit key. It is the hash of a path: seed, experiment, sweep point, trial, purpose. The same path
+//! gives the same numbers on every machine, in any order and on any number of threads. Different paths give
+//! independent numbers. Schemes can therefore be compared on common random numbers (the same path for truth and noise), while their
+//! own draws are independent (another purpose).
 //!
 //! ```
 //! use fewbits_monte_carlo::Stream;
@@ -28,7 +28,7 @@ pub struct Stream {
 
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A bijective scrambler of 64 bits in which every input bit reaches every output bit (the SplitMix64 finaliser).
+/// A bijection of 64-bit numbers in which every output bit depends on every input bit (the SplitMix64 finaliser).
 fn scramble(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

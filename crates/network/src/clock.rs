@@ -1,4 +1,4 @@
-//! Slots: the common time of all nodes.
+//! Slots: the time grid that all nodes share.
 
 use crate::units::{Instant, Seconds};
 use fewbits_numerics::ArgumentError;
@@ -7,7 +7,7 @@ use fewbits_protocol::Schedule;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroU64;
 
-/// The slots that all nodes share: slot `k` begins at `k` periods.
+/// The slots that all nodes share. Slot `k` begins at `k` periods after time 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clock {
@@ -16,7 +16,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Slots of the given length; reports are awaited for nine tenths of it.
+    /// Slots of the given length. The deadline for reports is nine tenths of it after the slot's beginning.
     ///
     /// # Errors
     /// If the period is below a microsecond or above 10^6 s.
@@ -34,7 +34,7 @@ impl Clock {
         Instant(self.period).since_start()
     }
 
-    /// From the beginning of a slot to its deadline.
+    /// Time from the beginning of a slot to its deadline.
     pub fn reporting_time(&self) -> Seconds {
         Instant(self.deadline).since_start()
     }
@@ -44,7 +44,7 @@ impl Clock {
         Instant(self.period.saturating_mul(u64::from(slot)))
     }
 
-    /// When the reports of a slot must be there.
+    /// Deadline of a slot: reports that arrive later are not used.
     pub fn deadline(&self, slot: u32) -> Instant {
         Instant(self.start(slot).0.saturating_add(self.deadline))
     }
@@ -54,13 +54,13 @@ impl Clock {
         Instant(self.start(slot.saturating_add(1)).0.saturating_sub(1))
     }
 
-    /// The slots as the machines of the protocol have them.
+    /// The slots in the form that the state machines of `fewbits-protocol` use.
     pub(crate) fn schedule(&self) -> Schedule {
-        // A period is a microsecond or more.
+        // A period is a microsecond or more, so it is never zero.
         Schedule::new(NonZeroU64::new(self.period).unwrap_or(NonZeroU64::MIN))
     }
 
-    /// The slot of an instant.
+    /// Number of the slot that contains an instant.
     pub fn slot(&self, now: Instant) -> u32 {
         u32::try_from(now.0 / self.period).unwrap_or(u32::MAX)
     }

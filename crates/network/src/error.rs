@@ -1,4 +1,4 @@
-//! Errors of this crate.
+//! Errors of the simulated network.
 
 use crate::note::Note;
 use crate::units::{Seconds, SensorId};
@@ -7,11 +7,11 @@ use fewbits_core::{ArgumentError, CodecError};
 /// An error of another crate or of a user's own estimator.
 pub type Cause = Box<dyn std::error::Error + Send + Sync>;
 
-/// Errors of the simulated network.
+/// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// If an argument is out of range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     /// A node that does not exist.
@@ -31,12 +31,12 @@ pub enum Error {
     /// Two nodes that are not in range of each other.
     #[error("node {to} is out of range of node {from}")]
     OutOfRange {
-        /// The sender.
+        /// Index of the sender.
         from: usize,
-        /// The receiver.
+        /// Index of the receiver.
         to: usize,
     },
-    /// A node that takes part although no other node is in range of it.
+    /// A node takes part although no other node is in range of it.
     #[error("nobody hears node {node}: expected another node within {range} m")]
     Unheard {
         /// Index of the node.
@@ -44,41 +44,41 @@ pub enum Error {
         /// Range of the radios, metres.
         range: f64,
     },
-    /// A network that a protocol needs in one piece.
+    /// The protocol needs a connected network, and this one is not.
     #[error("the network is disconnected: {reached} of {nodes} nodes are reached from node {root}")]
     Disconnected {
-        /// Where the search began.
+        /// Node at which the search began.
         root: usize,
-        /// Nodes that it reached.
+        /// Number of nodes that it reached.
         reached: usize,
         /// Number of nodes.
         nodes: usize,
     },
-    /// The frames of one slot take longer than the slot has time for reports.
+    /// The frames of one slot take longer on air than the time from the slot's beginning to its deadline.
     #[error(
         "the slot is too short: {frames} frames take at least {needed} of air, and {available} are there before the deadline"
     )]
     SlotTooShort {
-        /// Frames of a slot in which every sensor reports.
+        /// Number of frames of a slot in which every sensor reports.
         frames: usize,
-        /// Their time on air without payload of reports.
+        /// Their time on air if reports have no payload.
         needed: Seconds,
-        /// From the beginning of a slot to its deadline.
+        /// Time from the beginning of a slot to its deadline.
         available: Seconds,
     },
     /// A node failed in more than half of the slots of the run.
     #[error("{node} failed in {failed} of {slots} slots; the last time: {last}")]
     MostSlotsFailed {
-        /// The node.
+        /// The node that failed.
         node: SensorId,
-        /// Slots in which it failed.
+        /// Number of slots in which it failed.
         failed: u32,
-        /// Slots of the run.
+        /// Number of slots of the run.
         slots: u32,
-        /// Its last note.
+        /// The last note of the node.
         last: Note,
     },
-    /// A message that does not fit its format.
+    /// A message does not fit its format.
     #[error("message does not fit its format: {0}")]
     Codec(#[from] CodecError),
     /// An estimator or scheme failed for another reason than an impossible observation.
@@ -89,30 +89,30 @@ pub enum Error {
         /// The estimator's error.
         source: Cause,
     },
-    /// A log or snapshot that cannot be written.
+    /// A log or snapshot could not be written.
     #[error("the run cannot be written")]
     Unwritable {
-        /// Why.
+        /// The error of the writer.
         source: Cause,
     },
-    /// A stored log or snapshot that cannot be read.
+    /// A stored log or snapshot could not be read.
     #[error("the stored run cannot be read")]
     Unreadable {
-        /// Why.
+        /// The error of the reader.
         source: Cause,
     },
-    /// A snapshot that names nodes which the network does not have.
+    /// A snapshot is of a network with another number of nodes.
     #[error("the snapshot has {found} nodes: expected {expected}, all that it names among them")]
     SnapshotOfOtherNetwork {
-        /// Nodes of the snapshot.
+        /// Number of nodes of the snapshot.
         found: usize,
-        /// Nodes of the network.
+        /// Number of nodes of the network.
         expected: usize,
     },
 }
 
 impl Error {
-    /// The error of an estimator, under the estimator's name.
+    /// Wraps the error of the estimator `name`.
     pub fn estimator(name: &'static str, source: impl Into<Cause>) -> Self {
         Self::Estimator {
             name,

@@ -1,27 +1,29 @@
-//! A simulated sensor network: bits and joules, faulty links, and any scheme over them.
+//! A simulated sensor network that counts bits and joules, with faulty links, for any estimation scheme.
 //!
-//! An estimator alone says how many bits its reports have. What they cost on a node, and what happens to them on the way, is here:
+//! An estimator says only how many bits its reports have. This crate computes what they cost on a node, and what happens to them on the
+//! way:
 //!
 //! | question | item |
 //! |---|---|
-//! | where the nodes are, who is in range of whom | [`Field`]: positions, or a list of links as CSV |
+//! | where the nodes are, and which are in range of each other | [`Field`]: positions, or a list of links as CSV |
 //! | what a frame costs | [`Radio`] (one for all, or one per node), [`Account`], [`Ledger`] |
 //! | what happens to frames and nodes | [`Channel`], [`Loss`] (one for all, or one per link), [`Fault`], clocks that drift ([`Setup::drift`]) |
-//! | who sends when | an ideal schedule, or carrier sense with collisions ([`Access`]) |
+//! | which node sends when | an ideal schedule, or carrier sense with collisions ([`Access`]) |
 //! | sensors around a fusion centre | [`BitStar`]: any `Receiver` of `fewbits-protocol`, any `SensorNode` of `fewbits-core` |
-//! | a belief that travels | [`Walk`]: any `Leader` of `fewbits-protocol` |
+//! | a belief that is sent from node to node | [`Walk`]: any `Leader` of `fewbits-protocol` |
 //! | what the sensors measure | [`Measurements`]: a table, an iterator or a closure |
-//! | what happened | [`Summary`]; [`Log`], written and read; [`Simulator::snapshot`] and [`restore`](Simulator::restore) |
+//! | results of a run | [`Summary`]; [`Log`], written and read; [`Simulator::snapshot`] and [`restore`](Simulator::restore) |
 //! | a protocol of one's own | [`Protocol`], [`Simulator`] |
 //!
-//! The central choice: **nodes share nothing but bits.** A node is a small state machine that sees its own state and the frames that
-//! came; every frame is encoded, crosses the air bit by bit, and is decoded. Sending gives no answer: an acknowledgement is a frame that takes
-//! time and air of its own, and may be lost. So payload bits are those of the codecs, and two ends
-//! disagree exactly when bits went astray. Every frame that rests on shared state carries a digest of it: a disagreement is seen by
-//! whoever receives the next frame, noted in the log, and ended by a snapshot. The price is 32 bits a frame, which are charged.
+//! **Nodes share nothing but bits.** A node is a small state machine. It sees its own state and the frames that
+//! arrive. Every frame is encoded, crosses the channel bit by bit, and is decoded. Sending returns no result: an acknowledgement is a frame
+//! that takes time on air and may be lost. The payload bits are therefore those of the codecs, and the states of two ends
+//! differ only if bits were lost or inverted. Every frame whose meaning depends on shared state carries a digest of that state. The
+//! receiver of the next frame detects a difference and notes it in the log; a snapshot ends it. A digest costs 32 bits per frame, which
+//! are counted.
 //!
-//! Time is in whole nanoseconds and events of one time happen in the order in which they were scheduled; every frame draws from a
-//! random stream of its own. So a run is a function of its arguments, to the byte.
+//! Time is counted in whole nanoseconds. Events of the same time happen in the order in which they were scheduled. Every frame draws from
+//! its own random stream. A run is therefore a function of its arguments and can be repeated bit for bit.
 //!
 //! ```
 //! use fewbits_core::{Gaussian, SchemeNode, SensorNode};
@@ -47,7 +49,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: estimation mathematics.
+//! Not here: estimators and filters (`fewbits-filters` and the crates of the schemes).
 
 mod clock;
 mod error;

@@ -6,10 +6,10 @@ use fewbits_protocol::SLOT_BITS;
 use std::fmt;
 use std::sync::Arc;
 
-/// Measurements of all sensors in all slots: a table or a function. Any of them may be missing.
+/// Measurements of all sensors in all slots, from a table or a function. Any of them may be missing.
 ///
-/// A table converts from `Vec<Vec<M>>` (entry `[k][i]`: sensor `i` in slot `k + 1`) or `Vec<Vec<Option<M>>>`, or is collected from an iterator over
-/// slots.
+/// A table is made from `Vec<Vec<M>>` (entry `[k][i]`: sensor `i` in slot `k + 1`) or `Vec<Vec<Option<M>>>`, or collected from an iterator
+/// over slots.
 #[derive(Clone)]
 pub struct Measurements<M>(Source<M>);
 
@@ -23,8 +23,8 @@ enum Source<M> {
 }
 
 impl<M> Measurements<M> {
-    /// `slots` slots (the first is 1); `measure(slot, sensor)` is called when the sensor (the first is 0) measures, which may be never or, after a
-    /// restored snapshot, again.
+    /// Measurements of `slots` slots from a function. `measure(slot, sensor)` is called when the sensor measures; slots count from 1,
+    /// sensors from 0. It may never be called for a slot, or again after a snapshot is restored.
     pub fn from_fn(slots: u32, measure: impl Fn(u32, usize) -> Option<M> + Send + Sync + 'static) -> Self {
         Self(Source::Function {
             slots,
@@ -57,7 +57,7 @@ impl<M> Measurements<M> {
     }
 
     /// # Errors
-    /// If a slot of a table has not one entry per sensor, or a frame could not number the slots.
+    /// If a slot of a table has not one entry per sensor, or there are more slots than a frame can number.
     pub(crate) fn check(&self, sensors: usize) -> Result<(), Error> {
         if let Source::Table(table) = &self.0
             && let Some(slot) = table.iter().find(|slot| slot.len() != sensors)

@@ -5,32 +5,32 @@ use fewbits_protocol::BoxError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Something that a node noticed or that happened to it.
+/// An event at a node that the log records.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Note {
-    /// What the node's machine noticed of a frame.
+    /// The node's state machine noticed something about a frame.
     Frame {
         /// Sender of the frame.
         with: SensorId,
         /// What was noticed.
         note: fewbits_protocol::Note,
     },
-    /// The update failed with the observations as they arrived, and succeeded without the sensors of which nothing arrived.
+    /// The update failed with the observations as they arrived. It succeeded without the sensors from which nothing arrived.
     SilenceIgnored {
         /// The slot.
         slot: u32,
-        /// Why the update failed the first time.
+        /// Error of the first update.
         reason: String,
     },
-    /// A step of the estimator or of a sensor failed. The slot passed without it.
+    /// A step of the estimator or of a sensor failed. The slot continued without it.
     Failed {
-        /// Which step.
+        /// The step that failed.
         stage: Stage,
         /// The slot.
         slot: u32,
-        /// Why.
+        /// Its error.
         reason: String,
     },
     /// A sensor had no measurement in a slot and was silent.
@@ -38,7 +38,7 @@ pub enum Note {
         /// The slot.
         slot: u32,
     },
-    /// The node began anew without its memory.
+    /// The node lost its memory and started again.
     Restarted,
     /// The node died.
     Died,
@@ -51,7 +51,7 @@ impl Note {
     }
 }
 
-/// The message of an error with those of all sources.
+/// The message of an error, followed by those of its sources.
 fn in_full(error: &(dyn std::error::Error + 'static)) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
@@ -68,11 +68,11 @@ fn in_full(error: &(dyn std::error::Error + 'static)) -> String {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Stage {
-    /// Time update.
+    /// Prediction of the estimator.
     Prediction,
     /// A sensor's report.
     Report,
-    /// Measurement update.
+    /// Update of the estimator with the observations.
     Update,
     /// A leader's step.
     Lead,

@@ -1,4 +1,4 @@
-//! Quantities with units, so that bits, joules, seconds and watts are not mixed up.
+//! Quantities with units. The types prevent mixing bits, joules, seconds and watts.
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::non_negative;
@@ -7,7 +7,7 @@ use std::fmt;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Mul, Sub};
 
-/// A number of bits; sums saturate.
+/// A number of bits. Sums saturate at the largest number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Bits(pub u64);
@@ -24,22 +24,22 @@ impl SensorId {
     }
 }
 
-/// Energy, finite and never negative.
+/// Energy in joules, finite and not negative.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct Joules(f64);
 
-/// A duration, finite and never negative.
+/// A duration in seconds, finite and not negative.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct Seconds(f64);
 
-/// Power, finite and never negative.
+/// Power in watts, finite and not negative.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct Watts(f64);
 
-/// Construction, sums and display of a quantity in its unit.
+/// Implements constructor, sums and display of a quantity.
 macro_rules! quantity_operations {
     ($name:ident, $unit:literal) => {
         impl $name {
@@ -49,7 +49,7 @@ macro_rules! quantity_operations {
             /// A value in the unit of the type.
             ///
             /// # Errors
-            /// If it is negative or not finite.
+            /// If `value` is negative or not finite.
             pub fn new(value: f64) -> Result<Self, ArgumentError> {
                 non_negative($unit, value).map(Self)
             }
@@ -93,7 +93,7 @@ macro_rules! quantity_operations {
             }
         }
 
-        /// The difference, or nothing where it would be negative.
+        /// The difference; zero if it would be negative.
         impl Sub for $name {
             type Output = Self;
 
@@ -168,13 +168,13 @@ impl fmt::Display for SensorId {
     }
 }
 
-/// A point of simulated time, in nanoseconds: integers, so that ties are ties on every machine.
+/// A point of simulated time, in nanoseconds. Integers make ties equal on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Instant(pub u64);
 
 impl Instant {
-    /// The instant so much later, to the nanosecond, and at most the last one that can be told.
+    /// The instant later by `duration`, rounded to nanoseconds and at most the largest instant.
     #[must_use]
     pub fn after(self, duration: Seconds) -> Self {
         Self(self.0.saturating_add((duration.0 * 1e9).round() as u64))

@@ -1,15 +1,15 @@
-//! Censoring sensors: the sample travels if it is far enough from what was predicted.
+//! Censoring sensors: a sample is sent only if it is far enough from its prediction.
 //!
 //! | threshold | function |
 //! |---|---|
-//! | known for each slot: a constant, or a table made beforehand | [`speaks`]; of codes, without floating point, [`speaks_of_codes`] |
-//! | from the covariance that is broadcast with the prediction | [`half_width`] |
-//! | about the sensor's own prediction, which nobody broadcasts | [`OwnFilter`] |
+//! | known for each slot: a constant, or a table made beforehand | [`speaks`]; for integer codes, [`speaks_of_codes`] |
+//! | computed from the covariance that is broadcast with the prediction | [`half_width`] |
+//! | about the sensor's own prediction, without any broadcast | [`OwnFilter`] |
 
 use crate::error::{Error, finite};
 use crate::math::sqrt;
 
-/// Whether the sample is reported: `|sample - prediction| >= half_width`. A tie is reported.
+/// Whether the sample is sent: `|sample - prediction| >= half_width`. A tie is sent.
 ///
 /// # Errors
 /// If the sample or the prediction is not finite, or the half width is NaN.
@@ -22,20 +22,20 @@ pub fn speaks(sample: f64, prediction: f64, half_width: f64) -> Result<bool, Err
     Ok(reaches(innovation, half_width))
 }
 
-/// Whether an innovation is reported. NaN is not.
+/// Whether an innovation is sent: `|innovation| >= half_width`. NaN is not.
 #[inline]
 pub fn reaches(innovation: f64, half_width: f64) -> bool {
     innovation.abs() >= half_width
 }
 
-/// [`speaks`] of codes, without floating point.
+/// [`speaks`] for integer codes, without floating point.
 #[inline]
 pub fn speaks_of_codes(sample: i32, prediction: i32, half_width: u32) -> bool {
     sample.abs_diff(prediction) >= half_width
 }
 
-/// Half width `sqrt(threshold S)` of the interval of silence, `S = h P h' + noise_variance`: `row` is the sensing's `h`, `covariance` the
-/// broadcast `P`.
+/// Half width `sqrt(threshold S)` of the interval of silence, with `S = h P h' + noise_variance`. `row` is the measurement row `h`,
+/// `covariance` the broadcast `P`.
 ///
 /// # Errors
 /// If `threshold S` is negative or not finite.
@@ -61,8 +61,8 @@ pub fn half_width<const D: usize>(
     }
 }
 
-/// A sensor of scalar samples `h x + noise` that compares them with the prediction of its own filter, and updates the filter with
-/// every sample, whether it reports it or not.
+/// A sensor of scalar samples `h x + noise` that compares them with the prediction of its own filter. It updates the filter with
+/// every sample, whether it sends it or not.
 ///
 /// ```text
 /// predicted = F estimate,  innovation = sample - h predicted
@@ -70,8 +70,8 @@ pub fn half_width<const D: usize>(
 /// estimate = predicted + gain innovation
 /// ```
 ///
-/// Gain and half width follow from the models without data. A model that stays the same has constant ones after a few slots; otherwise
-/// they come from a table, one entry per slot.
+/// Gain and half width follow from the models without data. For a constant model they are constant after a few slots; otherwise
+/// use a table with one entry per slot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OwnFilter<const D: usize> {
     transition: [[f64; D]; D],
@@ -80,7 +80,7 @@ pub struct OwnFilter<const D: usize> {
 }
 
 impl<const D: usize> OwnFilter<D> {
-    /// A filter with transition matrix `F` (rows), sensing row `h` and the estimate before the first slot.
+    /// A filter with transition matrix `F` (by rows), measurement row `h` and the estimate before the first slot.
     ///
     /// # Errors
     /// If a number is not finite.
@@ -106,10 +106,10 @@ impl<const D: usize> OwnFilter<D> {
         &self.estimate
     }
 
-    /// Whether the sample is reported; the filter then goes on with it.
+    /// Whether the sample is sent. Updates the filter with it in any case.
     ///
     /// # Errors
-    /// If the sample is not finite, the half width is NaN, or the estimate would no longer be finite; the filter is then as it was.
+    /// If the sample is not finite, the half width is NaN, or the estimate would not be finite. The filter is then unchanged.
     pub fn speaks(&mut self, sample: f64, gain: &[f64; D], half_width: f64) -> Result<bool, Error> {
         let mut predicted = [0.0; D];
         for (value, row) in predicted.iter_mut().zip(&self.transition) {
@@ -126,7 +126,7 @@ impl<const D: usize> OwnFilter<D> {
     }
 }
 
-/// The sum of products, from the first.
+/// The scalar product, summed in order.
 fn product<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     let mut sum = 0.0;
     for (a, b) in a.iter().zip(b) {

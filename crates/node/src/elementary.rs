@@ -1,6 +1,6 @@
-//! Base-2 logarithm and power in `f32`, by additions, multiplications and divisions in a stated order: the same bits on every machine.
+//! Base-2 logarithm and power in `f32`, by additions, multiplications and divisions in a fixed order: the same bits on every machine.
 //!
-//! They serve predicted probabilities only, so an absolute error of `1e-5` (in bits) is far below what it costs to be wrong.
+//! They are used for predicted probabilities only. An absolute error of `1e-5` bits in their logarithms is negligible.
 
 /// `log2(x)` of a positive normal number, within `2e-5`.
 #[inline(always)]
@@ -18,7 +18,7 @@ pub fn log2(x: f32) -> f32 {
 /// Adding and subtracting this rounds an `f32` below `2^22` to a whole number.
 const ROUNDING: f32 = 12_582_912.0;
 
-/// The nearest whole number of a value below `2^22` in size, halves to even.
+/// The nearest integer of a value below `2^22` in size, ties to even.
 #[inline(always)]
 pub fn round(x: f32) -> f32 {
     (x + ROUNDING) - ROUNDING
@@ -30,13 +30,13 @@ pub fn exp2(x: f32) -> f32 {
     power(x.clamp(-100.0, 100.0))
 }
 
-/// [`exp2`] of a number that is known to be within `-126..=126`.
+/// [`exp2`] without clamping. Precondition: `x` in `-126..=126`.
 #[inline(always)]
 pub fn power(x: f32) -> f32 {
-    // The last bits of the sum are the whole number, in two's complement.
+    // The lowest bits of the sum are the integer part, in two's complement.
     let shifted = x + ROUNDING;
     let f = x - (shifted - ROUNDING);
-    // In pairs, so that few operations wait for each other.
+    // Evaluated in pairs, so that fewer operations depend on each other.
     let square = f * f;
     let high =
         (0.240_226_45 + f * 0.055_503_615) + square * ((0.009_618_791 + f * 0.001_339_05) + square * 0.000_152_510_57);
@@ -44,19 +44,19 @@ pub fn power(x: f32) -> f32 {
     f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23)) * fraction
 }
 
-/// The lesser; a comparison, where the library's function is a call on small processors.
+/// The smaller number, by a comparison: the library's function is a call on small processors.
 #[inline(always)]
 pub fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The greater.
+/// The larger number.
 #[inline(always)]
 pub fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Probability of log odds in bits.
+/// The probability with these log odds, in bits.
 #[inline(always)]
 pub fn squash(log_odds: f32) -> f32 {
     1.0 / (1.0 + exp2(-log_odds))

@@ -1,15 +1,15 @@
-//! The error of this crate.
+//! The error type of all sensor halves.
 
 use core::fmt;
 
-/// An argument that a sensor's half refuses; its state is then as it was.
+/// An invalid argument of a sensor's half, whose state is then unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Error {
-    /// Name of the argument as the signature spells it.
+    /// Name of the argument in the function's signature.
     pub name: &'static str,
-    /// The offending value.
+    /// The invalid value.
     pub value: f64,
-    /// What would have been accepted.
+    /// Description of the accepted values.
     pub expected: &'static str,
 }
 
@@ -44,7 +44,7 @@ pub(crate) const fn finite(name: &'static str, value: f64) -> Result<f64, Error>
 }
 
 pub(crate) const fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
-    // By bits, because comparing doubles is a routine of its own in software: those from the smallest number up to the largest.
+    // Compared by bits (from the smallest positive number to the largest), because comparing doubles is a library call in software.
     if value.to_bits().wrapping_sub(1) < f64::MAX.to_bits() {
         Ok(value)
     } else {

@@ -1,7 +1,7 @@
-//! Inputs and messages of every scheme, to compare machines, compilers and other implementations.
+//! Test vectors: inputs and messages of every scheme, to compare machines, compilers and other implementations.
 //!
-//! [`Vectors`] makes inputs by integer arithmetic from a fixed seed, runs one [`Scheme`] on them and gives inputs and messages as bytes.
-//! `tests/golden/v2` holds the first [`RECORDS`] of each; [`hash`] sums up any number of messages.
+//! [`Vectors`] makes inputs by integer arithmetic from a fixed seed, runs one [`Scheme`] on them, and returns inputs and messages as bytes.
+//! `tests/golden/v2` has the first [`RECORDS`] of each; [`hash`] is a checksum of any number of messages.
 //!
 //! A file is a header and records, all numbers little-endian:
 //!
@@ -33,9 +33,9 @@ use crate::adaptive::{Config, Encoder};
 use crate::{Error, Packet, Quantizer, censor, trigger};
 use crate::{innovation_cell, innovation_cell_of_codes, pattern_bit, range_level, range_level_of_codes, sign_bit};
 
-/// Version of the vectors' files.
+/// Version of the files with test vectors.
 pub const VERSION: u8 = 2;
-/// Records in a file.
+/// Number of records in a file.
 pub const RECORDS: u32 = 300;
 /// Thresholds of the words of the innovation: the four-level Lloyd-Max quantizer of the normal density, rounded to three decimals.
 pub const THRESHOLDS: [f64; 3] = [-0.982, 0.0, 0.982];
@@ -69,7 +69,7 @@ pub enum Scheme {
 }
 
 impl Scheme {
-    /// All of them with the names of their files.
+    /// All schemes with the names of their files.
     pub const ALL: [(Self, &'static str); 16] = [
         (Self::SignBit, "sign-bit"),
         (Self::SignBitCodes, "sign-bit-codes"),
@@ -125,7 +125,7 @@ impl Input {
     }
 }
 
-/// A wandering signal in thousandths with rests, steps and rare wild values, from integer arithmetic.
+/// A random signal in thousandths with constant parts, steps and rare outliers, by integer arithmetic.
 #[derive(Debug, Clone)]
 pub struct Signal {
     state: u64,
@@ -143,7 +143,7 @@ impl Signal {
         }
     }
 
-    /// The next of SplitMix64 (Steele and others 2014).
+    /// The next number of SplitMix64 (Steele and others 2014).
     pub fn random(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.state;
@@ -152,7 +152,7 @@ impl Signal {
         z ^ (z >> 31)
     }
 
-    /// The next sample in thousandths, without wild values.
+    /// The next sample in thousandths, without outliers.
     fn thousandths(&mut self) -> (u64, i64) {
         let r = self.random();
         match r & 0xff {
@@ -174,18 +174,18 @@ impl Signal {
         place as f64 / 1000.0
     }
 
-    /// A whole number below `2^bits`, less half of that.
+    /// A random integer in `-2^(bits - 1)..2^(bits - 1)`.
     fn whole(&mut self, bits: u32) -> i32 {
         ((self.random() >> (64 - bits)) as i32) - (1 << (bits - 1))
     }
 
-    /// A multiple of `1/64` from -32 up to 32; ties occur.
+    /// A random multiple of `1/64` in `[-32, 32)`, so that ties with thresholds occur.
     fn multiple(&mut self) -> f64 {
         f64::from(self.whole(12)) / 64.0
     }
 }
 
-/// Inputs and messages of one scheme, one after the other.
+/// Generator of the test vectors of one scheme.
 #[derive(Debug, Clone)]
 pub struct Vectors {
     scheme: Scheme,
@@ -206,10 +206,10 @@ fn bit(value: bool) -> Packet {
 }
 
 impl Vectors {
-    /// The vectors of a scheme from the first.
+    /// The test vectors of a scheme, from the first.
     ///
     /// # Errors
-    /// Never: its parameters are constants.
+    /// Never: the parameters are constants.
     pub fn new(scheme: Scheme) -> Result<Self, Error> {
         let config = match scheme {
             Scheme::AdaptiveCircle => Config::new(0.5)?.circular(360.0)?,
@@ -223,10 +223,10 @@ impl Vectors {
         })
     }
 
-    /// The next input with its message; `None` is silence.
+    /// The next input and its message; `None` is silence.
     ///
     /// # Errors
-    /// Never: its inputs are numbers.
+    /// Never: the inputs are valid.
     pub fn next_record(&mut self) -> Result<(Input, Option<Packet>), Error> {
         let signal = &mut self.signal;
         let codes = |signal: &mut Signal| [signal.whole(16), signal.whole(14)];
@@ -339,7 +339,7 @@ fn double(x: f64) -> Packet {
 /// FNV-1a of 64 bits over lengths and bytes of the first `count` messages of a scheme.
 ///
 /// # Errors
-/// Never.
+/// Never: parameters and inputs are valid.
 pub fn hash(scheme: Scheme, count: u32) -> Result<u64, Error> {
     let mut hash = Hash::START;
     let mut vectors = Vectors::new(scheme)?;
@@ -349,15 +349,15 @@ pub fn hash(scheme: Scheme, count: u32) -> Result<u64, Error> {
     Ok(hash.0)
 }
 
-/// The sum of messages.
+/// Running checksum of messages (FNV-1a of 64 bits).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hash(pub u64);
 
 impl Hash {
-    /// Of no message.
+    /// The checksum before the first message.
     pub const START: Self = Self(0xcbf2_9ce4_8422_2325);
 
-    /// Takes one message, or silence, into account.
+    /// Adds one message, or silence, to the checksum.
     pub fn add(&mut self, message: Option<Packet>) {
         let packet = message.unwrap_or_default();
         self.byte(packet.bits() as u8);

@@ -1,8 +1,8 @@
-//! The sensor's halves of all schemes, for microcontrollers: without the standard library, without allocation, without panics.
+//! The sensor's part of all schemes, for microcontrollers: without the standard library, allocation or panics.
 //!
-//! A sensor's half takes a sample, and perhaps what was broadcast, and returns a word, a packet or nothing. What the report means is
-//! known to the receiver's half, which needs the standard library and stands in the crates of the estimators; these call the functions
-//! here, so that simulation and firmware run the same code.
+//! A sensor's part takes a sample, and in some schemes a broadcast value, and returns a word, a packet or nothing. The receiver's part
+//! needs the standard library and is in the crates of the estimators. These call the functions
+//! of this crate, so that simulation and firmware run the same code.
 //!
 //! ```
 //! use fewbits_node::adaptive::{Config, Encoder};
@@ -25,21 +25,21 @@
 //! | scheme | function | estimator |
 //! |---|---|---|
 //! | sign bit at a threshold | [`sign_bit`] | `dymbo` |
-//! | word of the innovation | [`innovation_cell`], [`innovation_cell_of_codes`] | `dymbo` |
-//! | quantizer with words | [`Quantizer`], [`cell_of`] | `quantizers`, `quantizer-design` |
-//! | bit of a pattern | [`pattern_bit`] | `binary-patterns` |
-//! | level of a range | [`range_level`], [`range_level_of_codes`] | `pf-mpa` |
-//! | censoring with a scheduled or told threshold | [`censor::speaks`], [`censor::speaks_of_codes`], [`censor::half_width`] | `cfwmd` |
-//! | censoring by an own filter | [`censor::OwnFilter`] | `cfwmd` |
+//! | index of the innovation's quantizer cell | [`innovation_cell`], [`innovation_cell_of_codes`] | `dymbo` |
+//! | quantizer with a word per cell | [`Quantizer`], [`cell_of`] | `quantizers`, `quantizer-design` |
+//! | bit of a binary pattern | [`pattern_bit`] | `binary-patterns` |
+//! | quantizer level of a range | [`range_level`], [`range_level_of_codes`] | `pf-mpa` |
+//! | censoring, threshold scheduled or broadcast | [`censor::speaks`], [`censor::speaks_of_codes`], [`censor::half_width`] | `cfwmd` |
+//! | censoring by the sensor's own filter | [`censor::OwnFilter`] | `cfwmd` |
 //! | random trigger | [`trigger::speaks`] | `cfwmd` |
 //! | adaptive encoder | [`adaptive::Encoder`] | `adaptive` |
 //!
-//! The central choice: **thresholds are of the samples' own type.** A sample that is a code of a converter is compared with codes, so a
-//! sign bit, a word, a bit of a pattern and a censoring sensor need no floating point. Only the level of a range, the own filter, the
-//! trigger and the adaptive encoder compute, and they use IEEE arithmetic, square roots and powers that are the same on every
-//! machine: [`golden`] has inputs and messages to check that against.
+//! **Thresholds have the type of the samples.** If a sample is an integer code of a converter, it is compared with integer codes. Sign
+//! bits, words, bits of patterns and censoring sensors then need no floating point. Only the level of a range, a sensor's own filter, the
+//! trigger and the adaptive encoder compute in floating point. They use IEEE arithmetic, square roots and powers that give the same bits
+//! on every machine; [`golden`] has inputs and messages to check that.
 //!
-//! Not here: what a report means (the estimators), frames and resynchronisation (the protocol), radio, storage.
+//! Not here: the estimators that use the reports, frames and resynchronisation (`fewbits-protocol`), radio, storage.
 
 #![no_std]
 

@@ -1,4 +1,4 @@
-//! Functions of the standard library that `core` lacks: its own with the feature `std`, those of `libm` without. All are exact or
+//! Functions that `core` lacks: those of the standard library with the feature `std`, those of `libm` without. All are exact or
 //! correctly rounded, so both give the same bits.
 
 #[cfg(feature = "std")]
@@ -7,7 +7,7 @@ mod chosen {
         x.ceil()
     }
 
-    /// Halves away from zero.
+    /// The nearest integer, ties away from zero.
     pub(crate) fn round(x: f64) -> f64 {
         x.round()
     }
@@ -38,18 +38,18 @@ mod chosen {
 
 pub(crate) use chosen::{ceil, remainder, round, sqrt, sqrt_f32, twice_ratio};
 
-/// The remainder in `[0, period)`, but for a tiny negative value, whose remainder rounds to the period.
+/// The remainder in `[0, period)`. Exception: for a tiny negative value it rounds to `period`.
 pub(crate) fn rem_euclid(value: f64, period: f64) -> f64 {
     let rest = remainder(value, period);
     if rest < 0.0 { rest + period } else { rest }
 }
 
-/// The remainder of `x / y` with the sign of `x`, exact, for finite `x` and `y > 0`: one subtraction per bit of the quotient. Slower than the
-/// library's and a tenth of its size.
+/// The exact remainder of `x / y` with the sign of `x`, for finite `x` and `y > 0`, by one subtraction per bit of the quotient. It is
+/// slower than the library's function and has a tenth of its code size.
 #[cfg(any(not(feature = "std"), test))]
 pub(crate) fn long_division(x: f64, y: f64) -> f64 {
     const IMPLICIT: u64 = 1 << 52;
-    // Mantissa of 53 bits and exponent, so that the number is `mantissa 2^exponent` of the smallest number.
+    // Mantissa of 53 bits and exponent: the number is `mantissa 2^exponent` times the smallest positive number.
     let parts = |bits: u64| {
         let exponent = (bits >> 52) as i32;
         let shift = (bits.leading_zeros() as i32 - 11).max(0);
@@ -66,7 +66,7 @@ pub(crate) fn long_division(x: f64, y: f64) -> f64 {
         if rest >= divisor {
             rest -= divisor;
         }
-        // Below twice the divisor, which is below 2^53.
+        // The remainder is below twice the divisor, which is below 2^53.
         rest <<= 1;
         exponent -= 1;
     }
@@ -80,19 +80,19 @@ pub(crate) fn long_division(x: f64, y: f64) -> f64 {
         rest <<= 1;
         exponent -= 1;
     }
-    // Exact: the remainder is a multiple of the smallest number.
+    // Exact: the remainder is a multiple of the smallest positive number.
     rest >>= (-exponent).max(0);
-    // A mantissa without its highest bit is that of a subnormal number: the bits are in place.
+    // A mantissa without its highest bit is that of a subnormal number: its bits need no change.
     f64::from_bits(((exponent.max(0) as u64) << 52) + rest).copysign(x)
 }
 
-/// `2 n / d` correctly rounded, for `0 < n < d`, one subtraction per bit: a tenth of the size of a division of doubles.
+/// `2 n / d` correctly rounded, for `0 < n < d`, by one subtraction per bit: a tenth of the code size of a division of doubles.
 #[cfg(any(not(feature = "std"), test))]
 pub(crate) fn twice_ratio_bit_by_bit(n: u32, d: u32) -> f64 {
-    // The 53 bits of the quotient, and one by which to round.
+    // The 53 bits of the quotient, and one for rounding.
     let (mut rest, mut bits, mut exponent) = (n, 0_u64, 1024 + 53);
     while bits >> 53 == 0 {
-        // Twice the rest reaches the divisor.
+        // The next bit is one if twice the remainder reaches the divisor.
         let left = d - rest;
         let is_one = rest >= left;
         rest = if is_one { rest - left } else { rest + rest };

@@ -1,34 +1,34 @@
-//! Packets: whole bits, at most 128.
+//! Packets: bit strings of at most 128 bits.
 
-/// What a sensor sends in one slot. Its length is known from its frame, so no bit is spent on it.
+/// The bits that a sensor sends in one slot. The receiver knows their number from the frame, so it is not encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Packet {
-    /// The bits, the last one lowest.
+    /// The bits as a number; the last bit is the lowest.
     word: u128,
     bits: u32,
 }
 
 impl Packet {
-    /// Most bits of a packet.
+    /// Largest length of a packet in bits.
     pub const MAX_BITS: u32 = 128;
 
-    /// The low `bits` bits of `word`; `None` if there are more than 128, or the word has more.
+    /// The low `bits` bits of `word`. `None` if `bits` exceeds 128 or a higher bit of `word` is set.
     pub fn from_word(word: u128, bits: u32) -> Option<Self> {
         (bits <= Self::MAX_BITS && word.checked_shr(bits).unwrap_or(0) == 0).then_some(Self { word, bits })
     }
 
-    /// Length.
+    /// Length in bits.
     pub fn bits(&self) -> u32 {
         self.bits
     }
 
-    /// The bits as a number, the last one lowest.
+    /// The bits as a number; the last bit is the lowest.
     pub fn word(&self) -> u128 {
         self.word
     }
 
-    /// Appends the low `width` bits of `value`, most significant first. Nothing is appended if they are more than 64, or the packet would
-    /// have more than 128.
+    /// Appends the low `width` bits of `value`, most significant first. Appends nothing if `width` exceeds 64 or the packet would
+    /// exceed 128 bits.
     pub fn push(&mut self, value: u64, width: u32) {
         if (1..=64).contains(&width) && self.bits + width <= Self::MAX_BITS {
             let kept = value & (u64::MAX >> (64 - width));
@@ -37,28 +37,29 @@ impl Packet {
         }
     }
 
-    /// The bits in bytes, most significant first, the last byte padded with zeros: [`byte_count`](Self::byte_count) of them count.
+    /// The bits as bytes, most significant first, padded with zeros. Only the first [`byte_count`](Self::byte_count) bytes are used.
     pub fn to_bytes(&self) -> [u8; 16] {
-        // A shift by all 128 bits is one of none: there is nothing to shift.
+        // For an empty packet the shift would be by 128 bits, which is not allowed.
         (self.word.checked_shl(Self::MAX_BITS - self.bits).unwrap_or(0)).to_be_bytes()
     }
 
-    /// Bytes that the bits fill.
+    /// Number of bytes that the bits need.
     pub fn byte_count(&self) -> usize {
         self.bits.div_ceil(8) as usize
     }
 }
 
-/// Powers of ten that are whole doubles.
+/// Powers of ten that doubles represent exactly.
 pub static TENS: [f64; 16] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
 ];
 
-/// Appends any finite number exactly. Numbers of a few decimals, as instruments write them, take 12 bits and those of their
-/// digits: `0`, sign, decimals (4 bits), length (6 bits), digits; all others `1` and 64 bits.
+/// Appends any finite number exactly. A number of few decimals, as instruments give, takes 12 bits and those of its
+/// digits: `0`, sign, decimals (4 bits), length (6 bits), digits. Any other takes 65: `1` and the bits of the double.
 pub fn push_number(packet: &mut Packet, value: f64) {
     let size = value.abs();
     for (decimals, ten) in (0..).zip(TENS.iter().copied()) {
+        // Find the smallest number of decimals that represents this number exactly; otherwise send all 64 bits.
         let digits = crate::math::round(size * ten);
         if digits >= 9e15 || digits / ten != size {
             continue;

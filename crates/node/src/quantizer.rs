@@ -1,12 +1,12 @@
-//! Schemes that compare a sample with thresholds: sign bit, word, bit of a pattern.
+//! Schemes that compare a sample with thresholds: sign bit, word, bit of a binary pattern.
 
 use crate::error::{Error, finite, positive};
 use crate::sample::Sample;
 
-/// Whether the sample reached the threshold; a tie did. The threshold of the Dymbo filter is the broadcast prediction.
+/// Whether the sample is at or above the threshold. In the Dymbo filter the threshold is the broadcast prediction.
 ///
 /// # Errors
-/// If one of them is not finite.
+/// If sample or threshold is not finite.
 #[inline]
 pub fn sign_bit<T: Sample>(sample: T, threshold: T) -> Result<bool, Error> {
     if !sample.is_finite() {
@@ -18,8 +18,8 @@ pub fn sign_bit<T: Sample>(sample: T, threshold: T) -> Result<bool, Error> {
     Ok(sample >= threshold)
 }
 
-/// Number of thresholds at or below the sample: the cell that holds it, if the thresholds increase. A threshold belongs to the cell above
-/// it; infinite samples fall into the outer cells.
+/// Number of thresholds at or below the sample. If the thresholds increase, it is the index of the cell that contains the sample. A sample
+/// at a threshold is in the cell above; infinite samples are in the outer cells.
 ///
 /// # Errors
 /// If the sample is NaN.
@@ -32,7 +32,7 @@ pub fn cell_of<T: Sample>(thresholds: &[T], sample: T) -> Result<usize, Error> {
     }
 }
 
-/// The bit of a pattern: the parity of [`cell_of`], for it changes at every threshold.
+/// The bit of a binary pattern, which changes at every threshold: the parity of [`cell_of`].
 ///
 /// # Errors
 /// If the sample is NaN.
@@ -41,22 +41,23 @@ pub fn pattern_bit<T: Sample>(thresholds: &[T], sample: T) -> Result<bool, Error
     Ok(cell_of(thresholds, sample)? % 2 == 1)
 }
 
-/// Cell of the innovation `(sample - mean) / deviation` among thresholds of the standard normal density.
+/// Index of the cell of the innovation `(sample - mean) / deviation` among thresholds in standard deviations.
 ///
 /// # Errors
-/// If the sample or the mean is not finite, or the deviation not a number above 0.
+/// If sample or mean is not finite, or the deviation is not positive.
 #[inline]
 pub fn innovation_cell(thresholds: &[f64], sample: f64, mean: f64, deviation: f64) -> Result<usize, Error> {
     let scale = positive("deviation", deviation)?;
     let innovation = finite("measurement", sample)? - finite("prediction", mean)?;
-    // Products, for a division in software takes more room than all else.
+    // Products instead of a quotient, because a division in software needs much code.
     Ok(thresholds.partition_point(|threshold| threshold * scale <= innovation))
 }
 
-/// [`innovation_cell`] without floating point: sample, mean and deviation are codes, the thresholds multiples of `2^-16` deviations.
+/// [`innovation_cell`] without floating point: sample, mean and deviation are integer codes, the thresholds multiples of `2^-16`
+/// deviations.
 #[inline]
 pub fn innovation_cell_of_codes(thresholds: &[i32], sample: i32, mean: i32, deviation: u32) -> usize {
-    // Below 2^33 * 2^16 and 2^31 * 2^32: neither side can overflow.
+    // The sides are below 2^33 * 2^16 and 2^31 * 2^32, so neither overflows.
     let innovation = (i64::from(sample) - i64::from(mean)) << 16;
     thresholds.partition_point(|threshold| i64::from(*threshold) * i64::from(deviation) <= innovation)
 }
@@ -99,7 +100,7 @@ impl<'a, T: Sample> Quantizer<'a, T> {
         })
     }
 
-    /// Bits of a word.
+    /// Length of a word in bits.
     pub fn bits(&self) -> u32 {
         self.bits
     }

@@ -1,4 +1,4 @@
-//! What a sample can be.
+//! The number types of samples.
 
 mod sealed {
     pub trait Sealed {}
@@ -6,11 +6,11 @@ mod sealed {
 
 /// A number that is compared with thresholds of its own type: a code of a converter, a fixed-point number or a float.
 pub trait Sample: Copy + PartialOrd + sealed::Sealed {
-    /// Whether it is a number: of the types here only floats can be none.
+    /// Whether it is not NaN; always true for integers.
     fn is_number(self) -> bool;
-    /// Whether it is a number and not infinite.
+    /// Whether it is neither NaN nor infinite; always true for integers.
     fn is_finite(self) -> bool;
-    /// For error messages; not exact beyond 53 bits.
+    /// The value for error messages; not exact beyond 53 bits.
     fn to_f64(self) -> f64;
 }
 

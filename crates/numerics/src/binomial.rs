@@ -1,6 +1,6 @@
 //! Binomial coefficients, exact and in logarithms.
 
-/// `C(n, k)`, exactly; `None` beyond 128 bits. Zero for `k > n`.
+/// `C(n, k)`, exactly; `None` if it needs more than 128 bits. Zero for `k > n`.
 pub fn exact(n: u128, k: u128) -> Option<u128> {
     if k > n {
         return Some(0);
@@ -17,7 +17,7 @@ fn gcd(a: u128, b: u128) -> u128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// `C(n, k)`, exactly up to `u64::MAX` and that beyond: for sizes of tables, in inner loops.
+/// `C(n, k)`, exact below `u64::MAX`; larger values are returned as `u64::MAX`. For table sizes and inner loops.
 pub fn saturating(n: usize, k: usize) -> u64 {
     if k > n {
         return 0;
@@ -38,14 +38,14 @@ pub fn saturating(n: usize, k: usize) -> u64 {
 
 /// `ln C(n, k)` for all `k` in `0..=n`.
 ///
-/// Relative error of the coefficients below `(n + 2) 2^-53`: exact products while they fit, ratios beyond.
+/// The coefficients behind the logarithms have a relative error below `(n + 2) 2^-53`.
 pub fn log_row(n: usize) -> Vec<f64> {
     let mut logs = vec![0.0; n + 1];
     let (mut mantissa, mut offset) = (1.0_f64, 0.0_f64);
     for k in 1..=n / 2 {
         mantissa *= (n + 1 - k) as f64 / k as f64;
         if mantissa > 1e280 {
-            // Logarithms are summed once in hundreds of orders of magnitude, not once a factor.
+            // The factors are multiplied as long as the product fits. A logarithm is taken once in hundreds of orders of magnitude.
             offset += mantissa.ln();
             mantissa = 1.0;
         }

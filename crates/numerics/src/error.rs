@@ -1,8 +1,8 @@
-//! The error every constructor shares, and the checks that raise it.
+//! The argument error that all constructors share, and functions that check arguments and return it.
 
 use thiserror::Error;
 
-/// An argument that a constructor or function refuses.
+/// An argument that a constructor or function does not accept.
 ///
 /// The message names the argument, shows its value and says what was expected, so that it can be shown to a user as it
 /// stands. Crates above wrap it (`#[from]`) in their own error enum.
@@ -11,9 +11,9 @@ use thiserror::Error;
 pub struct ArgumentError {
     /// Name of the argument as the signature spells it.
     pub name: &'static str,
-    /// The offending value, formatted.
+    /// The value that was given, formatted.
     pub value: String,
-    /// What would have been accepted.
+    /// What is accepted, as a noun phrase (`a finite number`).
     pub expected: String,
 }
 
@@ -29,7 +29,7 @@ impl ArgumentError {
     }
 }
 
-/// Refuses an argument in the words of any crate's error.
+/// Returns an argument error as the error type of any crate: `Err(ArgumentError::new(name, value, expected).into())`.
 pub fn refuse<T, E: From<ArgumentError>>(
     name: &'static str,
     value: impl std::fmt::Display,
@@ -38,7 +38,7 @@ pub fn refuse<T, E: From<ArgumentError>>(
     Err(ArgumentError::new(name, value, expected).into())
 }
 
-/// Returns `value` if `accepted` holds of it, the error otherwise.
+/// Returns `value` if `accepted(value)` is true, and the error otherwise.
 #[inline]
 fn require(
     name: &'static str,
@@ -53,7 +53,7 @@ fn require(
     }
 }
 
-/// Out of line: callers stay small enough to be inlined.
+/// Not inlined, so that callers stay small enough to be inlined themselves.
 #[cold]
 #[inline(never)]
 fn refused(name: &'static str, value: f64, expected: &str) -> ArgumentError {

@@ -1,22 +1,21 @@
-//! Numerics that every estimator here stands on, free of any probability model.
+//! Numerical functions for all crates of the workspace. They assume no probability model.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`normal`] | the standard normal distribution, exact in its tails and in narrow cells |
 //! | [`quadrature`] | Gauss-Legendre rules |
-//! | [`kernels`] | the same functions, sums and exponentials over whole columns, in vector registers |
+//! | [`kernels`] | the same functions, sums and exponentials over whole slices, in vector registers |
 //! | [`factored`] | a covariance factored once, for densities and draws |
 //! | [`linalg`], [`tridiagonal`], [`eigen`] | square roots of singular covariances, tridiagonal systems, eigenvalues |
 //! | [`roots`], [`newton`] | roots inside a bracket, without and with a derivative |
 //! | [`golden`] | the maximum of a function with one peak |
 //! | [`binomial`], [`LogSum`] | binomial coefficients, sums of exponentials that arrive one by one |
-//! | [`stored!`] | how types with checking constructors are written and read |
-//! | [`wild`] | numbers to test with: no numbers, infinities, the ends of the range |
+//! | [`stored!`] | serde forms for types whose constructors check their arguments |
+//! | [`wild`] | extreme numbers for tests: NaN, infinities, the ends of the range |
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
 //!
-//! The central choice: **probabilities of intervals live in the log domain, and nowhere else is one formed.** It costs an
-//! `erfcx` and an `exp` where `1 - cdf` would do in the middle of the bell, and it is why no filter in this workspace divides
-//! by zero when a bit is surprising.
+//! Design rule: **probabilities of intervals are kept as logarithms.** This costs an `erfcx` and an `exp` where `1 - cdf` would be enough
+//! in the middle of the distribution. In return, no filter in this workspace divides by zero when a report was very improbable.
 //!
 //! ```
 //! use fewbits_numerics::normal;
@@ -25,8 +24,8 @@
 //! assert!((normal::log_cdf(-40.0) + 804.608_442_013_754).abs() < 1e-9);
 //! ```
 //!
-//! Without the default feature `std` only the functions of [`kernels::scalar`] that need neither a library nor memory are left, `exp`
-//! and `ln`, and [`kernels::vectorised`]: what a sensor's half needs. They give the same bits either way.
+//! Without the default feature `std` only [`kernels::scalar`]'s `exp` and `ln` and [`kernels::vectorised`] remain, which need neither the
+//! standard library nor memory allocation. This is enough for a sensor. They give the same bits as with `std`.
 
 #![cfg_attr(not(feature = "std"), no_std)]
 

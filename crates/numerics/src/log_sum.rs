@@ -29,7 +29,7 @@ impl LogSum {
         self.add_with_share(term);
     }
 
-    /// As [`add`](Self::add); returns the share of the term in the sum so far.
+    /// Adds `exp(term)` and returns `exp(term) / sum`, where `sum` includes this term; 0 if nothing was added.
     #[inline]
     pub fn add_with_share(&mut self, term: f64) -> f64 {
         if term > self.largest {
@@ -45,7 +45,7 @@ impl LogSum {
         }
     }
 
-    /// The logarithm of the sum; minus infinity before the first term.
+    /// The logarithm of the sum; `-inf` before the first term.
     #[inline]
     pub fn value(&self) -> f64 {
         if self.largest.is_finite() {

@@ -1,10 +1,10 @@
-//! Quadrature rules, computed once a process.
+//! Gauss-Legendre quadrature rules, computed once per process.
 
 use gauss_quad::GaussLegendre;
 use std::num::NonZeroUsize;
 use std::sync::OnceLock;
 
-/// A Gauss-Legendre rule on `[-1, 1]`: exact for polynomials of degree `2 n - 1`.
+/// A Gauss-Legendre rule of `n` nodes on `[-1, 1]`: exact for polynomials up to degree `2 n - 1`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rule {
     nodes: Vec<f64>,
@@ -33,7 +33,7 @@ impl Rule {
         &self.weights
     }
 
-    /// Nodes and weights moved to `[a, b]`.
+    /// Nodes and weights for the interval `[a, b]`.
     pub fn on(&self, a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
         self.nodes
@@ -42,18 +42,18 @@ impl Rule {
             .map(move |(x, w)| (middle + half * x, half * w))
     }
 
-    /// `sum w f(x)` over `[a, b]`.
+    /// Integral of `f` over `[a, b]` by this rule: `sum w f(x)`.
     #[inline]
     pub fn sum(&self, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
         self.on(a, b).map(|(x, w)| w * f(x)).sum()
     }
 
-    /// `sum w f(x)` over `panels` equal parts of `[a, b]`.
+    /// Integral of `f` over `[a, b]`, split into `panels` equal parts with this rule on each.
     pub fn composite(&self, a: f64, b: f64, panels: usize, f: impl Fn(f64) -> f64) -> f64 {
         self.panels(a, b, panels).map(|(x, w)| w * f(x)).sum()
     }
 
-    /// Nodes and weights of `panels` equal parts of `[a, b]`, increasing.
+    /// Nodes and weights of this rule on each of `panels` equal parts of `[a, b]`, in increasing order.
     pub fn panels(&self, a: f64, b: f64, panels: usize) -> impl Iterator<Item = (f64, f64)> + '_ {
         let width = (b - a) / panels.max(1) as f64;
         (0..panels.max(1)).flat_map(move |i| {

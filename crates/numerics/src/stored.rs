@@ -1,8 +1,9 @@
-//! The stored form of a checked type, and floats that are stored exactly whatever the format does.
+//! Serialised forms of types whose constructors check their arguments, and floats that are stored exactly in every format.
 //!
-//! Some text formats print a float exactly and read it back one unit in the last place off. `#[serde(with = "fewbits_numerics::stored")]`
-//! on a field of type `f64` or `f32`, a matrix, or an `Option`, `Vec`, array or pair of [`Floats`], writes text formats' floats as text, the
-//! shortest that reads back exactly (`"0.1"`), and those of binary formats as they are. Plain numbers are read too.
+//! Some text formats print a float exactly but read it back with an error of one unit in the last place. Put
+//! `#[serde(with = "fewbits_numerics::stored")]` on a field of type `f64` or `f32`, a matrix, or an `Option`, `Vec`, array or pair of
+//! [`Floats`]. In text formats each float is then written as a string, the shortest that reads back exactly (`"0.1"`); binary formats
+//! store the float as usual. Plain numbers in text are accepted too.
 //!
 //! ```
 //! #[derive(Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -74,15 +75,15 @@ impl<'de> Deserialize<'de> for Exact {
     }
 }
 
-/// What holds floats: its form has [`Exact`] in their places.
+/// A type that holds floats. Its stored form has [`Exact`] in place of each float.
 pub trait Floats: Sized {
     /// The stored form.
     type Form: Serialize + for<'de> Deserialize<'de>;
 
-    /// The form of a value.
+    /// Converts a value to its stored form.
     fn form(&self) -> Self::Form;
 
-    /// The value of a form; `None` if its length is another.
+    /// Converts a stored form back; `None` if it has the wrong length.
     fn read(form: Self::Form) -> Option<Self>;
 }
 
@@ -98,7 +99,7 @@ impl Floats for f64 {
     }
 }
 
-/// As the same number in `f64`.
+/// Stored as the same number in `f64`.
 impl Floats for f32 {
     type Form = Exact;
 
@@ -111,7 +112,7 @@ impl Floats for f32 {
     }
 }
 
-/// A whole number beside floats is stored as it is.
+/// Integers beside floats are stored as they are.
 impl Floats for i64 {
     type Form = Self;
 
@@ -160,7 +161,7 @@ impl<T: Floats, const N: usize> Floats for [T; N] {
     }
 }
 
-/// Column by column, as nalgebra writes it.
+/// Stored column by column, as nalgebra does.
 impl<const R: usize, const C: usize> Floats for SMatrix<f64, R, C> {
     type Form = Vec<Exact>;
 
@@ -185,10 +186,10 @@ impl<A: Floats, B: Floats> Floats for (A, B) {
     }
 }
 
-/// Writes floats exactly: for `#[serde(with = "fewbits_numerics::stored")]`.
+/// Writes floats exactly. For use through `#[serde(with = "fewbits_numerics::stored")]`.
 ///
 /// # Errors
-/// Those of the format.
+/// If the format returns an error.
 pub fn serialize<T: Floats, S: Serializer>(value: &T, serializer: S) -> Result<S::Ok, S::Error> {
     value.form().serialize(serializer)
 }
@@ -196,15 +197,15 @@ pub fn serialize<T: Floats, S: Serializer>(value: &T, serializer: S) -> Result<S
 /// Reads what [`serialize`] wrote, or plain numbers.
 ///
 /// # Errors
-/// Those of the format, and if an array has another length or a text is no number.
+/// If the format returns an error, an array has the wrong length, or a string is not a number.
 pub fn deserialize<'de, T: Floats, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
     T::read(T::Form::deserialize(deserializer)?).ok_or_else(|| D::Error::custom("an array of another length"))
 }
 
-/// How a type with a checking constructor is written and read by serde: the fields of its stored form, each with its type and its
-/// value, and the constructor that reads them. The type itself says `#[serde(try_from = "Form", into = "Form")]`; without values
-/// (second form) it is written by its own derive, and `into` is left out; the form and its fields may then have serde's attributes.
-/// A type with a dimension is written `[const D: usize] Type as Form`, and its form is `Form<D>`.
+/// Implements serde for a type whose constructor checks its arguments: lists the fields of the stored form, each with its type and its
+/// value, and the constructor that reads them. The type itself has the attribute `#[serde(try_from = "Form", into = "Form")]`. In the
+/// second form of the macro the fields have no values: the type is written by its own derive, `into` is left out, and the form and its
+/// fields may have serde attributes. A type with a dimension is written `[const D: usize] Type as Form`; its form is then `Form<D>`.
 ///
 /// ```
 /// use fewbits_numerics::{ArgumentError, error::positive, stored};

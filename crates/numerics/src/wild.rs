@@ -1,4 +1,4 @@
-//! Numbers to test with: what a caller may hand over by mistake, beside what makes sense.
+//! Extreme numbers for tests: values that a caller may pass by mistake, mixed with ordinary ones.
 //!
 //! ```
 //! use fewbits_numerics::wild;
@@ -7,7 +7,7 @@
 //! assert_eq!(wild::number(0), 0.0);
 //! ```
 
-/// No numbers, infinities, zeros of both signs, and the ends of the range, of its squares and of whole numbers.
+/// NaN, infinities, zeros of both signs, and numbers at the limits of `f64`, of its squares and of exact integers.
 pub const EXTREMES: [f64; 20] = [
     0.0,
     f64::NAN,
@@ -31,8 +31,8 @@ pub const EXTREMES: [f64; 20] = [
     -1e16,
 ];
 
-/// The number that 64 bits choose: one of [`EXTREMES`] in two of nine cases, uniform in `[-3, 3)` in three, positive and below 4 in
-/// three, and a power of ten from `1e-300` to `1e299` in one.
+/// A number determined by 64 bits: one of [`EXTREMES`] with probability 2/9, uniform in `[-3, 3)` with 3/9, positive and below 4 with
+/// 3/9, and a power of ten from `1e-300` to `1e299` with 1/9.
 pub fn number(bits: u64) -> f64 {
     let (kind, rest) = (bits % 9, bits / 9);
     // 2^64 / 9 is above 2^60: 52 bits of the rest are uniform.

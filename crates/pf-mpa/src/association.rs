@@ -1,8 +1,8 @@
-//! Two targets on a line and two measurements in unknown order: which is whose?
+//! Two targets on a line and two measurements in unknown order: which measurement belongs to which target.
 //!
-//! `T1`, `T2` are random walks of variance `q` a step; the measurements `zA`, `zB` of variance `R` arrive in random order. `r = 0`
-//! says that `zA` is of the first target. As printed, `P(r = 0)` comes from a rule of thumb ([`AssociationRule::Tanh`]); it has an exact
-//! value ([`AssociationRule::Exact`]).
+//! The targets `T1`, `T2` are random walks of variance `q` per step. The measurements `zA`, `zB` of variance `R` arrive in random order.
+//! `r = 0` means that `zA` is of the first target. The thesis computes `P(r = 0)` by a heuristic ([`AssociationRule::Tanh`]);
+//! [`AssociationRule::Exact`] is the exact value.
 
 use crate::Error;
 use fewbits_core::Gaussian;
@@ -13,31 +13,31 @@ use serde::{Deserialize, Serialize};
 /// The printed constant of the tanh rule; `atanh(1/2)` rounded.
 pub const PRINTED_GAIN: f64 = 0.55;
 
-/// `P(r = 0)` from predictions `t` and measurements `z`.
+/// How `P(r = 0)` is computed from predictions `t` and measurements `z`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AssociationRule {
-    /// `tanh(K D)`, `D = |t1 - zB| |t2 - zA| / (|t1 - zA| |t2 - zB|)`, as printed (`K = 0.55`). Not symmetric in the labels, blind to
-    /// `R` (erratum `mpa-12`).
+    /// `tanh(K D)`, `D = |t1 - zB| |t2 - zA| / (|t1 - zA| |t2 - zB|)`, as printed (`K = 0.55`). Exchanging the labels does not give the
+    /// complement, and `R` is ignored (erratum `mpa-12`).
     Tanh {
-        /// `K`.
+        /// Gain `K`.
         gain: f64,
     },
-    /// `D / (1 + D)`: symmetric, and no better.
+    /// `D / (1 + D)`: symmetric in the labels, but not more accurate.
     Logistic,
-    /// The ratio of the likelihoods, given Gaussian predictions.
+    /// From the likelihoods of both orders, given Gaussian predictions.
     Exact,
 }
 
 impl AssociationRule {
-    /// The rule of the thesis.
+    /// The rule of the thesis, [`Tanh`](Self::Tanh) with `K = 0.55`.
     pub const PRINTED: Self = Self::Tanh { gain: PRINTED_GAIN };
 
     /// `P(r = 0)` for predictions with the given mean and variance, measurement variance `r`.
     ///
     /// # Errors
-    /// If a variance is negative, `r` is not above zero, or a number is not finite; [`Error::NotANumber`] if the likelihoods
-    /// of both orders leave the range of numbers.
+    /// If a variance is negative, `r` is not positive, or a number is not finite; [`Error::NotANumber`] if the likelihoods
+    /// overflow.
     pub fn probability(self, targets: &[Gaussian<1>; 2], z: [f64; 2], r: f64) -> Result<f64, Error> {
         fewbits_numerics::error::all_finite("z", &z)?;
         positive("r", r)?;
@@ -51,7 +51,7 @@ impl AssociationRule {
                 separation(means(targets), z).map_or(0.5, |d| if d == f64::INFINITY { 1.0 } else { d / (1.0 + d) })
             }
             Self::Exact => {
-                // ln N(z0; m, s) - ln N(z1; m, s) as a product: two fits that underflow do not meet as infinities.
+                // ln N(z0; m, s) - ln N(z1; m, s) as one product: the difference of two logarithms could be infinity minus infinity.
                 let log_ratio = |target: &Gaussian<1>| {
                     let middle = 0.5 * z[0] + 0.5 * z[1] - target.mean()[0];
                     (z[1] - z[0]) / (target.covariance()[0] + r) * middle
@@ -62,7 +62,7 @@ impl AssociationRule {
     }
 }
 
-/// Passes numbers on.
+/// `value`, or an error if it is NaN.
 fn number(value: f64, what: &'static str) -> Result<f64, Error> {
     if value.is_nan() {
         return Err(Error::NotANumber { what });
@@ -74,9 +74,9 @@ fn means(targets: &[Gaussian<1>; 2]) -> [f64; 2] {
     [targets[0].mean()[0], targets[1].mean()[0]]
 }
 
-/// `D` of the printed rule; infinite where only its denominator is zero, none where both are.
+/// `D` of the printed rule. Infinite if only its denominator is zero, `None` if numerator and denominator are.
 pub fn separation(t: [f64; 2], z: [f64; 2]) -> Option<f64> {
-    // Ratios first, so that no product leaves the range of numbers.
+    // Ratios first: the products of the distances could overflow or underflow.
     let (over, under) = ((t[0] - z[1]).abs(), (t[0] - z[0]).abs());
     let (other_over, other_under) = ((t[1] - z[0]).abs(), (t[1] - z[1]).abs());
     let (zero_over, zero_under) = (over == 0.0 || other_over == 0.0, under == 0.0 || other_under == 0.0);
@@ -88,7 +88,7 @@ pub fn separation(t: [f64; 2], z: [f64; 2]) -> Option<f64> {
     }
 }
 
-/// `tanh(K D)`; one half where `D` is undefined.
+/// `tanh(K D)`; 1/2 if `D` is undefined.
 pub fn tanh_rule(separation: Option<f64>, gain: f64) -> f64 {
     separation.map_or(0.5, |d| (gain * d).tanh())
 }
@@ -102,10 +102,10 @@ pub fn sigmoid(x: f64) -> f64 {
     }
 }
 
-/// The exact one-step posterior of two targets.
+/// The one-step posterior of two targets, reduced to its first two moments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
-    /// `P(r = 0)`.
+    /// `P(r = 0)`: `zA` is of the first target.
     pub straight: f64,
     /// Mean and variance of each target.
     pub targets: [Gaussian<1>; 2],
@@ -113,8 +113,8 @@ pub struct Pair {
     pub covariance: f64,
 }
 
-/// Posterior of both targets when `zA` is of the first with probability `straight`: mixtures of two Kalman updates, their moments
-/// matched.
+/// Posterior of both targets if `zA` is of the first with probability `straight`: mean and covariance of the mixture of two Kalman
+/// updates.
 ///
 /// # Errors
 /// If `straight` is outside `[0, 1]`, `r` is not above zero, or a measurement is not finite.
@@ -144,7 +144,7 @@ fn kalman(prior: &Gaussian<1>, z: f64, r: f64) -> (f64, f64) {
     (m + gain * (z - m), gain * r)
 }
 
-/// Time update of both walks.
+/// Both targets one step later, before the measurements: variances grow by `q`.
 fn predicted(targets: &[Gaussian<1>; 2], q: f64) -> [Gaussian<1>; 2] {
     targets.map(|t| Gaussian::from_trusted_parts(*t.mean(), t.covariance().add_scalar(q)))
 }
@@ -153,21 +153,21 @@ fn predicted(targets: &[Gaussian<1>; 2], q: f64) -> [Gaussian<1>; 2] {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PairTracker {
-    /// Knows the order: the bound of all.
+    /// Knows the order. No other tracker can be more accurate.
     Genie,
-    /// Weighs both orders by a rule and matches the moments of the mixture; with the exact rule, joint probabilistic data
+    /// Weighs both orders by a rule and keeps mean and covariance of the mixture. With the exact rule it is joint probabilistic data
     /// association.
     Weighted(AssociationRule),
-    /// Takes the likelier order: global nearest neighbour.
+    /// Takes the more probable order: global nearest neighbour.
     Nearest,
 }
 
 impl PairTracker {
-    /// One step of walks of variance `q`; returns the posterior and `P(r = 0)`. `straight` is the true order, which only the genie
-    /// looks at.
+    /// One step of walks of variance `q`. Returns the posterior and `P(r = 0)`. `straight` is the true order; only
+    /// [`Genie`](Self::Genie) uses it.
     ///
     /// # Errors
-    /// If a variance is negative or zero where it must not be, or a number is not finite.
+    /// If a variance is negative, `r` is not positive, or a number is not finite.
     pub fn step(self, targets: &[Gaussian<1>; 2], z: [f64; 2], q: f64, r: f64, straight: bool) -> Result<Pair, Error> {
         non_negative("q", q)?;
         let predicted = predicted(targets, q);
@@ -180,16 +180,16 @@ impl PairTracker {
     }
 }
 
-/// Multiple-hypothesis tracking: the likeliest histories of orders, each with two Kalman filters.
+/// Multiple-hypothesis tracking: the most probable histories of orders, each with two Kalman filters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypotheses {
     most: usize,
-    /// Log weight, and both targets.
+    /// Per kept history: its log weight, and both targets.
     kept: Vec<(f64, [Gaussian<1>; 2])>,
 }
 
 impl Hypotheses {
-    /// The start, keeping at most `most` histories.
+    /// The start with one history; at most `most` histories are kept.
     ///
     /// # Errors
     /// If `most` is zero.
@@ -204,8 +204,8 @@ impl Hypotheses {
     /// One step; returns `P(r = 0)`.
     ///
     /// # Errors
-    /// If a variance is negative or `r` is not above zero, or a number is not finite; [`Error::Impossible`] if the
-    /// measurements are out of reach of every hypothesis. The hypotheses are then as they were.
+    /// If a variance is negative, `r` is not positive, or a number is not finite; [`Error::Impossible`] if the
+    /// measurements have probability zero under every hypothesis. The hypotheses are then unchanged.
     pub fn step(&mut self, z: [f64; 2], q: f64, r: f64) -> Result<f64, Error> {
         fewbits_numerics::error::all_finite("z", &z)?;
         non_negative("q", q)?;
@@ -213,6 +213,7 @@ impl Hypotheses {
         let mut next = Vec::with_capacity(2 * self.kept.len());
         for (log, targets) in &self.kept {
             let targets = predicted(targets, q);
+            // Every hypothesis branches in two: which measurement belongs to which target.
             for order in [[z[0], z[1]], [z[1], z[0]]] {
                 let fit =
                     |i: usize| normal::log_pdf_with(order[i], targets[i].mean()[0], targets[i].covariance()[0] + r);
@@ -232,6 +233,7 @@ impl Hypotheses {
             return Err(Error::unlikely_or_no_number(largest, what));
         }
         let total: f64 = next.iter().map(|h| (h.0 - largest).exp()).sum();
+        // Sum before the list is shortened: entries of even index have the measurements in the given order.
         let straight: f64 = next.iter().step_by(2).map(|h| (h.0 - largest).exp()).sum();
         next.sort_by(|a, b| b.0.total_cmp(&a.0));
         next.truncate(self.most);

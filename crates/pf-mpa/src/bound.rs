@@ -1,4 +1,4 @@
-//! What no tracker can beat: Fisher information of a range, and the posterior Cramer-Rao recursion.
+//! Bounds on the error of any tracker: Fisher information of a range, and the posterior Cramer-Rao recursion.
 
 use crate::Error;
 use crate::factor::log_inside;
@@ -11,11 +11,11 @@ use fewbits_numerics::error::refuse;
 use fewbits_numerics::normal;
 use nalgebra::{Matrix4, Vector2};
 
-/// Fisher information about the distance `d` of a range itself: `(1 + 2 sigma'^2) / sigma^2`, `(c^2 + 2) / d^2` with the thesis's
-/// noise. The second term is what the size of the noise says.
+/// Fisher information about the distance `d` of an unquantized range: `(1 + 2 sigma'^2) / sigma^2`, with the thesis's noise
+/// `(c^2 + 2) / d^2`. The second term arises because the noise variance depends on the distance.
 ///
 /// # Errors
-/// If the distance is not above zero, or the information is no number.
+/// If the distance is not positive, or the information is not finite.
 pub fn range_information(noise: &RangeNoise, distance: f64) -> Result<f64, Error> {
     positive("distance", distance)?;
     let (sigma, slope) = (noise.deviation(distance), noise.slope(distance));
@@ -26,13 +26,13 @@ fn information(value: f64) -> Result<f64, Error> {
     Ok(fewbits_numerics::error::non_negative("information", value)?)
 }
 
-/// Fisher information about the distance of the level of a quantized range: `sum_q (dP_q/dd)^2 / P_q`, the outer cells open.
+/// Fisher information about the distance of a quantized range: `sum_q (dP_q/dd)^2 / P_q` over the levels. The outer cells are unbounded.
 ///
-/// Most of it is at the edges: the integral over one edge is `1.8063 / sigma`, so that its expectation grows without bound as the
-/// noise falls, though the error that can be reached does not. At high signal-to-noise ratios the bound is loose.
+/// Most of it is near the edges of the cells: the integral over one edge is `1.8063 / sigma`. Its expectation therefore grows without
+/// limit as the noise falls, but the attainable error does not vanish. At high signal-to-noise ratios the bound is loose.
 ///
 /// # Errors
-/// If the distance is not above zero, there are fewer than two levels, the reference is none, or the information is no number.
+/// If the distance is not positive, there are fewer than two levels, the reference is not valid, or the information is not finite.
 pub fn level_information(
     reference: &RangeReference,
     levels: usize,
@@ -67,8 +67,8 @@ pub fn level_information(
     information(sum)
 }
 
-/// The posterior Cramer-Rao bound of `[x, y, vx, vy]`, step by step. The accelerations count as known: a bound for a filter that
-/// knows less, and looser. Adding their variance to the process noise would be no bound.
+/// The posterior Cramer-Rao bound of `[x, y, vx, vy]`, step by step. The accelerations are taken as known, so it is a valid but looser
+/// bound for a filter that does not know them. Adding their variance to the process noise would not give a bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CramerRao {
     bound: Matrix4<f64>,
@@ -82,8 +82,8 @@ impl CramerRao {
         }
     }
 
-    /// `J_k = (F J_{k-1}^-1 F' + G q G')^-1 + I`, held as `J^-1`. `information` is expected: [`position_information`], averaged over what is
-    /// unknown.
+    /// `J_k = (F J_{k-1}^-1 F' + G q G')^-1 + I`; `J^-1` is stored. `information` is the expected `I`: the average of
+    /// [`position_information`] over the unknown states.
     ///
     /// # Errors
     /// If a matrix is not positive semidefinite.
@@ -92,7 +92,7 @@ impl CramerRao {
         Ok(())
     }
 
-    /// `J^-1`.
+    /// The bound `J^-1` on the covariance of `[x, y, vx, vy]`.
     pub fn covariance(&self) -> &Matrix4<f64> {
         &self.bound
     }
@@ -103,10 +103,11 @@ impl CramerRao {
     }
 }
 
-/// Information of all sensors about a target at `place`: of levels where there are references, of ranges otherwise.
+/// Sum of the sensors' information about a target at `place`. `quantizer`: one reference per sensor and the number of levels; `None` for
+/// unquantized ranges.
 ///
 /// # Errors
-/// If the target stands on a sensor.
+/// If the target is at the place of a sensor.
 pub fn position_information(
     sensors: &[RangeSensor],
     place: &Vector2<f64>,

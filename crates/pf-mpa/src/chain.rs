@@ -22,11 +22,11 @@ stored! { AccelerationChain as StoredChain |chain| {
 } => AccelerationChain::new(magnitude, initial, transition), Error }
 
 impl AccelerationChain {
-    /// A chain with accelerations `0`, `+magnitude`, `-magnitude` (length per time squared), the law `initial` of the one that
-    /// acts on the first step, and the rows of `transition` for "from".
+    /// A chain with accelerations `0`, `+magnitude`, `-magnitude` (length per time squared). `initial` has the probabilities of the first
+    /// step's acceleration. Row `i` of `transition` has the probabilities of the next acceleration after the `i`-th.
     ///
     /// # Errors
-    /// If the magnitude is negative, or a law does not sum to one within `1e-9`.
+    /// If the magnitude is negative, or probabilities do not sum to one within `1e-9`.
     pub fn new(magnitude: f64, initial: [f64; 3], transition: [[f64; 3]; 3]) -> Result<Self, Error> {
         non_negative("magnitude", magnitude)?;
         probabilities("initial", &initial)?;
@@ -40,7 +40,7 @@ impl AccelerationChain {
         })
     }
 
-    /// The printed chain for accelerations of the given magnitude.
+    /// The thesis's chain for accelerations of the given magnitude.
     ///
     /// # Errors
     /// If the magnitude is negative.
@@ -48,17 +48,17 @@ impl AccelerationChain {
         Self::new(magnitude, [0.7, 0.15, 0.15], [[0.6, 0.2, 0.2], [0.4, 0.5, 0.1], [0.4, 0.1, 0.5]])
     }
 
-    /// `g`.
+    /// Magnitude `g` of the accelerations.
     pub fn magnitude(&self) -> f64 {
         self.magnitude
     }
 
-    /// The three accelerations.
+    /// The three accelerations `(0, +g, -g)`.
     pub fn values(&self) -> [f64; 3] {
         [0.0, self.magnitude, -self.magnitude]
     }
 
-    /// Law of the acceleration that acts on step `k`, counted from zero: `Pr_0 Tr^k`, in `O(log k)`.
+    /// Probabilities of the acceleration in step `k`, counted from zero: `Pr_0 Tr^k`, in `O(log k)`.
     pub fn law(&self, k: usize) -> [f64; 3] {
         // The bits of `k`, lowest first: at bit `b` the transition is `Tr^(2^b)`.
         let (mut law, mut transition, mut left) = (self.initial, self.transition, k);
@@ -72,28 +72,28 @@ impl AccelerationChain {
         law
     }
 
-    /// Mean and variance of the acceleration that acts on step `k`.
+    /// Mean and variance of the acceleration in step `k`.
     pub fn moments(&self, k: usize) -> (f64, f64) {
         let [_, up, down] = self.law(k);
         let mean = self.magnitude * (up - down);
-        // Summed as positives: the variance cannot fall below zero.
+        // A sum of non-negative terms: the variance cannot become negative.
         let rest = (1.0 - up - down).max(0.0);
         let (over, under) = (self.magnitude - mean, self.magnitude + mean);
         (mean, rest * mean * mean + up * over * over + down * under * under)
     }
 
-    /// Law of the acceleration that acts on step `k`, given the one that acted before: rows for `0`, `+g`, `-g`. The first step has none
-    /// before it, and equal rows.
+    /// Probabilities of the acceleration in step `k` given the one before: rows for `0`, `+g`, `-g`. In the first step there is none
+    /// before, and all rows are equal.
     pub fn transition(&self, k: usize) -> [[f64; 3]; 3] {
         if k == 0 { [self.initial; 3] } else { self.transition }
     }
 
-    /// A draw from the law of step `k`.
+    /// A random acceleration with the probabilities of step `k`.
     pub fn sample<R: Rng + ?Sized>(&self, rng: &mut R, k: usize) -> f64 {
         draw(rng, &self.law(k), &self.values())
     }
 
-    /// The acceleration that follows `now` (one of the three; anything else counts as the nearest).
+    /// A random acceleration after `now`, one of the three accelerations. Any other `now` counts as the nearest of them.
     pub fn next<R: Rng + ?Sized>(&self, rng: &mut R, now: f64) -> f64 {
         let from = if now > 0.5 * self.magnitude {
             1
@@ -106,7 +106,7 @@ impl AccelerationChain {
     }
 }
 
-/// `row matrix`, scaled to sum to one as both do: squared again and again, rounding would take it away.
+/// `row matrix`, normalised as far as its factors are: repeated squaring would otherwise accumulate rounding errors in the sum.
 fn times(row: &[f64; 3], matrix: &[[f64; 3]; 3]) -> [f64; 3] {
     let product: [f64; 3] = std::array::from_fn(|j| (0..3).map(|i| row[i] * matrix[i][j]).sum());
     let total: f64 = product.iter().sum();

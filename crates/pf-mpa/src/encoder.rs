@@ -1,4 +1,4 @@
-//! How all nodes agree on the cells of the quantized ranges.
+//! How all nodes compute the same quantizer cells for the ranges.
 
 use crate::Error;
 use crate::quantized::RangeReference;
@@ -10,38 +10,38 @@ use fewbits_numerics::error::refuse;
 use fewbits_numerics::{golden, normal};
 use serde::{Deserialize, Serialize};
 
-/// Terms of the published normalisation `N_f` (3.13), whose last one is dimensionally inconsistent (erratum `mpa-2`).
+/// Terms of the published normalisation `N_f` (3.13). The last printed term has a wrong unit (erratum `mpa-2`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normalisation {
     /// `ts V + ts^2 g / 2 + 5 (ts^2 / 2) sigma_v`, as printed.
     #[default]
     Printed,
-    /// `ts V + ts^2 g / 2 + 5 (ts^2 / 2) sigma_u`: the process noise in its place.
+    /// `ts V + ts^2 g / 2 + 5 (ts^2 / 2) sigma_u`: as printed with the process noise instead of the measurement noise.
     Process,
-    /// The same plus `5 sigma_v`.
+    /// As [`Process`](Self::Process), plus `5 sigma_v`.
     Robust,
 }
 
-/// How the nodes derive the reference of each range from the belief that all of them hold. No bit is spent on it.
+/// How the nodes derive the reference of each range from the belief that all of them hold. No bit is sent for it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Encoder {
-    /// The published one: the range of the *previous* estimate, and the normalisation of a target of at most this speed.
+    /// As published: the centre is the range of the *previous* estimate. The half-width assumes a target of at most this speed.
     Published {
-        /// `V`, length per time.
+        /// Largest speed `V` of the target, length per time.
         max_speed: f64,
-        /// Which terms.
+        /// Terms of `N_f`.
         normalisation: Normalisation,
     },
-    /// The range of the *predicted* estimate with the published normalisation.
+    /// The centre is the range of the *predicted* estimate. The half-width is the published normalisation.
     Predicted {
-        /// `V`, length per time.
+        /// Largest speed `V` of the target, length per time.
         max_speed: f64,
-        /// Which terms.
+        /// Terms of `N_f`.
         normalisation: Normalisation,
     },
-    /// The range of the predicted estimate, and `loading` standard deviations of the innovation:
+    /// The centre is the range of the predicted estimate. The half-width is `loading` standard deviations of the innovation:
     /// `N_f = loading sqrt(h' P h + sigma^2)`. See [`optimal_loading`].
     Adaptive {
         /// Standard deviations from the centre to the outermost nominal edge.
@@ -50,7 +50,7 @@ pub enum Encoder {
 }
 
 impl Encoder {
-    /// The published encoder, checked.
+    /// [`Encoder::Published`] with the printed normalisation.
     ///
     /// # Errors
     /// If the speed is not above zero.
@@ -61,7 +61,7 @@ impl Encoder {
         })
     }
 
-    /// The published normalisation around the predicted range, checked.
+    /// [`Encoder::Predicted`] with the printed normalisation.
     ///
     /// # Errors
     /// If the speed is not above zero.
@@ -72,7 +72,7 @@ impl Encoder {
         })
     }
 
-    /// The adaptive encoder with the best loading for `levels` cells.
+    /// [`Encoder::Adaptive`] with [`optimal_loading`] for `levels` cells.
     ///
     /// # Errors
     /// If there are fewer than two levels.
@@ -82,7 +82,7 @@ impl Encoder {
         })
     }
 
-    /// The published `N_f` at a reference range.
+    /// The published half-width `N_f` at the reference range `range`.
     pub fn normaliser(target: &Target, noise: &RangeNoise, max_speed: f64, which: Normalisation, range: f64) -> f64 {
         let (half, sigma_v) = (0.5 * target.interval() * target.interval(), noise.deviation(range));
         let sigma_u = target.noise_variance().sqrt();
@@ -94,10 +94,10 @@ impl Encoder {
         }
     }
 
-    /// The reference of a sensor: from the estimate of the step before and its prediction, which every node has.
+    /// The reference of one sensor, from the estimate of the step before and its prediction. Every node has both.
     ///
     /// # Errors
-    /// If the beliefs or the settings give no number.
+    /// If centre or half-width is not finite.
     pub fn reference<const D: usize>(
         &self,
         target: &Target,
@@ -120,6 +120,7 @@ impl Encoder {
                 max_speed,
                 normalisation,
             } => Self::normaliser(target, noise, max_speed, normalisation, centre),
+            // Standard deviation of the innovation: predicted range and noise together.
             Self::Adaptive { loading } => {
                 let row = sensor.jacobian(about.mean());
                 let spread = (row * about.covariance() * row.transpose())[0].max(0.0);
@@ -132,7 +133,7 @@ impl Encoder {
     }
 }
 
-/// Standard deviations from the mean to the outermost edge of the uniform quantizer of least squared error for a normal
+/// Standard deviations from the mean to the outermost edge of the uniform quantizer with the least mean squared error for a normal
 /// variable: 1.596, 1.991, 2.344, 2.682 for 2, 4, 8, 16 levels.
 ///
 /// # Errors
@@ -141,7 +142,7 @@ pub fn optimal_loading(levels: usize) -> Result<f64, Error> {
     if !(2..=65_536).contains(&levels) {
         return refuse("levels", levels, "2 to 65536 levels");
     }
-    // Squared error of reconstructing each cell by its nominal middle; the cells are symmetric.
+    // Mean squared error if each cell is reconstructed by its nominal middle; the cells are symmetric about zero.
     let error = |loading: f64| {
         let width = 2.0 * loading / levels as f64;
         let cell = |q: usize| {
@@ -162,7 +163,7 @@ pub fn optimal_loading(levels: usize) -> Result<f64, Error> {
         };
         (0..levels).map(cell).sum::<f64>()
     };
-    // Of loadings whose errors differ by less than rounding the largest is kept: the search runs over `-loading`.
+    // The search runs over `-loading`: if errors differ by less than rounding, the largest loading is returned.
     Ok(-golden::maximum(|x| -error(-x), -12.0, -0.5, 1e-10).0)
 }
 

@@ -1,4 +1,4 @@
-//! What a quantized or plain range says about the distance, when the noise grows with the distance.
+//! Likelihood of a quantized or plain range as a function of the distance. The noise grows with the distance.
 
 use crate::sensor::RangeNoise;
 use fewbits_core::columns::lengths_agree;
@@ -10,7 +10,7 @@ use fewbits_numerics::kernels::{scalar, vectorised};
 use fewbits_numerics::normal;
 use nalgebra::SVector;
 
-/// `p(observation | d)` for a measurement `z = d + v`, `v ~ N(0, sigma(d)^2)`: the noise is that of the *hypothesised* distance.
+/// `p(observation | d)` for a measurement `z = d + v`, `v ~ N(0, sigma(d)^2)`. The noise is evaluated at the *hypothesised* distance `d`.
 ///
 /// | observation | probability |
 /// |---|---|
@@ -19,8 +19,8 @@ use nalgebra::SVector;
 /// | `z` itself | `N(z; d, sigma(d)^2)` |
 /// | nothing | a constant |
 ///
-/// In closed form and in logarithms everywhere: no tail surrogate, no underflow. The first and the last cell are half-infinite,
-/// as clamping makes them.
+/// All are in closed form and in logarithms, so tails do not underflow. The first and the last cell are half-infinite, because the
+/// quantizer clamps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RangeFactor {
     noise: RangeNoise,
@@ -34,11 +34,11 @@ enum Kind {
         lower: f64,
         upper: f64,
         log_share: f64,
-        /// The same cell with both ends finite.
+        /// The cell with both ends finite.
         nominal: [f64; 2],
     },
     Levels {
-        /// All edges, the outermost finite as well.
+        /// All edges of the cells, the outermost finite too.
         edges: Vec<f64>,
         given: Vec<f64>,
     },
@@ -46,7 +46,7 @@ enum Kind {
 }
 
 impl RangeFactor {
-    /// The range itself.
+    /// The likelihood of an unquantized range.
     ///
     /// # Errors
     /// If it is not finite.
@@ -55,8 +55,8 @@ impl RangeFactor {
         Ok(Self { noise, kind })
     }
 
-    /// The range lies in `cell`; the report arrives with probability `share`. `nominal` is the cell with both ends finite: what
-    /// message passing draws from and what its reconstruction is the middle of.
+    /// The range lies in `cell`; the report arrives with probability `share`. `nominal` is the cell with both ends finite: message
+    /// passing draws from it, and the reconstruction is its middle.
     ///
     /// # Errors
     /// If a nominal end is not finite or the ends are not increasing, or `share` is outside `(0, 1]`.
@@ -101,7 +101,7 @@ impl RangeFactor {
         &self.noise
     }
 
-    /// The cell with both ends finite, of a cell.
+    /// The cell with both ends finite; `None` unless the observation is a cell.
     pub fn nominal_cell(&self) -> Option<[f64; 2]> {
         match &self.kind {
             Kind::Cell { nominal, .. } => Some(*nominal),
@@ -109,9 +109,8 @@ impl RangeFactor {
         }
     }
 
-    /// The observation as a value with additional variance: a cell's middle and `width^2 / 12`; `None` where nothing was
-    /// observed, or mean
-    /// or variance are no numbers.
+    /// The observation as a value with an additional variance: the middle of the cell and `width^2 / 12`. `None` if nothing was
+    /// observed, or a number is not finite.
     pub fn reconstruction(&self) -> Option<(f64, f64)> {
         let uniform = |[a, b]: [f64; 2]| (0.5 * (a + b), (b - a) * (b - a) / 12.0);
         let (mean, variance) = match &self.kind {
@@ -129,7 +128,7 @@ impl RangeFactor {
         (mean.is_finite() && variance.is_finite()).then_some((mean, variance))
     }
 
-    /// `ln p(observation | d)`.
+    /// `ln p(observation | d)` at the distance `d`.
     #[inline]
     pub fn log_probability(&self, d: f64) -> f64 {
         let deviation = self.noise.deviation(d);
@@ -146,8 +145,8 @@ impl RangeFactor {
         }
     }
 
-    /// Whether a cell is so wide against the noise at all these distances that only its nearer edge counts: with 17 deviations
-    /// between the edges the other tail is below the rounding of the whole.
+    /// Whether the cell is wider than 17 noise deviations at all these distances. Then only the nearer edge matters: the other tail is
+    /// below the rounding of the sum.
     fn is_wide(&self, width: f64, distances: &[f64]) -> bool {
         let furthest = distances
             .iter()
@@ -170,7 +169,7 @@ impl RangeFactor {
             Kind::Levels { edges, .. } => edges.iter().copied().map(feature).collect(),
             Kind::Constant(_) => return Vec::new(),
         };
-        // Relative noise has a kink where the distance changes sign.
+        // Noise that grows with the distance has a kink at distance zero.
         if self.noise.relative() > 0.0 {
             let width = features.iter().map(|f| f.width).fold(f64::INFINITY, f64::min);
             features.push(Feature { location: 0.0, width });
@@ -207,7 +206,7 @@ fn log_mixed(edges: &[f64], given: &[f64], d: f64, deviation: f64) -> f64 {
     largest + terms.map(|t| (t - largest).exp()).sum::<f64>().ln()
 }
 
-/// Adds `log(d)` of every distance, in vector registers. `log` must be inlined.
+/// Adds `log(d)` to the log weight of every distance, vectorised. `log` must be inlined for that.
 #[inline(always)]
 fn add_to_each(log_weights: &mut [f64], distances: &[f64], log: impl Fn(f64) -> f64) {
     vectorised(
@@ -248,7 +247,7 @@ impl Factor<1> for RangeFactor {
                 log_share,
                 ..
             } => {
-                // A half-line is one cut, rising or falling.
+                // A half-infinite cell has one edge; the sign is that of the slope.
                 let cut = if *upper == f64::INFINITY {
                     Some((*lower, 1.0))
                 } else if *lower == f64::NEG_INFINITY {
@@ -296,7 +295,7 @@ impl Factor<1> for RangeFactor {
         if let Kind::Constant(p) = self.kind {
             return Tilted::unchanged(prior, p.ln());
         }
-        // Noise that is the same at every distance has closed forms.
+        // Noise that does not depend on the distance has closed forms.
         if self.noise.relative() == 0.0 {
             let variance = self.noise.at_sensor() * self.noise.at_sensor();
             match &self.kind {

@@ -8,7 +8,7 @@ use fewbits_core::Gaussian;
 use fewbits_filters::{GridFilter, GridWorkspace};
 use rand::Rng;
 
-/// Where the posterior underflows or the grid cannot resolve it, the step is that of Gaussian message passing, and says so.
+/// If the posterior underflows or the grid cannot resolve it, the step is that of Gaussian message passing and counts a fallback.
 impl GaussianTracker for GridFilter {
     type Workspace = GridWorkspace<2>;
 

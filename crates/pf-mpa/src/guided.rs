@@ -1,4 +1,4 @@
-//! Gaussian beliefs updated by a few weighted draws that have looked at the data.
+//! Gaussian beliefs, updated by a few weighted draws from a proposal that depends on the observations.
 
 use crate::Error;
 use crate::linearised::Linearised;
@@ -15,12 +15,12 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-/// The proposal's covariance in those of Gaussian message passing.
+/// The proposal's covariance divided by that of Gaussian message passing.
 const INFLATION: f64 = 1.5;
-/// Below this effective sample size the draws say nothing about a covariance.
+/// Below this effective sample size the draws do not determine a covariance.
 const LEAST: f64 = 2.5;
 
-/// A Gaussian particle filter with a proposal that has seen the data.
+/// A Gaussian particle filter whose proposal depends on the observations.
 ///
 /// ```text
 /// predicted N(m, P);  proposal q: the Gaussian message-passing posterior of the position, covariance x 1.5
@@ -35,7 +35,7 @@ pub struct GuidedGaussian {
 
 stored! { GuidedGaussian as Stored { draws: usize } => GuidedGaussian::new(draws), Error }
 
-/// Buffers kept from step to step.
+/// Buffers that are reused from step to step.
 #[derive(Debug, Clone, Default)]
 pub struct GuidedWorkspace {
     places: [Vec<f64>; 2],
@@ -44,10 +44,10 @@ pub struct GuidedWorkspace {
 }
 
 impl GuidedGaussian {
-    /// A filter with `draws` draws a step.
+    /// A filter with `draws` draws per step.
     ///
     /// # Errors
-    /// If there are fewer than two.
+    /// If `draws` is below 2.
     pub fn new(draws: usize) -> Result<Self, Error> {
         if draws < 2 {
             return refuse("draws", draws, "at least 2, for a covariance");
@@ -55,7 +55,7 @@ impl GuidedGaussian {
         Ok(Self { draws })
     }
 
-    /// The belief by weighted draws of the position; none where their effective sample size is too small.
+    /// The belief from weighted draws of the position; `None` if their effective sample size is too small.
     fn update<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -71,6 +71,7 @@ impl GuidedGaussian {
         for buffer in places.iter_mut().chain([&mut *logs, weights]) {
             buffer.resize(self.draws, 0.0);
         }
+        // Importance sampling of the position: draws from a wide Gaussian about the guide, weighed by prior and likelihood.
         for i in 0..self.draws {
             let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
             let place = proposal.mean() + proposal.lower() * z;
@@ -88,6 +89,7 @@ impl GuidedGaussian {
         if size.is_nan() || size < LEAST {
             return Ok(None);
         }
+        // Weighted moments. The factor ESS / (ESS - 1) removes the bias of the covariance.
         weights.iter_mut().for_each(|w| *w /= total);
         let mean = Vector2::new(kernels::dot(weights, &places[0]), kernels::dot(weights, &places[1]));
         let spread = |a: usize, b: usize| {
@@ -103,13 +105,13 @@ impl GuidedGaussian {
     }
 }
 
-/// The belief about the position.
+/// The marginal belief of the position.
 fn position(belief: &Gaussian<4>) -> Gaussian<2> {
     let covariance: Matrix2<f64> = belief.covariance().fixed_view::<2, 2>(0, 0).into();
     Gaussian::from_trusted_parts(Vector2::new(belief.mean()[0], belief.mean()[1]), covariance)
 }
 
-/// The belief when the position's has become `N(mean, covariance)`: the velocity follows by regression.
+/// The belief after the position has become `N(mean, covariance)`. The velocity follows by its regression on the position.
 fn regressed(predicted: &Gaussian<4>, mean: &Vector2<f64>, covariance: &Matrix2<f64>) -> Result<Gaussian<4>, Error> {
     let own = position(predicted);
     let factor = own.cholesky()?;

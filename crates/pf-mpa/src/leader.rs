@@ -1,4 +1,4 @@
-//! Who leads the next step, what is handed over, and what both cost.
+//! Which sensor leads the next step, what the leaders hand over, and how many bits both cost.
 
 use crate::Error;
 use fewbits_core::{BitReader, BitWriter, CodecError, Gaussian, Message, NumberFormat};
@@ -7,17 +7,17 @@ use fewbits_numerics::error::refuse;
 use nalgebra::{Matrix4, SMatrix, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
-/// The outcome of an election among sensors that each hold an estimate of their own.
+/// The outcome of an election among sensors, each with its own estimate.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Election {
-    /// Sensors that found themselves nearest to their own estimate, in increasing order.
+    /// Sensors that are the nearest to their own estimate, in increasing order.
     pub claimants: Vec<usize>,
-    /// Who leads: the claimant of lowest number; without one, after a time-out, the sensor with the smallest distance of its own.
+    /// The leader: the claimant of lowest number. Without a claimant, after a time-out, the sensor that is nearest to its own estimate.
     pub leader: usize,
 }
 
-/// Holds the election: sensor `i` claims the lead if no sensor is nearer to its own estimate `estimates[i]` (ties go to the lowest
-/// number). Deterministic trackers on the same reports hold the same estimate, and exactly one claims.
+/// Holds the election. Sensor `i` claims the lead if no sensor is nearer to its estimate `estimates[i]`; ties go to the lowest
+/// number. Deterministic trackers on the same reports hold the same estimate, and exactly one sensor claims.
 ///
 /// # Errors
 /// If there is no sensor, or not one estimate per sensor, or a number is not finite.
@@ -38,14 +38,14 @@ pub fn elect(positions: &[Vector2<f64>], estimates: &[Vector2<f64>]) -> Result<E
     Ok(Election { claimants, leader })
 }
 
-/// The sensor nearest to a place; the first of several. Zero without sensors.
+/// Index of the sensor nearest to a place, the lowest in a tie; 0 without sensors.
 pub fn nearest(positions: &[Vector2<f64>], place: &Vector2<f64>) -> usize {
     let distance = |i: usize| (positions[i] - place).norm_squared();
     (1..positions.len()).fold(0, |best, i| if distance(i) < distance(best) { i } else { best })
 }
 
-/// What a leader hands over: mean and covariance, 14 numbers. The covariance travels as its lower triangular factor, so that what
-/// arrives after rounding is a covariance.
+/// What a leader hands over: mean and covariance, 14 numbers. The covariance is sent as its lower triangular factor, so that it is
+/// positive semidefinite after rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeaderMessage {
     mean: Vector4<f64>,
@@ -56,7 +56,7 @@ impl LeaderMessage {
     /// The belief as it arrives in the given format.
     ///
     /// # Errors
-    /// If a number is not finite or beyond the format.
+    /// If a number is not finite or exceeds the format.
     pub fn new(belief: &Gaussian<4>, format: &NumberFormat) -> Result<Self, Error> {
         let lower = lower_factor(belief.covariance());
         let (mut mean, mut rounded) = (*belief.mean(), Matrix4::zeros());
@@ -69,20 +69,20 @@ impl LeaderMessage {
         Ok(Self { mean, lower: rounded })
     }
 
-    /// The belief that all nodes hold from now on.
+    /// The belief that all nodes hold after the handover.
     pub fn belief(&self) -> Gaussian<4> {
         Gaussian::from_trusted_parts(self.mean, self.lower * self.lower.transpose())
     }
 }
 
-/// Rows and columns of the lower triangle.
+/// Row and column of each entry of the lower triangle.
 fn triangle() -> impl Iterator<Item = (usize, usize)> {
     (0..4).flat_map(|i| (0..=i).map(move |j| (i, j)))
 }
 
-/// Cholesky factor of a covariance; columns of directions without spread are zero.
+/// Cholesky factor of a covariance. The columns of directions without variance are zero.
 ///
-/// Without pivoting, so that it is a continuous function of the covariance: draws through it do not jump with a rounding.
+/// It does not pivot, so it is a continuous function of the covariance: a rounding error does not make draws jump.
 pub(crate) fn lower_factor<const D: usize>(covariance: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let mut lower = SMatrix::<f64, D, D>::zeros();
     for j in 0..D {
@@ -118,15 +118,15 @@ impl Message for LeaderMessage {
     }
 }
 
-/// Bits of one step.
+/// Numbers of bits of one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepBits {
-    /// Levels of all sensors.
+    /// Levels of all sensors together.
     pub reports: u64,
-    /// Mean and covariance from leader to leader. Not needed where all nodes receive all levels and run the same deterministic
+    /// Mean and covariance from leader to leader. Not needed if all nodes receive all levels and run the same deterministic
     /// tracker.
     pub handover: u64,
-    /// The ranges of all sensors as plain numbers, for comparison.
+    /// Ranges of all sensors as unquantized numbers, for comparison.
     pub raw: u64,
 }
 

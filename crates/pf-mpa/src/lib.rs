@@ -1,28 +1,29 @@
 //! Tracking a target from quantized ranges.
 //!
-//! Sensors that know where they stand measure their distance to a target, in noise that grows with the distance, and send each
-//! the level of a quantizer of a few bits: the thesis's Chapter 3 has particle message passing on a factor graph for it. Here is
-//! that algorithm, as published and with its errata mended, beside what does better.
+//! Sensors at known places measure their distance to a target. The noise grows with the distance. Each sends the level of a quantizer of
+//! a few bits. Chapter 3 of the thesis that this crate follows uses particle message passing on a factor graph. The crate has that
+//! algorithm, as published and with its errata corrected, and trackers with smaller errors.
 //!
-//! The central choice: **a level is a factor, in closed form** ([`RangeFactor`]), and not a ring of particles under kernels. What a
-//! level says about a position is `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))`, at the *hypothesised* distance `d`; whoever has it needs no
-//! kernel, no weights and no Jacobian. From it every filter of the library follows, and the recommended one, [`GridFilter`]: a
-//! Gaussian in, its product with all factors on a grid of 15 x 15 nodes that follows the posterior, a Gaussian out, no random numbers. It is a third below Gaussian message
-//! passing and improved particle message passing, at a tenth of the latter's cost. What it gives up is any belief that is no bell.
+//! **The likelihood of a level is in closed form** ([`RangeFactor`]), instead of a ring of particles with kernels. As a function of the
+//! position it is `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))` at the *hypothesised* distance `d`. It needs no
+//! kernel, no weights and no Jacobian, and every filter of the library accepts it. The recommended tracker is [`GridFilter`]: it
+//! multiplies a Gaussian belief with all factors on a grid of 15 x 15 nodes about the posterior and returns the Gaussian of the
+//! same moments. It uses no random numbers. Its mean squared error is a third below those of Gaussian message passing and of improved
+//! particle message passing, at a tenth of the latter's cost. It cannot represent a belief with several modes.
 //!
 //! | task | item |
 //! |---|---|
-//! | the sensor, its noise, its quantizer, what a level says | [`RangeSensor`], [`RangeNoise`], [`QuantizedRange`], [`RangeFactor`] |
-//! | how all nodes derive the same cells | [`Encoder`]: published, predicted, adaptive |
-//! | the target: as dynamics, as nine interacting models, with its manoeuvre as part of the state | [`Target`], [`WithManoeuvre`] |
+//! | sensor, noise, quantizer, likelihood of a level | [`RangeSensor`], [`RangeNoise`], [`QuantizedRange`], [`RangeFactor`] |
+//! | how all nodes compute the same cells | [`Encoder`]: published, predicted, adaptive |
+//! | models of the target: plain, nine interacting models, with its manoeuvre in the state | [`Target`], [`WithManoeuvre`] |
 //! | the recommended tracker | [`GridFilter`] |
-//! | ranges of a recording: bias, outliers, missing anchors, unknown speed, acquisition | [`RangeTracker`] |
+//! | recorded ranges with bias, outliers, missing anchors, unknown speed and start | [`RangeTracker`] |
 //! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
 //! | particles and draws | [`ParticleFilter`](fewbits_filters::ParticleFilter) on [`WithManoeuvre`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
 //! | Algorithm 6, its messages, the factor graphs behind it | [`published`] |
 //! | bounds | [`CramerRao`], [`level_information`] |
 //! | two targets, measurements in unknown order | [`association`] |
-//! | who leads, what is handed over, in bits | [`leader`] |
+//! | which sensor leads, what it hands over, in bits | [`leader`] |
 //!
 //! ```
 //! use fewbits_core::Gaussian;
@@ -43,7 +44,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: radio, energy, delays; more than two targets; ranges in space.
+//! Not here: radio, energy and delays (`fewbits-network`); more than two targets; positions in three dimensions.
 
 pub mod association;
 mod bound;

@@ -10,28 +10,28 @@ use nalgebra::{Matrix1, Matrix4, RowVector4, Vector1, Vector2, Vector4};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// How a quantized range enters as a value.
+/// How a linearised tracker uses a quantized range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum QuantizationNoise {
-    /// The reconstruction is taken for the range. Loses the target where cells are wider than the noise.
+    /// The reconstruction is used as if it were the range. The tracker loses the target if cells are wider than the noise.
     Ignored,
-    /// The reconstruction has the additional variance `width^2 / 12`.
+    /// The reconstruction is used with the additional variance `width^2 / 12`.
     Uniform,
 }
 
-/// What a step does with the velocity.
+/// How a measurement update changes the velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Velocity {
-    /// As printed: mean and covariance pass through, no correlation with the position is kept (erratum `mpa-7`). The velocity is then
-    /// dead reckoning.
+    /// As printed: mean and covariance of the velocity are unchanged, and its correlation with the position is dropped (erratum `mpa-7`).
+    /// The velocity is then never corrected.
     Transfer,
-    /// The position's correction moves the velocity by their correlation.
+    /// The correction of the position changes the velocity by their correlation.
     Joint,
 }
 
-/// A Gaussian belief and linearised ranges.
+/// A tracker with a Gaussian belief and linearised ranges.
 ///
 /// ```text
 /// predict:  F m, F P F' + G (q + Var a) G'            (Var a only with manoeuvres)
@@ -40,22 +40,22 @@ pub enum Velocity {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Linearised {
-    /// What manoeuvres count as.
+    /// How manoeuvres enter the prediction.
     pub manoeuvres: Manoeuvres,
-    /// How a level enters.
+    /// How a quantized range is used.
     pub quantization: QuantizationNoise,
-    /// What becomes of the velocity.
+    /// How the velocity is updated.
     pub velocity: Velocity,
 }
 
 impl Linearised {
-    /// Extended Kalman filter that takes reconstructions for ranges.
+    /// Extended Kalman filter that uses reconstructions as if they were ranges.
     pub const EKF_NAIVE: Self = Self {
         manoeuvres: Manoeuvres::Ignored,
         quantization: QuantizationNoise::Ignored,
         velocity: Velocity::Joint,
     };
-    /// Extended Kalman filter with quantization noise; of plain ranges, it is the unquantized one.
+    /// Extended Kalman filter with quantization noise. With unquantized ranges it is the usual extended Kalman filter.
     pub const EKF: Self = Self {
         quantization: QuantizationNoise::Uniform,
         ..Self::EKF_NAIVE
@@ -65,7 +65,7 @@ impl Linearised {
         manoeuvres: Manoeuvres::AsNoise,
         ..Self::EKF
     };
-    /// Gaussian message passing as printed, velocities transferred.
+    /// Gaussian message passing as printed: the velocity is not corrected.
     pub const MESSAGE_PASSING_TRANSFER: Self = Self {
         velocity: Velocity::Transfer,
         ..Self::MESSAGE_PASSING
@@ -74,7 +74,7 @@ impl Linearised {
     /// Measurement update of a predicted belief, with `ln p(reconstructions | past)`.
     ///
     /// # Errors
-    /// If a range is no number.
+    /// If a range is not finite.
     pub fn update(&self, predicted: &Gaussian<4>, observed: &[Ranged]) -> Result<(Gaussian<4>, StepInfo), Error> {
         let (mut next, mut log_likelihood) = (*predicted, 0.0);
         let about = *predicted.mean();
@@ -97,11 +97,11 @@ impl Linearised {
     }
 }
 
-/// A range as a linear function of the position about some place, where it says anything.
+/// A range linearised in the position about some place.
 pub(crate) struct LinearRange {
-    /// Slope of the distance.
+    /// Gradient of the distance with respect to the position.
     pub(crate) direction: Vector2<f64>,
-    /// The reconstruction less the distance of the place.
+    /// The reconstruction minus the distance at the place.
     pub(crate) innovation: f64,
     pub(crate) noise_variance: f64,
     pub(crate) quantization_variance: f64,
@@ -121,7 +121,7 @@ impl LinearRange {
     }
 }
 
-/// The position's update beside the predicted velocity.
+/// The updated position with the predicted velocity, uncorrelated.
 fn transferred(predicted: &Gaussian<4>, updated: &Gaussian<4>) -> Gaussian<4> {
     let (mean, own) = (updated.mean(), predicted.mean());
     let mut joined = Matrix4::zeros();

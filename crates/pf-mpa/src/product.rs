@@ -1,8 +1,8 @@
-//! Products of mixtures, exact by enumeration.
+//! Products of Gaussian mixtures, exact by enumeration.
 //!
 //! The product of `F` mixtures is a mixture of one Gaussian for each choice of labels `b_1 .. b_F`, with
-//! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form: exact where the labels can
-//! be enumerated. Where they cannot, [`ProductSampler`](crate::published::ProductSampler) draws from it.
+//! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form. This is exact if the labels can
+//! be enumerated; otherwise [`ProductSampler`](crate::published::ProductSampler) draws from the product.
 
 use crate::Error;
 use fewbits_densities::{Component, Mixture};
@@ -11,7 +11,7 @@ use fewbits_numerics::factored::Factored;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 
-/// The most label choices that [`exact`] enumerates.
+/// Largest number of label choices that [`exact`] enumerates.
 pub const MOST_TERMS: usize = 1_000_000;
 
 /// A normalised product and the logarithm of its normaliser.
@@ -62,11 +62,11 @@ fn check<const D: usize>(factors: &[&Mixture<D>]) -> Result<SVector<f64, D>, Err
     Ok(factors.iter().map(|f| f.mean()).sum::<SVector<f64, D>>() / factors.len() as f64)
 }
 
-/// The product of mixtures with every choice of labels written out.
+/// The product of mixtures, with one component for every choice of labels.
 ///
 /// # Errors
 /// If there is no factor, there are more than [`MOST_TERMS`] choices, or every weight underflows
-/// ([`Error::Impossible`]: factors that contradict each other astronomically).
+/// ([`Error::Impossible`]: the factors have almost no overlap).
 pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<D>, Error> {
     let origin = check(factors)?;
     let terms = factors
@@ -104,7 +104,7 @@ pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<D>, Erro
     let mut gaussians = Vec::with_capacity(products.len());
     for p in &products {
         let (mean, covariance, factor) = gaussian(&p.precision, &p.shift)?;
-        // prod_l N(0; m_l, S_l) = N(0; mean, covariance) times the wanted weight.
+        // prod_l N(0; m_l, S_l) equals N(0; mean, covariance) times the weight: divide by the Gaussian.
         let own = 0.5 * mean.dot(&p.shift) - factor.half_log_det + D as f64 * LN_SQRT_2PI;
         gaussians.push((p.log_weight + own, mean, covariance));
     }

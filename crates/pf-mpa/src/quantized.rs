@@ -1,4 +1,4 @@
-//! The sensor's half of a quantized range, and what its levels say.
+//! The sensor's half of a quantized range, and the likelihood of its levels.
 
 use crate::Error;
 use crate::factor::RangeFactor;
@@ -13,14 +13,14 @@ use fewbits_quantizers::{Labelling, Symbol};
 use nalgebra::{Matrix1, Vector1, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Where the cells of a quantized range lie: `L` equal cells on `centre +- half_width`, the first and the last continued to
+/// Where the cells of a quantized range lie: `L` equal cells on `centre +- half_width`. The first and the last extend to
 /// infinity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RangeReference {
     /// The reference range, in the middle of the cells.
     pub centre: f64,
-    /// `N_f`, the range of an innovation of one; above zero.
+    /// Half-width `N_f` of the cells together; positive.
     pub half_width: f64,
 }
 
@@ -34,7 +34,7 @@ impl RangeReference {
         }
     }
 
-    /// Edge `q` of `levels` cells, of `levels + 1`.
+    /// Edge `q` of `levels` cells, `0 <= q <= levels`.
     #[inline]
     fn edge(&self, q: usize, levels: usize) -> f64 {
         fewbits_node::edge(q as u32, levels as u32, self.centre, self.half_width)
@@ -45,10 +45,10 @@ impl RangeReference {
         positive("half_width", self.half_width).map(|_| ())
     }
 
-    /// The cell of a level with both ends finite: what the decoded interval is.
+    /// The cell of a level with both ends finite: the decoded interval.
     ///
     /// # Errors
-    /// If the level is not below `levels`, the reference is none, or rounding closes the cell.
+    /// If the level is not below `levels`, the reference is not valid, or the ends of the cell coincide after rounding.
     pub fn nominal_cell(&self, level: usize, levels: usize) -> Result<Cell, ArgumentError> {
         self.check()?;
         if level >= levels {
@@ -71,12 +71,12 @@ impl Message for RangeReference {
     }
 }
 
-/// A sensor that reports in which of `L` equal cells around a reference its range lies: a [`Scheme`](fewbits_core::Scheme), so that every filter of
-/// the library tracks with it.
+/// A sensor that reports in which of `L` equal cells around a reference its range lies. It is a [`Scheme`](fewbits_core::Scheme), so every
+/// filter of the library accepts its reports.
 ///
-/// The innovation `I = (z - centre) / half_width` takes the cell `clamp(floor((I + 1) L / 2), 0, L - 1)`; a range on an edge
+/// The innovation `I = (z - centre) / half_width` is in the cell `clamp(floor((I + 1) L / 2), 0, L - 1)`; a range on an edge
 /// belongs to the cell above. The reference is the scheme's feedback. Nodes that receive all reports and run the same
-/// deterministic filter compute it themselves and pay nothing for it ([`Encoder`](crate::Encoder)); otherwise it is broadcast.
+/// deterministic filter compute it themselves without communication ([`Encoder`](crate::Encoder)); otherwise it is broadcast.
 ///
 /// ```
 /// use fewbits_core::factor::Factor;
@@ -95,12 +95,12 @@ impl Message for RangeReference {
 pub struct QuantizedRange {
     labelling: Labelling,
     noise: RangeNoise,
-    /// How a broadcast reference travels.
+    /// Number format of a broadcast reference.
     format: NumberFormat,
     interval: IntervalRule,
 }
 
-/// Which finite interval message passing draws from when it receives a level.
+/// The finite interval from which message passing draws for a received level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalRule {
@@ -115,7 +115,7 @@ impl QuantizedRange {
     /// A sensor with `levels` cells and the given noise; a reference that is broadcast costs 64 bits.
     ///
     /// # Errors
-    /// Unless there are 2 to 65536 levels.
+    /// If `levels` is outside `2..=65536`.
     pub fn new(levels: usize, noise: RangeNoise) -> Result<Self, Error> {
         Ok(Self {
             labelling: Labelling::natural(levels)?,
@@ -125,30 +125,30 @@ impl QuantizedRange {
         })
     }
 
-    /// The same with another interval for message passing; factors keep the true cell.
+    /// The same sensor with another interval for message passing. Factors use the true cell.
     #[must_use]
     pub fn with_interval(self, interval: IntervalRule) -> Self {
         Self { interval, ..self }
     }
 
-    /// The same with other words on the wire, such as those of a Gray code.
+    /// The same sensor with other code words, such as a Gray code.
     #[must_use]
     pub fn with_labelling(self, labelling: Labelling) -> Self {
         Self { labelling, ..self }
     }
 
-    /// The same with another format of a broadcast reference.
+    /// The same sensor with another number format of a broadcast reference.
     #[must_use]
     pub fn with_format(self, format: NumberFormat) -> Self {
         Self { format, ..self }
     }
 
-    /// `L`.
+    /// Number of levels `L`.
     pub fn levels(&self) -> usize {
         self.labelling.levels()
     }
 
-    /// Bits of a report.
+    /// Length of a report in bits.
     pub fn bits(&self) -> u32 {
         self.labelling.bits()
     }
@@ -161,13 +161,13 @@ impl QuantizedRange {
     /// The level of a range.
     ///
     /// # Errors
-    /// If the range is not finite, or the reference is none.
+    /// If the range is not finite, or the reference is not valid.
     pub fn level(&self, range: f64, reference: &RangeReference) -> Result<Symbol, ArgumentError> {
         let level = fewbits_node::range_level(range, reference.centre, reference.half_width, self.levels() as u32)?;
         Ok(Symbol(level as usize))
     }
 
-    /// What a level that arrived unharmed with probability `share` says.
+    /// The likelihood of a level that arrived without inverted bits. `share` is the probability of arrival.
     fn cell_factor(&self, level: usize, reference: &RangeReference, share: f64) -> Result<RangeFactor, ArgumentError> {
         let (levels, nominal) = (self.levels(), reference.nominal_cell(level, self.levels())?);
         let lower = if level == 0 { f64::NEG_INFINITY } else { nominal.lower() };
@@ -183,10 +183,10 @@ impl QuantizedRange {
         RangeFactor::in_cell(Cell::new(lower, upper)?, drawn_from, share, self.noise)
     }
 
-    /// What a received level says, over a perfect link.
+    /// The likelihood of a received level over a perfect link.
     ///
     /// # Errors
-    /// If there is no such level, or the reference is none.
+    /// If there is no such level, or the reference is not valid.
     pub fn received(&self, level: Symbol, reference: &RangeReference) -> Result<RangeFactor, ArgumentError> {
         self.cell_factor(level.0, reference, 1.0)
     }
@@ -236,6 +236,7 @@ impl Memoryless<1> for QuantizedRange {
             let expected = format!("a symbol below {}", self.labelling.symbols());
             return Err(ArgumentError::new("symbol", symbol.0, expected).into());
         };
+        // Inverted bits: the mixture over all levels, each with the probability that its word became the received one.
         let given = |level: usize| {
             let sent = word(level).unwrap_or(received);
             arrives * link.word_probability(sent, received, self.bits())

@@ -1,4 +1,4 @@
-//! Particles that know their velocity exactly.
+//! Particles whose velocity is a Gaussian given the positions (Rao-Blackwellised).
 
 use crate::Error;
 use crate::linearised::LinearRange;
@@ -17,7 +17,7 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-/// Particles that hold a position, and the velocity as a Gaussian with a common variance. Drawn from linearised cells.
+/// A filter of particles that hold a position and a Gaussian velocity of common variance. Positions are drawn from linearised cells.
 ///
 /// ```text
 /// particle (p, v, a), common velocity variance s;  s_0 from the prior, decoupled from the position
@@ -38,7 +38,7 @@ impl RaoBlackwellGuided {
     /// A filter with this many particles.
     ///
     /// # Errors
-    /// If there is none.
+    /// If `particles` is zero.
     pub fn new(particles: usize) -> Result<Self, Error> {
         if u32::try_from(particles).is_err() {
             return refuse("particles", particles, "fewer than 2^32 particles");
@@ -68,7 +68,7 @@ impl VelocityCloud {
     }
 }
 
-/// Buffers kept from step to step.
+/// Buffers that are reused from step to step.
 #[derive(Debug, Default)]
 pub struct VelocityWorkspace {
     filter: Workspace<6>,
@@ -84,7 +84,7 @@ impl Tracker for RaoBlackwellGuided {
         let covariance = prior.covariance();
         let positions: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into_owned();
         let across: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 2).into_owned();
-        // Positions are drawn, velocities start at their mean given the position: what the position explains of them is drawn with it.
+        // Positions are drawn. The part of the velocity that the position explains is drawn with them; the rest stays Gaussian.
         let explained = symmetrised(&(across.transpose() * solve_semidefinite(&positions, &across)?));
         let mut known = *covariance;
         known.fixed_view_mut::<2, 2>(2, 2).copy_from(&explained);
@@ -115,6 +115,7 @@ impl Tracker for RaoBlackwellGuided {
         workspace: &mut VelocityWorkspace,
     ) -> Result<StepInfo, Error> {
         let (ts, q, s) = (target.interval(), target.noise_variance(), belief.velocity_variance);
+        // Velocity is Gaussian given position and manoeuvre. Its variance and the gain are the same for all particles.
         let spread = ts * ts * s + 0.25 * ts.powi(4) * q;
         let cross = ts * s + 0.5 * ts.powi(3) * q;
         let gain = if spread > 0.0 { cross / spread } else { 0.0 };
@@ -130,6 +131,7 @@ impl Tracker for RaoBlackwellGuided {
             let velocity = Vector2::new(state[2], state[3]);
             let mean = Vector2::new(state[0], state[1]) + velocity * ts + acceleration * (0.5 * ts * ts);
             let (place, increment) = propose(rng, &mean, spread, observed);
+            // Regression of the velocity on the drawn position.
             let velocity = velocity + acceleration * ts + (place - mean) * gain;
             let moved = Vector6::new(place[0], place[1], velocity[0], velocity[1], acceleration[0], acceleration[1]);
             set_state(&mut columns, i, &moved);
@@ -153,7 +155,7 @@ impl Tracker for RaoBlackwellGuided {
     }
 }
 
-/// A position from `N(mean, spread I)` times the linearised cells, and its log importance weight.
+/// Draws a position from `N(mean, spread I)` times the linearised cells. Returns it with its log importance weight.
 fn propose<R: Rng + ?Sized>(rng: &mut R, mean: &Vector2<f64>, spread: f64, observed: &[Ranged]) -> (Vector2<f64>, f64) {
     let spread = spread.max(f64::MIN_POSITIVE);
     let mut precision = Matrix2::identity() / spread;
@@ -172,7 +174,7 @@ fn propose<R: Rng + ?Sized>(rng: &mut R, mean: &Vector2<f64>, spread: f64, obser
         return (*mean, f64::NEG_INFINITY);
     };
     let place = mean + factor.solve(&shift) + noise;
-    // ln N(place; mean, spread I) - ln proposal(place), the constants of pi gone.
+    // ln N(place; mean, spread I) - ln proposal(place); the constants with pi cancel.
     let log_prior = -0.5 * (place - mean).norm_squared() / spread - spread.ln();
     let log_proposal = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>() - 0.5 * normals.norm_squared();
     let log_likelihood = observed.log_likelihood(&place);

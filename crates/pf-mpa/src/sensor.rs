@@ -1,4 +1,4 @@
-//! A node that measures its distance to the target, and how its noise grows.
+//! A node that measures its distance to the target, and the noise of that range.
 
 use crate::Error;
 use fewbits_core::columns::measurements_agree;
@@ -12,7 +12,7 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-/// Noise of a range: variance `s0^2 + (d / c)^2` at distance `d`. The papers' has `s0 = 0`: a constant ratio of signal to noise.
+/// Noise of a range: variance `s0^2 + (d / c)^2` at distance `d`. The papers use `s0 = 0`: a constant signal-to-noise ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct RangeNoise {
@@ -26,7 +26,7 @@ stored! { RangeNoise as Stored |noise| {
 } => RangeNoise::new(constant, relative), Error }
 
 impl RangeNoise {
-    /// Standard deviation `constant` (length) at the sensor, growing by `relative` = `1 / c` of the distance.
+    /// Standard deviation `constant` (length) at distance 0. The other part grows as `relative` = `1 / c` times the distance.
     ///
     /// # Errors
     /// If one is negative or not finite, or both are zero.
@@ -42,7 +42,7 @@ impl RangeNoise {
     /// A constant ratio `d^2 / sigma^2` of the powers of range and noise, in decibels: `sigma = d / 10^(SNR / 20)`.
     ///
     /// # Errors
-    /// If the ratio is not finite or beyond the range of numbers.
+    /// If the ratio is not finite, or the resulting deviation is not.
     pub fn from_snr_db(snr_db: f64) -> Result<Self, Error> {
         Self::new(0.0, 10.0_f64.powf(-finite("snr_db", snr_db)? / 20.0))
     }
@@ -50,12 +50,12 @@ impl RangeNoise {
     /// The same standard deviation at every distance.
     ///
     /// # Errors
-    /// If it is not above zero.
+    /// If `deviation` is not positive.
     pub fn constant(deviation: f64) -> Result<Self, Error> {
         Self::new(deviation, 0.0)
     }
 
-    /// Standard deviation at distance `d`; positive, also at zero and below.
+    /// Standard deviation at distance `d`. It is positive also for `d <= 0`.
     #[inline(always)]
     pub fn deviation(&self, distance: f64) -> f64 {
         let relative = (self.relative * distance).abs();
@@ -78,19 +78,19 @@ impl RangeNoise {
         self.relative * (self.relative * distance / self.deviation(distance))
     }
 
-    /// Standard deviation at the sensor.
+    /// Standard deviation at distance 0, the constant part.
     pub fn at_sensor(&self) -> f64 {
         self.constant
     }
 
-    /// `1 / c`.
+    /// Growth `1 / c` of the standard deviation with the distance.
     pub fn relative(&self) -> f64 {
         self.relative
     }
 }
 
-/// A range sensor at a fixed place: `z = |p - n| + v`, `v` of the given [`RangeNoise`]. It senses a position, two coordinates; in a larger
-/// state it is told which ones those are ([`RangeSensor::on_axes`]).
+/// A range sensor at a fixed place: `z = |p - n| + v`, `v` of the given [`RangeNoise`]. Its state is a position of two coordinates. For
+/// a larger state, [`RangeSensor::on_axes`] says which coordinates are the position.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Place")]
 pub struct RangeSensor {
@@ -124,27 +124,27 @@ impl RangeSensor {
     /// ```
     ///
     /// # Errors
-    /// If an axis is not below `D`, or both are the same.
+    /// If an axis is not below `D`, or both are equal.
     pub fn on_axes<const D: usize>(self, axes: [usize; 2]) -> Result<OnAxes<Self, D, 2>, Error> {
         Ok(OnAxes::new(self, axes)?)
     }
 
-    /// Where it stands.
+    /// Position of the sensor.
     pub fn position(&self) -> &Vector2<f64> {
         &self.position
     }
 
-    /// Its noise.
+    /// Noise of the ranges.
     pub fn noise(&self) -> &RangeNoise {
         &self.noise
     }
 
-    /// Distance of a point.
+    /// Distance from the sensor to the point `(x, y)`.
     #[inline]
     pub fn distance(&self, x: f64, y: f64) -> f64 {
         let (dx, dy) = (x - self.position[0], y - self.position[1]);
         let squared = dx * dx + dy * dy;
-        // Squares that leave the range of numbers.
+        // The squares overflow or underflow.
         if !(1e-280..=1e280).contains(&squared) {
             libm::hypot(dx, dy)
         } else {
@@ -152,11 +152,12 @@ impl RangeSensor {
         }
     }
 
-    /// Distances of many points: a sweep without branches, and another one where squares leave the range of numbers.
+    /// Distances of many points. The loop has no branches; if a square overflows or underflows, all are computed again by `hypot`.
     fn distances(&self, x: &[f64], y: &[f64], distances: &mut [f64]) {
         let (sx, sy) = (self.position[0], self.position[1]);
         let count = distances.len();
         let (x, y) = (&x[..count], &y[..count]);
+        // The square overflows or underflows only at extreme coordinates; then `hypot` is used for all.
         let sound = vectorised(
             #[inline(always)]
             || {
@@ -178,11 +179,11 @@ impl RangeSensor {
         }
     }
 
-    /// Unit vector from the sensor to a point: the slope of the distance; zero at the sensor itself, where it has none.
+    /// Unit vector from the sensor to a point, the gradient of the distance; zero at the sensor itself, where there is none.
     pub fn direction(&self, x: f64, y: f64) -> Vector2<f64> {
         let distance = self.distance(x, y);
         if distance > f64::MAX {
-            // Differences or their length are beyond the range of numbers; a quarter of them is not.
+            // A difference or its length overflows; a quarter of it does not.
             let (dx, dy) = (0.25 * x - 0.25 * self.position[0], 0.25 * y - 0.25 * self.position[1]);
             return Vector2::new(dx, dy) / libm::hypot(dx, dy);
         }
@@ -193,7 +194,7 @@ impl RangeSensor {
         }
     }
 
-    /// A measurement of the given distance.
+    /// Draws a measurement of the given distance.
     pub fn measure<R: Rng + ?Sized>(&self, rng: &mut R, distance: f64) -> f64 {
         let normal: f64 = rng.sample(StandardNormal);
         distance + self.noise.deviation(distance) * normal
@@ -227,8 +228,8 @@ impl Sensing<2, 1> for RangeSensor {
     }
 }
 
-/// A range sensor whose measurements are all too long by a bias: `z = |p - n| + b + v`, of the coordinates `[x, y, b]`. Its noise is
-/// taken at `|p - n| + b`, which is exact where it is constant.
+/// A range sensor whose measurements have a bias `b`: `z = |p - n| + b + v`. Its state is `[x, y, b]`. The noise is evaluated at
+/// `|p - n| + b`, which is exact if it is constant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BiasedRangeSensor(pub RangeSensor);
 

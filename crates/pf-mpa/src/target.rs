@@ -1,4 +1,4 @@
-//! A target that manoeuvres: constant velocity, pushed by white noise and by an acceleration that jumps between three values.
+//! A target that manoeuvres: constant velocity with white acceleration noise and an acceleration that jumps between three values.
 
 use crate::Error;
 use crate::chain::AccelerationChain;
@@ -13,8 +13,8 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-/// The target: state `[x, y, vx, vy]`, `X_k = F X_{k-1} + G a_k + G u_k`, `F = [[1, ts], [0, 1]]` and `G = [ts^2/2, ts]'` on each
-/// axis, `u ~ N(0, q)`, `a` of an [`AccelerationChain`].
+/// The target: state `[x, y, vx, vy]`, `X_k = F X_{k-1} + G a_k + G u_k`. On each axis `F = [[1, ts], [0, 1]]` and
+/// `G = [ts^2/2, ts]'`; `u ~ N(0, q)`, and `a` follows an [`AccelerationChain`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredTarget", into = "StoredTarget")]
 pub struct Target {
@@ -30,7 +30,7 @@ stored! { Target as StoredTarget |target| {
 } => Target::new(interval, noise_variance, chain), Error }
 
 impl Target {
-    /// A target observed every `interval`, pushed by white accelerations of variance `noise_variance` per axis.
+    /// A target observed every `interval`, with white accelerations of variance `noise_variance` per axis.
     ///
     /// # Errors
     /// If the interval is not above zero or the variance is negative.
@@ -42,30 +42,30 @@ impl Target {
         })
     }
 
-    /// The thesis's: one step a second, `q = 0.02`, `g = 0.1`.
+    /// The thesis's target: one step per second, `q = 0.02`, `g = 0.1`.
     ///
     /// # Errors
-    /// None.
+    /// Never: the parameters are fixed.
     pub fn printed() -> Result<Self, Error> {
         Self::new(1.0, 0.02, AccelerationChain::printed(0.1)?)
     }
 
-    /// `ts`.
+    /// Time `ts` between steps.
     pub fn interval(&self) -> f64 {
         self.interval
     }
 
-    /// `q`.
+    /// Variance `q` of the white acceleration, per axis.
     pub fn noise_variance(&self) -> f64 {
         self.noise_variance
     }
 
-    /// The manoeuvres.
+    /// The Markov chain of the manoeuvre accelerations.
     pub fn chain(&self) -> &AccelerationChain {
         &self.chain
     }
 
-    /// `F`.
+    /// Transition matrix `F` of all four coordinates.
     pub fn transition(&self) -> Matrix4<f64> {
         let mut f = Matrix4::identity();
         f[(0, 2)] = self.interval;
@@ -73,13 +73,13 @@ impl Target {
         f
     }
 
-    /// `G`.
+    /// Gain `G` from the two accelerations to the state.
     pub fn gain(&self) -> Matrix4x2<f64> {
         let (half, ts) = (0.5 * self.interval * self.interval, self.interval);
         Matrix4x2::new(half, 0.0, 0.0, half, ts, 0.0, 0.0, ts)
     }
 
-    /// The white part with additional variance of the acceleration, as linear dynamics.
+    /// Linear dynamics without manoeuvres. The variance of the white acceleration is `q` plus `additional_variance`.
     ///
     /// # Errors
     /// If the variance is negative or not finite.
@@ -89,7 +89,7 @@ impl Target {
         LinearGaussian::new(self.transition(), self.gain(), SVector::repeat(variance))
     }
 
-    /// Time update of step `k`, counted from zero; manoeuvres count as noise of their mean and variance, or are left out.
+    /// The belief after step `k`, counted from zero, before any observation. `manoeuvres` says how manoeuvres enter.
     pub fn predict(&self, belief: &Gaussian<4>, k: usize, manoeuvres: Manoeuvres) -> Gaussian<4> {
         let (mean, variance) = self.acceleration(k, manoeuvres);
         let (f, g) = (self.transition(), self.gain());
@@ -100,17 +100,17 @@ impl Target {
         )
     }
 
-    /// Step `k` as dynamics, for any filter of Gaussians; manoeuvres count as noise of their mean and variance, or are left out.
+    /// Step `k` as affine dynamics for any Gaussian filter. `manoeuvres` says how manoeuvres enter.
     ///
     /// # Errors
-    /// If the covariance of the noise leaves the range of numbers.
+    /// If the covariance of the noise overflows.
     pub fn motion(&self, k: usize, manoeuvres: Manoeuvres) -> Result<AffineGaussian<4>, Error> {
         let (mean, variance) = self.acceleration(k, manoeuvres);
         self.pushed(&Vector2::repeat(mean), variance)
     }
 
-    /// Step `k` under each pair of accelerations, as interacting multiple models: nine, the acceleration along y fastest. The first step's
-    /// are drawn anew, whatever the probabilities before it.
+    /// Step `k` as nine interacting multiple models, one for each pair of accelerations; that along y varies fastest. In the first
+    /// step the models are drawn anew, whatever their probabilities were.
     ///
     /// # Errors
     /// As [`motion`](Self::motion).
@@ -156,7 +156,7 @@ impl Target {
         )
     }
 
-    /// A true track of `steps` states after `start`, with manoeuvres that remember; empty for no steps.
+    /// A random track of `steps` states after `start`. The manoeuvres follow the Markov chain.
     pub fn simulate<R: Rng + ?Sized>(&self, rng: &mut R, start: &Vector4<f64>, steps: usize) -> Vec<Vector4<f64>> {
         let mut state = *start;
         let mut acceleration = Vector2::zeros();
@@ -174,19 +174,19 @@ impl Target {
     }
 }
 
-/// What a filter that keeps no memory of manoeuvres takes them for.
+/// How a filter whose belief does not contain the manoeuvre treats manoeuvres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Manoeuvres {
-    /// Nothing: the extended Kalman filter of the thesis.
+    /// They are ignored: the extended Kalman filter of the thesis.
     Ignored,
-    /// White noise of their variance.
+    /// They are white noise with the mean and variance of the chain.
     AsNoise,
 }
 
-/// The target with the accelerations that acted last as part of the state, `[x, y, vx, vy, ax, ay]`: dynamics of one step for any
-/// particle filter, whose particles then remember their manoeuvre. Copies of a resampled particle draw their next acceleration
-/// each for itself.
+/// The target with the last accelerations as part of the state, `[x, y, vx, vy, ax, ay]`. These dynamics of one step serve any
+/// particle filter; its particles then remember their manoeuvre. Copies of a resampled particle draw their next accelerations
+/// independently.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WithManoeuvre {
     target: Target,
@@ -194,20 +194,20 @@ pub struct WithManoeuvre {
 }
 
 impl WithManoeuvre {
-    /// The dynamics of step `k`, counted from zero; all but the first are the same.
+    /// The dynamics of step `k`, counted from zero. All steps but the first are the same.
     pub fn at(target: Target, k: usize) -> Self {
         Self { target, step: k }
     }
 
-    /// A state before the first step, whose accelerations have no meaning.
+    /// A state before the first step. Its accelerations are not used.
     pub fn start(state: &Vector4<f64>) -> Vector6<f64> {
         Vector6::new(state[0], state[1], state[2], state[3], 0.0, 0.0)
     }
 
-    /// A cloud of `count` states before the first step.
+    /// A cloud of `count` particles drawn from `prior`, before the first step.
     ///
     /// # Errors
-    /// If there is none, or the prior cannot be drawn from.
+    /// If `count` is zero, or the prior's covariance is not positive semidefinite.
     pub fn cloud<R: Rng + ?Sized>(rng: &mut R, prior: &Gaussian<4>, count: usize) -> Result<Particles<6>, Error> {
         let states: Particles<4> = Particles::from_belief(rng, prior, count)?;
         let mut next = 0;
@@ -224,7 +224,7 @@ impl WithManoeuvre {
         Gaussian::from_trusted_parts(Vector4::from_fn(|i, _| mean[i]), Matrix4::from_fn(|i, j| covariance[(i, j)]))
     }
 
-    /// The acceleration that acts in this step after `last`.
+    /// Draws the acceleration of this step after `last`.
     pub(crate) fn next<R: Rng + ?Sized>(&self, rng: &mut R, last: f64) -> f64 {
         match self.step {
             0 => self.target.chain.sample(rng, 0),
@@ -232,7 +232,7 @@ impl WithManoeuvre {
         }
     }
 
-    /// Its mean.
+    /// Mean acceleration of this step after `last`.
     fn expected(&self, last: f64) -> f64 {
         let chain = &self.target.chain;
         let from = chain.values().iter().position(|v| *v == last).unwrap_or(0);

@@ -1,4 +1,4 @@
-//! What every tracker here does, and the sensors it tracks with.
+//! The traits of the trackers of this crate, and the network of sensors that they use.
 
 use crate::Error;
 use crate::encoder::Encoder;
@@ -16,23 +16,23 @@ use serde::{Deserialize, Serialize};
 /// Coordinates of the position in the states of [`Target`] and of [`WithManoeuvre`](crate::WithManoeuvre).
 pub const POSITION: [usize; 2] = [0, 1];
 
-/// What one range sensor's report says about the position.
+/// One range sensor's report, as a likelihood of the position.
 pub type Ranged = Observed<RangeSensor, RangeFactor, 1>;
 
-/// What a step reveals besides the new belief.
+/// Likelihood and diagnostics of one step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct StepInfo {
-    /// `ln p(observed now | past)`, as the tracker sees it; none where it has none (message passing).
+    /// `ln p(observed now | past)` under the tracker's model; `None` if the tracker does not compute it (message passing).
     pub log_likelihood: Option<f64>,
-    /// Effective sample size, of particles and draws.
+    /// Effective sample size of the particles or draws, if there are any.
     pub effective_sample_size: Option<f64>,
-    /// How often the step fell back to Gaussian message passing, or widened a kernel without spread.
+    /// How often the step fell back to Gaussian message passing, or widened a singular kernel.
     pub fallbacks: u32,
 }
 
 impl StepInfo {
-    /// Of a step without draws.
+    /// The information of a step without draws.
     pub(crate) fn of(log_likelihood: f64) -> Self {
         Self {
             log_likelihood: Some(log_likelihood),
@@ -41,11 +41,11 @@ impl StepInfo {
     }
 }
 
-/// A tracker of the manoeuvring [`Target`]. Beliefs are values; a failed step leaves them as they were.
+/// A tracker of the manoeuvring [`Target`]. After a failed step the belief is unchanged.
 pub trait Tracker {
-    /// What the tracker knows.
+    /// The tracker's state between steps.
     type Belief: Clone;
-    /// Buffers kept from step to step, so that a step does not allocate.
+    /// Buffers that are reused from step to step, so that a step does not allocate.
     type Workspace: Default;
 
     /// The belief before the first step.
@@ -57,10 +57,10 @@ pub trait Tracker {
     /// Mean and covariance of a belief: what a leader would broadcast.
     fn estimate(&self, belief: &Self::Belief) -> Gaussian<4>;
 
-    /// Step `k`, counted from zero: time update and what was observed.
+    /// Step `k`, counted from zero: predicts, then updates with the observations.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if what was observed is impossible under the belief; the belief is then as it was.
+    /// [`Error::Impossible`] if the observations have probability zero under the belief. The belief is then unchanged.
     fn step_in_place<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -71,7 +71,7 @@ pub trait Tracker {
         workspace: &mut Self::Workspace,
     ) -> Result<StepInfo, Error>;
 
-    /// The same from a belief to the next.
+    /// As [`step_in_place`](Self::step_in_place), but returns the new belief.
     ///
     /// # Errors
     /// As [`step_in_place`](Self::step_in_place).
@@ -89,13 +89,13 @@ pub trait Tracker {
     }
 }
 
-/// What one step of a [`GaussianTracker`] is given.
+/// The input of one step of a [`GaussianTracker`].
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub struct Step<'a> {
     /// The target, which moves before it is observed.
     pub target: &'a Target,
-    /// Which step of the target this is.
+    /// Number of the step, counted from zero.
     pub k: usize,
     /// The belief before the step.
     pub belief: &'a Gaussian<4>,
@@ -110,20 +110,20 @@ impl Step<'_> {
     }
 }
 
-/// A tracker whose belief is a Gaussian, and what makes it a [`Tracker`].
+/// A tracker whose belief is a Gaussian. Each one is a [`Tracker`].
 pub trait GaussianTracker {
-    /// Buffers kept from step to step.
+    /// Buffers that are reused from step to step.
     type Workspace: Default;
 
     /// Checks the settings, before the first step.
     ///
     /// # Errors
-    /// If one is out of range.
+    /// If a setting is out of range.
     fn check(&self) -> Result<(), Error> {
         Ok(())
     }
 
-    /// The belief after a step. A mean or covariance that is no number is [`Error::Impossible`].
+    /// The belief after a step. If a mean or covariance is not finite, the result is [`Error::Impossible`].
     ///
     /// # Errors
     /// As [`Tracker::step_in_place`].
@@ -178,11 +178,11 @@ impl<T: GaussianTracker> Tracker for T {
 pub enum Reports {
     /// Levels of the quantizer.
     Levels,
-    /// The ranges themselves: what quantization is measured against.
+    /// The unquantized ranges, for comparison.
     Ranges,
 }
 
-/// Range sensors that all nodes know, their quantizer and how references are derived.
+/// Range sensors that all nodes know, their quantizer, and how references are computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
     sensors: Vec<RangeSensor>,
@@ -191,10 +191,10 @@ pub struct Network {
 }
 
 impl Network {
-    /// Sensors at `positions`, numbered in this order. Fewer than three leave the position ambiguous.
+    /// Sensors at `positions`, numbered in this order. With fewer than three the position is ambiguous.
     ///
     /// # Errors
-    /// If there is none, a position is not finite, or two sensors stand at the same place.
+    /// If there is no sensor, a position is not finite, or two sensors are at the same place.
     pub fn new(positions: &[Vector2<f64>], scheme: QuantizedRange, encoder: Encoder) -> Result<Self, Error> {
         at_least_one("sensors", positions.len())?;
         if let Some(i) = (1..positions.len()).find(|i| positions[..*i].contains(&positions[*i])) {
@@ -213,17 +213,17 @@ impl Network {
         &self.sensors
     }
 
-    /// What they report.
+    /// The quantizer of all sensors.
     pub fn scheme(&self) -> &QuantizedRange {
         &self.scheme
     }
 
-    /// Bits of all reports of one step.
+    /// Bits of the reports of all sensors in one step.
     pub fn report_bits(&self) -> usize {
         self.sensors.len() * self.scheme.bits() as usize
     }
 
-    /// A measurement of every sensor.
+    /// Draws a range from every sensor to a target at `(x, y)`.
     pub fn measure<R: Rng + ?Sized>(&self, rng: &mut R, x: f64, y: f64) -> Vec<f64> {
         self.sensors.iter().map(|s| s.measure(rng, s.distance(x, y))).collect()
     }
@@ -231,7 +231,7 @@ impl Network {
     /// The reference of every sensor for step `k`, from the estimate of the step before.
     ///
     /// # Errors
-    /// If the estimate gives no number.
+    /// If a reference is not finite.
     pub fn references(&self, target: &Target, k: usize, previous: &Gaussian<4>) -> Result<Vec<RangeReference>, Error> {
         let predicted = target.predict(previous, k, Manoeuvres::AsNoise);
         let noise = self.scheme.noise();
@@ -242,10 +242,10 @@ impl Network {
         self.sensors.iter().map(of).collect()
     }
 
-    /// What the receivers know after step `k`: every range encoded against `previous`, the estimate of the step before.
+    /// The observations of step `k`. Every range is encoded with the references that follow from `previous`, the estimate of step `k - 1`.
     ///
     /// # Errors
-    /// If there is not one range per sensor, one is not finite, or the estimate gives no number.
+    /// If there is not one range per sensor, a range is not finite, or a reference is not.
     pub fn observe(
         &self,
         target: &Target,

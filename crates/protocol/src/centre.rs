@@ -9,12 +9,12 @@ use crate::slot::{Schedule, Slot};
 use fewbits_core::{BitString, Observation};
 use serde::{Deserialize, Serialize};
 
-/// A sensor as its centre knows it.
+/// Settings of one sensor at its centre.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Member {
-    /// How it learns what it must know.
+    /// How the sensor learns what it must know before it measures.
     pub feedback: Feedback,
-    /// Bits of its reports.
+    /// Length of its reports in bits.
     pub report: ReportLength,
 }
 
@@ -22,22 +22,23 @@ pub struct Member {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct CentreSettings {
-    /// The sensors, by number.
+    /// One entry per sensor, in the order of their numbers from 0.
     pub members: Vec<Member>,
     /// When slots begin. Slots are counted from 1 on.
     pub schedule: Schedule,
-    /// Nanoseconds from the beginning of a slot to its deadline: reports are awaited no longer.
+    /// Nanoseconds from the beginning of a slot to its deadline. Reports that arrive later are not used.
     pub deadline: u64,
     /// What the check of a frame covers.
     pub check: Check,
-    /// Whether reports are acknowledged by frames. A link that acknowledges by itself needs none.
+    /// Whether the centre acknowledges reports by frames. Not needed on a link that acknowledges by itself.
     pub acknowledges: bool,
-    /// Every so many slots a heartbeat goes to all where there is nothing else to send to all, so that clocks stay together; 0: never.
+    /// If so many slots pass in which nothing else is sent to all sensors, a heartbeat is sent, by which sensors set their clocks. 0:
+    /// never.
     pub announce_every: u32,
 }
 
 impl CentreSettings {
-    /// Deadline at nine tenths of a slot, whole check, no acknowledgements, no heartbeats.
+    /// Settings with the deadline at nine tenths of a slot, a check of the whole frame, no acknowledgements and no heartbeats.
     pub fn new(members: Vec<Member>, schedule: Schedule) -> Self {
         Self {
             members,
@@ -57,58 +58,58 @@ impl CentreSettings {
 pub enum CentreTimer {
     /// A slot begins.
     SlotBegins,
-    /// Reports of the slot are awaited no longer.
+    /// The deadline of the slot: later reports are not used.
     Deadline,
 }
 
-/// To whom a frame goes.
+/// The receiver of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Recipient {
     /// To all sensors.
     All,
-    /// To the sensor of this number.
+    /// The sensor of this number, counted from 0.
     Sensor(usize),
 }
 
-/// What the driver must do, in order. A driver that leaves one out is none, so that the list is exhaustive.
+/// What the driver must do, in this order. A driver must handle every variant, so the enum is exhaustive.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Predict into this slot, and call [`Centre::on_predicted`]. If the prediction fails, do nothing: the slot passes.
+    /// Predict into this slot and call [`Centre::on_predicted`]. If the prediction fails, do nothing: the slot passes without update.
     Predict {
         /// The slot, counted from 1.
         slot: u64,
     },
-    /// Update with these observations, one item per sensor: see [`update_or_drop`](crate::update_or_drop).
+    /// Update with these observations, one per sensor: see [`update_or_drop`](crate::update_or_drop).
     Update {
         /// The slot.
         slot: u64,
-        /// What was observed; `None` of a sensor that answered other feedback than it was sent.
+        /// The observations; `None` for a sensor that answered other feedback than it was sent.
         observed: Vec<Option<Observation<BitString>>>,
     },
     /// Send the bytes of a frame.
     Send {
-        /// To whom.
+        /// The receiver.
         to: Recipient,
         /// The frame's bytes.
         frame: Vec<u8>,
     },
-    /// Set a timer; it must not fire early.
+    /// Set a timer. It may fire late but not early.
     SetTimer {
-        /// When, in nanoseconds.
+        /// Time at which it fires, in nanoseconds.
         at: u64,
-        /// Which.
+        /// The timer to pass to [`Centre::on_timer`].
         timer: CentreTimer,
     },
-    /// Write down what was noticed of a sensor.
+    /// Record a note about a sensor.
     Note {
         /// The sensor's number.
         sensor: usize,
-        /// What was noticed.
+        /// The note.
         note: Note,
     },
 }
 
-/// The centre of a star: events in, [`Action`]s out.
+/// State machine of the centre of a star network. It takes events and returns [`Action`]s.
 ///
 /// ```text
 /// on_timer(slot begins) -> SetTimer (deadline, next slot), Predict
@@ -116,30 +117,30 @@ pub enum Action {
 /// on_frame(report of this slot and digest) -> kept, perhaps Send (acknowledgement)
 /// on_timer(deadline) -> Update
 /// ```
-/// A report of another slot is late; one of another digest rests on something else than was told, and is no observation. A second one is a
-/// duplicate. Slots that the driver slept through are passed over: their sensors were not asked.
+/// A report of another slot is late. A report with another digest answers other feedback than was sent and is no observation. A second
+/// report is a duplicate. If the driver missed slots, they are skipped: their sensors were not asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Centre {
     settings: CentreSettings,
     /// The last slot that began; 0 before the first.
     slot: u64,
-    /// Whether reports are awaited.
+    /// Whether reports of the slot are still accepted.
     open: bool,
-    /// Digests of what the sensors were told.
+    /// Per sensor the digest of what it was sent.
     digests: Vec<u32>,
     observed: Vec<Observation<BitString>>,
-    /// Sensors whose answer rests on something else than they were told in the slot.
+    /// Per sensor whether its answer in this slot belongs to other feedback than it was sent.
     unusable: Vec<bool>,
-    /// The slot that `observed` is of, where the update of it is done and can be echoed.
+    /// The slot of `observed`, once its update is done and it can be echoed.
     echoed: Option<u64>,
-    /// Somebody asked for the whole state.
+    /// Whether a sensor asked for the whole state.
     asked: bool,
-    /// The last slot in which each sensor sent anything that was for this centre.
+    /// Per sensor the last slot in which it sent a frame to this centre.
     heard: Vec<Option<Slot>>,
 }
 
 impl Centre {
-    /// A centre before its first slot. It is started by [`on_timer`](Self::on_timer) with [`CentreTimer::SlotBegins`].
+    /// A centre before its first slot. Start it by [`on_timer`](Self::on_timer) with [`CentreTimer::SlotBegins`].
     pub fn new(settings: CentreSettings) -> Self {
         let sensors = settings.members.len();
         Self {
@@ -165,25 +166,26 @@ impl Centre {
         self.slot
     }
 
-    /// The last slot in which a sensor sent anything.
+    /// The last slot in which a sensor sent anything; `None` if it sent nothing yet.
     pub fn heard(&self, sensor: usize) -> Option<Slot> {
         self.heard.get(sensor).copied().flatten()
     }
 
-    /// The centre after it has lost what it knew: it sends followers the whole state next.
+    /// Tells the machine that the estimator has lost its state. It sends the whole state to followers next.
     pub fn on_memory_lost(&mut self) {
         self.open = false;
         self.asked = true;
         self.echoed = None;
     }
 
-    /// Goes on after the program was stopped in a slot: `slot` is the last that may have begun. Its reports are lost, and it does not begin again.
+    /// Continues after the program was stopped in a slot. `slot` is the last that may have begun; its reports are lost, and it does not
+    /// begin again.
     pub fn resume(&mut self, slot: u64) {
         self.slot = self.slot.max(slot);
         self.on_memory_lost();
     }
 
-    /// A timer has fired.
+    /// A timer has fired; `now` in nanoseconds. Actions are appended to `actions`.
     pub fn on_timer(&mut self, now: u64, timer: CentreTimer, actions: &mut Vec<Action>) {
         match timer {
             CentreTimer::SlotBegins => self.on_slot_begins(now, actions),
@@ -192,7 +194,7 @@ impl Centre {
     }
 
     fn on_slot_begins(&mut self, now: u64, actions: &mut Vec<Action>) {
-        // A deadline that fires late must not take the next slot's reports.
+        // A deadline that fires late must not close the next slot.
         self.on_deadline(actions);
         let schedule = &self.settings.schedule;
         let count = schedule.count(now);
@@ -212,8 +214,8 @@ impl Centre {
         actions.push(Action::Predict { slot: count });
     }
 
-    /// The driver has predicted. `feedback` has what each sensor is told, empty for those that are told nothing; `state` is the
-    /// receiver's state before the prediction, where a sensor follows by echo.
+    /// The driver has predicted. `feedback` has what each sensor is sent, empty if nothing; `state` is the
+    /// receiver's state before the prediction, needed if a sensor follows by echo.
     pub fn on_predicted(&mut self, feedback: &[BitString], state: Option<&BitString>, actions: &mut Vec<Action>) {
         let slot = Slot::of_count(self.slot);
         let empty = BitString::default();
@@ -221,7 +223,7 @@ impl Centre {
         let members = &self.settings.members;
         let encode = |frame: Frame<'_>| frame.to_bytes(self.settings.check);
 
-        // One frame for all where all are told the same.
+        // If all sensors are sent the same, one frame goes to all.
         let mut spoken = false;
         let all_alike = members.iter().all(|member| member.feedback == Feedback::Told)
             && (1..members.len()).all(|i| told(i) == told(0));
@@ -245,7 +247,7 @@ impl Centre {
             actions.push(Action::Send { to, frame });
         }
 
-        // Followers are told what was observed in the slot before, or the whole state.
+        // Followers are sent what was observed in the slot before, or the whole state.
         let follows = |member: &Member| member.feedback == Feedback::Echoed;
         if let Some(state) = state.filter(|_| members.iter().any(follows)) {
             let sum = digest(slot.before(), Payload::from(state));
@@ -294,7 +296,7 @@ impl Centre {
             .collect()
     }
 
-    /// Bytes have arrived from a sensor, which the link has made sure of.
+    /// Bytes have arrived. The link guarantees that they are from this sensor.
     pub fn on_frame(&mut self, sensor: usize, bytes: &[u8], actions: &mut Vec<Action>) {
         match Frame::decode(bytes, self.settings.check) {
             Ok(frame) => self.on_decoded(sensor, &frame, actions),
@@ -308,7 +310,7 @@ impl Centre {
         }
     }
 
-    /// A frame of a sensor was damaged on its way: what it sent in this slot is lost, and is known to have been sent.
+    /// A damaged frame has arrived from a sensor: its report of this slot was sent and is lost.
     pub fn on_damaged(&mut self, sensor: usize) {
         if let Some(observed) = self.observed.get_mut(sensor)
             && self.open
@@ -318,7 +320,7 @@ impl Centre {
         }
     }
 
-    /// A frame has arrived from a sensor that the driver has decoded.
+    /// A decoded frame has arrived from a sensor.
     pub fn on_decoded(&mut self, sensor: usize, frame: &Frame<'_>, actions: &mut Vec<Action>) {
         let (kind, slot) = (frame.kind, frame.slot);
         let mut note = |note| actions.push(Action::Note { sensor, note });
@@ -332,9 +334,11 @@ impl Centre {
                 note(Note::Disagreement { slot });
             }
             Kind::Heartbeat => note(Note::Heartbeat { slot }),
+            // The order of these arms is the order of the checks: slot, repetition, digest, length.
             Kind::Report if slot != Slot::of_count(self.slot) || !self.open => return note(Note::Late { slot }),
             Kind::Report if *observed != Observation::Nothing => note(Note::Duplicate { slot }),
             Kind::Report if frame.digest != self.digests[sensor] => {
+                // The sensor answered other feedback than it was sent: the meaning of its report is unknown.
                 (*observed, self.unusable[sensor]) = (Observation::Lost, true);
                 note(Note::Disagreement { slot });
             }

@@ -1,23 +1,23 @@
-//! What a centre received in a slot, as those that follow it are told.
+//! Encoding of what a centre received in a slot, for the sensors that follow its filter.
 
 use fewbits_core::{BitReader, BitString, BitWriter, CodecError, Observation};
 use serde::{Deserialize, Serialize};
 
-/// Bits of a report's length in an echo, where reports differ in length.
+/// Bits of a report's length in an echo, for [`ReportLength::Varying`].
 const LENGTH_BITS: u32 = 16;
 
-/// Bits of a sensor's reports.
+/// Length of a sensor's reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReportLength {
-    /// All reports have so many bits.
+    /// All reports have this many bits.
     Fixed(u32),
-    /// Up to 65,535 bits. In an echo the length goes before each.
+    /// Each report has its own length, up to 65,535 bits. In an echo the length stands before the report.
     Varying,
 }
 
 impl ReportLength {
-    /// Whether a report of so many bits can be one.
+    /// Whether a report may have this many bits.
     pub fn allows(self, bits: usize) -> bool {
         match self {
             Self::Fixed(expected) => bits == expected as usize,
@@ -49,7 +49,7 @@ pub fn echo(observed: &[Option<Observation<BitString>>], lengths: &[ReportLength
     Ok(writer.finish())
 }
 
-/// Reads what [`echo`] wrote: one item per length. Total.
+/// Reads what [`echo`] wrote: one item per length. Any bits give items or an error.
 ///
 /// # Errors
 /// If bits are missing or left over.
@@ -60,6 +60,7 @@ pub fn reports_of(
     let mut reader = BitReader::new(echo);
     let mut observed = Vec::with_capacity(lengths.len());
     for length in lengths {
+        // Prefix code: 0 nothing arrived, 11 and a report, 100 known to be lost, 101 no observation.
         observed.push(if !reader.read_bit()? {
             Some(Observation::Nothing)
         } else if !reader.read_bit()? {

@@ -1,4 +1,4 @@
-//! Frames: the bytes that travel, and their codec. `docs/wire.md` has the format byte by byte.
+//! Frames: the bytes that are sent, and their codec. `docs/wire.md` has the format byte by byte.
 
 use crate::payload::Payload;
 use crate::slot::Slot;
@@ -7,9 +7,9 @@ use crc::{CRC_16_XMODEM, Crc};
 
 /// The version of the wire format that this crate writes and reads.
 pub const VERSION: u8 = 1;
-/// Bytes of the header: version, kind and padding in one; slot in three; digest in four.
+/// Bytes of the header: one for version, kind and padding, three for the slot, four for the digest.
 const HEADER_BYTES: usize = 8;
-/// Bytes of the destination, which only a handover has, behind the header.
+/// Bytes of the destination, which follows the header in a handover.
 const DESTINATION_BYTES: usize = 4;
 /// Bytes of the check at the end.
 pub const CHECK_BYTES: usize = 2;
@@ -18,25 +18,25 @@ const VERSION_SHIFT: u32 = 6;
 const KIND_SHIFT: u32 = 3;
 const SUM: Crc<u16> = Crc::<u16>::new(&CRC_16_XMODEM);
 
-/// Kind of content of a frame.
+/// Kind of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
 #[repr(u8)]
 pub enum Kind {
-    /// What sensors are told before they measure.
+    /// What a sensor must know before it measures.
     Feedback = 0,
     /// A sensor's report.
     Report = 1,
-    /// What a fusion centre received in the slot before, for those that follow it.
+    /// What the fusion centre received in the slot before, for sensors that follow its filter.
     Echo = 2,
-    /// The whole shared state after the slot before.
+    /// The whole state of the filter after the slot before.
     Snapshot = 3,
     /// A request for a snapshot.
     Request = 4,
-    /// A belief that travels on, and to whom.
+    /// A belief that is sent to another node, and the address of that node.
     Handover = 5,
-    /// A header alone: the sender works, and which slot it is.
+    /// A frame without payload: the sender works, and its slot sets clocks.
     Heartbeat = 6,
     /// The frame of this slot and digest has arrived.
     Acknowledgement = 7,
@@ -67,35 +67,35 @@ impl Kind {
     }
 }
 
-/// What the check at the end of a frame covers. Both ends must be set alike.
+/// What the check at the end of a frame covers. Both ends must use the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
 pub enum Check {
-    /// Header and payload: a frame with an inverted bit is lost.
+    /// Header and payload: a frame with an inverted bit is discarded.
     #[default]
     Whole,
-    /// The header only: bits of the payload may arrive inverted, and the receiver's factor knows how often.
+    /// Only the header: bits of the payload may arrive inverted, and the receiver's likelihood contains their probability.
     Header,
 }
 
-/// A frame: a header by which two ends see whether they still agree, and a payload.
+/// A frame: a header, by which two ends detect that their states differ, and a payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Kind of content.
+    /// Kind of the frame.
     pub kind: Kind,
     /// The slot that it belongs to.
     pub slot: Slot,
-    /// Digest of what both ends must share for the payload to mean anything.
+    /// Digest of the shared state that is needed to interpret the payload.
     pub digest: u32,
-    /// To whom a handover goes in the end; 0 in others, where it does not travel.
+    /// Address of the node for which a handover is meant; 0 and not sent in other frames.
     pub destination: u32,
-    /// The message proper.
+    /// The message.
     pub payload: Payload<'a>,
 }
 
 impl<'a> Frame<'a> {
-    /// A frame that is no handover.
+    /// A frame of another kind than [`Kind::Handover`].
     pub fn new(kind: Kind, slot: Slot, digest: u32, payload: Payload<'a>) -> Self {
         Self {
             kind,
@@ -106,12 +106,12 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Bytes that the frame takes.
+    /// Length of the encoded frame in bytes.
     pub fn len(&self) -> usize {
         self.kind.overhead() + self.payload.bytes().len()
     }
 
-    /// Never: a frame has a header at least.
+    /// Never true: a frame has at least a header.
     pub fn is_empty(&self) -> bool {
         false
     }
@@ -119,7 +119,7 @@ impl<'a> Frame<'a> {
     /// Writes the frame to the beginning of `buffer` and returns the bytes written. `None` if they do not fit.
     pub fn encode<'b>(&self, check: Check, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
         let bytes = buffer.get_mut(..self.len())?;
-        // Without indices: the optimiser need not prove lengths for a program in which no panic can be reached.
+        // Without indexing: the optimiser can then remove every panic.
         let (content, sum) = bytes.split_last_chunk_mut::<CHECK_BYTES>()?;
         let (header, payload) = content.split_at_mut_checked(self.kind.header())?;
         let (first, destination) = header.split_first_chunk_mut::<HEADER_BYTES>()?;
@@ -142,7 +142,7 @@ impl<'a> Frame<'a> {
         Some(bytes)
     }
 
-    /// The bytes of the frame.
+    /// The encoded frame.
     #[cfg(feature = "std")]
     pub fn to_bytes(&self, check: Check) -> Vec<u8> {
         let mut bytes = vec![0; self.len()];
@@ -151,7 +151,7 @@ impl<'a> Frame<'a> {
         bytes
     }
 
-    /// What bytes say they carry, unchecked; `None` if there are none.
+    /// The kind that bytes claim to be, without any check; `None` if there are no bytes.
     pub fn kind_of(bytes: &[u8]) -> Option<Kind> {
         // Three bits: always one of the eight.
         bytes
@@ -159,7 +159,7 @@ impl<'a> Frame<'a> {
             .map(|first| Kind::ALL[usize::from(first >> KIND_SHIFT & 7)])
     }
 
-    /// Reads a frame that takes all of `bytes`. Total: any bytes are a frame or an error.
+    /// Reads a frame that takes all of `bytes`. Any bytes give a frame or an error.
     ///
     /// # Errors
     /// If the bytes are of another version, too few, fail their check, or use bits that must be zero.
@@ -176,6 +176,7 @@ impl<'a> Frame<'a> {
         let end = bytes.len().checked_sub(CHECK_BYTES).ok_or(too_short)?;
         let header = kind.header();
         let content = bytes.get(header..end).ok_or(too_short)?;
+        // If the check covers the header only, inverted bits of the payload reach the estimator, which knows their probability.
         let covered = match check {
             Check::Whole => end,
             Check::Header => header,
@@ -197,25 +198,25 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Why bytes are no frame.
+/// Why bytes are not a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum DecodeError {
-    /// The frame is of another version of the format, 0 to 3. Nothing else of it was looked at.
+    /// The frame is of another version of the format, 0 to 3. Nothing else was checked.
     Version {
         /// The version.
         found: u8,
     },
-    /// Fewer bytes than header and check have.
+    /// There are fewer bytes than header and check need.
     TooShort {
         /// Number of bytes.
         found: usize,
     },
-    /// The check at the end is not that of the bytes before.
+    /// The check at the end does not match the bytes before.
     Check,
-    /// More padding than payload, or padding that is not zero.
+    /// There is more padding than payload, or padding that is not zero.
     Padding,
 }
 
@@ -234,9 +235,9 @@ impl fmt::Display for DecodeError {
 
 impl core::error::Error for DecodeError {}
 
-/// Digest of 32 bits of what two ends share in a slot: FNV-1a of 64 bits over slot, number of bits and bytes, folded.
+/// Digest of 32 bits of a payload and its slot: FNV-1a of 64 bits over slot, number of bits and bytes, folded.
 ///
-/// It finds ends that drifted apart. It is no protection against forgery, which is the link's.
+/// It detects that the states of two ends differ. It does not protect against forgery; that is the task of the link.
 pub fn digest(slot: Slot, payload: Payload<'_>) -> u32 {
     let add = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
     let start = 0xcbf2_9ce4_8422_2325_u64;

@@ -1,4 +1,4 @@
-//! A belief that travels from leader to leader: what a leader does, and the state machine of each node.
+//! A belief that is sent from leader to leader: the leader's step, and the state machine of each node.
 
 use crate::frame::{Check, Frame, Kind, digest};
 use crate::note::Note;
@@ -9,56 +9,56 @@ use fewbits_core::BitString;
 use fewbits_core::rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// What a leader does with the belief that it was handed. Object-safe.
+/// A leader's step with the belief that was handed to it. Object-safe.
 pub trait Leader {
-    /// One leader's step: measure, update, choose who leads next. The first leader has no message. `rng` is a function of the slot, so that
-    /// whoever repeats a step draws the same.
+    /// One step: measure, update, choose the next leader. The first leader has no message. `rng` is a function of the slot, so a node that
+    /// repeats the step draws the same numbers.
     ///
     /// # Errors
-    /// If the message is no belief, or the measurement is impossible under it: the leader then keeps what it had.
+    /// If the message is not a belief, or the measurement is impossible under it. The leader then keeps the belief that it had.
     fn lead(&self, rng: &mut dyn Rng, slot: u64, node: u32, message: Option<&BitString>) -> Result<Lead, BoxError>;
 }
 
-/// What a leader's step gives.
+/// Result of a leader's step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lead {
-    /// The belief as it travels on.
+    /// The updated belief, as it is sent.
     pub message: BitString,
-    /// Who leads next; nobody ends the walk.
+    /// Address of the next leader; `None` ends the walk.
     pub next: Option<u32>,
-    /// The estimate.
+    /// The estimate, for the log.
     pub estimate: Vec<f64>,
 }
 
-/// What the driver of a [`Bearer`] must do, in order.
+/// What the driver of a [`Bearer`] must do, in this order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Errand {
-    /// Lead in this slot with the belief that was handed over, and call [`Bearer::on_led`] or [`Bearer::on_failed`].
+    /// Take the leader's step in this slot with this belief, and call [`Bearer::on_led`] or [`Bearer::on_failed`].
     Lead {
         /// The slot.
         slot: Slot,
         /// The belief; `None` for the first leader.
         message: Option<BitString>,
     },
-    /// Send the frame's bytes one hop nearer to its destination. Where there is no route, call [`Bearer::on_give_up`].
+    /// Send the frame's bytes one hop towards its destination. If there is no route, call [`Bearer::on_give_up`].
     Send {
-        /// To whom it goes in the end.
+        /// Address of the node for which the frame is meant.
         destination: u32,
-        /// Slot and digest of the frame, which name it in [`Bearer::on_ack`] and [`Bearer::on_give_up`].
+        /// Slot and digest of the frame, which identify it in [`Bearer::on_ack`] and [`Bearer::on_give_up`].
         name: (Slot, u32),
         /// The frame's bytes.
         frame: Vec<u8>,
     },
-    /// Call [`Bearer::on_timer`] at this time (nanoseconds), not before.
+    /// Call [`Bearer::on_timer`] at this time or later.
     SetTimer {
-        /// When.
+        /// The time, in nanoseconds.
         at: u64,
     },
-    /// Write down what was noticed.
+    /// Record a note.
     Note {
-        /// Whom it is about.
+        /// Address of the node that the note is about.
         with: u32,
-        /// What was noticed.
+        /// The note.
         note: Note,
     },
 }
@@ -71,37 +71,38 @@ struct Pending {
     belief: BitString,
 }
 
-/// A node of a walk: it leads where it was handed the belief, and passes on what is for others. Events in, [`Errand`]s out.
+/// State machine of a node of a walk. It leads if the belief was handed to it, and forwards what is for others. It takes events and
+/// returns [`Errand`]s.
 ///
 /// ```text
 /// on_timer(slot begins) -> Lead;  on_led(next) -> Send;  on_failed -> leads again in the next slot
 /// on_frame(handover) -> for itself: SetTimer (its slot); for another: Send; a second one of its slot: Note
 /// on_ack ends a pending handover;  on_give_up -> leads itself, Note (retained)
 /// ```
-/// A handover that was given up may have arrived all the same: there are two leaders from then on, and where they meet there is a note of a
-/// disagreement. A node that leads already keeps the belief that has seen more slots.
+/// A handover that was given up may have arrived nevertheless. Then there are two leaders, and when they meet a disagreement is noted.
+/// A node that already leads keeps the belief that contains more slots.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Bearer {
     address: u32,
     schedule: Schedule,
-    /// The last slot in which anybody leads.
+    /// The last slot in which a node leads.
     last: u64,
-    /// Whether a link tells what became of a handover.
+    /// Whether the link reports success or failure of a handover.
     acknowledged: bool,
-    /// The slot in which it leads, and the belief that it was handed.
+    /// The slot in which the node will lead, and the belief that was handed to it.
     leading: Option<(Slot, Option<BitString>)>,
-    /// The same while the driver leads.
+    /// The same while the driver takes the leader's step.
     acting: Option<(Slot, Option<BitString>)>,
-    /// Name of the last handover that it took.
+    /// Slot and digest of the last handover that the node accepted.
     taken: Option<(Slot, u32)>,
-    /// Name of the last handover that it passed on.
+    /// Slot and digest of the last handover that the node forwarded.
     passed: Option<(Slot, u32)>,
     pending: Vec<Pending>,
 }
 
 impl Bearer {
-    /// A node with this address. Nobody leads after slot `last`. `acknowledged`: whether its driver calls [`on_ack`](Self::on_ack) or
-    /// [`on_give_up`](Self::on_give_up) for what it sends.
+    /// A node with this address. No node leads after slot `last`. `acknowledged`: whether the driver calls [`on_ack`](Self::on_ack) or
+    /// [`on_give_up`](Self::on_give_up) for each frame that it sends.
     pub fn new(address: u32, schedule: Schedule, last: u64, acknowledged: bool) -> Self {
         Self {
             address,
@@ -116,7 +117,7 @@ impl Bearer {
         }
     }
 
-    /// The node that leads in slot 1. Its driver calls [`on_timer`](Self::on_timer) when that begins.
+    /// The node as the leader of slot 1. The driver calls [`on_timer`](Self::on_timer) when that slot begins.
     #[must_use]
     pub fn first(self) -> Self {
         Self {
@@ -125,12 +126,12 @@ impl Bearer {
         }
     }
 
-    /// The slot in which it leads, if it does.
+    /// The slot in which the node leads; `None` if it does not.
     pub fn leads(&self) -> Option<Slot> {
         self.leading.as_ref().map(|(slot, _)| *slot)
     }
 
-    /// The belief is gone, if it was here.
+    /// The node has lost its memory, and the belief if it had it.
     pub fn on_memory_lost(&mut self) {
         (self.leading, self.acting) = (None, None);
         self.pending.clear();
@@ -140,7 +141,7 @@ impl Bearer {
         self.schedule.start(slot.nearest_count(self.schedule.count(now)))
     }
 
-    /// A timer has fired. One that was set for an earlier handover starts no slot that is still to come.
+    /// A timer has fired. A timer that was set for an earlier handover has no effect before the node's slot begins.
     pub fn on_timer(&mut self, now: u64, errands: &mut Vec<Errand>) {
         let due = self.leads().is_some_and(|slot| self.begins(slot, now) <= now);
         if !due {
@@ -155,7 +156,7 @@ impl Bearer {
         }
     }
 
-    /// The driver has led.
+    /// The leader's step has succeeded.
     pub fn on_led(&mut self, now: u64, lead: Lead, errands: &mut Vec<Errand>) {
         let (Some((slot, _)), Some(next)) = (self.acting.take(), lead.next) else {
             return;
@@ -169,7 +170,7 @@ impl Bearer {
         }
     }
 
-    /// The leader's step failed: it leads again in the next slot, with what it had.
+    /// The leader's step has failed: the node leads again in the next slot, with the belief that it had.
     pub fn on_failed(&mut self, now: u64, errands: &mut Vec<Errand>) {
         if let Some((slot, belief)) = self.acting.take() {
             self.stay(now, slot.after(), belief, errands);
@@ -195,7 +196,7 @@ impl Bearer {
             name,
             frame: frame.to_bytes(Check::Whole),
         });
-        // Kept even where nothing is acknowledged until the driver has found a route.
+        // The handover is kept until the driver has found a route, even if the link does not acknowledge.
         self.pending.retain(|pending| self.acknowledged && pending.name != name);
         self.pending.push(Pending {
             name,
@@ -204,13 +205,14 @@ impl Bearer {
         });
     }
 
-    /// A frame has arrived that the driver has decoded.
+    /// A decoded frame has arrived from the neighbour `from`.
     pub fn on_decoded(&mut self, now: u64, from: u32, frame: &Frame<'_>, errands: &mut Vec<Errand>) {
         let (slot, name) = (frame.slot, (frame.slot, frame.digest));
         let mut note = |note| errands.push(Errand::Note { with: from, note });
         if frame.kind != Kind::Handover {
             return note(Note::Unexpected { kind: frame.kind });
         }
+        // The digest is that of the belief: a mismatch means that the payload was damaged.
         if digest(slot, frame.payload) != frame.digest {
             return note(Note::Disagreement { slot });
         }
@@ -218,6 +220,7 @@ impl Bearer {
         let last = if own { &mut self.taken } else { &mut self.passed };
         match *last {
             Some(seen) if seen == name => return note(Note::Duplicate { slot }),
+            // Two leaders hand over different beliefs for one slot: keep the first.
             Some((seen, _)) if own && slot == seen => return note(Note::Disagreement { slot }),
             Some((seen, _)) if own && seen.is_after(slot) => return note(Note::Late { slot }),
             _ => *last = Some(name),
@@ -229,8 +232,8 @@ impl Bearer {
         }
     }
 
-    /// Takes a belief that another node was to lead with, or has sent. Where this node leads already, the belief that has seen more slots stays, of
-    /// equals the one that is here.
+    /// Accepts a belief that another node has sent or was meant to lead with. If this node leads already, the belief that contains more
+    /// slots is kept; in a tie, its own.
     fn take_over(&mut self, now: u64, with: u32, slot: Slot, belief: BitString, errands: &mut Vec<Errand>) {
         if let Some(leads) = self.leads() {
             let note = Note::Disagreement { slot };
@@ -242,12 +245,12 @@ impl Bearer {
         self.stay(now, slot, Some(belief), errands);
     }
 
-    /// A handover has arrived at the next hop.
+    /// A handover has arrived at the next hop; `name` is its slot and digest.
     pub fn on_ack(&mut self, name: (Slot, u32)) {
         self.pending.retain(|pending| pending.name != name);
     }
 
-    /// No acknowledgement of a handover came, or there is no route: this node keeps the belief.
+    /// No acknowledgement of a handover came, or there is no route: this node leads with the belief.
     pub fn on_give_up(&mut self, now: u64, name: (Slot, u32), errands: &mut Vec<Errand>) {
         let Some(at) = self.pending.iter().position(|pending| pending.name == name) else {
             return;

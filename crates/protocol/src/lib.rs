@@ -2,19 +2,19 @@
 //!
 //! | use | when |
 //! |---|---|
-//! | [`Frame`] | bytes are to be written or read: `docs/wire.md` has the format byte by byte |
-//! | [`Sensor`] | a sensor is written: for a simulator, a process or a microcontroller |
-//! | `Centre` (feature `std`) | a fusion centre is written |
-//! | `Receiver` (feature `std`) | an estimator is to run under a `Centre`: feedback, reports and state are bits |
-//! | `Estimator`, `OverBits` (feature `std`) | the same for an estimator in types |
-//! | `Leader`, `Bearer` (feature `std`) | a belief is to travel from leader to leader |
+//! | [`Frame`] | bytes are written or read: `docs/wire.md` has the format byte by byte |
+//! | [`Sensor`] | you write a sensor: for a simulator, a process or a microcontroller |
+//! | `Centre` (feature `std`) | you write a fusion centre |
+//! | `Receiver` (feature `std`) | an estimator runs under a `Centre`; feedback, reports and state are bits |
+//! | `Estimator`, `OverBits` (feature `std`) | the same, with feedback, reports and belief as Rust types |
+//! | `Leader`, `Bearer` (feature `std`) | a belief is sent from leader to leader |
 //!
-//! The central choice: **a machine takes events and returns what to do; it does nothing itself.** Bytes that came, timers that fired and samples
-//! that were taken go in with the time. Frames to send, timers to set and notes come out. So the same code runs in the simulator of
-//! `fewbits-network`, over the sockets of `fewbits-link`, and on a microcontroller. The price is that a driver must do what it is told: this page's
-//! example is one in full.
+//! **A state machine takes events and returns what to do; it does nothing itself.** Its inputs are the time, received bytes, fired timers
+//! and samples. Its outputs are frames to send, timers to set and notes. The same code therefore runs in the simulator of
+//! `fewbits-network`, over the sockets of `fewbits-link`, and on a microcontroller. Each of them needs a driver that carries out the
+//! outputs; the example on this page is a complete one.
 //!
-//! Frames and the sensor's half need neither the standard library nor allocation: depend on this crate with `default-features = false`.
+//! Frames and [`Sensor`] need neither the standard library nor allocation: depend on this crate with `default-features = false`.
 //!
 //! ```
 //! use fewbits_protocol::{Check, Feedback, Frame, Kind, Payload, Sensor, SensorSettings, Slot, Task, digest};

@@ -1,68 +1,68 @@
-//! What a node of the protocol can notice.
+//! Notes: what a node of the protocol reports to its driver besides actions.
 
 use crate::frame::{DecodeError, Kind, VERSION};
 use crate::slot::Slot;
 use core::fmt;
 
-/// Something worth writing down. None of it stops a node.
+/// An event worth recording. None of them stops a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Note {
-    /// Bytes that are no frame.
+    /// Received bytes are not a frame.
     Damaged(DecodeError),
-    /// A frame of a version of the format that is newer than this program. The frame is left alone, and so is all that it stands for.
+    /// A frame has a newer version of the format than this program. It is ignored.
     FutureVersion {
         /// The version.
         found: u8,
     },
-    /// A frame that this node does not take: of a kind for others, or before it was configured for it.
+    /// A frame of a kind that this node does not accept, or not before it is configured for it.
     Unexpected {
-        /// The kind.
+        /// Kind of the frame.
         kind: Kind,
     },
-    /// A payload that is no message of its format.
+    /// The payload of a frame does not decode to a message of its format.
     Malformed {
-        /// The slot.
+        /// Slot of the frame.
         slot: Slot,
     },
-    /// A frame came a second time.
+    /// A frame arrived a second time.
     Duplicate {
-        /// The slot.
+        /// Slot of the frame.
         slot: Slot,
     },
-    /// A frame belongs to a slot that is over, or that has not begun.
+    /// A frame belongs to a slot that is over or has not begun.
     Late {
-        /// The slot.
+        /// Slot of the frame.
         slot: Slot,
     },
-    /// The sender does not share what its frame rests on.
+    /// Sender and receiver of a frame have different states.
     Disagreement {
-        /// The slot.
+        /// Slot of the frame.
         slot: Slot,
     },
-    /// A follower took the state that was sent to it.
+    /// A follower replaced its state by the one that was sent to it.
     Resynchronised {
-        /// From which slot on.
+        /// First slot with the new state.
         slot: Slot,
     },
-    /// A report was repeated as often as allowed, and no acknowledgement came. It may have arrived all the same.
+    /// A report was repeated as often as allowed, and no acknowledgement came. It may have arrived nevertheless.
     Unacknowledged {
-        /// The slot.
+        /// Slot of the report.
         slot: Slot,
     },
-    /// A handover was given up: whoever sent it leads on.
+    /// A handover was given up: its sender continues to lead.
     Retained {
         /// The slot in which its receiver was to lead.
         slot: Slot,
     },
-    /// A sensor was silent for a while and says that it works.
+    /// A sensor that was silent for a while reports that it works.
     Heartbeat {
-        /// The slot.
+        /// Slot of the heartbeat.
         slot: Slot,
     },
-    /// The driver handed in what the machine did not wait for: a sample without a slot, a report that is too long.
+    /// The driver passed something unexpected: a sample outside a slot, or a report that is too long.
     Misuse,
 }
 

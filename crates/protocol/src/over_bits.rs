@@ -1,19 +1,19 @@
-//! Estimators in types, and the receivers over bits that they make.
+//! Estimators with typed messages, and the conversion of their messages to bits.
 
 use crate::receiver::{BoxError, Receiver};
 use fewbits_core::{BitReader, BitString, BitWriter, Gaussian, Message, Observation};
 
-/// An estimator at a fusion centre whose belief is a value. [`OverBits`] makes a [`Receiver`] of it.
+/// An estimator at a fusion centre with a typed belief. [`OverBits`] makes a [`Receiver`] of it.
 ///
 /// ```text
 /// slot k:  predicted = predict(belief);  feedback(predicted, i) for each sensor i
 ///          belief = update(predicted, what was observed)
 /// ```
-/// Law: all methods are functions of their arguments, so that two ends with equal beliefs stay equal.
+/// Invariant: all methods are functions of their arguments, so two ends with equal beliefs stay equal.
 pub trait Estimator {
-    /// What the receiver knows of the state. It travels to those that follow the centre.
+    /// The knowledge of the state. It is sent to sensors that follow the centre.
     type Belief: Message + Clone;
-    /// What a sensor is told before it measures.
+    /// What a sensor is sent before it measures.
     type Feedback: Message;
     /// What a sensor may report.
     type Report: Message;
@@ -21,25 +21,26 @@ pub trait Estimator {
     /// Number of sensors.
     fn sensors(&self) -> usize;
 
-    /// The belief before the first slot, known at both ends.
+    /// The belief before the first slot, which both ends know.
     fn start(&self) -> Self::Belief;
 
-    /// Time update into slot `slot`, from the slot before; the first is 1.
+    /// The belief predicted from the slot before into slot `slot`, which is counted from 1.
     ///
     /// # Errors
-    /// Those of the filter.
+    /// If the filter fails.
     fn predict(&self, slot: u64, belief: &Self::Belief) -> Result<Self::Belief, BoxError>;
 
-    /// What `sensor` is told, made from the prediction.
+    /// The feedback for `sensor`, from the predicted belief.
     ///
     /// # Errors
-    /// Those of the scheme.
+    /// If the scheme fails.
     fn feedback(&self, predicted: &Self::Belief, sensor: usize) -> Result<Self::Feedback, BoxError>;
 
-    /// Measurement update by what was observed of sensors, in rising order of their numbers. Sensors without observation are left out.
+    /// The predicted belief updated with observations of sensors, in increasing order of their numbers. Sensors without observation are
+    /// left out.
     ///
     /// # Errors
-    /// If the observations are impossible together; others of the filter.
+    /// If the observations have probability zero together, or the filter fails.
     fn update(
         &self,
         slot: u64,
@@ -47,16 +48,16 @@ pub trait Estimator {
         observed: &[(usize, Observation<Self::Report>)],
     ) -> Result<Self::Belief, BoxError>;
 
-    /// Mean and standard deviation of each coordinate.
+    /// Mean and standard deviation of each coordinate of the state.
     fn estimate(&self, belief: &Self::Belief) -> Vec<(f64, f64)>;
 
-    /// How beliefs travel.
+    /// Format in which beliefs are sent.
     fn belief_format(&self) -> <Self::Belief as Message>::Format;
 
-    /// How the feedback of a sensor travels.
+    /// Format in which the feedback of a sensor is sent.
     fn feedback_format(&self, sensor: usize) -> <Self::Feedback as Message>::Format;
 
-    /// How the reports of a sensor travel.
+    /// Format in which the reports of a sensor are sent.
     fn report_format(&self, sensor: usize) -> <Self::Report as Message>::Format;
 }
 
@@ -66,13 +67,14 @@ pub fn moments<const D: usize>(belief: &Gaussian<D>) -> Vec<(f64, f64)> {
     belief.mean().iter().copied().zip(deviations.iter().copied()).collect()
 }
 
-/// Bits of the slot in a state.
+/// Bits of the slot number in a state.
 const SLOT_BITS: u32 = 64;
 
-/// A [`Receiver`] made of an [`Estimator`]. Its state is the slot in 64 bits and the belief.
+/// A [`Receiver`] made from an [`Estimator`]. Its state is the slot in 64 bits, followed by the belief.
 ///
-/// The start holds before the first slot that is predicted, whichever that is. Slots that are left out later are predicted through. Bits that are no report of the scheme were sent and not understood: they are taken as
-/// [`Observation::Lost`]. A step that gives an estimate which is not finite fails, and leaves the state as it was.
+/// The start belief applies to the slot before the first prediction, whichever slot that is. If slots are skipped later, the belief is
+/// predicted through them. Bits that are not a report of the scheme count as [`Observation::Lost`]: a report was sent but not understood.
+/// A step whose estimate is not finite fails and leaves the state unchanged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverBits<E: Estimator> {
     estimator: E,
@@ -97,7 +99,7 @@ impl<E: Estimator> OverBits<E> {
         &self.estimator
     }
 
-    /// The belief: predicted between a prediction and its update.
+    /// The belief: the predicted one between a prediction and its update.
     pub fn belief(&self) -> &E::Belief {
         &self.belief
     }

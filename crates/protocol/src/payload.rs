@@ -1,6 +1,6 @@
-//! A message of some number of bits that someone else holds.
+//! Borrowed bit strings.
 
-/// Bits packed most significant first, borrowed. The bits behind the last one are zero.
+/// A borrowed bit string, packed with the most significant bit first. Unused bits of the last byte are zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Payload<'a> {
     bytes: &'a [u8],
@@ -8,10 +8,10 @@ pub struct Payload<'a> {
 }
 
 impl<'a> Payload<'a> {
-    /// No bits.
+    /// The empty bit string.
     pub const EMPTY: Payload<'static> = Payload { bytes: &[], bits: 0 };
 
-    /// The first `bits` bits of `bytes`. `None` if there are fewer, or if a bit behind them in the last byte is one.
+    /// The first `bits` bits of `bytes`. `None` if there are fewer, or if an unused bit of the last byte is one.
     pub fn new(bytes: &'a [u8], bits: usize) -> Option<Self> {
         let bytes = bytes.get(..bits.div_ceil(8))?;
         let padding = 8 * bytes.len() - bits;
@@ -29,7 +29,7 @@ impl<'a> Payload<'a> {
         self.bytes
     }
 
-    /// Bits of the last byte that are not used, 0 to 7.
+    /// Number of unused bits of the last byte, 0 to 7.
     pub(crate) fn padding(&self) -> u8 {
         (8 * self.bytes.len() - self.bits) as u8
     }
@@ -48,7 +48,7 @@ impl<'a> From<&'a fewbits_core::BitString> for Payload<'a> {
 #[cfg(feature = "std")]
 impl From<Payload<'_>> for fewbits_core::BitString {
     fn from(payload: Payload<'_>) -> Self {
-        // The bytes hold that many bits by construction.
+        // The bytes contain that many bits by construction.
         Self::from_bytes(payload.bytes.to_vec(), payload.bits).unwrap_or_default()
     }
 }

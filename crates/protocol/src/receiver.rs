@@ -1,4 +1,4 @@
-//! An estimator as the centre's machine needs it: bits in, bits out.
+//! Interface of an estimator to the centre's state machine: all messages are bits.
 
 use crate::centre::Member;
 use crate::sensor::Feedback;
@@ -8,64 +8,64 @@ use serde::{Deserialize, Serialize};
 /// Any error of an estimator.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 
-/// An estimator at a fusion centre, slot by slot. Object-safe.
+/// An estimator at a fusion centre, called slot by slot. Object-safe.
 ///
 /// ```text
 /// slot k:  predict(k);  feedback(i) for each sensor i;  update(what was observed of each sensor that was asked)
 /// ```
-/// Laws: calls are functions of the state and their arguments, so that two ends with equal state stay equal; a call that fails leaves the
-/// state as it was; `restore(state())` changes nothing.
+/// Invariants: calls are functions of the state and their arguments, so two ends with equal states stay equal. A call that fails leaves the
+/// state unchanged. `restore(state())` changes nothing.
 pub trait Receiver {
     /// Number of sensors.
     fn sensors(&self) -> usize;
 
-    /// Moves on to slot `slot`, counted from the first, which is 1. Slots may be left out.
+    /// Predicts into slot `slot`, counted from 1. Slots may be skipped.
     ///
     /// # Errors
-    /// Those of the estimator.
+    /// If the estimator fails.
     fn predict(&mut self, slot: u64) -> Result<(), BoxError>;
 
-    /// What a sensor is told before it measures, from the prediction. Empty where there is nothing to tell.
+    /// The feedback for a sensor, from the prediction; empty if the sensor needs none.
     ///
     /// # Errors
-    /// Those of the scheme.
+    /// If the scheme fails.
     fn feedback(&self, sensor: usize) -> Result<BitString, BoxError>;
 
-    /// Takes in what was observed of sensors in the slot, in rising order of their numbers. Sensors that were not asked are left out.
+    /// Updates with observations of the slot, in increasing order of the sensors' numbers. Sensors that were not asked are left out.
     ///
     /// # Errors
-    /// If the observations are impossible together; others of the estimator.
+    /// If the observations have probability zero together, or the estimator fails.
     fn update(&mut self, observed: &[(usize, Observation<BitString>)]) -> Result<(), BoxError>;
 
-    /// The estimate: mean and standard deviation of each coordinate.
+    /// Mean and standard deviation of each coordinate of the state.
     fn estimate(&self) -> Vec<(f64, f64)>;
 
-    /// How each sensor is judged, by their numbers. Empty for an estimator that does not judge them.
+    /// The estimator's judgement of each sensor, by their numbers. Empty if the estimator does not judge sensors.
     fn health(&self) -> Vec<SensorHealth> {
         Vec::new()
     }
 
-    /// All that the estimator knows, exactly.
+    /// The complete state of the estimator, without rounding.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the state cannot be written.
     fn state(&self) -> Result<BitString, BoxError>;
 
-    /// Goes on from a state. Total.
+    /// Continues from a state. Any bits give a state or an error.
     ///
     /// # Errors
-    /// If the bits are no state of this estimator.
+    /// If the bits are not a state of this estimator.
     fn restore(&mut self, state: &BitString) -> Result<(), BoxError>;
 }
 
-/// How an estimator judges one sensor.
+/// An estimator's judgement of one sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SensorHealth {
-    /// Probability that it works.
+    /// Probability that the sensor works.
     pub working: f64,
-    /// It is taken for dead.
+    /// Whether the estimator regards it as dead.
     pub dead: bool,
-    /// Its reports are not used at present, since they do not fit the model.
+    /// Whether its reports are not used at present because they do not fit the model.
     pub excluded: bool,
 }
 
@@ -103,11 +103,11 @@ impl<R: Receiver + ?Sized> Receiver for Box<R> {
     }
 }
 
-/// Predicts into a slot. Returns what each of the `members` is told and, where one of them follows by echo, the state before the
-/// prediction: what [`Centre::on_predicted`](crate::Centre::on_predicted) takes.
+/// Predicts into a slot. Returns the feedback for each of the `members` and, if one of them follows by echo, the state before the
+/// prediction. Both are arguments of [`Centre::on_predicted`](crate::Centre::on_predicted).
 ///
 /// # Errors
-/// Those of the receiver.
+/// If the receiver fails.
 pub fn predict_and_ask<R: Receiver + ?Sized>(
     receiver: &mut R,
     members: &[Member],
@@ -120,29 +120,30 @@ pub fn predict_and_ask<R: Receiver + ?Sized>(
     Ok((feedback.collect::<Result<_, _>>()?, state))
 }
 
-/// How an update went.
+/// Result of an update.
 #[derive(Debug)]
 pub enum Outcome {
-    /// With all observations.
+    /// All observations were used.
     Used,
-    /// The observations were impossible together, and possible without the sensors of which nothing came: these count as not asked.
+    /// The observations were impossible together, but possible without the sensors from which nothing came; these count as not asked.
     SilentDropped(BoxError),
-    /// Without any: the prediction stands.
+    /// No observation was used: the prediction remains.
     Failed(BoxError),
 }
 
-/// Updates with what was observed; if that fails, without the sensors of which nothing came; if that fails too, not at all.
+/// Updates with the observations. If that fails, it updates without the sensors from which nothing came. If that fails too, it does not
+/// update.
 ///
-/// A sensor that is silent where its scheme had to speak contradicts a link that is thought to lose nothing. It is left out rather than
-/// taken as lost, since [`Observation::Lost`] says that it spoke.
+/// A sensor that is silent although its scheme always sends contradicts a link that is assumed to lose nothing. It is left out and not
+/// counted as lost, because [`Observation::Lost`] means that it sent.
 ///
-/// `observed` has one item per sensor; `None` is no observation.
+/// `observed` has one item per sensor; `None` means no observation.
 pub fn update_or_drop<R: Receiver + ?Sized>(receiver: &mut R, observed: &[Option<Observation<BitString>>]) -> Outcome {
     let asked = observed.iter().cloned().enumerate();
     update_asked(receiver, asked.filter_map(|(sensor, o)| Some((sensor, o?))).collect())
 }
 
-/// The same with what was observed of the sensors that were asked, in rising order of their numbers.
+/// As [`update_or_drop`], with observations of the sensors that were asked, in increasing order of their numbers.
 pub fn update_asked<R: Receiver + ?Sized>(
     receiver: &mut R,
     mut asked: Vec<(usize, Observation<BitString>)>,

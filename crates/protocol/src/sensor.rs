@@ -11,11 +11,11 @@ use crate::slot::{Schedule, Slot};
 #[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Feedback {
-    /// The centre sends it in full.
+    /// The centre sends the feedback in full.
     Told,
-    /// There is nothing to know: the sensor reports by the clock. Any frame of the centre sets the clock.
+    /// No feedback is needed: the sensor reports at fixed times. Every frame of the centre sets its clock.
     Clock,
-    /// The sensor runs the centre's filter too and is sent what the centre received. Where it no longer agrees, it asks for the whole state.
+    /// The sensor runs a copy of the centre's filter and is sent what the centre received. If the two differ, it asks for the whole state.
     Echoed,
 }
 
@@ -24,25 +24,26 @@ pub enum Feedback {
 #[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct SensorSettings {
-    /// How it learns what it must know.
+    /// How the sensor learns what it must know before it measures.
     pub feedback: Feedback,
     /// What the check of a frame covers.
     pub check: Check,
-    /// When slots begin. [`Feedback::Clock`] needs it; with it, other sensors refuse frames of another slot than the present one.
+    /// When slots begin. Required for [`Feedback::Clock`]. Other sensors with a schedule refuse frames of another slot than the present
+    /// one.
     pub schedule: Option<Schedule>,
-    /// Nanoseconds from the beginning of a slot until a sensor that reports by the clock measures. A clock may be ahead by as much, and sensors
-    /// with offsets of their own do not send at once.
+    /// For sensors that report by the clock: nanoseconds from the beginning of a slot to the measurement. The clock may be ahead by at most
+    /// this. Different offsets keep sensors from sending at once.
     pub offset: u64,
-    /// After so many silent slots in a row a heartbeat is sent; 0: never.
+    /// After this many silent slots in a row a heartbeat is sent; 0: never.
     pub heartbeat_after: u32,
-    /// How often a report is sent again that was not acknowledged; 0: no acknowledgement is awaited.
+    /// How often a report without acknowledgement is repeated; 0: no acknowledgement is expected.
     pub repeats: u8,
-    /// Nanoseconds to an acknowledgement before a report is sent again.
+    /// Nanoseconds that the sensor waits for an acknowledgement before it repeats a report.
     pub patience: u64,
 }
 
 impl SensorSettings {
-    /// Whole check, no schedule, no offset, no heartbeat, no repeats.
+    /// Settings with a check of the whole frame and without schedule, offset, heartbeats and repetitions.
     pub fn new(feedback: Feedback) -> Self {
         Self {
             feedback,
@@ -70,7 +71,7 @@ pub enum SensorTimer {
     },
 }
 
-/// What the driver must do next. A driver that leaves one out is none, so that the list is exhaustive.
+/// What the driver must do next. A driver must handle every variant, so the enum is exhaustive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Task<'a> {
     /// Nothing.
@@ -79,32 +80,33 @@ pub enum Task<'a> {
     Sample {
         /// The slot.
         slot: Slot,
-        /// The feedback as it travelled; empty with [`Feedback::Clock`] and [`Feedback::Echoed`], where the driver's replica knows it.
+        /// The feedback as it was sent. Empty with [`Feedback::Clock`]; with [`Feedback::Echoed`] the driver's copy of the filter has it.
         feedback: Payload<'a>,
     },
-    /// Bring the replica up to the end of the slot before `slot` by this payload, and call [`Sensor::on_followed`].
+    /// Bring the copy of the filter to the end of the slot before `slot` by this payload, and call [`Sensor::on_followed`].
     Follow {
         /// The slot that begins.
         slot: Slot,
         /// [`Kind::Echo`]: what the centre received in the slot before. [`Kind::Snapshot`]: the state itself.
         kind: Kind,
-        /// Echo or state.
+        /// The echo or the state.
         payload: Payload<'a>,
     },
     /// Send this frame to the centre.
     Send(Frame<'a>),
-    /// Send the last report again, the same bytes.
+    /// Send the bytes of the last report again.
     SendAgain,
 }
 
-/// What follows from an event: a task, perhaps a timer to set (time in nanoseconds), perhaps a note.
+/// What follows from an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reaction<'a> {
     /// What to do next.
     pub task: Task<'a>,
-    /// A timer to set. Several may run at once. Late timers are harmless; none may fire early.
+    /// A timer to set: time in nanoseconds, and what to pass to [`Sensor::on_timer`]. Several may run at once. They may fire late but not
+    /// early.
     pub timer: Option<(u64, SensorTimer)>,
-    /// What was noticed.
+    /// A note to record.
     pub note: Option<Note>,
 }
 
@@ -123,22 +125,22 @@ fn noted(note: Note) -> Reaction<'static> {
     }
 }
 
-/// Where a sensor is within a slot.
+/// Stage of a sensor within a slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 enum Stage {
-    /// Waits for a frame or the clock.
+    /// It waits for a frame or a timer.
     Idle,
-    /// The driver brings the replica up to date, which should have this digest.
+    /// The driver updates the copy of the filter, whose state should then have this digest.
     Following { slot: Slot, digest: u32, kind: Kind },
     /// The driver measures.
     Sampling { slot: Slot, digest: u32 },
-    /// A report is out, and may be sent again so often.
+    /// A report was sent and may be repeated this often.
     Awaiting { slot: Slot, repeats: u8 },
 }
 
-/// A sensor of a star: events in, a [`Reaction`] out. It has no clock, no socket and no estimator; times are nanoseconds of any clock that
-/// does not go back.
+/// State machine of a sensor of a star network. It takes events and returns [`Reaction`]s. It has no clock, no socket and no estimator.
+/// Times are nanoseconds of any clock that does not go back.
 ///
 /// ```text
 /// told:     on_frame(feedback) -> Sample;  on_sample(report or silence) -> Send
@@ -151,18 +153,19 @@ enum Stage {
 pub struct Sensor {
     settings: SensorSettings,
     stage: Stage,
-    /// The last slot that it answered in, or began to.
+    /// The last slot in which it answered or began to.
     answered: Option<Slot>,
-    /// The last slot whose beginning the replica was brought up to.
+    /// The last slot to whose beginning the copy of the filter was updated.
     followed: Option<Slot>,
     silent: u32,
-    /// When the next slot begins for a sensor that reports by the clock. Timers that were set before the clock was set fire earlier, and
-    /// are ignored.
+    /// Beginning of the next slot for a sensor that reports by the clock. Timers that were set before the clock was corrected fire earlier
+    /// and are ignored.
     begins_at: u64,
 }
 
 impl Sensor {
-    /// A sensor before its first slot. One that reports by the clock is started by [`on_timer`](Self::on_timer) with [`SensorTimer::SlotBegins`].
+    /// A sensor before its first slot. If it reports by the clock, start it by [`on_timer`](Self::on_timer) with
+    /// [`SensorTimer::SlotBegins`].
     pub fn new(settings: SensorSettings) -> Self {
         Self {
             settings,
@@ -174,17 +177,18 @@ impl Sensor {
         }
     }
 
-    /// The settings. The schedule is as the centre's frames have set it.
+    /// The settings. The schedule includes the corrections by the centre's frames.
     pub fn settings(&self) -> &SensorSettings {
         &self.settings
     }
 
-    /// The last slot that it answered in.
+    /// The last slot in which it answered; `None` before the first.
     pub fn answered(&self) -> Option<Slot> {
         self.answered
     }
 
-    /// The sensor after it has lost what it shared with the centre: an echo no longer helps it, a snapshot does. It does not answer a slot twice.
+    /// Tells the machine that the driver's copy of the filter is lost: an echo no longer suffices, a snapshot does. It does not answer a
+    /// slot twice.
     pub fn on_memory_lost(&mut self) {
         self.followed = None;
         self.stage = Stage::Idle;
@@ -198,7 +202,7 @@ impl Sensor {
         }
     }
 
-    /// A frame has arrived that the driver has decoded.
+    /// A decoded frame has arrived.
     pub fn on_decoded<'a>(&mut self, now: u64, frame: Frame<'a>) -> Reaction<'a> {
         let slot = frame.slot;
         let is_broadcast = match (self.settings.feedback, frame.kind) {
@@ -224,7 +228,7 @@ impl Sensor {
         if frame.kind != Kind::Feedback {
             return self.follow(frame);
         }
-        // The digest of told feedback is that of the feedback: under a check of the header it shows inverted bits.
+        // The digest of feedback is computed from the feedback: with a check of the header only, a mismatch shows inverted bits.
         if digest(slot, frame.payload) != frame.digest {
             return noted(Note::Disagreement { slot });
         }
@@ -242,7 +246,7 @@ impl Sensor {
 
     fn follow<'a>(&mut self, frame: Frame<'a>) -> Reaction<'a> {
         let Frame { kind, slot, digest, .. } = frame;
-        // An echo tells of one slot: it helps a replica that stands at the beginning of that slot, and the first echo any that is new.
+        // An echo is of one slot: it suits a copy at the beginning of that slot, and the first echo suits a new copy.
         let connects = kind == Kind::Snapshot || self.followed == Some(slot.before()) || self.is_first(slot);
         if !connects {
             return self.disagree(slot);
@@ -255,12 +259,12 @@ impl Sensor {
         }
     }
 
-    /// Slot 1 begins with what both ends were configured with.
+    /// Whether this is slot 1, which begins with the state that both ends were configured with.
     fn is_first(&self, slot: Slot) -> bool {
         slot == Slot::of_count(1) && self.answered.is_none()
     }
 
-    /// Asks for the whole state.
+    /// The states differ: asks for the whole state.
     fn disagree(&mut self, slot: Slot) -> Reaction<'static> {
         self.followed = None;
         self.stage = Stage::Idle;
@@ -271,7 +275,8 @@ impl Sensor {
         }
     }
 
-    /// The replica was brought up to date; `state` is the [`digest`] of its bits in the slot before. `None` if it could not be.
+    /// The driver has updated its copy of the filter. `state` is the [`digest`] of its bits after the slot before; `None` if the update
+    /// failed.
     pub fn on_followed(&mut self, state: Option<u32>) -> Reaction<'static> {
         let Stage::Following { slot, digest, kind } = self.stage else {
             return noted(Note::Misuse);
@@ -287,12 +292,13 @@ impl Sensor {
         }
     }
 
-    /// The driver has measured: the report, or `None` for silence (also where there was no measurement).
+    /// The driver has measured. `report` is `None` for silence, also without a measurement.
     pub fn on_sample<'a>(&mut self, now: u64, report: Option<Payload<'a>>) -> Reaction<'a> {
         let Stage::Sampling { slot, digest } = self.stage else {
             return noted(Note::Misuse);
         };
         self.stage = Stage::Idle;
+        // After many silent slots send a heartbeat: it tells the centre that the sensor works.
         let Some(report) = report else {
             self.silent = self.silent.saturating_add(1);
             if self.settings.heartbeat_after == 0 || self.silent < self.settings.heartbeat_after {
@@ -365,7 +371,7 @@ impl Sensor {
         self.begins_at = schedule.start(count.saturating_add(1)).saturating_add(offset);
         let timer = Some((self.begins_at, SensorTimer::SlotBegins));
         let slot = Slot::of_count(count);
-        // A clock that was set back meets a slot again: it is not answered twice.
+        // After a clock was set back a slot may begin twice: do not answer it again.
         if self.answered.is_some_and(|answered| !slot.is_after(answered)) {
             return Reaction {
                 timer,
@@ -378,13 +384,13 @@ impl Sensor {
         }
     }
 
-    /// The centre has begun a slot: a sensor that reports by the clock sets it.
+    /// The centre has begun a slot: a sensor that reports by the clock sets its clock by it.
     fn on_slot_announced(&mut self, now: u64, slot: Slot) -> Reaction<'static> {
         let Some(schedule) = &mut self.settings.schedule else {
             return Reaction::NOTHING;
         };
         schedule.synchronise(slot, now);
-        // The slot that is announced is reported in, too, unless that was done before the clock was set back.
+        // The announced slot is reported in too, unless that was done before the clock was set back.
         let offset = self.settings.offset;
         let next = schedule.count(now.saturating_sub(offset)).saturating_add(1);
         self.begins_at = schedule.start(next).saturating_add(offset);

@@ -1,22 +1,22 @@
-//! Slot numbers of 24 bits, and the schedule that gives them times.
+//! Slot numbers of 24 bits, and the schedule of their times.
 
 use core::num::NonZeroU64;
 
-/// Bits of a slot number on the wire.
+/// Bits of a slot number in a frame.
 pub const SLOT_BITS: u32 = 24;
 const MASK: u32 = (1 << SLOT_BITS) - 1;
 
-/// Number of a slot as it travels: counted modulo `2^24`.
+/// Number of a slot as it is sent: counted modulo `2^24`.
 ///
-/// Order is that of serial numbers: `a` is after `b` if `a - b` modulo `2^24` is from 1 to `2^23 - 1`. At ten slots a second numbers come again
-/// after 19 days, and two ends may be 9 days apart before they take old for new.
+/// Slots are compared as serial numbers: `a` is after `b` if `a - b` modulo `2^24` is from 1 to `2^23 - 1`. At ten slots per second numbers
+/// repeat after 19 days, and two ends may differ by up to 9 days before an old slot counts as new.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "std", serde(from = "u64", into = "u64"))]
 pub struct Slot(u32);
 
 impl Slot {
-    /// The slot of this count, modulo `2^24`.
+    /// The number of the slot with this count: `count` modulo `2^24`.
     pub fn of_count(count: u64) -> Self {
         Self((count & u64::from(MASK)) as u32)
     }
@@ -48,7 +48,7 @@ impl Slot {
     pub fn nearest_count(self, count: u64) -> u64 {
         let ahead = u64::from(self.0.wrapping_sub(count as u32) & MASK);
         let behind = (1 << SLOT_BITS) - ahead;
-        // At the ends of the range there is one on one side only.
+        // At the ends of the range of counts there is a candidate on one side only.
         let (later, earlier) = (count.checked_add(ahead), count.checked_sub(behind));
         let nearer = if ahead < behind { later } else { earlier };
         nearer.or(earlier).or(later).unwrap_or(count)
@@ -86,13 +86,13 @@ impl Schedule {
         self.period.get()
     }
 
-    /// Count of the slot at a time; 0 before the first.
+    /// Count of the slot that contains a time; 0 before the first.
     pub fn count(&self, now: u64) -> u64 {
         let count = (i128::from(now) - self.origin) / i128::from(self.period.get());
         u64::try_from(count.max(0)).unwrap_or(u64::MAX)
     }
 
-    /// When the slot of a count begins.
+    /// Time at which the slot of a count begins.
     pub fn start(&self, count: u64) -> u64 {
         let start = self
             .origin
@@ -100,7 +100,7 @@ impl Schedule {
         u64::try_from(start.max(0)).unwrap_or(u64::MAX)
     }
 
-    /// Takes over the centre's time: its slot `slot` begins now.
+    /// Sets the schedule so that slot `slot` begins at `now`.
     pub fn synchronise(&mut self, slot: Slot, now: u64) {
         let count = slot.nearest_count(self.count(now));
         self.origin = i128::from(now) - i128::from(count) * i128::from(self.period.get());

@@ -1,7 +1,7 @@
-//! Linear maps along one group's axis of a table of joint outcomes.
+//! Linear maps along the axis of one group in a table of joint outcomes.
 //!
-//! A table holds, for every joint outcome, a few moments; the axis of a group runs over its count vectors. Moving a breakpoint
-//! moves one report from symbol to symbol, which relates a table over `N` reports to one over `N - 1`.
+//! A table holds a few moments for every joint outcome. The axis of a group runs over its count vectors. If a breakpoint moves, one report
+//! may change from one symbol to another. This relates a table over `N` reports to one over `N - 1`.
 
 use crate::compositions::Compositions;
 
@@ -12,7 +12,7 @@ pub(crate) struct Axis {
     pub(crate) inner: usize,
 }
 
-/// The part of a table whose axis has rows `(block, m)` that belongs to one block.
+/// The part of a table that belongs to one block, if the axis has rows `(block, m)`.
 pub(crate) fn slice(values: &[f64], axis: Axis, blocks: usize, rows: usize, block: usize) -> Vec<f64> {
     let chunk = rows * axis.inner;
     let mut out = Vec::with_capacity(axis.outer * chunk);
@@ -34,6 +34,7 @@ pub(crate) fn reduce(worth: &[f64], axis: Axis, compositions: &Compositions, mis
                 .iter()
                 .enumerate()
             {
+                // Cells that the breakpoint does not bound have coefficient zero.
                 if c[t] != 0.0 {
                     let from = (o * above + at) * axis.inner;
                     let factor = sensors * c[t];

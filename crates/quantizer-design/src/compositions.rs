@@ -1,11 +1,11 @@
-//! Count vectors: how many sensors of a group report each symbol.
+//! Count vectors: the number of sensors of a group that report each symbol.
 //!
-//! The likelihood of `N` identical sensors depends on how many reported each symbol, so `L^N` outcomes collapse to
+//! The likelihood of `N` identical sensors depends only on how many reported each symbol. The `L^N` outcomes reduce to
 //! `C(N + L - 1, L - 1)` count vectors with multinomial coefficients: 220 instead of 262144 for nine sensors of four levels.
 
 use fewbits_numerics::binomial;
 
-/// Number of ways to spread `total` reports over `parts` symbols.
+/// Number of ways to distribute `total` reports over `parts` symbols.
 pub(crate) fn count(total: usize, parts: usize) -> u64 {
     if parts == 0 {
         u64::from(total == 0)
@@ -14,7 +14,7 @@ pub(crate) fn count(total: usize, parts: usize) -> u64 {
     }
 }
 
-/// The count vectors of `total` reports, in decreasing lexicographic order, and those of fewer reports from which they come.
+/// The count vectors of `total` reports in decreasing lexicographic order, and those of fewer reports from which they are built.
 #[derive(Debug, Clone)]
 pub(crate) struct Compositions {
     pub(crate) total: usize,
@@ -24,7 +24,7 @@ pub(crate) struct Compositions {
     pub(crate) log_multiplicity: Vec<f64>,
     /// `up[m][r * parts + t]`: rank among vectors of `m + 1` reports of vector `r` of `m` reports with one more report of `t`.
     up: Vec<Vec<usize>>,
-    /// How the probabilities of `m + 1` reports follow from those of `m`.
+    /// Recursion from the probabilities of `m` reports to those of `m + 1`.
     steps: Vec<Vec<Step>>,
 }
 
@@ -33,6 +33,7 @@ impl Compositions {
         let (mut up, mut steps) = (Vec::with_capacity(total), Vec::with_capacity(total));
         let mut vectors = vec![vec![0; parts]];
         for m in 0..total {
+            // The index of each count vector of `m` reports after one more report of symbol `t`.
             let raised = |v: &Vec<usize>, t: usize| {
                 let mut raised = v.clone();
                 raised[t] += 1;
@@ -47,6 +48,7 @@ impl Compositions {
             vectors = vectors_of(m + 1, parts);
             steps.push(vectors.iter().map(|v| Step::to(v, m + 1)).collect());
         }
+        // In logarithms, since multinomial coefficients of many sensors overflow.
         let ln_factorial = |n: usize| (2..=n).map(|i| (i as f64).ln()).sum::<f64>();
         let log_multiplicity = vectors
             .iter()
@@ -72,15 +74,15 @@ impl Compositions {
         count(self.total - missing, self.parts) as usize
     }
 
-    /// Ranks one level up from the level with `missing` reports fewer than the total.
+    /// For each vector with `missing` reports fewer than the total: ranks of the vectors with one more report.
     pub(crate) fn up(&self, missing: usize) -> &[usize] {
         &self.up[self.total - missing]
     }
 
     /// Multinomial probabilities at every node; `symbol[t * nodes + i]` is the probability of symbol `t` at node `i`.
     ///
-    /// From `R_m(n) = (m / n_t) P_t R_{m-1}(n - e_t)`, the first `t` that occurs. Returns the tables of `total`, `total - 1` and
-    /// `total - 2` reports, the last two as far as they exist.
+    /// By `R_m(n) = (m / n_t) P_t R_{m-1}(n - e_t)` with `t` the first symbol that occurs. Returns the tables of `total`, `total - 1` and
+    /// `total - 2` reports, as far as these are not negative.
     pub(crate) fn probabilities(&self, symbol: &[f64], nodes: usize) -> Vec<Vec<f64>> {
         let mut levels = vec![vec![1.0; nodes]];
         for steps in &self.steps {
@@ -127,7 +129,7 @@ fn vectors_of(total: usize, parts: usize) -> Vec<Vec<usize>> {
     let mut vector = vec![0; parts];
     vector[0] = total;
     let mut all = vec![vector.clone()];
-    // The next one has one report less at the last place before the end that has any; it and those of the end follow behind.
+    // Next vector: one report moves from the last non-empty place before the end to the place after it, and so do all reports of the end.
     while let Some(i) = (0..parts - 1).rev().find(|i| vector[*i] > 0) {
         let end = std::mem::take(&mut vector[parts - 1]);
         vector[i] -= 1;
@@ -137,7 +139,7 @@ fn vectors_of(total: usize, parts: usize) -> Vec<Vec<usize>> {
     all
 }
 
-/// Position of a count vector among those of its sum and length, in decreasing lexicographic order.
+/// Index of a count vector among those of equal sum and length, in decreasing lexicographic order.
 pub(crate) fn rank(vector: &[usize]) -> usize {
     let mut left: usize = vector.iter().sum();
     let mut rank = 0;

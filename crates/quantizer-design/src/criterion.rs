@@ -1,35 +1,35 @@
-//! Design criteria as sums over joint outcomes.
+//! Design criteria, computed as sums over joint outcomes.
 
 use crate::error::{Error, refuse};
 use crate::observation_model::{Feature, ObservationModel};
 use serde::{Deserialize, Serialize};
 
-/// Below this a probability counts as zero inside a logarithm.
+/// Smaller probabilities are treated as zero inside a logarithm.
 pub(crate) const LOG_FLOOR: f64 = 1e-300;
 
-/// Up to this many values of the unknown, information is the prior's entropy minus the equivocation, which keeps its digits
-/// where decisions are almost sure.
+/// With at most this many values of the unknown, information is computed as the prior's entropy minus the equivocation. This keeps digits
+/// if decisions are almost certain.
 const FEW_VALUES: usize = 8;
 
-/// The figure of merit of a system of quantizers.
+/// The quantity by which a system of quantizers is designed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Criterion {
-    /// `I(X; T)` in nats, to be maximised.
+    /// Mutual information `I(X; T)` in nats, to be maximised.
     MutualInformation,
-    /// `E (X - E[X | T])^2`, to be minimised.
+    /// Mean squared error `E (X - E[X | T])^2`, to be minimised.
     MeanSquaredError,
     /// Error probability of the maximum a posteriori decision, to be minimised; for finite priors.
     BayesError,
 }
 
-/// Which cells of the sample may share a level or a word.
+/// Whether a level or word may be used for several intervals of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AllowedCells {
-    /// One interval for each.
+    /// One interval for each level or word.
     #[default]
     Intervals,
-    /// Several intervals for one: folded cells.
+    /// Any number of intervals for each (folded cells).
     Any,
 }
 
@@ -43,9 +43,9 @@ impl Criterion {
     }
 }
 
-/// A criterion in the model where it is evaluated.
+/// A criterion together with the data of the model that it needs.
 ///
-/// Every criterion is `constant + sense * sum_outcomes psi(m)` where `m` are a few moments of the outcome's likelihood:
+/// Every criterion is `constant + sense * sum_outcomes psi(m)`, where `m` are a few moments of the outcome's likelihood:
 ///
 /// | criterion | moments | `psi` |
 /// |---|---|---|
@@ -95,12 +95,12 @@ impl Scored {
         &self.features
     }
 
-    /// Whether the conditional entropy of the symbols must be subtracted, sensor by sensor.
+    /// Whether the conditional entropy of the symbols is subtracted separately for each sensor.
     pub(crate) fn has_separable_entropy(&self) -> bool {
         self.kind == Kind::Entropy
     }
 
-    /// `psi` of one outcome that stands for `exp(log_multiplicity)` equally likely ones.
+    /// `psi` of an outcome that represents `exp(log_multiplicity)` equally likely ones.
     pub(crate) fn value(&self, m: &[f64], log_multiplicity: f64) -> f64 {
         match self.kind {
             Kind::Entropy if m[0] > 0.0 => -m[0] * (m[0].max(LOG_FLOOR).ln() - log_multiplicity),
@@ -119,6 +119,7 @@ impl Scored {
                     .filter(|(k, (w, q))| *k != best && *w * *q > 0.0)
                     .map(|(_, (w, q))| w * q * (w * q / mass).ln())
                     .sum();
+                // The term of the most probable value uses `ln_1p`, since its posterior is often within rounding of one.
                 rest + (mass - others) * (-others / mass).ln_1p()
             }
             Kind::Information => {
@@ -170,7 +171,7 @@ impl Scored {
         }
     }
 
-    /// The matrix of second derivatives of `psi`, applied to `direction`.
+    /// The product of the matrix of second derivatives of `psi` and `direction`.
     pub(crate) fn curvature(&self, m: &[f64], direction: &[f64], out: &mut [f64]) {
         match self.kind {
             Kind::Entropy => out[0] = if m[0] > 0.0 { -direction[0] / m[0] } else { 0.0 },
@@ -192,7 +193,7 @@ impl Scored {
                     *o = if mass <= 0.0 || *q <= LOG_FLOOR {
                         0.0
                     } else if k == best {
-                        // d/q - change/mass without cancellation where the favourite has all the mass.
+                        // d/q - change/mass, without cancellation if the most probable value has all the mass.
                         w * (d / q * (others / mass) - moved / mass)
                     } else {
                         w * (d / q - change / mass)
@@ -215,7 +216,7 @@ impl Scored {
         self.weights.iter().zip(q).map(|(w, q)| w * q).sum()
     }
 
-    /// The most probable value, the mass of the outcome, and what of it belongs to the others.
+    /// Index of the most probable value, mass of the outcome, and mass of all other values.
     fn favourite(&self, q: &[f64]) -> (usize, f64, f64) {
         let best = most_probable(&self.weights, q);
         let all = self.weights.iter().zip(q).enumerate();
@@ -223,7 +224,7 @@ impl Scored {
         (best, others + self.weights[best] * q[best], others)
     }
 
-    /// Constant that is added to the sum over outcomes within a design. [`Scored::offset`] is added to the returned value only.
+    /// Constant that is added to the sum over outcomes during a design. [`Scored::offset`] is added to the returned value only.
     pub(crate) fn constant(&self, model: &ObservationModel) -> f64 {
         if self.kind == Kind::Explained {
             -model.variance
@@ -232,8 +233,8 @@ impl Scored {
         }
     }
 
-    /// The prior's entropy, if it is part of the criterion. It is added to returned values only: within a design small changes would
-    /// lose their digits beside it.
+    /// The prior's entropy, if it is part of the criterion. It is added to returned values only: during a design, small changes would
+    /// lose digits if it were included.
     pub(crate) fn offset(&self) -> f64 {
         if self.kind != Kind::Equivocation {
             return 0.0;
@@ -241,7 +242,7 @@ impl Scored {
         self.weights.iter().filter(|w| **w > 0.0).map(|w| -w * w.ln()).sum()
     }
 
-    /// Scale of the signed value without offset: changes are judged relative to it, so that results do not depend on units.
+    /// Reference size of the signed value without offset. Changes are compared with it, so that results do not depend on units.
     pub(crate) fn unit(&self, value: f64, model: &ObservationModel) -> f64 {
         match self.kind {
             Kind::Equivocation | Kind::Decision => value.abs(),
@@ -251,7 +252,7 @@ impl Scored {
     }
 }
 
-/// Index of the largest `w_k q_k`; the first on ties.
+/// Index of the largest `w_k q_k`; the first one if several are equal.
 pub(crate) fn most_probable(weights: &[f64], q: &[f64]) -> usize {
     let mut best = 0;
     for k in 1..q.len() {

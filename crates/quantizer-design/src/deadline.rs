@@ -1,18 +1,18 @@
-//! When a computation must end.
+//! Time limits of computations.
 
 use std::time::{Duration, Instant};
 
-/// Multiplications per second that a computation may count on: a third of what a slow processor does.
+/// Multiplications per second that a computation may assume: a third of the speed of a slow processor.
 const SPEED: f64 = 3e8;
 
-/// The instant at which a computation must end, if there is one.
+/// The instant by which a computation must end; `None` without a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Deadline(Option<Instant>);
 
 impl Deadline {
     pub(crate) const NEVER: Self = Self(None);
 
-    /// `limit` after `start`. Never, if there is no limit or the sum is beyond the clock's range.
+    /// The instant `limit` after `start`. Never, if there is no limit or the sum overflows.
     pub(crate) fn after(start: Instant, limit: Option<Duration>) -> Self {
         Self(limit.and_then(|limit| start.checked_add(limit)))
     }
@@ -21,7 +21,7 @@ impl Deadline {
         self.0.is_some_and(|end| Instant::now() >= end)
     }
 
-    /// Whether so many multiplications may take longer than what is left of the time.
+    /// Whether this many multiplications may take longer than the remaining time.
     pub(crate) fn is_short_for(self, work: f64) -> bool {
         self.0
             .is_some_and(|end| work > SPEED * end.saturating_duration_since(Instant::now()).as_secs_f64())

@@ -5,7 +5,7 @@ pub use fewbits_quantizers::Error;
 use fewbits_numerics::ArgumentError;
 pub(crate) use fewbits_numerics::error::refuse;
 
-/// A stored number that is a size: not negative, but for rounding, and finite.
+/// Reads a stored size: finite, and not negative except for rounding.
 pub(crate) fn stored_size<'de, D: serde::Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     let size = <f64 as serde::Deserialize>::deserialize(source)?;
     if size.is_finite() && size >= -1e-9 {

@@ -8,18 +8,18 @@ use crate::problem::Problem;
 use crate::system::System;
 
 impl System {
-    /// Value of a criterion: nats, squared units of the unknown, or a probability. Exact up to quadrature (1e-12).
+    /// Value of a criterion: nats, squared units of the unknown, or a probability. The quadrature error is about 1e-12.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] beyond the outcome limit; [`Error::Argument`] for a Bayes error under a continuous prior.
+    /// [`Error::TooLarge`] if there are more outcomes than the limit; [`Error::Argument`] for a Bayes error under a continuous prior.
     pub fn value(&self, criterion: Criterion) -> Result<f64, Error> {
         let problem = Problem::new(self, criterion, &[])?;
         Ok((problem.value(&[]) + problem.offset()) * criterion.sense())
     }
 
-    /// Value, gradient and Hessian of a criterion with respect to all breakpoints, group after group.
+    /// Value, gradient and Hessian of a criterion with respect to all breakpoints, group by group.
     ///
-    /// The Bayes error is smooth between the breakpoints at which a decision changes; its derivatives hold inside such a piece.
+    /// The Bayes error is smooth except at breakpoints where a decision changes; its derivatives are those of the smooth piece.
     ///
     /// # Errors
     /// As [`System::value`].

@@ -1,4 +1,4 @@
-//! The laws of one group's reports, and how they move with its breakpoints.
+//! Probabilities of one group's reports, and their derivatives with respect to its breakpoints.
 
 use crate::compositions::Compositions;
 use crate::error::Error;
@@ -7,7 +7,7 @@ use crate::observation_model::Feature;
 use crate::system::{SensorGroup, System};
 use fewbits_numerics::{kernels, normal};
 
-/// A group whose breakpoints may move.
+/// A group whose breakpoints may change.
 #[derive(Debug, Clone)]
 pub(crate) struct Active<'a> {
     pub(crate) index: usize,
@@ -16,11 +16,11 @@ pub(crate) struct Active<'a> {
     /// Mean of a sensor's sample at each node, and its standard deviation there.
     pub(crate) means: Vec<f64>,
     pub(crate) deviation: f64,
-    /// `c[i][t]`: change of the probability of symbol `t` when breakpoint `i` moves up, per density.
+    /// `c[i][t]`: derivative of the probability of symbol `t` with respect to breakpoint `i`, divided by the density of the sample there.
     pub(crate) exchange: Vec<Vec<f64>>,
 }
 
-/// Factors of the node sums of one group at given breakpoints.
+/// Tables from which the node sums of one group are formed, at given breakpoints.
 pub(crate) struct Slots {
     /// Report probabilities of all sensors of the group, of all but one, and of all but two.
     pub(crate) reports: [Table; 3],
@@ -57,7 +57,7 @@ impl<'a> Active<'a> {
         self.exchange.len()
     }
 
-    /// The breakpoints as they are in the system.
+    /// The breakpoints of the group in the system.
     pub(crate) fn breakpoints(&self) -> &'a [f64] {
         self.group.quantizer().breakpoints()
     }
@@ -82,7 +82,7 @@ impl<'a> Active<'a> {
         symbols
     }
 
-    /// Logarithms of the symbols' probabilities at each node, a row per symbol.
+    /// Logarithms of the symbols' probabilities at each node, one row per symbol.
     fn log_symbols(&self, b: &[f64]) -> Vec<Vec<f64>> {
         let edge = |i: usize| b.get(i).copied().unwrap_or(f64::INFINITY);
         let lower = |cell: usize| if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
@@ -124,7 +124,7 @@ impl<'a> Active<'a> {
             .unzip()
     }
 
-    /// The tables whose products the node sums run over.
+    /// The tables that enter the node sums as factors.
     pub(crate) fn slots(&self, symbols: &[f64], densities: &[Vec<f64>], slopes: &[Vec<f64>]) -> Slots {
         let nodes = self.means.len();
         let mut levels = self.compositions.probabilities(symbols, nodes).into_iter();
@@ -146,7 +146,7 @@ impl<'a> Active<'a> {
     }
 }
 
-/// Probability of each cell between breakpoints for normal samples of these means, a list per cell.
+/// Probability of each cell between breakpoints, for normal samples of these means; one list per cell.
 pub(crate) fn cell_probabilities(means: &[f64], deviation: f64, breakpoints: &[f64]) -> Vec<Vec<f64>> {
     let standardised = |edge: f64| -> Vec<f64> { means.iter().map(|m| (edge - m) / deviation).collect() };
     let mut lower = standardised(f64::NEG_INFINITY);
@@ -175,7 +175,8 @@ pub(crate) fn negative_entropy(symbols: &[f64], mass: &[f64]) -> f64 {
         .sum()
 }
 
-/// Report probabilities of every group at every node, and the log multiplicity of every joint outcome, first group slowest.
+/// Report probabilities of every group at every node, and the log multiplicity of every joint outcome, with the first group varying
+/// slowest.
 pub(crate) struct Reports {
     tables: Vec<Table>,
     pub(crate) log_multiplicity: Vec<f64>,
@@ -197,7 +198,7 @@ impl Reports {
         })
     }
 
-    /// The features' moments of every joint outcome.
+    /// For every joint outcome, its moments: the features of the product of its report probabilities.
     pub(crate) fn moments(&self, features: &[Feature]) -> Vec<f64> {
         moments(&self.tables.iter().collect::<Vec<_>>(), features)
     }
@@ -212,7 +213,7 @@ pub(crate) fn symbol_tables(system: &System) -> Result<Vec<Table>, Error> {
     (0..system.groups().len()).map(of).collect()
 }
 
-/// `ln P(outcome | x_k)` for every joint outcome, outcomes by values: digits where the probabilities themselves underflow.
+/// `ln P(outcome | x_k)` for every joint outcome, outcomes by values. It stays accurate if the probabilities underflow.
 pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
     system.check_outcomes()?;
     let model = system.model();
@@ -237,6 +238,7 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
         let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x + y).collect();
         joint = joint.iter().flat_map(|a| rows.iter().map(move |b| sum(a, b))).collect();
     }
+    // With correlated noise each value is a mixture over nodes: log-sum-exp over the nodes of the value.
     let mut out = Vec::with_capacity(joint.len() * model.values.len());
     for row in &joint {
         for feature in &model.given {
@@ -248,7 +250,7 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
     Ok(out)
 }
 
-/// All sums of an entry of `a` and an entry of `b`, the latter running faster.
+/// All sums of an entry of `a` and an entry of `b`; the index of `b` varies faster.
 pub(crate) fn sums(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().flat_map(|x| b.iter().map(move |y| x + y)).collect()
 }

@@ -1,9 +1,9 @@
-//! Joint design of the scalar quantizers of several sensors, and what follows from their symbols.
+//! Joint design of the scalar quantizers of several sensors, and decoders for their symbols.
 //!
-//! Several sensors measure one unknown through noise, and each may report a few bits. Which cells should each sensor use so
-//! that together they say most, and which word stands for which cell? Start with [`Request`]: it takes the prior and the noise
-//! ([`ObservationModel`]), the bits of each sensor ([`BitBudget`]) and the link, and returns [`Solutions`], best first. A [`Solution`] encodes
-//! and decodes, and leaves the library as a table, JSON, a C header or Rust constants ([`Export`]).
+//! Several sensors measure one unknown with noise, and each may report a few bits. The design chooses the cells of each sensor, and the
+//! word of each cell, so that the estimate from all words is best. Start with [`Request`]: it takes the prior and the noise
+//! ([`ObservationModel`]), the bits of each sensor ([`BitBudget`]) and the link, and returns [`Solutions`], best first. A [`Solution`]
+//! encodes and decodes, and can be exported as a table, JSON, a C header or Rust constants ([`Export`]).
 //!
 //! ```
 //! use fewbits_core::Link;
@@ -18,22 +18,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | [`solve`] | requests, solutions, exports, designs for a box of models |
-//! | [`observation_model`], [`system`] | prior and noise; the sensors with their quantizers and channels |
-//! | [`design`] | local design of given levels by Newton's method: all sensors at once, or one after the other |
+//! | [`solve`] | requests, solutions, exports, designs for uncertain models |
+//! | [`observation_model`], [`system`] | prior and noise; sensors with their quantizers and channels |
+//! | [`design`] | local design for given numbers of levels by Newton's method: all sensors at once, or one after the other |
 //! | [`decoder`], [`table`] | the posterior of the unknown, decisions and tests |
-//! | [`bounds`] | limits that no design can pass |
-//! | [`published`] | algorithms of the publications, to reproduce their tables |
+//! | [`bounds`] | bounds for every design |
+//! | [`published`] | algorithms of the publications, for reproducing their tables |
 //!
-//! The central choice: **every figure of merit is computed exactly, never sampled.** Given the unknown (and a shared noise
-//! factor) the sensors are independent, so each joint outcome has a probability that is a one-dimensional sum of products of
-//! positive cell probabilities. That gives twelve digits, and with them gradients, Hessians, Newton's method, and the
-//! certainty that a stationary point is an optimum and not a saddle ([`Certificate`]). The price is the enumeration of outcomes,
-//! `L^N` of them for `N` different sensors of `L` levels; identical sensors are counted instead of told apart, which leaves
-//! `C(N + L - 1, L - 1)`, and every enumeration has a limit with a typed error beyond it. Nothing depends on the unit: a model
-//! in other units has the design in other units.
+//! Design rule: **every criterion is computed exactly, not by simulation.** Given the unknown (and a shared noise
+//! factor) the sensors are independent, so the probability of a joint outcome is a one-dimensional sum of products of
+//! positive cell probabilities. This gives twelve digits, gradients and Hessians, so that Newton's method works and a
+//! stationary point can be classified as optimum or saddle ([`Certificate`]). The cost is the enumeration of outcomes:
+//! `L^N` for `N` different sensors of `L` levels. Of identical sensors only the counts matter, which leaves
+//! `C(N + L - 1, L - 1)`. Every enumeration has a limit, with a typed error above it. A model in other units gives the same design in those
+//! units.
 //!
 //! ```
 //! use fewbits_core::Observation;
@@ -55,8 +55,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: random numbers (multi-starts draw from fixed streams, so every design is reproducible), vector quantizers,
-//! variable-length codes, time: a filter uses these quantizers through their factors.
+//! Not in this crate: random numbers (designs from several starts use fixed streams, so they are reproducible), vector quantizers,
+//! variable-length codes, time. A filter uses these quantizers through their factors.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 

@@ -1,9 +1,9 @@
-//! Sums over nodes of products of per-group tables: where all the time is spent.
+//! Sums over nodes of products of per-group tables. Most of the computing time is spent here.
 
 use crate::deadline::Deadline;
 use crate::observation_model::Feature;
 
-/// Functions on the nodes, one a row.
+/// Functions on the nodes, one per row.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Table {
     pub(crate) values: Vec<f64>,
@@ -23,7 +23,7 @@ impl Table {
         &self.values[r * self.nodes..(r + 1) * self.nodes]
     }
 
-    /// All products of a row of `self` with a row of `other`, the latter running faster.
+    /// All products of a row of `self` and a row of `other`; the index of `other` varies faster.
     pub(crate) fn outer(&self, other: &Self) -> Self {
         let mut values = Vec::with_capacity(self.values.len() * other.rows());
         for a in 0..self.rows() {
@@ -35,7 +35,7 @@ impl Table {
     }
 }
 
-/// Inner product with four independent sums, so that it vectorises.
+/// Inner product with four independent sums, which the compiler vectorises.
 #[inline]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
@@ -49,7 +49,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// [`dot`] of `a` with four rows at once, to the bit: `a` is read once for them.
+/// [`dot`] of `a` with four rows, with the same bits; `a` is read only once.
 #[inline]
 fn dot_with_four(a: &[f64], rows: [&[f64]; 4]) -> [f64; 4] {
     let whole = a.len() / 4 * 4;
@@ -70,14 +70,14 @@ fn dot_with_four(a: &[f64], rows: [&[f64]; 4]) -> [f64; 4] {
     })
 }
 
-/// `sum_node feature(node) prod_g table_g[r_g](node)` for every choice of one row a table and every feature.
+/// `sum_node feature(node) prod_g table_g[r_g](node)` for every combination of one row per table, and every feature.
 ///
-/// Layout of the result: rows of the first table slowest, features fastest.
+/// Layout of the result: the row of the first table varies slowest, the feature fastest.
 pub(crate) fn moments(tables: &[&Table], features: &[Feature]) -> Vec<f64> {
     moments_until(tables, features, Deadline::NEVER).unwrap_or_default()
 }
 
-/// As [`moments`]; `None` if the time is over first.
+/// As [`moments`]; `None` if the time limit is reached first.
 pub(crate) fn moments_until(tables: &[&Table], features: &[Feature], deadline: Deadline) -> Option<Vec<f64>> {
     let combinations: usize = tables.iter().map(|t| t.rows()).product();
     let mut out = Vec::with_capacity(combinations * features.len());
@@ -124,6 +124,7 @@ fn descend(
             out[at] = sum;
             at += features.len();
         };
+        // Four dot products at a time, so that the common factor is read once.
         let fours = last.rows() / 4 * 4;
         for r in (0..fours).step_by(4) {
             let four = [0, 1, 2, 3].map(|i| &last.row(r + i)[range.clone()]);

@@ -1,4 +1,4 @@
-//! Newton's method with a spectrally modified Hessian, for breakpoints that must stay in order.
+//! Newton's method with a modified Hessian, for breakpoints that must stay in increasing order.
 
 use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
@@ -7,33 +7,33 @@ use fewbits_numerics::error::{at_least_one, non_negative, positive};
 use nalgebra::{DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
-/// Curvatures smaller than this share of the largest are replaced by it, so that flat directions take finite steps.
+/// Curvatures below this fraction of the largest are replaced by it, so that steps along flat directions stay finite.
 const CURVATURE_FLOOR: f64 = 1e-10;
-/// A step may lower the objective by this, relative to its size: rounding.
+/// Relative amount by which a step may lower the objective, because of rounding.
 const SLACK: f64 = 1e-15;
-/// Where the predicted gain is below this, relative to the objective, rounding hides it: Newton's quadratic convergence is
-/// trusted and the objective not consulted.
+/// If the predicted gain is below this fraction of the objective, rounding hides it. The Newton step is then taken without comparing the
+/// objective.
 const HIDDEN_GAIN: f64 = 1e-13;
-/// A curvature above this marks a saddle, one below its negative an optimum; in units of the criterion and the breakpoints'
-/// scale, so that the verdict knows no unit.
+/// A curvature above this is a saddle, one below its negative an optimum. In units of the criterion and of the breakpoints'
+/// scale, so that the result does not depend on units.
 const CURVATURE: f64 = 1e-8;
 
-/// What the second derivatives say of a stationary point.
+/// Classification of a stationary point by its second derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Certificate {
-    /// Every change of the breakpoints makes it worse to second order: a local optimum.
+    /// Every change of the breakpoints makes the criterion worse to second order: a local optimum.
     LocalOptimum,
-    /// Some change neither improves nor worsens it to second order: nothing is proved.
+    /// Some change neither improves nor worsens it to second order: undecided.
     Flat,
     /// Some change improves it to second order.
     Saddle,
-    /// The point is not known to be stationary: the iteration was not run to its end, or the breakpoints were rounded.
+    /// The point may not be stationary: the iteration did not converge, or the breakpoints were rounded.
     Unproved,
 }
 
 impl Certificate {
-    /// The verdict on a largest curvature (of the criterion signed so that larger is better), given the sizes of the criterion
+    /// The certificate for a largest curvature (of the criterion signed so that larger is better), given the scales of the criterion
     /// and of the breakpoints.
     pub(crate) fn of(largest_curvature: f64, unit: f64, scale: f64) -> Self {
         let relative = largest_curvature * scale * scale / unit.max(f64::MIN_POSITIVE);
@@ -47,26 +47,26 @@ impl Certificate {
     }
 }
 
-/// What Newton's method does at a saddle.
+/// The behaviour of Newton's method at a saddle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AtSaddle {
-    /// Steps off along the direction of ascent and goes on. Without this a symmetric start stays symmetric.
+    /// Steps off in the direction of ascent and continues. Without this a symmetric start stays symmetric.
     #[default]
     StepOff,
-    /// Stays, and returns the saddle with its positive curvature.
+    /// Stops and returns the saddle with its positive curvature.
     Stay,
 }
 
-/// Stopping and safeguards of a Newton design.
+/// Stopping rule and safeguards of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Newton {
-    /// Most iterations, escapes from saddles included.
+    /// Largest number of iterations, steps off saddles included.
     pub max_iterations: usize,
-    /// The iteration ends when no breakpoint moves by more than this times the scale.
+    /// The iteration ends if no breakpoint moves by more than this times the scale.
     pub tolerance: f64,
-    /// No breakpoint moves by more than this times the scale at once.
+    /// Largest move of a breakpoint in one iteration, in units of the scale.
     pub max_step: f64,
-    /// What to do on arriving at a saddle.
+    /// What to do at a saddle.
     pub at_saddle: AtSaddle,
 }
 
@@ -82,7 +82,7 @@ impl Default for Newton {
 }
 
 impl Newton {
-    /// Refuses settings with which no design could end.
+    /// An error for settings with which the iteration cannot end.
     fn check(&self) -> Result<(), Error> {
         at_least_one("max_iterations", self.max_iterations)?;
         non_negative("tolerance", self.tolerance)?;
@@ -90,7 +90,7 @@ impl Newton {
         Ok(())
     }
 
-    /// Stays at the stationary point that the start leads to, be it a saddle.
+    /// Settings that stop at the stationary point to which the start leads, even if it is a saddle.
     pub fn to_nearest_stationary_point() -> Self {
         Self {
             at_saddle: AtSaddle::Stay,
@@ -103,9 +103,9 @@ impl Newton {
 pub(crate) trait Objective {
     fn value(&self, b: &[f64]) -> f64;
     fn derivatives(&self, b: &[f64]) -> Derivatives;
-    /// Lengths of the runs of `b` that must be increasing.
+    /// Lengths of the parts of `b` that must be increasing.
     fn blocks(&self) -> Vec<usize>;
-    /// The size against which changes of a value are small or large, whatever the unit.
+    /// Scale of the value: changes are compared with it, whatever the unit.
     fn unit(&self, value: f64) -> f64;
 }
 
@@ -120,16 +120,16 @@ pub(crate) struct Stationary {
     pub(crate) evaluations: usize,
 }
 
-/// Climbs from `start`; an iteration that the deadline cuts short has not converged.
+/// Maximises from `start`. If the deadline ends the iteration, it counts as not converged.
 ///
 /// ```text
 /// repeat
 ///     g, H     <- gradient and Hessian at b;  H = V diag(lambda) V'
 ///     step     <- V diag(1 / max(|lambda|, 1e-10 max |lambda|)) V' g       # ascent even where H is not negative definite
 ///     shorten so that no entry exceeds max_step
-///     halve until b + step is in order and the objective does not fall
+///     halve until b + step is increasing and the objective does not decrease
 ///     b        <- b + step
-/// until |step| <= tolerance; at a saddle step off along the top eigenvector and go on
+/// until |step| <= tolerance; at a saddle step off along the eigenvector of the largest eigenvalue and continue
 /// ```
 pub(crate) fn climb(
     objective: &impl Objective,
@@ -141,7 +141,7 @@ pub(crate) fn climb(
     newton.check()?;
     let blocks = objective.blocks();
     let mut b = start.to_vec();
-    // Evaluations without derivatives; those with them are as many as iterations.
+    // Counts evaluations without derivatives; those with derivatives equal the iterations.
     let mut values = 0;
     let mut last_step = f64::INFINITY;
     let mut escapes = 0;
@@ -165,7 +165,7 @@ pub(crate) fn climb(
             step *= newton.max_step * scale / longest;
         }
         let trusted = longest <= 1e-3 * scale && predicted_gain <= HIDDEN_GAIN * unit;
-        // Rounding in the gradient stops the quadratic decrease before any fixed tolerance on flat objectives.
+        // On flat objectives, rounding of the gradient ends the quadratic convergence before a fixed tolerance is met.
         let arrived = longest <= newton.tolerance * scale || (trusted && longest >= 0.5 * last_step);
         if arrived {
             let largest_curvature = eigen.eigenvalues.max();
@@ -206,7 +206,7 @@ fn not_converged(iterations: usize, change: f64) -> Error {
     }
 }
 
-/// `b + step`, the step halved until the result is in order and accepted; `None` if it never is.
+/// `b + step`, with the step halved until the result is increasing and accepted; `None` if this never happens.
 fn moved(
     b: &[f64],
     step: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! The joint outcome table of a system, for inspection and for decisions.
+//! The table of joint outcomes of a system, for inspection and for decisions.
 
 use crate::compositions::rank;
 use crate::criterion::most_probable;
@@ -8,10 +8,10 @@ use crate::observation_model::ObservationModel;
 use crate::system::System;
 use fewbits_numerics::error::entries;
 
-/// Most entries of a table (outcomes times values of the unknown).
+/// Largest number of entries of a table (outcomes times values of the unknown).
 const ENTRY_LIMIT: u64 = 1 << 25;
 
-/// Index of a joint report in the tables of a system: the rank of each group's count vector, first group slowest.
+/// Index of a joint report in the tables of a system: the rank of each group's count vector, with the first group varying slowest.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout {
     groups: Vec<(Vec<usize>, usize, usize)>,
@@ -30,7 +30,7 @@ impl Layout {
         }
     }
 
-    /// Number of the outcome in which sensor `n` was received as `symbols[n]`.
+    /// Index of the outcome in which `symbols[n]` was received from sensor `n`.
     pub(crate) fn index(&self, symbols: &[usize]) -> Result<usize, Error> {
         entries("symbols", symbols.len(), self.sensors)?;
         let mut index = 0;
@@ -55,7 +55,7 @@ impl Layout {
     }
 }
 
-/// `P(outcome | x)` for every joint outcome, up to permutations within groups, and every value of the unknown.
+/// `P(outcome | x)` for every value of the unknown and every joint outcome. An outcome is given by the counts of symbols in each group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointTable {
     system: System,
@@ -66,7 +66,7 @@ pub struct JointTable {
 }
 
 impl JointTable {
-    /// Tabulates a system.
+    /// Computes the table of a system.
     ///
     /// # Errors
     /// [`Error::TooLarge`] beyond the system's outcome limit or 33 million entries.
@@ -101,22 +101,22 @@ impl JointTable {
         self.model().values()
     }
 
-    /// Outcome in which sensor `n` was received as symbol `symbols[n]`.
+    /// Index of the outcome in which `symbols[n]` was received from sensor `n`.
     ///
     /// # Errors
-    /// If there is not one symbol a sensor, or one is out of range.
+    /// If there is not one symbol per sensor, or one is out of range.
     pub fn outcome(&self, symbols: &[usize]) -> Result<usize, Error> {
         self.layout.index(symbols)
     }
 
-    /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. Sensors of a group are not told apart: divide by the
+    /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. An outcome does not say which sensor of a group sent what: divide by the
     /// [`multiplicity`](Self::multiplicity) for one particular report.
     pub fn likelihood(&self, outcome: usize) -> &[f64] {
         let values = self.model().values().len();
         self.likelihood.chunks_exact(values).nth(outcome).unwrap_or_default()
     }
 
-    /// Number of reports of individual sensors that make up the outcome.
+    /// Number of different reports of individual sensors that give this outcome.
     pub fn multiplicity(&self, outcome: usize) -> f64 {
         self.log_multiplicity.get(outcome).map_or(0.0, |l| l.exp().round())
     }
@@ -131,14 +131,14 @@ impl JointTable {
             .sum()
     }
 
-    /// Maximum a posteriori value of the unknown, as an index into [`values`](Self::values); the first on ties.
+    /// Maximum a posteriori value of the unknown, as an index into [`values`](Self::values); the first if several are equal.
     pub fn decide(&self, outcome: usize) -> usize {
         most_probable(self.model().weights(), self.likelihood(outcome))
     }
 
     /// Entropy of the unknown given the outcome, `H(X | T)` in nats, for a finite prior.
     ///
-    /// `H(X) - I(X; T)` loses all digits where the decision is almost sure; this sum of small positive terms does not.
+    /// `H(X) - I(X; T)` loses all digits if the decision is almost certain; this sum of small positive terms does not.
     ///
     /// # Errors
     /// If the prior is continuous.
@@ -158,11 +158,11 @@ impl JointTable {
                 let joint = w * q;
                 if k != best && joint > 0.0 {
                     others += joint;
-                    // Of a quotient that is at most 1: its inverse overflows for the smallest numbers.
+                    // The quotient is at most 1; its inverse would overflow for the smallest numbers.
                     total -= joint * (joint / mass).ln();
                 }
             }
-            // -(1 - d) ln(1 - d) of the favourite.
+            // -(1 - d) ln(1 - d) of the most probable value.
             let d = others / mass;
             total -= mass * (1.0 - d) * (-d).ln_1p();
         }

@@ -1,13 +1,13 @@
-//! One form for all descriptions of the same design.
+//! A standard form in which equivalent designs are equal.
 
 use crate::quantizer::Quantizer;
 use std::cmp::Ordering;
 
-/// The same set of quantizers in a fixed form: levels numbered in the order in which their cells appear, and of the design and
-/// its mirror image, each with interchangeable sensors sorted, the one that sorts last. Two descriptions of one design over
-/// clear channels compare equal after this, to `1e-6` of the largest breakpoint.
+/// The same set of quantizers in a standard form. Levels are numbered in the order in which their cells appear. Interchangeable sensors are
+/// sorted. Of the design and its mirror image, the one that sorts last is taken. Two descriptions of one design over
+/// ideal channels are equal in this form, up to `1e-6` of the largest breakpoint.
 ///
-/// `interchangeable[n]` names the class of sensor `n`; sensors of one class may be swapped.
+/// `interchangeable[n]` is the class of sensor `n`; sensors of one class may be swapped.
 pub fn canonical(quantizers: &[Quantizer], interchangeable: &[usize]) -> Vec<Quantizer> {
     let scale = quantizers
         .iter()
@@ -54,7 +54,7 @@ impl Quantizer {
     }
 }
 
-/// Lexicographic order that takes numbers within `slack` of each other as equal.
+/// Lexicographic comparison that treats numbers within `slack` of each other as equal.
 fn compare(a: &[f64], b: &[f64], slack: f64) -> Ordering {
     a.iter()
         .zip(b)

@@ -6,14 +6,14 @@ use fewbits_numerics::error::entries;
 use fewbits_numerics::normal;
 use serde::{Deserialize, Serialize};
 
-/// Most entries of a transition matrix.
+/// Largest number of entries of a transition matrix.
 const MAX_ENTRIES: u64 = 1 << 24;
-/// Columns may miss one by this much; they are not renormalised.
+/// Columns may sum to one within this; they are not renormalised.
 const SUM_TOLERANCE: f64 = 1e-9;
 
-/// `P(received = t | sent = z)`, with any number of outputs: a column-stochastic matrix.
+/// `P(received = t | sent = z)`, with any number of outputs: a matrix whose columns sum to one.
 ///
-/// More outputs than inputs describe soft decisions or erasures.
+/// There may be more outputs than inputs, for soft decisions or erasures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
 pub struct Channel {
@@ -43,18 +43,18 @@ impl TryFrom<Vec<Vec<f64>>> for Channel {
 }
 
 impl Channel {
-    /// What is sent is received.
+    /// The channel that delivers every level as it was sent.
     ///
     /// # Errors
-    /// If `levels < 2`; [`Error::TooLarge`] beyond 16 million entries, as for every channel.
+    /// If `levels < 2`; [`Error::TooLarge`] for more than 16 million entries, which holds for every constructor.
     pub fn ideal(levels: usize) -> Result<Self, Error> {
         Self::from_fn(levels, levels, |t, z| if t == z { 1.0 } else { 0.0 })
     }
 
-    /// Any column-stochastic matrix, given by rows: `rows[t][z]`.
+    /// A channel from any matrix whose columns sum to one, given by rows: `rows[t][z]`.
     ///
     /// # Errors
-    /// If the rows differ in length, there are fewer than two columns or no row, an entry is no probability, or a column does
+    /// If the rows differ in length, there are fewer than two columns or no row, an entry is not in `[0, 1]`, or a column does
     /// not sum to 1 within 1e-9.
     pub fn from_rows(rows: &[Vec<f64>]) -> Result<Self, Error> {
         let inputs = rows.first().map_or(0, Vec::len);
@@ -73,6 +73,7 @@ impl Channel {
         }
         let needed = (inputs as u64).saturating_mul(outputs as u64);
         Error::at_most("transition matrix of a channel", needed, MAX_ENTRIES)?;
+        // Fill the table, then check that entries are probabilities and columns sum to one.
         let transition: Vec<f64> = (0..outputs)
             .flat_map(|t| (0..inputs).map(move |z| (t, z)))
             .map(|(t, z)| p(t, z))
@@ -94,10 +95,10 @@ impl Channel {
         })
     }
 
-    /// Each bit of the word is inverted with probability `crossover`, independently.
+    /// A binary symmetric channel: each bit of the word is inverted with probability `crossover`, independently.
     ///
-    /// `C[t, z] = eps^d (1 - eps)^(k - d)`, `d` the Hamming distance of the words. A crossover above 1/2 is a channel below 1/2
-    /// with all received bits complemented; it is accepted as it stands.
+    /// `C[t, z] = eps^d (1 - eps)^(k - d)`, with `d` the Hamming distance of the words and `k` their bits. A crossover above 1/2 is
+    /// accepted.
     ///
     /// # Errors
     /// If the labelling leaves words unused (use [`Channel::binary_symmetric_with_gaps`]) or `crossover` is not in `[0, 1]`.
@@ -108,7 +109,7 @@ impl Channel {
         Self::binary_symmetric_with_gaps(labelling, crossover)
     }
 
-    /// As [`Channel::binary_symmetric`], for labellings that leave words unused: those are outputs without an input.
+    /// As [`Channel::binary_symmetric`], for labellings that do not use all words: an unused word is an output that no input maps to.
     ///
     /// # Errors
     /// If `crossover` is not in `[0, 1]`.
@@ -124,7 +125,7 @@ impl Channel {
         })
     }
 
-    /// The symbol is lost, and known to be lost, with probability `erasure`: output `levels` is the erasure.
+    /// The symbol is lost with probability `erasure`, and the receiver knows it: output `levels` is the erasure.
     ///
     /// # Errors
     /// If `levels < 2` or `erasure` is not in `[0, 1]`.
@@ -137,7 +138,7 @@ impl Channel {
         })
     }
 
-    /// An error with probability `error`, every wrong symbol equally likely (orthogonal signals, hard decision).
+    /// An error occurs with probability `error`, and every wrong symbol is equally likely (orthogonal signals, hard decisions).
     ///
     /// # Errors
     /// If `levels < 2` or `error` is not in `[0, 1]`.
@@ -152,7 +153,7 @@ impl Channel {
         })
     }
 
-    /// Pulse amplitude modulation with hard decisions: equidistant amplitudes, unit-variance noise, thresholds midway.
+    /// Pulse amplitude modulation with hard decisions: equidistant amplitudes, unit-variance noise, thresholds midway between amplitudes.
     ///
     /// Half the distance of two amplitudes is `sqrt(3 snr / (levels^2 - 1))` noise standard deviations, `snr` being mean signal
     /// power over noise power (10 dB is 10).
@@ -178,17 +179,17 @@ impl Channel {
         })
     }
 
-    /// Levels that can be sent.
+    /// Number of levels that can be sent.
     pub fn inputs(&self) -> usize {
         self.inputs
     }
 
-    /// Symbols that can be received.
+    /// Number of symbols that can be received.
     pub fn outputs(&self) -> usize {
         self.outputs
     }
 
-    /// `P(received = output | sent = input)`; 0 for symbols there are not.
+    /// `P(received = output | sent = input)`; 0 if there is no such symbol.
     pub fn probability(&self, output: usize, input: usize) -> f64 {
         if input < self.inputs && output < self.outputs {
             self.transition[output * self.inputs + input]
@@ -197,10 +198,10 @@ impl Channel {
         }
     }
 
-    /// Distribution of the received symbol when the levels have the given probabilities.
+    /// Distribution of the received symbol, given the probabilities of the levels.
     ///
     /// # Errors
-    /// Unless there is one probability per input, in `[0, 1]` and of sum 1.
+    /// If there is not one probability per input, one is not in `[0, 1]`, or their sum is not 1.
     pub fn received(&self, levels: &[f64]) -> Result<Vec<f64>, Error> {
         fewbits_numerics::error::probabilities("levels", levels)?;
         entries("levels", levels.len(), self.inputs)?;

@@ -6,39 +6,39 @@ use fewbits_numerics::ArgumentError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// An argument is outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
-    /// An iteration stopped at its limit before its tolerance was met.
+    /// An iteration reached its limit before it converged.
     #[error("{algorithm} did not converge in {iterations} iterations: the last change was {change:e}")]
     NotConverged {
-        /// Which iteration.
+        /// Name of the iteration.
         algorithm: &'static str,
-        /// Iterations spent.
+        /// Number of iterations done.
         iterations: usize,
-        /// Size of the last change, in the units of the stop rule.
+        /// Size of the last change, in the units of the stopping rule.
         change: f64,
     },
-    /// A design ended where the error is not least: a cell is empty, or some change of the breakpoints still lowers the error.
+    /// A design ended at a point that is not a local optimum: a cell is empty, or some change of the breakpoints still lowers the error.
     #[error("{algorithm} ended at no optimum: cell {cell} of {levels} has probability {probability:e}")]
     NotOptimal {
-        /// Which iteration.
+        /// Name of the iteration.
         algorithm: &'static str,
-        /// The least probable cell.
+        /// Index of the least probable cell.
         cell: usize,
         /// Number of cells.
         levels: usize,
         /// Probability of that cell.
         probability: f64,
     },
-    /// A table would be larger than allowed.
+    /// A table would have more entries than allowed.
     #[error("{table} would need {needed} entries: at most {limit} are allowed")]
     TooLarge {
-        /// Which table.
+        /// Name of the table.
         table: &'static str,
-        /// Entries needed, saturated at `u64::MAX`.
+        /// Number of entries needed; larger numbers are given as `u64::MAX`.
         needed: u64,
-        /// Entries allowed.
+        /// Number of entries allowed.
         limit: u64,
     },
     /// The noise of three sensors or more needs more than one shared factor.
@@ -94,7 +94,7 @@ impl Error {
 pub(crate) use fewbits_numerics::error::refuse;
 
 impl From<Error> for fewbits_core::Error {
-    /// What a scheme reports: the argument, or that nothing converged.
+    /// The core's argument error, or its error for an iteration that did not converge.
     fn from(error: Error) -> Self {
         match error {
             Error::Argument(argument) => Self::Argument(argument),

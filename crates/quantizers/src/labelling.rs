@@ -1,4 +1,4 @@
-//! Which binary word stands for which level, and the message that carries it.
+//! The binary word of each level, and the message that carries it.
 
 use crate::error::{Error, refuse};
 use fewbits_core::Message;
@@ -6,13 +6,13 @@ use fewbits_core::bits::{BitReader, BitWriter, CodecError};
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
-/// Longest word.
+/// Largest number of bits of a word.
 pub const MAX_WORD_BITS: u32 = 16;
 
-/// An injective map from levels to words of a fixed number of bits.
+/// An injective map from levels to words with a fixed number of bits.
 ///
-/// Words that no level uses can still be received over a noisy link. They are given the symbol numbers behind the levels, in
-/// increasing order of the word, so that every received word is one symbol in `0..2^bits`.
+/// Words without a level can still be received over a noisy link. They get the symbol numbers from `levels` on, in
+/// increasing order of the word, so that every received word is a symbol in `0..2^bits`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Labelling {
@@ -33,20 +33,20 @@ impl Labelling {
     /// Level `z` is sent as the number `z` in `ceil(log2 levels)` bits.
     ///
     /// # Errors
-    /// Unless `levels` is in `2..=65536`.
+    /// If `levels` is not in `2..=65536`.
     pub fn natural(levels: usize) -> Result<Self, Error> {
         Self::with_words(word_bits(levels)?, (0..levels as u32).collect())
     }
 
-    /// Level `z` is sent as `z ^ (z >> 1)`: neighbours differ in one bit.
+    /// Level `z` is sent as `z ^ (z >> 1)` (Gray code): words of neighbouring levels differ in one bit.
     ///
     /// # Errors
-    /// Unless `levels` is in `2..=65536`.
+    /// If `levels` is not in `2..=65536`.
     pub fn gray(levels: usize) -> Result<Self, Error> {
         Self::with_words(word_bits(levels)?, (0..levels as u32).map(|z| z ^ (z >> 1)).collect())
     }
 
-    /// Level `z` is sent as `words[z]` in the fewest bits that number the levels.
+    /// Level `z` is sent as `words[z]`, with the smallest number of bits that is enough for the levels.
     ///
     /// # Errors
     /// As [`Labelling::with_words`].
@@ -67,6 +67,7 @@ impl Labelling {
             return refuse("words", format!("{levels} words"), "at least two words");
         }
         let mut symbols = vec![u32::MAX; 1 << bits];
+        // Invert the map from levels to words; a word that is too large or used twice is an error.
         for (symbol, word) in words.iter().enumerate() {
             match symbols.get_mut(*word as usize) {
                 Some(slot) if *slot == u32::MAX => *slot = symbol as u32,
@@ -74,6 +75,7 @@ impl Labelling {
                 None => return refuse("words", word, format!("words below 2^{bits}")),
             }
         }
+        // Words without a level become the symbols after the levels.
         for (word, slot) in symbols.iter_mut().enumerate() {
             if *slot == u32::MAX {
                 *slot = words.len() as u32;
@@ -88,17 +90,17 @@ impl Labelling {
         })
     }
 
-    /// Bits a word.
+    /// Number of bits of a word.
     pub fn bits(&self) -> u32 {
         self.bits
     }
 
-    /// Levels that can be sent.
+    /// Number of levels that can be sent.
     pub fn levels(&self) -> usize {
         self.levels
     }
 
-    /// Symbols that can be received, `2^bits`; those from `levels` up belong to words never sent.
+    /// Number of symbols that can be received, `2^bits`. Symbols from `levels` on are words that are never sent.
     pub fn symbols(&self) -> usize {
         self.words.len()
     }
@@ -108,7 +110,7 @@ impl Labelling {
         self.levels == self.words.len()
     }
 
-    /// Word of symbol `symbol`, if there is one.
+    /// Word of symbol `symbol`; `None` if there is no such symbol.
     pub fn word(&self, symbol: usize) -> Option<u32> {
         self.words.get(symbol).copied()
     }
@@ -126,7 +128,7 @@ fn word_bits(levels: usize) -> Result<u32, Error> {
     Ok(usize::BITS - (levels - 1).leading_zeros())
 }
 
-/// A quantizer level on its way, or the symbol that was received.
+/// A quantizer level as a message, or the symbol that was received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Symbol(pub usize);

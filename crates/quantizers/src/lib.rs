@@ -1,18 +1,17 @@
-//! The scalar quantizer that a sensor holds: its cells and labels, the words on the wire, the channel they cross, and the
+//! Scalar quantizers for sensors: their cells and labels, the binary words of the levels, discrete channels, and
 //! Lloyd-Max tables.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`quantizer`] | breakpoints, cells, labels; the factor of a received symbol |
-//! | [`labelling`] | which binary word stands for which level; the report |
+//! | [`labelling`] | the binary word of each level; the report |
 //! | [`channel`] | discrete channels from levels to symbols |
-//! | [`sensor`] | all of these as a [`Scheme`](fewbits_core::Scheme), ready for every filter |
-//! | [`lloyd_max`], [`density`] | least squared error for one scalar |
+//! | [`sensor`] | all of these as a [`Scheme`](fewbits_core::Scheme) for every filter |
+//! | [`lloyd_max`], [`density`] | quantizers of smallest squared error for one scalar |
 //!
-//! The central choice: **one rule for edges, everywhere.** A cell is `[lower, upper)`, a sample on a breakpoint belongs to the
-//! cell above it, and NaN is a typed error, never a level. So a quantizer, its likelihood and its tables cannot disagree about
-//! what a level means, and a sensor that fails to measure cannot seem to have measured. The price is that `encode` returns a
-//! `Result`.
+//! Design rule: **edges are treated in the same way everywhere.** A cell is `[lower, upper)`, a sample on a breakpoint is in the
+//! cell above it, and NaN is a typed error, never a level. A quantizer, its likelihood and its tables therefore agree about
+//! each level, and a sensor that fails to measure sends no level. In exchange, `encode` returns a `Result`.
 //!
 //! ```
 //! use fewbits_core::Message;
@@ -28,7 +27,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: the design of several quantizers together (`fewbits-quantizer-design`), random numbers, vector quantizers,
+//! Not in this crate: the design of several quantizers together (`fewbits-quantizer-design`), random numbers, vector quantizers,
 //! variable-length codes.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]

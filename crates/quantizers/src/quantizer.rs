@@ -1,4 +1,4 @@
-//! The scalar quantizer a sensor holds.
+//! Scalar quantizers: breakpoints, and the level of each cell.
 
 use crate::channel::Channel;
 use crate::density::edges;
@@ -10,11 +10,11 @@ use fewbits_numerics::stored;
 use fewbits_numerics::{ArgumentError, normal};
 use serde::{Deserialize, Serialize};
 
-/// Ordered breakpoints that part the line into cells, and the level each cell is reported as.
+/// Increasing breakpoints that divide the line into cells, and the level that is reported for each cell.
 ///
-/// Cell `i` is `[breakpoints[i - 1], breakpoints[i])`, the outer cells being unbounded: a sample on a breakpoint belongs to the
-/// cell above it. In a *contiguous* quantizer cell `i` is level `i`; otherwise several cells may share a level ("labels"), as in
-/// a modulo or `|y| > c` quantizer.
+/// Cell `i` is `[breakpoints[i - 1], breakpoints[i])`; the outer cells are unbounded. A sample equal to a breakpoint is in the
+/// cell above it. In a *contiguous* quantizer cell `i` is level `i`. Otherwise several cells may have the same level ("label"), as in
+/// a modulo quantizer or for the bit `|y| > c`.
 ///
 /// ```
 /// use fewbits_quantizers::Quantizer;
@@ -40,7 +40,7 @@ pub(crate) fn increasing(b: &[f64]) -> bool {
     b.iter().all(|x| x.is_finite()) && b.windows(2).all(|w| w[0] < w[1])
 }
 
-/// Accepts strictly increasing finite breakpoints.
+/// Checks that breakpoints are finite and strictly increasing.
 ///
 /// # Errors
 /// If a number is not finite, or not above the one before.
@@ -55,7 +55,7 @@ pub fn check_increasing(breakpoints: &[f64]) -> Result<(), ArgumentError> {
     }
 }
 
-/// Index of the cell that holds `y`: the number of breakpoints at or below it. Infinite samples fall into the outer cells.
+/// Index of the cell that contains `y`: the number of breakpoints at or below `y`. Infinite samples are in the outer cells.
 ///
 /// # Errors
 /// If `y` is NaN.
@@ -131,12 +131,12 @@ impl Quantizer {
         self.labels.len()
     }
 
-    /// Whether cell `i` is level `i` throughout.
+    /// Whether cell `i` is level `i` for all `i`.
     pub fn is_contiguous(&self) -> bool {
         self.cells() == self.levels && self.labels.iter().enumerate().all(|(i, l)| i == *l)
     }
 
-    /// Level of the cell that holds `y`; a breakpoint belongs to the cell above it. Never allocates. Infinite samples fall into
+    /// Level of the cell that contains `y`; a breakpoint is in the cell above it. Does not allocate. Infinite samples are in
     /// the outer cells.
     ///
     /// # Errors
@@ -146,13 +146,13 @@ impl Quantizer {
         Ok(self.labels[cell_of(&self.breakpoints, y)?])
     }
 
-    /// Cell `i`, if there is one.
+    /// Cell `i`; `None` if there is no such cell.
     pub fn cell(&self, cell: usize) -> Option<Cell> {
         let (lower, upper) = self.edges(cell);
         (cell < self.cells()).then(|| Cell::new(lower, upper).ok()).flatten()
     }
 
-    /// Probability of each level for a sample `N(mean, deviation^2)`, each a sum of positive terms.
+    /// Probability of each level for a sample `N(mean, deviation^2)`, computed as a sum of positive terms.
     ///
     /// # Errors
     /// If `mean` is not finite or `deviation` is not a positive number.
@@ -167,12 +167,12 @@ impl Quantizer {
         Ok(levels)
     }
 
-    /// `p(symbol received | h(x) = m)` for a sample `m + n`, `n ~ N(0, noise_variance)`, whose level crosses `channel`.
+    /// `p(symbol received | h(x) = m)` for a sample `m + n`, `n ~ N(0, noise_variance)`, whose level is sent over `channel`.
     ///
-    /// A symbol that no level can cause is a factor of probability 0.
+    /// A symbol that no level can cause has a factor of probability 0.
     ///
     /// # Errors
-    /// If the channel takes another number of levels, has no such symbol, or the variance is not a positive number.
+    /// If the channel has another number of inputs than levels, there is no such symbol, or the variance is not a positive number.
     pub fn factor(&self, symbol: usize, channel: &Channel, noise_variance: f64) -> Result<Scalar, Error> {
         if channel.inputs() != self.levels {
             return refuse("channel", format!("{} inputs", channel.inputs()), format!("{} inputs", self.levels));
@@ -183,7 +183,7 @@ impl Quantizer {
         self.factor_of(noise_variance, |level| channel.probability(symbol, level))
     }
 
-    /// The factor of an observation of which `given_level(l)` is the probability if level `l` was sent.
+    /// The factor of an observation that has probability `given_level(l)` if level `l` was sent.
     ///
     /// # Errors
     /// If a probability is outside `[0, 1]` or the variance is not a positive number.
@@ -201,7 +201,7 @@ impl Quantizer {
         edges(&self.breakpoints, cell)
     }
 
-    /// The same labels on other breakpoints.
+    /// The quantizer with the same labels and other breakpoints.
     ///
     /// # Errors
     /// As [`Quantizer::with_labels`].
@@ -209,7 +209,7 @@ impl Quantizer {
         Self::with_labels(breakpoints, self.labels.clone())
     }
 
-    /// The quantizer of `-y` with the order of the levels reversed: the same design seen in a mirror.
+    /// The mirror image: the quantizer of `-y`, with the order of the levels reversed.
     pub fn mirrored(&self) -> Self {
         Self {
             breakpoints: self.breakpoints.iter().rev().map(|b| -b).collect(),

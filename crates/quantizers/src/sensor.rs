@@ -1,4 +1,4 @@
-//! The whole scheme of a quantizing sensor: sample in, word out, and what a received word says.
+//! The scheme of a sensor with a scalar quantizer: sample to word, and the likelihood of a received word.
 
 use crate::error::Error;
 use crate::labelling::{Labelling, Symbol};
@@ -11,10 +11,10 @@ use fewbits_numerics::error::positive;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
-/// A sensor that reports the level of its scalar sample in every slot: a [`Scheme`](fewbits_core::Scheme), so that every filter takes it.
+/// A sensor that reports the level of its scalar sample in every slot, as a [`Scheme`](fewbits_core::Scheme) that every filter accepts.
 ///
-/// Over a [`Link`] of crossover `e` each bit of the word is inverted with probability `e`; a word that no level uses is a symbol,
-/// too, so no received word is undecodable. The sensor is never silent: a missing report says nothing about the sample.
+/// Over a [`Link`] of crossover `e` each bit of the word is inverted with probability `e`. A word without a level is a symbol
+/// too, so every received word decodes. The sensor is never silent, so a missing report does not depend on the sample.
 ///
 /// ```
 /// use fewbits_core::factor::Factor;
@@ -43,10 +43,10 @@ stored! { QuantizingSensor as Stored |sensor| {
 } => QuantizingSensor::with_variance(quantizer, labelling, noise_variance), Error }
 
 impl QuantizingSensor {
-    /// A sensor with this quantizer and these words, whose samples have noise of the given variance.
+    /// A sensor with this quantizer and these words, whose samples have noise of variance `noise_variance`.
     ///
     /// # Errors
-    /// If the labelling has not a word per level, or `noise_variance` is not a positive number.
+    /// If the labelling does not have one word per level, or `noise_variance` is not a positive number.
     pub fn with_variance(quantizer: Quantizer, labelling: Labelling, noise_variance: f64) -> Result<Self, Error> {
         positive("noise_variance", noise_variance)?;
         if labelling.levels() != quantizer.levels() {
@@ -65,7 +65,7 @@ impl QuantizingSensor {
         &self.quantizer
     }
 
-    /// The words: the format of the reports.
+    /// The words of the levels, which are the format of the reports.
     pub fn labelling(&self) -> &Labelling {
         &self.labelling
     }

@@ -1,6 +1,6 @@
-//! Blocks as Arrow record batches, and batches as rows.
+//! Conversion between blocks and Arrow record batches.
 //!
-//! A batch has one field of time and one of 64-bit floats per column; `null` is a gap.
+//! A batch has one field for time and one of 64-bit floats per column; a gap is `null`.
 //!
 //! | time base | field of time |
 //! |---|---|
@@ -25,10 +25,10 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::sync::Arc;
 
-/// Whole numbers up to this size are doubles.
+/// Integers up to this size are exact doubles.
 const MAX_WHOLE: i64 = 1 << 53;
 
-/// The unit of timestamps whose ticks have so many decimals.
+/// The unit of timestamps with as many decimals as the ticks; `None` for other time bases.
 fn unit_of(time: TimeBase) -> Option<TimeUnit> {
     match time {
         TimeBase::Clock {
@@ -56,7 +56,7 @@ fn decimals_of(unit: TimeUnit) -> u8 {
 }
 
 impl Schema {
-    /// The fields of this recording's batches; units, and the decimals of ticks, as metadata.
+    /// The fields of batches of this recording. Units, and the decimals of ticks, are in the metadata.
     pub fn to_arrow(&self) -> arrow_schema::Schema {
         let time = match (self.time, unit_of(self.time)) {
             (_, Some(unit)) => Field::new("time", DataType::Timestamp(unit, Some("UTC".into())), false),
@@ -79,10 +79,10 @@ impl Schema {
 }
 
 impl Block {
-    /// The rows as a batch of the fields of [`Schema::to_arrow`]; columns that were not asked for are left out.
+    /// The rows as a batch with the fields of [`Schema::to_arrow`]. Columns that were not requested are left out.
     ///
     /// # Errors
-    /// If the block is none of a recording of this schema.
+    /// If the block is not of a recording with this schema.
     pub fn to_record_batch(&self, schema: &Schema) -> Result<RecordBatch, Error> {
         let fields = schema.to_arrow();
         if self.columns.len() != schema.columns.len() {
@@ -115,7 +115,7 @@ where
     Arc::new(PrimitiveArray::<T>::from(ticks.collect::<Vec<i64>>()).in_utc())
 }
 
-/// Timestamps with a zone.
+/// A timestamp array with a time zone.
 trait TimeZoned {
     fn in_utc(self) -> Self;
 }
@@ -129,7 +129,7 @@ impl<T: arrow_array::types::ArrowTimestampType> TimeZoned for PrimitiveArray<T> 
 /// The cells of an array of numbers, `None` for nulls.
 ///
 /// # Errors
-/// If the array holds no numbers, or a whole number of more than 53 bits, which is no double.
+/// If the array has no numbers, or an integer above 2^53, which is not an exact double.
 pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
     fn of<T: ArrowPrimitiveType>(array: &dyn Array, number: impl Fn(T::Native) -> Option<f64>) -> Option<Cells> {
         let cells = array.as_primitive::<T>().iter();
@@ -165,10 +165,10 @@ pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
     found.ok_or_else(|| refuse(format!("`{name}`"), "whole numbers of at most 53 bits: split the column"))
 }
 
-/// The times of an array as ticks of `decimals`: timestamps of any unit, or whole numbers, which are ticks already.
+/// The times of an array as ticks of `10^-decimals` seconds. Timestamps may have any unit; integers are taken as ticks.
 ///
 /// # Errors
-/// If the array holds no times, one is missing, or a tick does not fit.
+/// If the array has no times, one is missing, or a tick overflows.
 pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Error> {
     let refuse = |given: String, expected: &str| -> Error { ArgumentError::new("time", given, expected).into() };
     if array.null_count() > 0 {
@@ -203,11 +203,11 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
 }
 
 impl<W: Write> Recorder<W> {
-    /// The rows of a batch. Its columns are found by name: `time` (or `row`) and every column of the schema; others are not read.
-    /// Without times, rows follow the last one.
+    /// Adds the rows of a batch. Its columns are found by name: `time` (or `row`) and every column of the schema; others are ignored.
+    /// Without times, each row follows the last one.
     ///
     /// # Errors
-    /// If a column is missing or holds no numbers, or as [`push`](Self::push). Rows before the one that was refused are in the recording.
+    /// If a column is missing or has no numbers; as [`push`](Self::push). Rows before the refused one are in the recording.
     pub fn push_batch(&mut self, batch: &RecordBatch) -> Result<(), Error> {
         let array = |name: &str| {
             batch.column_by_name(name).ok_or_else(|| {

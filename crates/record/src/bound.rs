@@ -1,27 +1,27 @@
-//! What a column promises, and the test whether a restored value keeps the promise.
+//! The error bound of a column, and the test whether a restored value is within it.
 //!
-//! The test is exact. `|a - b| <= delta` in rounded arithmetic accepts differences that are larger than `delta` by half an ulp; here
-//! the rounding error of the difference decides where the rounded difference equals `delta`.
+//! The test is exact. In rounded arithmetic `|a - b| <= delta` accepts differences that exceed `delta` by half a unit in the last place.
+//! Here the rounding error of the difference decides if the rounded difference equals `delta`.
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::positive;
 
-/// The promise of a column for every finite sample. Gaps, NaN and infinities always return as they were.
+/// The error bound of a column, for every finite sample. Gaps, NaN and infinities are always restored exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Bound {
-    /// The same 64 bits.
+    /// Restored with the same 64 bits.
     Lossless,
-    /// At most this far from the sample, in units of the column.
+    /// Restored within this distance, in units of the column.
     Absolute(f64),
-    /// At most this share of the column's range. The range is that of the rows up to the sample's block, unless
-    /// [`Column::with_range`](crate::Column::with_range) fixes it: it only grows, so the promise holds for the whole range too.
+    /// Restored within this share of the column's range. The range is that of the rows up to the sample's block, unless
+    /// [`Column::with_range`](crate::Column::with_range) fixes it. It only grows, so the bound holds for the range of all rows too.
     ShareOfRange(f64),
-    /// Numbers of at most this many decimals (up to 15) return exactly; others within half a unit of the last decimal.
+    /// Numbers of at most this many decimals (up to 15) are restored exactly, others within half a unit of the last decimal.
     Decimals(u8),
 }
 
-/// Most decimals of [`Bound::Decimals`].
+/// Largest number of decimals of [`Bound::Decimals`].
 pub const MAX_DECIMALS: u8 = 15;
 
 impl Bound {
@@ -48,23 +48,23 @@ impl Bound {
     }
 }
 
-/// The promise for one block, with numbers in place of shares.
+/// The bound for one block, with shares converted to numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Promise {
-    /// The same 64 bits.
+    /// Same 64 bits.
     Exact,
-    /// Within this distance, around the circle if there is one.
+    /// Within this distance, on a circle if there is one.
     Within(f64),
-    /// Decimals of so many places exactly, others within half a unit of the last.
+    /// Numbers of this many decimals exactly, others within half a unit of the last.
     Decimals(u8),
 }
 
-/// Powers of ten that are whole doubles.
+/// Powers of ten that doubles represent exactly.
 pub(crate) const TENS: [f64; 16] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
 ];
 
-/// The whole number `j` with `j / 10^places == value`, if there is one below 2^53.
+/// The integer `j` with `j / 10^places == value`, if there is one below 2^53.
 pub(crate) fn decimal(value: f64, places: u8) -> Option<i64> {
     let ten = *TENS.get(usize::from(places))?;
     let scaled = (value * ten).round();
@@ -72,7 +72,7 @@ pub(crate) fn decimal(value: f64, places: u8) -> Option<i64> {
 }
 
 impl Promise {
-    /// Whether `restored` is what was promised for `sample`; both are finite.
+    /// Whether `restored` is within the bound of `sample`; both are finite.
     pub(crate) fn holds(self, sample: f64, restored: f64, period: Option<f64>) -> bool {
         match self {
             Self::Exact => sample.to_bits() == restored.to_bits(),
@@ -99,7 +99,7 @@ fn difference(a: f64, b: f64) -> (f64, f64) {
     (rounded, (a - of_a) + (of_b - b))
 }
 
-/// Whether `|a - b| <= delta` for the real numbers that the doubles stand for.
+/// Whether `|a - b| <= delta` exactly, as real numbers.
 pub fn is_within(a: f64, b: f64, delta: f64) -> bool {
     let (rounded, error) = difference(a, b);
     let distance = rounded.abs();
@@ -107,9 +107,9 @@ pub fn is_within(a: f64, b: f64, delta: f64) -> bool {
     distance < delta || (distance == delta && error * rounded.signum() <= 0.0)
 }
 
-/// Whether some `a - b + k period` with whole `k` is at most `delta` in size; `b` lies in `[0, period)`.
+/// Whether `|a - b + k period| <= delta` for some integer `k`. Precondition: `b` in `[0, period)`.
 ///
-/// Refuses where rounding could matter, so `true` is certain.
+/// Returns `false` if rounding could matter, so `true` is certain.
 pub fn is_within_on_circle(a: f64, b: f64, delta: f64, period: f64) -> bool {
     // The remainder of a division is exact.
     let reduced = a % period;

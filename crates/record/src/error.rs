@@ -1,57 +1,57 @@
-//! What this crate refuses.
+//! Errors of recordings.
 
 use fewbits_numerics::ArgumentError;
 use std::io;
 
-/// Errors of this crate. A refused row leaves the recorder as it was.
+/// Errors of this crate. After a refused row the recorder is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument out of range.
+    /// If an argument is out of range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     /// Reading or writing failed.
     #[error("cannot {action} the recording")]
     Io {
-        /// `open`, `read`, `write`, `truncate`.
+        /// What was tried: `open`, `read`, `write` or `truncate`.
         action: &'static str,
         /// The system's error.
         #[source]
         source: io::Error,
     },
-    /// An earlier write failed half-way. What was written before it can be read; `resume` cuts off the rest.
+    /// An earlier write failed in the middle. Everything before it can be read; `resume` removes the rest.
     #[error("an earlier write failed: resume the recording to go on")]
     Broken,
-    /// The bytes do not begin as a recording does.
+    /// The bytes do not begin like a recording.
     #[error("not a recording: the first bytes are not those of one")]
     NotARecording,
-    /// A recording of another version of the format.
+    /// The recording is of another version of the format.
     #[error("format version {found}: this program reads version {supported}")]
     Version {
-        /// The recording's version.
+        /// Version of the recording.
         found: u8,
-        /// The version of this program.
+        /// Version that this program reads.
         supported: u8,
     },
-    /// The header is cut off or does not match its checksum. Without it nothing can be decoded.
+    /// The header is incomplete or does not match its checksum. Then nothing can be decoded.
     #[error("the header is damaged ({0})")]
     Header(Damage),
-    /// A block, or bytes between blocks, that cannot be read. All other blocks can.
+    /// A block, or bytes between blocks, cannot be read. All other blocks can.
     #[error("{bytes} bytes at offset {offset} are damaged ({damage})")]
     Block {
-        /// First byte.
+        /// Offset of the first unreadable byte.
         offset: u64,
-        /// Number of bytes that are skipped.
+        /// Number of bytes skipped.
         bytes: u64,
-        /// What is wrong.
+        /// Kind of the damage.
         damage: Damage,
     },
-    /// A column that the recording does not have.
+    /// The recording has no such column.
     #[error("no column `{name}`: the recording has {existing}")]
     UnknownColumn {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
-        /// The names that exist, with commas between them.
+        /// The existing names, separated by commas.
         existing: String,
     },
     /// Arrow refused a batch.
@@ -64,16 +64,16 @@ pub enum Error {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Damage {
-    /// The end comes before the end of what was announced.
+    /// The bytes end before the stated length.
     #[error("cut off")]
     CutOff,
-    /// The checksum differs.
+    /// The checksum does not match.
     #[error("the checksum differs")]
     Checksum,
-    /// The checksum agrees, but no recorder writes this.
+    /// The checksum matches, but no recorder writes this content.
     #[error("`{0}` is not what a recorder writes")]
     Content(&'static str),
-    /// Some other recording's block, or not a block at all.
+    /// The bytes are a block of another recording, or not a block.
     #[error("no block begins here")]
     NoBlock,
 }

@@ -1,8 +1,8 @@
-//! Frames on a link that loses, repeats and reorders them: each is one block, or a piece of the header.
+//! Frames for a link that may lose, repeat and reorder them. A frame contains one block, or a piece of the header.
 //!
-//! [`FrameWriter`] and [`FrameReader`] know no socket and no clock: rows go in and frames come out, or the other way round. The reader
-//! needs the header's pieces once, in any order; the writer hands them out as often as it is asked to. Frames that arrive before the
-//! header is whole are kept, up to a limit.
+//! [`FrameWriter`] converts rows to frames and [`FrameReader`] frames to rows; neither uses a socket or a clock. The reader
+//! needs each piece of the header once, in any order; the writer returns the pieces as often as it is asked to. Frames that arrive before
+//! the header is complete are kept, up to a limit.
 //!
 //! ```text
 //! frame    := block | piece
@@ -20,20 +20,20 @@ use fewbits_adaptive::Effort;
 use fewbits_numerics::ArgumentError;
 use std::collections::VecDeque;
 
-/// The smallest limit of a frame: a piece has 26 bytes of the header then.
+/// Smallest allowed maximal length of a frame: a piece then has 26 bytes of the header.
 pub const MIN_FRAME_BYTES: usize = 40;
-/// Bytes of a piece besides its part of the header.
+/// Bytes of a piece in addition to its part of the header.
 const PIECE_OVERHEAD: usize = 14;
 const PIECE: u8 = b'H';
 const MAX_PIECES: usize = 256;
-/// Frames that are kept while the header is not whole.
+/// Largest number of frames that are kept while the header is incomplete.
 const MAX_WAITING: usize = 256;
-/// Share of a frame that is aimed at when the number of rows for the next trial is guessed.
+/// Share of a frame that is aimed at when the number of rows for the next trial is estimated.
 const FILLED: f64 = 0.97;
-/// A frame that is this full is sent.
+/// A frame that is at least this full is returned.
 const FULL: f64 = 0.93;
 
-/// Makes frames of rows, each as long as the link takes.
+/// Converts rows to frames that are as full as possible.
 #[derive(Debug)]
 pub struct FrameWriter {
     schema: Schema,
@@ -42,13 +42,13 @@ pub struct FrameWriter {
     ticks: Vec<i64>,
     columns: Vec<Cells>,
     ranges: Ranges,
-    /// Rows at which it is tried next whether they fill a frame.
+    /// Number of rows at which it is next tried whether they fill a frame.
     next_trial: usize,
     has_sent: bool,
 }
 
 impl FrameWriter {
-    /// Frames of at most `max_bytes` bytes and at most the schema's rows per block.
+    /// A writer of frames of at most `max_bytes` bytes, and at most the schema's rows per block.
     ///
     /// # Errors
     /// If `max_bytes` is below [`MIN_FRAME_BYTES`], or the header needs more than 256 pieces.
@@ -71,12 +71,12 @@ impl FrameWriter {
         })
     }
 
-    /// Rows that no frame holds yet.
+    /// Number of rows that are not in a frame yet.
     pub fn waiting(&self) -> usize {
         self.ticks.len()
     }
 
-    /// The header as a recording begins with it, for links that lose nothing; `None` before the first frame.
+    /// The header as at the beginning of a recording, for links without losses; `None` before the first frame.
     pub fn header(&self) -> Option<Vec<u8>> {
         self.sent_header().map(Header::to_bytes)
     }
@@ -85,7 +85,7 @@ impl FrameWriter {
         self.header.as_ref().filter(|_| self.has_sent)
     }
 
-    /// The header's pieces; none before the first frame.
+    /// Frames with the pieces of the header; none before the first frame with rows.
     pub fn header_frames(&self) -> Vec<Vec<u8>> {
         let Some(header) = self.sent_header() else {
             return Vec::new();
@@ -103,10 +103,10 @@ impl FrameWriter {
         pieces.enumerate().map(frame).collect()
     }
 
-    /// One row; returns the frames that became full. A row that does not fit waits for the next frame.
+    /// Adds one row. Returns the frames that became full. A row that does not fit waits for the next frame.
     ///
     /// # Errors
-    /// If the row has another number of cells than there are columns, or does not fit into a frame alone.
+    /// If the number of cells is not that of the columns, or the row does not fit into a frame by itself.
     pub fn push(&mut self, tick: i64, row: &[Option<f64>]) -> Result<Vec<Vec<u8>>, Error> {
         if row.len() != self.columns.len() {
             let expected = format!("{} cells, one per column", self.columns.len());
@@ -136,10 +136,10 @@ impl FrameWriter {
         Ok(frames)
     }
 
-    /// The frames of all rows that wait, however few.
+    /// Frames of all waiting rows, even if they are not full.
     ///
     /// # Errors
-    /// If a row does not fit into a frame alone.
+    /// If a row does not fit into a frame by itself.
     pub fn flush(&mut self) -> Result<Vec<Vec<u8>>, Error> {
         let mut frames = Vec::new();
         while !self.ticks.is_empty() {
@@ -155,9 +155,9 @@ impl FrameWriter {
         Ok(frames)
     }
 
-    /// A frame of the first rows, fewer than `too_many`, that is nearly full; those rows are done.
+    /// A nearly full frame of the first rows, fewer than `too_many`, and removes those rows.
     ///
-    /// Bytes grow nearly in proportion to rows, so the next trial is where the proportion of the last one says.
+    /// The number of bytes is nearly proportional to that of rows, so the next trial follows from the last one by proportion.
     fn largest(&mut self, too_many: usize, bytes_of_too_many: usize) -> Result<Vec<u8>, Error> {
         let (mut fits, mut too_many, mut best) = (0, too_many, None::<Vec<u8>>);
         let mut proportion = self.max_bytes as f64 / bytes_of_too_many as f64;
@@ -171,7 +171,7 @@ impl FrameWriter {
                 if filled >= FULL {
                     break;
                 }
-                // Half of the way to the rows that do not fit.
+                // Try half-way to the number of rows that do not fit.
                 proportion = 0.5 * (1.0 + rows as f64 / too_many as f64) / FILLED;
             } else {
                 too_many = rows;
@@ -194,7 +194,7 @@ impl FrameWriter {
     }
 
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
-        // Until the first frame is out, all rows that wait say what frames begin with.
+        // The first frame: the header's starts follow from all waiting rows.
         if !self.has_sent {
             let bounds = self.ranges.bounds(&self.schema);
             let header = Header::new(self.schema.clone(), &self.ticks, bounds);
@@ -209,31 +209,31 @@ impl FrameWriter {
     }
 }
 
-/// Makes rows of frames. Total: any bytes give rows, nothing, or an error.
+/// Converts frames to rows. Any bytes give rows, nothing, or an error.
 #[derive(Debug, Default)]
 pub struct FrameReader {
     header: Option<Header>,
-    /// The header that is being put together: its checksum and pieces.
+    /// The incomplete header: its checksum and pieces.
     pieces: Option<(u32, Vec<Option<Vec<u8>>>)>,
     waiting: VecDeque<Vec<u8>>,
 }
 
 impl FrameReader {
-    /// A reader that knows no header yet.
+    /// A reader without header.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// What the sender sends, once the header is whole.
+    /// The schema of the sender; `None` until the header is complete.
     pub fn schema(&self) -> Option<&Schema> {
         self.header.as_ref().map(|header| &header.schema)
     }
 
-    /// One frame as it arrived. Returns the blocks that it made readable: its own, or, with the last piece of the header, those that
-    /// arrived before and can be read now.
+    /// Processes one received frame. Returns the blocks that became readable: its own, or, with the last piece of the header, those that
+    /// arrived before.
     ///
     /// # Errors
-    /// If the frame is damaged or belongs to another header. The reader is then as it was.
+    /// If the frame is damaged or belongs to another header. The reader is then unchanged.
     pub fn handle(&mut self, frame: &[u8]) -> Result<Vec<Block>, Error> {
         let damaged = |damage| Error::Block {
             offset: 0,

@@ -1,4 +1,4 @@
-//! The header: what every block of a recording is decoded with.
+//! The header: everything that is needed to decode any block of a recording.
 
 use crate::bound::{Bound, TENS};
 use crate::codec::{Target, adaptive};
@@ -8,27 +8,27 @@ use crate::time::Grid;
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_text, push_varint, zigzag};
 use fewbits_adaptive::Start;
 
-/// The first bytes. Like PNG's they contain a byte above 127 and a line end, so that text transfers are noticed.
+/// The first bytes of a recording. As in PNG, a byte above 127 and a line end reveal a conversion as text.
 const MAGIC: [u8; 7] = *b"\x8bfewb\r\n";
-/// The version of the format.
+/// Version of the format.
 pub(crate) const VERSION: u8 = 5;
-/// No header is longer: 4096 columns with names and units.
+/// Largest length of a header in bytes: 4096 columns with names and units.
 pub(crate) const MAX_HEADER: usize = 1 << 24;
 
-/// The start of a column is no longer.
+/// Largest length of the start of a column in bytes.
 pub(crate) const MAX_START: usize = 32;
 
-/// The header as it is used.
+/// The decoded header.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Header {
     pub(crate) schema: Schema,
     pub(crate) origin: i64,
     pub(crate) step: i64,
-    /// For columns with a share: the bound of blocks that have none of their own; 0 means lossless.
+    /// For columns with a share: the bound of blocks that do not state their own; 0 means lossless.
     pub(crate) share_bounds: Vec<f64>,
-    /// What blocks of each column begin with, if they have no bound of their own.
+    /// The start of each column, for blocks that do not state their own bound.
     starts: Vec<Option<Start>>,
-    /// The header's checksum. The checksums of all blocks begin with it, so a block of another recording is refused.
+    /// The header's checksum. The checksums of all blocks include it, so a block of another recording is refused.
     pub(crate) check: u32,
 }
 
@@ -55,7 +55,7 @@ impl Header {
         header.checked()
     }
 
-    /// The same header with starts of columns like these.
+    /// The same header with starts for columns like these.
     pub(crate) fn with_starts(mut self, columns: &[Vec<Option<f64>>]) -> Self {
         let start = |(column, cells): (usize, &Vec<Option<f64>>)| {
             let finite: Vec<f64> = cells.iter().flatten().copied().filter(|x| x.is_finite()).collect();
@@ -72,7 +72,7 @@ impl Header {
         self
     }
 
-    /// What a block of a column begins with; blocks with a bound of their own have other indices.
+    /// The start of a column for a block. A block with a bound of its own has another grid and no start.
     pub(crate) fn start(&self, column: usize, own: Option<f64>) -> Option<Start> {
         self.starts[column].filter(|_| own.is_none())
     }
@@ -90,7 +90,7 @@ impl Header {
         }
     }
 
-    /// The promise of a column in a block, whose own bound counts if it has one.
+    /// The bound of a column in a block; `own` is the block's own one.
     pub(crate) fn target(&self, column: usize, own: Option<f64>) -> Target {
         let spec = &self.schema.columns[column];
         Target {
@@ -99,7 +99,7 @@ impl Header {
         }
     }
 
-    /// Magic, version, length, content, checksum.
+    /// The encoded header: magic bytes, version, length, content, checksum.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let mut body = Vec::new();
         push_varint(&mut body, self.schema.rows_per_block as u64);
@@ -134,7 +134,7 @@ impl Header {
         bytes
     }
 
-    /// Reads a header from the front; `None` if more bytes are needed. Returns its length too.
+    /// Reads a header from the front of `bytes`. Returns it with its length; `None` if more bytes are needed.
     pub(crate) fn read(bytes: &[u8]) -> Result<Option<(Self, usize)>, Error> {
         let known = bytes.len().min(MAGIC.len());
         if bytes[..known] != MAGIC[..known] {
@@ -204,7 +204,7 @@ impl Header {
     }
 }
 
-/// The next smaller double of 12 bits of mantissa, as stored in three bytes.
+/// The largest double with 12 bits of mantissa that does not exceed `bound`; it is stored in three bytes.
 pub(crate) fn rounded_down(bound: f64) -> f64 {
     f64::from_bits(bound.to_bits() & !0xff_ffff_ffff)
 }
@@ -213,10 +213,10 @@ pub(crate) fn rounded_down(bound: f64) -> f64 {
 const HAS_PERIOD: u8 = 0x10;
 const HAS_START: u8 = 0x20;
 const HAS_UNIT: u8 = 0x40;
-/// In place of decimals: the double itself follows.
+/// Stored in place of the number of decimals: the double itself follows.
 const DOUBLE: u8 = 0xff;
 
-/// A number that is not negative: its decimals and digits where these are exact, else its bits.
+/// Appends a non-negative number: decimals and digits if these are exact, otherwise its bits.
 fn push_number(body: &mut Vec<u8>, number: f64) {
     let digits = (0_u8..).zip(TENS).find_map(|(decimals, ten)| {
         let digits = (number * ten).round();

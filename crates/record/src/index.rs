@@ -1,8 +1,8 @@
-//! The index: where blocks are, when, and between which values. A recording is read without it too, only not as fast.
+//! The index: offset, times and ranges of values of each block. A recording can be read without it, but more slowly.
 //!
-//! `docs/record.md` says each byte. A segment follows its blocks, every 1024 blocks and at the end; so a recorder holds no more than that many
-//! entries. A footer lists the segments; where there is one only, its index stands in the footer's place. An entry without rows stands for
-//! damaged bytes that `resume` left in place.
+//! `docs/record.md` describes each byte. A segment of the index follows every 1024 blocks and the last one, so a recorder holds at most
+//! that many entries. A footer lists the segments; a single segment takes the place of the footer. An entry without rows stands for damaged
+//! bytes that `resume` left in place.
 
 use crate::block::Cells;
 use crate::error::Damage;
@@ -10,28 +10,28 @@ use crate::header::Header;
 use crate::ranges::{self, Ends};
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint, unzigzag, zigzag};
 
-/// Blocks of one segment.
+/// Number of blocks per segment.
 pub(crate) const BLOCKS_PER_SEGMENT: usize = 1024;
 pub(crate) const SEGMENT: u8 = b'I';
 pub(crate) const FOOTER: u8 = b'F';
-/// The only segment of a finished recording.
+/// Kind of a segment that is the only one of a finished recording.
 pub(crate) const ONLY: u8 = b'O';
 /// The last bytes of a finished recording.
 pub(crate) const END: [u8; 4] = *b"fEnd";
-/// Bytes behind the footer's checksum.
+/// Bytes after the footer's checksum.
 pub(crate) const TRAILER_BYTES: usize = 8;
-/// No footer is longer.
+/// Largest length of a footer in bytes.
 const MAX_FOOTER: usize = 1 << 22;
 
-/// One block in the index.
+/// Entry of one block.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
-    /// Bytes of the whole block.
+    /// Length of the whole block in bytes.
     pub(crate) length: u64,
-    /// 0 for damaged bytes.
+    /// Number of rows; 0 for damaged bytes.
     pub(crate) rows: u64,
     pub(crate) ticks: (i64, i64),
-    /// Least and largest finite value of each column, or something beyond them; `None` without any.
+    /// Lower and upper bound of the finite values of each column; `None` if there are none.
     pub(crate) ends: Vec<Ends>,
 }
 
@@ -61,14 +61,14 @@ impl Entry {
     }
 }
 
-/// One segment in the footer.
+/// Entry of one segment in the footer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Segment {
-    /// Where its first block begins.
+    /// Offset of its first block.
     pub(crate) start: u64,
-    /// Bytes of its blocks, behind which it stands itself.
+    /// Total length of its blocks in bytes; the segment follows them.
     pub(crate) blocks: u64,
-    /// Its own bytes.
+    /// Length of the segment itself in bytes.
     pub(crate) length: u64,
     pub(crate) rows: u64,
     pub(crate) ticks: (i64, i64),
@@ -91,13 +91,13 @@ impl Segment {
         }
     }
 
-    /// Where the next segment's blocks begin.
+    /// Offset of the next segment's first block.
     pub(crate) fn end(&self) -> u64 {
         self.start.saturating_add(self.blocks).saturating_add(self.length)
     }
 }
 
-/// A special record: kind and content between mark and checksum.
+/// A special record: mark, kind, content, checksum.
 pub(crate) fn special(check: u32, kind: u8, content: &[u8]) -> Vec<u8> {
     let mut bytes = vec![0, kind];
     push_varint(&mut bytes, content.len() as u64);
@@ -139,7 +139,7 @@ pub(crate) fn read_special<'a>(header: &Header, bytes: &'a [u8]) -> Result<(u8, 
     Ok((kind, content, end + CHECK_BYTES))
 }
 
-/// The nearest `f32` that is not above.
+/// The largest `f32` that does not exceed `value`.
 fn f32_below(value: f64) -> f32 {
     let near = value as f32;
     if f64::from(near) > value {
@@ -149,13 +149,13 @@ fn f32_below(value: f64) -> f32 {
     }
 }
 
-/// Bytes of a column's ends: the first ones of a big-endian `f32`.
+/// Bytes of a stored bound of a column: the first ones of a big-endian `f32`.
 const SHORT: usize = 3;
 
-/// The nearest number of so many bytes that is not above.
+/// The largest number of `SHORT` bytes that does not exceed `value`.
 fn short_below(value: f64) -> f32 {
     let near = f32_below(value).to_bits();
-    // Without its last byte a negative number is larger.
+    // Dropping the last byte makes a negative number larger.
     let cut = near & !0xff;
     f32::from_bits(if near >> 31 == 1 && cut != near {
         cut + 0x100
@@ -173,17 +173,17 @@ fn read_short(reader: &mut Bytes<'_>) -> Result<f64, Damage> {
     Ok(f64::from(f32::from_be_bytes([a, b, c, 0])))
 }
 
-/// Levels between a column's ends.
+/// Number of levels between a column's bounds.
 const MOST: u8 = 15;
 const LEVELS: f64 = MOST as f64;
-/// Levels of a column without values: the low one is above.
+/// Levels of a column without values: the lower exceeds the upper.
 const NO_VALUES: [u8; 2] = [1, 0];
 
-/// A value between two ends, in 15ths, rounded down; `ends` may be infinite.
+/// The level of a value between two bounds, in 15ths, rounded down; `ends` may be infinite.
 fn level_below(value: f64, ends: (f64, f64)) -> u8 {
     let share = (value - ends.0) / (ends.1 - ends.0);
     let level = (LEVELS * share).floor().clamp(0.0, LEVELS) as u8;
-    // Rounding may put the level's value above.
+    // Rounding may put the level above the value.
     if level > 0 && level_value(level, ends) > value {
         level - 1
     } else {
@@ -204,7 +204,7 @@ fn level_value(level: u8, ends: (f64, f64)) -> f64 {
     match level {
         0 => ends.0,
         MOST.. => ends.1,
-        // Ends beyond the numbers of 32 bits are infinite: nothing lies between them.
+        // Bounds that exceed an `f32` are infinite: there are no levels between them.
         _ if !(ends.1 - ends.0).is_finite() => ends.1,
         level => ends.0 + (ends.1 - ends.0) * (f64::from(level) / LEVELS),
     }
@@ -219,7 +219,7 @@ pub(crate) fn push_segment(header: &Header, entries: &[Entry]) -> Vec<u8> {
     for column in 0..columns {
         let ends = entries.iter().filter_map(|entry| entry.ends[column]);
         let all = ends.reduce(|(l, h), (low, high)| (l.min(low), h.max(high)));
-        // Without values the low end is above the high one.
+        // Without values the lower bound is stored above the upper one.
         let (low, high) = all.map_or((1.0, 0.0), |(low, high)| (short_below(low), short_above(high)));
         content.extend_from_slice(&low.to_be_bytes()[..SHORT]);
         content.extend_from_slice(&high.to_be_bytes()[..SHORT]);
@@ -230,7 +230,7 @@ pub(crate) fn push_segment(header: &Header, entries: &[Entry]) -> Vec<u8> {
         let distance = entry.ticks.0.wrapping_sub(last);
         let shape = (entry.rows, distance, entry.ticks.1.wrapping_sub(entry.ticks.0));
         let same = before == Some(shape);
-        // Blocks of as many rows are of similar length: the difference mostly fits a byte.
+        // Blocks with equal numbers of rows have similar lengths: the difference mostly fits into a byte.
         let longer = zigzag(entry.length.wrapping_sub(length) as i64);
         push_varint(&mut content, longer << 1 | u64::from(same));
         length = entry.length;
@@ -308,7 +308,7 @@ pub(crate) fn push_footer(header: &Header, segments: &[Segment]) -> Vec<u8> {
     special(header.check, FOOTER, &content)
 }
 
-/// What ends a recording behind its footer.
+/// The last bytes of a recording, after its footer.
 pub(crate) fn trailer(footer: u64) -> Vec<u8> {
     [&(footer as u32).to_le_bytes()[..], &END].concat()
 }

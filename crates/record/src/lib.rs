@@ -1,4 +1,4 @@
-//! Recordings of many columns, each within a bound that it states, in blocks that are read alone.
+//! Recordings of many columns, each within a stated error bound, in blocks that can be read independently.
 //!
 //! ```
 //! use fewbits_record::{Bound, Column, Playback, Recorder, Schema, TimeBase};
@@ -28,22 +28,22 @@
 //! # Ok::<(), fewbits_record::Error>(())
 //! ```
 //!
-//! The central choice: **a block is a frame.** A block holds rows, 512 of them unless another number is chosen, needs nothing but
-//! the header to be decoded, and carries a checksum that covers the header's too. So a file that was cut off, flipped bits, blocks
-//! of another recording and lost frames on a link are one case: what cannot be read is an error of its own, everything else is
-//! read. The cost is that each block learns the signal anew.
+//! **A block is also a frame.** A block holds 512 rows by default. It needs only the header to be decoded, and
+//! its checksum includes the header's. Truncated files, inverted bits, blocks of another recording and frames lost on a link are
+//! therefore handled alike: what cannot be read gives an error, and everything else is
+//! read. The cost: the models of each block start anew.
 //!
-//! The second choice: **the promise is checked, not trusted.** The recorder decodes every block that it writes and compares each
-//! sample with its restored value in exact arithmetic ([`is_within`]). A sample whose restored value is too far off is stored as it
-//! is. So the bound holds for huge and tiny numbers too, whatever a codec does.
+//! **Bounds are verified.** The recorder decodes every block that it writes and compares each
+//! sample with its restored value in exact arithmetic ([`is_within`]). A sample whose restored value is outside the bound is stored in
+//! full. The bound therefore holds for very large and very small numbers too, whatever a codec does.
 //!
 //! | part | where |
 //! |---|---|
-//! | columns, promises, time | [`Schema`], [`Column`], [`Bound`], [`TimeBase`] |
+//! | columns, error bounds, time | [`Schema`], [`Column`], [`Bound`], [`TimeBase`] |
 //! | writing | [`Recorder`] |
-//! | reading at any place | [`Playback`] |
-//! | reading from front to end, from a pipe | [`BlockReader`] |
-//! | frames on a link that loses some | [`FrameWriter`], [`FrameReader`] |
+//! | reading with random access | [`Playback`] |
+//! | reading from front to end, for example from a pipe | [`BlockReader`] |
+//! | frames for a link that loses some | [`FrameWriter`], [`FrameReader`] |
 //!
 //! Not here: how values are predicted and coded (`fewbits-adaptive`), text formats and the command line (`fewbits-cli`). The format
 //! is described byte by byte in `docs/record.md`.
@@ -78,7 +78,7 @@ pub use recorder::Recorder;
 pub use scan::BlockReader;
 pub use schema::{Column, MAX_CELLS, ROWS_PER_BLOCK, Schema, TimeBase, TimeFormat};
 
-/// The programs of the page, kept running.
+/// The programs of `docs/record.md`, which are run as tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/record.md")]
 mod page {}

@@ -1,4 +1,4 @@
-//! Reading recordings.
+//! Reading of recordings with random access.
 
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
@@ -11,41 +11,42 @@ use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Take};
 use std::path::Path;
 
-/// One row: its tick and the cells of the chosen columns, `None` for a gap.
+/// One row: its tick, and one cell per requested column.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Row {
-    /// When.
+    /// Time of the row in ticks.
     pub tick: i64,
-    /// One cell per column that was asked for, in the order of the request.
+    /// One cell per requested column, in the order of the request; `None` is a gap.
     pub values: Vec<Option<f64>>,
 }
 
-/// A block in the index.
+/// What the index says of one block.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct BlockInfo {
-    /// First byte.
+    /// Offset of the first byte.
     pub offset: u64,
-    /// Bytes.
+    /// Length in bytes.
     pub bytes: u64,
-    /// Rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Least and largest tick.
+    /// Smallest and largest tick.
     pub ticks: (i64, i64),
-    /// Least and largest value of each column or a little beyond them (a 15th of the column's range in 1024 blocks); `None` without any.
+    /// Lower and upper bound of each column's values (they exceed them by at most a 15th of the column's range in 1024 blocks); `None`
+    /// without values.
     pub ends: Vec<Option<(f64, f64)>>,
 }
 
-/// Reads a recording, by its index if it has one, else from front to end.
+/// Reads a recording by its index, or from front to end if it has none.
 #[derive(Debug)]
 pub struct Playback<R> {
     reader: R,
     header: Header,
-    /// First byte behind the header, and behind everything.
+    /// Offsets of the first byte after the header, and of the end.
     span: (u64, u64),
     segments: Option<Vec<Segment>>,
-    /// Columns that were asked for.
+    /// Indices of the requested columns.
     chosen: Vec<usize>,
 }
 
@@ -60,10 +61,10 @@ impl Playback<File> {
 }
 
 impl<R: Read + Seek> Playback<R> {
-    /// A recording in anything that can be read at any place.
+    /// Opens a recording in any source with random access.
     ///
     /// # Errors
-    /// If reading fails or the header is not whole. Damage behind the header is no error yet.
+    /// If reading fails or the header is incomplete or damaged. Damage after the header is reported later.
     pub fn new(mut reader: R) -> Result<Self, Error> {
         reader.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
         let mut scanner = Scanner::new(&mut reader, 0);
@@ -80,25 +81,25 @@ impl<R: Read + Seek> Playback<R> {
         })
     }
 
-    /// What the recording holds.
+    /// Columns and time of the recording.
     pub fn schema(&self) -> &Schema {
         &self.header.schema
     }
 
-    /// Whether the recording was finished and its index is whole.
+    /// Whether the recording was finished and its index is undamaged.
     pub fn has_index(&self) -> bool {
         self.segments.is_some()
     }
 
-    /// Bytes of the whole recording.
+    /// Length of the whole recording in bytes.
     pub fn bytes(&self) -> u64 {
         self.span.1
     }
 
-    /// From now on only these columns, in this order.
+    /// Requests only these columns, in this order, for all later reading.
     ///
     /// # Errors
-    /// If there is no such column; all that was chosen before stays.
+    /// If there is no such column. The request before then stays in effect.
     pub fn columns(&mut self, names: &[&str]) -> Result<&mut Self, Error> {
         self.chosen = names
             .iter()
@@ -107,7 +108,7 @@ impl<R: Read + Seek> Playback<R> {
         Ok(self)
     }
 
-    /// All blocks in their order. Damaged bytes are one error each; the iteration goes on behind them.
+    /// All blocks in order. Damaged bytes give one error per stretch; the iteration continues after them.
     pub fn blocks(&mut self) -> Blocks<'_, R> {
         self.blocks_between(i64::MIN, i64::MAX)
     }
@@ -124,7 +125,7 @@ impl<R: Read + Seek> Playback<R> {
         }
     }
 
-    /// All rows in their order. Damaged bytes are one error each; the iteration goes on behind them.
+    /// All rows in order. Damaged bytes give one error per stretch; the iteration continues after them.
     pub fn rows(&mut self) -> Rows<'_, R> {
         self.range(i64::MIN, i64::MAX)
     }
@@ -140,7 +141,7 @@ impl<R: Read + Seek> Playback<R> {
         }
     }
 
-    /// What the index says of each block; empty without index.
+    /// The index, one entry per block; empty if the recording has none.
     ///
     /// # Errors
     /// If reading fails or a part of the index is damaged.
@@ -170,7 +171,7 @@ impl<R: Read + Seek> Playback<R> {
     }
 }
 
-/// Reads `length` bytes at an offset; `None` if the file ends before.
+/// Reads `length` bytes at an offset; `None` if the file ends earlier.
 fn read_at(reader: &mut (impl Read + Seek), offset: u64, length: u64) -> Result<Option<Vec<u8>>, Error> {
     reader.seek(SeekFrom::Start(offset)).map_err(Error::io("read"))?;
     let mut bytes = Vec::new();
@@ -181,7 +182,7 @@ fn read_at(reader: &mut (impl Read + Seek), offset: u64, length: u64) -> Result<
     }
 }
 
-/// The segments of a finished recording; `None` without a whole footer.
+/// The segments of a finished recording; `None` without an undamaged footer.
 pub(crate) fn segments(reader: &mut (impl Read + Seek), header: &Header) -> Result<Option<Vec<Segment>>, Error> {
     let end = reader.seek(SeekFrom::End(0)).map_err(Error::io("read"))?;
     let Some(trailer) = end.checked_sub(TRAILER_BYTES as u64) else {
@@ -242,9 +243,9 @@ pub struct Blocks<'a, R> {
     playback: &'a mut Playback<R>,
     ticks: (i64, i64),
     next_segment: usize,
-    /// Offsets and entries of the segment that is being read.
+    /// Offsets and entries of the segment that is read at present.
     entries: VecDeque<(u64, Entry)>,
-    /// The stretch without index that is being scanned: where it goes on, and where it ends.
+    /// Start and end of the bytes without index that are scanned at present.
     scan: Option<(u64, u64)>,
     scanned: bool,
 }
@@ -348,7 +349,7 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
                         offset = next;
                     }
                 }
-                // The segment itself is damaged: its blocks are not.
+                // Only the segment itself is damaged: scan for its blocks.
                 Ok(None) => self.scan = Some((segment.start, segment.start.saturating_add(segment.blocks))),
                 Err(error) => return Some(Err(error)),
             }

@@ -1,16 +1,16 @@
-//! Ranges of columns so far, and the bounds that shares of them mean.
+//! Ranges of the columns so far, and the error bounds that follow from shares of them.
 
 use crate::bound::Bound;
 use crate::header::{Header, rounded_down};
 use crate::schema::Schema;
 
-/// A share's bound in a block is written when it is larger than the header's by this factor.
+/// A block states its own bound if that exceeds the header's by this factor.
 const WIDER: f64 = 1.25;
 
-/// Least and greatest of some values.
+/// Smallest and largest of some values; `None` without values.
 pub(crate) type Ends = Option<(f64, f64)>;
 
-/// The ends with one more cell, which counts if it is finite.
+/// The ends including one more cell, if it is finite.
 pub(crate) fn with(ends: Ends, cell: Option<f64>) -> Ends {
     match (ends, cell.filter(|value| value.is_finite())) {
         (None, value) => value.map(|value| (value, value)),
@@ -28,14 +28,15 @@ impl Ranges {
         Self(vec![None; columns])
     }
 
-    /// Takes one row.
+    /// Includes one row.
     pub(crate) fn add(&mut self, row: &[Option<f64>]) {
         for (ends, cell) in self.0.iter_mut().zip(row) {
             *ends = with(*ends, *cell);
         }
     }
 
-    /// A bound not above what the column's share means by now, 0 where the range is none or overflows; `None` for columns without a share.
+    /// A bound that does not exceed the column's share of the present range; 0 if the range is empty or overflows. `None` for columns
+    /// without a share.
     fn share_bound(&self, schema: &Schema, column: usize) -> Option<f64> {
         let spec = &schema.columns[column];
         let Bound::ShareOfRange(share) = spec.bound else {
@@ -44,7 +45,7 @@ impl Ranges {
         let range = spec
             .known_range()
             .or_else(|| self.0[column].map(|(low, high)| high - low));
-        // The product may be rounded up; a bound must not be.
+        // The product may have been rounded up, which a bound must not be.
         let bound = (share * range.unwrap_or(0.0)).next_down().max(0.0);
         Some(if (2.0 * bound).is_finite() { bound } else { 0.0 })
     }
@@ -56,7 +57,7 @@ impl Ranges {
             .collect()
     }
 
-    /// The bounds that a block states itself, where the header's are much smaller.
+    /// The bounds that a block must state itself, because the header's are much smaller.
     pub(crate) fn own_bounds(&self, header: &Header) -> Vec<Option<f64>> {
         let own = |i: usize| {
             let bound = rounded_down(self.share_bound(&header.schema, i)?);

@@ -1,4 +1,4 @@
-//! Writing recordings.
+//! Writing of recordings.
 
 use crate::block::{self, Cells};
 use crate::error::Error;
@@ -13,7 +13,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
-/// Whether a new header says what the blocks begin with.
+/// Whether a new header contains starts of the columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Starts {
     None,
@@ -22,9 +22,9 @@ enum Starts {
 
 /// Writes rows in blocks.
 ///
-/// The header is written with the first block, since the first rows tell the spacing of time and the range that shares refer to.
-/// Each block is written whole, by one call, and never touched again: after a crash at any byte all blocks before it are read.
-/// Memory: the rows of one block, 1024 entries of the index, and 40 bytes for every 1024 blocks.
+/// The header is written with the first block, because it contains the spacing of times and the ranges, which the first rows determine.
+/// Each block is written by one call and never changed: after a crash at any byte all blocks before it can be read.
+/// Memory: the rows of one block, 1024 entries of the index, and 40 bytes per 1024 blocks.
 #[derive(Debug)]
 pub struct Recorder<W> {
     writer: W,
@@ -34,9 +34,9 @@ pub struct Recorder<W> {
     columns: Vec<Cells>,
     ranges: Ranges,
     next_tick: i64,
-    /// Bytes written.
+    /// Number of bytes written.
     offset: u64,
-    /// Where the blocks of the segment begin that is being filled.
+    /// Offset of the first block of the present segment.
     segment_start: u64,
     entries: Vec<Entry>,
     segments: Vec<Segment>,
@@ -44,7 +44,7 @@ pub struct Recorder<W> {
     broken: bool,
 }
 
-/// The state of a recording that is to be continued.
+/// State of a recording that is to be continued.
 pub(crate) struct Resumed {
     pub(crate) header: Header,
     pub(crate) offset: u64,
@@ -54,7 +54,7 @@ pub(crate) struct Resumed {
 }
 
 impl Recorder<File> {
-    /// A new file; one that exists is replaced.
+    /// Creates a file. An existing one is replaced.
     ///
     /// # Errors
     /// If the file cannot be created.
@@ -63,10 +63,10 @@ impl Recorder<File> {
         Ok(Self::new(file, schema))
     }
 
-    /// Goes on with a recording, finished or not: cuts off the index, or what a crash left behind the last whole block.
+    /// Continues a recording, finished or not. The index, or what a crash left after the last complete block, is removed.
     ///
     /// # Errors
-    /// If the file cannot be opened, read or cut, or its header is not whole.
+    /// If the file cannot be opened, read or truncated, or its header is incomplete or damaged.
     pub fn resume(path: impl AsRef<Path>) -> Result<Self, Error> {
         let (file, resumed) = resume::open(path.as_ref())?;
         let mut recorder = Self::new(file, resumed.header.schema.clone());
@@ -87,7 +87,7 @@ impl Recorder<File> {
         Ok(recorder)
     }
 
-    /// Writes the rows so far as a block, however few, and waits until the device has them.
+    /// Writes the rows so far as a block, even if it is not full, and waits until the storage device has them.
     ///
     /// # Errors
     /// If writing fails.
@@ -98,7 +98,7 @@ impl Recorder<File> {
 }
 
 impl<W: Write> Recorder<W> {
-    /// A recording into any sink. Blocks are written by one call each, so no buffer is needed.
+    /// A recording into any sink. Each block is written by one call, so no buffer is needed.
     pub fn new(writer: W, schema: Schema) -> Self {
         let columns = schema.columns.len();
         Self {
@@ -118,13 +118,13 @@ impl<W: Write> Recorder<W> {
         }
     }
 
-    /// How much time blocks may take; the fewest bits unless another effort is chosen. Readers need not know.
+    /// Sets how much computing time blocks may take. The default gives the fewest bits. Readers need not know it.
     #[must_use]
     pub fn with_effort(self, effort: Effort) -> Self {
         Self { effort, ..self }
     }
 
-    /// What is being recorded.
+    /// Columns and time of the recording.
     pub fn schema(&self) -> &Schema {
         &self.schema
     }
@@ -139,10 +139,10 @@ impl<W: Write> Recorder<W> {
         self.next_tick
     }
 
-    /// One row: its tick, and one cell per column, `None` for a gap.
+    /// Adds one row: its tick, and one cell per column, `None` for a gap.
     ///
     /// # Errors
-    /// If the row has another number of cells, or a block is full and cannot be written.
+    /// If the number of cells is not that of the columns, or a full block cannot be written.
     pub fn push(&mut self, tick: i64, row: &[Option<f64>]) -> Result<(), Error> {
         if self.broken {
             return Err(Error::Broken);
@@ -163,7 +163,7 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    /// One row, one tick after the last; for rows without time.
+    /// Adds one row whose tick is one after the last; for rows without time.
     ///
     /// # Errors
     /// As [`push`](Self::push).
@@ -171,7 +171,7 @@ impl<W: Write> Recorder<W> {
         self.push(self.next_tick, row)
     }
 
-    /// Writes the rows so far as a block, however few: a reader then has them.
+    /// Writes the rows so far as a block, even if it is not full, so that a reader can read them.
     ///
     /// # Errors
     /// If writing fails.
@@ -185,7 +185,7 @@ impl<W: Write> Recorder<W> {
         self.writer.flush().map_err(Error::io("write"))
     }
 
-    /// Writes the rest and the index. A recording that was not finished can be read too, only without index.
+    /// Writes the remaining rows and the index. A recording that was not finished can be read too, but without index.
     ///
     /// # Errors
     /// If writing fails.
@@ -193,12 +193,12 @@ impl<W: Write> Recorder<W> {
         if self.broken {
             return Err(Error::Broken);
         }
-        // The only block says itself what others would share.
+        // A single block contains itself what several would share.
         if !self.ticks.is_empty() {
             self.write_block(Starts::None)?;
         }
         self.write_header(Starts::None)?;
-        // The only segment is its own footer.
+        // A single segment is also the footer.
         let is_only = self.segments.is_empty() && !self.entries.is_empty();
         self.write_segment(if is_only { index::ONLY } else { index::SEGMENT })?;
         let footer = match &self.header {

@@ -1,17 +1,17 @@
-//! Which columns may help to predict another one.
+//! Choice of the columns from which another one is predicted.
 
 use crate::block::Cells;
 use crate::codec::JOINT_COLUMNS;
 
-/// Columns that are looked at: the nearest before.
+/// Number of columns that are considered: the nearest ones before.
 const MAX_LOOKED_AT: usize = 32;
-/// The least correlation of steps that is worth a trial. A predictor that explains a share `r^2` of the variance saves
-/// `-log2(1 - r^2) / 2` bits per sample: 0.07 at 0.3.
+/// Smallest correlation of steps for which a column is tried. A predictor that explains a share `r^2` of the variance saves
+/// `-log2(1 - r^2) / 2` bits per sample: 0.07 at `r` = 0.3.
 const MIN_CORRELATION: f64 = 0.3;
-/// The least number of pairs of steps.
+/// Smallest number of pairs of steps.
 const MIN_STEPS: f64 = 16.0;
 
-/// The columns before this one whose steps from row to row go with its own, the closest first.
+/// The earlier columns whose steps from row to row are correlated with this column's, by decreasing correlation.
 pub(crate) fn columns(cells: &[Option<f64>], before: &[Cells]) -> Vec<usize> {
     let nearest = before.iter().enumerate().rev().take(MAX_LOOKED_AT);
     let mut found: Vec<(usize, f64)> = nearest
@@ -29,7 +29,7 @@ fn finite_steps(cells: &[Option<f64>]) -> impl Iterator<Item = Option<f64>> {
         .map(|pair| Some(pair[1]? - pair[0]?).filter(|step| step.is_finite()))
 }
 
-/// Correlation of steps about zero; 0 where it is unknown.
+/// Correlation of steps about zero; 0 if there are too few.
 fn correlation(a: &[Option<f64>], b: &[Option<f64>]) -> f64 {
     let (mut count, mut products, mut squares_a, mut squares_b) = (0.0, 0.0, 0.0, 0.0);
     for (a, b) in finite_steps(a).zip(finite_steps(b)) {

@@ -1,4 +1,4 @@
-//! Where an existing recording is continued.
+//! Finding the place where an existing recording is continued.
 
 use crate::error::Error;
 use crate::header::Header;
@@ -10,7 +10,7 @@ use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::Path;
 
-/// Opens a recording, cuts it behind its last whole block, and goes there.
+/// Opens a recording, truncates it after its last complete block, and moves there.
 pub(crate) fn open(path: &Path) -> Result<(File, Resumed), Error> {
     let mut file = File::options()
         .read(true)
@@ -39,7 +39,7 @@ fn next_tick(segments: &[Segment], entries: &[Entry]) -> i64 {
         .map_or(0, |tick| tick.wrapping_add(1))
 }
 
-/// From footer and last segment; `None` if they are not there or damaged.
+/// The state from footer and last segment; `None` if they are missing or damaged.
 fn from_index(file: &mut File, header: &Header) -> Result<Option<Resumed>, Error> {
     let Some(mut segments) = playback::segments(file, header)? else {
         return Ok(None);
@@ -50,7 +50,7 @@ fn from_index(file: &mut File, header: &Header) -> Result<Option<Resumed>, Error
         let Some(found) = playback::entries(file, header, &last)? else {
             return Ok(None);
         };
-        // A segment that is not full is filled up.
+        // The last segment is not full: continue it.
         if found.len() < BLOCKS_PER_SEGMENT {
             offset = last.start + last.blocks;
             entries = found;
@@ -66,7 +66,7 @@ fn from_index(file: &mut File, header: &Header) -> Result<Option<Resumed>, Error
     }))
 }
 
-/// From the blocks themselves, which are decoded once for their ends.
+/// The state from the blocks themselves, which are decoded once for their ranges.
 fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     file.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
     let mut scanner = Scanner::new(file, 0);
@@ -96,7 +96,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
                 segments.push(segment);
                 entries.clear();
             }
-            // A footer, or a segment of which blocks were damaged since: its bytes stay, its place is skipped.
+            // A footer, or a segment some of whose blocks were damaged later: its bytes stay and are skipped.
             Kind::Segment | Kind::Footer => entries.push(Entry::damaged(found.length as u64, columns)),
         }
     }

@@ -1,4 +1,4 @@
-//! Blocks from a stream of bytes, one behind the other, without an index: files that were not finished, pipes, collected frames.
+//! Sequential reading of blocks without an index: files that were not finished, pipes, collected frames.
 
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
@@ -7,10 +7,10 @@ use crate::index::{self, TRAILER_BYTES};
 use crate::schema::Schema;
 use std::io::Read;
 
-/// Bytes that are asked for at once.
+/// Number of bytes requested at once.
 const CHUNK: usize = 1 << 16;
 
-/// What stands at a place.
+/// Kind of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Block,
@@ -18,7 +18,7 @@ pub(crate) enum Kind {
     Footer,
 }
 
-/// A record that was found whole.
+/// A complete record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Found {
     pub(crate) kind: Kind,
@@ -26,16 +26,16 @@ pub(crate) struct Found {
     pub(crate) length: usize,
 }
 
-/// Finds whole records; steps over damaged bytes.
+/// Finds complete records and skips damaged bytes.
 pub(crate) struct Scanner<R> {
     reader: R,
     buffer: Vec<u8>,
-    /// Where the next record begins, in the buffer.
+    /// Position of the next record in the buffer.
     position: usize,
     /// Offset of the buffer's first byte.
     offset: u64,
     ended: bool,
-    /// The last record that was found begins here.
+    /// Position of the last record found.
     current: usize,
     pending: Option<Found>,
 }
@@ -53,7 +53,7 @@ impl<R: Read> Scanner<R> {
         }
     }
 
-    /// Reads one more piece; forgets what was consumed.
+    /// Reads one more chunk and drops consumed bytes.
     fn fill(&mut self) -> Result<(), Error> {
         self.buffer.drain(..self.position);
         self.offset += self.position as u64;
@@ -98,7 +98,7 @@ impl<R: Read> Scanner<R> {
         self.offset + self.position as u64
     }
 
-    /// The bytes of the record that was found last.
+    /// The bytes of the last record found.
     pub(crate) fn bytes(&self, found: &Found) -> &[u8] {
         &self.buffer[self.current..self.current + found.length]
     }
@@ -130,10 +130,10 @@ impl<R: Read> Scanner<R> {
         }
     }
 
-    /// The next whole record; `None` at the end.
+    /// The next complete record; `None` at the end.
     ///
     /// # Errors
-    /// If reading fails, or bytes are damaged: the call after that goes on behind them.
+    /// If reading fails, or bytes are damaged. After damage the next call continues behind it.
     pub(crate) fn next(&mut self, header: &Header) -> Result<Option<Found>, Error> {
         if let Some(found) = self.pending.take() {
             return Ok(Some(found));
@@ -170,7 +170,7 @@ impl<R: Read> Scanner<R> {
     }
 }
 
-/// Blocks of a recording that is read from front to end, from any source of bytes.
+/// Iterator over the blocks of a recording from any source of bytes, from front to end.
 pub struct BlockReader<R> {
     scanner: Scanner<R>,
     header: Header,
@@ -180,20 +180,20 @@ impl<R: Read> BlockReader<R> {
     /// Reads the header.
     ///
     /// # Errors
-    /// If reading fails, or the source does not begin with a whole header of this version.
+    /// If reading fails, or the source does not begin with a complete header of this version.
     pub fn new(reader: R) -> Result<Self, Error> {
         let mut scanner = Scanner::new(reader, 0);
         let header = scanner.header()?;
         Ok(Self { scanner, header })
     }
 
-    /// What the recording holds.
+    /// Columns and time of the recording.
     pub fn schema(&self) -> &Schema {
         &self.header.schema
     }
 }
 
-/// An error about damaged bytes does not end the iteration: the next item is the first whole block behind them.
+/// An error about damaged bytes does not end the iteration: the next item is the first complete block after them.
 impl<R: Read> Iterator for BlockReader<R> {
     type Item = Result<Block, Error>;
 

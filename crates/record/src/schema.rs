@@ -1,25 +1,25 @@
-//! What a recording holds: columns with their promises, time, the size of blocks.
+//! The schema of a recording: columns with their error bounds, time, size of blocks.
 
 use crate::bound::{Bound, Promise};
 use crate::error::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
 
-/// Most cells (rows times columns, time included) of one block: what a reader may have to hold.
+/// Largest number of cells (rows times columns, time included) of one block, which a reader must hold in memory.
 pub const MAX_CELLS: usize = 1 << 24;
-/// Most bytes of a name or a unit.
+/// Largest length of a name or a unit in bytes.
 const MAX_NAME: usize = 1 << 10;
-/// Largest number of cells around a circle: the codec's indices stay exact.
+/// Largest number of cells on a circle, for which the codec's indices are exact.
 const MAX_CIRCLE_CELLS: f64 = (1_u64 << 40) as f64;
 
-/// One column: name, unit, promise.
+/// One column: name, unit, error bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     pub(crate) name: String,
     pub(crate) unit: String,
     pub(crate) bound: Bound,
     pub(crate) period: Option<f64>,
-    /// Size of the range that a share refers to, where it is fixed beforehand.
+    /// Size of the range that a share refers to, if it is known beforehand.
     pub(crate) range: Option<f64>,
 }
 
@@ -27,8 +27,8 @@ impl Column {
     /// A column without a unit.
     ///
     /// # Errors
-    /// If the name is longer than 1024 bytes, an absolute bound is not positive with a finite double, a share is not in `(0, 1]`, or
-    /// decimals are above 15.
+    /// If the name is longer than 1024 bytes, an absolute bound is not positive or its double not finite, a share is not in `(0, 1]`, or
+    /// there are more than 15 decimals.
     pub fn new(name: impl Into<String>, bound: Bound) -> Result<Self, Error> {
         Ok(Self {
             name: text("name", name.into())?,
@@ -39,7 +39,7 @@ impl Column {
         })
     }
 
-    /// The unit that samples are in; only shown.
+    /// Sets the unit of the samples, which is only shown to users.
     ///
     /// # Errors
     /// If it is longer than 1024 bytes.
@@ -50,11 +50,11 @@ impl Column {
         })
     }
 
-    /// Samples are directions on a circle of this circumference (360 for degrees): the bound holds around the circle, and restored
-    /// values lie in `[0, period)`. Without effect on lossless columns.
+    /// Declares that samples are directions on a circle of this circumference (360 for degrees). The bound then holds around the circle,
+    /// and restored values lie in `[0, period)`. No effect on lossless columns.
     ///
     /// # Errors
-    /// If `period` is not positive and finite, above `2^40` times the bound, or the column is to keep decimals.
+    /// If `period` is not positive and finite, exceeds `2^40` times the bound, or the bound is [`Bound::Decimals`].
     pub fn with_period(self, period: f64) -> Result<Self, Error> {
         positive("period", period)?;
         if let Bound::Decimals(places) = self.bound {
@@ -75,8 +75,8 @@ impl Column {
         })
     }
 
-    /// The range that a share refers to, if it is known beforehand. Without it, it is the range of the rows so far; on a circle it
-    /// is the period.
+    /// Sets the range that a share refers to, if it is known beforehand. Without it, it is the range of the rows so far, or on a circle
+    /// the period.
     ///
     /// # Errors
     /// If an end is not finite or `from` is above `to`.
@@ -105,18 +105,18 @@ impl Column {
         &self.unit
     }
 
-    /// The promise.
+    /// The error bound.
     pub fn bound(&self) -> Bound {
         self.bound
     }
 
-    /// Circumference, if samples are directions.
+    /// Circumference of the circle, if samples are directions.
     pub fn period(&self) -> Option<f64> {
         self.period
     }
 
-    /// Whether a restored cell keeps what the column promises of a sample: gaps, NaN and infinities the same bits, finite samples within
-    /// the bound. `share_bound` is that of the block ([`Block::share_bounds`](crate::Block::share_bounds)), for columns with a share.
+    /// Whether a restored cell is within the bound of a sample. Gaps, NaN and infinities must have the same bits. `share_bound` is that of
+    /// the block ([`Block::share_bounds`](crate::Block::share_bounds)), for columns with a share.
     pub fn keeps(&self, sample: Option<f64>, restored: Option<f64>, share_bound: Option<f64>) -> bool {
         let (Some(sample), Some(restored)) = (sample, restored) else {
             return sample.is_none() && restored.is_none();
@@ -128,7 +128,7 @@ impl Column {
             .holds(sample, restored, self.period)
     }
 
-    /// The promise of a block; `share_bound` is what a share means there, 0 for lossless.
+    /// The bound in a block; `share_bound` is the value of a share there, 0 for lossless.
     pub(crate) fn promise(&self, share_bound: f64) -> Promise {
         match self.bound {
             Bound::Lossless => Promise::Exact,
@@ -152,7 +152,7 @@ fn text(name: &'static str, text: String) -> Result<String, ArgumentError> {
     Ok(text)
 }
 
-/// How a tick is written for people.
+/// Text form of a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TimeFormat {
@@ -162,28 +162,28 @@ pub enum TimeFormat {
     Utc,
 }
 
-/// When rows were taken.
+/// How rows are related to time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TimeBase {
-    /// Rows have no time. Their ticks are whole numbers that count up by one; a jump says that rows are missing.
+    /// Rows have no time. Their ticks are integers that increase by one; a jump means missing rows.
     Numbered,
     /// Ticks of `10^-decimals` seconds.
     Clock {
-        /// Decimals of a second in one tick, at most 18.
+        /// Number of decimals of a second, at most 18.
         decimals: u8,
-        /// Restored ticks are at most this many ticks off; 0 for exact times.
+        /// Largest error of restored ticks; 0 for exact times.
         tolerance: u64,
-        /// How ticks are written.
+        /// Text form of ticks.
         format: TimeFormat,
     },
 }
 
-/// Largest tolerance of time, in ticks.
+/// Largest allowed tolerance in ticks.
 const MAX_TOLERANCE: u64 = 1 << 52;
 
 impl TimeBase {
-    /// How far a restored tick may be off.
+    /// Largest error of a restored tick.
     pub fn tolerance(self) -> u64 {
         match self {
             Self::Numbered => 0,
@@ -192,7 +192,7 @@ impl TimeBase {
     }
 }
 
-/// Everything that a recording's header says.
+/// Columns, time and size of blocks of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schema {
     pub(crate) columns: Vec<Column>,
@@ -200,14 +200,14 @@ pub struct Schema {
     pub(crate) rows_per_block: usize,
 }
 
-/// Rows of a block unless another number is chosen.
+/// Default number of rows per block.
 pub const ROWS_PER_BLOCK: usize = 512;
 
 impl Schema {
-    /// Blocks of 512 rows.
+    /// A schema with blocks of 512 rows.
     ///
     /// # Errors
-    /// If there is no column, there are more than 4096, two have one name, a clock has more than 18 decimals or its tolerance is above
+    /// If there is no column, there are more than 4096, two have the same name, a clock has more than 18 decimals or its tolerance exceeds
     /// `2^52`.
     pub fn new(columns: Vec<Column>, time: TimeBase) -> Result<Self, Error> {
         if columns.is_empty() || columns.len() > 4096 {
@@ -238,8 +238,8 @@ impl Schema {
         })
     }
 
-    /// Blocks of this many rows. Small blocks lose less when one is lost and wait less on a link; each costs 7 to 10 bytes and
-    /// begins to learn anew.
+    /// Sets the number of rows per block. With small blocks fewer rows are lost with a block, and rows wait less on a link. Each block
+    /// costs 7 to 10 bytes, and its models start anew.
     ///
     /// # Errors
     /// If `rows` is 0 or a block would have more than [`MAX_CELLS`] cells.
@@ -259,20 +259,20 @@ impl Schema {
         &self.columns
     }
 
-    /// When rows were taken.
+    /// How rows are related to time.
     pub fn time(&self) -> TimeBase {
         self.time
     }
 
-    /// Rows of a whole block.
+    /// Number of rows of a full block.
     pub fn rows_per_block(&self) -> usize {
         self.rows_per_block
     }
 
-    /// Where a column stands.
+    /// Index of a column.
     ///
     /// # Errors
-    /// If there is none of this name.
+    /// If there is no column of this name.
     pub fn position(&self, name: &str) -> Result<usize, Error> {
         self.columns
             .iter()

@@ -1,29 +1,30 @@
-//! Cells that the codec of values does not hold: gaps, NaN, infinities, and samples stored whole.
+//! Special cells, which the codec does not restore: gaps, NaN, infinities, and samples stored in full.
 //!
-//! One arithmetic code for all columns of a block, row by row: whether a cell is special, given the cell above and how many cells of its
-//! row before it are special too. So a row without any sample costs little more than one cell. Then what it is, if not the same as the
-//! one above: the same as the last one of the block, or three bits and, for those that have any, 64 more.
+//! One arithmetic code has the special cells of all columns of a block, row by row. First it says whether a cell is special, given the cell
+//! above and how many cells before it in its row are special; so a row without any sample costs little more than one cell. Then it says
+//! which special cell it is, unless it equals the one above: the same as the last one of the block, or three bits and for some kinds 64
+//! more.
 
 use crate::error::Damage;
 use fewbits_adaptive::arithmetic::{Coder, Reader, Writer};
 
-/// What a cell is, if it is not the codec's value.
+/// Kind of a special cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Special {
     /// No sample.
     Gap,
-    /// Not a number, with these bits.
+    /// NaN with these bits.
     Nan(u64),
     Infinity,
     NegativeInfinity,
-    /// A sample stored whole; the codec has a value for this cell, which is not used.
+    /// A sample stored in full. The codec has a value for this cell too, which is not used.
     Whole(u64),
 }
 
 /// The special cells of one column.
 pub(crate) type Specials = Vec<Option<Special>>;
 
-/// The bits of the usual NaN, which are not stored.
+/// The bits of the usual NaN; they are not stored.
 const USUAL_NAN: u64 = 0x7ff8_0000_0000_0000;
 const KIND_BITS: u32 = 3;
 /// An even probability.
@@ -41,7 +42,7 @@ impl Special {
         }
     }
 
-    /// The cell that it stands for.
+    /// The cell that is restored.
     pub(crate) fn cell(self) -> Option<f64> {
         match self {
             Self::Gap => None,
@@ -51,7 +52,7 @@ impl Special {
         }
     }
 
-    /// Whether the codec holds a value for this cell too.
+    /// Whether the codec has a value for this cell too.
     pub(crate) fn has_value(self) -> bool {
         matches!(self, Self::Whole(_))
     }
@@ -67,7 +68,7 @@ impl Special {
         }
     }
 
-    /// A kind, and the bits of those that have some.
+    /// Codes a kind and, if it has any, its bits.
     fn code<C: Coder>(coder: &mut C, wanted: Option<Self>) -> Result<Self, Damage> {
         let kind = coder.raw(wanted.map_or(0, Self::kind), KIND_BITS);
         let bits = match wanted {
@@ -89,7 +90,7 @@ impl Special {
     }
 }
 
-/// How often a decision was yes, and how often no; both in halves.
+/// Number of decisions for yes and for no, in halves.
 #[derive(Debug, Clone, Copy)]
 struct Count {
     yes: u32,
@@ -106,7 +107,7 @@ impl Count {
     }
 }
 
-/// Cells of the same row before this one, of the columns that have special cells at all: none is special, some are, all are.
+/// Number of states of the cells before this one in its row, among columns with special cells: none is special, some are, all are.
 const LEFT: usize = 3;
 
 /// Codes the special cells of all columns: `wanted` at the writer, `None` at the reader.
@@ -165,10 +166,10 @@ pub(crate) fn code<C: Coder>(
     Ok(all)
 }
 
-/// The bytes of the special cells of all columns; of a column without any, as many `None` as there are rows.
+/// The coded special cells of all columns. A column without any has `None` for every row.
 pub(crate) fn encode(specials: &[Specials], rows: usize) -> Vec<u8> {
     let mut writer = Writer::new(Vec::new());
-    // Only a reader finds what no writer codes.
+    // Only a reader can fail here.
     let _ = code(&mut writer, Some(specials), specials.len(), rows);
     writer.finish()
 }
@@ -181,7 +182,7 @@ pub(crate) fn decode(bytes: &[u8], columns: usize, rows: usize) -> Result<Vec<Sp
     Ok(specials)
 }
 
-/// Which rows the codec has a value for; an empty list stands for no special cells.
+/// For which rows the codec has a value. An empty list means no special cells.
 pub(crate) fn has_value(specials: &[Option<Special>], rows: usize) -> Vec<bool> {
     let mut has_value: Vec<bool> = specials
         .iter()
@@ -191,7 +192,7 @@ pub(crate) fn has_value(specials: &[Option<Special>], rows: usize) -> Vec<bool> 
     has_value
 }
 
-/// Values with the special cells between them; an empty list stands for none.
+/// The cells of a column: values with the special cells inserted. An empty list means no special cells.
 pub(crate) fn merged(specials: &[Option<Special>], values: &[f64]) -> Vec<Option<f64>> {
     if specials.is_empty() {
         return values.iter().copied().map(Some).collect();

@@ -1,4 +1,4 @@
-//! The ticks of a block's rows.
+//! Encoding of the ticks of a block's rows.
 //!
 //! | kind | stored | ticks |
 //! |---|---|---|
@@ -7,7 +7,7 @@
 //! | 2 coded | start, mean step, scale, numbers `k_i` | `start + i step + scale k_i` |
 //! | 3 raw | 64 bits each | as they are |
 //!
-//! The first kind that is within the tolerance is taken. All arithmetic is exact in 128 bits.
+//! The first kind that is within the tolerance is used. All arithmetic is exact in 128 bits.
 
 use crate::bound::Promise;
 use crate::codec::{self, CodecId, Context, Target};
@@ -35,7 +35,7 @@ impl TimeKind {
     }
 }
 
-/// Where rows are expected: every `step` ticks from `origin` on; no grid if `step` is 0.
+/// The expected ticks: every `step` ticks from `origin` on; no grid if `step` is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Grid {
     pub(crate) origin: i64,
@@ -44,7 +44,7 @@ pub(crate) struct Grid {
     pub(crate) tolerance: u64,
 }
 
-/// Block numbers are smaller, so that a varint with one more bit holds them.
+/// Limit on block numbers, so that a varint with one more bit can hold them.
 const MAX_BLOCK: i128 = 1 << 60;
 
 const INTEGERS: Target = Target {
@@ -53,7 +53,7 @@ const INTEGERS: Target = Target {
 };
 
 impl Grid {
-    /// The grid that the first rows suggest.
+    /// The grid that follows from the first rows.
     pub(crate) fn of(ticks: &[i64], rows_per_block: usize, tolerance: u64) -> Self {
         let even = even(ticks, tolerance).filter(|_| ticks.len() > 1);
         let step = even.and_then(|(_, span)| {
@@ -74,7 +74,7 @@ impl Grid {
         i64::try_from(i128::from(self.origin) + i128::from(self.step) * rows).ok()
     }
 
-    /// The block number, if the rows are where the grid has them.
+    /// The block number, if the ticks are on the grid.
     fn block(&self, ticks: &[i64]) -> Option<u64> {
         let first = i128::from(*ticks.first()?) - i128::from(self.origin);
         let size = i128::from(self.step) * self.rows_per_block as i128;
@@ -104,7 +104,7 @@ fn greatest_common_divisor(mut a: u64, mut b: u64) -> u64 {
     a
 }
 
-/// Start and span of evenly spaced ticks.
+/// Start and span of evenly spaced ticks; `None` if they are not even within the tolerance.
 fn even(ticks: &[i64], tolerance: u64) -> Option<(i64, i64)> {
     let (first, last) = (*ticks.first()?, *ticks.last()?);
     let span = last.checked_sub(first)?;
@@ -114,7 +114,7 @@ fn even(ticks: &[i64], tolerance: u64) -> Option<(i64, i64)> {
     ticks.iter().enumerate().all(fits).then_some((first, span))
 }
 
-/// The stored form of at least one tick: its kind and what follows it.
+/// The stored form of at least one tick: its kind and its bytes.
 pub(crate) fn encode(ticks: &[i64], grid: &Grid) -> (TimeKind, Vec<u8>) {
     let mut bytes = Vec::new();
     if let Some(block) = grid.block(ticks) {
@@ -133,7 +133,7 @@ pub(crate) fn encode(ticks: &[i64], grid: &Grid) -> (TimeKind, Vec<u8>) {
     (TimeKind::Raw, bytes)
 }
 
-/// The shorter of the exact ticks, as multiples of their common divisor, and ticks moved by at most the tolerance.
+/// The shorter of two codes: exact ticks as multiples of their common divisor, or ticks rounded within the tolerance.
 fn coded(ticks: &[i64], grid: &Grid) -> Option<Vec<u8>> {
     let start = *ticks.first()?;
     let divisor = ticks
@@ -145,7 +145,7 @@ fn coded(ticks: &[i64], grid: &Grid) -> Option<Vec<u8>> {
     exact.into_iter().chain(moved.flatten()).min_by_key(Vec::len)
 }
 
-/// Ticks rounded to multiples of `scale` about a line whose slope is a multiple of `unit`.
+/// Codes ticks, rounded to multiples of `scale`, relative to a line whose slope is a multiple of `unit`.
 fn coded_in(ticks: &[i64], grid: &Grid, scale: u64, unit: i128) -> Option<Vec<u8>> {
     let (start, last) = (*ticks.first()?, *ticks.last()?);
     let steps = ticks.len() as i128 - 1;
@@ -171,7 +171,7 @@ fn coded_in(ticks: &[i64], grid: &Grid, scale: u64, unit: i128) -> Option<Vec<u8
     Some(bytes)
 }
 
-/// Reads what [`encode`] wrote of `rows` ticks.
+/// Decodes `rows` ticks that [`encode`] wrote.
 pub(crate) fn decode(kind: TimeKind, bytes: &mut Bytes<'_>, rows: usize, grid: &Grid) -> Result<Vec<i64>, Damage> {
     let beyond = Damage::Content("ticks");
     match kind {

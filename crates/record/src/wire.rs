@@ -1,4 +1,4 @@
-//! Bytes: variable-length integers, a reader that never reads past the end, the checksum.
+//! Encoding of integers and texts as bytes, a reader that cannot read beyond the end, and the checksum.
 
 use crate::error::Damage;
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
@@ -9,7 +9,7 @@ static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 /// Bytes of a checksum.
 pub(crate) const CHECK_BYTES: usize = 4;
 
-/// The checksum of the parts one after the other.
+/// The checksum of the concatenated parts.
 pub(crate) fn checksum(parts: &[&[u8]]) -> u32 {
     let mut digest = CRC.digest();
     for part in parts {
@@ -27,7 +27,7 @@ pub(crate) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
     bytes.push(value as u8);
 }
 
-/// Small numbers of either sign as small numbers without one: 0, -1, 1, -2, ...
+/// Maps integers to non-negative ones, small sizes to small numbers: 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
 pub(crate) fn zigzag(value: i64) -> u64 {
     ((value << 1) ^ (value >> 63)) as u64
 }
@@ -37,13 +37,13 @@ pub(crate) fn unzigzag(value: u64) -> i64 {
     (value >> 1) as i64 ^ -((value & 1) as i64)
 }
 
-/// Appends a text behind its length.
+/// Appends the length of a text and the text.
 pub(crate) fn push_text(bytes: &mut Vec<u8>, text: &str) {
     push_varint(bytes, text.len() as u64);
     bytes.extend_from_slice(text.as_bytes());
 }
 
-/// Reads from the front of a slice. Every method fails at its end instead of reading on.
+/// Reads from the front of a slice. Every method fails at the end of the slice.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bytes<'a>(pub(crate) &'a [u8]);
 
@@ -88,7 +88,7 @@ impl<'a> Bytes<'a> {
         Ok(unzigzag(self.varint()?))
     }
 
-    /// An integer that is at most `limit`.
+    /// Reads an integer that must not exceed `limit`.
     pub(crate) fn count(&mut self, limit: usize, what: &'static str) -> Result<usize, Damage> {
         let value = self.varint()?;
         usize::try_from(value)

@@ -1,4 +1,4 @@
-//! Sensors of unequal noise, one for each bit of a Gray code, and the exact errors of their assignments.
+//! Sensors of unequal noise, each of which sends one bit of a Gray code, and the exact errors of their assignments.
 
 use crate::Error;
 use fewbits_binary_patterns::{
@@ -10,17 +10,17 @@ use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
-/// Most sensors: there are `2^N` cells.
+/// Largest number of sensors: there are `2^N` cells.
 const MAX_SENSORS: usize = 16;
-/// Panel width in noise standard deviations.
+/// Width of quadrature panels in noise standard deviations.
 const PANEL: f64 = 2.0;
 
-/// The first two moments of `u` at the nodes, as [`CodedSensors::centre_mse`] defines them.
+/// The first two moments of `u` at the nodes; for `u` see [`CodedSensors::centre_mse`].
 pub(crate) type Moments = (Vec<f64>, Vec<f64>);
 
-/// `N` sensors that share the `N` Gray bits of `2^N` cells over `[-V, V]`.
+/// `N` sensors that send the `N` Gray code bits of `2^N` cells over `[-V, V]`, one bit each.
 ///
-/// Construction tabulates every bit's probabilities at every sensor's noise, so that errors of assignments are cheap.
+/// The constructor computes every bit's probabilities for every sensor's noise, so that errors of assignments take little time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredSensors", into = "StoredSensors")]
 pub struct CodedSensors {
@@ -28,9 +28,9 @@ pub struct CodedSensors {
     half_width: f64,
     noise_deviations: Vec<f64>,
     quantizers: Vec<BinaryQuantizer>,
-    /// Nodes on `[0, V]`: the code is symmetric up to its first bit.
+    /// Nodes on `[0, V]`, since the code is symmetric except for its first bit.
     pub(crate) nodes: Nodes,
-    /// `[P0, P1]` at the nodes, `[bit][sensor][value]`.
+    /// `[P0, P1]` at the nodes: `[bit][sensor][value]`.
     pub(crate) probability: Vec<Vec<[Vec<f64>; 2]>>,
 }
 
@@ -40,7 +40,7 @@ stored! { CodedSensors as StoredSensors |sensors| {
 } => CodedSensors::with_deviations(half_width, &noise_deviations), Error }
 
 impl CodedSensors {
-    /// From the half width of the uniform source and each sensor's noise VARIANCE.
+    /// The sensors from the half width of the uniform source and each sensor's noise VARIANCE.
     ///
     /// # Errors
     /// If the half width or a variance is not positive and finite, or the number of sensors is not in `1..=16`.
@@ -52,7 +52,7 @@ impl CodedSensors {
         Self::with_deviations(half_width, &noise_deviations)
     }
 
-    /// From the half width of the uniform source and each sensor's noise standard deviation.
+    /// The sensors from the half width of the uniform source and each sensor's noise standard deviation.
     ///
     /// # Errors
     /// As [`CodedSensors::with_variances`].
@@ -75,6 +75,7 @@ impl CodedSensors {
             .iter()
             .flat_map(|&noise| Threshold::of(grid.breakpoints(), noise));
         let thresholds: Vec<Threshold> = thresholds.collect();
+        // The problem is symmetric about zero: half of the axis is used with twice the weight.
         let mut nodes = Nodes::adapted(&source, 0.0, half_width, &thresholds, PANEL, gauss_legendre::<12>());
         nodes.w.iter_mut().for_each(|w| *w *= 2.0);
         let probability: Vec<Vec<[Vec<f64>; 2]>> = quantizers
@@ -99,7 +100,7 @@ impl CodedSensors {
         })
     }
 
-    /// Number of sensors, and of bits.
+    /// Number of sensors, which is the number of bits.
     pub fn sensors(&self) -> usize {
         self.noise_deviations.len()
     }
@@ -114,12 +115,12 @@ impl CodedSensors {
         &self.noise_deviations
     }
 
-    /// The quantizer of each Gray bit, the coarsest first.
+    /// The quantizer of each Gray bit, the most significant first.
     pub fn quantizers(&self) -> &[BinaryQuantizer] {
         &self.quantizers
     }
 
-    /// The sensors as a bank, bit by bit.
+    /// The sensors of an assignment as a bank, in the order of the bits.
     ///
     /// # Errors
     /// If the assignment is not a permutation.
@@ -133,21 +134,21 @@ impl CodedSensors {
         Ok(Bank::new(self.source, sensors)?)
     }
 
-    /// Exact error of the posterior mean, `2^N` outcomes a node.
+    /// Exact mean squared error of the posterior mean. Takes `2^N` outcomes per node.
     ///
     /// # Errors
     /// If the assignment is not a permutation.
     pub fn mmse(&self, assignment: &[usize]) -> Result<f64, Error> {
         check_permutation(assignment, self.sensors())?;
         let mut levels = vec![self.nodes.w.clone(); self.sensors()];
-        // The nodes cover one side; both sides share the weight.
+        // The nodes cover one side, with the weight of both.
         levels[0].iter_mut().for_each(|w| *w *= 0.5);
         Ok(self.source.variance() - self.explained(assignment, 1, &mut levels))
     }
 
-    /// `sum M1^2/M0` over the outcomes of the bits from `bit` on, given `w p(x) P(bits 1, ..., bit - 1|x)`; bit 0 comes last.
+    /// `sum M1^2/M0` over the outcomes of the bits from `bit` on, given `w p(x) P(bits 1, ..., bit - 1|x)`. Bit 0 is processed last.
     ///
-    /// Reflecting `x` flips bit 0 and no other, so its two values are mirror images and one side has all it takes.
+    /// Reflecting `x` inverts bit 0 and no other, so its two values are mirror images, and one side of the axis is enough.
     fn explained(&self, assignment: &[usize], bit: usize, levels: &mut [Vec<f64>]) -> f64 {
         let (own, below) = levels.split_at_mut(1);
         if bit == assignment.len() {
@@ -157,6 +158,7 @@ impl CodedSensors {
                 mass += w * (zero + one);
                 moment += w * x * (zero - one);
             }
+            // The first bit is the sign; both of its outcomes explain the same variance.
             return if mass > IMPOSSIBLE {
                 2.0 * moment * moment / mass
             } else {
@@ -173,10 +175,10 @@ impl CodedSensors {
         explained
     }
 
-    /// Exact error of the decoder that reads the Gray bits as a cell and answers its centre, `O(N)` a node.
+    /// Exact error of the decoder that reads the Gray bits as a cell index and returns the cell's centre. Takes `O(N)` per node.
     ///
-    /// With `t_k = E[(-1)^(z_k)|x]` the centre is `-V u_1`, `u_k = (-1)^(z_k) (1/2 + u_{k+1}/2)`, so that the first two moments of
-    /// `u` follow backwards from the finest bit:
+    /// With `t_k = E[(-1)^(z_k)|x]` the centre is `-V u_1`, where `u_k = (-1)^(z_k) (1/2 + u_{k+1}/2)`. The first two moments of
+    /// `u` therefore follow by recursion from the last bit:
     ///
     /// ```text
     /// m1, m2 <- 0, 0
@@ -197,16 +199,15 @@ impl CodedSensors {
         Ok(self.centre_error(&moments))
     }
 
-    /// The estimate from one observation per bit, the coarsest first: the centre of the cell that the Gray bits name. Where a
-    /// bit is missing (these sensors always report, so that nothing received says no more than an erasure) it is the posterior
-    /// mean given the others.
+    /// The estimate from one observation per bit, the most significant first: the centre of the cell that the Gray bits give. The sensors
+    /// always report, so a missing bit carries no information; if one is missing, the estimate is the posterior mean given the others.
     ///
     /// # Errors
     /// If the assignment is not a permutation, or there is not one observation per bit.
     pub fn decode(&self, assignment: &[usize], observations: &[Observation<bool>]) -> Result<f64, Error> {
         check_permutation(assignment, self.sensors())?;
         entries("observations", observations.len(), self.sensors())?;
-        // From the finest bit on, as in `centre_mse`.
+        // From the last bit on, as in `centre_mse`.
         let centre = observations.iter().rev().try_fold(0.0, |u, o| {
             let sign = if *o.received()? { -1.0 } else { 1.0 };
             Some(sign * (0.5 + 0.5 * u))
@@ -217,7 +218,7 @@ impl CodedSensors {
         }
     }
 
-    /// One step of the recursion.
+    /// One step of the recursion of [`centre_mse`](Self::centre_mse).
     #[inline]
     pub(crate) fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
         let [p0, p1] = &self.probability[bit][sensor];
@@ -238,7 +239,7 @@ impl CodedSensors {
     }
 }
 
-/// Accepts permutations of `0..size` only.
+/// An error if `assignment` is not a permutation of `0..size`.
 pub(crate) fn check_permutation(assignment: &[usize], size: usize) -> Result<(), Error> {
     let mut seen = vec![false; size];
     let valid = assignment.len() == size

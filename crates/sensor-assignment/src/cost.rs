@@ -1,4 +1,4 @@
-//! The cost of giving one bit to one sensor, when no other bit is wrong.
+//! The cost of assigning a bit to a sensor, if no other bit is wrong.
 
 use super::CodedSensors;
 use super::linear::CostMatrix;
@@ -10,8 +10,8 @@ use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Estimate of the centre decoder if Gray bit `bit` of the cell of `x` is inverted and all others are right.
 ///
-/// With the cell's centre `c` and the block of width `2 V / 2^(bit)` (bits from 0) that holds it, flipping mirrors `c` inside
-/// the block. An involution on the centres.
+/// The cell's centre `c` is in a block of width `2 V / 2^(bit)` (bits counted from 0). Inverting the bit mirrors `c` within this
+/// block. Doing so twice gives `c` again.
 ///
 /// # Errors
 /// If `bit` is not below `bits`, `bits` is out of range, the half width is not positive, or `x` is NaN.
@@ -23,7 +23,7 @@ pub fn flipped_estimate(x: f64, bit: usize, bits: usize, half_width: f64) -> Res
     Ok(flipped_centre(grid.locate(x)?, bit, grid.cells(), half_width))
 }
 
-/// The same for the cell's index.
+/// As [`flipped_estimate`], from the cell's index.
 fn flipped_centre(cell: usize, bit: usize, cells: usize, half_width: f64) -> f64 {
     let block = cells >> bit;
     let first = cell / block * block;
@@ -31,7 +31,7 @@ fn flipped_centre(cell: usize, bit: usize, cells: usize, half_width: f64) -> f64
     half_width * (2.0 * mirrored as f64 + 1.0 - cells as f64) / cells as f64
 }
 
-/// `P(bit wrong | x)`: the probability that the bit differs from the one of the cell that holds `x`.
+/// `P(bit wrong | x)`: the probability that the bit differs from that of the cell that contains `x`.
 ///
 /// # Errors
 /// If `x` is NaN.
@@ -40,7 +40,7 @@ pub fn bit_error(quantizer: &BinaryQuantizer, x: f64, noise_deviation: f64) -> R
     Ok(quantizer.probabilities(x, noise_deviation)[usize::from(!right)])
 }
 
-/// Error of the cells' centres without noise, `V^2 / (3 4^N)`.
+/// Mean squared error of the cells' centres without noise, `V^2 / (3 4^N)`.
 pub fn quantization_error(half_width: f64, bits: usize) -> f64 {
     half_width * half_width / 3.0 / 4f64.powi(bits as i32)
 }
@@ -48,8 +48,8 @@ pub fn quantization_error(half_width: f64, bits: usize) -> f64 {
 /// `Gamma_{b,n} = E[(X - f_b(X))^2 P(bit b of sensor n wrong | X)]`, for every bit and sensor (equation 6.5).
 ///
 /// The sum of the costs of an assignment plus [`quantization_error`] approximates the error of the centre decoder
-/// (equation 6.6): it counts single wrong bits only. The integrand jumps where the cell changes, so every cell has its own
-/// panel; symmetry saves half of them.
+/// (equation 6.6); it includes the cases with one wrong bit only. The integrand jumps at the edges of cells, so every cell has its own
+/// panel. By symmetry half of them are enough.
 pub fn pair_costs(sensors: &CodedSensors) -> CostMatrix {
     let size = sensors.sensors();
     CostMatrix {
@@ -67,7 +67,7 @@ pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
     let noise = sensors.noise_deviations()[sensor];
     let cells = 1usize << bits;
     let width = 2.0 * v / cells as f64;
-    // Where a cell is narrow against the noise, a few nodes integrate its polynomial-like contents exactly.
+    // If a cell is narrow compared with the noise, the integrand is nearly a polynomial and a few nodes are enough.
     let panels = (width / noise).ceil().clamp(1.0, 1e4) as usize;
     let rule = if width < 0.3 * noise {
         gauss_legendre::<6>()
@@ -75,7 +75,7 @@ pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
         gauss_legendre::<12>()
     };
     let (mut points, mut weights) = (Vec::new(), Vec::new());
-    // The code is symmetric up to its first bit, and so is the cost.
+    // The code is symmetric except for its first bit, and so is the cost.
     for cell in cells / 2..cells {
         let landing = flipped_centre(cell, bit, cells, v);
         let low = v * (2.0 * cell as f64 - cells as f64) / cells as f64;

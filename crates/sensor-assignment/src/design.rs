@@ -1,8 +1,7 @@
-//! Which sensor sends which bit, together with the design of the cells.
+//! Assignment of bits to sensors, as a start for the design of the cells.
 //!
-//! The linear assignment knows a uniform unknown, independent noise and clear links. Its answer is a start for the design on
-//! request, which knows all the rest: the edges of the patterns move, cells merge, and the decoder is that of least squared
-//! error.
+//! The linear assignment assumes a uniform unknown, independent noise and ideal links. The design by `fewbits-quantizer-design` starts from
+//! it and makes none of these assumptions: edges of the patterns move, cells merge, and the decoder is that of least squared error.
 
 use crate::{CodedSensors, Error, pair_costs};
 use fewbits_core::Link;
@@ -11,8 +10,8 @@ use fewbits_quantizer_design::{AllowedCells, BitBudget, ObservationModel, Reques
 /// Breakpoints of a sensor, and the word of each cell.
 pub type BitCells = (Vec<f64>, Vec<usize>);
 
-/// Breakpoints and words of the Gray bit that each sensor sends under the best linear assignment, sensor by sensor, for the
-/// uniform unknown of the prior's mean and variance.
+/// For each sensor, breakpoints and words of the Gray bit that it sends in the best linear assignment, for a
+/// uniform unknown with the prior's mean and variance.
 ///
 /// # Errors
 /// If there are more than 16 sensors.
@@ -31,8 +30,8 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
     Ok(cells)
 }
 
-/// A request for the estimate from one bit per sensor that starts from [`bit_cells`] beside the usual starts: set what else is
-/// wanted, and run it.
+/// A request for the estimate from one bit per sensor, with [`bit_cells`] as an additional start. Set further options on it
+/// and run it.
 ///
 /// ```
 /// use fewbits_core::Link;

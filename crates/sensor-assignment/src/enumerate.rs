@@ -1,4 +1,4 @@
-//! All assignments, for small `N`, and local search for larger.
+//! Errors of all assignments for small `N`, and local search for larger `N`.
 
 use super::CodedSensors;
 use super::coded::Moments;
@@ -7,39 +7,39 @@ use fewbits_binary_patterns::IMPOSSIBLE;
 use fewbits_numerics::error::refuse;
 use nalgebra::DMatrix;
 
-/// Most sensors for enumeration: 10! is 3.6 million.
+/// Largest number of sensors for enumeration; 10! is 3.6 million.
 const MAX_ENUMERATED: usize = 10;
-/// Relative improvement that counts as one.
+/// Smallest relative improvement for which two sensors are exchanged.
 const IMPROVEMENT: f64 = 1e-12;
 
-/// Estimator of the fusion centre whose exact error is computed.
+/// The estimator whose exact error is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
-    /// Of the decoder that answers the cell's centre.
+    /// The decoder that returns the centre of the cell.
     CellCentre,
-    /// Of the posterior mean.
+    /// The posterior mean.
     PosteriorMean,
 }
 
 /// Errors of all assignments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllErrors {
-    /// The best assignment; the first in lexicographic order among equals.
+    /// The assignment of smallest error; the first in lexicographic order if several are equal.
     pub best: Vec<usize>,
-    /// Its error.
+    /// Error of the best assignment.
     pub least: f64,
-    /// Mean over all assignments: what assigning at random gives.
+    /// Mean error over all assignments, which is the expected error of a random assignment.
     pub mean: f64,
     /// Largest error.
     pub largest: f64,
 }
 
-/// The outcome of [`exchange`].
+/// The result of [`exchange`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exchanged {
     /// An assignment that no exchange of two sensors improves.
     pub assignment: Vec<usize>,
-    /// Its exact error.
+    /// Exact error of the assignment.
     pub error: f64,
     /// Number of errors evaluated.
     pub evaluations: usize,
@@ -58,7 +58,7 @@ impl CodedSensors {
     }
 }
 
-/// Exchanges pairs of sensors as long as the exact error falls, the best exchange first.
+/// Exchanges pairs of sensors as long as the exact error decreases, the best exchange first.
 ///
 /// # Errors
 /// If the start is not a permutation.
@@ -67,6 +67,7 @@ pub fn exchange(sensors: &CodedSensors, start: &[usize], estimator: Estimator) -
     let mut error = sensors.mse(&assignment, estimator)?;
     let mut evaluations = 1;
     loop {
+        // Steepest descent: the best of all exchanges is made, as long as it improves the error by more than rounding.
         let mut best = (error * (1.0 - IMPROVEMENT), None);
         for i in 0..assignment.len() {
             for j in i + 1..assignment.len() {
@@ -93,9 +94,9 @@ pub fn exchange(sensors: &CodedSensors, start: &[usize], estimator: Estimator) -
 
 /// Exact errors of all `N!` assignments.
 ///
-/// For the centre decoder the recursion runs from the finest bit, and assignments that agree on the finest bits share it. For
-/// the posterior mean the bits are cut into two halves: for every choice of the sensors of the coarse half, one matrix product
-/// combines all orders of the one with all orders of the other.
+/// For the centre decoder the recursion begins with the last bit, and assignments that agree on the last bits share it. For
+/// the posterior mean the bits are divided into two halves. For every choice of the sensors of the first half, one matrix product
+/// combines all orders of the one half with all orders of the other.
 ///
 /// # Errors
 /// If there are more than ten sensors.
@@ -125,7 +126,7 @@ pub fn all_errors(sensors: &CodedSensors, estimator: Estimator) -> Result<AllErr
     Ok(tally.errors)
 }
 
-/// Errors so far; the mean is their sum until all are there.
+/// The statistics of the errors so far; `mean` contains their sum until all are computed.
 struct Tally {
     errors: AllErrors,
     count: usize,
@@ -146,7 +147,7 @@ impl Tally {
     }
 }
 
-/// Assigns bits `left - 1, ..., 0`; `moments[left]` holds the recursion after the finer bits.
+/// Assigns bits `left - 1, ..., 0`; `moments[left]` contains the recursion after the later bits.
 fn centre_tree(
     sensors: &CodedSensors,
     left: usize,
@@ -171,7 +172,7 @@ fn centre_tree(
 /// All orders of some sensors over consecutive bits.
 struct Half {
     orders: Vec<Vec<usize>>,
-    /// `P(outcome|x)`: a row for each order and outcome, a column a node.
+    /// `P(outcome|x)`: one row per order and outcome, one column per node.
     rows: DMatrix<f64>,
 }
 
@@ -204,7 +205,7 @@ fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
         let second = Half::new(sensors, &others, coarse_bits);
         let mut weighted = second.rows.transpose();
         for (mut row, w) in weighted.row_iter_mut().zip(&nodes.w) {
-            // The nodes cover one side; both sides share the weight.
+            // The nodes cover one side, with the weight of both.
             row *= 0.5 * w;
         }
         let mass = &first.rows * &weighted;
@@ -217,7 +218,7 @@ fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
                 let mut explained = 0.0;
                 for a in (0..coarse).step_by(2) {
                     for b in 0..fine {
-                        // Reflection flips the first bit only, so outcomes a and a + 1 are mirror images of each other.
+                        // Reflection inverts the first bit only, so outcomes a and a + 1 are mirror images of each other.
                         let (at, image) = (i * coarse + a, i * coarse + a + 1);
                         let to = j * fine + b;
                         let m0 = mass[(at, to)] + mass[(image, to)];

@@ -1,12 +1,12 @@
-//! Which sensor sends which bit: unequal sensors share the bits of one Gray-coded cell index.
+//! Assignment of the bits of a Gray-coded cell index to sensors of unequal noise.
 //!
-//! A uniform source on `[-V, V]` is divided into `2^N` cells; their reflected Gray code has `N` bits, and each of `N` sensors,
-//! of different noise, sends one. Coarse bits matter more but have few edges; fine bits have many and are the first to drown.
-//! Which assignment is best is a linear assignment problem as long as bit errors are rare enough not to meet
-//! ([`pair_costs`], equation 6.6); the exact error of a given assignment costs `O(N)` a node for the decoder that takes
-//! the cell's centre ([`CodedSensors::centre_mse`]) and `2^N` for the posterior mean ([`CodedSensors::mmse`]).
+//! A uniform source on `[-V, V]` is divided into `2^N` cells, whose reflected Gray code has `N` bits. Each of `N` sensors of different
+//! noise sends one bit. An error in a more significant bit costs more, but such bits have few edges; less significant bits have many edges,
+//! so noise inverts them more often. The best assignment is a linear assignment problem if two bit errors at once are rare ([`pair_costs`],
+//! equation 6.6). The exact error of a given assignment takes `O(N)` operations per node for the decoder that returns the cell's centre
+//! ([`CodedSensors::centre_mse`]) and `2^N` for the posterior mean ([`CodedSensors::mmse`]).
 //!
-//! An assignment lists a sensor for every bit, both counted from 0, the coarsest bit first. The thesis counts from 1.
+//! An assignment lists the sensor of every bit, both counted from 0, the most significant bit first. The thesis counts from 1.
 //!
 //! ```
 //! use fewbits_sensor_assignment::{CodedSensors, pair_costs};
@@ -19,10 +19,10 @@
 //! # Ok::<(), fewbits_sensor_assignment::Error>(())
 //! ```
 //!
-//! [`bit_per_sensor`] goes on from there: it hands the assigned patterns to the design of `fewbits-quantizer-design` as its start,
-//! for any prior, correlated noise and links that lose or invert bits, and returns what that returns.
+//! [`bit_per_sensor`] uses the assigned patterns as a start for the design of `fewbits-quantizer-design`,
+//! which is for any prior, correlated noise and links that lose or invert bits.
 //!
-//! Table 6.1 of the thesis heads its row of noise variances "sigma" (erratum `assign-1`).
+//! In Table 6.1 of the thesis the row of noise variances has the heading "sigma" (erratum `assign-1`).
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 

@@ -1,14 +1,14 @@
-//! Linear assignment, with a proof of optimality for every answer.
+//! The linear assignment problem, with a proof of optimality for every solution.
 
 use super::coded::check_permutation;
 use crate::Error;
 use fewbits_numerics::error::{all_finite, refuse};
 use serde::{Deserialize, Serialize};
 
-/// Relative slack of the certificate's inequalities, in units of the largest cost.
+/// Tolerance of the certificate's inequalities, relative to the largest cost.
 const SLACK: f64 = 1e-12;
 
-/// A square matrix of finite costs, rows to be matched with columns.
+/// A square matrix of finite costs; each row is matched with one column.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
 pub struct CostMatrix {
@@ -40,7 +40,7 @@ fn not_square<T>(entries: usize, size: usize) -> Result<T, Error> {
 }
 
 impl CostMatrix {
-    /// From `size * size` costs, row by row.
+    /// A matrix from `size * size` costs, row by row.
     ///
     /// # Errors
     /// If there are not `size^2` costs, `size` is 0, or one is not finite.
@@ -58,7 +58,7 @@ impl CostMatrix {
         self.size
     }
 
-    /// The cost of matching `row` with `column`, if both exist.
+    /// The cost of matching `row` with `column`; `None` if one of them does not exist.
     pub fn get(&self, row: usize, column: usize) -> Option<f64> {
         (row < self.size && column < self.size).then(|| self.costs[row * self.size + column])
     }
@@ -67,7 +67,7 @@ impl CostMatrix {
         self.costs.chunks_exact(self.size)
     }
 
-    /// Total cost of an assignment, the column of each row.
+    /// Total cost of an assignment, given as the column of each row.
     ///
     /// # Errors
     /// If the assignment is not a permutation.
@@ -76,25 +76,25 @@ impl CostMatrix {
         Ok(assignment.iter().zip(self.rows()).map(|(&j, row)| row[j]).sum())
     }
 
-    /// The column of each row such that the total cost is least, by shortest augmenting paths (Jonker and Volgenant 1987), `O(n^3)` in
-    /// the worst case. Equal costs give equal answers.
+    /// The column of each row for the smallest total cost, by shortest augmenting paths (Jonker and Volgenant 1987). `O(n^3)` in
+    /// the worst case. Deterministic: the same costs give the same result.
     ///
     /// ```text
     /// u, v <- 0                                            # duals: u_i + v_j <= c_ij throughout
     /// for each row
     ///     slack_j <- c_ij - u_i - v_j along paths from that row that alternate between free and matched entries
     ///     repeat
-    ///         raise the duals of what is reached until another column has slack 0
+    ///         change the duals of the reached rows and columns until another column has slack 0
     ///     until that column is free
     ///     exchange matched and free entries along the path to it
     /// ```
     ///
-    /// The thesis describes the older Hungarian method with its Hopcroft-Karp step; the answer is the same, which
+    /// The thesis describes the older Hungarian method with its Hopcroft-Karp step. The result is equally good, as
     /// [`CostMatrix::certificate`] proves.
     pub fn solve(&self) -> Vec<usize> {
         let n = self.size;
         let largest = self.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
-        // Differences of the largest numbers would overflow.
+        // Costs are scaled, since differences of the largest numbers would overflow.
         let unit = if largest > 0.0 { largest } else { 1.0 };
         let cost = |row: usize, column: usize| self.costs[(row - 1) * n + column - 1] / unit;
         // Rows and columns count from 1; column 0 stands for the row that is being matched, row 0 for none.
@@ -142,11 +142,11 @@ impl CostMatrix {
         columns
     }
 
-    /// Dual variables that prove (or disprove) that an assignment is optimal.
+    /// Dual variables that show whether an assignment is optimal.
     ///
-    /// Feasible duals have `u_i + v_j <= c_ij`; their sum bounds every assignment from below and equals the cost of an optimal
+    /// Feasible dual variables have `u_i + v_j <= c_ij`. Their sum is a lower bound for every assignment and equals the cost of an optimal
     /// one. Given the assignment, `v` solves the shortest-path inequalities `v_j - v_a(i) <= c_ij - c_i,a(i)` (Bellman-Ford,
-    /// `O(n^2)` a pass, few passes); a negative cycle means that the assignment can be improved.
+    /// `O(n^2)` per pass, few passes). A negative cycle means that the assignment can be improved.
     ///
     /// # Errors
     /// If the assignment is not a permutation.
@@ -156,6 +156,7 @@ impl CostMatrix {
         let scale = self.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
         let tolerance = SLACK * scale;
         let mut columns = vec![0.0f64; n];
+        // Bellman-Ford: shortest paths in the graph of exchanges give column potentials, unless an exchange would lower the cost.
         for _ in 0..=n {
             let mut changed = false;
             for (i, row) in self.rows().enumerate() {
@@ -182,6 +183,7 @@ impl CostMatrix {
                 violation = violation.max(rows[i] + v - c);
             }
         }
+        // Weak duality: no assignment costs less than the sum of the dual variables if no entry violates them.
         let dual: f64 = rows.iter().sum::<f64>() + columns.iter().sum::<f64>();
         Ok(DualCertificate {
             rows,
@@ -194,7 +196,7 @@ impl CostMatrix {
     }
 }
 
-/// Dual variables of an assignment, and how far they are from proving it optimal.
+/// Dual variables of an assignment, and their distance from a proof of its optimality.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DualCertificate {
     /// Dual variable `u_i` of each row.
@@ -205,13 +207,13 @@ pub struct DualCertificate {
     pub cost: f64,
     /// Cost minus the sum of the duals.
     pub gap: f64,
-    /// Largest `u_i + v_j - c_ij`.
+    /// Largest `u_i + v_j - c_ij`; feasible if not above 0.
     pub violation: f64,
     tolerance: f64,
 }
 
 impl DualCertificate {
-    /// True if the duals are feasible and their sum is the cost, to `1e-12` of the largest cost (a row).
+    /// Whether the duals are feasible and their sum is the cost, up to `1e-12` of the largest cost per row.
     pub fn is_optimal(&self) -> bool {
         self.violation <= self.tolerance && self.gap.abs() <= self.tolerance * self.rows.len() as f64
     }

@@ -1,15 +1,17 @@
-//! Test networks, and the two assignments that need no optimisation.
+//! Noise variances for tests, and an assignment without optimisation.
 
 use crate::Error;
 use fewbits_numerics::error::{all_finite, non_negative, positive, refuse};
 
-/// Variances with exactly this mean and population standard deviation, in the direction of `direction`.
+/// Variances with exactly this mean and population standard deviation; their deviations from the mean are proportional to the centred
+/// `direction`.
 ///
-/// The direction is centred and scaled, then moved to the mean; drawn from a standard normal vector it gives networks uniform
-/// on the sphere of that radius. `Ok(None)` if a variance falls below `least`: draw again.
+/// With a standard normal random vector as direction, the variances are uniform on the sphere of that radius. `Ok(None)` if a variance
+/// is below `least`; try another direction then.
 ///
 /// # Errors
-/// Unless `deviation <= mean sqrt(N - 1)`, beyond which one variance is always negative; if the mean or `least` is not positive, the deviation negative, the direction constant or not finite, or a variance not finite.
+/// Unless `deviation <= mean sqrt(N - 1)` (for larger deviations some variance is always negative); if the mean or `least` is not
+/// positive, the deviation is negative, the direction is constant or not finite, or a variance is not finite.
 pub fn variances_with_moments(
     mean: f64,
     deviation: f64,
@@ -41,7 +43,7 @@ pub fn variances_with_moments(
     Ok(variances.iter().all(|&v| v >= least).then_some(variances))
 }
 
-/// "Assignment II": the most precise sensor takes the coarsest bit, and so on; the lower index first among equals.
+/// "Assignment II": the sensor of smallest variance gets the most significant bit, and so on; of equal sensors the lower index comes first.
 pub fn by_precision(variances: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..variances.len()).collect();
     order.sort_by(|&a, &b| variances[a].total_cmp(&variances[b]));

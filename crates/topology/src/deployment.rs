@@ -13,10 +13,10 @@ pub struct Deployment {
 }
 
 impl Deployment {
-    /// The given positions.
+    /// A deployment of the given positions, in metres.
     ///
     /// # Errors
-    /// If there is none, or a coordinate is not finite.
+    /// If there is no position, or a coordinate is not finite.
     pub fn given(positions: Vec<Vector2<f64>>) -> Result<Self, ArgumentError> {
         at_least_one("positions", positions.len())?;
         for position in &positions {
@@ -41,7 +41,7 @@ impl Deployment {
         Self::given((0..nodes).map(|_| draw(rng, lower, upper)).collect())
     }
 
-    /// A regular grid with nodes on the border; `counts` nodes along x and y. A single node of an axis stands in the middle.
+    /// A regular grid of `counts` nodes along x and y, the outermost on the border. If an axis has a single node, it is in the middle.
     ///
     /// # Errors
     /// If a count is zero or `upper` does not exceed `lower`.
@@ -80,7 +80,7 @@ impl Deployment {
         self.positions.is_empty()
     }
 
-    /// Index of the node nearest to a point; the lowest among equals.
+    /// Index of the node nearest to a point; the lowest index in a tie.
     pub fn nearest_to(&self, point: &Vector2<f64>) -> usize {
         let mut best = (f64::INFINITY, 0);
         for (i, position) in self.positions.iter().enumerate() {
@@ -92,7 +92,7 @@ impl Deployment {
         best.1
     }
 
-    /// The same deployment with one node elsewhere.
+    /// The same deployment with `node` moved to the position `to`.
     ///
     /// # Errors
     /// If the node does not exist or the point is not finite.

@@ -1,10 +1,10 @@
-//! Who is in range of whom.
+//! The graph of nodes that are in range of each other.
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, refuse};
 use nalgebra::Vector2;
 
-/// An undirected graph in compressed rows: neighbours of every node, sorted by index.
+/// An undirected graph in compressed sparse rows: the neighbours of each node, in increasing order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Graph {
     starts: Vec<usize>,
@@ -12,10 +12,10 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins nodes that are at most `range` apart, by lists of the nodes in each cell of a grid of that size.
+    /// Joins nodes that are at most `range` apart. The nodes are sorted into the cells of a grid of that size.
     ///
-    /// Time and memory are linear in nodes plus edges. A field that is far larger than the range times the root of the number of
-    /// nodes gets larger cells, so that their number stays of the order of the number of nodes.
+    /// Time and memory are linear in nodes plus edges. If the field is much larger than the range times the root of the number of
+    /// nodes, the cells are larger, so that their number stays of the order of the number of nodes.
     ///
     /// # Errors
     /// If a coordinate is not finite, `range` is not a positive number, or there are 2^32 nodes or more.
@@ -33,7 +33,7 @@ impl Graph {
             });
         }
         let cells = Cells::new(positions, range, count);
-        // A power of two: squares neither overflow nor vanish, and nothing is rounded.
+        // A power of two: squares neither overflow nor underflow, and scaling does not round.
         let scale = 2.0_f64.powi(-(range.log2().floor().clamp(-1000.0, 1000.0) as i32));
         let limit = (range * scale) * (range * scale);
         let mut starts = Vec::with_capacity(positions.len() + 1);
@@ -46,7 +46,7 @@ impl Graph {
                     neighbours.push(other);
                 }
             });
-            // The node itself is among them: it is at distance zero.
+            // The node itself is among the nodes found: its distance is zero.
             let own = (starts.len() - 1) as u32;
             neighbours[from..].sort_unstable();
             if let Ok(at) = neighbours[from..].binary_search(&own) {
@@ -98,7 +98,7 @@ impl Graph {
         self.neighbours.len() / 2
     }
 
-    /// Neighbours of `node` in increasing order; none for a node that does not exist.
+    /// Neighbours of `node` in increasing order; empty if there is no such node.
     pub fn neighbours(&self, node: usize) -> &[u32] {
         match (self.starts.get(node), self.starts.get(node + 1)) {
             (Some(from), Some(to)) => &self.neighbours[*from..*to],
@@ -122,7 +122,7 @@ pub(crate) fn no_such_node(node: usize, nodes: usize) -> ArgumentError {
     ArgumentError::new("node", node, format!("an index below {nodes}, the number of nodes"))
 }
 
-/// Nodes sorted by the grid cell they stand in.
+/// Nodes sorted by the grid cell that contains them.
 struct Cells {
     lower: Vector2<f64>,
     size: f64,
@@ -139,7 +139,7 @@ impl Cells {
             upper = upper.sup(position);
         }
         let extent = upper - lower;
-        // At most about four cells a node in each direction that has extent.
+        // At most about four cells per node in each direction that has an extent.
         let most = (2.0 * f64::from(count).sqrt()).max(1.0);
         let long = 4.0 * f64::from(count);
         let thin = extent.x.min(extent.y) < range;

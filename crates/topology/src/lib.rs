@@ -2,14 +2,14 @@
 //!
 //! | question | answer |
 //! |---|---|
-//! | where do the sensors stand | [`Deployment`]: uniform, grid, given |
-//! | who is in radio range of whom | [`Graph`], built in time and memory linear in nodes and edges |
-//! | how far, in hops, and by which way | [`Hops`]: breadth-first distances and the routing tree they form |
-//! | is the network in one piece | [`Graph::components`] |
-//! | where next, when every neighbour was visited | [`Graph::nearest`] |
+//! | where the sensors are | [`Deployment`]: uniform, grid, given |
+//! | which nodes are in radio range of each other | [`Graph`], built in time and memory linear in nodes and edges |
+//! | distances in hops, and routes | [`Hops`]: breadth-first distances and their routing tree |
+//! | whether the network is connected | [`Graph::components`] |
+//! | the nearest unvisited node, when every neighbour was visited | [`Graph::nearest`] |
 //!
-//! The central choice is that a graph is two flat arrays (neighbours sorted by index, and where each node's begin), never a
-//! list of lists: a million nodes fit in a few hundred megabytes, and equal positions give equal bits.
+//! A graph is stored in two flat arrays: the neighbours of all nodes, and where those of each node begin. A million nodes
+//! fit in a few hundred megabytes, and equal positions give bitwise equal graphs.
 //!
 //! ```
 //! use fewbits_topology::{Deployment, Graph};
@@ -22,7 +22,7 @@
 //! # Ok::<(), fewbits_numerics::ArgumentError>(())
 //! ```
 //!
-//! Not here: time, energy and radio channels, which belong to the simulated network.
+//! Not here: time, energy and radio channels (`fewbits-network`).
 
 mod deployment;
 mod graph;

@@ -1,22 +1,22 @@
-//! Distances in hops, routes, pieces of the network.
+//! Distances in hops, routes, connected components.
 
 use crate::Graph;
 use fewbits_numerics::ArgumentError;
 
 const UNREACHED: u32 = u32::MAX;
 
-/// Distances in hops from one node, and the routing tree that they form: every node's parent is the lowest-numbered of its
-/// neighbours that is one hop nearer.
+/// Distances in hops from one node, and the routing tree that they form. The parent of a node is the lowest-numbered neighbour
+/// that is one hop nearer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hops {
     distances: Vec<u32>,
     parents: Vec<u32>,
-    /// Reached nodes, by distance.
+    /// Reached nodes, by increasing distance.
     order: Vec<u32>,
 }
 
 impl Hops {
-    /// Hops to `node`, or `None` where no route leads.
+    /// Hops to `node`; `None` if there is no route.
     pub fn distance(&self, node: usize) -> Option<usize> {
         self.distances
             .get(node)
@@ -24,7 +24,7 @@ impl Hops {
             .map(|d| *d as usize)
     }
 
-    /// The next node from `node` towards the root; `None` at the root and where no route leads.
+    /// The next node from `node` towards the root; `None` at the root and if there is no route.
     pub fn parent(&self, node: usize) -> Option<usize> {
         self.parents.get(node).filter(|p| **p != UNREACHED).map(|p| *p as usize)
     }
@@ -34,7 +34,7 @@ impl Hops {
         &self.order
     }
 
-    /// A shortest route from the root to `node`, both included; `None` where no route leads.
+    /// A shortest route from the root to `node`, both included; `None` if there is no route.
     pub fn route(&self, node: usize) -> Option<Vec<usize>> {
         let length = self.distance(node)? + 1;
         let mut route = Vec::with_capacity(length);
@@ -49,7 +49,7 @@ impl Hops {
     }
 }
 
-/// The pieces of a network.
+/// The connected components of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Components {
     labels: Vec<u32>,
@@ -57,22 +57,22 @@ pub struct Components {
 }
 
 impl Components {
-    /// Which piece a node belongs to: pieces are numbered by their lowest node.
+    /// Number of the component that contains a node. Components are numbered in the order of their lowest node.
     pub fn label(&self, node: usize) -> Option<usize> {
         self.labels.get(node).map(|label| *label as usize)
     }
 
-    /// Number of nodes of each piece.
+    /// Number of nodes of each component.
     pub fn sizes(&self) -> &[usize] {
         &self.sizes
     }
 
-    /// Whether every node reaches every other.
+    /// Whether there is a route between any two nodes.
     pub fn is_connected(&self) -> bool {
         self.sizes.len() <= 1
     }
 
-    /// Share of the nodes in the largest piece.
+    /// Share of the nodes in the largest component.
     pub fn largest_share(&self) -> f64 {
         let largest = self.sizes.iter().copied().max().unwrap_or(0);
         largest as f64 / self.labels.len().max(1) as f64
@@ -80,7 +80,7 @@ impl Components {
 }
 
 impl Graph {
-    /// Breadth-first distances and routing tree.
+    /// Breadth-first distances from `root`, and the routing tree.
     ///
     /// # Errors
     /// If `root` does not exist.
@@ -92,7 +92,7 @@ impl Graph {
             order: Vec::new(),
         };
         self.flood(root, &mut hops);
-        // Parents by index rather than by the order of the search.
+        // Choose parents by index, so that they do not depend on the order of the search.
         for at in 0..hops.order.len() {
             let node = hops.order[at] as usize;
             let nearer = hops.distances[node].checked_sub(1);
@@ -123,7 +123,7 @@ impl Graph {
         }
     }
 
-    /// The pieces of the network.
+    /// The connected components.
     pub fn components(&self) -> Components {
         let mut labels = vec![UNREACHED; self.len()];
         let mut sizes = Vec::new();
@@ -150,8 +150,8 @@ impl Graph {
         Components { labels, sizes }
     }
 
-    /// The nodes fewest hops from `root`, the root left out, that satisfy `wanted`, and that number of hops: neighbours if one
-    /// of them does, else the way past dead ends through nodes that do not. Empty if no reachable node does.
+    /// The nodes other than `root` that satisfy `wanted` at the smallest number of hops, and that number. The way may lead through nodes
+    /// that do not satisfy it. Empty if no reachable node does.
     ///
     /// # Errors
     /// If `root` does not exist.

@@ -1,8 +1,8 @@
-//! Binary arithmetic coding with byte-exact ends.
+//! Binary arithmetic coder whose output ends after a whole number of bytes and needs no length.
 //!
-//! An interval `[low, high]` of 64-bit numbers is split at each decision in the proportion of a 16-bit probability. Bytes that both
-//! ends share are emitted. The end is the fewest bytes that, continued by zeros, lie in the interval; the decoder computes them
-//! again, so bytes after the end are refused.
+//! An interval `[low, high]` of 64-bit numbers is split at each decision in the proportion of a 16-bit probability. Leading bytes that are
+//! equal in both ends are output. The code ends with the fewest bytes that, followed by zeros, lie in the interval. The decoder computes
+//! them again, so it detects bytes after the end.
 
 use fewbits_core::CodecError;
 use std::hint::select_unpredictable;
@@ -11,25 +11,25 @@ use std::hint::select_unpredictable;
 const BITS: u32 = 16;
 /// An even probability.
 const EVEN: u32 = 1 << (BITS - 1);
-/// Decoders read at most this many bytes beyond the end: what the interval still holds.
+/// Largest number of bytes that a decoder reads beyond the end: the width of the interval.
 const AHEAD: usize = 8;
 
-/// Either end of the channel: a writer takes the bit that is given, a reader ignores it and returns the bit that was written.
+/// Common interface of writer and reader. A writer codes the given bit; a reader ignores it and returns the bit that was written.
 pub trait Coder: Default {
     /// Codes one decision; `one` is the probability of `true` in units of `2^-16`, in `1..2^16`.
     fn bit(&mut self, one: u32, bit: bool) -> bool;
 
-    /// The same as [`bit`](Self::bit). A reader decides without a branch: faster where a processor cannot foresee the outcome.
+    /// The same as [`bit`](Self::bit), for unpredictable bits: a reader decides without a branch, because a processor would mispredict it.
     fn even_bit(&mut self, one: u32, bit: bool) -> bool {
         self.bit(one, bit)
     }
 
-    /// Whether more was read than any writer would have left to be read.
+    /// Whether more decisions were read than any writer can have written.
     fn overran(&self) -> bool {
         false
     }
 
-    /// `width` bits of `value` without a model, the highest first.
+    /// Codes the low `width` bits of `value` without a model, the highest first.
     #[inline(always)]
     fn raw(&mut self, value: u64, width: u32) -> u64 {
         (0..width)
@@ -38,7 +38,7 @@ pub trait Coder: Default {
     }
 }
 
-/// The numbers `low..=low + width`.
+/// The interval of the numbers `low..=low + width`.
 #[derive(Debug, Clone, Copy)]
 struct Interval {
     low: u64,
@@ -51,7 +51,7 @@ impl Interval {
         width: u64::MAX,
     };
 
-    /// Width of the lower part, which stands for `true`.
+    /// Width of the lower part, which codes `true`.
     #[inline(always)]
     fn part(self, one: u32) -> u64 {
         (self.width >> BITS) * u64::from(one)
@@ -67,7 +67,7 @@ impl Interval {
         }
     }
 
-    /// Whether the highest byte is decided.
+    /// Whether the highest byte is equal in both ends.
     #[inline(always)]
     fn settled(self) -> bool {
         (self.low ^ (self.low + self.width)) >> 56 == 0
@@ -79,7 +79,7 @@ impl Interval {
         self.width = self.width << 8 | 255;
     }
 
-    /// The shortest end: its bytes, the first highest, and their number.
+    /// The shortest end of the code: its bytes, the first in the highest place, and their number.
     fn end(self) -> (u64, usize) {
         (0..8)
             .map(|count| {
@@ -91,7 +91,7 @@ impl Interval {
     }
 }
 
-/// Writes decisions as bytes.
+/// Codes decisions as bytes.
 #[derive(Debug, Clone)]
 pub struct Writer {
     interval: Interval,
@@ -105,7 +105,7 @@ impl Default for Writer {
 }
 
 impl Writer {
-    /// Appends to `bytes`.
+    /// A writer that appends to `bytes`.
     pub fn new(bytes: Vec<u8>) -> Self {
         Self {
             interval: Interval::WHOLE,
@@ -113,12 +113,12 @@ impl Writer {
         }
     }
 
-    /// Bits so far, to a fraction: what is left of the interval counts.
+    /// Information coded so far in bits, with the fraction that the interval holds.
     pub fn bits(&self) -> f64 {
         8.0 * self.bytes.len() as f64 + 64.0 - (self.interval.width as f64).log2()
     }
 
-    /// The bytes with the shortest end.
+    /// All bytes, with the shortest end.
     pub fn finish(mut self) -> Vec<u8> {
         let (end, count) = self.interval.end();
         self.bytes.extend_from_slice(&end.to_be_bytes()[..count]);
@@ -139,14 +139,14 @@ impl Coder for Writer {
     }
 }
 
-/// Reads what a [`Writer`] wrote; behind the end it reads zeros, and [`finish`](Self::finish) tells.
+/// Decodes what a [`Writer`] wrote. After the end it reads zeros; [`finish`](Self::finish) detects that.
 #[derive(Debug)]
 pub struct Reader<'a> {
     interval: Interval,
-    /// The number that the bytes stand for, less the interval's lowest.
+    /// The number that the next bytes form, minus the lower end of the interval.
     ahead: u64,
     bytes: &'a [u8],
-    /// Bytes shifted in, those behind the end included.
+    /// Number of bytes read, including zeros after the end.
     taken: usize,
 }
 
@@ -157,7 +157,7 @@ impl Default for Reader<'_> {
 }
 
 impl<'a> Reader<'a> {
-    /// Reads all of these bytes.
+    /// A reader of all these bytes.
     pub fn new(bytes: &'a [u8]) -> Self {
         let mut reader = Self {
             interval: Interval::WHOLE,
@@ -179,7 +179,7 @@ impl<'a> Reader<'a> {
     /// Checks that the decisions read are all that was written.
     ///
     /// # Errors
-    /// If the bytes are more, fewer or others than a writer of the decisions read would have ended with.
+    /// If the bytes are not those that a writer of the same decisions would have written.
     pub fn finish(&self) -> Result<(), CodecError> {
         let (end, count) = self.interval.end();
         let settled = self.taken - AHEAD;

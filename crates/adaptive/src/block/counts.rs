@@ -1,28 +1,28 @@
-//! Indices by counts of outcomes given the last difference: without a mixture, and more than ten times as fast as `model.rs`.
+//! Codes indices by counts of outcomes given the last difference. It uses no mixture and is more than ten times as fast as `model.rs`.
 //!
-//! A difference (of the index, or of its differences, as the block's writer chose) is told in units of `2^k`, where `k` follows the mean size
+//! A difference (of the index, or of its differences, as the block's writer chose) is coded in units of `2^k`; `k` follows the mean size
 //! of differences:
 //!
 //! ```text
 //! zero?   sign   at least 2, 3, .. 15?   the rest by an Elias gamma code   k low bits
 //! ```
 //!
-//! A second count of each decision, given the last index, would save 3 % of the bits; reading would take a third longer.
+//! A second set of counts given the last index was measured: 3 % fewer bits, but reading takes a third longer.
 
 use super::coder::Coder;
 use super::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
 use fewbits_core::CodecError;
 
-/// Decisions of a context: zero, sign, and whether the size is at least 2 to 15.
+/// Number of decisions in a context: zero, sign, and whether the size is at least 2 to 15.
 const NODES: usize = 16;
-/// Sizes that are told one by one.
+/// Number of sizes that are coded one by one.
 const SIZES: u64 = NODES as u64 - 2;
-/// Last differences are told apart up to this size.
+/// Largest size of the last difference that has its own context.
 const STEPS: i64 = 4;
-/// Contexts. More than there are: a power of two.
+/// Number of contexts, rounded up to a power of two.
 const CONTEXTS: usize = 16;
 const _: () = assert!(2 * STEPS < CONTEXTS as i64);
-/// Occurrences after which a count forgets.
+/// Number of occurrences after which old ones lose weight.
 const MOST_SEEN: u16 = 40;
 
 /// Probability of `true` in units of `2^-16`, and how often the decision was seen.
@@ -32,7 +32,7 @@ struct Count {
     seen: u16,
 }
 
-/// `2^15 / (n + 1.6)`. A power of two of them, so that no index is out of reach.
+/// Learning rates `2^15 / (n + 1.6)`. Their number is a power of two, so that masking replaces a bounds check.
 const SHARES: [i32; 64] = {
     let mut shares = [0; 64];
     let mut seen = 0;
@@ -43,7 +43,7 @@ const SHARES: [i32; 64] = {
     shares
 };
 
-/// Probabilities move towards these, so that they stay this far from certainty.
+/// Smallest distance of a probability from 0 and 1, in units of `2^-16`.
 const LEAST: i32 = 32;
 const MOST: i32 = 65_535 - LEAST;
 
@@ -66,22 +66,22 @@ impl Count {
     }
 }
 
-/// The state that both ends hold.
+/// The state of the coder, the same at writer and reader.
 #[derive(Debug, Clone)]
 pub(super) struct Counts {
     counts: Box<[[Count; NODES]; CONTEXTS]>,
-    /// Whether differences of differences are told.
+    /// Whether differences of differences are coded.
     second: bool,
     last: i64,
-    /// The last difference of the index, and the one that was told.
+    /// The last difference of the index, and the last coded difference.
     slope: i64,
     told: i64,
-    /// Sixteen times the mean size of what was told.
+    /// Sixteen times the mean size of the coded differences.
     size: u64,
 }
 
 impl Counts {
-    /// After the first index.
+    /// The state after the first index.
     pub(super) fn new(first: i64, second: bool) -> Self {
         Self {
             counts: Box::new([[Count::NEW; NODES]; CONTEXTS]),
@@ -93,7 +93,7 @@ impl Counts {
         }
     }
 
-    /// Whether differences of differences are smaller.
+    /// Whether differences of differences are smaller than differences.
     pub(super) fn prefers_second(indices: &[i64]) -> bool {
         let bits = |d: i64| u64::from(64 - d.unsigned_abs().leading_zeros());
         let (mut first, mut second, mut slope) = (0, 0, 0);
@@ -120,7 +120,7 @@ impl State for Counts {
         _: [f64; JOINT_COLUMNS],
     ) -> Result<i64, CodecError> {
         let expected = self.last + if self.second { self.slope } else { 0 };
-        // Of differences of mean size 4 and more the lowest bits are noise.
+        // From mean size 4 on the lowest bits of differences are noise.
         let k = 64 - (self.size / 64).leading_zeros();
         let context = ((self.told >> k).clamp(-STEPS, STEPS) + STEPS) as usize % CONTEXTS;
         let counts = &mut self.counts[context];
@@ -144,11 +144,11 @@ impl State for Counts {
                 let over = gamma(coder, (wanted + 1).saturating_sub(size))?;
                 size = size.saturating_add(over - 1);
             }
-            // No writer's differences of differences are larger.
+            // No writer codes a larger difference of differences.
             if size > (8 * LARGEST as u64) >> k {
                 return Err(damaged(i64::MAX));
             }
-            // Arithmetic, not a branch: it goes either way as often.
+            // Arithmetic instead of a branch: both signs are equally frequent.
             (2 * i64::from(up) - 1) * size as i64
         };
         let low = coder.raw((d - (cell << k)) as u64, k);

@@ -1,11 +1,11 @@
-//! Laws of the next index: what each expert says about the probability below and above an edge.
+//! Probability laws of the next index: what each expert predicts below and above an edge.
 //!
-//! Positions are relative to the last index. Predictions have logistic laws as wide as their errors were.
+//! Positions are relative to the last index. A prediction has a logistic law whose scale follows its past errors.
 
 use super::mixer::EXPERTS;
 use fewbits_node::elementary::power;
 
-/// What the experts say about an edge: probability below and above, each accurate relative to itself.
+/// Each expert's probability below and above an edge, both with a small relative error.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tails {
     pub(super) below: [f32; EXPERTS],
@@ -14,17 +14,17 @@ pub(super) struct Tails {
 
 /// `log2 e`: logistic laws are written in powers of two.
 const LOG2_E: f32 = std::f32::consts::LOG2_E;
-/// Beyond this many doublings a tail is flat.
+/// Distance, in doublings of the odds, beyond which a tail is constant.
 const FLAT: f32 = 60.0;
-/// Weight of the newest error once many were seen.
+/// Weight of the newest error in the mean, after many errors.
 const FADING: f32 = 0.02;
-/// The expert of [`Frequencies`]; those before it are predictions.
+/// Number of the expert [`Frequencies`]; other experts are predictions.
 pub(super) const PREDICTED: usize = 1;
 pub(super) const COUNTED: usize = EXPERTS - 1;
-/// Predictions, and one place that is not used.
+/// Places for predictions; one is unused.
 const TRACKS: usize = EXPERTS;
 
-/// Predictions with their mean absolute errors, fading with the past.
+/// Predictions with exponentially weighted means of their absolute errors.
 #[derive(Debug, Clone)]
 pub(super) struct Tracks {
     pub(super) at: [f32; TRACKS],
@@ -43,7 +43,7 @@ impl Tracks {
         tracks
     }
 
-    /// Of the logistic laws with these mean absolute errors.
+    /// Computes the scales of the logistic laws from the mean absolute errors.
     #[inline(always)]
     fn sharpen(&mut self) {
         for i in 0..TRACKS {
@@ -51,7 +51,7 @@ impl Tracks {
         }
     }
 
-    /// Learns the step after so many others.
+    /// Updates the errors with the actual step; `seen` is the number of earlier steps.
     #[inline(always)]
     pub(super) fn update(&mut self, step: f32, seen: f32) {
         let rate = (1.0 / (seen + 1.5)).max(FADING);
@@ -61,7 +61,7 @@ impl Tracks {
         self.sharpen();
     }
 
-    /// The laws at an edge.
+    /// The probabilities below and above an edge.
     #[inline(always)]
     pub(super) fn tails(&self, edge: f32) -> Tails {
         let mut tails = Tails::default();
@@ -75,7 +75,7 @@ impl Tracks {
     }
 }
 
-/// Least squares of the next difference on `N` regressors (a power of two), with fading memory.
+/// Recursive least squares for the next difference on `N` regressors (a power of two), with exponential forgetting.
 #[derive(Debug, Clone)]
 pub(super) struct LeastSquares<const N: usize> {
     pub(super) regressors: [f64; N],
@@ -83,16 +83,16 @@ pub(super) struct LeastSquares<const N: usize> {
     covariance: [[f64; N]; N],
 }
 
-/// Weight of the past in each slot.
+/// Forgetting factor per slot.
 const MEMORY: f64 = 0.998;
-/// Variance of coefficients before the first row.
+/// Prior variance of the coefficients.
 const VARIANCE: f64 = 0.15;
-/// Variances beyond this are no longer trusted: the memory is then emptied.
+/// If a variance exceeds this, the recursion starts again.
 const LARGEST_VARIANCE: f64 = 1e9;
-/// Predictions are no larger: `f32` keeps whole numbers up to there.
+/// Largest size of a prediction: `f32` represents integers up to there.
 const FARTHEST: f64 = 4e6;
 
-/// The sum of products, in halves: an order that vectorises.
+/// The scalar product, summed in halves: an order that can be vectorised.
 #[inline(always)]
 fn product<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     let mut terms = [0.0; N];
@@ -127,7 +127,7 @@ impl<const N: usize> LeastSquares<N> {
         product(&self.coefficients, &self.regressors).clamp(-FARTHEST, FARTHEST) as f32
     }
 
-    /// Learns that the regressors led to `step`.
+    /// Updates with the actual `step` that followed the regressors.
     #[inline(always)]
     pub(super) fn update(&mut self, step: f64) {
         let mut gain = [0.0; N];
@@ -137,6 +137,7 @@ impl<const N: usize> LeastSquares<N> {
             }
         }
         let error = step - product(&self.coefficients, &self.regressors);
+        // Recursive least squares with forgetting.
         let inverse = 1.0 / (MEMORY + product(&gain, &self.regressors));
         let (mut largest, mut least) = (0.0_f64, f64::INFINITY);
         for i in 0..N {
@@ -150,6 +151,7 @@ impl<const N: usize> LeastSquares<N> {
             }
             (largest, least) = (largest.max(row[i]), least.min(row[i]));
         }
+        // In a direction that is never excited the variance grows exponentially: start again before it overflows.
         if !(largest < LARGEST_VARIANCE && least > 0.0) {
             self.covariance = Self::ignorant();
             if !self.coefficients.iter().all(|c| c.abs() < LARGEST_VARIANCE) {
@@ -159,34 +161,34 @@ impl<const N: usize> LeastSquares<N> {
     }
 }
 
-/// Indices counted one by one.
+/// Number of consecutive indices that have counts.
 const WINDOW: usize = 4096;
-/// Weight of an index that differs from the last one; a repeated one counts one.
+/// Weight of an index that differs from the last one; a repeated index has weight one.
 const CHANGED: u32 = 8;
-/// Weight of a prediction's law among the counts.
+/// Weight of a prediction's law relative to the counts.
 const PRIOR: f32 = 12.0;
 
-/// Counts in all after which no more are taken.
+/// Total count at which counting stops.
 const MOST_COUNTED: u32 = 1 << 30;
-/// Indices whose counts are summed one by one.
+/// Number of indices per partial sum.
 const BLOCK: usize = 64;
 
-/// How often each index occurred: for signals whose values return.
+/// How often each index occurred, for signals whose values return.
 #[derive(Debug, Clone)]
 pub(super) struct Frequencies {
     counts: Vec<[u32; BLOCK]>,
-    /// Counts below each block.
+    /// Sum of the counts below each group of `BLOCK` indices.
     below: [u32; WINDOW / BLOCK],
     total: u32,
-    /// One over the total and the prior.
+    /// Reciprocal of the total count plus the prior's weight.
     inverse: f32,
     cells: Option<i64>,
-    /// The index at the window's start.
+    /// First index of the window.
     start: i64,
 }
 
 impl Frequencies {
-    /// About the first index; on a circle of at most `WINDOW` cells all of them.
+    /// A window centred on the first index. On a circle of at most `WINDOW` cells it holds all of them.
     pub(super) fn new(first: i64, cells: Option<i64>) -> Self {
         let cells = cells.filter(|cells| *cells <= WINDOW as i64);
         Self {
@@ -208,7 +210,7 @@ impl Frequencies {
         let weight = if changed { CHANGED } else { 1 };
         let (block, place) = (offset as usize / BLOCK, offset as usize % BLOCK);
         self.counts[block][place] += weight;
-        // All of them, so that the loop vectorises.
+        // Visit all groups, so that the loop can be vectorised.
         for (b, below) in (0_i32..).zip(&mut self.below) {
             *below += if b > block as i32 { weight } else { 0 };
         }
@@ -216,7 +218,7 @@ impl Frequencies {
         self.inverse = 1.0 / (self.total as f32 + PRIOR);
     }
 
-    /// Counts in the window below an offset from its start.
+    /// Sum of the counts below an offset from the window's start.
     #[inline(always)]
     fn prefix(&self, offset: i64) -> u32 {
         if offset >= WINDOW as i64 {
@@ -231,7 +233,7 @@ impl Frequencies {
         sum
     }
 
-    /// Counts of indices below `edge`; around the circle, of those from the point opposite to `centre` on.
+    /// Sum of the counts of indices below `edge`. On a circle it starts at the point opposite to `centre`.
     #[inline(always)]
     fn below(&self, edge: i64, centre: i64) -> u32 {
         let Some(cells) = self.cells else {
@@ -247,7 +249,7 @@ impl Frequencies {
         }
     }
 
-    /// Adds the law of the counts, filled up by a prediction's law, to what is said of an edge (the first index above it).
+    /// Adds the law of the counts, combined with a prediction's law as prior, to the tails at an edge (the first index above it).
     #[inline(always)]
     pub(super) fn complete(&self, edge: i64, centre: i64, tails: &mut Tails) {
         self.fill(self.below(edge, centre), tails);
@@ -259,7 +261,7 @@ impl Frequencies {
         tails.above[COUNTED] = ((self.total - below) as i32 as f32 + PRIOR * tails.above[PREDICTED]) * self.inverse;
     }
 
-    /// The same for both edges of the cell `first..next`.
+    /// As [`complete`](Self::complete), for both edges of the cell `first..next`.
     #[inline(always)]
     pub(super) fn complete_cell(&self, first: i64, next: i64, centre: i64, tails: &mut [Tails; 2]) {
         let below = self.below(first, centre);

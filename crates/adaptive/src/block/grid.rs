@@ -1,45 +1,45 @@
-//! Which points a block's reconstructions are: from samples to whole numbers and back.
+//! The grid of a block's reconstructions: conversion between samples and integers.
 
 use crate::Config;
 use fewbits_core::CodecError;
 use fewbits_node::adaptive::TENS;
 use fewbits_numerics::kernels::vectorised_narrow;
 
-/// Largest decimal digits of a sample: their sums stay whole doubles.
+/// Largest sample as a decimal integer: sums of two are exact doubles.
 const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
-/// Whole numbers of this size are doubles.
+/// Integers up to this size are exact doubles.
 const WHOLE: i64 = 1 << 53;
-/// Steps are this much shorter than `2 delta`, so that rounding never takes a reconstruction out of its bound.
+/// Share by which steps are shorter than `2 delta`, so that rounding cannot move a reconstruction out of its bound.
 const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
-/// Cells of a circle, at most.
+/// Largest number of cells of a circle.
 const LARGEST_CIRCLE: f64 = (1_u64 << 40) as f64;
-/// Parts of a cell by which grids are moved.
+/// A grid can be moved by multiples of `2^-PHASE_BITS` of a cell.
 const PHASE_BITS: u32 = 4;
 pub(super) const PHASES: u8 = 1 << PHASE_BITS;
-/// Samples by which the place of a grid is chosen.
+/// Number of samples from which the phase of a grid is chosen.
 const FITTED: usize = 1 << 20;
-/// Parts of cells beyond this distance from the first sample are not told apart.
+/// Distance from the first sample, in cells, beyond which the phase is not determined.
 const FARTHEST_PLACE: f64 = (1 << 28) as f64;
-/// Samples in another cell than the one before, as many as cost a byte or more.
+/// Number of changes of the cell between neighbouring samples that together cost about a byte.
 const CROSSINGS_OF_A_BYTE: u32 = 4;
-/// Decimals that are tried.
+/// Number of decimal grids that are tried.
 pub(super) const DECIMALS: u8 = 13;
 
-/// Reconstructions are the points with whole numbers of one of these.
+/// The reconstructions: points with integer indices.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Grid {
-    /// Samples are whole multiples of `10^-decimals`. A cell holds `width` neighbours, as many as lie within the bound of its middle.
-    /// The first of them is `phase` sixteenths of the width, rounded up, from a multiple of it.
+    /// Samples are integer multiples of `10^-decimals`. A cell has `width` neighbouring multiples, as many as lie within the bound of its
+    /// middle. The first of them is `phase` sixteenths of the width, rounded up, from a multiple of the width.
     Decimal { decimals: u8, width: i64, phase: u8 },
-    /// Samples are `(origin + unit j) / 10^decimals`: exactly.
+    /// Samples are exactly `(origin + unit j) / 10^decimals`.
     Stepped { decimals: u8, unit: i64, origin: i64 },
     /// `anchor + step (j + phase / 16)`.
     Line { anchor: f64, step: f64, phase: u8 },
-    /// Around a circle.
+    /// `cells` equal cells on a circle.
     Circle { period: f64, cells: i64 },
 }
 
-/// The digits of a number of so many decimals, if it is one to the last bit.
+/// The integer `digits` with `sample == digits / ten` to the last bit, if there is one.
 #[inline(always)]
 fn digits(sample: f64, ten: f64) -> Option<i64> {
     let whole = (sample * ten).round();
@@ -54,7 +54,7 @@ fn greatest_common_divisor(mut a: i64, mut b: i64) -> i64 {
 }
 
 impl Grid {
-    /// The decimal grid that fits all samples, if there is one; `delta` is zero where they are to return exactly.
+    /// The decimal grid that fits all samples, if there is one. `delta` is zero if samples must be exact.
     pub(super) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
         let decimals = (0..DECIMALS).find(|decimals| {
             let ten = TENS[usize::from(*decimals)];
@@ -71,6 +71,7 @@ impl Grid {
         }
         let mut all = samples.iter().filter_map(|x| digits(*x, ten));
         let origin = all.next()?;
+        // If all samples are multiples of a larger unit (for example an ADC step in millivolts), count in that unit.
         let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
         if unit <= 1 {
             return Some(Self::Decimal {
@@ -82,13 +83,13 @@ impl Grid {
         Some(Self::Stepped { decimals, unit, origin })
     }
 
-    /// Neighbouring multiples of `1 / ten` within `delta` of their middle; `None` if there are too many to count.
+    /// Number of neighbouring multiples of `1 / ten` within `delta` of their middle; `None` if it is too large.
     pub(super) fn width(delta: f64, ten: f64) -> Option<i64> {
         let neighbours = (2.0 * delta * ten * (1.0 - SLACK)).floor();
         (neighbours < LARGEST_DIGITS).then(|| neighbours as i64 + 1)
     }
 
-    /// The grid of a bound for samples of any digits.
+    /// The grid of a bound for samples that are not decimal numbers.
     pub(super) fn line(delta: f64, anchor: f64) -> Self {
         Self::Line {
             anchor,
@@ -97,7 +98,7 @@ impl Grid {
         }
     }
 
-    /// The same grid moved by so many sixteenths of a cell, if it can be.
+    /// The same grid moved by `moved` sixteenths of a cell, if the grid can be moved.
     pub(super) fn with_phase(mut self, moved: u8) -> Self {
         if let Self::Decimal { phase, .. } | Self::Line { phase, .. } = &mut self {
             *phase = moved;
@@ -113,11 +114,11 @@ impl Grid {
         }
     }
 
-    /// The grid moved to where neighbouring samples are most often in one cell, if that is worth the byte.
+    /// The grid moved so that neighbouring samples are most often in one cell, if that saves more than the byte for the phase.
     pub(super) fn fitted(self, samples: &[f64]) -> Self {
         let phases = f64::from(PHASES);
         let (scale, offset) = match self {
-            // Half a digit from the next cell, so that rounding takes none there.
+            // Half a digit from the next cell, so that rounding cannot move a sample there.
             Self::Decimal { decimals, width, .. } if width > 1 => {
                 let scale = phases / width as f64;
                 (scale * TENS[usize::from(decimals)], scale * 0.5 / phases)
@@ -133,7 +134,7 @@ impl Grid {
                 for sample in samples.iter().take(FITTED).filter(|sample| sample.is_finite()) {
                     let place = sample * scale + offset;
                     let origin = *origin.get_or_insert_with(|| (place / phases).floor() * phases);
-                    // Above zero, where a conversion rounds down.
+                    // Shifted to positive numbers, for which a conversion rounds down.
                     let place = ((place - origin).clamp(-FARTHEST_PLACE, FARTHEST_PLACE) + 2.0 * FARTHEST_PLACE) as i32;
                     let before = std::mem::replace(&mut last, place);
                     for (phase, crossings) in (0..).zip(&mut crossings) {
@@ -153,7 +154,7 @@ impl Grid {
         }
     }
 
-    /// The grid of a bound around a circle. [`Config::circular`] admits no more than `2^40` cells.
+    /// The grid of a bound on a circle. [`Config::circular`] allows at most `2^40` cells.
     pub(super) fn circle(config: &Config, period: f64) -> Self {
         let cells = (period / (2.0 * config.delta() * (1.0 - SLACK)))
             .ceil()
@@ -164,14 +165,14 @@ impl Grid {
         }
     }
 
-    /// Digits by which the first of a cell's neighbours is moved.
+    /// Number of multiples by which the first one of each cell is moved.
     #[inline(always)]
     fn digits_moved(width: i64, phase: u8) -> i64 {
         let sixteenths = i128::from(width) * i128::from(phase);
         ((sixteenths + i128::from(PHASES) - 1) >> PHASE_BITS) as i64
     }
 
-    /// Whether the points are as dense, wherever they begin.
+    /// Whether both grids have the same kind and spacing; their origins may differ.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Line { .. }, Self::Line { .. }) => true,
@@ -185,7 +186,7 @@ impl Grid {
         }
     }
 
-    /// Points of the circle.
+    /// Number of points on the circle; `None` for other grids.
     pub(super) fn cells(&self) -> Option<i64> {
         match self {
             Self::Circle { cells, .. } => Some(*cells),
@@ -199,7 +200,7 @@ impl Grid {
         match self {
             Self::Decimal { decimals, width, phase } => {
                 let moved = width - 1 + 2 * Self::digits_moved(*width, *phase);
-                // Twice the digits of the middle, which may be half of one.
+                // Twice the middle in digits, because the middle may be half of a digit.
                 let short = width
                     .checked_mul(index)
                     .and_then(|middle| middle.checked_mul(2)?.checked_add(moved));
@@ -224,7 +225,7 @@ impl Grid {
 
     /// The reconstructions of indices.
     pub(super) fn values(&self, indices: &[i64]) -> Vec<f64> {
-        // Of any that are a little larger than these, the arithmetic is that of doubles: exact, and in vectors.
+        // If all indices are a little smaller than these limits, arithmetic in doubles is exact and can be vectorised.
         let exact = |largest: i64| indices.iter().all(|index| index.unsigned_abs() < largest as u64);
         match *self {
             Self::Decimal { decimals, width, phase } if exact(WHOLE / (4 * width)) => {
@@ -237,8 +238,8 @@ impl Grid {
         }
     }
 
-    /// The index of a sample, on a circle the name nearest to `near`; `None` if it is out of reach. Whether the reconstruction is
-    /// within the bound is for the caller to check.
+    /// The index of a sample; on a circle, of its equivalent indices the one nearest to `near`. `None` if it is too large. The caller must
+    /// check that the reconstruction is within the bound.
     #[inline(always)]
     pub(super) fn index(&self, sample: f64, near: i64) -> Option<i64> {
         let whole = |x: f64| (x.abs() < super::rows::LARGEST as f64).then(|| x.round() as i64);
@@ -260,6 +261,7 @@ impl Grid {
             Self::Circle { period, cells } => {
                 let turned = sample.rem_euclid(*period);
                 let index = whole(turned / (period / *cells as f64))?;
+                // The turn nearest to the index before: a direction that passes north continues without a jump.
                 let around = (index - near).rem_euclid(*cells);
                 let shortest = if 2 * around > *cells { around - cells } else { around };
                 near.checked_add(shortest)
@@ -268,7 +270,7 @@ impl Grid {
         .filter(|index| index.abs() <= super::rows::LARGEST)
     }
 
-    /// What the reader needs beyond the configuration.
+    /// Writes what the reader needs besides the configuration.
     pub(super) fn write(&self, bytes: &mut Vec<u8>) {
         match self {
             Self::Stepped { unit, origin, .. } => {
@@ -292,7 +294,7 @@ pub(super) fn unzigzag(z: u64) -> i64 {
     (z >> 1) as i64 ^ -((z & 1) as i64)
 }
 
-/// Seven bits a byte, the lowest first; the highest bit says that more follow.
+/// Appends seven bits per byte, the lowest first. The highest bit of a byte says that more follow.
 pub(super) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
     while value >= 128 {
         bytes.push(value as u8 | 128);
@@ -301,7 +303,7 @@ pub(super) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
     bytes.push(value as u8);
 }
 
-/// Takes bytes from the front.
+/// Reads bytes from the front.
 #[derive(Debug)]
 pub(super) struct Bytes<'a>(pub(super) &'a [u8]);
 

@@ -1,9 +1,9 @@
-//! What stands before a block's indices.
+//! The head of a block, before the indices.
 
 use super::grid::{Grid, push_varint};
 use fewbits_core::CodecError;
 
-/// Grids without decimals.
+/// Code of the line in the head; smaller codes are numbers of decimals.
 pub(super) const LINE: u8 = 13;
 pub(super) const CIRCLE: u8 = 14;
 pub(super) const SAMPLES: u8 = 15;
@@ -17,7 +17,7 @@ pub(super) enum Coding {
     Counts,
 }
 
-/// What was read before the indices.
+/// The head as it was read.
 pub(super) struct Head {
     pub(super) grid: Option<Grid>,
     pub(super) coding: Coding,

@@ -1,4 +1,4 @@
-//! The indices of a block as bytes, in each of the codings, and back.
+//! Conversion of the indices of a block to bytes and back, in each of the codings.
 
 use super::coder::{Coder, Reader, Writer};
 use super::counts::Counts;
@@ -11,7 +11,7 @@ use pco::data_types::Number;
 use pco::standalone::{DecompressorItem, FileDecompressor, simple_compress};
 use pco::{ChunkConfig, DeltaSpec};
 
-/// Bits of the length of the first index.
+/// Bits of the length field of the first index.
 const FIRST_LENGTH: u32 = 6;
 
 fn from_pco(error: impl std::fmt::Display) -> CodecError {
@@ -84,7 +84,7 @@ pub(super) fn read_counts(bytes: &[u8], rows: usize) -> Result<Vec<i64>, CodecEr
     Ok(indices)
 }
 
-/// Orders of differences that are tried beside pco's own choice, which is far off for few distinct indices.
+/// Orders of differences that are tried besides the one that pco chooses, which is bad for few distinct indices.
 const ORDERS: [usize; 2] = [0, 1];
 
 pub(super) fn smallest_pco<T: Number>(numbers: &[T]) -> Result<Vec<u8>, CodecError> {
@@ -107,7 +107,7 @@ pub(super) fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, CodecEr
     Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }
 
-/// Numbers of a pco stream: as many as rows, and nothing after them.
+/// Numbers of a pco stream. It must have as many as there are rows, and nothing after them.
 pub(super) fn from_pco_bytes<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, CodecError> {
     let mut numbers = Vec::new();
     let (file, mut rest) = FileDecompressor::new(bytes).map_err(from_pco)?;

@@ -5,38 +5,38 @@
 //! w_i <- w_i + rate (bit - p) s_i   the gradient of the code length
 //! ```
 //!
-//! All inputs of a decision are one array, so that vector instructions serve them together.
+//! All inputs of a decision are in one array, so that vector instructions process them together.
 
 use super::priors::MIXER_WEIGHTS;
 use fewbits_node::elementary::{greater, lesser, log2, squash};
 
-/// Contexts whose outcomes are counted.
+/// Number of contexts in which outcomes are counted.
 pub(super) const CONTEXTS: usize = 4;
-/// Experts that predict the index; their inputs follow those of the contexts.
+/// Number of experts. Their inputs follow those of the contexts.
 pub(super) const EXPERTS: usize = 4;
-/// All inputs: a vector register.
+/// Number of inputs: they fill a vector register.
 pub(super) const INPUTS: usize = CONTEXTS + EXPERTS;
-/// Classes of decisions, each with weights of its own: zero, sign, three magnitudes, further ones, inside an interval, low bits.
+/// Number of classes of decisions, each with its own weights: zero, sign, three magnitudes, further ones, inside an interval, low bits.
 pub(super) const CLASSES: usize = 8;
-/// Log odds of a decision, and of one input, are within these bits.
+/// Largest size of the log odds of a decision and of an input, in bits.
 const FARTHEST: f32 = 15.0;
 const FARTHEST_INPUT: f32 = 12.0;
-/// The least share of a probability.
+/// Smallest share of an expert's probability.
 const LEAST: f32 = 1e-9;
 /// Learning rate of the weights in the long run, its factor at the start, and the decisions over which it falls.
 const RATE: f32 = 0.0015;
 const FIRST_RATES: f32 = 6.0;
 const RATE_FALLS: f32 = 32.0;
-/// Occurrences after which a context forgets.
+/// Number of occurrences after which a context gives old ones less weight.
 const MOST_SEEN: f32 = 60.0;
-/// Occurrences at which a context has half of its confidence.
+/// Number of occurrences at which a context has half of its final confidence.
 const HALF_CONFIDENCE: f32 = 1.3;
-/// Probabilities of slots are stored in units of one over this, and stay this many units from certainty.
+/// Reciprocal of the unit of stored probabilities.
 const UNITS: f32 = 65536.0;
 const LEAST_UNITS: f32 = 16.0;
-/// The same of what a context seen for the first time starts from.
+/// Smallest distance from 0 and 1, in these units, of the probability that a new context starts from.
 const LEAST_FIRST: f32 = 256.0;
-/// The whole number of an `f32` below `2^23` to which this was added are its lowest bits.
+/// Adding this to an `f32` below `2^23` puts its integer part into the lowest bits.
 const WHOLE: f32 = 8_388_608.0;
 
 /// Outcomes of a decision in one context: probability of `true` (high 16 bits), how often seen (8 bits), a few bits of the hash, never 0.
@@ -51,17 +51,17 @@ fn seen(slot: Slot) -> u32 {
 pub(super) struct Mixer {
     /// Pairs of slots, context after context.
     slots: Vec<[Slot; 2]>,
-    /// Pairs of one context.
+    /// Number of pairs per context.
     pairs: u32,
     /// Hashes of the contexts of this row.
     pub(super) contexts: [u32; CONTEXTS],
-    /// Shares of the two outcomes, to be set for the experts before each decision.
+    /// Shares of the two outcomes. The caller sets those of the experts before each decision.
     yes: [f32; INPUTS],
     no: [f32; INPUTS],
     weights: Box<[[f32; INPUTS]; CLASSES]>,
     decisions: [f32; CLASSES],
     class: usize,
-    /// Slots of the decision looked up: where they are, bits of their hashes, how often they were seen.
+    /// The slots of the present decision: their places, hash bits, and numbers of occurrences.
     places: [u32; CONTEXTS],
     checks: [u32; CONTEXTS],
     seen: [f32; CONTEXTS],
@@ -70,7 +70,7 @@ pub(super) struct Mixer {
 }
 
 impl Mixer {
-    /// For a block of so many rows.
+    /// A mixer for a block of `rows` rows.
     pub(super) fn new(rows: usize) -> Self {
         let pairs = rows.min(1 << 13).next_power_of_two().max(1 << 8);
         Self {
@@ -90,15 +90,17 @@ impl Mixer {
         }
     }
 
-    /// Finds what the contexts say about the decision `node`, of a class. The experts' inputs can be computed while memory is waited for.
+    /// Looks up the counts of all contexts for the decision `node` of a class. The caller can compute the experts' inputs while memory is
+    /// read.
     ///
-    /// Decisions of one context lie side by side, sixteen in a line of the cache. A slot is one of a pair; if neither is of this
-    /// context, the less seen is given up. Written without branches, for which one it is cannot be foreseen.
+    /// Decisions of one context are adjacent, sixteen per cache line. A slot is one of a pair. If neither is of this
+    /// context, the one with fewer occurrences is replaced. The code has no branches, because the processor would mispredict them.
     #[inline(always)]
     pub(super) fn look_up(&mut self, node: u32, class: usize) {
         self.class = class;
         let far = (node >> 4).wrapping_mul(0x9E37_79B1);
         let (mut places, mut checks) = ([0; CONTEXTS], [0; CONTEXTS]);
+        // All addresses first, then all loads: the loads overlap instead of waiting for each other.
         for c in 0..CONTEXTS {
             let hash = (self.contexts[c] ^ far).wrapping_mul(0x85EB_CA6B);
             let hash = hash ^ hash >> 15;
@@ -112,6 +114,8 @@ impl Mixer {
         }
         for c in 0..CONTEXTS {
             let (a, b, check) = (first[c], second[c], checks[c]);
+            // Each bucket has two slots. The check byte identifies the context; if neither matches, replace the slot with fewer
+            // occurrences.
             let is_second = (b & 255 == check) | ((a & 255 != check) & (seen(b) < seen(a)));
             let slot = if is_second { b } else { a };
             places[c] |= u32::from(is_second);
@@ -149,14 +153,14 @@ impl Mixer {
             terms[i] = weights[i] * inputs[i];
         }
         self.inputs = inputs;
-        // In pairs, so that few additions wait for each other.
+        // Summed in pairs, so that fewer additions depend on each other.
         let [a, b, c, d, e, f, g, h] = terms;
         let sum = ((a + e) + (b + f)) + ((c + g) + (d + h));
         self.p = squash(sum.clamp(-FARTHEST, FARTHEST));
         ((self.p * UNITS) as u32).clamp(1, 65535)
     }
 
-    /// Learns the outcome of the decision just predicted.
+    /// Updates counts and weights with the outcome of the decision.
     #[inline(always)]
     pub(super) fn update(&mut self, bit: bool) {
         let decisions = &mut self.decisions[self.class];
@@ -168,7 +172,7 @@ impl Mixer {
         for i in 0..INPUTS {
             weights[i] += change * self.inputs[i];
         }
-        // A context seen for the first time starts from what all others said.
+        // A new context starts from the mixed probability.
         let mixed = self.p.clamp(LEAST_FIRST / UNITS, 1.0 - LEAST_FIRST / UNITS);
         let mut slots = [0; CONTEXTS];
         for c in 0..CONTEXTS {

@@ -1,8 +1,8 @@
 //! Blocks: many samples of one column as bytes, decodable alone.
 //!
-//! Where a stream must tell each sample before the next one is known, a block is known whole. [`BlockCodec`] chooses the grid of
-//! reconstructions from all its samples and codes their indices by a mixture of models. Nothing is carried from one block to the
-//! next.
+//! A stream must code each sample before the next one is known; a block is known as a whole. [`BlockCodec`] chooses the grid of
+//! reconstructions from all its samples and codes their indices by a mixture of models. Blocks are independent of each
+//! other.
 //!
 //! ```
 //! use fewbits_adaptive::{BlockCodec, Config};
@@ -27,8 +27,8 @@
 //! | exceptions | varints and 8 each | number; rows since the last one; the sample |
 //! | indices | the rest | models: 6 bits length and as many bits of the first index (zigzag), then decisions (`block/model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`block/counts.rs`); pco: its standalone format |
 //!
-//! There is no checksum, no length and no number of rows: a container holds all three. An arithmetic code has no redundancy: most
-//! truncated or damaged blocks decode to wrong samples. Trailing bytes are refused.
+//! There is no checksum, no length and no number of rows: the container must store all three. An arithmetic code has no redundancy, so most
+//! truncated or damaged blocks decode to wrong samples. Trailing bytes are detected and refused.
 
 pub mod coder;
 mod counts;
@@ -53,19 +53,19 @@ pub use rows::JOINT_COLUMNS;
 use rows::Others;
 pub use start::{Start, StartedBlock};
 
-/// Rows from which an anchor of eight bytes is worth it.
+/// Smallest number of rows for which an anchor of eight bytes is stored.
 const ANCHORED_ROWS: usize = 1024;
-/// Bits per sample from which pco is tried beside the models, and from which the samples themselves are.
+/// Bits per sample above which pco, and the samples themselves, are tried besides the models.
 const FINE: usize = 4;
 const VERY_FINE: usize = 16;
-/// How much time a block may take.
+/// How much computing time the writer may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Effort {
-    /// Mixed models, and pco where the bound is fine: the fewest bits.
+    /// Mixed models, and pco if the bound is fine: the fewest bits.
     #[default]
     Thorough,
-    /// Counts in few contexts, and pco where the bound is fine: faster, at more bits (`docs/adaptive.md` has both).
+    /// Counts in few contexts, and pco if the bound is fine: faster, with more bits (`docs/adaptive.md` has both).
     Fast,
 }
 
@@ -75,7 +75,7 @@ enum Accuracy {
     Lossless,
 }
 
-/// Writes and reads blocks. Both ends hold the same accuracy; [`Effort`] is the writer's choice alone.
+/// Writes and reads blocks. Both ends must use the same accuracy; [`Effort`] matters only to the writer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockCodec {
     accuracy: Accuracy,
@@ -83,8 +83,8 @@ pub struct BlockCodec {
 }
 
 impl BlockCodec {
-    /// Every finite sample returns within [`Config::delta`], around the circle if there is one; samples of
-    /// [`Config::exact`] return exactly. What the configuration says of lost packets has no effect.
+    /// A codec that returns every finite sample within [`Config::delta`], around the circle if there is one. Samples of
+    /// [`Config::exact`] return exactly. The settings for lost packets have no effect.
     pub fn new(config: Config) -> Self {
         Self {
             accuracy: Accuracy::Within(config),
@@ -92,7 +92,7 @@ impl BlockCodec {
         }
     }
 
-    /// Every sample returns to the last bit.
+    /// A codec that returns every sample to the last bit.
     pub fn lossless() -> Self {
         Self {
             accuracy: Accuracy::Lossless,
@@ -106,7 +106,7 @@ impl BlockCodec {
         Self { effort, ..self }
     }
 
-    /// The bound of finite samples; zero if they return exactly.
+    /// The error bound of finite samples; zero if they are exact.
     fn delta(&self) -> f64 {
         match self.accuracy {
             Accuracy::Within(config) if config.resolution().is_none() => config.delta(),
@@ -114,8 +114,8 @@ impl BlockCodec {
         }
     }
 
-    /// The samples of a column as one block. Samples that are not finite, and those that no point of the grid is near to, return
-    /// to the last bit; each costs some nine bytes.
+    /// The samples of a column as one block. Samples that are not finite, and those without a grid point within the bound, return
+    /// to the last bit; each costs about nine bytes.
     ///
     /// # Errors
     /// If pco fails, which no samples are known to cause.
@@ -123,8 +123,8 @@ impl BlockCodec {
         self.encode_with(samples, &[])
     }
 
-    /// As [`encode`](Self::encode), predicting also from the same rows of other columns (at most [`JOINT_COLUMNS`] of them are
-    /// used, the first ones). `others` are what the reader will have: their reconstructions. Where they do not help, the block is
+    /// As [`encode`](Self::encode), with the same rows of other columns as regressors (at most [`JOINT_COLUMNS`] of them are
+    /// used, the first ones). `others` must be their reconstructions, which the reader has. If they do not help, the block is
     /// the same as without them.
     ///
     /// # Errors
@@ -152,6 +152,7 @@ impl BlockCodec {
             if self.effort == Effort::Fast {
                 keep(with_counts(&grid, &indices, &exceptions)?, &mut best);
             }
+            // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
             if best.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8) {
                 let mut bytes = Vec::new();
                 write_head(&grid, Coding::Pco, false, &exceptions, &mut bytes);
@@ -170,10 +171,10 @@ impl BlockCodec {
         Ok(best.unwrap_or_default())
     }
 
-    /// The samples of a block of so many rows.
+    /// The samples of a block of `rows` rows.
     ///
     /// # Errors
-    /// If the bytes are none that a writer of the same accuracy and as many rows can have written, as far as this shows.
+    /// If it is detectable that no writer of this accuracy and number of rows wrote the bytes.
     pub fn decode(&self, bytes: &[u8], rows: usize) -> Result<Vec<f64>, Error> {
         self.decode_with(bytes, rows, &[])
     }
@@ -217,7 +218,7 @@ impl BlockCodec {
         Ok(samples)
     }
 
-    /// The grid that the samples want; `None` if only their own bits will do.
+    /// The grid that fits the samples; `None` if only their own bits do.
     fn grid(&self, samples: &[f64]) -> Option<Grid> {
         let finite = || samples.iter().copied().filter(|x| x.is_finite());
         let first = finite().next()?;
@@ -227,7 +228,7 @@ impl BlockCodec {
             return Some(Grid::circle(&config, period));
         }
         let lossless = self.accuracy == Accuracy::Lossless;
-        // Only a lossless block tells the two zeros apart.
+        // Only a lossless block distinguishes the two zeros.
         let ordinary: Vec<f64> = finite()
             .filter(|x| !lossless || x.to_bits() != (-0.0_f64).to_bits())
             .map(|x| x + 0.0)
@@ -241,7 +242,7 @@ impl BlockCodec {
         })
     }
 
-    /// Whether a reconstruction keeps the bound.
+    /// Whether a reconstruction is within the bound of its sample.
     #[inline(always)]
     fn is_within(&self, value: f64, sample: f64) -> bool {
         match self.accuracy {
@@ -257,7 +258,7 @@ impl BlockCodec {
         }
     }
 
-    /// Indices, those of exceptions repeating the last one, and the exceptions.
+    /// The indices (an exception repeats the last one), and the exceptions with their rows.
     fn indices(&self, grid: &Grid, samples: &[f64]) -> (Vec<i64>, Vec<(usize, f64)>) {
         let mut exceptions = Vec::new();
         let mut indices = Vec::with_capacity(samples.len());
@@ -273,7 +274,7 @@ impl BlockCodec {
                         Some(index) if self.is_within(grid.value(index), *sample) => last = Some(index),
                         _ => exceptions.push((row, *sample)),
                     }
-                    // Before the first ordinary sample, its index is not known yet.
+                    // Exceptions before the first ordinary sample: its index is not known yet.
                     indices.push(last);
                 }
             },
@@ -282,7 +283,7 @@ impl BlockCodec {
         (indices.into_iter().map(|index| index.unwrap_or(first)).collect(), exceptions)
     }
 
-    /// The grid of samples of so many decimals; the steps are read if there are any.
+    /// The grid of samples with `decimals` decimals; its steps are read if `stepped`.
     fn decimal_grid(&self, decimals: u8, stepped: bool, bytes: &mut Bytes<'_>) -> Result<Grid, CodecError> {
         if stepped {
             return Ok(Grid::Stepped {
@@ -370,7 +371,7 @@ impl BlockCodec {
     }
 }
 
-/// The grid moved as the next byte says.
+/// The grid moved by the phase in the next byte.
 fn read_phase(grid: Grid, bytes: &mut Bytes<'_>) -> Result<Grid, CodecError> {
     let [phase] = bytes.array()?;
     match grid {

@@ -1,7 +1,7 @@
-//! One column of whole numbers, coded decision by decision.
+//! Codes one column of integers, decision by decision, with mixed models.
 //!
-//! The index is coded relative to a centre (of the last index, the least-squares prediction, and that with other columns or else the slow
-//! mean, the one with the smallest error so far), in cells of `2^k` indices, where `k` follows that error:
+//! The index is coded relative to a centre, in cells of `2^k` indices. The centre is the prediction with the smallest error so far: the
+//! last index, least squares, or least squares with other columns (without any, the slow mean). `k` follows that error:
 //!
 //! ```text
 //! cell 0?   sign   at least 2, 3, 4, 6, 10, .. cells away?   where in the interval?   k low bits, the highest two with a model
@@ -14,11 +14,11 @@ use super::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
 use fewbits_core::CodecError;
 use fewbits_node::elementary::round;
 
-/// Differences remembered.
+/// Number of past differences used as regressors.
 const PAST: usize = 4;
-/// Least weight of a new index in the slow mean.
+/// Smallest weight of a new index in the slow mean.
 const SLOW: f64 = 0.02;
-/// Low bits that are coded with a model.
+/// Number of low bits that are coded with a model.
 const MODELLED: u32 = 2;
 /// Numbers of decisions, by which contexts tell them apart.
 const MAGNITUDES: u32 = 2;
@@ -29,7 +29,7 @@ const CLASS_MAGNITUDES: usize = 2;
 const CLASS_INSIDE: usize = 6;
 const CLASS_LOW: usize = 7;
 
-/// Predictions: the last index, least squares, and least squares with other columns or else the slow mean.
+/// Numbers of the predictions: the last index, least squares, and least squares with other columns or else the slow mean.
 const HOLD: usize = 0;
 const RECURSION: usize = PREDICTED;
 const THIRD: usize = 2;
@@ -56,11 +56,11 @@ impl State for Model {
     }
 }
 
-/// Where the next index is expected, and how finely it is told.
+/// Centre and cell size for the next index.
 #[derive(Debug, Clone, Copy)]
 struct Grid {
     centre: i64,
-    /// Bits of a cell.
+    /// A cell has `2^k` indices.
     k: u32,
 }
 
@@ -78,12 +78,12 @@ impl Grid {
     }
 }
 
-/// The state that both ends hold.
+/// The state of the coder, the same at writer and reader.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     mixer: Mixer,
     squares: LeastSquares<4>,
-    /// Least squares on other columns too.
+    /// Least squares with other columns too.
     joint: Option<LeastSquares<8>>,
     frequencies: Frequencies,
     tracks: Tracks,
@@ -104,7 +104,7 @@ fn less(a: [f32; EXPERTS], b: [f32; EXPERTS]) -> [f32; EXPERTS] {
 }
 
 impl Model {
-    /// After the first index of a block of so many rows; `cells`: points of a circle.
+    /// The state after the first index of a block of `rows` rows. `cells`: number of points on a circle.
     pub(super) fn new(rows: usize, first: i64, cells: Option<i64>, joint: bool) -> Self {
         let mut frequencies = Frequencies::new(first, cells);
         frequencies.add(first, true);
@@ -122,7 +122,7 @@ impl Model {
         }
     }
 
-    /// Predictions, contexts and the centre.
+    /// Computes predictions, contexts and the centre.
     #[inline(always)]
     fn expect(&mut self, others: [f64; JOINT_COLUMNS]) -> Grid {
         let [d0, d1, d2, d3] = self.past;
@@ -138,7 +138,7 @@ impl Model {
             }
             None => -level as f32,
         };
-        // The last index is as good as a prediction that is little better.
+        // The last index is preferred to a prediction that is only a little better.
         let (at, errors) = (&self.tracks.at, &self.tracks.errors);
         let mut best = (errors[HOLD] * 0.96, 0.0);
         for track in [RECURSION, THIRD] {
@@ -148,7 +148,7 @@ impl Model {
         }
         // Predictions are within 2^22, where rounding is exact.
         let offset = round(best.1.clamp(-4e6, 4e6)) as i64;
-        // Doublings of the error over the square root of two, rounded down, if any.
+        // k: base-2 logarithm of the error over the square root of two, rounded down, at least zero.
         let k = ((best.0 * std::f32::consts::FRAC_1_SQRT_2).to_bits() >> 23).saturating_sub(127);
 
         let step = |d: i64| ((d >> k).clamp(-20, 20) + 32) as u32;
@@ -166,7 +166,7 @@ impl Model {
         Grid { centre, k }
     }
 
-    /// What each expert says about an edge: the first index above it.
+    /// Each expert's probabilities below and above an edge, given by the first index above it.
     #[inline(always)]
     fn tails(&self, grid: Grid, edge: i64) -> Tails {
         let mut tails = self.tracks.tails(self.place(edge));
@@ -174,7 +174,7 @@ impl Model {
         tails
     }
 
-    /// Where an edge is, from the last index.
+    /// Position of an edge relative to the last index.
     #[inline(always)]
     fn place(&self, edge: i64) -> f32 {
         (edge - self.last) as f32 - 0.5
@@ -201,7 +201,7 @@ impl Model {
         let (mut inside, mut outside) = ([0.0; EXPERTS], [0.0; EXPERTS]);
         for e in 0..EXPERTS {
             outside[e] = low.below[e] + high.above[e];
-            // Of the forms of the share inside, the one that cancels least.
+            // Of the equivalent expressions for the share inside, use the one with the least cancellation.
             let beside = if low.below[e] > 0.5 {
                 low.above[e] - high.above[e]
             } else {
@@ -219,7 +219,7 @@ impl Model {
         let side = |tails: Tails| if up { tails.above } else { tails.below };
         let is_beyond = |edge: i64| wanted.is_some_and(|j| if up { j >= edge } else { j < edge });
 
-        // Outwards: is the index at least so many cells away?
+        // Outwards in growing steps: is the index at least this many cells away?
         let mut near = side(if up { high } else { low });
         let mut far;
         let (mut begin, mut width, mut count) = (1_i64, 1_i64, 0_usize);
@@ -261,7 +261,7 @@ impl Model {
         Ok(self.low_bits(coder, grid, grid.first(cell), wanted))
     }
 
-    /// Where in a cell.
+    /// Codes the position within a cell.
     #[inline(always)]
     fn low_bits<C: Coder>(&mut self, coder: &mut C, grid: Grid, first: i64, wanted: Option<i64>) -> i64 {
         let mut index = first;
@@ -270,6 +270,8 @@ impl Model {
             let half = 1 << (grid.k - level - 1);
             let (a, b) = (self.tails(grid, index), self.tails(grid, index + half));
             let c = self.tails(grid, index + 2 * half);
+            // Probabilities of the upper and lower half from each expert's distribution. In the upper tail they come from the survival
+            // function, which keeps its digits there.
             let (mut upper, mut lower) = (less(c.below, b.below), less(b.below, a.below));
             let (above, beneath) = (less(b.above, c.above), less(a.above, b.above));
             for e in 0..EXPERTS {

@@ -1,8 +1,8 @@
-//! What both ends believe at the start of a block.
+//! Initial weights of the models at the start of a block.
 //!
-//! Means of what was learned on blocks of 512 rows of recordings of several kinds (gas and weather in a room, positions and ranges of a
-//! vehicle, server metrics, electricity) at bounds of .25 to 2 % of their ranges. They are part of the format: other numbers read other
-//! samples.
+//! They are means of the weights learned on blocks of 512 rows of several kinds of recordings (gas and weather in a room, positions and
+//! ranges of a vehicle, server metrics, electricity) at bounds of .25 to 2 % of their ranges. They are part of the format: with other
+//! numbers a reader decodes other samples.
 
 use super::mixer::{CLASSES, INPUTS};
 

@@ -1,14 +1,14 @@
-//! Index after index: the loop that both ends run, whatever codes an index.
+//! The loop over rows that writer and reader share, for any coder of indices.
 
 use super::coder::Coder;
 use fewbits_core::CodecError;
 use fewbits_numerics::kernels::vectorised_narrow;
 
-/// Largest index, either sign: sums of a few stay whole in an `i64` with room.
+/// Largest size of an index: sums of a few fit into an `i64`.
 pub(super) const LARGEST: i64 = 1 << 46;
-/// Other columns that a joint block uses.
+/// Largest number of other columns that a joint block uses.
 pub const JOINT_COLUMNS: usize = 3;
-/// Differences of other columns from row to row, in units of their mean size: the same numbers at both ends.
+/// Differences of other columns from row to row, divided by their mean size. Both ends compute the same numbers.
 pub(super) struct Others<'a> {
     columns: Vec<(&'a [f64], f64)>,
 }
@@ -33,17 +33,17 @@ impl<'a> Others<'a> {
         let mut found = [0.0; JOINT_COLUMNS];
         for (found, (column, scale)) in found.iter_mut().zip(&self.columns) {
             let step = (column[row] - column[row - 1]) * scale;
-            // What is not finite says nothing; the clamp bounds what a wild value does to least squares.
+            // A value that is not finite counts as no difference. The clamp limits the effect of an outlier on least squares.
             *found = if step.is_finite() { step.clamp(-1e6, 1e6) } else { 0.0 };
         }
         found
     }
 }
 
-/// Room is made for so many rows before any is read: a damaged number of rows must not exhaust the memory.
+/// Largest number of rows for which memory is reserved in advance: a damaged number of rows must not exhaust memory.
 const EXPECTED_ROWS: usize = 4096;
 
-/// The state that both ends hold, which codes index after index.
+/// The state of a coder of indices, the same at writer and reader.
 pub(super) trait State {
     /// The index that was coded last.
     fn last(&self) -> i64;
@@ -58,8 +58,8 @@ pub(super) trait State {
     ) -> Result<i64, CodecError>;
 }
 
-/// The indices behind the first one: `wanted` at the writer, `None` at the reader, which stops where the bytes end too early. Returns all.
-/// After an error nothing more can be coded.
+/// Codes the indices after the first one: `wanted` at the writer, `None` at the reader, which stops if the bytes end too early. Returns all
+/// indices. After an error the coder must not be used.
 pub(super) fn code_all<C: Coder, S: State>(
     coder: &mut C,
     state: S,
@@ -70,7 +70,7 @@ pub(super) fn code_all<C: Coder, S: State>(
     vectorised_narrow(
         #[inline(always)]
         move || {
-            // Variables of the loop's own: what nobody else can reach stays in registers.
+            // A local variable that nothing else can reach stays in registers.
             let mut state = state;
             let mut own = std::mem::take(coder);
             let mut indices = Vec::with_capacity(rows.min(EXPECTED_ROWS));

@@ -1,6 +1,6 @@
-//! What the blocks of one column have in common, told once: their grid, and where their first indices are.
+//! What the blocks of one column have in common and is stored once: their grid, and where their first indices are.
 //!
-//! A container keeps a [`Start`] where every reader has it. A block that begins with it has no head and a short first index; it is one
+//! A container stores a [`Start`] where every reader has it. A block that uses it has no head and a short first index. The block is one
 //! arithmetic code:
 //!
 //! ```text
@@ -21,10 +21,10 @@ use super::{Accuracy, BlockCodec, Effort, check_rows};
 use crate::Error;
 use fewbits_core::CodecError;
 
-/// Probabilities in units of `2^-16` that a block begins with the start, and that models code it.
+/// Probabilities, in units of `2^-16`, that a block uses the start, and that it is coded by models.
 const WITH_START: u32 = 65_280;
 const BY_MODELS: u32 = 61_440;
-/// The first byte of a block of its own: no code that begins with a decision of `WITH_START` begins with it.
+/// First byte of a block that does not use the start. No code that begins with the decision `WITH_START` begins with this byte.
 const ALONE: u8 = 255;
 /// Blocks of differences of more bits in the mean may be shorter otherwise; of few rows they rarely are.
 const COARSE_BITS: usize = 1;
@@ -37,7 +37,7 @@ const MOVED: u8 = 32;
 /// Indices are smaller than `2^47` in zigzag form.
 const MOST_BITS: u8 = 47;
 
-/// What blocks of one column and one accuracy begin with; made by [`BlockCodec::start`].
+/// The common beginning of blocks of one column and one accuracy; made by [`BlockCodec::start`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
     grid: Grid,
@@ -46,12 +46,12 @@ pub struct Start {
     k: u8,
 }
 
-/// A block that began with a [`Start`].
+/// A block made with a [`Start`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StartedBlock {
     /// The block.
     pub bytes: Vec<u8>,
-    /// Whether the other columns are needed to decode it; otherwise none must be given.
+    /// Whether the other columns are needed to decode it. If not, none may be passed.
     pub joint: bool,
 }
 
@@ -93,7 +93,7 @@ impl Start {
 }
 
 impl BlockCodec {
-    /// What blocks of samples like these may begin with; `None` where no grid holds them.
+    /// The start for blocks of samples like these; `None` if no grid fits them.
     pub fn start(&self, samples: &[f64]) -> Option<Start> {
         let grid = match self.grid(samples)? {
             Grid::Line { step, .. } => Grid::Line {
@@ -110,7 +110,7 @@ impl BlockCodec {
         let sizes: u128 = indices.iter().map(|index| u128::from(zigzag(index - usual))).sum();
         let mean = (sizes / indices.len() as u128) as u64;
         Some(match grid.cells() {
-            // Around the circle any is as likely.
+            // On a circle all first indices are equally likely.
             Some(cells) => Start {
                 grid,
                 usual: 0,
@@ -124,10 +124,10 @@ impl BlockCodec {
         })
     }
 
-    /// Takes the bytes of [`Start::to_bytes`] of a codec of the same accuracy from the front.
+    /// Reads the bytes of [`Start::to_bytes`], made by a codec of the same accuracy, from the front of `bytes`.
     ///
     /// # Errors
-    /// If they are none.
+    /// If the bytes are not a start.
     pub fn read_start(&self, bytes: &mut &[u8]) -> Result<Start, Error> {
         let mut reader = Bytes(bytes);
         let [head] = reader.array()?;
@@ -167,6 +167,7 @@ impl BlockCodec {
         let is_fine = found
             .first()
             .is_none_or(|block| block.bytes.len() > super::FINE * samples.len() / 8);
+        // If the start does not fit the block, a block of its own is shorter.
         if is_fine || !self.grid(samples).is_some_and(|grid| grid.is_like(&start.grid)) {
             let alone = self.encode_with(samples, others)?;
             found.push(StartedBlock {
@@ -178,7 +179,7 @@ impl BlockCodec {
         shortest.ok_or_else(|| invalid("block", "none", "a coding that holds the samples").into())
     }
 
-    /// The samples as points of the start's grid, for [`code_shared`](Self::code_shared); `None` where a block of its own may be shorter: some
+    /// The samples as indices on the start's grid, for [`code_shared`](Self::code_shared). `None` if a block of its own may be shorter: a
     /// sample is off the grid, another grid is better, or neighbours differ by many points.
     pub fn indices_on(&self, start: &Start, samples: &[f64]) -> Option<Vec<i64>> {
         let (indices, exceptions) = self.indices(&start.grid, samples);
@@ -195,11 +196,11 @@ impl BlockCodec {
         (is_like || begins_with_start()?).then_some(indices)
     }
 
-    /// Codes one column as a part of a code that goes on behind it: `wanted` at the writer, `None` at the reader. Returns the indices of
-    /// `rows` rows, predicted from `others` if there are any; [`Start::values`] has their samples.
+    /// Codes one column as a part of a longer arithmetic code: `wanted` at the writer, `None` at the reader. Returns the indices of
+    /// `rows` rows, with `others` as regressors if there are any; [`Start::values`] converts them to samples.
     ///
     /// # Errors
-    /// If a column has another number of rows, or a reader finds what no writer codes.
+    /// If a column has another number of rows, or the reader finds what no writer writes.
     pub fn code_shared<C: Coder>(
         &self,
         coder: &mut C,

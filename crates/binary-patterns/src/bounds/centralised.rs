@@ -1,4 +1,4 @@
-//! The best that `N` bits can do if one place sees all measurements.
+//! The smallest error that `N` bits allow if one encoder sees all measurements.
 
 use super::rate_distortion::ConditionalMean;
 use crate::Error;
@@ -8,15 +8,15 @@ use fewbits_numerics::newton;
 use fewbits_quantizers::density::{CellMoments, Density};
 use fewbits_quantizers::lloyd_max;
 
-/// Most sensors: the quantizer of the estimate has `2^N` levels.
+/// Largest number of sensors: the quantizer of the estimate has `2^N` levels.
 const MAX_SENSORS: usize = 12;
-/// Points of the table that starts the inversion of the conditional mean.
+/// Number of points of the table from which the inversion of the conditional mean starts.
 const TABLE: usize = 2000;
 
-/// Exact least mean squared error of any scheme in which `sensors` measurements of equal noise are described by as many bits.
+/// Exact least mean squared error of any scheme in which `sensors` measurements of equal noise are described by one bit each.
 ///
-/// `E Var[X|Ybar] + ` the Lloyd-Max distortion of `E[X|Ybar]` with `2^N` levels, where `Ybar`, the average, has noise
-/// `s^2/N`. A strict bound: a distributed scheme is a special case of a central one.
+/// It is `E Var[X|Ybar]` plus the Lloyd-Max distortion of `E[X|Ybar]` with `2^N` levels, where the average `Ybar` has noise
+/// variance `s^2/N`. No distributed scheme has a smaller error, since it is a special case of a centralised one.
 ///
 /// # Errors
 /// If `noise_deviation` is not positive and finite, `sensors` not in `1..=12`, or the quantizer's iteration fails.
@@ -27,8 +27,8 @@ pub fn centralised_bound(source: &Source, noise_deviation: f64, sensors: usize) 
     centralised_bound_of_levels(source, noise_deviation, sensors, 1 << sensors)
 }
 
-/// The same for `measurements` measurements described by one of `levels` symbols together: several levels of one measurement,
-/// or a few symbols for many.
+/// As [`centralised_bound`], for `measurements` measurements that are together described by one of `levels` symbols: several levels for one
+/// measurement, or few symbols for many.
 ///
 /// # Errors
 /// If `noise_deviation` is not positive and finite, `measurements` is 0, `levels` not in `2..=4096`, or the quantizer's iteration fails.
@@ -48,10 +48,10 @@ pub fn centralised_bound_of_levels(
     Ok(measurement.estimation_error() + quantizer.mean_squared_error())
 }
 
-/// Distribution of `E[X|Y]`, integrated over the measurement `y`, where everything is smooth.
+/// Distribution of `E[X|Y]`. Integrals are taken over the measurement `y`, in which the integrands are smooth.
 struct EstimateDensity {
     measurement: ConditionalMean,
-    /// `E[X|y]` on an even grid of `y`, increasing.
+    /// `E[X|y]` at evenly spaced `y`, increasing.
     table: Vec<f64>,
 }
 
@@ -64,7 +64,7 @@ impl EstimateDensity {
         Self { measurement, table }
     }
 
-    /// The measurement whose estimate is `v`: Newton's method within the bracket that the table gives.
+    /// The measurement whose estimate is `v`, by Newton's method within a bracket from the table.
     fn measurement_of(&self, v: f64) -> f64 {
         let reach = self.measurement.measurement_reach();
         let at = self.table.partition_point(|&t| t < v);

@@ -1,10 +1,10 @@
-//! Lower bounds on the error of schemes of `N` bits, and one printed formula that is not such a bound.
+//! Lower bounds on the error of schemes with `N` bits, and one printed formula that is no bound.
 //!
 //! | quantity | function | valid for |
 //! |---|---|---|
 //! | optimal-weight van Trees bound of given sensors | [`optimal_weight_van_trees`] | every bank, both sources |
 //! | remote rate-distortion bound, `N` observations and bits | [`network_rate_distortion`] | every scheme |
-//! | exact centralised bound | [`centralised_bound`] | every scheme, the tightest of its kind |
+//! | exact centralised bound | [`centralised_bound`] | every scheme; the tightest of those for every scheme |
 //! | equation 5.13, "CRLB" | [`printed_crlb`] | Gaussian source only |
 //! | equations 5.12 and B.1 as printed | [`RemoteDistortion`] of one observation | one sensor only |
 
@@ -22,7 +22,7 @@ use crate::observation::source::{Kind, Nodes};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// Panel width in noise standard deviations; the quotient is less smooth than the probabilities.
+/// Width of quadrature panels in noise standard deviations; the integrand, a quotient, is less smooth than the probabilities.
 const INFORMATION_PANEL: f64 = 0.5;
 
 /// Mean Fisher information `E[J(X)]` of the bits about the source.
@@ -34,9 +34,9 @@ pub fn mean_information(bank: &Bank) -> f64 {
 
 /// Equation 5.13: `1/(E[J] + J2)` with `J2 = 1/sigma_x^2` for a Gaussian source and 0 for a uniform one.
 ///
-/// For a Gaussian source this is the van Trees bound with constant weight, hence valid. For a uniform source the density
-/// does not vanish at `+-V`, no such bound exists with `J2 = 0`, and the mean squared error does fall below (three Gray
-/// bits at 0 dB: 0.198 against 0.382; erratum `binary-7`). It is kept because the thesis ranks patterns by it.
+/// For a Gaussian source this is the van Trees bound with constant weight, hence valid. The density of a uniform source
+/// does not vanish at `+-V`, so with `J2 = 0` it is no bound, and the mean squared error can be smaller (three Gray
+/// bits at 0 dB: 0.198 against 0.382; erratum `binary-7`). It is provided because the thesis ranks patterns by it.
 ///
 /// # Errors
 /// If the information is zero to machine precision, so that the quotient is not finite.

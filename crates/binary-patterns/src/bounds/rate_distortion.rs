@@ -1,4 +1,4 @@
-//! Remote rate-distortion: the source is seen in noise, and a limited number of bits describes what was seen.
+//! Remote rate-distortion bounds: the source is observed in noise, and a limited number of bits describes the observation.
 
 use crate::Error;
 use crate::Source;
@@ -8,12 +8,12 @@ use fewbits_numerics::normal::{interval, pdf, truncated_moments};
 use fewbits_numerics::quadrature::gauss_legendre;
 use std::f64::consts::{E, PI};
 
-/// Noise standard deviations beyond the support at which the measurement's density ends for all purposes.
+/// Distance from the support, in noise standard deviations, beyond which the density of the measurement is negligible.
 const REACH: f64 = 9.0;
-/// Below this share of the noise's standard deviation a source hardly changes the measurement.
+/// If the source's width is below this fraction of the noise deviation, the source hardly changes the measurement.
 const FAINT: f64 = 3e-6;
 
-/// The measurement `Y = X + N(0, s^2)` and the conditional mean `E[X|Y]`, which is all that any fusion centre could use.
+/// The measurement `Y = X + N(0, s^2)` and the conditional mean `E[X|Y]`, the best estimate from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConditionalMean {
     source: Source,
@@ -21,7 +21,7 @@ pub struct ConditionalMean {
 }
 
 impl ConditionalMean {
-    /// From the source and the noise of the (only, or averaged) measurement.
+    /// From the source and the noise of the measurement, which may be an average of several.
     ///
     /// # Errors
     /// If `noise_deviation` is not positive and finite.
@@ -57,11 +57,11 @@ impl ConditionalMean {
     pub fn moments(&self, y: f64) -> (f64, f64) {
         let s = self.noise_deviation;
         match self.source.kind() {
-            // To first order in `v/s`: the ends of the truncation would differ by rounding alone.
+            // To first order in `v/s`; the ends of the truncation would differ only by rounding.
             Kind::Uniform { half_width: v } if v < FAINT * s => (v / s * (v / s) * y / 3.0, v * v / 3.0),
             Kind::Uniform { half_width: v } => match truncated_moments((-v - y) / s, (v - y) / s) {
                 Ok(cell) => (y + s * cell.mean, s * s * cell.variance),
-                // So far out that both ends round to one: the nearest point of the support is the limit.
+                // Both ends round to one: the limit is the nearest point of the support.
                 Err(_) => (y.clamp(-v, v), 0.0),
             },
             Kind::Gaussian { deviation } => {
@@ -71,7 +71,7 @@ impl ConditionalMean {
         }
     }
 
-    /// Half the width of the interval that carries the measurement.
+    /// Half the width of the interval outside which the density of the measurement is negligible.
     pub(super) fn measurement_reach(&self) -> f64 {
         match self.source.kind() {
             Kind::Uniform { half_width } => half_width + REACH * self.noise_deviation,
@@ -85,7 +85,7 @@ impl ConditionalMean {
             Kind::Uniform { half_width } => (self.noise_deviation, half_width - REACH * self.noise_deviation),
             Kind::Gaussian { deviation } => (deviation.hypot(self.noise_deviation), 0.0),
         };
-        // Noise far below a uniform source rounds its two ends only; between them the density is constant.
+        // If the noise is far narrower than a uniform source, only the density's two ends are smoothed; between them it is constant.
         let corner = corner.max(0.0);
         let ends = [from, (-corner).clamp(from, to), corner.clamp(from, to), to];
         let mut sum = 0.0;
@@ -101,7 +101,7 @@ impl ConditionalMean {
         sum
     }
 
-    /// `E Var[X|Y]`: what the noise alone costs.
+    /// `E Var[X|Y]`: the error that the noise alone causes.
     pub fn estimation_error(&self) -> f64 {
         let reach = self.measurement_reach();
         self.integrate(-reach, reach, |_, _, variance| variance)
@@ -118,7 +118,7 @@ pub struct RemoteDistortion {
 }
 
 impl RemoteDistortion {
-    /// The bound at `rate` bits a source sample.
+    /// The bound at `rate` bits per source sample, in squared units of the source.
     ///
     /// # Errors
     /// If the rate is negative or not finite.
@@ -130,8 +130,8 @@ impl RemoteDistortion {
 
 /// The remote rate-distortion bound for one measurement with noise `noise_deviation`.
 ///
-/// The estimate splits the distortion exactly into `E Var[X|Y]` and the distortion of describing `E[X|Y]`: the cross term is
-/// zero by orthogonality, whatever the quantizer (erratum `binary-9`). The entropy needs no inverse function:
+/// The distortion is exactly the sum of `E Var[X|Y]` and the distortion of describing `E[X|Y]`: the cross term is
+/// zero by orthogonality, for every quantizer (erratum `binary-9`). The entropy is computed without inverse function:
 /// `h(E[X|Y]) = h(Y) + E log2 f'(Y)` with `f'(y) = Var[X|y]/s^2`. For a Gaussian source this is equation 5.12,
 /// `D(R) = sx^2 - sx^4/(sx^2 + s^2) (1 - 2^(-2R))`.
 ///
@@ -159,8 +159,8 @@ pub fn remote_distortion(source: &Source, noise_deviation: f64) -> Result<Remote
 
 /// The bound for `sensors` measurements of equal noise and one bit each: noise `s^2/N` and rate `N`.
 ///
-/// The thesis uses `s^2` with `N` bits (erratum `binary-6`), which schemes with several sensors beat: three sign bits of a
-/// Gaussian source at -5 dB reach 0.0649 where it forbids less than 0.0764; the value here is 0.0521.
+/// The thesis uses `s^2` with `N` bits (erratum `binary-6`). Schemes with several sensors have smaller errors: three sign bits of a
+/// Gaussian source at -5 dB have 0.0649 where it gives 0.0764 as bound; the value here is 0.0521.
 ///
 /// # Errors
 /// If `noise_deviation` is not positive and finite or there is no sensor.

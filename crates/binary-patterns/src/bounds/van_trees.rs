@@ -1,22 +1,22 @@
-//! The Bayesian Cramer-Rao bound with the best weight function.
+//! The van Trees (Bayesian Cramer-Rao) bound with the best weight function.
 
 use crate::observation::source::{Kind, Threshold};
 use crate::{Bank, Error};
 use fewbits_numerics::newton;
 use std::f64::consts::PI;
 
-/// Intervals of the coarsest grid, and more for each threshold.
+/// Number of intervals of the coarsest grid, and additional intervals per threshold.
 const COARSEST: usize = 512;
 const PER_THRESHOLD: usize = 64;
-/// Grids, each of twice the intervals of the one before.
+/// Number of grids; each has twice the intervals of the one before.
 const LEVELS: usize = 8;
-/// Most intervals of a grid.
+/// Largest number of intervals of a grid.
 const FINEST: usize = 1 << 17;
-/// Relative change between extrapolated values at which the doubling stops.
+/// The doubling stops if the extrapolated value changes by less than this, relative.
 const TOLERANCE: f64 = 1e-11;
-/// Relative change up to which a value that the finest grid still moves is returned.
+/// Largest relative change at the finest grid for which a value is still returned.
 const ACCEPTED: f64 = 1e-7;
-/// Half width, in noise standard deviations, of the region around a threshold that gets its share of the nodes.
+/// Half width, in noise standard deviations, of the region around a threshold with denser nodes.
 const FOCUS: f64 = 4.0;
 
 /// The largest van Trees bound over all weight functions, for the sensors of `bank`.
@@ -31,13 +31,13 @@ const FOCUS: f64 = 4.0;
 /// bound = E[q(X)]
 /// ```
 ///
-/// Both are `-(p q')' + p r q = p` with the density `p` as weight, solved by finite volumes (tridiagonal) on grids of
-/// doubling fineness with Romberg extrapolation. The grids are even in a smooth coordinate that gives every threshold its share
-/// of nodes, so that the walls of information are resolved however small the noise is. Without information the bound is `Var X`; as the noise vanishes the
-/// information makes walls at the thresholds and the bound tends to `Delta^2/12`.
+/// Both are `-(p q')' + p r q = p` with the density `p` as weight. They are solved by finite volumes (tridiagonal) on grids of
+/// doubling fineness with Romberg extrapolation. The grids are even in a smooth coordinate with additional nodes around every threshold,
+/// so that peaks of the information are resolved for any noise. Without information the bound is `Var X`. As the noise vanishes, the
+/// information becomes infinite at the thresholds and zero elsewhere, and the bound tends to `Delta^2/12`.
 ///
 /// # Errors
-/// [`Error::NotConverged`] if the grids, refined as far as they go, do not agree to `1e-7`.
+/// [`Error::NotConverged`] if the values on the finest grids differ by more than `1e-7`.
 pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
     let source = bank.source();
     let (prior, clamped) = match source.kind() {
@@ -47,7 +47,7 @@ pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
     let mesh = Mesh::new(source.reach(), &bank.thresholds());
     let mut intervals = COARSEST + PER_THRESHOLD * mesh.focus.len();
     let rate = |x: f64| bank.fisher_information(x) + prior;
-    // Nodes and the middles between them alternate.
+    // Nodes and midpoints alternate.
     let mut points = mesh.points(2 * intervals);
     let mut rates: Vec<f64> = points.iter().step_by(2).map(|&x| rate(x)).collect();
     extrapolated(|level| {
@@ -55,7 +55,7 @@ pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
             if 2 * intervals > FINEST {
                 return None;
             }
-            // The old middles become nodes.
+            // The previous midpoints become nodes.
             intervals *= 2;
             rates = (0..=intervals)
                 .map(|i| if i % 2 == 0 { rates[i / 2] } else { rate(points[i]) })
@@ -66,7 +66,7 @@ pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
     })
 }
 
-/// The limit of values on grids of doubling fineness, of which the error falls by fours, by Romberg's extrapolation.
+/// The limit of values on grids of doubling fineness, whose error falls by a factor of four each, by Romberg extrapolation.
 fn extrapolated(mut on_grid: impl FnMut(usize) -> Option<f64>) -> Result<f64, Error> {
     let mut row: Vec<f64> = Vec::with_capacity(LEVELS);
     let mut change = f64::INFINITY;
@@ -101,12 +101,12 @@ fn extrapolated(mut on_grid: impl FnMut(usize) -> Option<f64>) -> Result<f64, Er
     }
 }
 
-/// The coordinate `xi(x)`: half of it even in `x`, half shared among the thresholds.
+/// The grid coordinate `xi(x)`: half of it is proportional to `x`, half is shared among the thresholds.
 struct Mesh {
     reach: f64,
-    /// Thresholds inside the support and the half widths of their regions.
+    /// Thresholds inside the support, with the half widths of their regions.
     focus: Vec<(f64, f64)>,
-    /// Total of the coordinate over the support.
+    /// Range of the coordinate over the support.
     total: f64,
 }
 
@@ -144,7 +144,7 @@ impl Mesh {
         self.total / (0.5 / self.reach + self.share() * focused / PI)
     }
 
-    /// `x` at `intervals + 1` even steps of the coordinate, by safeguarded Newton.
+    /// The points `x` at `intervals + 1` evenly spaced values of the coordinate, by Newton's method with safeguards.
     fn points(&self, intervals: usize) -> Vec<f64> {
         let start = self.coordinate(-self.reach);
         let mut points = Vec::with_capacity(intervals + 1);
@@ -162,8 +162,8 @@ impl Mesh {
     }
 }
 
-/// `E[q]` for `-(p q')' + p r q = p` by an elimination of its own, in which nothing is subtracted but a ratio from one, so that huge
-/// information costs no digit; even entries of `points` are nodes, odd ones the middles between them.
+/// `E[q]` for `-(p q')' + p r q = p`, by an elimination in which the only subtraction is that of a ratio from one, so huge
+/// information costs no digits. Even entries of `points` are nodes, odd ones midpoints.
 fn weighted_mean(mesh: &Mesh, points: &[f64], rates: &[f64], clamped: bool, density: impl Fn(f64) -> f64) -> f64 {
     let n = rates.len() - 1;
     let h = 1.0 / n as f64;

@@ -5,24 +5,24 @@ use crate::observation::source::Kind;
 use fewbits_numerics::golden::maximum;
 use fewbits_numerics::normal::log_pdf;
 
-/// Fewest points of the scan.
+/// Smallest number of points of the scan.
 const POINTS: usize = 4001;
-/// Most points of the scan.
+/// Largest number of points of the scan.
 const MOST_POINTS: usize = 64_001;
-/// Points a noise standard deviation.
+/// Number of points per noise standard deviation.
 const PER_NOISE: f64 = 8.0;
-/// Log densities this close belong to one plateau.
+/// Log densities closer than this belong to the same plateau.
 const PLATEAU: f64 = 1e-12;
 /// Relative width at which golden-section search stops.
 const GOLDEN_STOP: f64 = 1e-10;
 
-/// For each outcome the argument of the largest posterior density.
+/// For each outcome, the argument of the largest posterior density.
 ///
-/// A dense scan finds the highest peak; a golden-section search refines it. On a plateau, the estimate is its middle.
+/// A dense scan finds the highest peak; a golden-section search refines it. On a plateau the estimate is its midpoint.
 pub(crate) fn estimates(bank: &Bank, outcomes: usize) -> Vec<f64> {
     let reach = bank.source().reach();
     let intervals = (PER_NOISE * 2.0 * reach / bank.finest_noise()).min(MOST_POINTS as f64 - 1.0) as usize;
-    // An even number of intervals puts zero on the scan, and both ends are always there.
+    // An even number of intervals, so that zero and both ends are points of the scan.
     let intervals = intervals.max(POINTS - 1).next_multiple_of(2);
     let points: Vec<f64> = (0..=intervals)
         .map(|i| reach * (2.0 * i as f64 - intervals as f64) / intervals as f64)

@@ -8,18 +8,18 @@ use crate::{CellGrid, LookupTable};
 use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, finite};
 
-/// Probabilities below this are taken as this when their logarithm is multiplied by a count that may be zero.
+/// Smaller probabilities are replaced by this before their logarithm is multiplied by a count, which may be zero.
 const FLOOR: f64 = 1e-300;
-/// Scores closer than this are ties, and the lowest cell wins; symmetric outcomes tie up to rounding.
+/// Scores closer than this are ties, and the lowest cell is taken; scores of symmetric outcomes are equal up to rounding.
 const TIE: f64 = 1e-11;
 
-/// How the fusion centre turns the bits into an estimate.
+/// Rule by which the fusion centre computes an estimate from the bits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Decoder<'a> {
     /// Posterior mean: the least mean squared error.
     Mmse,
-    /// Centroid of the cell `l` that maximises `ln P(c_l) + sum_n ln P(z_n|c_l)` (equation 5.10 with the missing division of
-    /// `P(z_n, c_l)` by `P(c_l)` put back, erratum `binary-4`). Bits count as independent given the cell, which they are
+    /// Centroid of the cell `l` that maximises `ln P(c_l) + sum_n ln P(z_n|c_l)`. This is equation 5.10 with the missing division of
+    /// `P(z_n, c_l)` by `P(c_l)` (erratum `binary-4`). The bits are treated as independent given the cell, but they are independent
     /// only given `X` (erratum `binary-5`).
     DiscreteMap(&'a CellGrid),
     /// Equation 5.10 as printed, with joint in place of conditional probabilities. Equal to [`Self::DiscreteMap`] for
@@ -27,12 +27,12 @@ pub enum Decoder<'a> {
     PrintedDiscreteMap(&'a CellGrid),
     /// Centroid of the cell of greatest posterior probability `int_cell p(x) prod_n P(z_n|x) dx`.
     ExactDivisionMap(&'a CellGrid),
-    /// The `x` on the support that maximises `ln p(x) + sum_n ln P(z_n|x)`; the middle of a plateau, the lowest of equals.
+    /// The `x` in the support that maximises `ln p(x) + sum_n ln P(z_n|x)`; the midpoint of a plateau, the lowest of equal maxima.
     ContinuousMap,
 }
 
 impl Bank {
-    /// The posterior mean from one observation per sensor, without a table; a bit that is missing says nothing.
+    /// The posterior mean from one observation per sensor, without a table. A missing bit carries no information.
     ///
     /// # Errors
     /// If the number of observations is not the number of sensors.
@@ -41,8 +41,8 @@ impl Bank {
         Ok(mean_under(&score, &nodes))
     }
 
-    /// `E[(x - estimate)^2 | observations]` from one observation per sensor; a bit that is missing says nothing. At the posterior mean it is
-    /// the posterior variance. In squared units of the source.
+    /// `E[(x - estimate)^2 | observations]` from one observation per sensor, in squared units of the source. A missing bit carries no
+    /// information. At the posterior mean it is the posterior variance.
     ///
     /// # Errors
     /// If the number of observations is not the number of sensors, or `estimate` is not finite.
@@ -58,7 +58,7 @@ impl Bank {
         })
     }
 
-    /// Log likelihood of the observations at the nodes of the source, and the nodes.
+    /// Log likelihood of the observations at the quadrature nodes of the source, and the nodes.
     fn posterior_score(&self, observations: &[Observation<bool>]) -> Result<(Vec<f64>, Nodes), Error> {
         entries("observations", observations.len(), self.sensors())?;
         let nodes = self.fine_nodes();
@@ -107,7 +107,7 @@ impl Bank {
 
     /// Exact mean squared error of the posterior mean, `sum_z int (x - E[X|z])^2 p(x) P(z|x) dx`.
     ///
-    /// Every term is positive, so that no digit is lost when the error is small.
+    /// Every term is positive, so no digits are lost if the error is small.
     ///
     /// # Errors
     /// If there are more than `2^26` outcomes.
@@ -143,6 +143,7 @@ impl Bank {
                 impossible.push(index);
             }
         });
+        // Outcomes whose probability underflows are computed in logarithms, which takes longer.
         if !impossible.is_empty() {
             let logs = self.log_rows(&nodes.x);
             let mut counts = Vec::new();
@@ -175,7 +176,7 @@ impl Bank {
         }
     }
 
-    /// Nodes with breaks at the edges of `grid`, cell by cell.
+    /// Nodes with breaks at the edges of `grid`, for each cell.
     fn cells(&self, grid: &CellGrid) -> Vec<Cell> {
         (0..grid.cells())
             .filter_map(|cell| grid.support(cell, self.source()))
@@ -227,6 +228,7 @@ impl Bank {
             .map(|index| {
                 self.counts_at(index, &mut counts);
                 self.log_likelihood(&logs, &counts, &mut score);
+                // Logarithm of the cell's prior probability. The score is then the log posterior up to a constant.
                 for (s, cell) in score.iter_mut().zip(&cells) {
                     *s += log(cell.mass);
                 }
@@ -258,12 +260,12 @@ impl Bank {
     }
 }
 
-/// Probabilities that equation 5.10 multiplies.
+/// The probabilities that equation 5.10 multiplies.
 #[derive(Clone, Copy, PartialEq)]
 enum Scaling {
     /// Probabilities given the cell.
     Conditional,
-    /// Joint ones, as printed.
+    /// Joint probabilities of bit and cell, as printed.
     Printed,
 }
 
@@ -274,21 +276,21 @@ struct Cell {
     centroid: f64,
 }
 
-/// The first index whose score is within `slack(best)` of the best.
+/// The first index whose score is within `slack(best)` of the best score.
 fn first_largest(scores: &[f64], slack: impl Fn(f64) -> f64) -> usize {
     let best = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let enough = best - slack(best);
     scores.iter().position(|&s| s >= enough).unwrap_or(0)
 }
 
-/// Mean of the source when its density is multiplied by the exponential of `score`, given at the nodes.
+/// Mean of the source if its density is multiplied by the exponential of `score`, which is given at the nodes.
 fn mean_under(score: &[f64], nodes: &Nodes) -> f64 {
     let (mass, first) = moments(&weights_under(score, nodes), &nodes.x);
     if mass > 0.0 { first / mass } else { 0.0 }
 }
 
-/// Weights of the nodes times the exponential of `score`, up to a constant. The largest score is subtracted first, so that not all of them
-/// underflow.
+/// Weights of the nodes times the exponential of `score`, up to a constant. The largest score is subtracted first, so that at least one
+/// does not underflow.
 fn weights_under(score: &[f64], nodes: &Nodes) -> Vec<f64> {
     let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect()

@@ -1,4 +1,4 @@
-//! From the reports to an estimate.
+//! Estimates from the reports of all sensors.
 
 pub(crate) mod continuous_map;
 pub(crate) mod decoder;

@@ -1,4 +1,4 @@
-//! Estimates for all that a bank may report.
+//! Estimates for every outcome of a bank, as a table.
 
 use crate::observation::source::Nodes;
 use crate::{Bank, Error};
@@ -7,7 +7,7 @@ use fewbits_numerics::error::{all_finite, entries};
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
-/// Most sensors for a table over bit strings.
+/// Largest number of sensors for a table over bit strings.
 const MAX_TABLE_SENSORS: usize = 24;
 
 /// Estimates for every outcome of a bank.
@@ -28,8 +28,8 @@ stored! { LookupTable as StoredTable |table| {
 }, Error }
 
 impl LookupTable {
-    /// The estimate from one observation per sensor. Where a bit is missing (these sensors always report, so that nothing
-    /// received, like an erasure, says nothing) it is the posterior mean given the others, whatever the table's decoder.
+    /// The estimate from one observation per sensor. The sensors always report, so a missing bit carries no information. If one is missing,
+    /// the estimate is the posterior mean given the others, for every decoder.
     ///
     /// # Errors
     /// If the number of observations is not the number of sensors.
@@ -50,7 +50,7 @@ impl LookupTable {
         Ok((estimate, self.bank.posterior_squared_error(observations, estimate)?))
     }
 
-    /// The estimate for one bit a sensor.
+    /// The estimate from one bit per sensor.
     ///
     /// # Errors
     /// If the number of bits is not the number of sensors.
@@ -58,12 +58,12 @@ impl LookupTable {
         Ok(self.estimates[self.bank.index_of(bits)?])
     }
 
-    /// Number of distinguishable outcomes stored.
+    /// Number of stored outcomes that the estimate distinguishes.
     pub fn outcomes(&self) -> usize {
         self.estimates.len()
     }
 
-    /// `(E[xhat|x] - x, Var[xhat|x])`: bias and variance of the estimate for one value of the source.
+    /// `(E[xhat|x] - x, Var[xhat|x])`: bias and variance of the estimate, given the value `x` of the source.
     ///
     /// # Errors
     /// If `x` is not finite.
@@ -82,7 +82,7 @@ impl LookupTable {
         Ok((mean, (second - mean * mean).max(0.0)))
     }
 
-    /// Expanded to all `2^N` bit strings, sensor 1 the most significant bit of the index.
+    /// The estimates of all `2^N` bit strings; sensor 1 is the most significant bit of the index.
     ///
     /// # Errors
     /// If there are more than 24 sensors.

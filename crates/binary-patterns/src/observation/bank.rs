@@ -1,4 +1,4 @@
-//! A source observed through a bank of one-bit sensors, and the exact enumeration of what they may report.
+//! A source with its one-bit sensors, and the exact enumeration of their joint reports.
 
 use crate::observation::source::{Nodes, Threshold};
 use crate::{BinaryQuantizer, Error, PatternSensor, Source};
@@ -8,29 +8,29 @@ use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
-/// Most outcomes that may be enumerated.
+/// Largest number of outcomes that may be enumerated.
 pub(crate) const MAX_OUTCOMES: u128 = 1 << 26;
 
-/// Outcomes less likely than this are never met; their share of any error is below `1e-280`.
+/// Outcomes of smaller probability are left out; their contribution to any error is below `1e-280`.
 pub const IMPOSSIBLE: f64 = 1e-290;
 
-/// Panel width in noise standard deviations; with twelve nodes the integrals are good to `1e-12`.
+/// Width of quadrature panels in noise standard deviations; with twelve nodes per panel the integrals have an error of `1e-12`.
 const PANEL: f64 = 2.0;
 
-/// A source and the sensors that measure it, their noises independent.
+/// A source and the sensors that measure it, with independent noises.
 ///
-/// Sensors with equal quantizer and noise are exchangeable: only how many of them report 1 matters. The bank groups them, so
-/// that fifty sensors in three groups of 17, 16 and 17 have 5508 outcomes instead of `2^50`.
+/// Sensors with equal quantizer and noise are exchangeable: only the number of them that report 1 matters. The bank groups them, so
+/// fifty sensors in three groups of 17, 16 and 17 have 5508 outcomes instead of `2^50`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredBank", into = "StoredBank")]
 pub struct Bank {
     source: Source,
     groups: Vec<Exchangeable>,
-    /// Exchangeable of each sensor, in the order given.
+    /// Index of the group of each sensor, in the order given.
     membership: Vec<usize>,
 }
 
-/// Exchangeable sensors.
+/// A group of exchangeable sensors.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Exchangeable {
     pub sensor: PatternSensor,
@@ -43,7 +43,7 @@ stored! { Bank as StoredBank |bank| {
 } => Bank::new(source, sensors), Error }
 
 impl Bank {
-    /// From the sensors in the order in which their bits will be decoded.
+    /// The bank of these sensors. Bits are decoded in the same order.
     ///
     /// # Errors
     /// If there is no sensor.
@@ -69,7 +69,7 @@ impl Bank {
         })
     }
 
-    /// Sensors of equal noise, one a quantizer.
+    /// A bank of sensors with equal noise, one for each quantizer.
     ///
     /// # Errors
     /// If there is no quantizer or `noise_deviation` is not positive and finite.
@@ -95,7 +95,7 @@ impl Bank {
         self.membership.len()
     }
 
-    /// Sensor `n`, which must be there.
+    /// Sensor `n`; the index must be valid.
     pub(crate) fn sensor(&self, n: usize) -> &PatternSensor {
         &self.groups[self.membership[n]].sensor
     }
@@ -104,7 +104,7 @@ impl Bank {
         &self.groups
     }
 
-    /// Number of distinguishable outcomes, `prod (count + 1)` over the groups, saturated.
+    /// Number of outcomes, `prod (count + 1)` over the groups; larger numbers are returned as `u128::MAX`.
     pub fn outcomes(&self) -> u128 {
         self.groups
             .iter()
@@ -125,7 +125,7 @@ impl Bank {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Total Fisher information about `x`, `sum_n P1'^2 / (P0 P1)`.
+    /// Fisher information about `x` in all bits, `sum_n P1'^2 / (P0 P1)`.
     pub fn fisher_information(&self, x: f64) -> f64 {
         self.groups
             .iter()
@@ -133,18 +133,18 @@ impl Bank {
             .sum()
     }
 
-    /// Nodes fine enough for `1e-12`.
+    /// Quadrature nodes for errors of `1e-12`.
     pub fn fine_nodes(&self) -> Nodes {
         let reach = self.source.reach();
         self.nodes_between(-reach, reach)
     }
 
-    /// The same for a part of the support.
+    /// The same nodes for a part of the support.
     pub(crate) fn nodes_between(&self, from: f64, to: f64) -> Nodes {
         Nodes::adapted(&self.source, from, to, &self.thresholds(), PANEL, gauss_legendre::<12>())
     }
 
-    /// All thresholds with their noise.
+    /// All thresholds, with the noise of their sensors.
     pub(crate) fn thresholds(&self) -> Vec<Threshold> {
         let sensors = self.groups.iter().map(|g| &g.sensor);
         sensors
@@ -152,7 +152,7 @@ impl Bank {
             .collect()
     }
 
-    /// Walks all outcomes. `visit` gets the counts' index (last group fastest) and `w p(x) P(outcome|x)` at the nodes.
+    /// Enumerates all outcomes. `visit` gets the index of the counts (last group fastest) and `w p(x) P(outcome|x)` at the nodes.
     pub fn for_outcomes(&self, nodes: &Nodes, mut visit: impl FnMut(usize, &[f64])) {
         let table_of = |g: &Exchangeable| {
             let p = g
@@ -167,7 +167,7 @@ impl Bank {
         descend(&tables, &mut levels, 0, &mut visit);
     }
 
-    /// Refuses bit strings of another length, and turns the others into the index of their counts.
+    /// Index of the counts of a bit string; an error if its length is not the number of sensors.
     pub(crate) fn index_of(&self, bits: &[bool]) -> Result<usize, Error> {
         entries("bits", bits.len(), self.sensors())?;
         let mut counts = vec![0usize; self.groups.len()];
@@ -181,7 +181,7 @@ impl Bank {
             .fold(0, |index, (g, k)| index * (g.count + 1) + k))
     }
 
-    /// Number of sensors that say 1 in each group, for an index of [`Self::for_outcomes`].
+    /// Number of sensors that report 1 in each group, for an index of [`Self::for_outcomes`].
     pub(crate) fn counts_at(&self, mut index: usize, counts: &mut Vec<usize>) {
         counts.clear();
         for g in self.groups.iter().rev() {
@@ -211,7 +211,7 @@ pub(crate) struct CountTable {
     pub rows: Vec<Vec<f64>>,
 }
 
-/// Larger groups take the binomial probabilities through logarithms, where neither powers nor coefficients overflow.
+/// For larger groups the binomial probabilities are computed in logarithms, so that powers and coefficients do not overflow.
 const LOG_COUNT: usize = 60;
 
 impl CountTable {

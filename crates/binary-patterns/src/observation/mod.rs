@@ -1,4 +1,4 @@
-//! What is observed: the source, the sensors with their noise, and what they may report.
+//! The observation model: the source, the sensors with their noise, and their joint reports.
 
 pub(crate) mod bank;
 pub(crate) mod sensor;

@@ -1,4 +1,4 @@
-//! One sensor with a one-bit quantizer, and the scheme by which it reports.
+//! A sensor with a one-bit quantizer, as a scheme.
 
 use crate::{BinaryQuantizer, Error};
 use fewbits_core::factor::{Constant, Scalar};
@@ -9,7 +9,7 @@ use fewbits_numerics::stored;
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
-/// One sensor: what it measures is `Y = X + N(0, noise_deviation^2)`, what it reports is the bit of its quantizer.
+/// A sensor that measures `Y = X + N(0, noise_deviation^2)` and reports the bit of its quantizer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredSensor", into = "StoredSensor")]
 pub struct PatternSensor {
@@ -23,7 +23,7 @@ stored! { PatternSensor as StoredSensor |sensor| {
 } => PatternSensor::with_deviation(quantizer, noise_deviation), Error }
 
 impl PatternSensor {
-    /// A sensor from its quantizer and the standard deviation (not the variance) of its noise.
+    /// A sensor with the given quantizer and standard deviation (not variance) of its noise.
     ///
     /// # Errors
     /// If `noise_deviation` is not positive and finite.
@@ -35,12 +35,12 @@ impl PatternSensor {
         })
     }
 
-    /// Its quantizer.
+    /// The sensor's quantizer.
     pub fn quantizer(&self) -> &BinaryQuantizer {
         &self.quantizer
     }
 
-    /// Standard deviation of its noise.
+    /// Standard deviation of the measurement noise.
     pub fn noise_deviation(&self) -> f64 {
         self.noise_deviation
     }
@@ -55,13 +55,13 @@ impl PatternSensor {
         self.quantizer.log_probabilities(x, self.noise_deviation)
     }
 
-    /// Fisher information about `x` in its bit.
+    /// Fisher information about `x` in the sensor's bit.
     pub fn fisher_information(&self, x: f64) -> f64 {
         self.quantizer.fisher_information(x, self.noise_deviation)
     }
 }
 
-/// The report is the bit of the cell that holds the measurement. A missing report says nothing about the measurement.
+/// The report is the bit of the cell that contains the measurement. A missing report carries no information about the measurement.
 impl Memoryless<1> for PatternSensor {
     type Feedback = ();
     type Report = bool;

@@ -1,4 +1,4 @@
-//! The scalar under observation.
+//! The scalar that the sensors measure.
 
 use crate::Error;
 use fewbits_numerics::error::{finite, positive, refuse};
@@ -40,7 +40,7 @@ pub(crate) enum Kind {
     Gaussian { deviation: f64 },
 }
 
-/// A number above zero whose square is a number above zero, with room for sums.
+/// Returns a number above zero whose square does not underflow or overflow; otherwise an error.
 fn squared(argument: &'static str, value: f64) -> Result<f64, Error> {
     positive(argument, value)?;
     Ok(fewbits_numerics::error::within(argument, value, 1e-150, 1e150)?)
@@ -50,7 +50,7 @@ impl Source {
     /// Uniform on `[-half_width, half_width]`.
     ///
     /// # Errors
-    /// If `half_width` is not a finite number above zero, or its square leaves the range of numbers.
+    /// If `half_width` is not a finite number above zero, or its square overflows or underflows.
     pub fn uniform(half_width: f64) -> Result<Self, Error> {
         let half_width = squared("half_width", half_width)?;
         Ok(Self {
@@ -61,7 +61,7 @@ impl Source {
     /// `N(0, deviation^2)`.
     ///
     /// # Errors
-    /// If `deviation` is not a finite number above zero, or its square leaves the range of numbers.
+    /// If `deviation` is not a finite number above zero, or its square overflows or underflows.
     pub fn gaussian_with_deviation(deviation: f64) -> Result<Self, Error> {
         let deviation = squared("deviation", deviation)?;
         Ok(Self {
@@ -73,7 +73,7 @@ impl Source {
         self.kind
     }
 
-    /// The source's own unit: `V`, or the standard deviation.
+    /// Length scale of the source: `V`, or the standard deviation.
     pub fn scale(&self) -> f64 {
         match self.kind {
             Kind::Uniform { half_width } => half_width,
@@ -110,7 +110,7 @@ impl Source {
         }
     }
 
-    /// Half the width of the interval that carries the source: `V`, or nine standard deviations.
+    /// Half the width of the interval on which the source is integrated: `V`, or nine standard deviations.
     pub fn reach(&self) -> f64 {
         match self.kind {
             Kind::Uniform { half_width } => half_width,
@@ -127,7 +127,7 @@ impl Source {
         Ok(positive("noise_deviation", (self.variance() / 10f64.powf(snr_db / 10.0)).sqrt())?)
     }
 
-    /// Widest panel: half of `V`, or one and a half standard deviations of the source.
+    /// Largest width of a quadrature panel: half of `V`, or one and a half standard deviations of the source.
     fn widest_panel(&self) -> f64 {
         match self.kind {
             Kind::Uniform { half_width } => 0.5 * half_width,
@@ -135,25 +135,25 @@ impl Source {
         }
     }
 
-    /// Number of panels no wider than `width` or [`widest_panel`](Self::widest_panel).
+    /// Number of panels of width at most `width` and at most [`widest_panel`](Self::widest_panel).
     fn panels(&self, from: f64, to: f64, width: f64) -> usize {
-        // A noise far below the resolution of any grid must not ask for unbounded memory.
+        // Limited, so that very small noise does not need unbounded memory.
         (((to - from) / width.min(self.widest_panel())).ceil() as usize).clamp(1, MAX_PANELS)
     }
 
-    /// Composite Gauss-Legendre nodes over `[from, to]`, weighted by the density.
+    /// Composite Gauss-Legendre nodes over `[from, to]`, with the density included in the weights.
     pub(crate) fn nodes_between(&self, from: f64, to: f64, width: f64, rule: &Rule) -> Nodes {
         let mut nodes = Nodes::default();
         nodes.extend(self, from, to, width, rule);
         nodes
     }
 
-    /// The same over the whole support, for noise so large that no part of it is certain.
+    /// The same over the whole support, for noise so large that the bits are uncertain everywhere.
     pub(crate) fn nodes(&self, width: f64, rule: &Rule) -> Nodes {
         self.nodes_between(-self.reach(), self.reach(), width, rule)
     }
 
-    /// Refuses noise too small for an even grid of nodes to resolve.
+    /// An error if the noise is too small for an even grid of nodes.
     pub(crate) fn resolvable(&self, noise_deviation: f64) -> Result<f64, Error> {
         let noise_deviation = positive("noise_deviation", noise_deviation)?;
         let least = FINEST * self.reach();
@@ -164,19 +164,19 @@ impl Source {
     }
 }
 
-/// Enough for 75 dB where all of the support has to be resolved.
+/// Largest number of panels: enough for 75 dB if all of the support must be resolved.
 const MAX_PANELS: usize = 20_000;
-/// The smallest noise, as a share of the support, that an even grid of so many panels resolves.
+/// The smallest noise, as a fraction of the support, that an even grid of so many panels resolves.
 const FINEST: f64 = 1e-4;
-/// Beyond this many noise standard deviations from a threshold its bit is certain to `1e-50`.
+/// Beyond this many noise standard deviations from a threshold the bit is certain to `1e-50`.
 const ZONE: f64 = 15.0;
 
-/// A threshold in noise. Integrands vary within some deviations of a threshold, and nowhere else.
+/// A threshold of a sensor, with its noise. Integrands vary only within some noise deviations of a threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Threshold {
-    /// Where it is on the measurement axis.
+    /// Position on the measurement axis.
     pub position: f64,
-    /// Standard deviation of the noise of the sensor that has it.
+    /// Standard deviation of the noise of its sensor.
     pub noise_deviation: f64,
 }
 
@@ -190,17 +190,17 @@ impl Threshold {
     }
 }
 
-/// Quadrature nodes `x` and weights `w` with the source density inside: `E[f(X)] = sum w f(x)`.
+/// Quadrature nodes `x` and weights `w` that include the source density: `E[f(X)] = sum w f(x)`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nodes {
-    /// Where the integrand is evaluated, increasing.
+    /// Nodes, increasing.
     pub x: Vec<f64>,
-    /// Weights, the source's density included.
+    /// Weights, which include the source's density.
     pub w: Vec<f64>,
 }
 
 impl Nodes {
-    /// Appends a part of the support.
+    /// Adds the nodes of the interval `[from, to]`.
     pub(crate) fn extend(&mut self, source: &Source, from: f64, to: f64, width: f64, rule: &Rule) {
         for (x, w) in rule.panels(from, to, source.panels(from, to, width)) {
             self.x.push(x);
@@ -218,10 +218,10 @@ impl Nodes {
         self.x.is_empty()
     }
 
-    /// Nodes on `[from, to]` that are dense near thresholds and sparse where all bits are certain.
+    /// Nodes on `[from, to]`, dense near thresholds and sparse where all bits are certain.
     ///
-    /// Panels within reach of a threshold are `share` of its noise wide. The number of nodes so depends on the number of
-    /// thresholds and not on how small the noise is.
+    /// Panels near a threshold have a width of `share` times its noise deviation. The number of nodes therefore depends on the number of
+    /// thresholds, not on the noise.
     pub fn adapted(source: &Source, from: f64, to: f64, thresholds: &[Threshold], share: f64, rule: &Rule) -> Self {
         let mut nodes = Self::default();
         let widest = source.widest_panel();
@@ -235,13 +235,13 @@ impl Nodes {
             {
                 let ahead = threshold - ZONE * noise - x;
                 if ahead > 0.0 {
-                    // A panel fine enough for the zone need not stop at its edge.
+                    // A panel that is fine enough for the zone of a threshold may extend beyond it.
                     step = step.min(ahead.max(share * noise));
                 } else if x < threshold + ZONE * noise {
                     step = step.min(share * noise);
                 }
             }
-            // Rounding must neither stop the march nor leave a sliver.
+            // Rounding must not stop the loop or leave a panel of almost no width.
             let end = if x + step >= to - 1e-12 * widest {
                 to
             } else {

@@ -1,4 +1,4 @@
-//! Exact sizes of the search spaces, in checked 128-bit arithmetic.
+//! Exact sizes of the search spaces, in 128-bit integers with overflow checks.
 
 use crate::Error;
 use crate::patterns::grid::bits_in_range;
@@ -10,7 +10,7 @@ fn overflow(what: &'static str) -> Error {
     ArgumentError::new(what, "too large a number", "one below 2^128").into()
 }
 
-/// Number of multisets of `size` out of `kinds` things: `C(kinds + size - 1, size)`.
+/// Number of multisets of `size` elements of `kinds` kinds: `C(kinds + size - 1, size)`.
 ///
 /// # Errors
 /// If the number exceeds 128 bits.
@@ -24,7 +24,7 @@ pub fn multisets(kinds: u128, size: u128) -> Result<u128, Error> {
         .ok_or(overflow("multisets"))
 }
 
-/// Unordered bases of GF(2)^bits, `prod_{i=1..B} (2^B - 2^(i-1)) / B!` (equation 5.5): 3, 28, 840, ...
+/// Number of unordered bases of GF(2)^bits, `prod_{i=1..B} (2^B - 2^(i-1)) / B!` (equation 5.5): 3, 28, 840, ...
 ///
 /// # Errors
 /// If `bits` is not in `1..=16` or the number exceeds 128 bits.
@@ -41,9 +41,9 @@ pub fn unordered_bases(bits: usize) -> Result<u128, Error> {
     Ok(count / factorial)
 }
 
-/// The number of sets of `sensors` linear patterns as the thesis counts them (equation 5.7).
+/// Number of sets of `sensors` linear patterns by equation 5.7 of the thesis.
 ///
-/// It counts a multiset once for every basis that it contains; [`full_rank_multisets`] is right (erratum `binary-2`).
+/// That equation counts a multiset once for every basis that it contains. [`full_rank_multisets`] is correct (erratum `binary-2`).
 ///
 /// # Errors
 /// If `bits` is out of range, `sensors < bits`, or the number exceeds 128 bits.
@@ -65,7 +65,7 @@ fn enough_sensors(bits: usize, sensors: usize) -> Result<(), Error> {
 
 /// Gaussian binomial coefficient: the number of `k`-dimensional subspaces of GF(2)^n.
 fn subspaces(n: usize, k: usize) -> Option<u128> {
-    // Pascal's rule avoids the division of two huge products.
+    // Pascal's rule avoids dividing two huge products.
     let mut row = vec![1u128];
     for i in 1..=n {
         let mut next = vec![1u128; i + 1];
@@ -77,10 +77,10 @@ fn subspaces(n: usize, k: usize) -> Option<u128> {
     row.get(k).copied()
 }
 
-/// Multisets of `sensors` non-zero masks that span GF(2)^bits, by inclusion and exclusion over the span:
+/// Number of multisets of `sensors` non-zero masks that span GF(2)^bits, by inclusion and exclusion over the span:
 /// `sum_j (-1)^(B-j) 2^C(B-j,2) [B choose j]_2 C(2^j + N - 2, N)`.
 ///
-/// 2702 for three bits and eight sensors, 277 755 for four bits and eight.
+/// Examples: 2702 for three bits and eight sensors, 277 755 for four bits and eight sensors.
 ///
 /// # Errors
 /// If `bits` is out of range, `sensors < bits`, or an intermediate number exceeds 128 bits.
@@ -105,7 +105,7 @@ pub fn full_rank_multisets(bits: usize, sensors: usize) -> Result<u128, Error> {
     plus.checked_sub(minus).ok_or(overflow(what))
 }
 
-/// Sets that strategy 1 tries: the Gray basis is fixed, the other `N - B` masks are free.
+/// Number of sets in strategy 1: the Gray basis is fixed, the other `N - B` masks are free.
 ///
 /// # Errors
 /// As [`printed_pattern_sets`].
@@ -119,7 +119,7 @@ fn factorial(n: u128) -> Option<u128> {
     (2..=n).try_fold(1u128, |f, i| f.checked_mul(i))
 }
 
-/// One-to-one labelings of `2^bits` cells by `bits` bits, with bit order and complements identified: `L! / (B! 2^B)`.
+/// Number of one-to-one labelings of `2^bits` cells by `bits` bits, up to bit order and complements: `L! / (B! 2^B)`.
 ///
 /// # Errors
 /// If `bits` is out of range or the number exceeds 128 bits (six bits and more).
@@ -132,7 +132,7 @@ pub fn bijective_labelings(bits: usize) -> Result<u128, Error> {
         .ok_or(overflow("labelings"))
 }
 
-/// The same with mirror images identified too: 472 for three bits.
+/// As [`bijective_labelings`], also up to mirror images: 472 for three bits.
 ///
 /// Burnside: half of all labelings plus those equal to their mirror image. A labeling is its own mirror image if reflecting
 /// the cells acts on the labels as an involution of the cube without fixed vertices; one with `k` transposed pairs of bits

@@ -1,4 +1,4 @@
-//! Division of the measurement axis into cells.
+//! Cells of the measurement axis.
 
 use crate::Error;
 use crate::observation::source::{Kind, Source};
@@ -6,16 +6,16 @@ use fewbits_numerics::error::refuse;
 use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use serde::{Deserialize, Serialize};
 
-/// Most bits a cell index may take.
+/// Largest number of bits of a cell index.
 pub(crate) const MAX_BITS: usize = 16;
 
 /// Interior edges of the eight-level Lloyd-Max quantizer of `N(0, 1)` with the four digits that Max (1960) prints.
 const MAX_EIGHT_LEVEL_EDGES: [f64; 7] = [-1.748, -1.05, -0.5006, 0.0, 0.5006, 1.05, 1.748];
 
-/// Interior edges `t_1 < ... < t_{L-1}` that divide the axis into `L` cells; the outer cells reach to infinity.
+/// Interior edges `t_1 < ... < t_{L-1}` that divide the axis into `L` cells; the outer cells are unbounded.
 ///
-/// For a bounded source the infinite outer cells are the clipping rule: a measurement below `-V` counts as `-V`, one above
-/// `V` as `V` (the thesis, section 5.2, prints the two sides swapped; erratum `binary-1`).
+/// For a bounded source the unbounded outer cells have the effect of clipping: a measurement below `-V` is treated as `-V`, one above
+/// `V` as `V` (section 5.2 of the thesis prints the two sides exchanged; erratum `binary-1`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct CellGrid {
@@ -37,21 +37,21 @@ impl From<CellGrid> for Vec<f64> {
 }
 
 impl CellGrid {
-    /// `2^bits` cells with edges at multiples of `2 V / 2^bits` from `-V`.
+    /// The grid of `2^bits` cells with edges at multiples of `2 V / 2^bits` from `-V`.
     ///
     /// # Errors
     /// If `half_width` is not positive and finite or `bits` not in `1..=16`.
     pub fn uniform(half_width: f64, bits: usize) -> Result<Self, Error> {
         let half_width = fewbits_numerics::error::positive("half_width", half_width)?;
         let cells = 1usize << bits_in_range(bits)?;
-        // Symmetric by construction: the edge in the middle is exactly zero.
+        // Symmetric by construction, so that the middle edge is exactly zero.
         let breakpoints = (1..cells)
             .map(|l| half_width * ((2.0 * l as f64 - cells as f64) / cells as f64))
             .collect();
         Ok(Self { breakpoints })
     }
 
-    /// From any strictly increasing finite interior edges, at least one.
+    /// A grid with any strictly increasing finite interior edges, at least one.
     ///
     /// # Errors
     /// If the edges are empty, not finite or not strictly increasing.
@@ -63,7 +63,7 @@ impl CellGrid {
         Ok(Self { breakpoints })
     }
 
-    /// `2^bits` cells of the Lloyd-Max quantizer of `N(0, deviation^2)`.
+    /// The `2^bits` cells of the Lloyd-Max quantizer of `N(0, deviation^2)`.
     ///
     /// # Errors
     /// If `deviation` is not positive and finite or `bits` not in `1..=8`.
@@ -73,7 +73,7 @@ impl CellGrid {
         Self::from_breakpoints(table.breakpoints().iter().map(|t| t * deviation).collect())
     }
 
-    /// The eight-cell Gaussian grid with the four digits that Max (1960) prints, for reproductions.
+    /// The Gaussian grid of eight cells with the four digits that Max (1960) prints, for reproducing published results.
     ///
     /// # Errors
     /// If `deviation` is not positive and finite.
@@ -92,14 +92,14 @@ impl CellGrid {
         self.breakpoints.len() + 1
     }
 
-    /// Bits of a cell index, if `L` is a power of two.
+    /// Number of bits of a cell index; `None` if `L` is not a power of two.
     pub fn bits(&self) -> Option<usize> {
         self.cells()
             .is_power_of_two()
             .then(|| self.cells().trailing_zeros() as usize)
     }
 
-    /// Index of the cell of a measurement, from 0: the number of edges at or below it.
+    /// Index, from 0, of the cell that contains a measurement: the number of edges at or below it.
     ///
     /// # Errors
     /// If the measurement is NaN.
@@ -107,7 +107,7 @@ impl CellGrid {
         Ok(cell_of(&self.breakpoints, measurement)?)
     }
 
-    /// Limits of cell `l`, cut to the support of the source; `None` if nothing of it lies inside.
+    /// Limits of cell `l`, restricted to the support of the source; `None` if the two do not overlap.
     pub(crate) fn support(&self, cell: usize, source: &Source) -> Option<(f64, f64)> {
         let reach = source.reach();
         let low = if cell == 0 {
@@ -119,7 +119,7 @@ impl CellGrid {
         (low < high).then_some((low, high))
     }
 
-    /// Mean squared error of the cell centroids when the measurement is exact; `Delta^2/12` for a uniform source on its grid.
+    /// Mean squared error of the cell centroids without measurement noise; `Delta^2/12` for a uniform source on its grid.
     pub fn noiseless_mse(&self, source: &Source) -> f64 {
         let rule = fewbits_numerics::quadrature::gauss_legendre::<24>();
         (0..self.cells())

@@ -1,11 +1,11 @@
-//! Linear patterns: XORs of the natural binary digits of the cell index, named by masks over GF(2).
+//! Linear patterns: XORs of the binary digits of the cell index, given by masks over GF(2).
 
 use crate::Error;
 use crate::patterns::grid::bits_in_range;
 use crate::{CellGrid, Pattern, PatternSensor};
 use fewbits_numerics::error::refuse;
 
-/// Selects which natural patterns are XORed: the most significant of the `bits` binary digits selects pattern 1.
+/// Selects the digits that are XORed: the most significant of the `bits` binary digits selects pattern 1.
 ///
 /// With three bits, `4` is the sign bit `00001111`, `6` its XOR with the second, `00111100`, and so on.
 pub type Mask = u32;
@@ -20,7 +20,7 @@ pub(crate) fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
     }
 }
 
-/// The pattern of a mask over `2^bits` cells: bit `l` is the parity of `mask & l`. [`mask_of`] is the way back.
+/// The pattern of a mask over `2^bits` cells: bit `l` is the parity of `mask & l`. Inverse of [`mask_of`].
 ///
 /// # Errors
 /// If `bits` is not in `1..=16`, or the mask is 0 or has a digit beyond `bits`.
@@ -38,7 +38,7 @@ pub fn natural_basis(bits: usize) -> Result<Vec<Mask>, Error> {
     Ok((0..bits).rev().map(|at| 1 << at).collect())
 }
 
-/// Masks of the reflected Gray code, coarsest bit first: `{4, 6, 3}` for three bits.
+/// Masks of the reflected Gray code, most significant bit first: `{4, 6, 3}` for three bits.
 ///
 /// # Errors
 /// If `bits` is not in `1..=16`.
@@ -83,12 +83,12 @@ impl Span {
     }
 }
 
-/// Rank over GF(2) of a set of masks. The patterns of `masks` separate all `2^bits` cells exactly if it is `bits`.
+/// Rank over GF(2) of a set of masks. Their patterns distinguish all `2^bits` cells if and only if it is `bits`.
 pub fn rank(masks: &[Mask]) -> usize {
     masks.iter().fold(Span::default(), |span, &mask| span.with(mask)).rank()
 }
 
-/// The generator matrix, one row a cell and one column a sensor: entry `(l, n)` is the bit of sensor `n` for cell `l`.
+/// The generator matrix, one row per cell and one column per sensor: entry `(l, n)` is the bit of sensor `n` for cell `l`.
 ///
 /// # Errors
 /// As [`linear_pattern`], for any mask.
@@ -109,7 +109,7 @@ pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
         return None;
     }
     let bits = cells.trailing_zeros() as usize;
-    // A linear pattern is fixed by its bits at the powers of two.
+    // A linear pattern is determined by its bits at the powers of two.
     let mask = (0..bits)
         .filter(|&at| pattern.bits()[1 << at])
         .fold(0, |m, at| m | 1 << at);
@@ -123,7 +123,7 @@ pub(crate) fn sensors_of(masks: &[Mask], grid: &CellGrid, noise_deviation: f64) 
     masks.iter().map(sensor).collect()
 }
 
-/// The grid's number of bits.
+/// Number of bits of the grid's cell index; an error if its number of cells is not a power of two.
 pub(crate) fn grid_bits(grid: &CellGrid) -> Result<usize, Error> {
     match grid.bits() {
         Some(bits) => bits_in_range(bits),

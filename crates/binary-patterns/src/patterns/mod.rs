@@ -1,4 +1,4 @@
-//! Patterns of cells: the grid, which bit is sent from which cell, and how many patterns there are.
+//! Patterns: the grid of cells, the bit for each cell, and the number of patterns.
 
 pub mod count;
 pub(crate) mod grid;

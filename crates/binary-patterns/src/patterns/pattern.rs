@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// One bit a cell: the sensor sends bit `l` when its measurement falls into cell `l`.
+/// One bit per cell: the sensor sends bit `l` if its measurement is in cell `l`.
 ///
-/// A pattern and its complement name the same quantizer with its outputs relabelled, so the constructor keeps the one
-/// that starts with 0. It reads from and prints as a string of digits, the lowest cell first.
+/// A pattern and its complement are the same quantizer with its outputs renamed, so the constructor keeps the one
+/// that starts with 0. As text it is a string of digits, the lowest cell first.
 ///
 /// ```
 /// use fewbits_binary_patterns::Pattern;
@@ -26,7 +26,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// From one bit a cell, the lowest cell first.
+    /// A pattern from one bit per cell, the lowest cell first.
     ///
     /// # Errors
     /// If all bits are equal (or there are none).
@@ -50,10 +50,10 @@ impl Pattern {
         self.bits.len()
     }
 
-    /// The quantizer that sends this pattern over `grid`; runs of equal bits become one cell.
+    /// The quantizer that sends this pattern over `grid`; successive cells of equal bit are joined.
     ///
     /// # Errors
-    /// If the pattern has not as many bits as the grid has cells.
+    /// If the number of bits is not the number of cells of the grid.
     pub fn on(&self, grid: &CellGrid) -> Result<BinaryQuantizer, Error> {
         if self.cells() != grid.cells() {
             return refuse("grid", format!("of {} cells", grid.cells()), format!("{}, one a bit", self.cells()));
@@ -71,7 +71,7 @@ impl Pattern {
     /// All `2^(cells-1) - 1` patterns over `cells` cells, in the order of their strings.
     ///
     /// # Errors
-    /// If `cells` is not in `2..=20`; there are too many beyond.
+    /// If `cells` is not in `2..=20`.
     pub fn all(cells: usize) -> Result<Vec<Self>, Error> {
         if !(2..=20).contains(&cells) {
             return refuse("cells", cells, "a number of cells in 2..=20");
@@ -85,7 +85,7 @@ impl Pattern {
 }
 
 impl Pattern {
-    /// The pattern over `grid` that makes this quantizer, if all its breakpoints are the grid's (to `1e-9` of its extent).
+    /// The pattern over `grid` of this quantizer; `None` unless all its breakpoints are edges of the grid (to `1e-9` of its extent).
     pub fn of(quantizer: &BinaryQuantizer, grid: &CellGrid) -> Option<Self> {
         let edges = grid.breakpoints();
         let slack = 1e-9 * edges.iter().fold(0.0, |m, e| f64::max(m, e.abs()));
@@ -137,10 +137,10 @@ impl FromStr for Pattern {
     }
 }
 
-/// Checks that every two cells differ in the bit of at least one pattern, so that without noise each cell is recognised.
+/// Checks that every two cells differ in the bit of at least one pattern, so that without noise each cell can be identified.
 ///
-/// For linear patterns this is full rank. For others linear independence over GF(2) is necessary but does not suffice
-/// (erratum `binary-3`), hence the test of the columns themselves.
+/// For linear patterns this is the condition of full rank. For others, linear independence over GF(2) is necessary but not sufficient
+/// (erratum `binary-3`), so the columns themselves are compared.
 ///
 /// # Errors
 /// Names the first two cells that no pattern separates; if lengths differ.
@@ -154,6 +154,7 @@ pub fn check_separation(patterns: &[Pattern]) -> Result<(), Error> {
     let mut columns: Vec<(Vec<bool>, usize)> = (0..first.cells())
         .map(|cell| (patterns.iter().map(|p| p.bits[cell]).collect(), cell))
         .collect();
+    // Two cells with the same bits of all sensors cannot be distinguished; sorting makes them neighbours.
     columns.sort();
     match columns.windows(2).find(|w| w[0].0 == w[1].0) {
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! The sensor's half: breakpoints that turn a measurement into one bit.
+//! One-bit quantizers: breakpoints at which the bit changes.
 
 use crate::Error;
 use fewbits_numerics::ArgumentError;
@@ -9,12 +9,12 @@ use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::quantizer::check_increasing;
 use serde::{Deserialize, Serialize};
 
-/// Beyond this many standard deviations a normal tail is below the smallest double.
+/// Beyond this many standard deviations the tail probability underflows.
 const VANISHED: f64 = 39.0;
 
 /// A one-bit quantizer: the bit is 0 below the first breakpoint and changes at each breakpoint.
 ///
-/// Every one-bit quantizer of a scalar has this form up to the name of its two outputs, whatever [`Pattern`] it came from.
+/// Every one-bit quantizer of a scalar has this form, up to the names of its outputs, whatever [`Pattern`] it came from.
 ///
 /// [`Pattern`]: crate::Pattern
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,7 +24,7 @@ pub struct BinaryQuantizer {
 }
 
 impl BinaryQuantizer {
-    /// From strictly increasing finite breakpoints, at least one.
+    /// A quantizer with strictly increasing finite breakpoints, at least one.
     ///
     /// # Errors
     /// If there is no breakpoint, one is not finite, or they do not increase strictly.
@@ -43,7 +43,7 @@ impl BinaryQuantizer {
 
     /// The bit of a measurement: the parity of the number of breakpoints at or below it.
     ///
-    /// Infinite measurements fall into the outermost cells.
+    /// Infinite measurements are in the outermost cells.
     ///
     /// # Errors
     /// If the measurement is NaN.
@@ -53,7 +53,7 @@ impl BinaryQuantizer {
 
     /// `[P(0|x), P(1|x)]` for the measurement `Y = x + N(0, noise_deviation^2)`.
     ///
-    /// Each is a sum of interval probabilities of its own cells, so that neither loses digits when it is small.
+    /// Each is a sum of interval probabilities, so that neither loses digits if it is small.
     pub fn probabilities(&self, x: f64, noise_deviation: f64) -> [f64; 2] {
         let mut mass = [0.0; 2];
         self.for_cells(x, noise_deviation, |bit, low, high| {
@@ -80,7 +80,7 @@ impl BinaryQuantizer {
         mass
     }
 
-    /// `[ln P(0|x), ln P(1|x)]`, finite however far `x` lies from the cells.
+    /// `[ln P(0|x), ln P(1|x)]`, finite for every finite `x`.
     pub fn log_probabilities(&self, x: f64, noise_deviation: f64) -> [f64; 2] {
         let mut largest = [f64::NEG_INFINITY; 2];
         self.for_cells(x, noise_deviation, |bit, low, high| {
@@ -95,7 +95,7 @@ impl BinaryQuantizer {
         [largest[0] + sum[0].ln(), largest[1] + sum[1].ln()]
     }
 
-    /// `dP(1|x)/dx`, the sum of `+-phi((t - x)/s)/s` over the breakpoints.
+    /// `dP(1|x)/dx`, the sum of `+-phi((t - x)/s)/s` over the breakpoints `t`.
     pub fn slope(&self, x: f64, noise_deviation: f64) -> f64 {
         let mut sign = 1.0;
         let mut slope = 0.0;
@@ -106,7 +106,7 @@ impl BinaryQuantizer {
         slope / noise_deviation
     }
 
-    /// Fisher information about `x` in the bit: `P1'^2 / (P0 P1)`, 0 where that is below the smallest double.
+    /// Fisher information about `x` in the bit: `P1'^2 / (P0 P1)`; 0 if it underflows.
     pub fn fisher_information(&self, x: f64, noise_deviation: f64) -> f64 {
         let [p0, p1] = self.probabilities(x, noise_deviation);
         let slope = self.slope(x, noise_deviation);
@@ -145,7 +145,7 @@ impl From<BinaryQuantizer> for Vec<f64> {
 impl TryFrom<&BinaryQuantizer> for Quantizer {
     type Error = Error;
 
-    /// The same cells with their bits as levels.
+    /// The same cells, with the bit as level.
     fn try_from(binary: &BinaryQuantizer) -> Result<Self, Error> {
         let labels = (0..=binary.breakpoints.len()).map(|cell| cell % 2).collect();
         Ok(Self::with_labels(binary.breakpoints.clone(), labels)?)

@@ -1,4 +1,4 @@
-//! Adaptive quantization: the sensors report in turn, and each is told the bits before it.
+//! Adaptive quantization: the sensors report in turn, and each is told the earlier bits.
 
 use crate::Error;
 use crate::Source;
@@ -11,30 +11,30 @@ use fewbits_numerics::newton;
 use fewbits_numerics::normal::{cdf, inverse_mills, log_cdf, log_pdf};
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// Most sensors: the bit tree has `2^N` leaves.
+/// Largest number of sensors: the tree of bits has `2^N` leaves.
 const MAX_SENSORS: usize = 20;
 /// Relative accuracy of the maximum-likelihood estimate.
 const MLE_STOP: f64 = 1e-14;
-/// Posterior standard deviations within which the variance-minimising threshold is sought.
+/// Range of the search for the threshold of least variance, in posterior standard deviations to each side of the mean.
 const GREEDY_REACH: f64 = 1.5;
 
 /// Relative width at which the search for that threshold stops.
 const THRESHOLD_STOP: f64 = 1e-10;
 
-/// How the next threshold follows from the bits so far. All rules start at 0.
+/// Rule for the next threshold, given the bits so far. The first threshold is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AdaptiveRule {
-    /// AQ-VS, adaptive delta modulation with one bit of memory: the threshold moves by `step` in the direction of the last bit;
-    /// the step grows by `factor` when a bit repeats the one before and shrinks by it otherwise.
+    /// AQ-VS, adaptive delta modulation with one bit of memory. The threshold moves by the step in the direction of the last bit.
+    /// The step is multiplied by `factor` if a bit equals the one before, and divided by it otherwise.
     ///
-    /// The thesis gives no rule; `factor = 1.5` and `step = V/2` are the usual choice, smaller ones are better by a tenth.
+    /// The thesis gives no values; `factor = 1.5` and `step = V/2` are usual. Smaller ones give an error smaller by a tenth.
     VariableStep {
         /// First step, in units of the source.
         step: f64,
-        /// Growth and shrinkage of the step, above 1.
+        /// Factor by which the step grows or shrinks, above 1.
         factor: f64,
     },
-    /// AQ-ML: the maximum-likelihood estimate from the bits so far, bounded to the support.
+    /// AQ-ML: the maximum-likelihood estimate from the bits so far, restricted to the support.
     MaximumLikelihood,
     /// The posterior mean given the bits so far.
     PosteriorMean,
@@ -45,15 +45,15 @@ pub enum AdaptiveRule {
 /// Exact mean squared errors of an adaptive scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveErrors {
-    /// With the bounded maximum-likelihood estimate from all bits.
+    /// Error of the maximum-likelihood estimate from all bits, restricted to the support.
     pub mle: f64,
-    /// With the posterior mean.
+    /// Error of the posterior mean.
     pub mmse: f64,
 }
 
 /// Exact errors of `sensors` sensors that report in turn, by expanding the tree of all bit strings.
 ///
-/// Each node of the tree carries `p(x) P(bits|x)` on the quadrature nodes, so that nothing is simulated.
+/// Each node of the tree carries `p(x) P(bits|x)` at the quadrature nodes; nothing is simulated.
 ///
 /// # Errors
 /// If the noise is below `1e-4` of the source's reach, a parameter of the rule is out of range, or `sensors` is not in `1..=20`.
@@ -73,6 +73,7 @@ pub fn adaptive(
             return refuse("factor", factor, "a finite number, 1 or above");
         }
     }
+    // The tree is expanded depth first; one buffer of node weights per depth is enough.
     let nodes = source.nodes(2.0 * noise_deviation, gauss_legendre::<12>());
     let mut tree = Tree {
         source,
@@ -114,6 +115,7 @@ impl Tree<'_> {
         for bit in [false, true] {
             let sign = if bit { 1.0 } else { -1.0 };
             let (above, below) = self.levels.split_at_mut(depth + 1);
+            // Joint density of the unknown and the bits so far, at the nodes.
             for ((child, w), x) in below[0].iter_mut().zip(&above[depth]).zip(&self.nodes.x) {
                 *child = w * cdf(sign * (x - threshold) / self.noise_deviation);
             }
@@ -134,6 +136,7 @@ impl Tree<'_> {
         let w = &self.levels[self.history.len()];
         match self.rule {
             AdaptiveRule::VariableStep { factor, .. } => {
+                // Adaptive delta modulation: equal bits lengthen the step, different bits shorten it.
                 let step = match (self.history.len(), repeated) {
                     (1, _) => step,
                     (_, true) => step * factor,
@@ -158,7 +161,7 @@ impl Tree<'_> {
         (mass > IMPOSSIBLE).then(|| (first / mass, squared_error(w, &self.nodes.x, first / mass) / mass))
     }
 
-    /// `sum_bit M1^2/M0` after a bit at threshold `t`: what the next bit explains of the variance.
+    /// `sum_bit M1^2/M0` after a bit with threshold `t`. The threshold that maximises it minimises the expected posterior variance.
     fn explained(&self, w: &[f64], t: f64) -> f64 {
         let mut sums = [(0.0, 0.0); 2];
         for (w, x) in w.iter().zip(&self.nodes.x) {
@@ -176,8 +179,8 @@ impl Tree<'_> {
 
 /// Maximum-likelihood estimate of `x` in `[-bound, bound]` from bits `Y > threshold` in normal noise.
 ///
-/// The log likelihood is concave, so the sign of its derivative brackets the maximum and Newton's method is safe. All bits
-/// equal means an end of the interval.
+/// The log likelihood is concave, so the sign of its derivative brackets the maximum and Newton's method is safe. If all bits
+/// are equal, the estimate is an end of the interval.
 ///
 /// # Errors
 /// If there is no bit, a threshold is not finite, or the noise or the bound is not positive and finite.
@@ -202,10 +205,11 @@ fn maximum_likelihood(bits: &[(f64, bool)], noise_deviation: f64, bound: f64) ->
     newton::increasing(falling, -bound, bound, 0.0, MLE_STOP * bound)
 }
 
-/// Logarithm of the pull of the 1s over that of the 0s, and its derivative: zero where the score is, decreasing.
+/// Logarithm of the ratio between the score's positive part (from the 1s) and negative part (from the 0s), and its derivative. It is
+/// decreasing, and zero where the score is.
 ///
-/// The score is a difference of sums of inverse Mills ratios. Between thresholds many deviations apart all of them are below
-/// the smallest double, and only the logarithms still say which side is stronger.
+/// The score is a difference of sums of inverse Mills ratios. Between thresholds many deviations apart all ratios
+/// underflow, and only their logarithms can be compared.
 fn balance(bits: &[(f64, bool)], noise_deviation: f64, x: f64) -> (f64, f64) {
     // For each side the largest log ratio, the sum relative to it, and the sum weighted with the derivative of the logarithm.
     let mut sides = [(f64::NEG_INFINITY, 0.0, 0.0); 2];

@@ -1,4 +1,4 @@
-//! Luo's universal scheme (2005): half of the sensors quantize the most significant natural bit, a quarter the next, ...
+//! Luo's universal scheme (2005): half of the sensors send the most significant binary digit, a quarter the next, and so on.
 
 use crate::Error;
 use crate::observation::bank::CountTable;
@@ -8,7 +8,7 @@ use crate::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source, linear_patte
 use fewbits_numerics::error::{positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// The allocation of sensors to natural bits, for a uniform source.
+/// The allocation of sensors to binary digits, for a uniform source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Luo {
     source: Source,
@@ -18,29 +18,30 @@ pub struct Luo {
     allocation: Vec<usize>,
 }
 
-/// Mean squared errors of the three ways to fuse Luo's bits.
+/// Mean squared errors of three ways to estimate from Luo's bits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LuoErrors {
-    /// `V sum_b 2^-b (2 mean_b - 1)`, linear in the bits as in the source.
+    /// `V sum_b 2^-b (2 mean_b - 1)`, with `mean_b` the mean of the bits for digit `b`.
     pub soft: f64,
-    /// The same with each mean replaced by the majority; ties go to a fair coin.
+    /// The same with each mean replaced by the majority; ties are decided at random with equal probability.
     pub majority: f64,
     /// Posterior mean of the same bits.
     pub mmse: f64,
 }
 
 impl Luo {
-    /// `floor(N/2)` sensors for bit 1, `floor(N/4)` for bit 2, ..., the rest for the last: 4, 2, 2 for eight sensors and
+    /// Allocates `floor(N/2)` sensors to bit 1, `floor(N/4)` to bit 2, ..., and the rest to the last: 4, 2, 2 for eight sensors and
     /// three bits.
     ///
     /// # Errors
-    /// If the source is not uniform, `bits` is out of range, an allocation would be empty, or the noise is not positive.
+    /// If the source is not uniform, `bits` is out of range, a bit would have no sensor, or the noise is not positive.
     pub fn new(source: Source, noise_deviation: f64, bits: usize, sensors: usize) -> Result<Self, Error> {
         let Kind::Uniform { half_width } = source.kind() else {
             return refuse("source", "Gaussian", "a uniform source");
         };
         let bits = bits_in_range(bits)?;
         let noise_deviation = positive("noise_deviation", noise_deviation)?;
+        // Half of the sensors for the first bit, a quarter for the second, and so on; the rest for the last.
         let mut allocation: Vec<usize> = (1..bits).map(|b| sensors.checked_shr(b as u32).unwrap_or(0)).collect();
         allocation.push(sensors - allocation.iter().sum::<usize>());
         if allocation.contains(&0) {
@@ -60,12 +61,12 @@ impl Luo {
         })
     }
 
-    /// Sensors for each bit.
+    /// Number of sensors for each bit.
     pub fn allocation(&self) -> &[usize] {
         &self.allocation
     }
 
-    /// The sensors as a bank, bit by bit.
+    /// The sensors as a bank, ordered by bit.
     ///
     /// # Errors
     /// As [`Bank::new`].
@@ -79,7 +80,7 @@ impl Luo {
         Bank::new(self.source, sensors)
     }
 
-    /// Exact errors: `int p(x) [(x - E xhat)^2 + Var xhat] dx`, the bits being independent given `x`.
+    /// Exact errors: `int p(x) [(x - E xhat)^2 + Var xhat] dx`; the bits are independent given `x`.
     ///
     /// # Errors
     /// If the bank has too many outcomes.
@@ -111,7 +112,7 @@ impl Luo {
     }
 }
 
-/// Probability that the majority of `count` bits says 0 and 1.
+/// Probabilities that the majority of `count` bits is 0 and 1.
 fn votes(p: [f64; 2], count: usize) -> [f64; 2] {
     let mut votes = [0.0; 2];
     for (k, row) in CountTable::from_probabilities(&[p], count).rows.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Published schemes for comparison: other ways to send one bit per sensor, and the thesis's shortcuts around a search. The
-//! recommended designs are in [`search`](crate::search). All errors are exact.
+//! Published schemes for comparison: other ways to send one bit per sensor, and the thesis's substitutes for a search. The
+//! recommended designs are in [`search`](crate::search). All errors are computed exactly.
 
 mod adaptive;
 mod luo;
@@ -15,7 +15,7 @@ use crate::Error;
 use crate::{Bank, BinaryQuantizer, Source};
 use fewbits_numerics::error::at_least_one;
 
-/// `sensors` sensors that all send the sign of their measurement.
+/// A bank of `sensors` sensors that all send the sign of their measurement.
 ///
 /// # Errors
 /// If there is no sensor or `noise_deviation` is not positive and finite.

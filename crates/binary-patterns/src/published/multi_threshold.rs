@@ -1,4 +1,4 @@
-//! Ribeiro and Giannakis (2006): one threshold a sensor, spread over the range of the source to minimise a Cramer-Rao bound.
+//! Ribeiro and Giannakis (2006): one threshold per sensor, distributed over the range of the source to minimise a Cramer-Rao bound.
 
 use crate::Error;
 use crate::Source;
@@ -8,27 +8,27 @@ use fewbits_numerics::normal::log_cdf;
 use fewbits_numerics::quadrature::gauss_legendre;
 use std::f64::consts::TAU;
 
-/// Thresholds of the grid.
+/// Number of thresholds of the grid.
 const THRESHOLDS: usize = 401;
-/// Noise standard deviations by which the thresholds exceed the support.
+/// Noise standard deviations by which the thresholds extend beyond the support.
 const MARGIN: f64 = 2.0;
-/// Stop when no threshold's share of the objective exceeds its fair share by more than this.
+/// The iteration stops once the relative gap, which bounds the distance from the optimum, is below this.
 const GAP: f64 = 3e-4;
-/// Limit on the multiplicative updates.
+/// Largest number of multiplicative updates.
 const MAX_UPDATES: usize = 200_000;
 /// Information beyond this many standard deviations from the threshold is below `1e-17` of its peak.
 const BAND: f64 = 9.0;
 
-/// The relaxed optimum.
+/// The optimum with fractional numbers of sensors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MultiThreshold {
     /// `E[1 / sum_k rho_k I(X; t_k)]`, the averaged Cramer-Rao bound.
     pub bound: f64,
     /// Thresholds of the grid.
     pub thresholds: Vec<f64>,
-    /// Fractional numbers of sensors at them, summing to the number of sensors.
+    /// Number of sensors at each threshold, not necessarily whole; they sum to the number of sensors.
     pub sensors: Vec<f64>,
-    /// Relative distance from the optimum, certified by duality.
+    /// Largest relative distance from the optimum, by duality.
     pub gap: f64,
 }
 
@@ -37,10 +37,10 @@ fn log_information(u: f64, noise_deviation: f64) -> f64 {
     -u * u - log_cdf(u) - log_cdf(-u) - (TAU * noise_deviation * noise_deviation).ln()
 }
 
-/// Minimum over `rho >= 0`, `sum rho = N`, of `E[1 / sum_k rho_k I(X; t_k)]` on 401 thresholds over `+-(V + 2 s)`.
+/// Minimum over `rho >= 0`, `sum rho = N`, of `E[1 / sum_k rho_k I(X; t_k)]` with 401 thresholds over `+-(V + 2 s)`.
 ///
-/// Convex in `rho`. Whole numbers of sensors would do worse: they leave gaps between the thresholds, whose bound explodes as
-/// the noise vanishes.
+/// The problem is convex in `rho`. Whole numbers of sensors give larger values: they leave gaps between the thresholds, in which the bound
+/// grows without limit as the noise vanishes.
 ///
 /// ```text
 /// rho_k <- N / K
@@ -71,7 +71,7 @@ fn optimum(
     let thresholds: Vec<f64> = (0..THRESHOLDS)
         .map(|k| limit * (2.0 * k as f64 / (THRESHOLDS - 1) as f64 - 1.0))
         .collect();
-    // A threshold informs about nearby points only; the rest of its row is dropped.
+    // A threshold has information about nearby points only; the rest of its row is left out.
     let spacing = thresholds[1] - thresholds[0];
     let band = (BAND * noise_deviation).max(4.0 * spacing);
     let rows: Vec<(usize, Vec<f64>)> = thresholds
@@ -132,7 +132,7 @@ impl Objective {
         let mut value = 0.0;
         for (m, w) in information.iter_mut().zip(&nodes.w) {
             value += w / *m;
-            // From here on the slot holds w / M^2.
+            // From here on the slot contains w / M^2.
             *m = w / (*m * *m);
         }
         let descent = rows
@@ -169,7 +169,7 @@ mod tests {
         assert_relative_eq!(found.bound, 400.0 * std::f64::consts::FRAC_PI_2 / 4.0, max_relative = 2e-3);
     }
 
-    /// What the last update left open is an error, not a bound.
+    /// If the last update leaves a larger gap than allowed, the result is an error, not a bound.
     #[test]
     fn an_open_gap_is_an_error() {
         let stopped = optimum(&Source::uniform(1.0).unwrap(), 0.3, 10, 3);

@@ -1,4 +1,4 @@
-//! The thesis's shortcuts around an exhaustive search.
+//! The thesis's substitutes for an exhaustive search.
 
 use crate::Error;
 use crate::bounds::mean_information;
@@ -6,10 +6,10 @@ use crate::patterns::linear::{grid_bits, sensors_of};
 use crate::{Bank, CellGrid, Mask, Source};
 use fewbits_numerics::error::refuse;
 
-/// Strategy 2: repeats the masks of a smaller optimum until there are `sensors` of them, in increasing order.
+/// Strategy 2: repeats the masks of a smaller optimal set, in increasing order, until there are `sensors` of them.
 ///
-/// Close to the optimum of the larger problem only by luck: at 18.2 dB, doubling the best eight masks of three bits is 6 %
-/// worse than what a descent finds for sixteen.
+/// The result need not be close to the optimum of the larger problem: at 18.2 dB, doubling the best eight masks of three bits is 6 %
+/// worse than the result of a descent for sixteen.
 ///
 /// # Errors
 /// If `masks` is empty or longer than `sensors`.
@@ -22,13 +22,13 @@ pub fn tile(masks: &[Mask], sensors: usize) -> Result<Vec<Mask>, Error> {
     Ok(tiled)
 }
 
-/// Strategy 3: the masks that minimise equation 5.13, with `forced` ones in the set.
+/// Strategy 3: the masks that minimise equation 5.13, among sets that contain the `forced` ones.
 ///
-/// The information of independent sensors adds, so the best set repeats the single most informative pattern: the search
-/// is trivial and the result poor, 1.3 to 2.7 times the optimal error with the Gray basis forced.
+/// The information of independent sensors adds, so the best set repeats the single most informative pattern. The search
+/// is trivial and the result poor: 1.3 to 2.7 times the optimal error if the Gray basis is forced.
 ///
 /// # Errors
-/// If the grid has not `2^B` cells, a mask is out of range, the noise is not positive, or more masks are forced than there
+/// If the grid does not have `2^B` cells, a mask is out of range, the noise is not positive, or more masks are forced than there
 /// are sensors.
 pub fn by_information(
     source: &Source,
@@ -41,7 +41,7 @@ pub fn by_information(
     let mut best = (0, f64::NEG_INFINITY);
     for mask in 1..1 << bits {
         let information = mean_information(&Bank::new(*source, sensors_of(&[mask], grid, noise_deviation)?)?);
-        // Mirror images and rounding make ties; the lowest mask keeps them.
+        // Mirror images and rounding cause ties; the lowest mask is taken.
         if information > best.1 * (1.0 + 1e-12) || best.0 == 0 {
             best = (mask, information);
         }

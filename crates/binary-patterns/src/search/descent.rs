@@ -1,4 +1,4 @@
-//! Coordinate descent: one sensor at a time takes its best pattern, all candidates in one matrix product.
+//! Coordinate descent: one sensor at a time gets its best pattern; all candidates are evaluated in one matrix product.
 
 use super::outcomes::{Candidates, Outcomes};
 use crate::Error;
@@ -10,12 +10,12 @@ use fewbits_numerics::error::{at_least_one, positive, refuse};
 use nalgebra::DMatrix;
 use rand::RngExt;
 
-/// Relative improvement that counts as one.
+/// Smallest relative improvement for which a move is made.
 const IMPROVEMENT: f64 = 1e-11;
-/// Sweeps over all sensors; a handful suffices.
+/// Largest number of sweeps over all sensors; a few are usually enough.
 const MAX_SWEEPS: usize = 60;
 
-/// Each sensor, whatever its noise, picks one of several quantizers.
+/// The search problem: each sensor, with its own noise, uses one of several quantizers.
 ///
 /// ```text
 /// choose a start
@@ -26,9 +26,9 @@ const MAX_SWEEPS: usize = 60;
 /// until a sweep changes nothing
 /// ```
 ///
-/// Equal sensors with equal choices are counted, not enumerated. If all candidates are symmetric about zero, half of the
-/// nodes suffice. The result is a local optimum; several starts make it the global one in every case that can be checked
-/// exhaustively (three bits, eight and ten sensors). Good starts are all sensors alike, and a basis repeated.
+/// Of equal sensors with equal choices only the count matters. If all candidates are symmetric about zero, half of the
+/// nodes are used. The result is a local optimum. With several starts it was the global one in every case that can be checked
+/// exhaustively (three bits, eight and ten sensors). Good starts: the same pattern for all sensors, and a repeated basis.
 #[derive(Debug, Clone)]
 pub struct Descent {
     source: Source,
@@ -37,7 +37,8 @@ pub struct Descent {
 }
 
 impl Descended {
-    /// The pattern of each sensor over `grid`, if its breakpoints are the grid's; [`mask_of`](crate::mask_of) names a linear one.
+    /// The pattern of each sensor over `grid`; `None` if its breakpoints are not the grid's. [`mask_of`](crate::mask_of) gives a linear
+    /// one's mask.
     pub fn patterns(&self, grid: &CellGrid) -> Vec<Option<Pattern>> {
         self.sensors.iter().map(|s| Pattern::of(s.quantizer(), grid)).collect()
     }
@@ -48,14 +49,14 @@ impl Descended {
 pub struct Descended {
     /// Index of the candidate that each sensor uses.
     pub choice: Vec<usize>,
-    /// The sensors with the quantizers chosen for them.
+    /// The sensors with their chosen quantizers.
     pub sensors: Vec<PatternSensor>,
     /// Exact mean squared error of the posterior mean.
     pub mse: f64,
 }
 
 impl Descent {
-    /// From each sensor's noise standard deviation and the quantizers to choose from.
+    /// The problem for sensors of these noise standard deviations, with the quantizers to choose from.
     ///
     /// # Errors
     /// If either list is empty or a noise is not positive and finite.
@@ -76,10 +77,10 @@ impl Descent {
         })
     }
 
-    /// The bank of a choice.
+    /// The bank of a choice, one candidate index per sensor.
     ///
     /// # Errors
-    /// If there are not as many choices as sensors, or one is no index of a candidate.
+    /// If there is not one choice per sensor, or one is not the index of a candidate.
     pub fn bank(&self, choice: &[usize]) -> Result<Bank, Error> {
         Bank::new(self.source, self.sensors(choice)?)
     }
@@ -106,19 +107,20 @@ impl Descent {
         refuse("choice", format!("{choice:?}"), expected)
     }
 
-    /// The best of the descents from the given starts and `extra` scattered ones.
+    /// The best result of the descents from the given starts and `extra` random ones.
     ///
-    /// `allowed` restricts the choices, for instance to full rank; starts that it forbids are left as they are until a move
-    /// that it allows improves on them.
+    /// `allowed` restricts the choices, for instance to full rank. A start that it does not allow is kept until a move to an
+    /// allowed choice.
     ///
     /// # Errors
-    /// If there is no start at all, one is not a valid choice, or there are too many outcomes.
+    /// If there is no start, one is not a valid choice, or there are too many outcomes.
     pub fn run(
         &self,
         starts: &[Vec<usize>],
         extra: usize,
         allowed: impl Fn(&[usize]) -> bool,
     ) -> Result<Descended, Error> {
+        // Descend from each given and each random start; keep the best allowed result, by its exact error on fine nodes.
         let kernel = Kernel::new(self);
         let sensors = self.noise.len();
         let kinds = self.candidates.len();
@@ -147,11 +149,11 @@ impl Descent {
 struct Kernel<'a> {
     descent: &'a Descent,
     candidates: Candidates,
-    /// Which of the distinct noises each sensor has.
+    /// Index of each sensor's noise among the distinct noises.
     class: Vec<usize>,
-    /// `[P0, P1]` of every class and candidate.
+    /// `[P0, P1]` of every noise class and candidate.
     p: Vec<Vec<Vec<[f64; 2]>>>,
-    /// For each class, rows (candidate, bit, moment).
+    /// For each noise class, a matrix with rows (candidate, bit, moment).
     products: Vec<DMatrix<f64>>,
 }
 
@@ -168,6 +170,7 @@ impl<'a> Kernel<'a> {
                 })
             })
             .collect();
+        // Tabulate every candidate's bit probabilities for each distinct noise, and their rows of the matrix product.
         let candidates = Candidates::new(&descent.source, &descent.candidates, &noises);
         let of_noise = |noise: &f64| -> Vec<Vec<[f64; 2]>> {
             let quantizers = descent.candidates.iter();
@@ -196,7 +199,7 @@ impl<'a> Kernel<'a> {
             for n in 0..choice.len() {
                 let explained = self.respond(&choice, n)?;
                 let present = choice[n];
-                // A start outside the constraint must be left even at a loss.
+                // A start that is not allowed must be left, even if the error increases.
                 let mut best = if allowed(&choice) {
                     (present, explained[present])
                 } else {
@@ -220,9 +223,9 @@ impl<'a> Kernel<'a> {
         Ok(choice)
     }
 
-    /// Variance explained by the bits, for each candidate quantizer of sensor `n`.
+    /// Variance explained by the bits, for each candidate quantizer at sensor `n`.
     fn respond(&self, choice: &[usize], n: usize) -> Result<Vec<f64>, Error> {
-        // Exchangeable others: (noise class, candidate, count).
+        // The other sensors, grouped as exchangeable: (noise class, candidate, count).
         let mut groups: Vec<(usize, usize, usize)> = Vec::new();
         for (other, &c) in choice.iter().enumerate().filter(|(other, _)| *other != n) {
             let class = self.class[other];

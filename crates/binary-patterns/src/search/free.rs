@@ -1,4 +1,4 @@
-//! Thresholds that are free of any grid, by descent along the exact gradient.
+//! Optimal thresholds without a grid, by descent along the exact gradient.
 
 use super::lbfgs::{Stop, minimise};
 use super::outcomes::SEARCH_PANEL;
@@ -14,7 +14,7 @@ use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::gauss_legendre;
 use rand::RngExt;
 
-/// Most sensors: the outcome tree of distinct sensors has `2^N` leaves.
+/// Largest number of sensors: the outcome tree of distinct sensors has `2^N` leaves.
 const MAX_SENSORS: usize = 16;
 const STOP: Stop = Stop {
     iterations: 400,
@@ -32,13 +32,13 @@ pub struct FreeDesign {
 
 /// Moves all thresholds of all sensors to a local minimum of the posterior mean's error.
 ///
-/// The gradient is exact. For `E = sum_z M1^2/M0` and `xhat = M1/M0`, `dE = sum_z int (2 xhat x - xhat^2) dW_z`, so one walk
-/// through the outcome tree, back-propagating these leaf weights, gives the derivative in every sensor's probabilities;
-/// thresholds enter through `dP1/dt = -+phi((t - x)/s)/s`. The variables are each sensor's first threshold and the logarithms
-/// of the gaps, which keeps the order; L-BFGS minimises.
+/// The gradient is exact. With `E = sum_z M1^2/M0` and `xhat = M1/M0`, `dE = sum_z int (2 xhat x - xhat^2) dW_z`. One pass
+/// through the outcome tree that propagates these leaf weights back gives the derivative with respect to every sensor's probabilities;
+/// for thresholds `dP1/dt = -+phi((t - x)/s)/s`. The variables are each sensor's first threshold and the logarithms
+/// of the gaps, which keeps the thresholds in order. They are optimised by L-BFGS.
 ///
-/// Sensors with equal thresholds stay equal under the gradient. `starts` runs, all but the first with every threshold moved by
-/// up to `jitter` (in units of `V`, or of the source's standard deviation), break that symmetry; the best run is returned.
+/// Sensors with equal thresholds stay equal under the gradient. To break this symmetry there are `starts` runs, all but the first with
+/// every threshold moved at random by up to `jitter` (in units of `V`, or of the source's standard deviation). The best run is returned.
 ///
 /// # Errors
 /// If there is no sensor or more than 16, a noise is below `1e-4` of the source's reach, `starts` is 0, or `jitter` is
@@ -59,7 +59,7 @@ pub fn free_breakpoints(
         // The thresholds move, so the nodes must be dense everywhere.
         source.resolvable(sensor.noise_deviation())?;
     }
-    // In the source's own unit, so that no step or tolerance knows another.
+    // In the source's own unit, so that steps and tolerances do not depend on units.
     let unit = source.scale();
     let scaled = sensors
         .iter()
@@ -76,7 +76,7 @@ pub fn free_breakpoints(
     })
 }
 
-/// From masks to free breakpoints in one call: the sensors of `masks` on `grid`, one per sensor, moved as [`free_breakpoints`] does.
+/// As [`free_breakpoints`], started from the patterns of `masks` on `grid`, one per sensor.
 ///
 /// # Errors
 /// As [`free_breakpoints`], and if a mask is out of the grid's range.
@@ -91,7 +91,7 @@ pub fn free_breakpoints_of_masks(
     free_breakpoints(source, &sensors_of(masks, grid, noise_deviation)?, jitter, starts)
 }
 
-/// The sensor in units in which every number is `factor` times as large.
+/// The sensor in units in which all numbers are `factor` times as large.
 fn rescaled(sensor: &PatternSensor, factor: f64) -> Result<PatternSensor, Error> {
     let breakpoints = sensor.quantizer().breakpoints().iter().map(|b| factor * b).collect();
     PatternSensor::with_deviation(BinaryQuantizer::new(breakpoints)?, factor * sensor.noise_deviation())
@@ -121,7 +121,7 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
                     })
                     .collect();
                 moved.sort_by(f64::total_cmp);
-                // Gaps must be positive for their logarithms.
+                // Gaps must be positive, since their logarithms are the variables.
                 for j in 1..moved.len() {
                     moved[j] = moved[j].max(moved[j - 1] + 1e-9);
                 }
@@ -136,7 +136,7 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
                 PatternSensor::with_deviation(BinaryQuantizer::new(thresholds)?, sensor.noise_deviation())
             })
             .collect::<Result<Vec<_>, _>>();
-        // A run that drives two thresholds into one has left the domain; the others stand.
+        // A run in which two thresholds meet is left out; the other runs are used.
         let Ok(found) = found else { continue };
         let mse = Bank::new(*source, found.clone())?.mmse()?;
         if mse < best.mse {
@@ -146,7 +146,7 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
     Ok(best)
 }
 
-/// First threshold and logarithms of the gaps, sensor after sensor.
+/// Variables: first threshold and logarithms of the gaps, for one sensor after the other.
 fn encode(thresholds: &[Vec<f64>]) -> Vec<f64> {
     thresholds
         .iter()
@@ -173,7 +173,7 @@ fn decode(variables: &[f64], lengths: &[usize]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Value and gradient of the error in the thresholds of distinct sensors.
+/// Value and gradient of the error as a function of the thresholds, for distinct sensors.
 struct OutcomeTree {
     nodes: Nodes,
     noise: Vec<f64>,
@@ -181,7 +181,7 @@ struct OutcomeTree {
     variance: f64,
     /// `P(bit|x)` of each sensor.
     p: Vec<[Vec<f64>; 2]>,
-    /// Derivative of what is explained in `p`.
+    /// Derivative of the explained variance with respect to `p`.
     slope: Vec<[Vec<f64>; 2]>,
     /// `w p(x) P(bits so far|x)` at each depth.
     weight: Vec<Vec<f64>>,
@@ -217,7 +217,7 @@ impl OutcomeTree {
         let all = decode(variables, &self.lengths);
         for (n, thresholds) in all.iter().enumerate() {
             let Ok(quantizer) = BinaryQuantizer::new(thresholds.clone()) else {
-                // Overflowing or merged thresholds: infinitely bad, so that the line search turns back.
+                // Overflowing or merged thresholds have an infinite error, so that the line search goes back.
                 gradient.fill(0.0);
                 return f64::INFINITY;
             };
@@ -235,7 +235,7 @@ impl OutcomeTree {
         let mut at = 0;
         for (n, thresholds) in all.iter().enumerate() {
             let slopes = self.threshold_slopes(n, thresholds);
-            // Moving the first threshold moves all; widening a gap moves those above it.
+            // Moving the first threshold moves all thresholds; widening a gap moves those above it.
             let mut above = 0.0;
             for j in (0..slopes.len()).rev() {
                 above += slopes[j];
@@ -267,7 +267,7 @@ impl OutcomeTree {
             .collect()
     }
 
-    /// Fills `value[depth]` and adds to `slope`; returns what the leaves below explain.
+    /// Computes `value[depth]` and adds to `slope`; returns the variance explained by the leaves below.
     fn walk(&mut self, depth: usize) -> f64 {
         if depth == self.p.len() {
             let (mass, first) = moments(&self.weight[depth], &self.nodes.x);
@@ -275,6 +275,8 @@ impl OutcomeTree {
                 self.value[depth].fill(0.0);
                 return 0.0;
             }
+            // Leaf: the posterior mean explains `first^2 / mass`. Its derivative with respect to the joint density at x is `estimate (2 x -
+            // estimate)`.
             let estimate = first / mass;
             for (v, x) in self.value[depth].iter_mut().zip(&self.nodes.x) {
                 *v = estimate * (2.0 * x - estimate);
@@ -294,6 +296,7 @@ impl OutcomeTree {
             }
             let p = &self.p[depth][bit];
             let slope = &mut self.slope[depth][bit];
+            // Reverse mode: derivatives are carried from the leaves upwards, and those with respect to the bit probabilities are added up.
             for i in 0..p.len() {
                 own[depth][i] += p[i] * child[0][i];
                 slope[i] += self.weight[depth][i] * child[0][i];

@@ -3,20 +3,20 @@
 use std::collections::VecDeque;
 
 const MEMORY: usize = 12;
-/// Sufficient decrease and curvature of the Wolfe conditions.
+/// Constants of the Wolfe conditions: sufficient decrease, and curvature.
 const DECREASE: f64 = 1e-4;
 const CURVATURE: f64 = 0.9;
 const LINE_STEPS: usize = 40;
 
-/// When to stop.
+/// Stopping rule.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stop {
     pub iterations: usize,
-    /// Relative decrease of the value over one iteration.
+    /// The iteration stops below this relative decrease of the value.
     pub decrease: f64,
 }
 
-/// Minimises `f`, which returns the value and writes the gradient. Returns the last point and its value, never worse than
+/// Minimises `f`, which returns the value and writes the gradient. Returns the last point and its value, which is never above that at
 /// the start.
 ///
 /// Two-loop recursion with a bisecting weak-Wolfe line search, which keeps the curvature `s.y` positive.
@@ -33,7 +33,7 @@ pub(crate) fn minimise(mut f: impl FnMut(&[f64], &mut [f64]) -> f64, start: Vec<
         if slope >= 0.0 || slope.is_nan() {
             break;
         }
-        // No curvature is known at first: a step of moderate length.
+        // The curvature is not known at first: take a step of moderate length.
         let first = if pairs.is_empty() {
             0.1 / dot(&direction, &direction).sqrt()
         } else {
@@ -65,7 +65,7 @@ pub(crate) fn minimise(mut f: impl FnMut(&[f64], &mut [f64]) -> f64, start: Vec<
     (x, value)
 }
 
-/// A step along `direction` with sufficient decrease and, if it can be had, a flatter slope: point, gradient, value.
+/// A point along `direction` with sufficient decrease and, if possible, a flatter slope: returns point, gradient, value.
 fn line_search(
     f: &mut impl FnMut(&[f64], &mut [f64]) -> f64,
     x: &[f64],
@@ -80,7 +80,7 @@ fn line_search(
         let trial: Vec<f64> = x.iter().zip(direction).map(|(x, d)| x + step * d).collect();
         let mut gradient = vec![0.0; x.len()];
         let at = f(&trial, &mut gradient);
-        // NaN counts as too far.
+        // A value of NaN means that the step was too long.
         if at <= value + DECREASE * step * slope {
             let flat = dot(&gradient, direction) >= CURVATURE * slope;
             best = Some((trial, gradient, at));

@@ -1,13 +1,13 @@
-//! Designing the patterns: exact errors instead of simulation, so that a search cannot be fooled by noise.
+//! Search for good patterns. Errors are exact, so the ranking does not depend on random numbers.
 //!
-//! | question | answer |
+//! | task | function |
 //! |---|---|
-//! | best set of linear patterns, small `B` and `N` | [`LinearSearch::best`], all sets |
+//! | best set of linear patterns, for small `B` and `N` | [`LinearSearch::best`], which tries all sets |
 //! | the same with the Gray basis fixed (strategy 1) | [`LinearSearch::with_forced`] |
-//! | more sensors than can be searched (strategy 2) | [`tile`](crate::published::tile) |
-//! | rank by equation 5.13 (strategy 3, poor) | [`by_information`](crate::published::by_information) |
+//! | sets for more sensors than can be searched (strategy 2) | [`tile`](crate::published::tile) |
+//! | ranking by equation 5.13 (strategy 3, poor) | [`by_information`](crate::published::by_information) |
 //! | large `B` or `N`, any patterns, unequal sensors | [`Descent`] |
-//! | thresholds off the grid | [`free_breakpoints`] |
+//! | thresholds that are not edges of a grid | [`free_breakpoints`] |
 
 mod descent;
 mod exhaustive;

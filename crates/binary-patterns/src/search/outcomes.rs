@@ -1,4 +1,4 @@
-//! Quantizers and joint outcomes on the nodes of a search.
+//! Probabilities of quantizers and joint outcomes at the nodes of a search.
 
 use crate::observation::bank::{CountTable, IMPOSSIBLE};
 use crate::observation::source::{Nodes, Threshold};
@@ -6,19 +6,19 @@ use crate::{BinaryQuantizer, Source};
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, Matrix, Storage};
 
-/// Nodes for searching: half the width of the final ones suffices with fewer points, to about `1e-10`.
+/// Width of quadrature panels in a search, in noise standard deviations; errors of about `1e-10`.
 pub(crate) const SEARCH_PANEL: f64 = 1.6;
 
-/// All outcomes of some groups of exchangeable sensors, on the nodes of a search.
+/// All outcomes of some groups of exchangeable sensors, at the nodes of a search.
 pub(crate) struct Outcomes {
-    /// `w p(x) P(outcome|x)`, one contiguous column an outcome.
+    /// `w p(x) P(outcome|x)`, one contiguous column per outcome.
     pub(crate) w: Vec<f64>,
-    /// For each outcome the one that is as likely under `-x`; meaningful where the problem is symmetric.
+    /// For each outcome, the index of the one with the same probability under `-x`; used only if the problem is symmetric.
     pub(crate) mirror: Vec<usize>,
 }
 
 impl Outcomes {
-    /// Before any sensor has reported.
+    /// The state before any sensor has reported.
     pub(crate) fn new(weights: &[f64]) -> Self {
         Self {
             w: weights.to_vec(),
@@ -26,7 +26,7 @@ impl Outcomes {
         }
     }
 
-    /// One group more; `flips` says that reflecting `x` flips its bits.
+    /// Adds a group; `flips` says whether the reflection of `x` inverts its bits.
     pub(crate) fn with(&self, group: &CountTable, flips: bool) -> Self {
         let counts = group.rows.len();
         let nodes = self.w.len() / self.mirror.len();
@@ -41,7 +41,8 @@ impl Outcomes {
         Self { w, mirror }
     }
 
-    /// `functions x outcomes`: every row of `functions` (over the nodes) integrated against every outcome, outcome by outcome.
+    /// Integrals of every row of `functions` (values at the nodes) against every outcome: `functions x outcomes`, stored outcome by
+    /// outcome.
     pub(crate) fn integrals<S: Storage<f64, Dyn, Dyn>>(&self, functions: &Matrix<f64, Dyn, Dyn, S>) -> Vec<f64> {
         let (rows, outcomes) = (functions.nrows(), self.mirror.len());
         let mut sums = vec![0.0; rows * outcomes];
@@ -51,17 +52,18 @@ impl Outcomes {
     }
 }
 
-/// The quantizers of a search on its nodes.
+/// The candidate quantizers of a search, at its nodes.
 pub(crate) struct Candidates {
     pub(crate) nodes: Nodes,
-    /// All quantizers are symmetric about zero: only half of the nodes are there, and outcomes are paired with their mirror images.
+    /// Whether all quantizers are symmetric about zero. Then only half of the nodes are used, and outcomes are paired with their mirror
+    /// images.
     folded: bool,
-    /// Whether reflecting `x` flips the bit of a quantizer.
+    /// Whether the reflection of `x` inverts the bit of a quantizer.
     pub(crate) flips: Vec<bool>,
 }
 
 impl Candidates {
-    /// Nodes for these quantizers at sensors of these noises.
+    /// Nodes for these quantizers at sensors with these noises.
     pub(crate) fn new(source: &Source, quantizers: &[BinaryQuantizer], noise_deviations: &[f64]) -> Self {
         let is_symmetric = |q: &BinaryQuantizer| {
             let t = q.breakpoints();
@@ -82,7 +84,7 @@ impl Candidates {
         }
     }
 
-    /// For every table and count the probability at the nodes, and the same times `x`; a row each.
+    /// For every table and count, two rows: the probability at the nodes, and the same times `x`.
     pub(crate) fn integrands<'t>(&self, tables: impl Iterator<Item = &'t CountTable>) -> DMatrix<f64> {
         let rows: Vec<&Vec<f64>> = tables.flat_map(|t| &t.rows).collect();
         DMatrix::from_fn(2 * rows.len(), self.nodes.len(), |row, at| {
@@ -91,8 +93,8 @@ impl Candidates {
         })
     }
 
-    /// Variance explained by the outcomes of some groups and the counts of one more, of `count` sensors with quantizer `candidate`.
-    /// `sums` has `rows` [`integrals`](Outcomes::integrals) an outcome, those of this group from `first` on.
+    /// Variance explained by the outcomes of some groups together with the counts of one more group of `count` sensors with quantizer
+    /// `candidate`. `sums` has `rows` [`integrals`](Outcomes::integrals) per outcome; those of this group begin at `first`.
     pub(crate) fn explained(
         &self,
         outcomes: &Outcomes,
@@ -107,6 +109,8 @@ impl Candidates {
                 let at = |outcome: usize, k: usize| outcome * rows + first + 2 * k;
                 let here = at(outcome, k);
                 let (mut mass, mut moment) = (sums[here], sums[here + 1]);
+                // By symmetry only half of the axis is integrated. The other half gives the mirrored outcome, with the sign of the moment
+                // changed.
                 if self.folded {
                     let there = at(image, if self.flips[candidate] { count - k } else { k });
                     mass += sums[there];

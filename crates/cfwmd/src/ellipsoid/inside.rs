@@ -1,4 +1,4 @@
-//! A Gaussian inside an ellipsoid: probability, mean and covariance.
+//! Probability, mean and covariance of a Gaussian inside or outside an ellipsoid.
 
 use super::quadrature::{Moments, Side, log_mass, moments};
 use fewbits_numerics::ArgumentError;
@@ -7,20 +7,20 @@ use fewbits_numerics::error::all_finite;
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
 
-/// Above this probability inside, one minus it has lost too many digits, and the mass outside is integrated itself.
+/// Above this probability inside, `1 - P(inside)` has lost too many digits; the mass outside is then integrated directly.
 const MOSTLY_INSIDE: f64 = 0.9;
 
-/// Probability and moments of `N(mu, V)` inside (and outside) an [`Ellipsoid`](super::Ellipsoid), by conditioning instead of sampling.
+/// Probability and moments of `N(mu, V)` inside and outside an [`Ellipsoid`](super::Ellipsoid), by quadrature instead of sampling.
 ///
 /// In coordinates whitened by `S` and rotated onto the eigenvectors of the whitened `V`, the region is the ball
 /// `|q|^2 < eta` and the components `q_j ~ N(b_j, w_j)` are independent.
 ///
-/// Along the leading axis `q_1 = sqrt(eta) sin(theta)` and what is left is the same problem with one dimension less in a ball of
-/// squared radius `eta cos^2(theta)`; the last dimension is an interval of a normal variable, in closed form. So `M` dimensions
-/// cost at least `24^(M-1)` intervals; where a component is narrow or far the axis is cut adaptively. Sums are formed in the log
-/// domain.
+/// Along the leading axis `q_1 = sqrt(eta) sin(theta)`. Given `theta`, the others form the same problem with one dimension less, in a
+/// ball of squared radius `eta cos^2(theta)`. The last dimension is an interval of a normal variable, in closed form. `M` dimensions
+/// therefore cost at least `24^(M-1)` intervals. Where a component is narrow or far from zero, the axis is divided adaptively. Sums
+/// are formed in the log domain.
 ///
-/// Relative error of the probability, and of the moments against the spread inside: below 1e-7.
+/// Relative error of the probability below 1e-7; error of the moments below 1e-7 of the spread inside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussianInEllipsoid<const M: usize> {
     forward: SMatrix<f64, M, M>,
@@ -29,19 +29,19 @@ pub struct GaussianInEllipsoid<const M: usize> {
     threshold: f64,
 }
 
-/// Mean and covariance of a Gaussian restricted to an ellipsoid, or to what lies outside it.
+/// Probability, mean and covariance of a Gaussian restricted to an ellipsoid or to its outside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EllipsoidMoments<const M: usize> {
-    /// `ln P` of the restriction.
+    /// Logarithm of the probability of the region.
     pub log_mass: f64,
-    /// Mean given the restriction.
+    /// Mean given the region.
     pub mean: SVector<f64, M>,
-    /// Covariance given the restriction.
+    /// Covariance given the region.
     pub covariance: SMatrix<f64, M, M>,
 }
 
 impl<const M: usize> GaussianInEllipsoid<M> {
-    /// For `S = L L'`, a threshold and `V`.
+    /// The region `nu' S^-1 nu < threshold` with `S = L L'`, `L = lower`, and a Gaussian of covariance `V`.
     pub(super) fn new(
         lower: &SMatrix<f64, M, M>,
         threshold: f64,
@@ -52,7 +52,8 @@ impl<const M: usize> GaussianInEllipsoid<M> {
         let half = lower.solve_lower_triangular(covariance).ok_or_else(refuse)?;
         let white = lower.solve_lower_triangular(&half.transpose()).ok_or_else(refuse)?;
         let (values, vectors) = symmetric_eigen(symmetrised(&white));
-        // In whitened coordinates 1 is the scale of the innovation itself.
+        // Negative eigenvalues up to 1e-9 of the largest are rounding. In whitened coordinates the innovation has variance 1, hence the
+        // floor for a `V` of much smaller scale.
         let sound = values.iter().all(|x| x.is_finite()) && values.min() >= -1e-9 * values.amax().max(1e-3);
         if !sound {
             return Err(refuse());
@@ -86,7 +87,7 @@ impl<const M: usize> GaussianInEllipsoid<M> {
         self.back(moments(Side::Inside, self.variances.as_slice(), &b, 0, self.threshold))
     }
 
-    /// `ln P(nu outside)`, with digits however small it is.
+    /// `ln P(nu outside)`, accurate for tiny probabilities too.
     pub fn log_probability_outside(&self, mu: &SVector<f64, M>) -> f64 {
         let b = self.forward * mu;
         if let Some(x) = b.iter().find(|x| !x.is_finite()) {
@@ -105,12 +106,12 @@ impl<const M: usize> GaussianInEllipsoid<M> {
         self.back(moments(Side::Outside, self.variances.as_slice(), &b, 0, self.threshold))
     }
 
-    /// Whitened coordinates, if they are numbers.
+    /// `mu` in whitened coordinates; `None` if it is not finite.
     fn finite(&self, mu: &SVector<f64, M>) -> Option<SVector<f64, M>> {
         Some(self.forward * mu).filter(|b| b.iter().all(|x| x.is_finite()))
     }
 
-    /// From whitened coordinates to those of the innovation.
+    /// Transforms moments from whitened coordinates to those of the innovation.
     fn back(&self, white: Moments<M>) -> Option<EllipsoidMoments<M>> {
         white.log_mass.is_finite().then(|| EllipsoidMoments {
             log_mass: white.log_mass,

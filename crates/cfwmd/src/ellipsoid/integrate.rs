@@ -1,32 +1,33 @@
-//! Quadrature over the angle of the leading component.
+//! Quadrature over the angle `theta` of the leading component, `q_1 = radius sin(theta)`.
 
 use fewbits_numerics::golden;
 use fewbits_numerics::quadrature::gauss_legendre;
 use std::f64::consts::FRAC_PI_2;
 
-/// Means up to this many deviations need 24 nodes, up to the next 40; beyond them the quadrature is adaptive ...
+/// Largest mean, in standard deviations, for a fixed rule of 24 nodes; `FAR` for 40 nodes. Beyond `FAR` the quadrature is adaptive.
 pub(super) const NEAR: f64 = 4.0;
 const FAR: f64 = 8.0;
-/// ... and so it is for radii beyond this many deviations.
+/// Largest radius, in standard deviations, for a fixed rule.
 const RADIUS: f64 = 5.0;
-/// Fall of the log integrand at which the bulk ends.
+/// The integrand is cut where its logarithm has fallen by this much from its peak.
 const FALL: f64 = 40.0;
-/// Panels are halved until two rules agree to this share of the whole, or to what rounding leaves of a far tail ...
+/// A panel is halved until its two rules agree to this share of the whole integral ...
 const TOLERANCE: f64 = 1e-10;
-/// ... per unit of the logarithm of the integrand, or this often.
+/// ... or to this much per unit of the integrand's logarithm (rounding in far tails), at most `HALVINGS` times.
 const ROUNDING: f64 = 4e-15;
 const HALVINGS: u32 = 40;
-/// The same where the integrand has steps: enough to find one to `pi / 2^24`.
+/// Limit on the halvings where the integrand has steps: a step is located to `pi / 2^24`.
 const STEP_HALVINGS: u32 = 24;
-/// The bulk of a component, in deviations: beyond the last the density has fallen by `exp(-32)`.
+/// Distances from a component's mean at which the range is cut, in standard deviations. Beyond the last the density has fallen by
+/// `exp(-32)`.
 const CUTS: [f64; 3] = [0.0, 2.0, 8.0];
 
-/// Nodes of a panel.
+/// Nodes and weights of the 24-point Gauss-Legendre rule on `[a, b]`.
 pub(super) fn panel(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
     gauss_legendre::<24>().on(a, b)
 }
 
-/// Whether all means and the radius are within so many deviations.
+/// Whether all means are within `reach` standard deviations of zero and the radius within `RADIUS`.
 pub(super) fn tame(variances: &[f64], means: &[f64], eta: f64, reach: f64) -> bool {
     let tame = |(w, b): (&f64, &f64)| b * b <= reach * reach * w && eta <= RADIUS * RADIUS * w;
     variances.iter().zip(means).all(tame)
@@ -42,6 +43,7 @@ pub(super) fn with_one_mode(
     mut visit: impl FnMut(f64, f64),
 ) {
     let node = |(theta, w): (f64, f64)| visit(theta, w);
+    // Fixed rules where the integrand is smooth; elsewhere panels about the mode.
     if tame(variances, means, eta, NEAR) {
         return panel(-FRAC_PI_2, FRAC_PI_2).for_each(node);
     }
@@ -49,6 +51,7 @@ pub(super) fn with_one_mode(
         return gauss_legendre::<40>().on(-FRAC_PI_2, FRAC_PI_2).for_each(node);
     }
     let (mode, peak) = golden::maximum(&f, -FRAC_PI_2, FRAC_PI_2, 1e-12);
+    // Bisection for the angle at which the integrand has fallen by exp(-FALL).
     let end = |outer: f64| {
         let (mut inside, mut outside) = (mode, outer);
         for _ in 0..30 {
@@ -65,7 +68,7 @@ pub(super) fn with_one_mode(
     adaptive(&bulk, peak, TOLERANCE.max(ROUNDING * peak.abs()), HALVINGS, &f, &mut visit);
 }
 
-/// The same for any function, between increasing cuts at which it may change its course.
+/// As [`with_one_mode`] for any function. It is smooth between the `cuts`, which increase.
 pub(super) fn over_angles(cuts: &[f64], f: impl Fn(f64) -> f64, mut visit: impl FnMut(f64, f64)) {
     let nodes = cuts.windows(2).flat_map(|pair| panel(pair[0], pair[1]));
     let peak = nodes.map(|(theta, _)| f(theta)).fold(f64::NEG_INFINITY, f64::max);
@@ -74,8 +77,8 @@ pub(super) fn over_angles(cuts: &[f64], f: impl Fn(f64) -> f64, mut visit: impl 
     }
 }
 
-/// Visits nodes and weights of a quadrature of `exp(f)` between the cuts, from left to right: panels are halved until two rules agree to
-/// the share `tolerance` of the whole. `peak` is about the largest `f`.
+/// Visits nodes and weights of a quadrature of `exp(f)` between the cuts, from left to right. A panel is halved until its rule and the
+/// rules of its halves agree to the share `tolerance` of the whole. `peak` is approximately the largest `f`.
 fn adaptive(
     cuts: &[f64],
     peak: f64,
@@ -91,7 +94,7 @@ fn adaptive(
         .map(|pair| (pair[0], pair[1], mass(pair[0], pair[1]), 0));
     let mut waiting: Vec<_> = panels.rev().collect();
     let whole: f64 = waiting.iter().map(|panel| panel.2).sum();
-    // A panel whose ends are not numbers would be halved without end.
+    // A NaN would never meet the tolerance: all panels would be halved to the limit.
     if !whole.is_finite() {
         return;
     }
@@ -109,8 +112,8 @@ fn adaptive(
     }
 }
 
-/// Increasing angles at which the integrand may change its course: the bulk of the leading component, and where the edge of the
-/// ball passes through the bulk of each other one.
+/// Increasing angles at which the integrand may change quickly: the ends of the leading component's bulk, and the angles at which the
+/// ball's surface passes through the bulk of another component.
 pub(super) fn cuts(variances: &[f64], means: &[f64], radius: f64) -> Vec<f64> {
     let mut all = vec![-FRAC_PI_2, 0.0, FRAC_PI_2];
     for (i, (w, b)) in variances.iter().zip(means).enumerate() {

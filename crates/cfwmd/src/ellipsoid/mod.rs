@@ -1,4 +1,4 @@
-//! The region of silence of a vector sensor: an ellipsoid, and a Gaussian inside it.
+//! The ellipsoid in which the innovation of a silent vector sensor lies, and the moments of a Gaussian inside it.
 
 mod inside;
 mod integrate;
@@ -44,12 +44,12 @@ impl<const M: usize> Ellipsoid<M> {
         })
     }
 
-    /// `S`.
+    /// Innovation covariance `S`.
     pub fn innovation_covariance(&self) -> &SMatrix<f64, M, M> {
         &self.innovation_covariance
     }
 
-    /// `eta`.
+    /// Threshold `eta`.
     pub fn threshold(&self) -> f64 {
         self.threshold
     }
@@ -63,12 +63,12 @@ impl<const M: usize> Ellipsoid<M> {
         }
     }
 
-    /// A point of the ellipsoid from one of the unit ball.
+    /// The image of a point of the unit ball: `sqrt(eta) L point`.
     pub fn from_ball(&self, point: &SVector<f64, M>) -> SVector<f64, M> {
         self.lower * point * self.threshold.sqrt()
     }
 
-    /// `ln` of the ellipsoid's volume, `ln det(S)/2 + M/2 ln(eta) + ln V_M` with `V_M = V_{M-2} 2 pi/M` of the unit ball.
+    /// `ln` of the ellipsoid's volume, `ln det(S)/2 + M/2 ln(eta) + ln V_M`. The unit ball has `V_M = V_{M-2} 2 pi/M`.
     pub fn log_volume(&self) -> f64 {
         let log_determinant: f64 = self.lower.diagonal().iter().map(|d| d.ln()).sum();
         let (mut ball, mut dimension) = if M % 2 == 1 { (2.0, 1) } else { (1.0, 0) };
@@ -82,7 +82,7 @@ impl<const M: usize> Ellipsoid<M> {
     /// Prepares probabilities and moments of `N(mu, V)` inside the region, for any `mu`. `V` may be singular.
     ///
     /// # Errors
-    /// If an entry of `V` is not finite or an eigenvalue negative beyond rounding.
+    /// If an entry of `V` is not finite, or an eigenvalue is negative by more than rounding.
     pub fn under(&self, covariance: &SMatrix<f64, M, M>) -> Result<GaussianInEllipsoid<M>, ArgumentError> {
         GaussianInEllipsoid::new(&self.lower, self.threshold, covariance)
     }

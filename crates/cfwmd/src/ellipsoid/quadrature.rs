@@ -1,9 +1,9 @@
 //! Mass and moments of independent normal variables inside or outside a ball, one dimension at a time.
 //!
-//! Along the leading axis `q_1 = radius sin(theta)` what is left is the same problem with one dimension less and a ball of squared radius
-//! `eta cos^2(theta)`. Outside has another part: `|q_1| >= radius`, whatever the other components are. The last component is inside an
-//! interval, or in its two tails. Both are sums of positive terms: `1 - P(inside)` would lose all digits where almost everything is
-//! inside.
+//! Along the leading axis `q_1 = radius sin(theta)`. Given `theta`, the others form the same problem with one dimension less, in a ball
+//! of squared radius `eta cos^2(theta)`. The outside has a second part, `|q_1| >= radius` with all other components free. The last
+//! component lies inside an interval, or in its two tails. Inside and outside are both sums of positive terms: where almost all mass is
+//! inside, `1 - P(inside)` would lose all digits.
 
 use super::integrate::{NEAR, cuts, over_angles, panel, tame, with_one_mode};
 use fewbits_numerics::normal::{self, TruncatedMoments};
@@ -12,10 +12,10 @@ use nalgebra::{SMatrix, SVector};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::OnceLock;
 
-/// A variance below this share of the ball's squared radius is a known number.
+/// A component whose variance is below this share of the ball's squared radius is taken as known.
 const KNOWN: f64 = 1e-16;
 
-/// Which side of the ball's surface.
+/// Whether the mass inside or outside the ball is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
     Inside,
@@ -23,7 +23,7 @@ pub(super) enum Side {
 }
 
 impl Side {
-    /// `ln P` of a known point, inside the ball or not.
+    /// `ln P` for a known point, 0 or minus infinity. `inside` says whether the point lies in the ball.
     fn of_point(self, inside: bool) -> f64 {
         if inside == (self == Self::Inside) {
             0.0
@@ -48,8 +48,8 @@ impl Side {
     }
 }
 
-/// The leading component along its axis, `q_1 = sqrt(eta) sin(theta)`: its value, the squared radius that is left, and the
-/// logarithm of its density times `dq_1/dtheta`.
+/// The leading component `q_1 = sqrt(eta) sin(theta)` as a function of `theta`: its value, the squared radius that is left for the others,
+/// and the logarithm of its density times `dq_1/dtheta`.
 fn leading(variance: f64, mean: f64, eta: f64) -> impl Fn(f64) -> (f64, f64, f64) {
     let (radius, deviation) = (eta.sqrt(), variance.sqrt());
     let log_scale = (radius / deviation).ln();
@@ -60,7 +60,7 @@ fn leading(variance: f64, mean: f64, eta: f64) -> impl Fn(f64) -> (f64, f64, f64
     }
 }
 
-/// `ln P(|q|^2 < eta)`, or of the contrary, for independent `q_j ~ N(means_j, variances_j)`, the variances in decreasing order.
+/// `ln P(|q|^2 < eta)`, or `ln P(|q|^2 >= eta)`, for independent `q_j ~ N(means_j, variances_j)`. The variances decrease.
 pub(super) fn log_mass(side: Side, variances: &[f64], means: &[f64], eta: f64) -> f64 {
     if eta <= 0.0 {
         return side.of_point(false);
@@ -68,6 +68,7 @@ pub(super) fn log_mass(side: Side, variances: &[f64], means: &[f64], eta: f64) -
     let (Some((w, inner)), Some((b, inner_means))) = (variances.split_first(), means.split_first()) else {
         return side.of_point(true);
     };
+    // The smallest variance is negligible: that coordinate is known, and its square is subtracted from the squared radius.
     if let (Some((last_w, rest)), Some((last_b, rest_means))) = (variances.split_last(), means.split_last())
         && *last_w <= KNOWN * eta
     {
@@ -81,11 +82,13 @@ pub(super) fn log_mass(side: Side, variances: &[f64], means: &[f64], eta: f64) -
             return tame_plane([*w, *inner_w], [*b, *inner_b], eta);
         }
         (Side::Inside, ..) => {}
+        // Outside: the two tails of the first coordinate, and (below) the part where it is within the radius.
         (Side::Outside, ..) => {
             sum.add(normal::log_cdf((-radius - b) / deviation));
             sum.add(normal::log_cdf((b - radius) / deviation));
         }
     }
+    // Given the first coordinate, the others lie in or outside a smaller ball: recursion over dimensions.
     if !inner.is_empty() {
         let leading = leading(*w, *b, eta);
         let integrand = |theta: f64| {
@@ -99,9 +102,9 @@ pub(super) fn log_mass(side: Side, variances: &[f64], means: &[f64], eta: f64) -
     sum.value()
 }
 
-/// [`log_mass`] inside in two dimensions on 24 nodes: all chords at once, in vector registers.
+/// [`log_mass`] inside for two dimensions and a smooth integrand: a fixed rule of 24 nodes, whose intervals are evaluated together.
 fn tame_plane(variances: [f64; 2], means: [f64; 2], eta: f64) -> f64 {
-    /// Sines and cosines of the nodes, and the logarithms of weights times cosines.
+    /// Sines and cosines of the nodes, and the logarithms of weight times cosine.
     static NODES: OnceLock<[[f64; 24]; 3]> = OnceLock::new();
     let [sines, cosines, log_weights] = NODES.get_or_init(|| {
         let mut nodes = [[0.0; 24]; 3];
@@ -124,7 +127,7 @@ fn tame_plane(variances: [f64; 2], means: [f64; 2], eta: f64) -> f64 {
     kernels::log_sum_exp(&logs) + (radius / deviations[0]).ln() - normal::LN_SQRT_2PI
 }
 
-/// Mass, mean and covariance, in the coordinates from `first` on; zero in those before.
+/// Mass, mean and covariance over the coordinates from `first` on; entries before `first` are zero.
 pub(super) struct Moments<const M: usize> {
     pub(super) log_mass: f64,
     pub(super) mean: SVector<f64, M>,
@@ -140,7 +143,7 @@ impl<const M: usize> Moments<M> {
         }
     }
 
-    /// The components as they are.
+    /// Moments of the unrestricted components.
     fn free(variances: &[f64], means: &[f64], first: usize) -> Self {
         let mut free = Self::with_mass(0.0);
         for (i, (w, b)) in variances.iter().zip(means).enumerate() {
@@ -150,7 +153,7 @@ impl<const M: usize> Moments<M> {
         free
     }
 
-    /// The same with the first component, of this variance and mean, cut.
+    /// Replaces the moments of component `first`, of this variance and mean, by those of its truncation `cut`.
     fn with_cut(mut self, first: usize, variance: f64, mean: f64, cut: &TruncatedMoments) -> Self {
         self.log_mass = cut.log_probability;
         self.mean[first] = mean + variance.sqrt() * cut.mean;
@@ -159,7 +162,7 @@ impl<const M: usize> Moments<M> {
     }
 }
 
-/// As [`log_mass`], with the moments; the variances are those of the coordinates from `first` on.
+/// As [`log_mass`], with mean and covariance. `variances` are those of the coordinates from `first` on, `means` those of all.
 pub(super) fn moments<const M: usize>(
     side: Side,
     variances: &[f64],
@@ -186,14 +189,14 @@ pub(super) fn moments<const M: usize>(
     let cuts: &[(f64, f64)] = match (side, inner) {
         (Side::Inside, []) => &[(low, high)],
         (Side::Inside, _) => &[],
-        // The two tails of the leading component, the others free.
+        // The two tails of the leading component; the others are unrestricted.
         (Side::Outside, _) => &[(f64::NEG_INFINITY, low), (high, f64::INFINITY)],
     };
     let (mut sum, mut total) = (LogSum::default(), Moments::with_mass(0.0));
     let mut add = |part: Moments<M>, log_weight: f64| {
         let share = sum.add_with_share(part.log_mass + log_weight);
         if share > 0.0 {
-            // The mixture of what was there and the part, free of the cancellation of raw moments.
+            // Moments of the mixture of the sum so far and the part, about their means: raw moments would cancel.
             let step = part.mean - total.mean;
             total.mean += step * share;
             total.covariance =

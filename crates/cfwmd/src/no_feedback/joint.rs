@@ -1,4 +1,4 @@
-//! The assumed-density filter on the state and every sensor's own estimate.
+//! The assumed-density filter for the state and every sensor's own estimate together.
 
 use super::{advance, check};
 use crate::Error;
@@ -12,11 +12,11 @@ use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, Const, DMatrix, DVector, Dyn, OMatrix, SMatrix, SVector};
 
-/// A Gaussian belief about the state and every sensor's own estimate: block 0 is the state, block `i + 1` the estimate of
-/// sensor `i`.
+/// A Gaussian belief of the state and of every sensor's own estimate: `D (sensors + 1)` components. Block 0 is the state, block
+/// `i + 1` the estimate of sensor `i`.
 ///
-/// It holds a square root of the covariance, which updates extend by columns and an orthogonal triangularisation shortens
-/// again: no ratio of variances can make it indefinite.
+/// The covariance is stored as a square root. Updates append columns to it, and an orthogonal triangularisation shortens it again. It
+/// therefore stays positive semidefinite for any ratio of the variances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointBelief<const D: usize> {
     own: Vec<OwnRecursion<D>>,
@@ -25,22 +25,22 @@ pub struct JointBelief<const D: usize> {
     root: DMatrix<f64>,
 }
 
-/// Above this probability of the contrary a received value is taken as is: conditioning on a rarer event would amplify the
-/// error of the Gaussian belief in its tails.
+/// If the sensor would have been silent with a probability above this, a received value is fused without the rule: conditioning on a
+/// rarer event would amplify the error of the Gaussian belief in its tails.
 const IMPLAUSIBLE: f64 = 0.999;
-/// Variances below this share of the innovation's count as zero.
+/// Eigenvalues below this share of the innovation's count as zero.
 const NEGLIGIBLE: f64 = 1e-12;
 
 /// One row of the measurement equation per component, one column per column of the root.
 type Rows<const M: usize> = OMatrix<f64, Const<M>, Dyn>;
-/// Regression of the joint state on a measurement.
+/// Regression coefficients of the joint state on a measurement.
 type Gains<const M: usize> = OMatrix<f64, Dyn, Const<M>>;
 
 impl<const D: usize> JointBelief<D> {
-    /// All `sensors` share the start: their estimates are its mean.
+    /// The belief before the first step: every sensor's estimate is the mean of `start`.
     ///
     /// # Errors
-    /// If the covariance of the start is none.
+    /// If the covariance of `start` is not positive semidefinite.
     pub fn new(start: &Gaussian<D>, sensors: usize) -> Result<Self, Error> {
         let size = (sensors + 1) * D;
         let factor = semidefinite_factor("start", start.covariance())?;
@@ -58,7 +58,7 @@ impl<const D: usize> JointBelief<D> {
         self.block(0)
     }
 
-    /// Mean and covariance of what sensor `i` estimates, if there is such a sensor.
+    /// Mean and covariance of sensor `i`'s estimate; `None` if there is no such sensor.
     pub fn estimate(&self, i: usize) -> Option<Gaussian<D>> {
         (i < self.own.len()).then(|| self.block(i + 1))
     }
@@ -98,19 +98,20 @@ impl<const D: usize> JointBelief<D> {
         }
     }
 
-    /// The same covariance with no more columns than rows.
+    /// Reduces the root to at most as many columns as rows; the covariance is unchanged.
     fn shorten(&mut self) {
         if self.root.ncols() > self.root.nrows() {
             self.root = self.root.transpose().qr().r().transpose();
         }
     }
 
-    /// `H L` for one block.
+    /// `H L` with the rows of `L` that belong to one block.
     fn rows<const M: usize>(&self, matrix: &SMatrix<f64, M, D>, block: usize) -> Rows<M> {
         matrix * self.root.fixed_rows::<D>(block * D)
     }
 
-    /// Replaces what the joint state owes to something with these rows by its regression: `L <- L - G rows`.
+    /// Removes from the joint state the part that its regression on a variable explains: `L <- L - G rows`. `rows` are the root of the
+    /// variable, `G` the regression coefficients.
     fn detach<const M: usize>(&mut self, gains: &Gains<M>, rows: &Rows<M>) {
         self.root -= gains * rows;
     }
@@ -119,7 +120,7 @@ impl<const D: usize> JointBelief<D> {
         self.mean += gains * by;
     }
 
-    /// A received value: Kalman update, what the rule says about the sensor's own prediction, and the sensor's own update.
+    /// Fuses a received value: a Kalman update, the condition of the rule on the sensor's own prediction, and the sensor's own update.
     fn receive<const M: usize>(
         &mut self,
         sensor: &impl LinearSensing<D, M>,
@@ -141,7 +142,7 @@ impl<const D: usize> JointBelief<D> {
         let mut log_likelihood =
             -0.5 * innovation.dot(&factor.solve(&innovation)) - log_determinant - M as f64 * LN_SQRT_2PI;
 
-        // The sensor's prediction t = H xhat was at least the threshold away: a Gaussian outside an ellipsoid.
+        // The sensor's prediction t = H xhat_i was at least the threshold away from z: a Gaussian outside an ellipsoid.
         let mu = value - h * self.block_mean(own);
         let rows = self.rows(h, own);
         let spread = symmetrised(&(&rows * rows.transpose()));
@@ -150,7 +151,7 @@ impl<const D: usize> JointBelief<D> {
         } else if rule.threshold() > 0.0 {
             let inside = rule.region().under(&spread)?.moments(&mu);
             let p = inside.map_or(0.0, |inside| inside.log_mass.exp());
-            // What rounding leaves of a contradiction is improbable, not impossible.
+            // Rounding may give p = 1. The report is then improbable, not impossible.
             log_likelihood += (1.0 - p).max(f64::EPSILON).ln();
             if let Some(inside) = inside.filter(|_| p < IMPLAUSIBLE) {
                 let outside = (mu - inside.mean * p) / (1.0 - p);
@@ -158,7 +159,7 @@ impl<const D: usize> JointBelief<D> {
                 let left = (spread - inside.covariance * p) / (1.0 - p) - apart * apart.transpose() * p;
                 let inverse = pseudo_inverse(&spread, NEGLIGIBLE * covariance.amax());
                 let gains: Gains<M> = &self.root * rows.transpose() * inverse;
-                // t = z - nu, so that its mean moves the other way.
+                // t = z - nu: the mean of t moves opposite to that of nu.
                 self.shift(&gains, &(mu - outside));
                 self.detach(&gains, &rows);
                 self.append(&[columns(&gains * square_root(&left))]);
@@ -173,8 +174,8 @@ impl<const D: usize> JointBelief<D> {
         Ok(log_likelihood)
     }
 
-    /// No value: `y = H (x - xhat_i) + n` has the moments that `after` says, given its prior ones; the sensor's own filter used
-    /// it all the same, `xhat_i += W y`.
+    /// Fuses a missing report. `after` maps prior mean and covariance of the innovation `y = H (x - xhat_i) + n` to its moments given that
+    /// the report is missing. The sensor's own filter used the measurement all the same: `xhat_i += W y`.
     fn withhold<const M: usize>(
         &mut self,
         sensor: &impl LinearSensing<D, M>,
@@ -183,6 +184,7 @@ impl<const D: usize> JointBelief<D> {
         after: impl FnOnce(&SVector<f64, M>, &SMatrix<f64, M, M>) -> Result<EllipsoidMoments<M>, Error>,
     ) -> Result<f64, Error> {
         let (h, own) = (sensor.matrix(), i + 1);
+        // The innovation of the sensor is a linear function of the joint state, plus noise.
         let rows = self.rows(h, 0) - self.rows(h, own);
         let covariance = symmetrised(&(&rows * rows.transpose() + sensor.noise_covariance()));
         let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
@@ -193,6 +195,7 @@ impl<const D: usize> JointBelief<D> {
         self.shift(&gains, &(after.mean - mu));
         self.detach(&gains, &rows);
         let residual = columns(&gains * noise);
+        // The sensor has used its measurement: its block moves by its own gain.
         let mut mean = self.mean.fixed_rows_mut::<D>(own * D);
         mean += step.gain * after.mean;
         let mut absorbed = gains.fixed_rows_mut::<D>(own * D);
@@ -216,7 +219,7 @@ impl<const D: usize> JointBelief<D> {
 ///
 /// # Errors
 /// If there is not one observation per sensor, or a value is not finite; [`Error::Impossible`];
-/// if the rule would not have sent a value, where the sensor's prediction is known exactly.
+/// if the sensor's prediction is known exactly and the value violates the rule.
 pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
     network: &Network<S, D, M>,
     dynamics: &impl LinearDynamics<D>,
@@ -229,6 +232,7 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
     next.predict(dynamics)?;
     let link = network.link();
     let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
+    // Values first: their Kalman update is exact, and the moments of silence are then computed from the better belief.
     for (i, ((sensor, step), observation)) in sensors() {
         if let Observation::Received(value) = observation {
             info.log_likelihood += link.of_received()?.ln() + next.receive(sensor, step, i, value)?;
@@ -258,14 +262,14 @@ fn columns<const M: usize>(part: Gains<M>) -> DMatrix<f64> {
     part.reshape_generic(Dyn(rows), Dyn(M))
 }
 
-/// Inverse on the eigenvectors whose eigenvalues exceed `floor`, zero on the others.
+/// Pseudo-inverse of a symmetric matrix: eigenvalues up to `floor` count as zero.
 fn pseudo_inverse<const M: usize>(matrix: &SMatrix<f64, M, M>, floor: f64) -> SMatrix<f64, M, M> {
     let (values, vectors) = symmetric_eigen(*matrix);
     let inverted = values.map(|v| if v > floor { 1.0 / v } else { 0.0 });
     vectors * SMatrix::from_diagonal(&inverted) * vectors.transpose()
 }
 
-/// A square root; eigenvalues below zero by rounding count as zero.
+/// A square root of a covariance; eigenvalues that rounding made negative count as zero.
 fn square_root<const M: usize>(matrix: &SMatrix<f64, M, M>) -> SMatrix<f64, M, M> {
     let (values, vectors) = symmetric_eigen(symmetrised(matrix));
     vectors * SMatrix::from_diagonal(&values.map(|v| v.max(0.0).sqrt()))

@@ -1,15 +1,14 @@
 //! Fusion without feedback: each sensor compares its measurement with the prediction of its own Kalman filter.
 //!
-//! The fusion centre does not know those predictions, so silence and even a received value say something about them too. The
-//! belief is joint, over the state and every sensor's own estimate; given all observations it is what makes silence
-//! informative. The paper averages the silent factor over estimates drawn independently of the past instead; that factor is
-//! one constant for every state, cancels in the normalisation and leaves the filter that ignores silence (erratum
-//! `cfwmd-2`).
+//! The fusion centre does not know those predictions. Silence depends on them, and so does the fact that a value was sent. The
+//! belief is therefore joint, over the state and every sensor's own estimate. The paper instead averages the likelihood of silence over
+//! estimates that are drawn independently of the past. That average is the same for every state and cancels in the
+//! normalisation, so the paper's filter ignores silence (erratum `cfwmd-2`).
 //!
 //! | estimator | item |
 //! |---|---|
-//! | joint Gaussian belief with exact moments after each observation: the default, as accurate as the next in every case measured | [`joint`] |
-//! | exact as the number of particles grows: withheld measurements imputed, the rest Gaussian | [`imputing`](crate::published::imputing) |
+//! | joint Gaussian belief with exact moments after each observation (default; measured as accurate as the next) | [`joint`] |
+//! | particles over the withheld measurements, the rest Gaussian; exact as their number grows | [`imputing`](crate::published::imputing) |
 //! | silence ignored (the paper's CFoMD) | [`fuse_received`](crate::published::fuse_received) |
 
 pub mod joint;
@@ -25,12 +24,11 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};
 use nalgebra::SVector;
 
-/// A sensor that compares each measurement with its own filter's prediction, and updates that filter with the measurement whether it
-/// reports or not (as it travels, if it does).
+/// A sensor that compares each measurement with its own filter's prediction. It updates that filter with every measurement, sent or
+/// not; a sent one is first rounded to its format.
 ///
-/// What its silence says is a factor of the state only for who knows its estimate, as [`Censoring`](crate::scheme::Censoring) told that
-/// estimate. A fusion centre does not: it carries the estimate in its belief, as [`joint`] and
-/// [`imputing`](crate::published::imputing) do.
+/// Its silence is a likelihood of the state only if the sensor's estimate is known, as for [`Censoring`](crate::scheme::Censoring). The
+/// fusion centre does not know it and carries it in its belief: [`joint`], [`imputing`](crate::published::imputing).
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalSensor<S, const D: usize, const M: usize> {
     sensing: S,
@@ -41,10 +39,10 @@ pub struct LocalSensor<S, const D: usize, const M: usize> {
 }
 
 impl<S: LinearSensing<D, M>, const D: usize, const M: usize> LocalSensor<S, D, M> {
-    /// A sensor that starts from the common belief.
+    /// A sensor whose filter starts from the belief that all sensors and the fusion centre share.
     ///
     /// # Errors
-    /// If the threshold is negative, or the format one of a few levels (the centre must follow the sensor's filter exactly).
+    /// If the threshold is negative, or `format` is one of a few levels: the centre must follow the sensor's filter exactly.
     pub fn new(sensing: S, threshold: f64, format: NumberFormat, start: &Gaussian<D>) -> Result<Self, Error> {
         non_negative("threshold", threshold)?;
         if matches!(format, NumberFormat::Fixed(_)) {
@@ -64,10 +62,10 @@ impl<S: LinearSensing<D, M>, const D: usize, const M: usize> LocalSensor<S, D, M
         &self.estimate
     }
 
-    /// Takes one measurement, updates its own filter with it and reports what the rule lets it report.
+    /// Takes one measurement, updates the sensor's filter with it, and returns the value to send; `None` if the sensor is silent.
     ///
     /// # Errors
-    /// If the measurement is not finite, or an innovation covariance not positive definite; the sensor is then as it was.
+    /// If the measurement is not finite, or an innovation covariance is not positive definite. The sensor is then unchanged.
     pub fn step(
         &mut self,
         dynamics: &impl LinearDynamics<D>,
@@ -99,7 +97,7 @@ pub(crate) fn advance<S: Sensing<D, M> + Clone + PartialEq, const D: usize, cons
     each.collect()
 }
 
-/// Refuses observations of the wrong number or with values that are not finite.
+/// Checks that there is one observation per sensor and that all values are finite.
 pub(crate) fn check<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
     network: &Network<S, D, M>,
     observations: &[Observation<SVector<f64, M>>],

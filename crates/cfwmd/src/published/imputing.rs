@@ -1,4 +1,4 @@
-//! The exact fusion centre without feedback: withheld measurements are imputed, the rest is Gaussian.
+//! The fusion centre without feedback by particles: withheld measurements are drawn (imputed), and given them the belief is Gaussian.
 
 use crate::Error;
 use crate::network::{FusionInfo, Network};
@@ -12,22 +12,22 @@ use nalgebra::SVector;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-/// Log weight of a particle for which a sensor sent what it should have withheld: finite, so that the filter survives a
-/// report that contradicts all of them.
+/// Log weight of a particle under which the sensor should have been silent, but sent. It is finite, so that the filter continues if a
+/// report contradicts all particles.
 const VIOLATION: f64 = -1e5;
 
-/// Given every measurement, sent or not, the central Kalman filter and each sensor's own are deterministic. A particle is the
-/// central mean and, beside it, every sensor's estimate under the measurements imputed to it; all share one covariance.
+/// Given every measurement, sent or not, the central Kalman filter and each sensor's own are deterministic. A particle therefore holds
+/// the central mean and every sensor's estimate, both under the measurements imputed to it. All particles share one covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImputedBelief<const D: usize> {
     own: Vec<OwnRecursion<D>>,
-    /// Side rows: `D` numbers per sensor.
+    /// The central means, with `D` numbers per sensor beside each.
     cloud: GaussianCloud<D>,
     violations: usize,
 }
 
 impl<const D: usize> ImputedBelief<D> {
-    /// `particles` particles that start from the belief all `sensors` start from.
+    /// `particles` particles. The centre and all `sensors` start from the belief `start`.
     ///
     /// # Errors
     /// If there is no particle or no sensor.
@@ -67,8 +67,8 @@ impl<const D: usize> ImputedBelief<D> {
 /// nothing from i:   z ~ N(H xc, S) where |z - H xhat_i| < threshold, w *= P(there);  the same updates with that z
 /// lost from i:      z ~ N(H xc, S) where |z - H xhat_i| >= threshold, w *= P(there);  the same updates
 /// ```
-/// Scalar measurements are drawn from their conditional law; vector ones uniformly in the ellipsoid and weighted. With loss the
-/// law of what did not arrive is `N(z) (loss + (1 - loss) 1{inside})`.
+/// Scalar measurements are drawn from their conditional distribution, vector ones from a proposal and weighted. If the link loses
+/// reports, a measurement that did not arrive has the distribution `N(z) (loss + (1 - loss) 1{inside})`.
 ///
 /// # Errors
 /// If there is not one observation per sensor, or a value is not finite; [`Error::Impossible`].
@@ -95,6 +95,7 @@ where
     let (link, loss) = (network.link(), network.link().loss());
     let mut log_weights = vec![0.0; next.cloud.means().len()];
     let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
+    // Values first: the withheld measurements are then drawn given them.
     for received in [true, false] {
         for (i, ((sensor, (step, rule)), observation)) in sensors().filter(|s| s.1.1.received().is_some() == received) {
             let mut contradicted = 0;
@@ -143,7 +144,7 @@ fn noise<const M: usize, R: Rng + ?Sized>(rng: &mut R, innovation: &FactoredGaus
     innovation.lower() * SVector::<f64, M>::from_fn(|_, _| rng.sample(StandardNormal))
 }
 
-/// A measurement that did not arrive, `z ~ q`, with `ln (N(z; central, S) (loss + (1 - loss) 1{inside}) / q(z))`.
+/// Draws a measurement that did not arrive: `z ~ q`, with log weight `ln (N(z; central, S) (loss + (1 - loss) 1{inside}) / q(z))`.
 fn impute<const M: usize, R: Rng + ?Sized>(
     rng: &mut R,
     innovation: &FactoredGaussian<M>,
@@ -157,7 +158,7 @@ fn impute<const M: usize, R: Rng + ?Sized>(
         return (SVector::repeat(z), log_weight);
     }
     let region = rule.region();
-    // Where everything is sent, only the link can be to blame.
+    // Threshold 0: every measurement is sent, so a missing report was lost on the link.
     let share = if region.threshold() == 0.0 { 1.0 } else { loss };
     let anywhere = share > 0.0 && rng.random::<f64>() < share;
     let z = if anywhere {
@@ -168,7 +169,7 @@ fn impute<const M: usize, R: Rng + ?Sized>(
     let inside = region.statistic(&(z - own)) < region.threshold();
     let log_density = innovation.log_pdf(&(z - central));
     let log_target = log_density + if inside { 0.0 } else { loss.ln() };
-    // Proposal share N(z) + (1 - share) U(z), U uniform in the ellipsoid.
+    // Proposal: `share N(z) + (1 - share) U(z)`, `U` uniform in the ellipsoid.
     let (normal_part, uniform_part) = (share.ln() + log_density, (1.0 - share).ln() - region.log_volume());
     let log_proposal = match (inside, share > 0.0) {
         (true, false) => uniform_part,
@@ -188,7 +189,7 @@ fn impute<const M: usize, R: Rng + ?Sized>(
     )
 }
 
-/// A measurement that was sent and is known to be lost, `z ~ q`, with `ln (N(z; central, S) 1{outside} / q(z))`.
+/// Draws a measurement that was sent and lost: `z ~ q`, with log weight `ln (N(z; central, S) 1{outside} / q(z))`.
 fn impute_sent<const M: usize, R: Rng + ?Sized>(
     rng: &mut R,
     innovation: &FactoredGaussian<M>,
@@ -196,7 +197,7 @@ fn impute_sent<const M: usize, R: Rng + ?Sized>(
     central: &SVector<f64, M>,
     own: &SVector<f64, M>,
 ) -> (SVector<f64, M>, f64) {
-    /// Half of the vectors are drawn this much wider, so that a region far outside is found.
+    /// Half of the vectors are drawn with a deviation larger by this factor, so that a region far outside is reached.
     const WIDER: f64 = 3.0;
     if M == 1 {
         let (interval, deviation) = (rule.interval(own[0]), innovation.lower()[(0, 0)]);
@@ -223,7 +224,7 @@ fn impute_sent<const M: usize, R: Rng + ?Sized>(
     (z, -(0.5 * (1.0 + ratio)).ln())
 }
 
-/// From the conditional law itself: truncated to the interval, or outside it and lost.
+/// Draws from the conditional distribution itself: the normal truncated to the interval, or, lost, outside it.
 fn impute_scalar<R: Rng + ?Sized>(
     rng: &mut R,
     deviation: f64,
@@ -240,12 +241,12 @@ fn impute_scalar<R: Rng + ?Sized>(
     let (from, to) = if loss == 0.0 || u < share {
         (low, high)
     } else if (u - share) / loss < normal::cdf(low) {
-        // The rest is loss times the mass outside.
+        // The remaining probability is loss times the mass outside.
         (f64::NEG_INFINITY, low)
     } else {
         (high, f64::INFINITY)
     };
-    // Only an interval of no width is refused: nothing can lie in it.
+    // An interval of zero width holds no mass and is refused.
     normal::sample_truncated(rng, from, to)
         .map_or((central, f64::NEG_INFINITY), |x| (central + deviation * x, log_weight))
 }

@@ -1,4 +1,4 @@
-//! What the publications compare with: silence ignored, a random trigger, and withheld measurements imputed.
+//! Comparisons of the publications: silence ignored, a random trigger, and withheld measurements imputed.
 
 pub mod imputing;
 pub mod trigger;
@@ -11,8 +11,8 @@ use fewbits_core::{Gaussian, LinearSensing, Observation};
 use fewbits_filters::kalman;
 use nalgebra::SVector;
 
-/// The baseline (the paper's CFoMD, and all-send and random censoring): a Kalman filter on what was received, to which silence says
-/// nothing.
+/// The baseline that ignores silence (the paper's CFoMD; all-send and random censoring use it too): a Kalman filter on the received
+/// values.
 ///
 /// # Errors
 /// If there is not one observation per sensor, or a value is not finite.

@@ -1,4 +1,4 @@
-//! A random trigger that keeps the belief Gaussian.
+//! A sensor that sends at random, with a probability that keeps the belief Gaussian.
 
 use crate::Error;
 use crate::censored::mix;
@@ -11,11 +11,11 @@ use nalgebra::SVector;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// Sends with probability `1 - exp(-nu^2 Y/2)` (Han and others 2015).
+/// Sends an innovation `nu` with probability `1 - exp(-nu^2 Y/2)` (Han and others 2015).
 ///
-/// The probability of silence is a Gaussian function of the innovation, so silence is a measurement `nu = 0` with noise
-/// variance `r + 1/Y`, and over a perfect link the Kalman filter stays exact. The price is paid in information: at equal rate
-/// the error is larger than with a deterministic threshold whose silence is fused.
+/// The probability of silence is a Gaussian function of the innovation. Silence therefore acts as a measurement `nu = 0` with noise
+/// variance `r + 1/Y`, and over a perfect link the Kalman filter is exact. At equal rate the error is larger than with a deterministic
+/// threshold whose silence is fused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct StochasticTrigger {
@@ -49,7 +49,7 @@ impl StochasticTrigger {
         Self::new(rate * (1.0 + silent) / (silent * silent) / innovation_variance)
     }
 
-    /// `Y`.
+    /// Precision `Y`, in inverse measurement units squared.
     pub fn precision(&self) -> f64 {
         self.precision
     }
@@ -60,8 +60,8 @@ impl StochasticTrigger {
     }
 }
 
-/// A sensor of scalar measurements with a [`StochasticTrigger`], told the state prediction of the fusion centre. Values travel in
-/// double precision.
+/// A scalar sensor with a [`StochasticTrigger`]. It receives the predicted state of the fusion centre. Values are sent in double
+/// precision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Triggered<S, const D: usize> {
     /// The sensor.
@@ -70,7 +70,7 @@ pub struct Triggered<S, const D: usize> {
     pub trigger: StochasticTrigger,
 }
 
-/// What a triggered sensor's report, its silence or a known loss says, with `g(m) = exp(log_share) N(centre; m, variance)`.
+/// Likelihood of a triggered sensor's report, silence or known loss. It contains `g(m) = exp(log_share) N(centre; m, variance)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bump {
     value: Value<1>,
@@ -80,20 +80,20 @@ pub struct Bump {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
-    /// `floor + g(m)`: a report (floor 0), or nothing over a link that loses reports.
+    /// `floor + g(m)`: a report (floor 0), or nothing arrived (floor above 0 if the link loses reports).
     Above { floor: f64 },
-    /// `scale (1 - g(m))`, `g` the probability of silence: a known loss.
+    /// `scale (1 - g(m))`: a known loss. Here `g` is the probability of silence.
     Below { scale: f64 },
 }
 
 impl Bump {
-    /// The logarithm of the factor where that of `g` is `log_peak`.
+    /// The logarithm of the likelihood at a point where `ln g` is `log_peak`.
     fn mixed(&self, log_peak: f64) -> f64 {
         match self.kind {
             Kind::Above { floor: 0.0 } => log_peak,
             Kind::Above { floor } => (floor + log_peak.exp()).ln(),
             Kind::Below { .. } if log_peak.is_nan() => log_peak,
-            // Rounding may lift `g` above one where the noise is nothing beside `1/Y`.
+            // Rounding may make `g` exceed 1 if the noise is negligible beside `1/Y`.
             Kind::Below { scale } => scale.ln() + (-log_peak.min(0.0).exp_m1()).ln(),
         }
     }
@@ -112,8 +112,7 @@ impl Factor<1> for Bump {
         });
     }
 
-    /// Silence: the mixture of the prior, by the weight of the floor, and of the Kalman update. A known loss: what that update
-    /// leaves of the prior.
+    /// Silence: a mixture of the prior (weight of the floor) and the Kalman update. A known loss: the prior minus the Kalman update.
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         let inside = self.value.tilted(prior)?;
         let log_inside = self.log_share + inside.log_evidence;
@@ -162,7 +161,7 @@ impl Factor<1> for Bump {
 
 impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
     type State = ();
-    /// The state prediction of the fusion centre.
+    /// The predicted state of the fusion centre.
     type Feedback = SVector<f64, D>;
     type Report = f64;
     type Factor = Bump;
@@ -195,6 +194,7 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
         let (prediction, r) = (self.sensing.mean(broadcast)[0], self.sensing.noise_covariance_at(broadcast)[0]);
         finite("prediction", prediction)?;
         let y = self.trigger.precision;
+        // The probability of silence is `exp(-y (z - prediction)^2 / 2)`: a Gaussian function without its normalisation.
         let log_scale = 0.5 * (std::f64::consts::TAU.ln() - y.ln());
         Ok(match observation {
             Observation::Received(z) => {

@@ -1,4 +1,4 @@
-//! A fusion centre over sensors that all measure one level.
+//! The fusion centre for sensors that all measure the same level.
 
 use super::rows::Instant;
 use super::sensors::{Sends, threshold_bits};
@@ -14,10 +14,10 @@ use rand_pcg::Pcg64Mcg;
 /// Why a row was refused, or no centre could be made.
 pub(super) type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// Failures of a sensor per row.
+/// Probability per row that a sensor fails.
 const FAILURE: f64 = 1e-4;
-/// False alarms per observation and per row: a table of many sensors and rows should have none. Offsets that `--align` finds from some
-/// rows are a little off, which a more sensitive test calls a contradiction.
+/// False alarm probabilities per observation and per row. They are small, because a table of many sensors and rows should have no false
+/// alarm, and the offsets that `--align` estimates have small errors, which a more sensitive test would detect.
 const ALARMS: FalseAlarms = FalseAlarms {
     sensor: 1e-6,
     centre: 1e-5,
@@ -27,71 +27,71 @@ const NO_ALARMS: FalseAlarms = FalseAlarms {
     sensor: 1e-9,
     centre: 1e-9,
 };
-/// Deviation of a slope that is not known, in multiples of the change per time.
+/// Standard deviation of an unknown slope, in multiples of the change per time.
 const STEEPEST: f64 = 10.0;
 
-/// What is supposed of the level.
+/// Model of the level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct World {
     pub(super) model: Model,
-    /// Deviation of the level from its forecast, and after how many seconds.
+    /// Standard deviation of the level from its forecast, and after how many seconds.
     pub(super) change: f64,
     pub(super) within: f64,
-    /// Mean and deviation before the first row.
+    /// Mean and standard deviation of the level before the first row.
     pub(super) prior: (f64, f64),
     /// Seconds between rows.
     pub(super) interval: f64,
 }
 
-/// What is supposed of a sensor.
+/// Model of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Seat {
     pub(super) sends: Sends,
-    /// Deviation of its noise.
+    /// Standard deviation of its measurement noise.
     pub(super) noise: f64,
     pub(super) threshold: Option<f64>,
-    /// Share of reports that do not arrive.
+    /// Share of its reports that do not arrive.
     pub(super) loss: f64,
-    /// What is subtracted from its measurements.
+    /// Offset that is subtracted from its measurements.
     pub(super) offset: f64,
 }
 
-/// Estimates after an instant.
+/// Results of one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Step {
-    /// Level, slope, curvature: as many as the model has, with deviations.
+    /// Level, slope and curvature, as many as the model has, each with its standard deviation.
     pub(super) estimate: Vec<(f64, f64)>,
-    /// `ln p` of what came.
+    /// `ln p` of the reports of this instant.
     pub(super) log_likelihood: f64,
-    /// Bits that were sent, reports, and events by sensor.
+    /// Number of bits sent, number of reports, and events by sensor.
     pub(super) bits: usize,
     pub(super) reports: usize,
     pub(super) events: Vec<(&'static str, Option<usize>)>,
-    /// Sensors that are used, and factor of the process noise.
+    /// Number of sensors whose reports are used, and factor of the process noise.
     pub(super) used: usize,
     pub(super) noise_scale: f64,
 }
 
 /// A centre of any number of coordinates.
 pub(super) trait Estimator {
-    /// Seats the next sensor.
+    /// Adds the next sensor.
     fn join(&mut self, seat: Seat) -> Result<(), Failure>;
-    /// How many are seated.
+    /// Number of sensors added.
     fn seated(&self) -> usize;
-    /// Takes in one instant.
+    /// Processes one instant.
     fn step(&mut self, instant: &Instant) -> Result<Step, Failure>;
-    /// What is known of a sensor: probability to work, whether its reports are used.
+    /// Probability that a sensor works, and whether its reports are used.
     fn health(&self, sensor: usize) -> (f64, bool);
 }
 
-/// What the centre is for.
+/// Purpose of the centre.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
     /// Cells are measurements, which sensors of this program quantize.
     Measurements,
     /// Cells are reports.
     Reports,
-    /// Measurements in full, and nothing is learnt on the way: its likelihoods are compared.
+    /// Unquantized measurements and no adaptation: the centre serves to compare likelihoods.
     Comparison,
 }
 
@@ -114,7 +114,7 @@ pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, 
             let model = ContinuousLinear::ornstein_uhlenbeck(world.prior.0, 1.0 / rate, variance)?;
             Box::new(Centre::<1>::new(model, world, purpose)?)
         }
-        // Ranges have a tracker of their own.
+        // Ranges have their own tracker.
         Model::Walk | Model::Ranges => {
             Box::new(Centre::<1>::new(ContinuousLinear::random_walk(c / t)?, world, purpose)?)
         }
@@ -172,7 +172,7 @@ impl<const D: usize> Centre<D> {
             Some(threshold) => threshold_bits(threshold - member.seat.offset)?,
             None => self.centre.feedback(number)?,
         };
-        // A measurement that is no number is none.
+        // A measurement that is not finite counts as missing.
         let report = match cell.filter(|cell| cell.is_finite()) {
             None => None,
             Some(cell) if self.purpose == Use::Reports && member.seat.sends != Sends::Value => {
@@ -227,7 +227,7 @@ impl<const D: usize> Estimator for Centre<D> {
                 });
                 (events.collect(), received.info.log_likelihood)
             }
-            // Nothing that is known explains the reports: they are dropped.
+            // The reports have probability zero under the model: they are dropped.
             Err(FilterError::Impossible) => (vec![("impossible", None)], f64::NEG_INFINITY),
             Err(error) => return Err(error.into()),
         };

@@ -1,4 +1,4 @@
-//! A level that sensors measure: its estimates with bands, row by row.
+//! Tracking of a level that sensors measure: estimates with bands, row by row.
 
 use super::centre::{Estimator, Failure, Step, Use, centre};
 use super::report::{BAND, first_cell, first_name, summarise};
@@ -18,13 +18,13 @@ struct Summary {
     reports: usize,
     bits: usize,
     bits_per_report: f64,
-    /// Deviation of a measurement's noise that is supposed of sensors of which nothing was said.
+    /// Assumed standard deviation of the noise of sensors for which none was given.
     noise: f64,
     /// Deviation of the level from its forecast and in how many seconds: what was supposed, and factor of its square at the end.
     change: f64,
     within: f64,
     noise_scale: f64,
-    /// Root mean square difference from the estimates of the same values in full.
+    /// Root mean square difference from the estimates that use the same values unquantized.
     difference_from_full_values: Option<f64>,
     sensors: Vec<SensorSummary>,
     events: Vec<EventSummary>,
@@ -46,9 +46,9 @@ struct EventSummary {
     sensor: Option<String>,
 }
 
-/// Events that are kept for the summary.
+/// Largest number of events in the summary.
 const MAX_EVENTS: usize = 1000;
-/// Events that are printed.
+/// Largest number of events that are printed.
 const PRINTED_EVENTS: usize = 12;
 
 struct Picked {
@@ -57,7 +57,7 @@ struct Picked {
     full: Option<f64>,
 }
 
-/// Both centres, and what is to be told of them.
+/// State of a run: both centres, and the counts for the summary.
 struct Run {
     settings: Settings,
     file: String,
@@ -115,7 +115,7 @@ impl Run {
             row: instant.row,
             source,
         };
-        // Sensors of a table of reports are new when they are first named.
+        // In a table of reports a sensor is added when it first occurs.
         for (sensor, name) in names.iter().enumerate().skip(self.centre.seated()) {
             let seat = self.settings.seat(sensor, name);
             self.centre.join(seat.clone()).map_err(refused)?;

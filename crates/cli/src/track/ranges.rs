@@ -1,4 +1,4 @@
-//! A place in the plane from its distances to anchors.
+//! Tracking of a position in the plane by distances to anchors.
 
 use super::report::{BAND, first_cell, first_name, summarise};
 use super::rows::Instants;
@@ -25,7 +25,7 @@ struct Summary {
     ranges: usize,
     bits: usize,
     bits_per_range: f64,
-    /// Rows without an estimate, since the position is being looked for.
+    /// Number of rows without an estimate, during acquisition of the position.
     searching: u64,
     losses: usize,
     anchors: Vec<AnchorSummary>,

@@ -1,4 +1,4 @@
-//! What both tasks write: the first cell of a row, bands, a summary.
+//! Common output of both tasks: the first cell of a row, bands, a summary.
 
 use super::rows::Instants;
 use crate::error::Error;

@@ -1,4 +1,4 @@
-//! Rows of a table as instants: what each sensor reported at one time.
+//! Conversion of rows of a table to instants: what each sensor reported at one time.
 
 use crate::arguments::{TableOptions, TrackOptions};
 use crate::clock;
@@ -7,10 +7,10 @@ use crate::input::Table;
 use fewbits_record::TimeBase;
 use std::collections::VecDeque;
 
-/// Times above these are no seconds since 1970 but parts of a second: how many make one.
+/// Times above these are not seconds since 1970 but fractions of a second: the number of them in one second.
 const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)];
 
-/// What came at one time.
+/// All reports of one time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Instant {
     /// Seconds since the first row.
@@ -19,7 +19,7 @@ pub(super) struct Instant {
     pub(super) time: String,
     /// The first row of this time.
     pub(super) row: u64,
-    /// Numbers of sensors, and what they reported; `None` if the cell is empty.
+    /// Index of each sensor, and what it reported; `None` if the cell is empty.
     pub(super) reports: Vec<(usize, Option<f64>)>,
 }
 
@@ -37,14 +37,14 @@ pub(super) struct Instants {
     pub(super) names: Vec<String>,
     /// Rows that were read ahead.
     ahead: VecDeque<Instant>,
-    /// The row behind an instant of several rows.
+    /// The row after an instant that has several rows.
     pending: Option<Instant>,
 }
 
 impl Instants {
     pub(super) fn open(options: &TrackOptions) -> Result<Self, Error> {
         let table_options = TableOptions {
-            // Only the time between rows counts, so that decimals beyond a nanosecond may go.
+            // Only differences of times matter, so decimals beyond a nanosecond can be dropped.
             time: options.table.time.clone().or(Some("±2ns".to_owned())),
             ..options.table.clone()
         };
@@ -94,7 +94,7 @@ impl Instants {
         })
     }
 
-    /// What messages call the table.
+    /// The name of the table in messages.
     pub(super) fn file(&self) -> &str {
         self.table.file()
     }
@@ -104,7 +104,7 @@ impl Instants {
         self.base != TimeBase::Numbered
     }
 
-    /// Reads up to so many instants without taking them.
+    /// Reads up to `count` instants without consuming them.
     pub(super) fn peek(&mut self, count: usize) -> Result<&VecDeque<Instant>, Error> {
         while self.ahead.len() < count {
             match self.read()? {

@@ -1,4 +1,4 @@
-//! What a sensor sends, at both ends.
+//! The schemes of the sensors, at sensor and centre.
 
 use crate::error::Error;
 use fewbits_core::{
@@ -10,7 +10,7 @@ use fewbits_models::LinearSensor;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// What a sensor sends of a measurement.
+/// Kind of a sensor's reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sends {
     Value,
@@ -18,7 +18,7 @@ pub(super) enum Sends {
     Word(u32),
 }
 
-/// Longest word: its alternatives are enumerated by the centre's health test.
+/// Largest length of a word, because the centre's health test enumerates all words.
 const MAX_BITS: u32 = 4;
 
 impl Sends {

@@ -1,4 +1,4 @@
-//! What options and first rows say of the level and its sensors.
+//! Settings of the level and its sensors, from options and first rows.
 
 use super::centre::{Seat, Use, World, centre};
 use super::rows::{Instant, Instants};
@@ -8,24 +8,24 @@ use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::numbers::{above_zero, mean_and_deviation, number};
 
-/// Rows that are looked at before the first estimate.
+/// Number of rows that are examined before the first estimate.
 const FIRST_ROWS: usize = 200;
 /// Steps of the search for change and noise, as logarithms, and its reach.
 const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 const REACH: f64 = 9.0;
-/// Share of lost reports that is supposed at least and at most.
+/// Smallest and largest assumed share of lost reports.
 const LOSS: (f64, f64) = (0.02, 0.5);
-/// Deviation of rounding to a step, in steps.
+/// Standard deviation of rounding to a step, in steps.
 const ROUNDING: f64 = 0.29;
 /// Measurements and process in the first guess: the change is this share of the noise.
 const FIRST_CHANGE: f64 = 0.3;
-/// Median of the size of a standard normal number.
+/// Median of the absolute value of a standard normal variable.
 const NORMAL_MEDIAN: f64 = 0.6745;
 
 const DO_NOT_VARY: &str = "the first rows do not vary, so it cannot be found from them";
 const NO_VALUES: &str = "it cannot be found from reports of few bits";
 
-/// All that a centre over a level needs.
+/// All settings of a centre for a level.
 pub(super) struct Settings {
     pub(super) world: World,
     noises: PerColumn<Option<f64>>,
@@ -37,7 +37,7 @@ pub(super) struct Settings {
     offsets: Vec<f64>,
 }
 
-/// `0.5/1h`; rows that are numbered are a second apart.
+/// Parses `0.5/1h`. Numbered rows are one second apart.
 fn change(text: &str) -> Result<(f64, f64), Error> {
     const EXPECTED: &str = "a change above 0 and the time in which it happens, as `0.5/1h`, or `0.5` in one row";
     let Some((size, time)) = text.split_once('/') else {
@@ -52,7 +52,7 @@ fn change(text: &str) -> Result<(f64, f64), Error> {
     }
 }
 
-/// The middle one; 0 if there is none.
+/// The median; 0 without numbers.
 fn median(mut numbers: Vec<f64>) -> f64 {
     numbers.sort_by(f64::total_cmp);
     numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
@@ -66,7 +66,7 @@ fn values_of(first: &[Instant], sensor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Mean difference of each sensor's values from the middle of the row.
+/// Mean difference between each sensor's values and the median of their rows.
 fn offsets(first: &[Instant], sensors: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0_u32); sensors];
     for instant in first {
@@ -102,7 +102,7 @@ impl Settings {
             .map(|text| mean_and_deviation("--prior", text))
             .transpose()?;
         let asked_noise = noises.of("*").filter(|_| !options.noise.is_empty());
-        // Rows that are not needed are not waited for: estimates follow a pipe.
+        // If no first rows are needed, do not wait for them: estimates then follow a pipe without delay.
         let known = asked_change.is_some() && asked_prior.is_some() && asked_noise.is_some() && options.align.is_none();
         let rows = if known {
             1
@@ -169,8 +169,8 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Finds what was not said from the first rows: the prior by their spread; change and noise by the likelihood that the centre has of
-    /// them in full.
+    /// Estimates what no option states from the first rows: the prior from their spread, change and noise by maximum likelihood of the
+    /// unquantized values.
     fn fit(&mut self, first: &[Instant], sensors: usize) -> Result<(), Error> {
         let shifted = |n: usize| {
             let offset = self.offsets.get(n).copied().unwrap_or(0.0);
@@ -289,13 +289,13 @@ impl Settings {
         }
     }
 
-    /// What is supposed of a sensor.
+    /// The model of a sensor.
     pub(super) fn seat(&self, sensor: usize, name: &str) -> Seat {
         let noise = self.noises.of(name).unwrap_or(self.noise);
         self.seat_with(sensor, *self.sends.of(name), noise, *self.thresholds.of(name))
     }
 
-    /// Whether any sensor sends less than values.
+    /// Whether any sensor sends quantized reports.
     pub(super) fn has_bits(&self, names: &[String]) -> bool {
         names.iter().any(|name| *self.sends.of(name) != Sends::Value)
     }

@@ -1,4 +1,4 @@
-//! A measurement known to lie in a cell, over a link that may lose or invert what says so.
+//! A measurement known to lie in a cell, reported over a link that may lose or invert bits.
 
 use super::{Factor, Tilted};
 use crate::cell::Cell;
@@ -91,22 +91,22 @@ impl InCell {
         Self::new(cell, noise_variance, link.loss(), 1.0 - link.loss())
     }
 
-    /// The cell.
+    /// The cell that holds the measurement.
     pub fn cell(&self) -> &Cell {
         &self.cell
     }
 
-    /// `r`.
+    /// Noise variance `r`.
     pub fn noise_variance(&self) -> f64 {
         self.variance
     }
 
-    /// Probability of the observation where the cell is out of reach.
+    /// The constant part of the likelihood: its value where the probability of the cell is zero.
     pub fn floor(&self) -> f64 {
         self.floor
     }
 
-    /// What the cell adds to the floor where it is certain.
+    /// The factor of the cell's probability in the likelihood.
     pub fn share(&self) -> f64 {
         self.share
     }
@@ -120,7 +120,8 @@ impl InCell {
         (self.floor + self.share * self.of_cell(m, normal::cdf, normal::interval)).ln()
     }
 
-    /// A function of the cell as it lies about `m` in deviations: of the distance of its only edge, inside positive, or of its two ends.
+    /// Applies `half_line` to the signed distance of `m` from the only finite edge, positive inside the cell, or `interval` to both edges
+    /// minus `m`. All in standard deviations of the noise.
     #[inline]
     fn of_cell(&self, m: f64, half_line: impl Fn(f64) -> f64, interval: impl Fn(f64, f64) -> f64) -> f64 {
         let (lower, upper) = (self.cell.lower(), self.cell.upper());
@@ -133,7 +134,7 @@ impl InCell {
         }
     }
 
-    /// `ln P`, mean and variance of a standard normal variable in `[a, b)`, if the cell is within reach of the numbers.
+    /// `ln P`, mean and variance of a standard normal variable in `[a, b)`; `None` if the probability underflows.
     #[inline]
     fn standard(a: f64, b: f64) -> Option<(f64, f64, f64)> {
         if b == f64::INFINITY && a == f64::NEG_INFINITY {
@@ -158,7 +159,7 @@ impl Factor<1> for InCell {
         self.log_probability(m[0])
     }
 
-    /// Probabilities into a short buffer, then their logarithms: each stage stays in vector registers.
+    /// Writes probabilities into a short buffer first and takes logarithms second: each loop runs in vector registers.
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
         const BLOCK: usize = 128;
         if !lengths_agree(means, log_weights) {
@@ -166,7 +167,7 @@ impl Factor<1> for InCell {
         }
         let (lower, upper) = (self.cell.lower(), self.cell.upper());
         let (scale, floor, share, log_share) = (1.0 / self.deviation, self.floor, self.share, self.log_share);
-        // A half-line is one cut, rising (`m` above the edge) or falling.
+        // A half-line has one finite edge; its probability rises with `m` (`m` above the edge) or falls.
         let cut = if upper == f64::INFINITY {
             Some((lower, scale))
         } else if lower == f64::NEG_INFINITY {
@@ -210,15 +211,15 @@ impl Factor<1> for InCell {
         }
     }
 
-    /// The measurement `m + n ~ N(mu, s^2)`, `s^2 = v + r`, is truncated to the cell; `m` follows it with gain `v / s^2` and is
-    /// mixed with the prior where the floor may have caused the observation.
+    /// The measurement `m + n ~ N(mu, s^2)` with `s^2 = v + r` is truncated to the cell. The posterior of `m` given the cell follows by the
+    /// gain `v / s^2`. The result is its mixture with the prior, in proportion to `share P(cell)` and `floor`.
     #[inline]
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         let (mean, v) = (prior.mean()[0], prior.covariance()[0]);
         let total = v + self.variance;
         let s = total.sqrt();
         let standard = Self::standard((self.cell.lower() - mean) / s, (self.cell.upper() - mean) / s);
-        // A cell out of reach of the numbers can still be blamed on the floor.
+        // If the probability of the cell underflows, the observation is attributed to the floor (a bit flip or a loss).
         let out_of_reach = (self.floor > 0.0).then_some((f64::NEG_INFINITY, 0.0, 1.0));
         let (log_inside, inside_mean, inside_variance) = standard.or(out_of_reach).ok_or(Error::Impossible)?;
         let gain = v / total;

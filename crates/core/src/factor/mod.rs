@@ -1,17 +1,16 @@
-//! How likely what was observed is, for each noise-free measurement: the hinge of the library.
+//! The likelihood of an observation as a function of the noise-free measurement.
 //!
-//! A [`Factor`] is `p(observation | h(x) = m)` as a function of `m`. A value, a sign bit through a noisy link, a quantizer cell,
-//! the silence of a censoring sensor: each is one small type that implements it, and every filter follows. Particle and grid
-//! filters weigh by [`Factor::log_likelihood`]; the assumed-density filter asks for the moments of the posterior,
-//! [`Factor::tilted`].
+//! A [`Factor`] is `p(observation | h(x) = m)` as a function of `m`. Each kind of observation (a value, a sign bit over a noisy link, a
+//! quantizer cell, the silence of a censoring sensor) is a small type that implements it, and every filter accepts it. Particle and grid
+//! filters call [`Factor::log_likelihood`]; the assumed-density filter calls [`Factor::tilted`] for the moments of the posterior.
 //!
 //! | factor | type |
 //! |---|---|
 //! | a value in Gaussian noise | [`Value`] |
 //! | a measurement known to lie in a cell, mixed with a constant: sign bits, quantizer cells, silence, over lossy and flipping links | [`InCell`] |
 //! | a symbol through any discrete channel: a probability for each cell of a partition | [`Partition`] |
-//! | nothing that depends on `m` | [`Constant`] |
-//! | any of these | [`Scalar`] |
+//! | an observation that does not depend on `m` | [`Constant`] |
+//! | any of the four above | [`Scalar`] |
 //! | a factor of a report that may be an outlier | [`Robust`] |
 //! | several observations of one `m` | [`Product`], [`Repeated`] |
 
@@ -39,16 +38,17 @@ use nalgebra::{SMatrix, SVector};
 /// `p(observation | h(x) = m)` for the `M` components of a noise-free measurement `m`.
 ///
 /// Laws ([`crate::laws::factor`]):
-/// 1. `log_likelihood` is finite or `-inf` for every finite `m`; where `m` is NaN it is NaN, or no more than at any number, so that a
-///    NaN never raises a weight;
-/// 2. `add_log_likelihoods` adds what `log_likelihood` returns, to rounding; where lengths differ all of `log_weights` becomes NaN
+/// 1. `log_likelihood` is finite or `-inf` for every finite `m`. If `m` is NaN, the result is NaN or at most the smallest value at any
+/// number, so that a NaN never raises a weight;
+/// 2. `add_log_likelihoods` adds what `log_likelihood` returns, up to rounding. If lengths differ, all of `log_weights` becomes NaN
 ///    ([`crate::columns::lengths_agree`]);
 /// 3. `tilted` agrees with quadrature of `log_likelihood` against the prior.
 pub trait Factor<const M: usize> {
     /// `ln p(observation | h(x) = m)`.
     fn log_likelihood(&self, m: &SVector<f64, M>) -> f64;
 
-    /// Adds the log likelihood of every column of `means` to `log_weights`. Override where a sweep is faster.
+    /// Adds the log likelihood of every column of `means` to `log_weights`. Override it if a sweep over columns is faster than single
+    /// calls.
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
         if lengths_agree(means, log_weights) {
             for (i, log_weight) in log_weights.iter_mut().enumerate() {
@@ -57,22 +57,22 @@ pub trait Factor<const M: usize> {
         }
     }
 
-    /// Evidence and moments of the posterior of `m ~ prior`.
+    /// Evidence, mean and covariance of the posterior of `m ~ prior`.
     ///
     /// # Errors
     /// [`Error::Impossible`] if the observation has probability zero under the prior; [`Error::NotANumber`] if the prior or the likelihood
-    /// leaves the range of numbers; [`Error::NotConverged`].
+    /// is not finite; [`Error::NotConverged`] if a quadrature does not reach its accuracy.
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error>;
 
-    /// This factor as one of the kinds of [`Scalar`] times `exp` of a number; `None` for other kinds. Filters that impute measurements
-    /// ask for it.
+    /// This factor as a [`Scalar`] and the logarithm of a constant that multiplies it; `None` if it is no such product. Filters that impute
+    /// measurements call it.
     fn as_scalar(&self) -> Option<(Scalar, f64)> {
         None
     }
 }
 
-/// Adds mapped log likelihoods to `log_weights`, block by block: `add(means, logs)` adds those of a block of means to zeros, `map` changes
-/// them. Where lengths differ all of `log_weights` becomes NaN.
+/// Adds transformed log likelihoods to `log_weights`, block by block. `add(means, logs)` adds the log likelihoods of a block to `logs`,
+/// which is zero before; `map` is applied to each. If lengths differ, all of `log_weights` becomes NaN.
 pub fn add_mapped<const M: usize>(
     means: &Columns<'_, M>,
     log_weights: &mut [f64],
@@ -94,7 +94,7 @@ pub fn add_mapped<const M: usize>(
     }
 }
 
-/// The posterior of a noise-free measurement: `N(m; prior) p(observation | m) / evidence`.
+/// The posterior of a noise-free measurement `m`: density `N(m; prior) p(observation | m) / evidence`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tilted<const M: usize> {
     /// `ln` of the evidence, `ln integral N(m; prior) p(observation | m) dm`.
@@ -106,7 +106,7 @@ pub struct Tilted<const M: usize> {
 }
 
 impl<const M: usize> Tilted<M> {
-    /// The prior itself: an observation that says nothing, of probability `exp(log_evidence)`.
+    /// The posterior of an observation that does not depend on `m` and has probability `exp(log_evidence)`: the prior itself.
     ///
     /// # Errors
     /// [`Error::Impossible`] for a probability of zero, [`Error::NotANumber`] for NaN or an infinite likelihood.
@@ -126,8 +126,8 @@ impl<const M: usize> Tilted<M> {
 }
 
 impl Tilted<1> {
-    /// A scalar posterior, if its numbers are numbers. Under a finite prior the factors of this crate leave the range of numbers only
-    /// where the observation is out of reach.
+    /// A scalar posterior; an error if a number is not finite. Under a finite prior the factors of this crate give such numbers only if the
+    /// probability of the observation underflows.
     #[inline]
     pub(crate) fn scalar(log_evidence: f64, mean: f64, variance: f64) -> Result<Self, Error> {
         if !(log_evidence.is_finite() && mean.is_finite() && variance.is_finite()) {

@@ -1,4 +1,4 @@
-//! Moments of a scalar posterior by quadrature, wherever its mass may lie.
+//! Moments of a scalar posterior by quadrature.
 
 use super::Tilted;
 use crate::error::Error;
@@ -7,36 +7,38 @@ use fewbits_numerics::kernels;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// Where a likelihood changes, and over which distance: the edge of a cell and the deviation of the noise.
+/// A place where a likelihood changes, such as the edge of a cell, and the distance over which it changes, such as the noise deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Feature {
-    /// Where.
+    /// Position on the measurement axis.
     pub location: f64,
-    /// Over which distance.
+    /// Distance over which the likelihood changes, in measurement units.
     pub width: f64,
 }
 
-/// Below this share of the peak (in logarithms) the posterior is left out.
+/// Where the log posterior is further below its peak than this, it is left out of the integral.
 const DROP: f64 = 46.0;
-/// Most steps of a search for the mode between two candidates.
+/// Largest number of steps of a search for the mode between two candidates.
 const SEARCH: usize = 80;
-/// Most evaluations of the likelihood.
+/// Largest number of evaluations of the likelihood.
 const MOST: usize = 200_000;
-/// Panels are split until two rules agree to this share of the whole ...
+/// Panels are split until two quadrature rules agree to this fraction of the integral ...
 const TOLERANCE: f64 = 1e-11;
-/// ... or, where the likelihood's own rounding keeps them from it, until splitting no longer helps and they agree to this.
+/// ... or, if rounding of the likelihood prevents that, until splitting no longer helps and they agree to this fraction.
 const ROUNDING: f64 = 1e-9;
 
 /// Evidence, mean and variance of `m ~ prior` under any scalar likelihood, to about 1e-12 relative.
 ///
-/// `log_likelihoods(nodes, logs)` adds `ln p(observation | m)` at each of the nodes to `logs`; `features` say where the
-/// likelihood changes. The posterior's logarithm is compared at the prior's mean, at the features, between them on every
-/// scale and around them; the best place is refined to the mode; the axis is cut where the posterior has fallen by
-/// `exp(-46)`; and what is left is integrated adaptively, with panels that begin at the features.
+/// `log_likelihoods(nodes, logs)` adds `ln p(observation | m)` at each of the nodes to `logs`; `features` lists where the
+/// likelihood changes. Steps:
+/// 1. Evaluate the log posterior at the prior's mean, at and around the features, and between prior and features on every scale.
+/// 2. Refine the best of these points to the mode.
+/// 3. Cut the axis where the posterior has fallen by `exp(-46)`.
+/// 4. Integrate the rest adaptively, with panels that begin at the features.
 ///
 /// # Errors
-/// [`Error::Impossible`] if the posterior is zero wherever it was looked for; [`Error::NotANumber`] if the likelihood or the prior is
-/// none; [`Error::NotConverged`].
+/// [`Error::Impossible`] if the posterior is zero at every point that was evaluated; [`Error::NotANumber`] if the likelihood or the prior
+/// is NaN or infinite; [`Error::NotConverged`] if the accuracy is not reached.
 pub fn tilted_by_quadrature(
     prior: &Gaussian<1>,
     features: impl IntoIterator<Item = Feature>,
@@ -52,7 +54,7 @@ pub fn tilted_by_quadrature(
         log_likelihoods(&[centre], &mut log);
         return Tilted::unchanged(prior, log[0]);
     }
-    // All in deviations of the prior from its mean.
+    // From here on positions are in prior deviations from the prior's mean.
     let features: Vec<(f64, f64)> = features
         .into_iter()
         .map(|f| ((f.location - centre) / deviation, f.width / deviation))
@@ -96,7 +98,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         let right = beside(Some(best + 1), places[best] + 1.0);
         let (mode, peak) = posterior.maximum(left, (places[best], values[best]), right);
 
-        // Every place still worth counting, and a step beyond the outermost ones.
+        // Keep all points with a posterior above the cut, and a step beyond the outermost ones.
         let counted = || {
             (0..places.len())
                 .filter(|i| values[*i] > peak - DROP)
@@ -121,7 +123,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
     }
 }
 
-/// Places at which to look for the mode: increasing, without repetition.
+/// Points at which the search for the mode begins: increasing, without repetition.
 fn candidates(features: &[(f64, f64)]) -> Vec<f64> {
     const AROUND: [f64; 4] = [-4.0, -1.0, 1.0, 4.0];
     let mut places = vec![0.0];
@@ -129,7 +131,7 @@ fn candidates(features: &[(f64, f64)]) -> Vec<f64> {
     for (at, width) in features {
         places.push(*at);
         places.extend(AROUND.map(|k| at + k * width));
-        // Between the prior and the feature on every scale: precisions of prior and likelihood are weighed against each other.
+        // The mode is a precision-weighted mean of prior and feature. Try weights over many powers of two.
         for k in -7..=7 {
             let weight = f64::from(k * 4).exp2();
             places.push(at * weight / (1.0 + weight));
@@ -141,7 +143,7 @@ fn candidates(features: &[(f64, f64)]) -> Vec<f64> {
     places
 }
 
-/// Nodes of the two rules that are compared on a panel.
+/// Nodes of the coarse and the fine rule that are compared on a panel.
 const COARSE: usize = 10;
 const FINE: usize = 21;
 
@@ -150,12 +152,12 @@ struct Posterior<F> {
     deviation: f64,
     log_likelihoods: F,
     evaluations: usize,
-    /// Whether the likelihood was NaN or infinite somewhere.
+    /// Whether the likelihood was NaN or `+inf` at some node.
     no_number: bool,
 }
 
 impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
-    /// Logarithms of likelihood times `exp(-t^2/2)`; at most 128 at a time are computed together.
+    /// Writes the logarithms of likelihood times `exp(-t^2/2)`, at most 128 at a time.
     fn logs(&mut self, at: &[f64], logs: &mut [f64]) {
         let mut nodes = [0.0; 128];
         for (at, logs) in at.chunks(nodes.len()).zip(logs.chunks_mut(nodes.len())) {
@@ -173,20 +175,23 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         }
     }
 
-    /// The moments by the trapezoid rule, where features near the prior and no finer than it allow that: for entire functions
-    /// under a Gaussian it converges as `exp(-c/h^2)`, so that the rule of half the nodes, which comes for free, bounds the
-    /// error by its fourth power: a disagreement of `1e-3` leaves `1e-12`. Nodes reach out as far as the posterior does, in multiples
-    /// of eight that fill vector registers.
+    /// The moments by the trapezoid rule; `None` if features are far from the prior or narrower than it, or if the rule does not converge.
+    ///
+    /// For an entire function under a Gaussian its error falls as `exp(-c/h^2)`. The rule with every second node needs no evaluations of
+    /// its own, and the error of the full rule is about the fourth power of the difference: `1e-3` leaves `1e-12`. Nodes extend as far as
+    /// the posterior does, in multiples of eight that fill vector registers.
     fn by_trapezoid(&mut self, features: &[(f64, f64)]) -> Option<Tilted<1>> {
         const NEAR: f64 = 4.5;
         const REACH: f64 = 9.0;
         const MOST_NODES: usize = 128;
         const NEGLIGIBLE: f64 = 34.0;
         let finest = features.iter().map(|f| f.1).fold(1.0, f64::min);
+        // A likelihood that changes far out, or over less than .3 prior deviations, needs the adaptive rule.
         if features.iter().any(|(at, _)| at.abs() > 6.0) || finest < 0.3 {
             return None;
         }
         let step = 0.5 * finest;
+        // Most posteriors lie within `NEAR` prior deviations; nodes beyond are evaluated only if the integrand has not fallen there.
         let near = 4 * (NEAR / (4.0 * step)).ceil() as usize;
         let most = near + 8 * ((REACH - step * near as f64) / (8.0 * step)).ceil() as usize;
         let (mut nodes, mut logs, mut weights) = ([0.0; MOST_NODES], [0.0; MOST_NODES], [0.0; MOST_NODES]);
@@ -212,6 +217,8 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         };
         let (nodes, weights) = (&nodes[from..to], &mut weights[from..to]);
         kernels::exp_minus(&logs[from..to], peak, weights);
+        // The sum over every second node is the same rule at twice the step. Their difference estimates the error of the coarser rule,
+        // which is far above that of the finer one.
         let (mut all, mut even) = ([0.0; 3], [0.0; 3]);
         for (i, (t, p)) in nodes.iter().zip(&*weights).enumerate() {
             for (k, term) in [*p, p * t, p * t * t].into_iter().enumerate() {
@@ -225,6 +232,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         if (0..3).any(|k| (all[k] - even[k]).abs() > 1e-3 * scales[k]) {
             return None;
         }
+        // The variance is summed about the mean, since the difference of raw moments would cancel for a narrow posterior.
         let shift = all[1] / all[0];
         let spread = |(t, p): (&f64, &f64)| p * (t - shift) * (t - shift);
         let second = nodes.iter().zip(&*weights).map(spread).sum::<f64>() / all[0];
@@ -239,11 +247,13 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         log[0]
     }
 
-    /// Golden-section search around a candidate that is no worse than its neighbours, until the posterior is flat between
-    /// them: panels do the rest.
+    /// Golden-section search around a candidate that is no worse than its neighbours. Stops when the log posterior varies by less than one
+    /// over the bracket; the quadrature resolves the rest.
     fn maximum(&mut self, mut left: (f64, f64), mut best: (f64, f64), mut right: (f64, f64)) -> (f64, f64) {
+        // Golden section: the probe divides the longer part, so that each step shrinks the bracket by at least .618.
         const SHARE: f64 = 0.381_966_011_250_105_2;
         for _ in 0..SEARCH {
+            // The log posterior varies by less than one over the bracket: the quadrature resolves the rest.
             let flat = best.1 - left.1.min(right.1) < 1.0;
             if flat || right.0 - left.0 <= 1e-15 * (left.0.abs() + right.0.abs()) {
                 break;
@@ -264,7 +274,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         best
     }
 
-    /// Where, going outwards from `from` with steps that begin with `step` and grow, the logarithm falls below `floor`.
+    /// The point where the log posterior falls below `floor`, searched from `from` in the direction of `step` with growing steps.
     fn edge(&mut self, from: f64, step: f64, floor: f64) -> f64 {
         let mut step = step;
         let mut inside = from;
@@ -292,7 +302,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
             .map(|pair| (pair[0], pair[1], f64::INFINITY))
             .collect();
         let mut total = [0.0; 3];
-        // What has been summed so far only grows: a panel that is small against it is small against the whole.
+        // The sum so far only grows, so a panel that is small against it is small against the whole integral.
         let mut whole = [f64::MIN_POSITIVE; 3];
         while let Some((a, b, error_before)) = panels.pop() {
             if self.evaluations > MOST {
@@ -335,6 +345,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         }
         let mut logs = [0.0; COARSE + FINE];
         self.logs(&nodes, &mut logs);
+        // Moments about the mode, and densities relative to the peak: neither overflows nor cancels.
         let sums = |range: std::ops::Range<usize>| {
             let mut sums = [0.0; 3];
             for i in range {

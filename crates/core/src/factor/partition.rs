@@ -11,8 +11,8 @@ use fewbits_numerics::{kernels, normal};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-/// `p(observation | m) = sum_i p_i P(m + n in cell i)`, `n ~ N(0, r)`: a symbol through any discrete channel, a bit of a binary
-/// pattern, a two-sided bit.
+/// `p(observation | m) = sum_i p_i P(m + n in cell i)`, `n ~ N(0, r)`. Examples: a symbol received over any discrete channel, a bit
+/// of a binary pattern, a bit that says whether the measurement is in an interval.
 ///
 /// The cells are `[e_{i-1}, e_i)` between increasing edges, the first and the last unbounded; `p_i` is the probability of the
 /// observation given that the measurement lies in cell `i`.
@@ -74,13 +74,12 @@ impl Partition {
         &self.given_cell
     }
 
-    /// `r`.
+    /// Noise variance `r`.
     pub fn noise_variance(&self) -> f64 {
         self.variance
     }
 
-    /// Lower end, upper end and probability of each cell that can cause the observation; neighbours of equal probability
-    /// count as one cell.
+    /// Lower end, upper end and `p_i` of each cell with `p_i > 0`. Neighbours of equal probability are returned as one cell.
     fn parts(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
         let mut next = 0;
         std::iter::from_fn(move || {
@@ -125,9 +124,9 @@ impl Partition {
     }
 }
 
-/// Means swept at once.
+/// Number of means that are processed together.
 const BLOCK: usize = 256;
-/// Below this a probability has lost digits, and logarithms are summed instead.
+/// Probabilities below this have lost digits; the sum is then taken over logarithms.
 const LEAST: f64 = 1e-280;
 
 /// Adds `p P(lower < m + n < upper)` for every mean.
@@ -137,6 +136,7 @@ fn add_cell(means: &[f64], lower: f64, upper: f64, scale: f64, p: f64, probabili
     if lower == f64::NEG_INFINITY && upper == f64::INFINITY {
         pairs.for_each(|(sum, _)| *sum += p);
     } else if lower == f64::NEG_INFINITY || upper == f64::INFINITY {
+        // A cell with one infinite end: a single distribution function, mirrored if the cell is below its edge.
         let (edge, scale) = if upper == f64::INFINITY {
             (lower, scale)
         } else {
@@ -182,14 +182,14 @@ impl Factor<1> for Partition {
                 #[inline(always)]
                 || {
                     for (log_weight, p) in log_weights.iter_mut().zip(&*probabilities) {
-                        // What is far away is left to the logarithms below.
+                        // Where the probability is tiny, the logarithms below replace it.
                         let p = if *p > LEAST { *p } else { 1.0 };
                         *log_weight += kernels::scalar::ln(if p < 1.0 { p } else { 1.0 });
                     }
                 },
             );
             for ((log_weight, m), p) in log_weights.iter_mut().zip(means).zip(&*probabilities) {
-                // A whole line is certain even of NaN, which must not count as a measurement.
+                // The whole line has probability one even for a mean of NaN, which must not raise the weight.
                 if *p <= LEAST || p.is_nan() || m.is_nan() {
                     *log_weight += self.log_probability(*m);
                 }
@@ -197,7 +197,7 @@ impl Factor<1> for Partition {
         }
     }
 
-    /// A mixture of truncated normals, by the closed form of each cell.
+    /// The posterior is a mixture of those of the single cells, each in closed form.
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         let mut cells = Vec::with_capacity(self.given_cell.len());
         for (lower, upper, p) in self.parts() {
@@ -212,7 +212,7 @@ impl Factor<1> for Partition {
     }
 }
 
-/// The mixture of scalar posteriors in proportion to their evidence.
+/// The mixture of scalar posteriors, each weighted by its evidence.
 fn mixture(parts: &[Tilted<1>], prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
     let largest = parts.iter().map(|t| t.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     if largest == f64::NEG_INFINITY {

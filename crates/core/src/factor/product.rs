@@ -10,8 +10,8 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
-/// The same observation `count` times, by sensors that share the noise-free measurement: `p(observation | m)^count`. Silences
-/// and sign bits of identical sensors are fused exactly and together, at a cost that does not grow with their number.
+/// The same observation from `count` sensors that share the noise-free measurement: `p(observation | m)^count`. Silences
+/// and sign bits of identical sensors are fused exactly; the cost does not grow with their number.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Repeated {
@@ -29,12 +29,12 @@ impl Repeated {
         Ok(Self { factor, count })
     }
 
-    /// One of the observations.
+    /// The factor of a single observation.
     pub fn factor(&self) -> &Scalar {
         &self.factor
     }
 
-    /// How many there are.
+    /// Number of observations.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -66,17 +66,17 @@ pub struct Product {
 }
 
 impl Product {
-    /// No observation yet.
+    /// The product of no observations.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds an observation; one that is there already is counted again.
+    /// Multiplies by the factor of one more observation. One that equals an earlier one raises its count.
     pub fn push(&mut self, factor: Scalar) {
         self.push_repeated(Repeated { factor, count: 1 });
     }
 
-    /// Adds several observations of one kind.
+    /// Multiplies by the factor of several equal observations.
     pub fn push_repeated(&mut self, more: Repeated) {
         match self.factors.iter_mut().find(|known| known.factor == more.factor) {
             Some(known) => known.count += more.count,
@@ -84,12 +84,12 @@ impl Product {
         }
     }
 
-    /// The distinct observations with their numbers.
+    /// The distinct factors, each with its count.
     pub fn factors(&self) -> &[Repeated] {
         &self.factors
     }
 
-    /// Where the likelihood changes.
+    /// The places where the likelihood changes.
     fn features(&self) -> impl Iterator<Item = Feature> + '_ {
         self.factors.iter().flat_map(|f| f.factor.features())
     }
@@ -116,7 +116,7 @@ impl Factor<1> for Product {
         }
     }
 
-    /// One factor by its closed form, several by quadrature.
+    /// A single factor uses its closed form if it has one; several factors use quadrature.
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         match self.factors.as_slice() {
             [] => Tilted::unchanged(prior, 0.0),

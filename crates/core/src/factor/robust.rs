@@ -1,4 +1,4 @@
-//! Reports that may have nothing to do with the measurement.
+//! Reports that may be outliers, unrelated to the measurement.
 
 use super::{Factor, Tilted, add_mapped};
 use crate::columns::Columns;
@@ -8,19 +8,20 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::within;
 use nalgebra::SVector;
 
-/// `(1 - e) p(observation | m) + e c`: with probability `e` the report is an outlier, whose probability (density) is `c` wherever `m` is.
+/// `(1 - e) p(observation | m) + e c`: with probability `e` the report is an outlier, whose probability or density is `c` for every `m`.
 ///
-/// Its posterior is the mixture of the factor's own and of the prior, so that evidence and moments are as exact as the factor's.
+/// The posterior is the mixture of the factor's own posterior and the prior, so evidence and moments are as exact as those of the factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Robust<F> {
-    /// What the report says if it is none.
+    /// The factor of the report if it is not an outlier.
     pub factor: F,
     log_genuine: f64,
     log_outlier: f64,
 }
 
 impl<F> Robust<F> {
-    /// `share` is the probability `e` of an outlier, `density` what it has on average: the probability of a word, the density of a value.
+    /// `share` is the probability `e` of an outlier. `density` is `c`: the probability of the word, or the density of the value, under an
+    /// outlier.
     ///
     /// # Errors
     /// If the share is outside `[0, 1)`, or the density is negative or not finite.
@@ -34,11 +35,11 @@ impl<F> Robust<F> {
         })
     }
 
-    /// `ln` of the mixture, from the factor's own logarithm.
+    /// `ln` of the mixture, from the logarithm of the inner factor.
     #[inline]
     fn mixed(&self, log: f64) -> f64 {
         let own = log + self.log_genuine;
-        // A likelihood that is no number must not raise a weight.
+        // A likelihood of NaN must not raise a weight.
         if own.is_nan() {
             return f64::NEG_INFINITY;
         }
@@ -72,9 +73,11 @@ impl<const M: usize, F: Factor<M>> Factor<M> for Robust<F> {
             Err(error) => return Err(error),
         };
         let log_evidence = self.mixed(own.log_evidence);
+        // Posterior probability that the report is no outlier. An outlier leaves the prior unchanged.
         let share = (own.log_evidence + self.log_genuine - log_evidence).exp();
         let offset = own.mean - prior.mean();
         let mean = prior.mean() + offset * share;
+        // Moments of the mixture of both cases; the last term is the spread between their means.
         let covariance = own.covariance * share
             + prior.covariance() * (1.0 - share)
             + offset * offset.transpose() * (share * (1.0 - share));

@@ -1,4 +1,4 @@
-//! What can be observed of a scalar measurement.
+//! The likelihood of any observation of a scalar measurement.
 
 use super::moments::Feature;
 use super::{Factor, InCell, Partition, Tilted, Value};
@@ -11,7 +11,7 @@ use fewbits_numerics::error::ArgumentError;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-/// An observation of the same probability under every measurement: a loss, a random silence.
+/// An observation whose probability is the same for every measurement: a loss, a random silence.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Constant {
@@ -20,7 +20,7 @@ pub struct Constant {
 }
 
 impl Constant {
-    /// An observation that says nothing.
+    /// An observation that carries no information, of probability 1.
     pub const ONE: Self = Self { probability: 1.0 };
 
     /// An observation of the given probability under every measurement. Zero makes it impossible.
@@ -32,15 +32,15 @@ impl Constant {
         Ok(Self { probability })
     }
 
-    /// A missing report of a sensor that always speaks: `Nothing` is a loss without a trace, `Lost` a known one, and neither says
-    /// anything about `m`.
+    /// The factor of a missing report of a sensor that always sends. Whether the loss was noticed (`Lost`) or not (`Nothing`), it does not
+    /// depend on `m`.
     pub fn of_delivery<R>(observation: &Observation<R>, link: &Link) -> Self {
         Self {
             probability: link.delivery(observation),
         }
     }
 
-    /// Its probability.
+    /// The probability of the observation.
     pub fn probability(&self) -> f64 {
         self.probability
     }
@@ -65,13 +65,13 @@ impl<const M: usize> Factor<M> for Constant {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Scalar {
-    /// The measurement itself.
+    /// The measurement itself was observed.
     Value(Value<1>),
-    /// A cell that holds it.
+    /// The measurement is in a cell.
     InCell(InCell),
-    /// A probability for each cell.
+    /// Each cell of a partition has a probability.
     Partition(Partition),
-    /// Nothing about it.
+    /// The observation does not depend on the measurement.
     Constant(Constant),
 }
 
@@ -93,8 +93,8 @@ impl Scalar {
         Ok(Partition::new(edges, given_cell, noise_variance)?.into())
     }
 
-    /// `p(observation | measurement)` as a function of the noisy measurement, piecewise constant: cells with their
-    /// probabilities, zeros left out. Empty for a value, which is a point.
+    /// `p(observation | measurement)` as a piecewise constant function of the noisy measurement: cells with their
+    /// probabilities, those of probability zero left out. Empty for a [`Value`], which is a point.
     pub fn pieces(&self) -> Vec<(Cell, f64)> {
         let whole = (f64::NEG_INFINITY, f64::INFINITY);
         let (edges, shares) = match self {
@@ -120,7 +120,7 @@ impl Scalar {
             .collect()
     }
 
-    /// Where the likelihood changes, and over which distance.
+    /// The places where the likelihood changes.
     pub(crate) fn features(&self) -> Vec<Feature> {
         match self {
             Self::Value(value) => vec![Feature {

@@ -1,4 +1,4 @@
-//! A value in Gaussian noise.
+//! A value observed in Gaussian noise.
 
 use super::{Factor, Tilted};
 use crate::columns::{Columns, lengths_agree};
@@ -32,12 +32,12 @@ impl<const M: usize> Value<M> {
         Ok(Self { noise })
     }
 
-    /// `z`.
+    /// Observed value `z`.
     pub fn value(&self) -> &SVector<f64, M> {
         self.noise.mean()
     }
 
-    /// `R`.
+    /// Noise covariance `R`.
     pub fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
         self.noise.gaussian().covariance()
     }
@@ -79,9 +79,9 @@ impl<const M: usize> Factor<M> for Value<M> {
             return;
         }
         let half_precision = 0.5 / self.noise_covariance().iter().next().unwrap_or(&0.0);
-        // Below 1e-308 a variance has no precision.
+        // Variances below 1e-308 are subnormal and have lost precision.
         if M == 1 && half_precision.is_finite() {
-            // A plain quadratic: kept free of branches so that it vectorises.
+            // A plain quadratic without branches, so that the loop vectorises.
             let (value, constant) = (self.value()[0], self.noise.log_peak());
             vectorised(
                 #[inline(always)]
@@ -110,6 +110,7 @@ impl<const M: usize> Factor<M> for Value<M> {
         let squared = innovation.dot(&factor.solve(&innovation));
         let log_evidence = -0.5 * squared - log_root_determinant - M as f64 * fewbits_numerics::normal::LN_SQRT_2PI;
         let mean = prior.mean() + gain * innovation;
+        // Joseph form: stays positive semidefinite under rounding.
         let covariance = keep * spread * keep.transpose() + gain * noise * gain.transpose();
         let finite = log_evidence.is_finite() && mean.iter().chain(covariance.iter()).all(|x| x.is_finite());
         if !finite {

@@ -6,10 +6,10 @@ use crate::columns::state_at;
 use crate::gaussian::FactoredGaussian;
 use rand::Rng;
 
-/// Draws have the belief's mean and covariance, entry by entry within four standard errors; draws into columns of unequal lengths are NaN.
+/// Draws have the belief's mean and covariance, each entry within four standard errors. Draws into columns of unequal lengths are NaN.
 ///
 /// # Errors
-/// The entry that disagrees.
+/// If an entry differs by more; the violation names it.
 pub fn samples_have_the_moments<const D: usize, R: Rng + ?Sized>(
     belief: &impl Belief<D>,
     rng: &mut R,
@@ -39,11 +39,11 @@ fn not_a_number<'a>(law: &'static str, mut numbers: impl Iterator<Item = &'a f64
     }
 }
 
-/// The density integrates to one, by importance sampling from `proposal` (which should be wider than the belief), within four
-/// standard errors; and the sweep adds what the scalar function returns, or NaN where lengths differ.
+/// The density integrates to one within four standard errors, by importance sampling from `proposal`, which should be wider than the
+/// belief. The sweep adds what the scalar function returns, and writes NaN if lengths differ.
 ///
 /// # Errors
-/// The integral found, or the state at which the sweep disagrees.
+/// If the integral is not one, or the sweep disagrees at a state; the violation names either.
 pub fn density_integrates_to_one<const D: usize, R: Rng + ?Sized>(
     belief: &impl Density<D>,
     proposal: &FactoredGaussian<D>,
@@ -52,6 +52,7 @@ pub fn density_integrates_to_one<const D: usize, R: Rng + ?Sized>(
 ) -> Result<(), Violation> {
     let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| vec![0.0; draws]);
     proposal.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
+    // Sweeps add to what is there: a start that is not zero shows one that overwrites.
     let mut logs = vec![0.25; draws];
     belief.add_log_densities(&columns.each_ref().map(Vec::as_slice), &mut logs);
     let mut ratios = Vec::with_capacity(draws);

@@ -10,7 +10,7 @@ use rand::Rng;
 /// `noise_covariance_at`, entry by entry within four standard errors of `draws` draws.
 ///
 /// # Errors
-/// The entry that disagrees.
+/// If an entry disagrees; the violation names it.
 pub fn draws_have_the_law<const D: usize, R: Rng + ?Sized>(
     dynamics: &impl GaussianDynamics<D>,
     rng: &mut R,
@@ -35,7 +35,7 @@ pub fn draws_have_the_law<const D: usize, R: Rng + ?Sized>(
 /// The Jacobian is the derivative of the mean, by central differences of relative step `1e-5`.
 ///
 /// # Errors
-/// The entry that disagrees by more than `1e-6` of the largest.
+/// If an entry disagrees by more than `1e-6` of the largest; the violation names it.
 pub fn jacobian_is_the_derivative<const D: usize>(
     dynamics: &impl GaussianDynamics<D>,
     state: &SVector<f64, D>,
@@ -46,7 +46,7 @@ pub fn jacobian_is_the_derivative<const D: usize>(
 /// Linear dynamics have the mean `F x`, the Jacobian `F` and the noise `Q` at every state.
 ///
 /// # Errors
-/// The entry that disagrees.
+/// If an entry disagrees; the violation names it.
 pub fn is_linear<const D: usize>(
     dynamics: &impl LinearDynamics<D>,
     states: &[SVector<f64, D>],

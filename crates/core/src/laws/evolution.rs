@@ -5,8 +5,8 @@ use crate::dynamics::{Dynamics as _, GaussianDynamics};
 use crate::evolution::Evolution;
 use nalgebra::SVector;
 
-/// For linear evolutions: the mean and covariance after `a + b` seconds are those after `a` and then `b`, and nothing changes over 0
-/// seconds, to `tolerance` relative to the deviations.
+/// For linear evolutions: mean and covariance after `a + b` seconds equal those after `a` and then `b` seconds, and 0 seconds change
+/// nothing. Compared to `tolerance`, relative to the standard deviations.
 ///
 /// # Errors
 /// If a step is refused, or the entry that disagrees.
@@ -24,6 +24,7 @@ pub fn stretches_compose<const D: usize>(
         let middle = first.mean(state);
         let (mean, expected) = (both.mean(state), second.mean(&middle));
         let jacobian = second.jacobian(&middle);
+        // Noise of the first stretch is carried through the second by the Jacobian at its start.
         let composed =
             jacobian * first.noise_covariance_at(state) * jacobian.transpose() + second.noise_covariance_at(&middle);
         let covariance = both.noise_covariance_at(state);

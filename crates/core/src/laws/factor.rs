@@ -6,11 +6,11 @@ use crate::gaussian::Gaussian;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::SVector;
 
-/// Law 1: finite or `-inf`, never NaN or `+inf`, at every finite measurement; and a measurement with a NaN has NaN, or no more than
-/// the least of the others.
+/// Law 1: the log likelihood is finite or `-inf` at every finite measurement. At a measurement with a NaN it is NaN or at most
+/// the smallest value at the others.
 ///
 /// # Errors
-/// The first measurement at which the law fails.
+/// If the law fails at a measurement; the violation names the first one.
 pub fn is_a_number<const M: usize>(factor: &impl Factor<M>, measurements: &[SVector<f64, M>]) -> Result<(), Violation> {
     let mut least = f64::INFINITY;
     for m in measurements {
@@ -28,11 +28,10 @@ pub fn is_a_number<const M: usize>(factor: &impl Factor<M>, measurements: &[SVec
     Ok(())
 }
 
-/// Law 2: the sweep adds what the scalar function returns, for measurements with a NaN among them, too; where lengths differ it
-/// writes NaN everywhere.
+/// Law 2: the sweep adds what the scalar function returns, also at measurements with a NaN. If lengths differ it writes NaN everywhere.
 ///
 /// # Errors
-/// The first measurement at which the law fails.
+/// If the law fails at a measurement; the violation names the first one.
 pub fn sweep_is_scalar<const M: usize>(
     factor: &impl Factor<M>,
     measurements: &[SVector<f64, M>],
@@ -42,9 +41,8 @@ pub fn sweep_is_scalar<const M: usize>(
     super::sweep(&all, |columns, sums| factor.add_log_likelihoods(&columns, sums), |m| factor.log_likelihood(m))
 }
 
-/// Law 3: `tilted` agrees with the trapezoid rule over `prior mean +- reach` with `points` nodes, which the caller chooses
-/// wide and dense enough for the posterior: evidence, mean and variance to `tolerance`, relative to the posterior's own
-/// spread.
+/// Law 3: `tilted` agrees with the trapezoid rule of `points` nodes over the prior's mean `+- reach`. The caller chooses both so
+/// that the rule resolves the posterior. Evidence, mean and variance are compared to `tolerance`, relative to the posterior's deviation.
 ///
 /// # Errors
 /// If `tilted` fails, or the moment that disagrees.
@@ -64,6 +62,7 @@ pub fn tilted_is_quadrature(
     let (centre, variance) = (prior.mean()[0], prior.covariance()[0]);
     let step = 2.0 * reach / (points - 1) as f64;
     let nodes = || (0..points).map(|i| -reach + step * i as f64);
+    // The trapezoidal rule over the likelihood times the prior, relative to the peak.
     let log = |t: f64| factor.log_likelihood(&[centre + t].into()) - 0.5 * t * t / variance;
     let logs: Vec<f64> = nodes().map(log).collect();
     let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -4,11 +4,11 @@ use super::Violation;
 use crate::likelihood::Likelihood;
 use nalgebra::SVector;
 
-/// Finite or `-inf` at every state; a state of NaN has NaN, or no more than the least of the others. The sweep adds what the scalar
-/// function returns, and writes NaN everywhere where lengths differ.
+/// The log likelihood is finite or `-inf` at every state; at a state with a NaN it is NaN or at most the smallest value at the others. The
+/// sweep adds what the scalar function returns, and writes NaN everywhere if lengths differ.
 ///
 /// # Errors
-/// The first state at which a law fails.
+/// If a law fails at a state; the violation names the first one.
 pub fn sweep_is_scalar<const D: usize>(
     likelihood: &impl Likelihood<D>,
     states: &[SVector<f64, D>],

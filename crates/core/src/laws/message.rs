@@ -3,7 +3,7 @@
 use crate::bits::{BitReader, BitString, CodecError};
 use crate::message::Message;
 
-/// Law 1: encoding and decoding is the identity, to the last bit. Returns the number of bits spent.
+/// Law 1: decoding the encoded message returns the same message and reads all bits. Returns the number of bits.
 ///
 /// # Errors
 /// If encoding or decoding fails, or the decoded message differs.

@@ -1,7 +1,7 @@
-//! The laws of this crate's traits, to be called from a test of every implementation.
+//! Checks of the laws that this crate's traits state, to be called from a test of every implementation.
 //!
 //! Each function checks one law and returns a [`Violation`] that says what was expected and what was found. Laws about
-//! frequencies take a random stream and accept four standard errors: with a fixed seed they pass always or never.
+//! frequencies draw from a random source and accept deviations up to four standard errors. With a fixed seed the result is reproducible.
 
 pub mod belief;
 pub mod dynamics;
@@ -17,13 +17,13 @@ pub use fewbits_numerics::wild;
 use crate::columns::Columns;
 use nalgebra::{SMatrix, SVector};
 
-/// A law that an implementation breaks.
+/// A law that an implementation does not obey.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{law}: {found}, expected {expected}")]
 pub struct Violation {
-    /// The law.
+    /// Statement of the law.
     pub law: &'static str,
-    /// What was found, and where.
+    /// What was found, and for which input.
     pub found: String,
     /// What was expected.
     pub expected: String,
@@ -39,10 +39,10 @@ impl Violation {
     }
 }
 
-/// Standard errors that a frequency or an average may be off.
+/// Number of standard errors by which a frequency or an average may deviate.
 const STANDARD_ERRORS: f64 = 4.0;
 
-/// An error of the implementation under test is a violation, too.
+/// Turns an error of the implementation under test into a violation.
 fn failed<T>(law: &'static str, result: Result<T, impl std::fmt::Display>) -> Result<T, Violation> {
     result.map_err(|error| Violation::new(law, error, "no error"))
 }
@@ -64,7 +64,7 @@ fn agree(
     }
 }
 
-/// What is no number must not be likelier than what is.
+/// A likelihood at an input of NaN must not exceed the smallest one at numbers.
 fn never_raises(value: f64, least: f64, at: impl std::fmt::Display) -> Result<(), Violation> {
     if value.is_nan() || value <= least {
         Ok(())

@@ -15,7 +15,7 @@ const HONEST: &str = "reports have the frequencies that their factors say";
 /// the sensor spoke.
 ///
 /// # Errors
-/// If `factor` fails, or the measurement at which the law fails.
+/// If `factor` fails, or at the first measurement at which the law fails.
 pub fn total_probability<const M: usize, S: Scheme<M>>(
     scheme: &S,
     feedback: &S::Feedback,
@@ -31,8 +31,8 @@ pub fn total_probability<const M: usize, S: Scheme<M>>(
     total_probability_with(scheme, feedback, link, received, measurements, 1e-12)
 }
 
-/// Law 1 for a scheme with a continuous report: `received(m)` must be the integral of the received reports' densities at `m`, by
-/// a quadrature that suits the scheme; it is completed by [`Observation::Nothing`] and [`Observation::Lost`].
+/// Law 1 for a scheme with a continuous report. `received(m)` must return the integral of the factors of all received reports at `m`, by a
+/// suitable quadrature; the probabilities of [`Observation::Nothing`] and [`Observation::Lost`] are added here.
 ///
 /// # Errors
 /// As [`total_probability`].
@@ -62,11 +62,11 @@ pub fn total_probability_with<const M: usize, S: Scheme<M>>(
     Ok(())
 }
 
-/// What becomes of a report over a link is one of three: it arrives, is lost without a trace, or is known to be lost. The probabilities that
-/// schemes take from the link ([`Link::delivery`]) sum to one; where no loss is known, `Lost` is conditioned on and has the factor 1.
+/// A report sent over a link arrives, is lost without a trace, or is known to be lost. The three probabilities that schemes take from the
+/// link ([`Link::delivery`]) sum to one. If the link has no known losses, `Lost` has the factor 1 and is left out of the sum.
 ///
 /// # Errors
-/// The sum found.
+/// If the sum is not one.
 pub fn link_delivers_once(link: &Link) -> Result<(), Violation> {
     const LAW: &str = "a report arrives, is lost, or is known to be lost";
     let of = |observation| link.delivery::<()>(&observation);
@@ -105,6 +105,7 @@ pub fn honesty<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
         let observation = failed(HONEST, link.transmit(rng, report.as_ref(), &format))?;
         hits += usize::from(event(&observation));
     }
+    // Standard error of a binomial frequency; the small constant forgives rounding if it is zero.
     let share = hits as f64 / draws as f64;
     let error = (probability * (1.0 - probability) / draws as f64).max(0.0).sqrt();
     if (share - probability).abs() <= STANDARD_ERRORS * error + 1e-12 {
@@ -114,8 +115,8 @@ pub fn honesty<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
     }
 }
 
-/// Law 2 for every report of a scheme with finitely many, for nothing, and for known losses, which must have what the other
-/// probabilities leave of one.
+/// Law 2 for every report of a scheme with finitely many reports, for `Nothing`, and for `Lost`, whose frequency must be one minus the
+/// probabilities of all others.
 ///
 /// # Errors
 /// As [`honesty`].
@@ -134,6 +135,7 @@ where
     S::Report: PartialEq,
 {
     let observations = reports.into_iter().map(Observation::Received);
+    // All outcomes but `Lost` are compared with their own likelihoods; `Lost` with the remaining probability.
     let mut left = 1.0;
     for expected in observations.chain([Observation::Nothing]) {
         let factor = failed(HONEST, scheme.factor(feedback, &expected, link))?;
@@ -147,9 +149,9 @@ where
     honesty(scheme, feedback, link, rng, draws, measure, lost, left.clamp(0.0, 1.0))
 }
 
-/// The law of [`Deterministic`]: two sensors that are handed differently seeded sources report the same, and leave both as they were.
+/// The law of [`Deterministic`]: two sensors with differently seeded random sources send the same report, and neither source is drawn from.
 ///
-/// # Errors
+/// If encoding fails, or at the first measurement at which the law fails.
 /// If encoding fails, or the measurement at which the law fails.
 pub fn deterministic<const M: usize, S: Deterministic<M>, R: Rng + Clone + PartialEq>(
     scheme: &S,

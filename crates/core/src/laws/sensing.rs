@@ -8,7 +8,7 @@ use rand::Rng;
 /// The Jacobian is the derivative of the mean, and the sweep writes what the scalar function returns.
 ///
 /// # Errors
-/// The state and entry that disagree.
+/// If Jacobian or sweep disagree; the violation names state and entry.
 pub fn is_consistent<const D: usize, const M: usize>(
     sensing: &impl Sensing<D, M>,
     states: &[SVector<f64, D>],
@@ -30,7 +30,7 @@ pub fn is_consistent<const D: usize, const M: usize>(
 /// Measurements have the mean `h(x)` and the covariance `R(x)`, within four standard errors of `draws` draws.
 ///
 /// # Errors
-/// The entry that disagrees.
+/// If an entry disagrees; the violation names it.
 pub fn draws_have_the_law<const D: usize, const M: usize, R: Rng + ?Sized>(
     sensing: &impl Sensing<D, M>,
     rng: &mut R,

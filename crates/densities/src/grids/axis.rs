@@ -5,7 +5,7 @@ use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
-/// Uniform nodes of a trapezoid rule.
+/// Evenly spaced points on a line, the nodes of a trapezoid rule.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
 pub struct UniformGrid {
@@ -29,14 +29,14 @@ stored! { #[serde(rename = "Grid")] UniformGrid as Stored {
     UniformGrid::of_nodes(finite("lower", lower)?, spacing, points)
 }, Error }
 
-/// Most nodes of a grid.
+/// Largest number of nodes of a grid.
 const MOST: usize = 1_000_000;
 
-/// Largest width of a grid, and size of a belief over a lattice: squares of distances are still finite.
+/// Largest extent of a grid: squares of distances are still finite.
 pub(super) const WIDEST: f64 = 1e153;
 
 impl UniformGrid {
-    /// Refuses nodes over which the moments of a density overflow. A density is at most the reciprocal of the spacing.
+    /// Returns an error if moments of a density on the nodes could overflow. A density is at most the reciprocal of the spacing.
     fn of_nodes(lower: f64, spacing: f64, points: usize) -> Result<Self, Error> {
         let grid = Self {
             lower,
@@ -51,11 +51,11 @@ impl UniformGrid {
         Ok(grid)
     }
 
-    /// Nodes from `lower` to `upper` or just beyond, `spacing` apart.
+    /// Nodes from `lower` to `upper`, `spacing` apart. The last node may be beyond `upper` by less than `spacing`.
     ///
     /// # Errors
-    /// If bounds are not finite or not increasing, the spacing is not positive, there are more than a million nodes, or moments over
-    /// them would leave the range of numbers.
+    /// If a bound is not finite, `lower < upper` does not hold, the spacing is not positive, there are more than a million nodes, or
+    /// moments over them would overflow.
     pub fn new(lower: f64, upper: f64, spacing: f64) -> Result<Self, Error> {
         finite("lower", lower)?;
         finite("upper", upper)?;
@@ -68,14 +68,14 @@ impl UniformGrid {
         Self::of_nodes(lower, spacing, intervals as usize + 1)
     }
 
-    /// Nodes symmetric about zero, zero included, out to `half_width` or just beyond.
+    /// Nodes symmetric about zero, zero included, out to `half_width` or beyond by less than `spacing`.
     ///
     /// # Errors
     /// As [`UniformGrid::new`].
     pub fn symmetric(half_width: f64, spacing: f64) -> Result<Self, Error> {
         let half = (positive("half_width", half_width)? / positive("spacing", spacing)?).ceil() * spacing;
         let mut grid = Self::new(-half, half, spacing)?;
-        // Rounding of the quotient must not cost the symmetry.
+        // Constructed from the number of nodes on one side, so that rounding of the quotient cannot break the symmetry.
         grid.points = 2 * (half / spacing).round() as usize + 1;
         Ok(grid)
     }
@@ -85,23 +85,23 @@ impl UniformGrid {
         self.points
     }
 
-    /// Distance of neighbouring nodes.
+    /// Distance between neighbouring nodes.
     pub fn spacing(&self) -> f64 {
         self.spacing
     }
 
-    /// Node `i`.
+    /// Position of node `i`.
     #[inline]
     pub fn node(&self, i: usize) -> f64 {
         self.lower + i as f64 * self.spacing
     }
 
-    /// All nodes, increasing.
+    /// Positions of all nodes, increasing.
     pub fn nodes(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.points).map(|i| self.node(i))
     }
 
-    /// Indices of the nodes within `[lower, upper]`.
+    /// Indices of the nodes in `[lower, upper]`.
     #[inline]
     pub fn indices_within(&self, lower: f64, upper: f64) -> std::ops::Range<usize> {
         let from = ((lower - self.lower) / self.spacing).ceil().max(0.0) as usize;

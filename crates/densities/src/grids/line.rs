@@ -1,4 +1,4 @@
-//! A density on a line.
+//! A probability density on a line, given by its values on a grid.
 
 use super::axis::UniformGrid;
 use crate::Error;
@@ -11,8 +11,7 @@ use nalgebra::{Matrix1, Vector1};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// A density held by its values at the nodes of a [`UniformGrid`].
-/// Between the nodes it is linear.
+/// A probability density on a line, given by its values at the nodes of a [`UniformGrid`] and linear between the nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
 pub struct PointMass {
@@ -27,7 +26,7 @@ stored! { #[serde(rename = "PointMass")] PointMass as Stored {
     density: Vec<f64>,
 } => check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density }), Error }
 
-/// Densities at `nodes` nodes of the given volume each: finite, non-negative, integrating to one.
+/// Checks densities at `nodes` nodes of the given volume each: finite, non-negative, integrating to one.
 pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Result<(), Error> {
     let bad = density.iter().find(|p| !(**p >= 0.0 && p.is_finite()));
     let total = density.iter().sum::<f64>() * volume;
@@ -38,19 +37,19 @@ pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Resul
     Ok(())
 }
 
-/// Multiplies the values of a density at nodes of the given volume with the exponentials of `logs` and scales them to integrate to
-/// one; returns the logarithm of the integral before. On failure nothing is changed.
+/// Multiplies the values of a density by the exponentials of `logs` and normalises it; each node has the given volume. Returns the
+/// logarithm of the integral before normalisation. On failure nothing is changed.
 pub(crate) fn absorb(density: &mut [f64], logs: &[f64], volume: f64) -> Result<f64, Error> {
     let reachable = logs.iter().zip(&*density).filter(|(_, p)| **p > 0.0);
     let peak = reachable.map(|(l, _)| *l).fold(f64::NEG_INFINITY, f64::max);
-    // Where the density is zero the likelihood may be anything.
+    // Where the density is zero, the likelihood may have any value, NaN included.
     let product = |(l, p): (&f64, &f64)| if *p > 0.0 { p * (l - peak).exp() } else { 0.0 };
     let sum = logs.iter().zip(&*density).map(product).sum::<f64>();
     let no_number = logs.iter().zip(&*density).any(|(l, p)| *p > 0.0 && l.is_nan());
     if no_number || peak == f64::INFINITY {
         return Err(Error::NotANumber { what: "the likelihood" });
     }
-    // A peak of `-inf` leaves a sum that is no number.
+    // If all logarithms are `-inf`, the sum is NaN.
     if !(sum > 0.0 && sum.is_finite()) {
         return Err(Error::Impossible);
     }
@@ -60,7 +59,7 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64], volume: f64) -> Result<f
     Ok(sum.ln() + peak + volume.ln())
 }
 
-/// Scales a density at nodes of the given volume to integrate to one.
+/// Divides a density by its integral; each node has the given volume.
 pub(crate) fn normalise(density: &mut [f64], volume: f64) -> Result<(), Error> {
     let total = density.iter().sum::<f64>() * volume;
     if !(total > 0.0 && total.is_finite()) {
@@ -74,7 +73,7 @@ impl PointMass {
     /// The density proportional to `exp(log_density(x))`.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if that is zero at every node.
+    /// [`Error::Impossible`] if the density is zero at every node.
     pub fn new(grid: UniformGrid, log_density: impl Fn(f64) -> f64) -> Result<Self, Error> {
         let mut mass = Self {
             grid,
@@ -84,22 +83,22 @@ impl PointMass {
         Ok(mass)
     }
 
-    /// A normal density.
+    /// A normal density, evaluated at the nodes.
     ///
     /// # Errors
-    /// A variance that is not positive; [`Error::Impossible`] if it lies off the grid.
+    /// If the variance is not positive; [`Error::Impossible`] if the density is zero at every node.
     pub fn normal(grid: UniformGrid, mean: f64, variance: f64) -> Result<Self, Error> {
         finite("mean", mean)?;
         positive("variance", variance)?;
         Self::new(grid, |x| log_pdf_with(x, mean, variance))
     }
 
-    /// The nodes.
+    /// The grid of nodes.
     pub fn grid(&self) -> &UniformGrid {
         &self.grid
     }
 
-    /// Density at the nodes; sums to one over the spacing.
+    /// Density at the nodes. Their sum times the spacing is one.
     pub fn density(&self) -> &[f64] {
         &self.density
     }
@@ -115,16 +114,16 @@ impl PointMass {
         self.expectation(|x| (x - mean) * (x - mean))
     }
 
-    /// `E f(x)`.
+    /// `E f(x)`, by the trapezoid rule.
     pub fn expectation(&self, f: impl Fn(f64) -> f64) -> f64 {
         let sum: f64 = self.grid.nodes().zip(&self.density).map(|(x, p)| p * f(x)).sum();
         sum * self.grid.spacing()
     }
 
-    /// Bayes' rule with any likelihood; returns `ln p(observed | past)`.
+    /// Multiplies by a likelihood (Bayes' rule); returns `ln p(observed | past)`.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if the product with the belief is zero at every node; the belief is then as before.
+    /// [`Error::Impossible`] if the product is zero at every node; the belief is then unchanged.
     pub fn update(&mut self, observed: &(impl Likelihood<1> + ?Sized)) -> Result<f64, Error> {
         let nodes: Vec<f64> = self.grid.nodes().collect();
         let mut logs = vec![0.0; nodes.len()];
@@ -132,7 +131,7 @@ impl PointMass {
         absorb(&mut self.density, &logs, self.grid.spacing())
     }
 
-    /// The same with the log likelihood as a function of the state.
+    /// As [`update`](Self::update), with the log likelihood as a function of the state.
     ///
     /// # Errors
     /// As [`PointMass::update`].
@@ -141,11 +140,12 @@ impl PointMass {
         absorb(&mut self.density, &logs, self.grid.spacing())
     }
 
-    /// The same with the likelihood tabulated at the nodes, up to a factor, and without allocation; returns the evidence in
-    /// units of that factor. Prefer [`PointMass::update`] where the likelihood may underflow.
+    /// As [`update`](Self::update), with the likelihood given at the nodes up to a constant factor, without allocation. Returns
+    /// the evidence up to that factor, not its logarithm. Use [`PointMass::update`] if the likelihood may underflow.
     ///
     /// # Errors
-    /// A table of wrong length; [`Error::Impossible`], which leaves the belief as it was.
+    /// If the table has the wrong length; [`Error::NotANumber`] if the evidence is not finite;
+    /// [`Error::Impossible`] if it is zero. The belief is then unchanged.
     pub fn reweight(&mut self, likelihood: &[f64]) -> Result<f64, Error> {
         entries("likelihood", likelihood.len(), self.density.len())?;
         let sum: f64 = self.density.iter().zip(likelihood).map(|(p, l)| p * l).sum();
@@ -162,10 +162,10 @@ impl PointMass {
         Ok(evidence)
     }
 
-    /// Writes a new density through `fill`, node by node, and scales it to integrate to one.
+    /// Replaces the density: `fill` writes one value per node, up to a common factor; the result is normalised.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if nothing is left; the density is then uniform.
+    /// [`Error::Impossible`] if all values are zero; the density is then uniform.
     pub fn refill(&mut self, fill: impl FnOnce(&mut [f64])) -> Result<(), Error> {
         fill(&mut self.density);
         normalise(&mut self.density, self.grid.spacing()).inspect_err(|_| {
@@ -175,7 +175,7 @@ impl PointMass {
     }
 }
 
-/// The difference of two uniforms: how far a draw of a linear interpolant lies from its node, in spacings.
+/// A draw with triangular density on `(-1, 1)`: the offset, in spacings, of a draw of a linear interpolant from its node.
 pub(crate) fn triangular<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     rng.random::<f64>() - rng.random::<f64>()
 }
@@ -192,7 +192,7 @@ impl Belief<1> for PointMass {
         Matrix1::new(self.variance())
     }
 
-    /// Draws of the linear interpolant, drawn towards the mean by what interpolation adds to the variance.
+    /// Draws from the linear interpolant, shrunk towards the mean so that the variance is that of the nodes.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, [states]: ColumnsMut<'_, 1>) {
         let cumulative = Categorical::new(&self.density);
         let (mean, variance, h) = (self.mean(), self.variance(), self.grid.spacing());

@@ -1,4 +1,4 @@
-//! How wide the kernels of an estimate are: rules, shapes and shrinkage.
+//! The covariance of a density estimate's kernel: rules, shapes and shrinkage.
 
 use crate::Error;
 use crate::particles::Particles;
@@ -21,12 +21,12 @@ pub enum BandwidthRule {
     },
 }
 
-/// Which `n` a rule is given.
+/// Which sample size `n` a rule is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SampleSize {
     /// The number of particles.
     Count,
-    /// `1 / sum w^2`.
+    /// The effective sample size `1 / sum w^2`.
     Effective,
 }
 
@@ -35,7 +35,7 @@ pub enum SampleSize {
 pub enum Shape {
     /// Diagonal, from the weighted standard deviation of each axis.
     Diagonal,
-    /// Proportional to the weighted covariance. Every error measure is invariant under linear maps of the state then.
+    /// Proportional to the weighted covariance. All error measures are then invariant under linear maps of the state.
     Full,
 }
 
@@ -59,8 +59,8 @@ pub struct Bandwidth {
     pub shape: Shape,
     /// Multiple of the rule's standard deviation, above 0.
     pub factor: f64,
-    /// Smallest standard deviation of the kernel along each axis, in the state's unit: what coincident particles get. With 0,
-    /// a sample without any spread is refused.
+    /// Smallest standard deviation of the kernel along each axis, in units of the state. It lets coincident particles have a kernel.
+    /// With 0, particles that all coincide give an error.
     pub floor: f64,
 }
 
@@ -77,11 +77,11 @@ impl Default for Bandwidth {
     }
 }
 
-/// Kernel variances below this share of the largest one are raised to it: an axis without spread gives no singular kernel.
+/// Kernel variances below this multiple of the largest one are raised to it, so that an axis without spread gives no singular kernel.
 const RELATIVE_FLOOR: f64 = 1e-12;
 
 impl Bandwidth {
-    /// The rule's standard deviation for a sample of standard deviation 1: `factor h(n, d)`.
+    /// Standard deviation of the kernel for a sample of standard deviation 1: `factor h(n, d)`.
     ///
     /// # Errors
     /// If the factor is not above 0, the exponent is negative, or `n` is not above 0.
@@ -104,7 +104,7 @@ impl Bandwidth {
         }
     }
 
-    /// The kernel covariance for these particles.
+    /// The kernel covariance for these particles, with the sample size `n` that [`size`](Self::size) selects.
     ///
     /// # Errors
     /// As [`width`](Self::width); or if the particles coincide and there is no [`floor`](Self::floor).
@@ -112,7 +112,7 @@ impl Bandwidth {
         self.kernel_for(particles, self.size_of(particles))
     }
 
-    /// The kernel covariance for particles that stand for a sample of size `n`, as after some were dropped.
+    /// The kernel covariance for these particles and a given sample size `n`, for instance that before some particles were dropped.
     ///
     /// # Errors
     /// As [`kernel`](Self::kernel).
@@ -131,7 +131,7 @@ impl Bandwidth {
             return refuse("particles", "a sample without spread", expected);
         }
         for k in 0..D {
-            // Raising a diagonal keeps a matrix positive semidefinite.
+            // Adding to a diagonal entry keeps a matrix positive semidefinite.
             kernel[(k, k)] = match self.shape {
                 Shape::Diagonal => kernel[(k, k)].max(floor),
                 Shape::Full if self.floor > 0.0 || covariance[(k, k)] == 0.0 => kernel[(k, k)] + floor,
@@ -141,11 +141,11 @@ impl Bandwidth {
         Ok(kernel)
     }
 
-    /// Liu and West's shrinkage: draws the particles towards their mean so that, once the kernel is added, the estimate has the
-    /// variances (diagonal shape) or the covariance (full shape) of the sample. Without it every estimate is wider than its
-    /// sample, and a filter that passes estimates on grows wider at each step.
+    /// Liu and West's shrinkage: moves the particles towards their mean so that, with the kernel added, the estimate has the variances of
+    /// the sample (or its covariance, if the kernel has full shape). Without it every estimate is wider than its sample, and the estimates
+    /// of a filter widen at each step.
     ///
-    /// Per axis `x <- m + sqrt(1 - H_kk / C_kk) (x - m)`; an axis narrower than its kernel collapses to the mean.
+    /// Per axis `x <- m + sqrt(1 - H_kk / C_kk) (x - m)`. If `H_kk >= C_kk`, all particles have the mean as that coordinate.
     pub fn shrunk<const D: usize>(&self, particles: &Particles<D>, kernel: &SMatrix<f64, D, D>) -> Particles<D> {
         let mean = particles.mean();
         let covariance = particles.covariance_about(&mean);

@@ -22,10 +22,10 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 use sums::{RUN, TINY, chunk_of, log_far_sum, log_kernel_sums};
 
-/// A belief `sum_i w_i N(x; x_i, H)`: particles that have a density.
+/// A density `sum_i w_i N(x; x_i, H)`: weighted particles, each replaced by a Gaussian kernel of covariance `H`.
 ///
-/// The centres are also kept in coordinates where the kernel is the standard normal, so that a kernel costs `D` differences and
-/// one exponential.
+/// The centres are also stored in coordinates in which the kernel is standard normal. The evaluation of a kernel then takes `D`
+/// differences and one exponential.
 ///
 /// ```
 /// use fewbits_densities::{Bandwidth, KernelEstimate, Particles};
@@ -47,7 +47,7 @@ pub struct KernelEstimate<const D: usize> {
 }
 
 impl<const D: usize> KernelEstimate<D> {
-    /// Particles under a kernel of the given covariance.
+    /// An estimate from particles and the covariance of the kernel.
     ///
     /// # Errors
     /// If the kernel is not symmetric positive definite.
@@ -65,7 +65,7 @@ impl<const D: usize> KernelEstimate<D> {
         })
     }
 
-    /// Particles under the kernel of a bandwidth rule.
+    /// An estimate from particles, with the kernel that a bandwidth rule gives.
     ///
     /// # Errors
     /// As [`Bandwidth::kernel`].
@@ -99,7 +99,7 @@ impl<const D: usize> KernelEstimate<D> {
         &self.factor
     }
 
-    /// The centres in coordinates where the kernel is the standard normal, about the sample's mean.
+    /// The centres relative to the sample's mean, in coordinates in which the kernel is standard normal; one column per coordinate.
     pub fn whitened_centres(&self) -> &[Vec<f64>; D] {
         &self.white
     }
@@ -122,8 +122,7 @@ impl<const D: usize> KernelEstimate<D> {
         out[0]
     }
 
-    /// Writes `ln p` of every point of `columns` to `out`, in the log domain: exact in the tails. One kernel per particle and
-    /// point.
+    /// Writes `ln p` of every point of `columns` to `out`, accurate in the tails. Evaluates one kernel per particle and point.
     pub fn log_pdf_columns(&self, columns: Columns<'_, D>, out: &mut [f64]) {
         if !fewbits_core::columns::lengths_agree(&columns, out) {
             return;
@@ -149,14 +148,14 @@ impl<const D: usize> KernelEstimate<D> {
         );
     }
 
-    /// `ln p` at every centre, exact in the tails: a centre of weight zero may be far from all others. Half the kernels of
-    /// [`log_pdf_columns`](Self::log_pdf_columns): they are symmetric.
+    /// `ln p` at every centre, accurate in the tails (a centre of weight zero may be far from all others). By symmetry it takes half the
+    /// kernel evaluations of [`log_pdf_columns`](Self::log_pdf_columns).
     pub fn log_pdf_at_centres(&self) -> Vec<f64> {
         let weights = self.particles.weights();
         let mut sums = weights.to_vec();
         let white = self.white.each_ref().map(Vec::as_slice);
         let mut start = 0;
-        // Runs of centres against themselves one by one, against all that follow as a rectangle.
+        // Centres are taken in runs. Pairs within a run are evaluated one by one, pairs with all later centres as a rectangular block.
         while start < self.len() {
             let end = (start + RUN).min(self.len());
             let (before, after) = sums.split_at_mut(end);
@@ -188,7 +187,7 @@ impl<const D: usize> KernelEstimate<D> {
     /// The same density as a mixture, one component per particle of positive weight.
     ///
     /// # Errors
-    /// If the kernel is not positive definite: not for an estimate that was formed.
+    /// If the kernel is not positive definite, which cannot happen for an estimate that was constructed.
     pub fn to_mixture(&self) -> Result<Mixture<D>, Error> {
         let components = (0..self.len()).filter(|i| self.particles.weights()[*i] > 0.0).map(|i| {
             let centre = SVector::from_fn(|d, _| self.particles.columns()[d][i]);
@@ -197,7 +196,7 @@ impl<const D: usize> KernelEstimate<D> {
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
 
-    /// `count` equally weighted draws: systematic selection of the centres, each moved by one draw of the kernel.
+    /// `count` equally weighted draws: centres by systematic selection, each moved by a draw of the kernel.
     ///
     /// # Errors
     /// If `count` is 0.

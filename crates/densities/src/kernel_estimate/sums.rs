@@ -1,13 +1,13 @@
-//! Sums over standard normal kernels, in lanes: both halves of a symmetric kernel matrix from one exponential.
+//! Sums over standard normal kernels in vector registers. Each kernel of a symmetric kernel matrix is computed once.
 
 use fewbits_numerics::kernels::scalar::power_of_half;
 use fewbits_numerics::kernels::{LANES, folded, vectorised};
 
-/// Centres that are paired with each other one by one.
+/// Number of centres in a run; pairs within a run are evaluated one by one.
 pub(super) const RUN: usize = 16;
-/// `log2(e)/2`: half squares in powers of two.
+/// `log2(e)/2`: converts squared distances to exponents of two.
 const HALF_LOG2_E: f64 = 0.5 * std::f64::consts::LOG2_E;
-/// Sums of kernels below this (`2^-900`) are taken again with the nearest centre taken out.
+/// Sums of kernels below this (`2^-900`) are computed again relative to the nearest centre.
 pub(super) const TINY: f64 = 1.183_053_447e-271;
 /// `|z - z_j|^2 log2(e)/2` of centre `j`.
 #[inline(always)]
@@ -20,13 +20,13 @@ fn exponent<const D: usize>(white: &[&[f64]; D], z: &[f64; D], j: usize) -> f64 
     square * HALF_LOG2_E
 }
 
-/// `count` centres from `from` on: a shape whose bounds are checked once.
+/// `count` centres from index `from` on. A slice of known length, so that bounds are checked once.
 #[inline(always)]
 pub(super) fn chunk_of<'a, const D: usize>(white: &[&'a [f64]; D], from: usize, count: usize) -> [&'a [f64]; D] {
     std::array::from_fn(|d| &white[d][from..from + count])
 }
 
-/// `sum_j w_j 2^-(s_j - offset)` of each point over all centres; exponents below the offset count as equal to it.
+/// `sum_j w_j 2^-(s_j - offset)` of each point over all centres. An exponent `s_j` below the offset is replaced by the offset.
 #[inline(always)]
 fn kernel_sums<const D: usize, const P: usize>(
     white: &[&[f64]; D],
@@ -34,6 +34,7 @@ fn kernel_sums<const D: usize, const P: usize>(
     points: &[[f64; D]; P],
     offset: f64,
 ) -> [f64; P] {
+    // Several partial sums per point, so that additions do not wait for each other.
     let mut lane = [[0.0; LANES]; P];
     let whole = weights.len() / LANES * LANES;
     for from in (0..whole).step_by(LANES) {
@@ -54,8 +55,7 @@ fn kernel_sums<const D: usize, const P: usize>(
     lane.map(folded)
 }
 
-/// `ln sum_j w_j exp(-|z - z_j|^2/2)` of each point, exact in the tails: where the plain sum is tiny, it is taken again with the
-/// nearest centre taken out.
+/// `ln sum_j w_j exp(-|z - z_j|^2/2)` of each point, accurate in the tails: a tiny sum is computed again relative to the nearest centre.
 #[inline(always)]
 pub(super) fn log_kernel_sums<const D: usize, const P: usize>(
     white: &[&[f64]; D],
@@ -75,7 +75,7 @@ pub(super) fn log_kernel_sums<const D: usize, const P: usize>(
 #[cold]
 #[inline(never)]
 pub(super) fn log_far_sum<const D: usize>(white: &[&[f64]; D], weights: &[f64], z: &[f64; D]) -> f64 {
-    // Centres of weight zero may be nearer; they add nothing.
+    // Centres of weight zero may be nearer but add nothing.
     let nearest = (0..weights.len())
         .filter(|i| weights[*i] > 0.0)
         .map(|i| exponent(white, z, i))
@@ -87,7 +87,7 @@ pub(super) fn log_far_sum<const D: usize>(white: &[&[f64]; D], weights: &[f64], 
     sum.ln() - nearest / std::f64::consts::LOG2_E
 }
 
-/// Centres of a block of [`add_cross_sums`].
+/// Number of centres in a block of [`add_cross_sums`].
 const BLOCK: usize = 32;
 
 /// Kernels `k_ij = exp(-|z_i - z_j|^2/2)` between two runs of centres, `(white, weights, sums)` each: adds `sum_j w_j k_ij` to the
@@ -115,7 +115,7 @@ pub fn add_cross_sums<const D: usize>(
     );
 }
 
-/// `sum_j w_j k_j` of each point; adds the points' weighted kernels to `sums`: both halves of a symmetric kernel matrix.
+/// Returns `sum_j w_j k_j` of each point, and adds the points' weighted kernels to `sums`: each kernel is used for both sums.
 #[inline(always)]
 fn cross_sums<const D: usize, const P: usize>(
     white: &[&[f64]; D],
@@ -133,7 +133,7 @@ fn cross_sums<const D: usize, const P: usize>(
         cross_block(&chunk, weights, points, own, sums, &mut lane);
     }
     if rest.len() > LANES {
-        // Filled up with centres of weight zero.
+        // The block is filled up with centres of weight zero.
         let padded = columns.map(|c| padded(c.1));
         let mut sums = [0.0; BLOCK];
         cross_block(&padded.each_ref(), &self::padded(rest), points, own, &mut sums, &mut lane);
@@ -151,7 +151,7 @@ fn cross_sums<const D: usize, const P: usize>(
     lane.map(folded)
 }
 
-/// A short run filled up with zeros.
+/// A short run, filled up with zeros to the length of a block.
 #[inline(always)]
 fn padded(values: &[f64]) -> [f64; BLOCK] {
     let mut block = [0.0; BLOCK];

@@ -21,7 +21,7 @@ pub struct Component<const D: usize> {
 }
 
 impl<const D: usize> Component<D> {
-    /// A component of any weight from 0 up: a [`Mixture`](crate::Mixture) normalises the weights of its components.
+    /// A component of any weight from 0 up. A [`Mixture`](crate::Mixture) normalises the weights of its components.
     ///
     /// # Errors
     /// If the weight is negative or not finite, the mean is not finite, or the covariance is not symmetric positive definite
@@ -38,7 +38,7 @@ impl<const D: usize> Component<D> {
         })
     }
 
-    /// Share of the mixture's mass.
+    /// Weight of the component.
     pub fn weight(&self) -> f64 {
         self.weight
     }
@@ -58,7 +58,7 @@ impl<const D: usize> Component<D> {
         Gaussian::from_trusted_parts(self.mean, self.covariance)
     }
 
-    /// The covariance, factored.
+    /// The factored covariance.
     pub fn factor(&self) -> &Factored<D> {
         &self.factor
     }
@@ -69,14 +69,14 @@ impl<const D: usize> Component<D> {
         -0.5 * self.factor.squared(&(x - self.mean)) - self.factor.half_log_det - D as f64 * LN_SQRT_2PI
     }
 
-    /// Writes `ln w + ln N(x; mean, covariance)` of every point.
+    /// Writes `ln w + ln N(x; mean, covariance)` of every point to `out`.
     pub(super) fn log_terms(&self, columns: &Columns<'_, D>, out: &mut [f64]) {
         let offset = self.weight.ln() - self.factor.half_log_det - D as f64 * LN_SQRT_2PI;
         vectorised(
             #[inline(always)]
             || self.factor.log_forms(&self.mean, offset, columns, out),
         );
-        // Distances beyond the range of numbers meet as infinities.
+        // A NaN at a finite point comes from a difference of infinities: the distance overflowed, and the density is zero.
         for (i, log) in out.iter_mut().enumerate().filter(|(_, log)| log.is_nan()) {
             if columns.iter().all(|column| column[i].is_finite()) {
                 *log = f64::NEG_INFINITY;

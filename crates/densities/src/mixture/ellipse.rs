@@ -1,4 +1,4 @@
-//! Outlines of Gaussians in the plane.
+//! Probability ellipses of Gaussians in the plane.
 
 use crate::Error;
 use fewbits_core::Gaussian;
@@ -6,8 +6,8 @@ use fewbits_numerics::error::refuse;
 use fewbits_numerics::factored::Factored;
 use nalgebra::SVector;
 
-/// Outline of the ellipse that holds probability `level` of a Gaussian in the plane, as `points` points. Its squared radius in
-/// standard deviations is `-2 ln(1 - level)`.
+/// `points` points on the ellipse that holds probability `level` of a Gaussian in the plane. The ellipse is the set of squared
+/// Mahalanobis distance `-2 ln(1 - level)`.
 ///
 /// # Errors
 /// If the level is not strictly between 0 and 1 or the covariance is singular.

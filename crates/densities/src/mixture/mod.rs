@@ -18,7 +18,7 @@ use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// A belief `sum_k w_k N(x; m_k, S_k)` over `R^D` with weights that sum to one.
+/// A density `sum_k w_k N(x; m_k, S_k)` over `R^D` with weights that sum to one.
 ///
 /// ```
 /// use fewbits_densities::{Component, Mixture};
@@ -35,7 +35,7 @@ pub struct Mixture<const D: usize> {
     components: Vec<Component<D>>,
 }
 
-/// Points per block of a sweep: all log densities of a block stay in the first-level cache.
+/// Number of points that are processed together: their log densities stay in the first-level cache.
 const BLOCK: usize = 128;
 
 impl<const D: usize> Mixture<D> {
@@ -84,7 +84,7 @@ impl<const D: usize> Mixture<D> {
         self.components.iter().map(|c| c.mean() * c.weight).sum()
     }
 
-    /// Covariance: within the components plus between their means.
+    /// Covariance: the mean of the components' covariances plus the covariance of their means.
     pub fn covariance(&self) -> SMatrix<f64, D, D> {
         *self.moment_matched().covariance()
     }
@@ -94,13 +94,13 @@ impl<const D: usize> Mixture<D> {
         moment_matched(self.components.iter().map(|c| (c.weight, *c.mean(), *c.covariance())))
     }
 
-    /// `ln p(x)`; finite wherever `x` is finite and not astronomically far away, never NaN.
+    /// `ln p(x)`, never NaN for finite `x`; `-inf` only if the squared distance overflows.
     pub fn log_pdf(&self, x: &SVector<f64, D>) -> f64 {
         let kept = self.components.iter().filter(|c| c.weight > 0.0);
         kept.map(|c| c.weight.ln() + c.log_pdf(x)).collect::<LogSum>().value()
     }
 
-    /// Writes `ln p` of every point of `columns` to `out`; points beyond the end of `out` are passed over.
+    /// Writes `ln p` of every point of `columns` to `out`. Points beyond the length of `out` are ignored.
     pub fn log_pdf_columns(&self, columns: Columns<'_, D>, out: &mut [f64]) {
         if !fewbits_core::columns::lengths_agree(&columns, out) {
             return;
@@ -131,8 +131,7 @@ impl<const D: usize> Mixture<D> {
         }
     }
 
-    /// `count` equally weighted draws with systematic selection of the components: each contributes `count w_k` draws, rounded
-    /// up or down.
+    /// `count` equally weighted draws. Components are selected systematically: component `k` gives `count w_k` draws, rounded up or down.
     ///
     /// # Errors
     /// If `count` is 0.
@@ -143,7 +142,7 @@ impl<const D: usize> Mixture<D> {
         Particles::from_draws(count, || self.components[chosen.next().unwrap_or(0)].draw(rng))
     }
 
-    /// The law of the chosen coordinates, in the given order.
+    /// The marginal density of the chosen coordinates, in the given order.
     ///
     /// # Errors
     /// If an axis is out of range or given twice.
@@ -161,10 +160,10 @@ impl<const D: usize> Mixture<D> {
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
 
-    /// The law of `matrix x + shift`.
+    /// The density of `matrix x + shift` for `x` with this density.
     ///
     /// # Errors
-    /// If the image of a component is singular or not finite.
+    /// If the transformed covariance of a component is singular or not finite.
     pub fn affine<const K: usize>(
         &self,
         matrix: &SMatrix<f64, K, D>,
@@ -178,8 +177,8 @@ impl<const D: usize> Mixture<D> {
     }
 }
 
-/// The Gaussian of the mean and covariance of a mixture, whose parts are given by weight, mean and covariance. The weights sum to one;
-/// covariances may be singular.
+/// The Gaussian with the mean and covariance of a mixture whose parts are given by weight, mean and covariance. The weights must sum to
+/// one; covariances may be singular.
 pub fn moment_matched<const D: usize>(
     parts: impl Iterator<Item = (f64, SVector<f64, D>, SMatrix<f64, D, D>)> + Clone,
 ) -> Gaussian<D> {
@@ -191,7 +190,7 @@ pub fn moment_matched<const D: usize>(
     Gaussian::from_trusted_parts(mean, covariance.sum())
 }
 
-/// Writes `ln sum exp` over the rows of `terms` (each [`BLOCK`] long) to `out`; `-inf` where every row is.
+/// Writes `ln sum exp` over the rows of `terms` (each [`BLOCK`] long) to `out`, column by column; `-inf` where all rows have `-inf`.
 fn log_sum_rows(terms: &[f64], out: &mut [f64]) {
     vectorised(
         #[inline(always)]
@@ -199,6 +198,7 @@ fn log_sum_rows(terms: &[f64], out: &mut [f64]) {
             let n = out.len();
             let mut largest = [f64::MIN; BLOCK];
             let mut total = [0.0; BLOCK];
+            // Two passes per column: the largest term, then the sum relative to it.
             for row in terms.chunks_exact(BLOCK) {
                 for (l, x) in largest[..n].iter_mut().zip(row) {
                     *l = if *x > *l { *x } else { *l };
@@ -251,7 +251,7 @@ stored! { [const D: usize] Mixture as Stored |mixture| {
     let parts = weights.iter().zip(means).zip(covariances);
     let components = parts.map(|((weight, mean), covariance)| Component::new(*weight, mean.into(), covariance.into()));
     let mut mixture = Mixture::new(components.collect::<Result<_, _>>()?)?;
-    // Weights that already summed to one are kept to the last bit.
+    // Weights that already sum to one are kept to the last bit.
     if (weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 {
         let kept = mixture.components.iter_mut().zip(weights);
         kept.for_each(|(component, weight)| component.weight = weight);

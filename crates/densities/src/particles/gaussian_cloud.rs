@@ -10,8 +10,8 @@ use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// A mixture `sum_i w_i N(m_i, P)`: the belief of a Rao-Blackwellised filter, whose particles are conditional means and whose
-/// conditional covariance is the same for all. A singular `P` is fine.
+/// A density `sum_i w_i N(m_i, P)`. A Rao-Blackwellised filter uses it: its particles are conditional means `m_i`, and all share the
+/// conditional covariance `P`, which may be singular.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored<D>")]
 pub struct GaussianCloud<const D: usize> {
@@ -36,7 +36,7 @@ impl<const D: usize> GaussianCloud<D> {
         Ok(Self { means, covariance })
     }
 
-    /// `count` particles that agree on a Gaussian belief.
+    /// `count` particles that all have the mean and covariance of `belief`.
     ///
     /// # Errors
     /// If `count` is zero.
@@ -44,12 +44,12 @@ impl<const D: usize> GaussianCloud<D> {
         Self::new(Particles::from_draws(count, || *belief.mean())?, *belief.covariance())
     }
 
-    /// The conditional means, weighted.
+    /// The conditional means with their weights.
     pub fn means(&self) -> &Particles<D> {
         &self.means
     }
 
-    /// The conditional means for work in place.
+    /// The conditional means, to be changed in place.
     pub fn means_mut(&mut self) -> &mut Particles<D> {
         &mut self.means
     }
@@ -59,12 +59,12 @@ impl<const D: usize> GaussianCloud<D> {
         &self.covariance
     }
 
-    /// Replaces the shared covariance by one of an update that preserves its properties by construction.
+    /// Replaces the shared covariance. It is not checked; the update must keep it symmetric positive semidefinite.
     pub fn set_shared_covariance(&mut self, covariance: SMatrix<f64, D, D>) {
         self.covariance = covariance;
     }
 
-    /// Mean and covariance of the whole belief: the shared covariance plus the spread of the means.
+    /// The Gaussian of the same mean and covariance: the covariance is the shared one plus that of the means.
     pub fn gaussian(&self) -> Gaussian<D> {
         let mean = self.means.mean();
         Gaussian::from_trusted_parts(mean, self.covariance + self.means.covariance_about(&mean))
@@ -80,7 +80,7 @@ impl<const D: usize> Belief<D> for GaussianCloud<D> {
         *self.gaussian().covariance()
     }
 
-    /// A particle by its weight, then its Gaussian.
+    /// Draws a particle by its weight, then a state from its Gaussian.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
         let spread = Gaussian::from_trusted_parts(SVector::zeros(), self.covariance);
         spread.sample_columns(rng, states.each_mut().map(|column| &mut **column));

@@ -1,4 +1,4 @@
-//! Weighted particles in structure-of-arrays form.
+//! Weighted particles, stored by columns.
 
 mod gaussian_cloud;
 mod stored;
@@ -18,14 +18,14 @@ use serde::{Deserialize, Serialize};
 use stored::StoredParticles;
 use weights::{gather_rows, normalise};
 
-/// A belief `sum_i w_i delta(x - x_i)` over `R^D`, always normalised.
+/// A density `sum_i w_i delta(x - x_i)` over `R^D` whose weights sum to one.
 ///
-/// Each coordinate is one contiguous column and the weights are kept as logarithms and as themselves, so that a filter's
-/// inner loops run over plain slices, no weight underflows on the way, and one exponential a particle is paid where the
-/// weights change. They change only through [`reweigh`](Self::reweigh), which either succeeds or leaves the belief as it was.
+/// Each coordinate is one contiguous column. The weights are stored both as logarithms and as numbers, so that a filter's
+/// inner loops run over plain slices, no weight underflows while it is computed, and one exponential per particle is computed when the
+/// weights change. They change only through [`reweigh`](Self::reweigh), which either succeeds or leaves the belief unchanged.
 ///
-/// Beside its state a particle may carry a row of numbers of its own ([`with_auxiliary`](Self::with_auxiliary)), which is selected with
-/// it: what a sensor estimates under the particle's history, a label, a statistic.
+/// A particle may also carry a row of auxiliary numbers ([`with_auxiliary`](Self::with_auxiliary)), which is copied with the particle when
+/// particles are selected. Examples: a sensor's estimate given the particle's history, a label, a statistic.
 ///
 /// ```
 /// use fewbits_densities::Particles;
@@ -41,18 +41,17 @@ pub struct Particles<const D: usize> {
     log_weights: Vec<f64>,
     weights: Vec<f64>,
     effective_sample_size: f64,
-    /// One row of `auxiliary.len() / len` numbers per particle.
+    /// One row of `auxiliary.len() / len` numbers per particle, one row after the other.
     auxiliary: Vec<f64>,
-    /// Room for a column or for weights under construction, so that no step allocates.
+    /// Memory for a column or for new weights, so that no step allocates.
     scratch: Vec<f64>,
 }
 
 impl<const D: usize> Particles<D> {
-    /// Particles from their columns and log weights, which may share any offset; `-inf` is a weight of zero.
+    /// Particles from their columns and log weights. The log weights may have any common offset; `-inf` is a weight of zero.
     ///
     /// # Errors
-    /// Lengths that differ, no particle, a coordinate that is not finite, a log weight that is NaN or `+inf`, or all weights
-    /// zero.
+    /// If lengths differ, there is no particle, a coordinate is not finite, a log weight is NaN or `+inf`, or all weights are zero.
     pub fn new(columns: [Vec<f64>; D], log_weights: &[f64]) -> Result<Self, Error> {
         if let Some(bad) = log_weights.iter().find(|w| w.is_nan() || **w == f64::INFINITY) {
             return refuse("log_weights", bad, "log weights below infinity");
@@ -69,7 +68,7 @@ impl<const D: usize> Particles<D> {
     /// Equally weighted particles from their columns.
     ///
     /// # Errors
-    /// Lengths that differ, no particle, a coordinate that is not finite.
+    /// If lengths differ, there is no particle, or a coordinate is not finite.
     pub fn uniform(columns: [Vec<f64>; D]) -> Result<Self, Error> {
         let count = columns.first().map_or(0, Vec::len);
         at_least_one("particles", count)?;
@@ -89,10 +88,10 @@ impl<const D: usize> Particles<D> {
         Ok(belief)
     }
 
-    /// Equally weighted particles, drawn one after the other.
+    /// Equally weighted particles, one per call of `draw`.
     ///
     /// # Errors
-    /// No particle, or a draw that is not finite.
+    /// If `count` is zero or a draw is not finite.
     pub fn from_draws(count: usize, mut draw: impl FnMut() -> SVector<f64, D>) -> Result<Self, Error> {
         let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(count));
         for _ in 0..count {
@@ -104,7 +103,7 @@ impl<const D: usize> Particles<D> {
         Self::uniform(columns)
     }
 
-    /// Equally weighted particles, independent draws from a belief.
+    /// Equally weighted particles, drawn independently from a belief.
     ///
     /// # Errors
     /// If `count` is zero or a draw is not finite.
@@ -114,7 +113,7 @@ impl<const D: usize> Particles<D> {
         Self::uniform(columns)
     }
 
-    /// The same particles, each with a row of numbers of its own; `auxiliary` holds the rows one after the other.
+    /// The same particles, each with a row of auxiliary numbers. `auxiliary` holds the rows one after the other.
     ///
     /// # Errors
     /// If the length of `auxiliary` is no multiple of the number of particles, or an entry is not finite.
@@ -128,17 +127,17 @@ impl<const D: usize> Particles<D> {
         Ok(self)
     }
 
-    /// Numbers beside each particle's state.
+    /// Number of auxiliary numbers per particle.
     pub fn auxiliary_width(&self) -> usize {
         self.auxiliary.len() / self.len()
     }
 
-    /// The numbers beside all states, one row after the other.
+    /// The auxiliary numbers of all particles, one row after the other.
     pub fn auxiliary(&self) -> &[f64] {
         &self.auxiliary
     }
 
-    /// Coordinates and auxiliary rows for work in place. Finite numbers must stay finite.
+    /// Coordinates and auxiliary rows, to be changed in place. Finite numbers must stay finite.
     pub fn parts_mut(&mut self) -> (ColumnsMut<'_, D>, &mut [f64]) {
         (self.columns.each_mut().map(Vec::as_mut_slice), &mut self.auxiliary)
     }
@@ -153,12 +152,12 @@ impl<const D: usize> Particles<D> {
         self.weights.is_empty()
     }
 
-    /// The coordinates, one contiguous column each.
+    /// The coordinates: `columns()[d][i]` is coordinate `d` of particle `i`.
     pub fn columns(&self) -> Columns<'_, D> {
         self.columns.each_ref().map(Vec::as_slice)
     }
 
-    /// The coordinates for work in place, such as propagation. Finite numbers must stay finite.
+    /// The coordinates, to be changed in place (for instance by propagation). Finite numbers must stay finite.
     pub fn columns_mut(&mut self) -> ColumnsMut<'_, D> {
         self.columns.each_mut().map(Vec::as_mut_slice)
     }
@@ -178,17 +177,17 @@ impl<const D: usize> Particles<D> {
         (i < self.len()).then(|| SVector::from_fn(|d, _| self.columns[d][i]))
     }
 
-    /// `1 / sum w_i^2`, between 1 and the number of particles.
+    /// Effective sample size `1 / sum w_i^2`, between 1 and the number of particles.
     pub fn effective_sample_size(&self) -> f64 {
         self.effective_sample_size
     }
 
-    /// Lets `change` edit the log weights (typically: add log likelihoods) and normalises them. Returns
-    /// `ln sum_i exp(log weight_i)` after the change: the log-likelihood estimate if log likelihoods were added.
+    /// Calls `change` to edit the log weights (usually to add log likelihoods) and normalises them. Returns
+    /// `ln sum_i exp(log weight_i)` after the change. If log likelihoods were added, this estimates the log likelihood of the observation.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if no weight is left, [`Error::NotANumber`] if one is NaN or infinite; the belief is
-    /// then as it was before.
+    /// [`Error::Impossible`] if all weights are zero, [`Error::NotANumber`] if one is NaN or infinite. The
+    /// belief is then unchanged.
     pub fn reweigh(&mut self, change: impl FnOnce(Columns<'_, D>, &mut [f64])) -> Result<f64, Error> {
         self.scratch.clear();
         self.scratch.extend_from_slice(&self.log_weights);
@@ -199,11 +198,11 @@ impl<const D: usize> Particles<D> {
         Ok(log_sum)
     }
 
-    /// Replaces the particles by copies of the chosen ones, equally weighted. The number of particles becomes that of the
+    /// Replaces the particles by equally weighted copies of those with the given indices. The new number of particles is the number of
     /// indices.
     ///
     /// # Errors
-    /// If there is no index, or one is not below [`len`](Self::len); the belief is then as it was.
+    /// If there is no index, or one is not below [`len`](Self::len). The belief is then unchanged.
     pub fn select(&mut self, ancestors: &[u32]) -> Result<(), Error> {
         self.check(ancestors)?;
         let width = self.auxiliary_width();
@@ -221,7 +220,7 @@ impl<const D: usize> Particles<D> {
         Ok(())
     }
 
-    /// Becomes a selection of the particles of `source`, equally weighted, in the memory of this belief.
+    /// Becomes a selection of the particles of `source`, as by [`select`](Self::select), reusing this belief's memory.
     ///
     /// # Errors
     /// As [`select`](Self::select).
@@ -240,7 +239,7 @@ impl<const D: usize> Particles<D> {
     fn check(&self, ancestors: &[u32]) -> Result<(), Error> {
         at_least_one("ancestors", ancestors.len())?;
         let count = self.len();
-        // A maximum runs in vector registers, a search does not.
+        // A maximum runs in vector registers; a search with an early exit does not.
         let largest = ancestors.iter().fold(0, |largest: u32, a| largest.max(*a));
         if largest as usize >= count {
             return refuse("ancestors", largest, format!("indices below {count}"));
@@ -282,7 +281,7 @@ impl<const D: usize> Particles<D> {
     }
 }
 
-/// `clone_from` reuses memory, so that a filter can keep a belief to fall back to without allocating.
+/// `clone_from` reuses memory, so that a filter can keep a previous belief without allocating.
 impl<const D: usize> Clone for Particles<D> {
     fn clone(&self) -> Self {
         Self {
@@ -304,7 +303,7 @@ impl<const D: usize> Clone for Particles<D> {
     }
 }
 
-/// Equality of the belief: columns, weights and auxiliary rows.
+/// Two beliefs are equal if columns, weights and auxiliary rows are equal.
 impl<const D: usize> PartialEq for Particles<D> {
     fn eq(&self, other: &Self) -> bool {
         self.columns == other.columns && self.log_weights == other.log_weights && self.auxiliary == other.auxiliary
@@ -314,7 +313,7 @@ impl<const D: usize> PartialEq for Particles<D> {
 impl<const D: usize> Belief<D> for Particles<D> {
     crate::own_moments!();
 
-    /// Each draw is a particle, chosen by its weight.
+    /// Each draw is a particle, chosen with probability equal to its weight.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
         if !fewbits_core::columns::columns_agree(&mut states) {
             return;
@@ -374,7 +373,7 @@ impl<const D: usize> TryFrom<StoredParticles> for Particles<D> {
             ArgumentError::new("columns", format!("{} columns", columns.len()), format!("{D} columns"))
         })?;
         let mut belief = Self::new(columns, &log_weights)?.with_auxiliary(stored.auxiliary)?;
-        // As it was stored, to the last bit.
+        // The effective sample size is kept as it was stored, to the last bit.
         if weights.windows(2).all(|pair| pair[0] == pair[1]) {
             belief.equalise(weights.len());
         } else {

@@ -1,8 +1,8 @@
-//! Particles as they are stored.
+//! The serialised form of particles.
 
 use serde::{Deserialize, Serialize};
 
-/// Columns, weights with their logarithms (of which a weight of zero has none: JSON has no infinity) and auxiliary rows.
+/// Columns, log weights (none for a weight of zero, since JSON has no infinity), and auxiliary rows.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename = "Particles", deny_unknown_fields)]
 pub(super) struct StoredParticles {
@@ -10,11 +10,11 @@ pub(super) struct StoredParticles {
     pub(super) columns: Vec<Vec<f64>>,
     #[serde(with = "fewbits_numerics::stored")]
     pub(super) weights: Vec<f64>,
-    /// Equal weights need no logarithms.
+    /// Empty if all weights are equal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[serde(with = "fewbits_numerics::stored")]
     pub(super) log_weights: Vec<Option<f64>>,
-    /// As it was summed, so that a filter resumes to the last bit.
+    /// Stored as it was computed, so that a resumed filter gives the same bits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[serde(with = "fewbits_numerics::stored")]
     pub(super) effective_sample_size: Option<f64>,

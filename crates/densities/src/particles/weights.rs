@@ -1,10 +1,10 @@
-//! Weights of particles: draws in proportion, rows that travel along, normalisation.
+//! Weights of particles: random selection in proportion, copies of auxiliary rows, normalisation.
 
 use crate::Error;
 use fewbits_numerics::kernels::{exp_minus, largest_number, sum, vectorised};
 use rand::{Rng, RngExt};
 
-/// Draws of indices in proportion to weights, by their running sums: `O(n)` to prepare, `O(log n)` a draw.
+/// Draws indices with probability proportional to weights, by cumulative sums: `O(n)` to prepare, `O(log n)` per draw.
 ///
 /// ```
 /// use fewbits_densities::Categorical;
@@ -32,15 +32,15 @@ impl Categorical {
         }
     }
 
-    /// An index of positive weight.
+    /// Draws an index of positive weight.
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
         let point = rng.random::<f64>() * self.sums.last().copied().unwrap_or(0.0);
         self.sums.partition_point(|sum| *sum <= point).min(self.last)
     }
 }
 
-/// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i / sum w` times, rounded up or down. The first
-/// draw is at `offset` steps of the cumulative weight: uniform between 0 and 1 for a draw, 1/2 for a selection.
+/// Indices of `count` systematic draws from `weights`: index `i` occurs `count w_i / sum w` times, rounded up or down. Draw `j` is at
+/// `(j + offset) / count` of the cumulative weight; `offset` is uniform in `[0, 1)` for random draws, or 1/2 for a deterministic selection.
 pub fn systematic(weights: &[f64], count: usize, offset: f64) -> Vec<usize> {
     let total: f64 = sum(weights);
     let (mut i, mut cumulative) = (0, weights.first().copied().unwrap_or(0.0));
@@ -55,7 +55,7 @@ pub fn systematic(weights: &[f64], count: usize, offset: f64) -> Vec<usize> {
     (0..count).map(next).collect()
 }
 
-/// Copies the chosen rows.
+/// Copies the rows with the chosen indices to `out`.
 pub(crate) fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut Vec<f64>) {
     if width > 0 {
         for a in chosen {
@@ -65,8 +65,8 @@ pub(crate) fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut 
     }
 }
 
-/// Normalises log weights and writes their exponentials; returns `ln sum exp` and the effective
-/// sample size. On failure `weights` is as it was.
+/// Normalises log weights and writes their exponentials to `weights`. Returns `ln sum exp` and the effective sample size. On failure
+/// `weights` is unchanged.
 pub(crate) fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
     let what = "a log weight";
     let largest = largest_number(logs).ok_or(Error::NotANumber { what })?;

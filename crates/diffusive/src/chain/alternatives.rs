@@ -1,4 +1,4 @@
-//! The models of the medium that a search still holds possible.
+//! The models of the medium that a search still considers possible.
 
 use crate::fit::Fit;
 use crate::posterior::Posterior;
@@ -7,7 +7,7 @@ use fewbits_core::{Belief, Gaussian};
 use fewbits_densities::moment_matched;
 use fewbits_numerics::LogSum;
 
-/// Models this many nats below the best are not looked at again.
+/// A model whose log probability is this many nats below the best is excluded.
 pub(super) const EXCLUDED: f64 = 30.0;
 
 /// One model of the medium along a search.
@@ -40,7 +40,7 @@ impl Alternative {
     }
 }
 
-/// The first of the most probable.
+/// Index of the most probable model, the lowest in a tie.
 pub(super) fn most_probable(alternatives: &[Alternative]) -> usize {
     (1..alternatives.len()).fold(0, |best, i| {
         if alternatives[i].probability > alternatives[best].probability {
@@ -51,7 +51,7 @@ pub(super) fn most_probable(alternatives: &[Alternative]) -> usize {
     })
 }
 
-/// Mean and covariance of the position under all models.
+/// Mean and covariance of the position, averaged over all models by their probabilities.
 pub(super) fn mixed(alternatives: &[Alternative]) -> Gaussian<2> {
     let held = alternatives.iter().filter(|a| a.probability > 0.0);
     moment_matched(held.filter_map(|a| {
@@ -60,7 +60,7 @@ pub(super) fn mixed(alternatives: &[Alternative]) -> Gaussian<2> {
     }))
 }
 
-/// How the samples fit under all models.
+/// Fit of the samples, averaged over all models by their probabilities.
 pub(super) fn mixed_fit(alternatives: &[Alternative], samples: usize) -> Fit {
     let held = alternatives.iter().filter(|a| a.probability > 0.0);
     let parts = held.filter_map(|a| Some(a.probability * a.posterior.as_ref()?.fit.chi_squared));
@@ -70,7 +70,7 @@ pub(super) fn mixed_fit(alternatives: &[Alternative], samples: usize) -> Fit {
     }
 }
 
-/// Logarithm of the evidence under all models.
+/// Logarithm of the evidence, summed over all models.
 pub(super) fn log_evidence(alternatives: &[Alternative]) -> f64 {
     alternatives
         .iter()

@@ -1,4 +1,4 @@
-//! The search: a belief travels from node to node until it is sharp.
+//! The search: nodes update a belief of the source and send it on until its covariance is small.
 
 mod alternatives;
 mod outcome;
@@ -50,25 +50,24 @@ pub struct Search {
     pub rule: SelectionRule,
     /// The search has converged when the determinant of the position's covariance falls below this, m^4.
     pub threshold: f64,
-    /// The most nodes that sample.
+    /// Largest number of nodes that sample.
     pub most_nodes: usize,
-    /// After so many nodes without the determinant falling to a half, the next node is chosen by mutual information whatever the
-    /// rule.
+    /// If the determinant has not halved over this many nodes, the next node is chosen by mutual information, whatever `rule` is.
     pub stall: Option<usize>,
     /// Encoding of the messages.
     pub wire: Wire,
     /// Options of the cells that hold exact posteriors.
     pub cells: CellOptions,
-    /// The probability with which a right model may be refused ([`Status::Misfit`]), 1e-3 unless told. `None`: it is never refused.
+    /// Probability with which a correct model may be refused ([`Status::Misfit`]), 1e-3 by default. `None`: it is never refused.
     pub refusal: Option<f64>,
 }
 
-/// Mass at the border above which the source is taken to be outside.
+/// If the mass at the border of the box exceeds this, the source is taken to be outside.
 const LEANING: f64 = 0.5;
 
 impl Search {
-    /// A search around the node that raised the alarm, with a wide prior: standard deviation `deviation` about its place.
-    /// Raw records travel, the next node is chosen by mutual information.
+    /// A search that starts around the node `alarm`: the prior has standard deviation `deviation`, m, about that place. Nodes send raw
+    /// records, and the next node is chosen by mutual information.
     ///
     /// # Errors
     /// If `deviation` or `threshold` is not a positive number, or the box is empty.
@@ -100,13 +99,13 @@ impl Search {
         })
     }
 
-    /// Runs the search from node `start`; `samples` says what a node measures when it is asked.
+    /// Runs the search from node `start`. `samples` returns what a node measures, kg/m^3, when it is asked.
     ///
-    /// A search that fails on the way ends with a [`Status`]. Errors are for invalid arguments.
+    /// A search that cannot continue ends with a [`Status`]; errors are for invalid arguments.
     ///
     /// # Errors
     /// If `start` does not exist, graph and deployment differ in size, the model has no concentrations at a node, `samples` fails, a
-    /// sample is not finite, or the form cannot carry the rate.
+    /// sample is not finite, or messages of this form cannot contain the rate.
     pub fn run(
         &self,
         sensor: &SourceSensor,
@@ -118,12 +117,12 @@ impl Search {
         self.run_models(&ModelGrid::single(sensor.clone()), deployment, graph, start, samples)
     }
 
-    /// Runs the search while wind, diffusivity or anything else of the medium is known up to a few models. Every model has its own
-    /// posterior of all records, weighed by its evidence; estimate and determinant are those of the mixture, and the most probable
-    /// model chooses the next node.
+    /// Runs the search when a property of the medium, such as the wind or the diffusivity, is one of a few candidates. Every model has its
+    /// own posterior of all records, weighted by its evidence. Estimate and determinant are those of the mixture. The most probable model
+    /// chooses the next node.
     ///
     /// # Errors
-    /// As [`run`](Self::run), or if there are several models and anything but raw records travels.
+    /// As [`run`](Self::run); if there are several models and the form is not [`Form::Raw`].
     pub fn run_models(
         &self,
         models: &ModelGrid,
@@ -142,7 +141,7 @@ impl Search {
             models: models.iter().map(|(_, prior)| prior).collect(),
         };
         let mut visited = vec![false; deployment.len()];
-        // What the node received: a belief with the fit so far (nothing but records, if these travel), and its price.
+        // What the node received: a belief with the fit so far (only records, if the form is raw), and its number of bits.
         let mut received: Option<(Travelling, Fit)> = None;
         let (mut node, mut hops, mut bits) = (start, 0, 0);
         loop {
@@ -171,7 +170,7 @@ impl Search {
             let fit = mixed_fit(&alternatives, updated.fit.samples);
             let fit = received.as_ref().map_or(fit, |(_, before)| before.plus(&fit));
 
-            // Project, encode, and go on with what will be decoded.
+            // Project, encode, and continue with what the next node will decode.
             let ids: Vec<usize> = outcome.steps.iter().map(|step| step.node).chain([node]).collect();
             let last = &outcome.records[outcome.records.len() - 1];
             let projected = match project(&updated, self.form, &self.rate) {
@@ -285,7 +284,7 @@ impl Search {
         }
     }
 
-    /// For the Laplace form: replaces the moments by mode and curvature where there is a peak.
+    /// For the Laplace form: mode and curvature instead of the moments, if the posterior has a peak.
     fn peak(
         &self,
         moments: Travelling,

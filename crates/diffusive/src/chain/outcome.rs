@@ -9,57 +9,58 @@ use fewbits_core::Gaussian;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Status {
-    /// The determinant fell below the threshold.
+    /// The determinant of the position's covariance fell below the threshold.
     Converged,
     /// No unvisited node can be reached.
     Exhausted,
-    /// The most nodes were used.
+    /// The largest number of nodes was reached.
     NodeLimit,
-    /// A node's samples and the belief that it received exclude each other: a mode was lost on the way, or the model is wrong.
+    /// A node's samples have probability zero under the belief that it received. A mode was lost in an earlier message, or the model is
+    /// wrong.
     BeliefMiss,
-    /// The samples are not what the model says ([`Fit`]): no source at the place and with a rate that are possible causes them in this
-    /// medium. Whatever the belief says, do not trust it.
+    /// The samples contradict the model ([`Fit`]): no possible place and rate of a source explains them in this
+    /// medium. The belief must then not be used, however sharp it is.
     Misfit,
-    /// The encoded belief does not decode to a belief: the numbers of the wire format are too coarse.
+    /// The encoded belief does not decode to a belief: the number format is too coarse.
     Undecodable,
-    /// The posterior leans on the border of the search box: the source is probably outside.
+    /// The posterior has much mass at the border of the search box: the source is probably outside.
     OutsideField,
-    /// The posterior is too thin for the cells allowed.
+    /// The posterior is too thin for the allowed number of cells.
     Unresolved,
 }
 
 /// One node's part in a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// Which node sampled.
+    /// Index of the node that sampled.
     pub node: usize,
-    /// Hops from the node before.
+    /// Hops from the node before to this one.
     pub hops: usize,
-    /// Mean and covariance of what travels on (of the posterior, for raw records).
+    /// Mean and covariance of the belief that is sent on (of the posterior, for raw records), m and m^2.
     pub estimate: Gaussian<2>,
     /// `log10` of the determinant of that covariance, m^4.
     pub log10_determinant: f64,
-    /// Bits that arrived with the belief from the node before, over all hops.
+    /// Bits of the message from the node before, over all hops.
     pub bits: usize,
-    /// Cells that were evaluated.
+    /// Number of cells that were evaluated.
     pub evaluations: usize,
     /// Logarithm of the integral of belief times likelihood.
     pub log_evidence: f64,
-    /// How the samples fit so far. Raw records: all samples under this posterior. Other forms: of every node its own samples under
-    /// its own posterior, summed; the sum travels with the belief.
+    /// How the samples fit so far. Raw records: all samples under this posterior. Other forms: the sum over all nodes so far of the fit
+    /// of each node's samples under its own posterior. The sum is sent with the belief.
     pub fit: Fit,
 }
 
 /// Outcome of a search.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// Why it ended.
+    /// Why the search ended.
     pub status: Status,
     /// Every node that sampled, in order.
     pub steps: Vec<Step>,
-    /// The last posterior, before projection. With several models that of the most probable one.
+    /// The last posterior, before projection. With several models it is that of the most probable one.
     pub posterior: Option<Posterior>,
-    /// The records that were used. With several models those of the most probable one.
+    /// The records that were used. With several models they are those of the most probable one.
     pub records: Vec<Record>,
     /// Probabilities of the models, in their order.
     pub models: Vec<f64>,
@@ -76,13 +77,13 @@ impl Outcome {
         self.steps.last().map(|step| step.fit)
     }
 
-    /// All bits that travelled.
+    /// Total bits of all messages.
     pub fn bits(&self) -> usize {
         self.steps.iter().map(|step| step.bits).sum()
     }
 }
 
-/// Failures of a belief that end a search; others are errors.
+/// The status for an error of a belief that ends the search; `None` for other errors.
 pub(super) fn failure(error: &Error) -> Option<Status> {
     match error {
         Error::Impossible => Some(Status::BeliefMiss),

@@ -12,7 +12,7 @@ use crate::{Error, RateModel, SourceLikelihood};
 use fewbits_densities::Mixture;
 
 impl Search {
-    /// Updates the posterior of every model that is left, and the models' probabilities. A status if the search ends here.
+    /// Updates the posterior of every remaining model, and the models' probabilities. Returns a status if the search ends here.
     pub(super) fn update(
         &self,
         alternatives: &mut [Alternative],
@@ -30,7 +30,7 @@ impl Search {
                     let status = failure(&error).ok_or(error)?;
                     let status = self.explained(status, &prior, &likelihood, received.is_some())?;
                     if status == Status::Unresolved {
-                        // The evidence of this model is not known: no other can be said to be right.
+                        // Without the evidence of this model the probabilities of the others are unknown.
                         return Ok(Some(status));
                     }
                     alternative.log_weight = f64::NEG_INFINITY;
@@ -84,7 +84,7 @@ impl Search {
         Ok((prior, SourceLikelihood::new(records.to_vec(), self.rate)?, near))
     }
 
-    /// The status of an update that failed. If not even the best position explains the samples, that is the reason.
+    /// The status of an update that failed. If even the best position does not explain the samples, it is a misfit.
     pub(super) fn explained(
         &self,
         status: Status,
@@ -97,7 +97,7 @@ impl Search {
         };
         let fit = best_fit(&Target::new(prior, likelihood)?, likelihood, &self.search);
         Ok(match (status, fit) {
-            // What excludes a belief that was received may lie in the belief.
+            // If the belief was received, it may be the belief that is wrong and not the model.
             (Status::BeliefMiss, None) if carried => status,
             (_, None) => Status::Misfit,
             (_, Some(fit)) if fit.is_refused(level) => Status::Misfit,

@@ -1,4 +1,4 @@
-//! Equal cells that cover where a density is: the exact belief in few dimensions.
+//! A density represented by equal cells: the exact belief in few dimensions.
 
 use crate::Error;
 use fewbits_core::columns::{change_each, state_at};
@@ -13,27 +13,27 @@ use rand::Rng;
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-/// A density to be covered by cells.
+/// A density that [`Cells`] can cover.
 pub trait CellTarget<const D: usize> {
     /// Writes for every cell, a cube about its centre, the log density at the centre (up to one constant) and a score that
-    /// decides which cells are kept: the log density blurred over the cell, so that a ridge that runs between the centres still
-    /// scores. Where cells are small against the density, score and log density agree.
+    /// decides which cells are kept. The score is the log of the density averaged over the cell, so that a ridge between the centres
+    /// is not missed. For cells that are small against the density, score and log density agree.
     fn evaluate(&self, centres: &Columns<'_, D>, half_width: f64, log_densities: &mut [f64], scores: &mut [f64]);
 }
 
-/// When cells are kept, split and small enough.
+/// Which cells are kept and split, and when the refinement stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct CellOptions {
     /// Cells whose score is within this many nats of the best are kept and split.
     pub keep: f64,
-    /// The log evidence must settle to this, in nats.
+    /// The refinement stops if the log evidence changes by less than this, in nats, ...
     pub evidence_tolerance: f64,
-    /// The cells must be narrower than this share of the smallest standard deviation.
+    /// ... the cells are narrower than this share of the smallest standard deviation, ...
     pub width: f64,
-    /// The determinant of the covariance must settle to this share.
+    /// ... and the determinant of the covariance changes by less than this share.
     pub determinant_tolerance: f64,
-    /// More cells than this are refused.
+    /// Largest number of cells.
     pub most_cells: usize,
 }
 
@@ -49,15 +49,15 @@ impl Default for CellOptions {
     }
 }
 
-/// Levels of splitting after which a density is taken for a point: cells are then 2^-48 of the box.
+/// Largest number of splits: the cells are then 2^-48 of the box.
 const DEEPEST: usize = 48;
 /// Cells below this share of the largest weight are dropped at the end.
 const NEGLIGIBLE: f64 = 1e-12;
 
-/// A belief over equal cubic cells, of any shape; normalised. The density is constant on each cell.
+/// A normalised density over equal cubic cells, of any shape. It is constant on each cell.
 ///
-/// Sums over the centres are the midpoint rule, which is spectrally accurate for a smooth density that the cells resolve: moments
-/// are good to about 1e-7 with cells of 0.8 standard deviations.
+/// Sums over the centres are the midpoint rule. Its error falls faster than any power of the cell width for a smooth density that the
+/// cells resolve: with cells of 0.8 standard deviations the moments are accurate to about 1e-7.
 ///
 /// ```text
 /// cover the box with cells
@@ -111,6 +111,7 @@ impl<const D: usize> Cells<D> {
         let (mut logs, mut scores, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         let mut before: Option<(f64, f64)> = None;
         let mut evaluations = 0;
+        // Each level halves the width of the cells that are kept.
         for _ in 0..DEEPEST {
             let count = centres[0].len();
             logs.clear();
@@ -132,6 +133,7 @@ impl<const D: usize> Cells<D> {
                 let (mean, covariance) = moments(&centres, &weights, total);
                 let variances = symmetric_eigen(covariance).0;
                 let (determinant, narrowest) = (variances.product(), variances.min().max(0.0).sqrt());
+                // Done when evidence and covariance no longer change with the cell width, and cells are small beside the posterior.
                 let settled = before.is_some_and(|(evidence, size)| {
                     (log_evidence - evidence).abs() < options.evidence_tolerance
                         && (determinant / size - 1.0).abs() < options.determinant_tolerance
@@ -159,6 +161,7 @@ impl<const D: usize> Cells<D> {
                 before = Some((log_evidence, determinant));
             }
             let threshold = best_score - options.keep;
+            // Count before allocating: a density that is too thin is refused without using the memory.
             let kept = scores.iter().filter(|score| **score > threshold).count();
             if kept << D > options.most_cells {
                 return Err(too_many(kept << D));
@@ -170,12 +173,12 @@ impl<const D: usize> Cells<D> {
         Err(too_many(centres[0].len()))
     }
 
-    /// Centres, one column a coordinate.
+    /// Centres of the cells: one column per coordinate.
     pub fn columns(&self) -> Columns<'_, D> {
         self.columns.each_ref().map(Vec::as_slice)
     }
 
-    /// Probabilities of the cells.
+    /// Probabilities of the cells; they sum to one.
     pub fn weights(&self) -> &[f64] {
         &self.weights
     }
@@ -200,12 +203,12 @@ impl<const D: usize> Cells<D> {
         self.log_evidence
     }
 
-    /// Number of evaluated densities.
+    /// Number of density evaluations so far.
     pub fn evaluations(&self) -> usize {
         self.evaluations
     }
 
-    /// The box that the cells fill, as its corners.
+    /// Lower and upper corner of the box that contains all cells.
     pub fn bounds(&self) -> ([f64; D], [f64; D]) {
         let half = 0.5 * self.width;
         let end = |column: &Vec<f64>, f: fn(f64, f64) -> f64| column.iter().copied().reduce(f).unwrap_or(0.0);
@@ -234,13 +237,13 @@ impl<const D: usize> Belief<D> for Cells<D> {
         self.mean
     }
 
-    /// Covariance of the midpoint rule: for a smooth density closer to the truth, by `width^2 / 12`, than that of the piecewise
-    /// constant density.
+    /// Covariance by the midpoint rule. For a smooth density it is more accurate than that of the piecewise constant density, which is
+    /// larger by `width^2 / 12`.
     fn covariance(&self) -> SMatrix<f64, D, D> {
         self.covariance
     }
 
-    /// Draws are centres of cells, for the same reason.
+    /// Draws are centres of cells: their covariance is then that of [`covariance`](Belief::covariance).
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
         let weighted = Categorical::new(&self.weights);
         change_each(states, |_| state_at(&self.columns(), weighted.draw(rng)));
@@ -279,7 +282,7 @@ pub(crate) fn lattice<const D: usize>(
     for i in 0..total {
         let mut rest = i;
         for d in 0..D {
-            // Centred, so that a box that is no multiple of the width is covered evenly.
+            // The lattice is centred: if the box is no multiple of the width, it protrudes equally on both sides.
             let middle = 0.5 * (lower[d] + upper[d]);
             columns[d].push(middle + width * ((rest % counts[d]) as f64 - 0.5 * (counts[d] - 1) as f64));
             rest /= counts[d];
@@ -288,7 +291,7 @@ pub(crate) fn lattice<const D: usize>(
     Ok(columns)
 }
 
-/// The centres of the `2^D` parts of each of the given cells, a step from its own.
+/// The centres of the `2^D` parts of each of the given cells, at `step` from the cell's own centre along each axis.
 pub(crate) fn split<const D: usize>(
     centres: &[Vec<f64>; D],
     cells: impl Iterator<Item = usize> + Clone,

@@ -1,4 +1,4 @@
-//! A weighted cloud summed up by a few clumps.
+//! A weighted cloud of points summarised by a few clumps: weight, mean and covariance of groups of points.
 
 use crate::Error;
 use fewbits_core::{Columns, Gaussian};
@@ -9,7 +9,7 @@ use nalgebra::{SMatrix, SVector};
 /// Weight, mean and covariance of one part of a belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clump<const D: usize> {
-    /// Share of the mass.
+    /// Share of the total mass.
     pub weight: f64,
     /// Mean.
     pub mean: SVector<f64, D>,
@@ -17,7 +17,7 @@ pub struct Clump<const D: usize> {
     pub covariance: SMatrix<f64, D, D>,
 }
 
-/// A belief as clumps: their moments together are exactly those of the points they were made of.
+/// A belief as clumps. Their mean and covariance together are exactly those of the points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clumps<const D: usize> {
     pub(super) clumps: Vec<Clump<D>>,
@@ -67,7 +67,7 @@ impl<const D: usize> Clumps<D> {
             total,
             scale: SVector::repeat(1.0),
         };
-        // Coordinates may have different units: variances count in parts of the whole's.
+        // Coordinates may have different units: divide each variance by that of all points.
         let whole = cloud.part(&order, 0, order.len()).clump.covariance.diagonal();
         cloud.scale = whole.map(|v| if v > 0.0 { v.recip() } else { 0.0 });
         let mut parts = vec![cloud.part(&order, 0, order.len())];
@@ -80,7 +80,7 @@ impl<const D: usize> Clumps<D> {
             let cut = parts[chosen].clump.mean[axis];
             let middle = from + partition(&mut order[from..to], |i| columns[axis][i as usize] < cut);
             if middle == from || middle == to {
-                // Rounding left no point on one side.
+                // Rounding put all points on one side: do not try this part again.
                 parts[chosen].urgency = 0.0;
                 continue;
             }
@@ -98,7 +98,7 @@ impl<const D: usize> Clumps<D> {
         &self.clumps
     }
 
-    /// The same clumps with other weights of any sum above zero, one for each.
+    /// The same clumps with other weights, one for each, of any positive sum.
     pub(crate) fn reweighted(&self, weights: &[f64]) -> Self {
         let (mut other, total) = (self.clone(), weights.iter().sum::<f64>());
         let pairs = other.clumps.iter_mut().zip(weights);
@@ -111,7 +111,7 @@ impl<const D: usize> Clumps<D> {
         moment_matched(self.clumps.iter().map(|c| (c.weight, c.mean, c.covariance)))
     }
 
-    /// Sets the least variance of fitted components along each coordinate: what the points resolve. Zero sets none.
+    /// Sets the smallest variance of fitted components along each coordinate, the resolution of the points. Zero sets none.
     ///
     /// # Errors
     /// If a variance is negative or not finite.
@@ -143,6 +143,7 @@ struct Part<const D: usize> {
 impl<const D: usize> Cloud<'_, D> {
     fn part(&self, order: &[u32], from: usize, to: usize) -> Part<D> {
         let members = &order[from..to];
+        // Coordinates relative to a member: sums of squares about the origin would cancel.
         let origin = SVector::<f64, D>::from_fn(|d, _| self.columns[d][members[0] as usize]);
         let (mut weight, mut first, mut second) = (0.0, SVector::<f64, D>::zeros(), SMatrix::<f64, D, D>::zeros());
         let mut own = SVector::<f64, D>::zeros();
@@ -169,6 +170,7 @@ impl<const D: usize> Cloud<'_, D> {
             from,
             to,
             axis,
+            // The part with the largest weighted variance along its axis is split next.
             urgency: if members.len() > 1 {
                 weight * variance.max(0.0)
             } else {

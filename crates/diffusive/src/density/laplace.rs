@@ -6,11 +6,11 @@ use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::error::{all_finite, positive};
 use nalgebra::{SMatrix, SVector};
 
-/// The largest step from the mode, in standard deviations, at which curvature is measured.
+/// Largest step of the finite differences, in standard deviations.
 const STEP: f64 = 0.05;
-/// Newton steps before the search for a peak is given up.
+/// Limit on the Newton steps.
 const STEPS: usize = 100;
-/// The search ends when the predicted gain of a step falls below this, in nats.
+/// The search ends if the quadratic model predicts a rise below this, in nats.
 const SETTLED: f64 = 1e-13;
 
 fn no_peak<T>(reason: &'static str) -> Result<T, Error> {
@@ -22,21 +22,21 @@ fn no_peak<T>(reason: &'static str) -> Result<T, Error> {
 pub struct Peak<const D: usize> {
     /// Position of the peak.
     pub mode: SVector<f64, D>,
-    /// Log density there.
+    /// Log density at the mode.
     pub height: f64,
-    /// Negative inverse Hessian there: mode and this are the plain Laplace approximation.
+    /// Negative inverse Hessian at the mode. Mode and this covariance are the Laplace approximation.
     pub covariance: SMatrix<f64, D, D>,
     /// Half the log determinant of the negative Hessian.
     half_log_curvature: f64,
 }
 
 impl<const D: usize> Peak<D> {
-    /// Climbs from `start` by Newton's method with derivatives from differences; `scale` is the rough extent of the peak along
-    /// each coordinate, which sets the first differences and bounds the first steps.
+    /// Finds a peak from `start` by Newton's method with finite differences. `scale` is the approximate extent of the peak along
+    /// each coordinate. It sets the first differences and limits the first steps.
     ///
     /// # Errors
-    /// [`Error::NoPeak`] if the search does not settle, or the Hessian at its end is not negative definite: a ring, a plateau or a
-    /// ridge has no Gaussian of this kind, and cells or mixtures are the way out.
+    /// [`Error::NoPeak`] if the search does not converge, or the Hessian at its end is not negative definite. A ring, a plateau or a
+    /// ridge has no such Gaussian: use cells or a mixture.
     pub fn climb(
         log_density: &impl Fn(&SVector<f64, D>) -> f64,
         start: &SVector<f64, D>,
@@ -57,11 +57,13 @@ impl<const D: usize> Peak<D> {
             let Some((step, definite)) = ascent(&gradient, &hessian, &extent) else {
                 return no_peak("a derivative is not finite");
             };
+            // Rise of the log density that the quadratic model predicts.
             let gain = 0.5 * gradient.dot(&step);
             if definite && gain < SETTLED.max(1e-15 * height.abs()) {
                 return Self::at(log_density, x, height, extent);
             }
             let mut share = 1.0;
+            // Halve the step until the log density rises.
             let climbed = (0..40).find_map(|_| {
                 let next = x + step * share;
                 let level = log_density(&next);
@@ -73,6 +75,7 @@ impl<const D: usize> Peak<D> {
                 None if definite && gain < 1e-6 => return Self::at(log_density, x, height, extent),
                 None => return no_peak("no step leads upwards"),
             }
+            // Base the next differences on the width of the peak by the present Hessian.
             if definite && let Some(inverse) = (-hessian).cholesky() {
                 extent = inverse.inverse().diagonal().map(f64::sqrt);
             }
@@ -103,21 +106,21 @@ impl<const D: usize> Peak<D> {
         Gaussian::from_trusted_parts(self.mode, self.covariance)
     }
 
-    /// Laplace's approximation of the log of the integral.
+    /// Laplace's approximation of the log of the integral of the density.
     pub fn log_evidence(&self) -> f64 {
         self.height - self.half_log_curvature + D as f64 * fewbits_numerics::normal::LN_SQRT_2PI
     }
 }
 
-/// Mean and covariance by the cumulants of `Lambda(s) = max [ln p + s'x] - (1/2) ln det(-Hessian)`: the limit of Tierney and
-/// Kadane's fully exponential ratios (equations 24 to 31 of the paper) for a shift of the origin to infinity, in which the
-/// squares that cancel in equation (31) have cancelled on paper.
+/// Mean and covariance by the cumulants of `Lambda(s) = max [ln p + s'x] - (1/2) ln det(-Hessian)`. This is the limit of Tierney and
+/// Kadane's fully exponential ratios (equations 24 to 31 of the paper) for a shift of the origin to infinity. The squares that cancel
+/// numerically in equation (31) are cancelled analytically.
 ///
-/// On posteriors of three to five nodes the mean is off by less than 0.001 standard deviations and the covariance by less than
-/// 0.3 per cent, where mode and Hessian err by up to 0.18 standard deviations and 4 per cent.
+/// On posteriors of three to five nodes the mean errs by less than 0.001 standard deviations and the covariance by less than
+/// 0.3 per cent. Mode and Hessian err by up to 0.18 standard deviations and 4 per cent.
 ///
 /// # Errors
-/// As [`Peak::climb`], also at the tilted densities; or if the covariance found is not positive definite.
+/// As [`Peak::climb`], also for the tilted densities; if the resulting covariance is not positive definite.
 pub fn cumulant_laplace<const D: usize>(
     log_density: &impl Fn(&SVector<f64, D>) -> f64,
     start: &SVector<f64, D>,
@@ -127,7 +130,7 @@ pub fn cumulant_laplace<const D: usize>(
     let Some(factor) = centre.covariance.cholesky() else {
         return no_peak("the curvature is singular");
     };
-    // In coordinates y with x = mode + L y the posterior is near a standard normal and tilts of size STEP are alike everywhere.
+    // In coordinates y with x = mode + L y the posterior is near a standard normal, so one size STEP of the tilt fits all axes.
     let lower = factor.l();
     let whitened = |y: &SVector<f64, D>| log_density(&(centre.mode + lower * y));
     let ones = SVector::<f64, D>::repeat(1.0);
@@ -159,12 +162,12 @@ pub fn cumulant_laplace<const D: usize>(
 }
 
 /// `E[g(x)]` of a function that is positive around the peak, by Tierney and Kadane's ratio of two Laplace approximations
-/// (equations 24 to 27): the error is of second order in one over the number of observations.
+/// (equations 24 to 27). With `n` observations the error is of order `1 / n^2`.
 ///
-/// Variances formed from two such expectations cancel: see [`cumulant_laplace`].
+/// Do not form variances from two such expectations, because digits cancel: use [`cumulant_laplace`].
 ///
 /// # Errors
-/// As [`Peak::climb`], or if `g` is not positive where the search goes.
+/// As [`Peak::climb`]; if `g` is not positive at a point of the search.
 pub fn tierney_kadane<const D: usize>(
     log_density: &impl Fn(&SVector<f64, D>) -> f64,
     g: &impl Fn(&SVector<f64, D>) -> f64,
@@ -216,7 +219,7 @@ fn derivatives<const D: usize>(
     (gradient, hessian)
 }
 
-/// A step upwards and whether it is Newton's own; no longer than twice the extent otherwise.
+/// An ascent step, and whether it is Newton's step. Other steps are at most twice the extent.
 fn ascent<const D: usize>(
     gradient: &SVector<f64, D>,
     hessian: &SMatrix<f64, D, D>,

@@ -8,22 +8,22 @@ use fewbits_numerics::eigen::raised;
 use fewbits_numerics::error::{at_least_one, within};
 use nalgebra::{Cholesky, SMatrix, SVector};
 
-/// How a mixture is fitted.
+/// Settings of [`Clumps::fit`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct MixtureFit {
-    /// The most components.
+    /// Largest number of components.
     pub components: usize,
-    /// Components below this weight are dropped and the others fitted anew.
+    /// A component below this weight is dropped, and the others are fitted again.
     pub least_weight: f64,
-    /// The most steps of expectation-maximisation.
+    /// Limit on the steps of expectation-maximisation.
     pub iterations: usize,
-    /// It stops when the mean log density rises by less than this, in nats.
+    /// The iteration stops if the mean log density rises by less than this, in nats.
     pub tolerance: f64,
 }
 
 impl MixtureFit {
-    /// A fit of at most `components` Gaussians.
+    /// Settings for at most `components` Gaussians.
     ///
     /// # Errors
     /// If `components` is zero.
@@ -36,27 +36,27 @@ impl MixtureFit {
         })
     }
 
-    /// The same, with another least weight.
+    /// The same settings with another least weight.
     ///
     /// # Errors
-    /// If it is outside `[0, 1]`.
+    /// If `least_weight` is outside `[0, 1]`.
     pub fn with_least_weight(self, least_weight: f64) -> Result<Self, Error> {
         within("least_weight", least_weight, 0.0, 1.0)?;
         Ok(Self { least_weight, ..self })
     }
 }
 
-/// Shares this many nats below the largest are below rounding (4e-18).
+/// Shares this many nats below the largest are negligible (`exp(-40)` is 4e-18).
 const NEGLIGIBLE_NATS: f64 = 40.0;
 
 impl<const D: usize> Clumps<D> {
     /// A Gaussian mixture of the same mean and covariance, by expectation-maximisation over the clumps.
     ///
-    /// A clump counts with its covariance: the expected log density decides its shares, and its spread goes into the
-    /// components. The start is the clumps' own coarsest splitting, so that the result is deterministic.
+    /// A clump is used with its covariance: its expected log density determines its shares, and its covariance enters that of the
+    /// components. The start is the coarsest split of the clumps, so the result is deterministic.
     ///
     /// # Errors
-    /// If the whole has no spread in some direction.
+    /// If the total covariance is singular.
     pub fn fit(&self, options: &MixtureFit) -> Result<Mixture<D>, Error> {
         let whole = *self.gaussian().covariance();
         let mut components = self.start(options.components);
@@ -67,6 +67,7 @@ impl<const D: usize> Clumps<D> {
                 .enumerate()
                 .min_by(|a, b| a.1.weight.total_cmp(&b.1.weight))
                 .map(|(at, c)| (at, c.weight));
+            // A component of little weight is removed, and the others are fitted again.
             match least {
                 Some((at, weight)) if weight < options.least_weight && fitted.len() > 1 => {
                     components = fitted;
@@ -94,7 +95,7 @@ impl<const D: usize> Clumps<D> {
     }
 
     fn improve(&self, start: Vec<Clump<D>>, whole: &SMatrix<f64, D, D>, options: &MixtureFit) -> Vec<Clump<D>> {
-        // The floor keeps components from collapsing onto single clumps; it is below what the belief resolves.
+        // This floor keeps a component from shrinking to a single clump. It is below the resolution of the belief.
         let floor = (whole.diagonal() * 1e-9).sup(&self.least);
         let mut components = start;
         for c in &mut components {
@@ -191,7 +192,7 @@ impl<const D: usize> Default for Sums<D> {
 impl<const D: usize> Sums<D> {
     #[inline]
     fn add(&mut self, clump: &Clump<D>, weight: f64) {
-        // Second moments about the first clump met, which is near: no cancellation against a far origin.
+        // Second moments about the first clump added: about a far origin they would cancel.
         let d = clump.mean - *self.origin.get_or_insert(clump.mean);
         self.weight += weight;
         self.first += d * weight;

@@ -1,10 +1,10 @@
-//! Densities of the position and rate of a source: the exact posterior over cells, and what is fitted to it.
+//! Densities of the position and rate of a source: the exact posterior over cells, and approximations that are fitted to it.
 //!
 //! | density | use it when |
 //! |---|---|
-//! | [`Cells`] | moments must be exact (about 1e-7) in one to three dimensions; takes thousands of evaluations |
+//! | [`Cells`] | moments must be exact (about 1e-7) in one to three dimensions; needs thousands of evaluations |
 //! | [`Clumps`] | a mixture is to be fitted to cells: a few hundred weighted Gaussians with the moments of all cells |
-//! | [`Lpg`] | the shape must be kept in few numbers: a squared series of Hermite polynomials about Gaussians |
+//! | [`Lpg`] | the shape must be described by few numbers: the square of a series of Hermite polynomials about Gaussians |
 //! | [`laplace`] | there is one peak: its mode and curvature, or its cumulants |
 //!
 //! [`polynomials`] has the Hermite polynomials and the plain series of the paper.

@@ -1,4 +1,4 @@
-//! What is reported at each prediction error, and how the filter answers.
+//! Probability of each message as a function of the prediction error, and the filter's correction for it.
 
 use crate::plant::{filtered_variance, innovation_gain, scalar};
 use crate::sign_bit::SignBit;
@@ -10,22 +10,22 @@ use fewbits_numerics::error::within;
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use std::f64::consts::FRAC_2_PI;
 
-/// The messages of one slot at one predicted variance: the factor of each, as a function of the prediction error, and the
-/// filter's correction.
+/// All messages that one slot can bring at one predicted variance. Each has its likelihood as a function of the prediction error and
+/// the filter's correction, in state units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MessageLaw {
     corrections: Vec<f64>,
-    /// Logarithm of the number of messages that count as one, and their common factor.
+    /// Per entry: the logarithm of the number of messages that it stands for, and the likelihood that they share.
     factors: Vec<(f64, Product)>,
 }
 
-/// Most sensors whose bit strings are enumerated.
+/// Largest number of sensors whose bit strings are enumerated: `2^12 = 4096` strings.
 const LONGEST_SEQUENCE: usize = 12;
 
 const BITS: [Sign; 2] = [Sign::Below, Sign::Above];
 
 impl MessageLaw {
-    /// A sign bit through the link `actual`, by a filter that knows its own link. Every bit arrives.
+    /// One sign bit. It crosses the link `actual`; the filter corrects as its own link says. Every bit arrives.
     ///
     /// # Errors
     /// If the correction is not finite.
@@ -43,7 +43,7 @@ impl MessageLaw {
         Self::of(filter, &scalar(0.0, predicted_variance), &words, filter.link())
     }
 
-    /// One report of a scalar filter out of all it may receive.
+    /// The law of one report: one entry for each of `reports`, which are all that can be received.
     fn of<F: ScalarFilter>(
         filter: &F,
         predicted: &fewbits_core::Gaussian<1>,
@@ -65,10 +65,10 @@ impl MessageLaw {
         Ok(law)
     }
 
-    /// The number of `+1` among several sensors that answer at once.
+    /// The number of `+1` among several sensors that answer the same threshold at once.
     ///
     /// # Errors
-    /// None that a filter can cause.
+    /// Never for a filter that its constructors made.
     pub fn count(filter: &ParallelFilter, predicted_variance: f64) -> Result<Self, Error> {
         let (sensors, arriving) = (filter.sensors(), Link::flipping(filter.link().crossover())?);
         let scheme = SignBit::of(filter.plant());
@@ -83,10 +83,10 @@ impl MessageLaw {
         Ok(law)
     }
 
-    /// The bits of several sensors that answer one after the other, the threshold refreshed in between.
+    /// The bits of several sensors that answer one after the other. The threshold is refreshed after each bit.
     ///
     /// # Errors
-    /// If there are more than 12 sensors, whose strings are too many.
+    /// If `sensors` is zero or above 12: the number of bit strings doubles with each sensor.
     pub fn sequence(plant: &ScalarPlant, predicted_variance: f64, sensors: usize) -> Result<Self, Error> {
         within("sensors", sensors as f64, 1.0, LONGEST_SEQUENCE as f64)?;
         let (scheme, r) = (SignBit::of(plant), plant.measurement_variance());
@@ -98,6 +98,7 @@ impl MessageLaw {
             p = filtered_variance(p, r, FRAC_2_PI);
             let mut longer = Self::empty();
             for (threshold, (_, string)) in law.corrections.iter().zip(&law.factors) {
+                // Each string of bits branches in two. The next sensor compares with the estimate that the string has led to.
                 for bit in BITS {
                     let mut string = string.clone();
                     string.push(scheme.factor(threshold, &Observation::Received(bit), &Link::PERFECT)?);

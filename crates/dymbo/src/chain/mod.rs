@@ -1,7 +1,7 @@
 //! The exact mean squared error of every scalar filter of this crate, without Monte Carlo.
 //!
-//! With the threshold at the prediction, what the sensor says depends on the state only through the prediction error
-//! `e = theta - prediction`. So the error is a Markov chain of its own, whatever the state does:
+//! The threshold is the prediction, so the probability of a message depends on the state only through the prediction error
+//! `e = theta - prediction`. This error is therefore a Markov chain by itself:
 //!
 //! ```text
 //! message j with probability p_j(e)          sign bit: Phi(e/sigma); word: a cell; K sensors: a count or a string
@@ -9,8 +9,8 @@
 //! next error      a (e - d_j) + u,  u ~ N(0, sigma_u^2)
 //! ```
 //!
-//! Its density is smooth, so the trapezoid rule on a uniform grid of a few hundred points is exact to about `1e-12`; the
-//! shift by `d_j` is evaluated inside the normal kernel and never interpolated.
+//! The density of `e` is smooth. The trapezoid rule on a uniform grid of a few hundred points is therefore exact to about `1e-12`. The
+//! shift by `d_j` enters as the mean of the normal kernel, so nothing is interpolated.
 //!
 //! ```
 //! use fewbits_dymbo::{chain, DymboFilter, ScalarPlant};
@@ -37,26 +37,26 @@ use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::normal::{self, INV_SQRT_2PI};
 use std::f64::consts::FRAC_2_PI;
 
-/// Grid spacing as a share of the smaller of the two noise deviations.
+/// Grid spacing divided by the smaller of the two noise deviations.
 const SPACING: f64 = 0.4;
 /// Half width of the grid in deviations of the predicted error.
 const WIDTH: f64 = 14.0;
-/// Deviations beyond which the kernel is below rounding.
+/// The normal kernel is cut at this many deviations, where it has fallen below rounding.
 const REACH: f64 = 8.6;
-/// More points than this are refused: the plant has next to no process noise, and the chain next to no end.
+/// Largest number of grid points. A plant with very little process noise would need more and is refused.
 const MOST_POINTS: f64 = 40_000.0;
-/// A density at the edge of the grid above this share of its peak asks for a wider grid.
+/// The grid is too narrow if the density at its edge exceeds this share of the peak.
 const EDGE: f64 = 1e-13;
-/// Change of the density, in total mass, at which the power iteration has settled.
+/// The power iteration has converged if the density changes by less than this mass (times the root of the number of points).
 const SETTLED: f64 = 1e-14;
-/// Power iterations after which a chain is given up ...
+/// Limit on the power iterations ...
 const MOST_STEPS: usize = 200_000;
-/// ... or these multiplications.
+/// ... and on their multiplications; whichever is reached first.
 const MOST_WORK: f64 = 2e10;
-/// Most normal kernels of one transition: grid points times messages.
+/// Limit on the normal kernels of one transition: grid points times messages.
 const MOST_KERNELS: f64 = 2e7;
 
-/// The density of the prediction error.
+/// The density of the prediction error `e` on a uniform grid about zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorChain {
     plant: ScalarPlant,
@@ -80,7 +80,7 @@ impl ErrorChain {
     /// The chain after one prediction from a normal filtered error of variance `filtered_variance`.
     ///
     /// # Errors
-    /// No process noise: the chain then has no density on a grid.
+    /// If the process noise is zero or so small that the grid would need more than 40000 points.
     pub fn from_normal(plant: &ScalarPlant, filtered_variance: f64) -> Result<Self, Error> {
         let variance = plant.dynamics().predict_variance(filtered_variance);
         let grid = Self::grid(plant, WIDTH * variance.max(plant.process_variance()).sqrt())?;
@@ -95,11 +95,11 @@ impl ErrorChain {
         })
     }
 
-    /// The chain at `n = 1` after a first message of the given resolution about a state of unknown place: the error of the
+    /// The chain at `n = 1` after a first message of resolution `resolution` (`tau`, state units) and no prior. The error of the
     /// rounded sample has density `[Phi((e + tau/2)/sigma) - Phi((e - tau/2)/sigma)]/tau`.
     ///
     /// # Errors
-    /// No process noise, a resolution that is not positive.
+    /// If `resolution` is not positive, or the process noise is zero or too small for the grid.
     pub fn from_first_message(plant: &ScalarPlant, resolution: f64) -> Result<Self, Error> {
         let tau = positive("resolution", resolution)?;
         let sigma = plant.measurement_variance().sqrt();
@@ -189,6 +189,7 @@ impl ErrorChain {
             .nodes()
             .map(|e| {
                 let (mut first, mut end) = (self.grid.points(), 0);
+                // The error after a message of this correction, moved by the plant: a normal kernel about `a (e - correction)`.
                 for (probability, correction) in law.messages(e) {
                     let centre = a * (e - correction);
                     column.add_kernel(centre, unit * probability);
@@ -207,7 +208,7 @@ impl ErrorChain {
             .collect()
     }
 
-    /// Iterates one law until the density settles.
+    /// Applies the transition of one law (power iteration) until the density no longer changes.
     fn settle(&mut self, law: &MessageLaw) -> Result<(), Error> {
         let kernels = self.density.len() as f64 * law.corrections().len() as f64;
         if kernels > MOST_KERNELS {
@@ -225,6 +226,7 @@ impl ErrorChain {
                     *n += w * p;
                 }
             }
+            // The cut kernels lose a little mass in each step: normalise.
             let total = next.iter().sum::<f64>() * self.grid.spacing();
             let mut change = 0.0;
             for (n, p) in next.iter_mut().zip(&self.density) {

@@ -1,17 +1,17 @@
-//! What the error settles to.
+//! The stationary prediction error: mean squared errors and kurtosis after many slots.
 
 use super::{ErrorChain, MessageLaw};
 use crate::{DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, steady};
 use fewbits_core::Link;
 use std::f64::consts::FRAC_2_PI;
 
-/// What the error settles to.
+/// Moments of the stationary error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct StationaryError {
-    /// Mean squared error before a message.
+    /// Mean squared error before a message, in state units squared.
     pub predicted_mse: f64,
-    /// Mean squared error after a message.
+    /// Mean squared error after a message, in state units squared.
     pub filtered_mse: f64,
     /// `E e^4/(E e^2)^2` after a message: 3 for a normal error.
     pub kurtosis: f64,
@@ -20,7 +20,7 @@ pub struct StationaryError {
 /// The stationary error under one law of messages, e.g. that at the filter's steady predicted variance.
 ///
 /// # Errors
-/// A plant with `|a| > 1` (the chain has no stationary law) or without process noise; [`Error::NotConverged`].
+/// If `|a| > 1` (no stationary law exists) or the process noise is zero; [`Error::NotConverged`] if the iteration does not converge.
 pub fn stationary(plant: &ScalarPlant, law: &MessageLaw) -> Result<StationaryError, Error> {
     plant.refuse_unstable()?;
     let largest = law.corrections().iter().fold(0.0, |m: f64, d| m.max(d.abs()));
@@ -49,7 +49,7 @@ pub fn dymbo_mse(filter: &DymboFilter) -> Result<f64, Error> {
     crossover_mse(filter, filter.link())
 }
 
-/// The same when the link is `actual` and not what the filter believes.
+/// As [`dymbo_mse`] for bits that cross the link `actual`, while the filter assumes its own link.
 ///
 /// # Errors
 /// As [`stationary`].
@@ -67,8 +67,8 @@ pub fn multibit_mse(filter: &MultibitFilter) -> Result<f64, Error> {
     Ok(stationary(filter.plant(), &MessageLaw::word(filter, p)?)?.filtered_mse)
 }
 
-/// Exact stationary mean squared error of several sensors that answer at once, and the average variance that the filter
-/// computes.
+/// Exact stationary mean squared error of several sensors that answer at once, and the stationary mean of the variance that the
+/// filter computes: `(mse, variance)`.
 ///
 /// # Errors
 /// As [`stationary`].
@@ -87,7 +87,7 @@ pub fn sequential_mse(plant: &ScalarPlant, sensors: usize) -> Result<f64, Error>
     Ok(stationary(plant, &MessageLaw::sequence(plant, p, sensors)?)?.filtered_mse)
 }
 
-/// Exact stationary error over the Kalman filter's: what [`steady::loss`] predicts.
+/// Exact stationary mean squared error of the Dymbo filter divided by the Kalman filter's. [`steady::loss`] approximates it.
 ///
 /// # Errors
 /// As [`stationary`].
@@ -95,10 +95,11 @@ pub fn true_loss(plant: &ScalarPlant) -> Result<f64, Error> {
     Ok(dymbo_mse(&DymboFilter::new(*plant))? / plant.steady_state(1.0)?.filtered_variance)
 }
 
-/// The true loss exceeds the predicted one by at most 1.2 % within `|a| <= 1`; its crossings lie just below.
+/// The true loss exceeds the predicted one by at most 1.2 % for `|a| <= 1`. A level is therefore reached slightly below the predicted
+/// place, and the search starts at this share of it.
 const CLOSE: f64 = 0.9;
 
-/// The noise ratio at which [`true_loss`] reaches `level` for the given coefficient; `None` where it does not within 10 %
+/// The noise ratio at which [`true_loss`] reaches `level` for the given coefficient. `None` if that does not happen within 10 %
 /// below [`steady::noise_ratio_at_loss`].
 ///
 /// # Errors
@@ -112,7 +113,7 @@ pub fn noise_ratio_at_loss(level: f64, coefficient: f64) -> Result<Option<f64>, 
     Ok(root.map(f64::exp))
 }
 
-/// The coefficient at which [`true_loss`] reaches `level` for the given noise ratio; `None` where it does not within 10 %
+/// The coefficient at which [`true_loss`] reaches `level` for the given noise ratio. `None` if that does not happen within 10 %
 /// below [`steady::coefficient_at_loss`].
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! How the error goes from the first message to its steady state.
+//! Mean squared error, slot by slot, from the first message on.
 
 use super::{ErrorChain, MessageLaw};
 use crate::{DymboFilter, Error, ScalarPlant};
@@ -6,23 +6,23 @@ use fewbits_core::Link;
 use fewbits_numerics::error::non_negative;
 use std::f64::consts::FRAC_2_PI;
 
-/// One step of a transient: what the filter computes and what is true.
+/// One slot: the variances that the filter computes, and the exact mean squared error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TransientStep {
-    /// Predicted variance `P` of the filter; at the first message its filtered one.
+    /// Predicted variance `P` of the filter. In slot 0 it equals the filtered variance.
     pub predicted_variance: f64,
     /// Filtered variance `M` of the filter.
     pub filtered_variance: f64,
-    /// Exact mean squared error.
+    /// Exact mean squared error after the slot's message.
     pub mse: f64,
 }
 
-/// Variances and exact errors of the Dymbo filter for `n = 0..=steps` after a first message of the given resolution about a
-/// state of unknown place, when the filter starts from `initial_variance` (`sigma^2 + tau^2/12` is right).
+/// Variances and exact errors of the Dymbo filter for `n = 0..=steps` after a first message of resolution `tau` and no prior. The
+/// filter starts from `initial_variance`; `sigma^2 + tau^2/12` is the correct one.
 ///
 /// # Errors
-/// As [`ErrorChain::from_first_message`]; a negative variance.
+/// As [`ErrorChain::from_first_message`]; if `initial_variance` is negative.
 pub fn first_message_transient(
     plant: &ScalarPlant,
     resolution: f64,

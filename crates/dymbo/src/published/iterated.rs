@@ -1,16 +1,16 @@
-//! Several successive bits about the same sample, each threshold at the estimate so far.
+//! Several successive bits about the same sample. Each threshold is the estimate so far.
 //!
-//! Tempting, because each bit is a Dymbo step, and a sensor could stop early. But the steps are not those of fresh samples:
-//! after the first bit the density of the sample is half a normal, and pretending that it is normal promises more
-//! ([`IteratedInformation::claimed`]) than is there. A batch Lloyd-Max word is better at every length; embedded words should
-//! at least use the exact means ([`exact_tree_information`]).
+//! Each bit can be processed as a Dymbo step, and a sensor could stop early. But after the first bit the density of the sample is half
+//! a normal density. If it is taken as normal, the filter computes more information ([`IteratedInformation::claimed`]) than the bits
+//! bring. A Lloyd-Max word of the same length is better at every length; successive bits should at least use the exact conditional
+//! means ([`exact_tree_information`]).
 
 use crate::Error;
 use fewbits_numerics::error::ArgumentError;
 use fewbits_numerics::normal::{interval, truncated_moments};
 use std::f64::consts::FRAC_2_PI;
 
-/// Most bits about one sample; the words double with each.
+/// Largest number of bits about one sample; the number of words doubles with each bit.
 const MOST_BITS: usize = 16;
 
 fn check_bits(bits: usize) -> Result<(), Error> {
@@ -25,7 +25,7 @@ fn check_bits(bits: usize) -> Result<(), Error> {
 /// the cell so far.
 ///
 /// # Errors
-/// A word length outside `1..=16`.
+/// If `bits` is outside `1..=16`.
 pub fn exact_tree_information(bits: usize) -> Result<f64, Error> {
     check_bits(bits)?;
     let mut cells = vec![(f64::NEG_INFINITY, f64::INFINITY)];
@@ -43,26 +43,26 @@ pub fn exact_tree_information(bits: usize) -> Result<f64, Error> {
     })
 }
 
-/// What successive bits bring when each step assumes a normal density.
+/// Information coefficients of successive bits if each step assumes a normal density.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IteratedInformation {
-    /// What the assumption promises: `1 - (1 - 2/pi)^m`.
+    /// The coefficient that follows from the assumption: `1 - (1 - 2/pi)^m` for `m` bits.
     pub claimed: f64,
-    /// What is true of its own levels, the sums of its steps.
+    /// The true coefficient if a word is reconstructed by the sum of its steps.
     pub with_own_levels: f64,
-    /// What is true of its cells, reconstructed by their centroids.
+    /// The true coefficient if a word is reconstructed by the mean of its cell.
     pub with_centroids: f64,
-    /// Words that no sample can cause.
+    /// Number of words that no sample causes.
     pub empty_words: usize,
 }
 
 /// Evaluates the usual iterated quantization, with steps `+- sqrt(2/pi) (1 - 2/pi)^(k/2)`.
 ///
 /// # Errors
-/// A word length outside `1..=16`.
+/// If `bits` is outside `1..=16`.
 pub fn normal_assumption_information(bits: usize) -> Result<IteratedInformation, Error> {
     check_bits(bits)?;
-    // Cell and level of each word.
+    // Lower end, upper end and reconstruction level of each word's cell.
     let mut words = vec![(f64::NEG_INFINITY, f64::INFINITY, 0.0)];
     let mut variance = 1.0;
     for _ in 0..bits {

@@ -1,4 +1,4 @@
-//! What only the publications compare with; no filter needs it.
+//! Comparisons of the publications that no filter needs.
 //!
 //! | comparison | module |
 //! |---|---|

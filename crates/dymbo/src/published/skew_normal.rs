@@ -15,14 +15,14 @@ pub fn posterior_density(theta: f64, prior: &Gaussian<1>, measurement_variance: 
 
 /// Points of the first scan, over twelve prior standard deviations either side.
 const SCAN: usize = 4800;
-/// Golden-section steps: each keeps 0.618 of the bracket.
+/// Golden-section steps. Each multiplies the bracket's width by 0.618.
 const REFINEMENTS: usize = 60;
 
 /// Largest difference over `theta` between the exact posterior of one bit and the normal density with its mean and variance
 /// (Proposition 1b). It falls as `0.0200/s (s/sigma)^3` when the noise grows against the prior.
 ///
 /// # Errors
-/// A variance that is not positive.
+/// If a variance is not positive.
 pub fn distance_from_normal(prior_variance: f64, measurement_variance: f64) -> Result<f64, Error> {
     let s = positive("prior_variance", prior_variance)?.sqrt();
     let prior = Gaussian::scalar(0.0, prior_variance)?;
@@ -33,6 +33,7 @@ pub fn distance_from_normal(prior_variance: f64, measurement_variance: f64) -> R
         (exact - log_pdf_with(theta, mean, variance).exp()).abs()
     };
     let at = |i: usize| s * 12.0 * (2.0 * i as f64 / SCAN as f64 - 1.0);
+    // The difference has several peaks: a scan finds the highest, golden section refines it.
     let best = (1..SCAN)
         .max_by(|&i, &j| difference(at(i)).total_cmp(&difference(at(j))))
         .unwrap_or(1);

@@ -1,30 +1,31 @@
-//! Whether the model still holds, from the receiver's own evidence.
+//! Tests whether the model still holds, from the observations that the receiver has.
 //!
-//! Under a right model three sequences have mean 0 and variance 1 given the past and the reports before at the same instant, for every sensor:
+//! If the model is right, three sequences per sensor have mean 0 and variance 1, given the past and the earlier reports of the same
+//! instant:
 //!
-//! | sequence | what moves it |
+//! | sequence | what changes its mean |
 //! |---|---|
-//! | surprise: how far `ln p(o)` is below its mean, over its deviation over what could have come; for values `(NIS - 1) / sqrt 2` | noise or process noise wrong, outliers |
-//! | residual: what the observation says of the innovation, over its deviation | a biased sensor, a start that is off |
-//! | product of neighbouring residuals of one sensor | process noise too small (it repeats) or too large (it alternates), a lost track |
+//! | surprise: how far `ln p(o)` is below its mean, in deviations; for values `(NIS - 1) / sqrt 2` | wrong noise variance, outliers |
+//! | residual: correction by the observation, divided by its deviation | a biased sensor, a wrong initial state |
+//! | product of successive residuals of one sensor | process noise too small (residuals repeat) or too large (they alternate), lost track |
 //!
-//! A bit at the prediction has no surprise at all: both of its outcomes have probability 1/2. What tells there is the product.
-//! Each sequence feeds a two-sided cumulative sum. Silence is no residual; it is tested by [presence](super::presence).
+//! A bit whose threshold is the prediction has no surprise, since both outcomes have probability 1/2. Wrong noise then shows in the
+//! product. Each sequence is tested by a two-sided cumulative sum. Silence has no residual; it is tested by [presence](super::presence).
 
 use crate::Error;
 use fewbits_numerics::error::within;
 use serde::{Deserialize, Serialize};
 
-/// Drift of the cumulative sums: shifts of half a deviation are found fastest.
+/// Constant subtracted at each step of a cumulative sum. This value detects shifts of half a deviation fastest.
 const DRIFT: f64 = 0.25;
-/// A term counts at most this much, so that one outlier is no alarm.
+/// Terms are limited to this absolute value, so that one outlier raises no alarm.
 const CLIP: f64 = 3.0;
-/// Differences of probabilities, or deviations of their logarithms, that count as none.
+/// Differences of probabilities, or deviations of their logarithms, that are treated as zero.
 const EQUAL: f64 = 1e-3;
-/// Sequences of a sensor.
+/// Number of sequences per sensor.
 pub(super) const SEQUENCES: usize = 3;
 
-/// One observation's place in its predicted law.
+/// One observation, standardised by its predicted distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Residual {
     pub surprise: f64,
@@ -32,8 +33,8 @@ pub(super) struct Residual {
 }
 
 impl Residual {
-    /// Of a bit of probability `share`, from the sign of its correction: the other bit has what is left of the probability, and corrections
-    /// average to nothing. `None` if there is no choice.
+    /// Residual of a bit of probability `share`, from the sign of its correction. The other bit has the remaining probability, and the mean
+    /// correction is zero. `None` if only one outcome is possible.
     pub fn of_bit(share: f64, correction: f64) -> Option<Self> {
         let other = (1.0 - share).max(f64::MIN_POSITIVE);
         let size = (other / share).sqrt();
@@ -49,7 +50,8 @@ impl Residual {
         })
     }
 
-    /// Of a word, from `(ln p, correction)` of every word that could have come; the received one at `at`. `None` if there is no choice.
+    /// Residual of a word, from `(ln p, correction)` of every possible word; `at` is the index of the received one. `None` if only one is
+    /// possible.
     pub fn of_word(words: &[(f64, f64)], at: usize) -> Option<Self> {
         let total: f64 = words.iter().map(|w| w.0.exp()).sum();
         let shares: Vec<f64> = words.iter().map(|w| w.0.exp() / total).collect();
@@ -69,7 +71,7 @@ impl Residual {
         (residual.is_finite() && surprise.is_finite()).then_some(Self { surprise, residual })
     }
 
-    /// Of a value, from `ln` of its density, the variance of the innovation, and the sign of the correction.
+    /// Residual of a value, from `ln` of its density, the variance of the innovation, and the sign of the correction.
     pub fn of_value(log_density: f64, variance: f64, correction: f64) -> Option<Self> {
         let nis = (-2.0 * log_density - (std::f64::consts::TAU * variance).ln()).max(0.0);
         let residual = nis.sqrt().copysign(correction);
@@ -89,7 +91,7 @@ pub(super) struct Cusum {
 }
 
 impl Cusum {
-    /// Adds a term of mean 0 and variance 1; which sum crosses `limit`, if any. Both then start anew.
+    /// Adds a term of mean 0 and variance 1. Returns which of the two sums exceeds `limit`, if any; both are then reset to zero.
     pub fn add(&mut self, term: f64, limit: f64) -> Option<Direction> {
         let term = term.clamp(-CLIP, CLIP);
         self.up = (self.up + term - DRIFT).max(0.0);
@@ -106,19 +108,19 @@ impl Cusum {
     }
 }
 
-/// Which sum crossed its limit.
+/// The sum that exceeded its limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Direction {
     Up,
     Down,
 }
 
-/// What the three sequences together say.
+/// Conclusion from the three sequences together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Alarm {
-    /// Observations are less likely than they should be, residuals have a mean, or they repeat.
+    /// Observations are less likely than predicted, residuals have a mean, or they repeat.
     Contradiction,
-    /// Observations are likelier than they should be, or residuals alternate: a noise is overstated.
+    /// Observations are likelier than predicted, or residuals alternate: a stated noise is too large.
     Overstatement,
 }
 
@@ -139,13 +141,13 @@ fn limit(rate: f64) -> f64 {
     (low - 1.166).max(0.5)
 }
 
-/// How often healthy sensors and a healthy centre may raise an alarm.
+/// Rates of false alarms while sensors and model are right.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FalseAlarms {
-    /// Alarms per observation of one sensor.
+    /// Rate of false alarms of one sensor, per observation.
     pub sensor: f64,
-    /// Alarms of the whole per instant.
+    /// Rate of false alarms of the whole centre, per instant.
     pub centre: f64,
 }
 
@@ -183,7 +185,7 @@ impl Limits {
     }
 }
 
-/// The three sequences of one sensor, or of all.
+/// The cumulative sums of the three sequences, of one sensor or of all together.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Monitor {
@@ -220,14 +222,14 @@ mod tests {
     fn a_bit_is_a_word_of_two() {
         for (share, correction) in [(0.5, 0.3), (0.1, 2.0), (0.9, -0.2), (0.999, 1e-3)] {
             let other: f64 = 1.0 - share;
-            // Corrections average to nothing.
+            // Corrections have mean zero.
             let words = [(f64::ln(share), correction), (other.ln(), -correction * share / other)];
             let (bit, word) = (Residual::of_bit(share, correction).unwrap(), Residual::of_word(&words, 0).unwrap());
             assert!((bit.residual - word.residual).abs() < 1e-9, "{bit:?} {word:?}");
             assert!((bit.surprise - word.surprise).abs() < 1e-9, "{bit:?} {word:?}");
         }
         assert!(Residual::of_bit(0.5, 0.0).is_none() && Residual::of_bit(0.0, 1.0).is_none());
-        // A bit that hardly ever comes is a surprise, however rare.
+        // A bit of small probability has a large surprise, however rare it is.
         assert!(Residual::of_bit(1e-12, 1.0).unwrap().surprise > 1e5);
     }
 }

@@ -1,4 +1,4 @@
-//! What follows from what was observed: presence, health, process noise.
+//! Updates of presence, health and process noise after the observations of one instant.
 
 use super::health::{self, Alarm, Residual, SEQUENCES};
 use super::{Event, FusionCentre, Member};
@@ -6,12 +6,13 @@ use crate::Error;
 use crate::contract::{Evidence, StateFilter};
 use rand::Rng;
 
-/// Observations without an alarm after which an excluded sensor is believed again.
+/// An excluded sensor is used again after this many observations without an alarm.
 const READMISSION: u32 = 100;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// Presence, health and noise from what was watched.
+    /// Updates presence, health and learnt process noise from what each slot showed.
     pub(super) fn judge(&mut self, rng: &mut dyn Rng, watched: &[(usize, Watched)]) -> Result<Vec<Event>, Error> {
+        // 1. Each sensor: its presence, its own test, exclusion and readmission. At most half of the sensors are excluded.
         let mut events = Vec::new();
         let mut pooled = [(0.0, 0_u32); SEQUENCES];
         let (mut products, mut together) = (0.0, 0.0);
@@ -55,7 +56,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                         events.push(Event::Excluded(*number));
                         continue;
                     }
-                    // Residuals of different sensors have different signs when a track is lost; surprises and products do not.
+                    // The centre's own test leaves out residuals: in a lost track those of different sensors have different signs.
+                    // Surprises and products do not.
                     for (sum, term) in pooled.iter_mut().zip([terms[0], None, terms[2]]) {
                         if let Some(term) = term {
                             *sum = (sum.0 + term, sum.1 + 1);
@@ -65,12 +67,15 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 }
             }
         }
+        // 2. A common failure: the evidence of all sensors together.
         let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
         self.outage.weigh(together, sensors);
+        // 3. Process noise: larger if residuals repeat, smaller if they alternate.
         if let Some(learning) = &self.learning {
             let [low, high] = learning.range;
             self.noise_scale = (self.noise_scale * (learning.gain * products).exp()).clamp(low, high);
         }
+        // 4. The centre's own test, with terms pooled over the sensors. A lost track restarts from the prior, if one is set.
         let terms = pooled.map(|(sum, count)| (count > 0).then(|| sum / f64::from(count).sqrt()));
         let alarm = self.monitor.add(terms, self.limits.centre);
         if alarm == Some(Alarm::Overstatement) {
@@ -92,17 +97,17 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     }
 }
 
-/// What one slot says about its sensor.
+/// What one slot shows about its sensor.
 pub(super) enum Watched {
     Nothing,
     Silence(f64),
-    /// A bit of a sensor that always speaks, and the probability of its arrival.
+    /// A bit of a sensor that is never silent, and the probability that it arrives.
     Bit(Evidence, f64),
     Report(Option<Residual>),
 }
 
 impl Watched {
-    /// A report's place in its predicted law, `None` if it has none. The place of a bit is computed here, after the update, since no belief of the
+    /// The residual of a report; `None` if it has none. For a bit it is computed here, after the update, since no belief of the
     /// instant depends on it.
     fn residual(&self) -> Option<Residual> {
         match self {

@@ -1,4 +1,4 @@
-//! Reports that come late.
+//! Reports that arrive late.
 
 use super::state::{Checkpoint, StoredSlot};
 use super::{FusionCentre, Slot};
@@ -8,8 +8,8 @@ use fewbits_numerics::error::finite;
 use rand::Rng;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// Takes in what was observed at an earlier `time`: the belief goes back to it, and all that came since is taken in again. Returns
-    /// whether it did; reports older than the window are dropped and counted. Presence and health are not judged again.
+    /// Includes observations of an earlier `time`: restores the belief before that time and repeats all later updates. Returns
+    /// whether it did. Reports older than the window are dropped and counted. Presence and health are not updated again.
     ///
     /// # Errors
     /// As [`receive`](Self::receive).
@@ -19,6 +19,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             self.dropped += slots.len() as u64;
             return Ok(false);
         };
+        // Insert the late slots among the stored instants, in the order of time.
         let mut replayed = self.history[from..].to_vec();
         let stored: Vec<StoredSlot> = slots.iter().map(|slot| self.stored(slot)).collect::<Result<_, _>>()?;
         let at = replayed.partition_point(|checkpoint| checkpoint.time <= time);
@@ -28,6 +29,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             slots: stored,
         };
         replayed.insert(at, late);
+        // Repeat prediction and update at each of these instants.
         let (mut belief, mut now) = (replayed[0].belief.clone(), replayed[0].time);
         for checkpoint in &mut replayed {
             self.moved(rng, &mut belief, checkpoint.time - now)?;
@@ -35,7 +37,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             checkpoint.belief = belief.clone();
             let mut likelihoods: Vec<Box<dyn StateLikelihood<D>>> = Vec::new();
             for slot in checkpoint.slots.iter().filter(|slot| slot.used) {
-                // A sensor may have left since.
+                // A sensor may have left in the meantime.
                 if let Ok(member) = self.member(slot.sensor) {
                     likelihoods.push(member.sensor.likelihood(&slot.slot(), slot.working)?);
                 }
@@ -50,7 +52,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(true)
     }
 
-    /// Moves a belief over some time.
+    /// Predicts a belief over `seconds`.
     pub(super) fn moved(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, seconds: f64) -> Result<(), Error> {
         if seconds > 0.0 {
             let motion = self.world.over(seconds)?;
@@ -65,7 +67,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(StoredSlot::new(slot, state.presence.working, !state.excluded))
     }
 
-    /// Keeps the belief before an instant and its slots, as long as the window lasts.
+    /// Stores the belief before an instant and its slots, and drops those older than the window.
     pub(super) fn remember(&mut self, before: F::Belief, slots: &[Slot]) {
         let stored = slots.iter().filter_map(|slot| self.stored(slot).ok()).collect();
         self.history.push(Checkpoint {
@@ -73,7 +75,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             belief: before,
             slots: stored,
         });
-        // The last belief before the window is what a report from its beginning goes back to.
+        // The last belief before the window is kept, for reports from the beginning of the window.
         let oldest = self.now - self.window;
         let first = self.history.partition_point(|checkpoint| checkpoint.time < oldest);
         self.history.drain(..first.saturating_sub(1));

@@ -1,8 +1,8 @@
-//! A fusion centre: a belief that moves with time, and the sensors that it receives from.
+//! A fusion centre: a belief that is predicted in continuous time and updated by the reports of many sensors.
 //!
-//! Bits come in and go out; what carries them (a simulator, a socket, a recording) is the caller's. Sensors join and leave at any
-//! time, report at any time and by any scheme. The centre knows how likely each still works ([presence](Failures)), says when its model
-//! no longer holds ([health](FalseAlarms)), and goes on from a stored [`CentreState`] with the same bits.
+//! Input and output are bits. The caller carries them (by a simulator, a socket, a recording). Sensors join and leave at any time, and
+//! report at any time by any scheme. The centre estimates the probability that each sensor still works ([presence](Failures)), raises an
+//! alarm if its model no longer holds ([health](FalseAlarms)), and resumes from a stored [`CentreState`] with the same bits.
 //!
 //! ```
 //! use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, Observation, OnAxes, Message};
@@ -22,7 +22,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: radio, addresses, frames; schemes of any one paper.
+//! Not in this module: radio, addresses, frames; the scheme of any single paper.
 
 mod health;
 mod judge;
@@ -51,30 +51,30 @@ use state::{Checkpoint, MemberState};
 struct Member<const D: usize> {
     number: u32,
     sensor: Box<dyn RemoteSensor<D>>,
-    /// Probability that a report arrives that was sent.
+    /// Probability that a report that was sent arrives.
     arrival: f64,
-    /// Whether nothing but the link keeps its reports back.
+    /// Whether the sensor is never silent: a missing report was then lost on the link.
     always_speaks: bool,
     state: MemberState,
 }
 
-/// A belief that moves with time, and sensors that come and go.
+/// A belief that is predicted over time, and the sensors that report to the centre.
 ///
 /// ```text
-/// advance(t):  belief = predict(over(t - now), noise scale);  every sensor may have failed meanwhile
-/// feedback(i): what sensor i is told, from the belief now
+/// advance(t):  belief = predict(over(t - now), noise scale);  the failure probability of every sensor grows
+/// feedback(i): bits for sensor i, from the present belief
 /// receive:     likelihoods of all slots of one instant, each with the probability that its sensor works
 ///              presence, residuals and their tests, from the belief before;  belief = update(likelihoods)
-/// late(t):     back to the last belief before t;  all that came since, and the late slots, in order of time
+/// late(t):     go back to the last belief before t;  repeat all later updates, the late slots included, in the order of time
 /// ```
-/// A call that fails leaves the centre as it was.
+/// A call that fails leaves the centre unchanged.
 pub struct FusionCentre<const D: usize, F: StateFilter<D>> {
     world: Box<dyn Evolving<D>>,
     filter: F,
     belief: F::Belief,
     now: f64,
     noise_scale: f64,
-    /// In order of their numbers.
+    /// In increasing order of their numbers.
     members: Vec<Member<D>>,
     outage: presence::Outage,
     monitor: health::Monitor,
@@ -88,7 +88,7 @@ pub struct FusionCentre<const D: usize, F: StateFilter<D>> {
 }
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// A centre without sensors that knows `prior` at time 0.
+    /// A centre without sensors, with the belief `prior` at time 0.
     ///
     /// # Errors
     /// If the filter cannot represent the prior.
@@ -118,7 +118,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         })
     }
 
-    /// The same with other suppositions about failures.
+    /// The same centre with other assumptions about failures.
     ///
     /// # Errors
     /// If a rate is out of range.
@@ -127,7 +127,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(Self { failures, ..self })
     }
 
-    /// The same with other rates of false alarms.
+    /// The same centre with other rates of false alarms.
     ///
     /// # Errors
     /// If a rate is out of range.
@@ -139,10 +139,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         })
     }
 
-    /// The same with process noise that is learnt.
+    /// The same centre, learning the scale of the process noise.
     ///
     /// # Errors
-    /// If the gain is negative or the range is none.
+    /// If the gain is negative, or the range is not two positive numbers, the smaller first.
     pub fn learning_noise(self, learning: NoiseLearning) -> Result<Self, Error> {
         learning.check()?;
         Ok(Self {
@@ -151,8 +151,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         })
     }
 
-    /// The same, starting anew from `prior` whenever the track is lost: what is known of the state without any report.
-    /// What was learnt of the process noise is kept.
+    /// The same centre, which restarts from `prior` whenever the track is lost. `prior` is the distribution of the state without any
+    /// report. The learnt scale of the process noise is kept.
     #[must_use]
     pub fn reacquire_from(self, prior: Gaussian<D>) -> Self {
         Self {
@@ -161,7 +161,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
     }
 
-    /// The same, taking in reports that are at most `window` seconds late. It keeps every belief and slot of that time.
+    /// The same centre, which accepts reports that are at most `window` seconds late. It stores the beliefs and slots of that time.
     ///
     /// # Errors
     /// If the window is negative or not finite.
@@ -170,18 +170,18 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(Self { window, ..self })
     }
 
-    /// Seats a sensor; one of the same number is replaced.
+    /// Adds a sensor. An earlier sensor of the same number is replaced.
     ///
     /// # Errors
-    /// If the sensor cannot ask for a report under the present belief: its noise is stated twice with different numbers.
+    /// If the sensor cannot compute its feedback under the present belief, or its scheme and its sensing model state different noise.
     pub fn join(&mut self, number: u32, sensor: impl RemoteSensor<D> + 'static) -> Result<(), Error> {
         self.join_boxed(number, Box::new(sensor))
     }
 
-    /// As [`join`](Self::join), of a kind that is chosen while the program runs.
+    /// As [`join`](Self::join), for a type of sensor that is chosen at run time.
     ///
     /// # Errors
-    /// As there.
+    /// As [`join`](Self::join).
     pub fn join_boxed(&mut self, number: u32, sensor: Box<dyn RemoteSensor<D>>) -> Result<(), Error> {
         let silent = Slot::new(number, sensor.feedback(&self.estimate())?, Observation::Nothing);
         let nothing = sensor.likelihood(&silent, 1.0);
@@ -199,7 +199,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(())
     }
 
-    /// Dismisses a sensor. Whether there was one.
+    /// Removes a sensor. Returns whether there was one.
     pub fn leave(&mut self, number: u32) -> bool {
         self.seat(number, 0).map(|seat| self.members.remove(seat)).is_ok()
     }
@@ -209,17 +209,17 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.members.iter().map(|member| member.number)
     }
 
-    /// Seconds since the prior.
+    /// Present time, in seconds since the prior.
     pub fn time(&self) -> f64 {
         self.now
     }
 
-    /// The belief as the filter has it.
+    /// The belief in the representation of the filter.
     pub fn belief(&self) -> &F::Belief {
         &self.belief
     }
 
-    /// Mean and covariance of the belief.
+    /// Mean and covariance of the belief, as a Gaussian.
     pub fn estimate(&self) -> Gaussian<D> {
         Gaussian::from_trusted_parts(self.belief.mean(), self.belief.covariance())
     }
@@ -229,17 +229,17 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         &self.filter
     }
 
-    /// Factor of the stated process noise, as it was learnt.
+    /// The learnt factor of the stated process noise; 1 without learning.
     pub fn noise_scale(&self) -> f64 {
         self.noise_scale
     }
 
-    /// Reports that came too late.
+    /// Number of reports that were dropped because they were too late.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
 
-    /// Probability that a sensor works.
+    /// Probability that a sensor still works.
     ///
     /// # Errors
     /// If there is no such sensor.
@@ -247,7 +247,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(self.member(number)?.state.presence.working)
     }
 
-    /// Whether a sensor is taken for dead.
+    /// Whether a sensor has been declared dead because of its silence.
     ///
     /// # Errors
     /// If there is no such sensor.
@@ -255,7 +255,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(self.member(number)?.state.presence.named_dead)
     }
 
-    /// Whether a sensor's reports are not used at present.
+    /// Whether a sensor's reports are at present not used, because they contradict the others'.
     ///
     /// # Errors
     /// If there is no such sensor.
@@ -263,7 +263,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(self.member(number)?.state.excluded)
     }
 
-    /// Where a sensor is, or where it would be. Slots mostly come in order: it is looked for at `guess` first.
+    /// Index of a sensor, or the index at which to insert it. Slots are mostly in order, so `guess` is tried first.
     fn seat(&self, number: u32, guess: usize) -> Result<usize, usize> {
         match self.members.get(guess) {
             Some(member) if member.number == number => Ok(guess),
@@ -282,10 +282,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.seat(number, guess).map_err(unknown)
     }
 
-    /// Moves the belief to `time` (seconds since the prior).
+    /// Predicts the belief to `time` (seconds since the prior).
     ///
     /// # Errors
-    /// If the time is not finite or before the present.
+    /// If the time is not finite or earlier than the present time.
     pub fn advance(&mut self, rng: &mut dyn Rng, time: f64) -> Result<&mut Self, Error> {
         let seconds = finite("time", time)? - self.now;
         if seconds < 0.0 {
@@ -302,10 +302,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(self)
     }
 
-    /// What a sensor is told before it measures.
+    /// The bits that a sensor is told before it measures.
     ///
     /// # Errors
-    /// If there is no such sensor, or as [`RemoteSensor::feedback`].
+    /// If there is no such sensor, or if [`RemoteSensor::feedback`] fails.
     pub fn feedback(&self, number: u32) -> Result<BitString, Error> {
         self.member(number)?.sensor.feedback(&self.estimate())
     }

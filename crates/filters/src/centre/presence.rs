@@ -1,38 +1,38 @@
-//! Whether a silent sensor still works.
+//! The probability that a silent sensor still works.
 //!
 //! ```text
-//! alone        probability to work before the slot if sensors fail one by one; over dt seconds  alone <- alone exp(-rate dt)
-//! struck       the same if a common failure has struck, which takes each sensor with probability 1/2
-//! b            probability that it has; over dt seconds  b <- b + (1 - b) (1 - exp(-rate dt))
+//! alone        probability that the sensor works if sensors fail one by one; over dt seconds  alone <- alone exp(-rate dt)
+//! struck       the same if a common failure has occurred, in which each sensor fails with probability 1/2
+//! b            probability of a common failure; over dt seconds  b <- b + (1 - b) (1 - exp(-rate dt))
 //! silence      w <- w E / (w E + 1 - w) for both,   E = p(nothing arrives | works) under the belief without this observation
-//! a report     both <- 1
+//! a report     alone, struck <- 1
 //! b's odds     times the product over the sensors of p(observed | struck) / p(observed | alone)
 //! working      (1 - b) alone + b struck
 //! R            (1 + R) / E after silence, 0 after a report: the Shiryaev-Roberts statistic
-//! named dead   when R reaches 1 / (rate of false alarms)
+//! named dead   when R reaches 1 / (rate of false alarms): the sensor is declared dead
 //! ```
-//! `R` minus the number of slots is a martingale while the sensor works, so that a working sensor is named dead less than once in
-//! `1 / rate` slots on average (Pollak 1985), whatever the scheme, the threshold and the loss.
+//! `R` minus the number of slots is a martingale while the sensor works. A working sensor is therefore declared dead less than once in
+//! `1 / rate` slots on average (Pollak 1985), for every scheme, threshold and loss.
 //!
-//! Without a common failure, sensors that die together would each have to be doubted alone, and their silence would be believed for long.
-//! Not covered: sensors that die because of the state (the target destroys them).
+//! Common failures are modelled because sensors that die together would otherwise be doubted one by one, and their silence would be used as
+//! information for a long time. Not modelled: sensors that die because of the state (for instance, destroyed by the target).
 
 use crate::Error;
 use fewbits_numerics::error::{non_negative, within};
 use serde::{Deserialize, Serialize};
 
-/// What is supposed of failures.
+/// Assumed rates of failures.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Failures {
-    /// Failures of a working sensor per second, and common failures of half of the sensors per second.
+    /// Rate of failures of a working sensor, per second. Common failures, each of half of the sensors, have the same rate.
     pub rate: f64,
-    /// How often a working sensor may be named dead, per slot.
+    /// Largest rate, per slot, at which working sensors are declared dead.
     pub false_alarms: f64,
 }
 
 impl Default for Failures {
-    /// One failure in 10^4 seconds, one working sensor named dead in 10^4 slots.
+    /// One failure in 10^4 seconds; one working sensor declared dead in 10^4 slots.
     fn default() -> Self {
         Self {
             rate: 1e-4,
@@ -49,7 +49,7 @@ impl Failures {
     }
 }
 
-/// What is known of one sensor's presence.
+/// State of the test of one sensor's presence.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Presence {
@@ -75,13 +75,14 @@ impl Presence {
         }
     }
 
-    /// Nothing arrived, which has probability `silence` if the sensor works. `ln` of how much likelier a common failure makes that, and
-    /// whether the sensor is named dead now.
+    /// Updates after nothing arrived, which has probability `silence` if the sensor works. Returns `ln` of the likelihood ratio of a common
+    /// failure against none, and whether the sensor is declared dead now.
     pub fn silent(&mut self, silence: f64, failures: &Failures) -> (f64, bool) {
         let evidence = |works: &mut f64| {
             let alive = *works * silence;
             let total = alive + 1.0 - *works;
-            // Certain to work and certain to report: silence is impossible, and the failure has happened all the same.
+            // If the sensor certainly worked and would certainly have reported, silence has probability zero. The failure is then taken as
+            // certain.
             *works = if total > 0.0 { alive / total } else { 0.0 };
             total.max(f64::MIN_POSITIVE)
         };
@@ -93,7 +94,8 @@ impl Presence {
         (ratio, news)
     }
 
-    /// A report arrived. `ln` of how much likelier a common failure makes that, and whether the sensor had been named dead.
+    /// Updates after a report arrived. Returns `ln` of the likelihood ratio of a common failure against none, and whether the sensor had
+    /// been declared dead.
     pub fn heard(&mut self) -> (f64, bool) {
         let ratio = self.struck.max(f64::MIN_POSITIVE) / self.alone.max(f64::MIN_POSITIVE);
         let ratio = if ratio == 1.0 { 0.0 } else { ratio.ln() };
@@ -103,9 +105,9 @@ impl Presence {
     }
 }
 
-/// Share of the sensors that a common failure takes.
+/// Probability that a common failure destroys a given sensor.
 const TAKEN: f64 = 0.5;
-/// Probability from which on a common failure counts as a fact, and the next one may come.
+/// Above this probability a common failure is treated as certain, and the next one can occur.
 const SETTLED: f64 = 0.999;
 
 /// The probability that a common failure has struck.
@@ -128,9 +130,9 @@ impl Outage {
         self.0 = total;
     }
 
-    /// Takes in what the sensors of one instant say together.
+    /// Updates with the sum of the log likelihood ratios of all sensors of one instant.
     pub fn weigh<'a>(&mut self, log_ratio: f64, sensors: impl Iterator<Item = &'a mut Presence>) {
-        // The odds' logarithm within what a double can tell from certainty.
+        // The log odds are limited so that the probability differs from 0 and 1.
         let odds = ((self.0 / (1.0 - self.0)).ln() + log_ratio).clamp(-700.0, 700.0).exp();
         self.0 = odds / (1.0 + odds);
         let settled = self.0 > SETTLED;

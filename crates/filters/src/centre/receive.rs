@@ -1,4 +1,4 @@
-//! What is observed at one instant: the belief after it, and what each slot says about its sensor.
+//! The update at one instant: the new belief, and what each slot shows about its sensor.
 
 use super::health::Residual;
 use super::judge::Watched;
@@ -8,19 +8,20 @@ use crate::contract::{Evidence, Info, StateFilter, StateLikelihood};
 use fewbits_core::{BitString, Gaussian, Observation};
 use rand::Rng;
 
-/// Reports of at most this many bits are words, whose alternatives are enumerated.
+/// Reports of at most this many bits are treated as words; the residual then sums over all possible words.
 const WORD_BITS: usize = 4;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// Takes in what was observed at the present instant.
+    /// Updates with the observations of the present instant.
     ///
     /// # Errors
-    /// If a sensor is unknown or bits do not decode; [`Error::Impossible`] if the observations are impossible together, in
-    /// which case the caller may drop them or start anew.
+    /// If a sensor is unknown or bits do not decode; [`Error::Impossible`] if the observations have probability zero
+    /// together. The caller may then drop them or start again.
     pub fn receive(&mut self, rng: &mut dyn Rng, slots: &[Slot]) -> Result<Received, Error> {
         let predicted = self.estimate();
-        // A report is judged given those before it: sensors that err with the prediction would else count as independent. Silence is judged by
-        // the prediction alone, since the silence of sensors that died together would speak for each other's.
+        // A report is tested given those before it; otherwise sensors that share the error of the prediction would be treated as
+        // independent. Silence is tested given the prediction alone; otherwise, after several sensors died together, the silence of each
+        // would confirm that of the others.
         let mut given = predicted;
         let mut posterior = self.filter.of_moments(&predicted).map(|_| Posterior::default());
         let mut used = Vec::new();
@@ -57,7 +58,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let evidence = match conditioned {
                 Ok(evidence) => Some(evidence),
                 Err(error) if posterior.is_some() && is_used => return Err(error),
-                // What cannot be conditioned on may have evidence all the same.
+                // An observation that cannot update the belief may still have a probability.
                 Err(_) => member.evidence(slot, working, &given)?,
             };
             let report_says = match (evidence, before) {
@@ -79,6 +80,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             }
             used.extend(report);
         }
+        // All slots were read: form the posterior, either from the moments above or by the filter's joint update.
         let mut belief = self.belief.clone();
         let mut info = Info::default();
         if let Some(Posterior { apart, log_likelihood }) = posterior {
@@ -98,16 +100,16 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     }
 }
 
-/// The posterior of a filter of moments, while observations are taken in one after the other.
+/// The posterior of a filter of moments while the observations are processed one by one.
 #[derive(Default)]
 struct Posterior<const D: usize> {
-    /// Its moments once silence has been taken in. Before, they are those given the reports.
+    /// Moments given reports and silence. `None` until the first silence; until then they equal the moments given the reports.
     apart: Option<Gaussian<D>>,
     log_likelihood: f64,
 }
 
 impl<const D: usize> Posterior<D> {
-    /// Takes in silence or a loss.
+    /// Updates with a silence or a loss.
     fn missing(&mut self, missing: &dyn StateLikelihood<D>, given: &Gaussian<D>) -> Result<(), Error> {
         if let Some(log) = missing.as_constant().filter(|log| log.is_finite()) {
             self.log_likelihood += log;
@@ -119,7 +121,7 @@ impl<const D: usize> Posterior<D> {
 }
 
 impl<const D: usize> Member<D> {
-    /// What an observation in this slot says about the model; `None` if it is impossible.
+    /// Log likelihood and correction of the observation in this slot; `None` if its probability is zero.
     fn evidence(&self, slot: &Slot, working: f64, belief: &Gaussian<D>) -> Result<Option<Evidence>, Error> {
         match self.sensor.evidence(slot, working, belief) {
             Ok(found) => Ok(Some(found)),
@@ -128,7 +130,7 @@ impl<const D: usize> Member<D> {
         }
     }
 
-    /// How likely a sensor that works is silent, from the belief before the slot.
+    /// Probability that a working sensor is silent, given the belief before the slot.
     fn silence(
         &self,
         slot: &Slot,
@@ -147,7 +149,7 @@ impl<const D: usize> Member<D> {
         Ok(Watched::Silence(found.min(1.0)))
     }
 
-    /// A report's place in its predicted law, `None` if it has none.
+    /// The residual of a report; `None` if it has none.
     fn residual(
         &self,
         slot: &Slot,
@@ -173,7 +175,7 @@ impl<const D: usize> Member<D> {
                 words.push(place(received));
                 continue;
             }
-            // A word that the scheme never sends is no alternative.
+            // Words that the scheme never sends are left out.
             alternative.observation = Observation::Received(other);
             words.extend(
                 self.evidence(&alternative, working, predicted)

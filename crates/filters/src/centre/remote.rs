@@ -1,4 +1,4 @@
-//! A sensor as its receiver sees it: bits in, likelihoods out.
+//! A sensor from the receiver's side: bits in, likelihoods out.
 
 use super::Slot;
 use crate::Error;
@@ -8,24 +8,23 @@ use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::linalg::congruence;
 use nalgebra::SMatrix;
 
-/// The receiver's half of a sensor. Object-safe, so that sensors of any kind stand in one list.
+/// What a receiver needs to know of a sensor. Object-safe, so that sensors of different kinds can be in one list.
 ///
-/// Any [`Scheme`] and [`Sensing`] make one: [`Reporting`].
+/// [`Reporting`] makes one from any [`Scheme`] and [`Sensing`].
 pub trait RemoteSensor<const D: usize> {
-    /// What the sensor is told before it measures, from the predicted belief.
+    /// The bits that the sensor is told before it measures, from the predicted belief.
     ///
     /// # Errors
-    /// If the belief gives no feedback that fits its format, or sensing and scheme suppose different noise.
+    /// If the feedback of this belief does not fit its format, or if sensing model and scheme state different noise.
     fn feedback(&self, predicted: &Gaussian<D>) -> Result<BitString, Error>;
 
-    /// What a slot of it says. `working` is the probability that the sensor works at all: a
-    /// dead sensor is silent, too.
+    /// The likelihood of the observation in a slot. `working` is the probability that the sensor works; a dead sensor is silent.
     ///
     /// # Errors
-    /// If the feedback does not decode, `working` is outside `[0, 1]`, or the scheme refuses the report.
+    /// If the feedback does not decode, `working` is outside `[0, 1]`, or the scheme does not accept the report.
     fn likelihood(&self, slot: &Slot, working: f64) -> Result<Box<dyn StateLikelihood<D>>, Error>;
 
-    /// Conditions a Gaussian on [`likelihood`](Self::likelihood).
+    /// Updates a Gaussian by [`likelihood`](Self::likelihood).
     ///
     /// # Errors
     /// As there, and as [`StateLikelihood::condition`].
@@ -33,7 +32,7 @@ pub trait RemoteSensor<const D: usize> {
         self.likelihood(slot, working)?.condition(belief)
     }
 
-    /// The evidence of [`likelihood`](Self::likelihood) under a Gaussian.
+    /// Log likelihood and correction of [`likelihood`](Self::likelihood) under a Gaussian.
     ///
     /// # Errors
     /// As there, and as [`StateLikelihood::evidence`].
@@ -41,17 +40,17 @@ pub trait RemoteSensor<const D: usize> {
         self.likelihood(slot, working)?.evidence(belief)
     }
 
-    /// Variance of a scalar measurement under the prediction, noise included, if the sensor sends every measurement as a value.
+    /// Predicted variance of a scalar measurement, noise included, if the sensor sends every measurement as a value.
     /// `None` for words, vectors and sensors that may be silent.
     fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64>;
 
-    /// Probability that a report arrives that was sent.
+    /// Probability that a report that was sent arrives.
     fn arrival(&self) -> f64;
 }
 
-/// Both ends' knowledge of a sensor that reports by a [`Scheme`]: how it senses, what it reports, over which link, and what it is told.
+/// A sensor that reports by a [`Scheme`]: its sensing model, its scheme, its link, and the rule for its feedback.
 ///
-/// `ask` turns the predicted state and the predicted measurement `N(h(m), H P H' + R)` into the scheme's feedback.
+/// `ask` computes the scheme's feedback from the predicted state and the predicted measurement `N(h(m), H P H' + R)`.
 #[derive(Debug, Clone)]
 pub struct Reporting<S, C, A, const M: usize> {
     sensing: S,
@@ -61,11 +60,11 @@ pub struct Reporting<S, C, A, const M: usize> {
     sends_values: bool,
 }
 
-/// Relative difference of the noise of sensing and scheme that counts as rounding.
+/// Relative difference between the noise of sensing model and scheme that is treated as rounding.
 const NOISE_TOLERANCE: f64 = 1e-9;
 
 impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
-    /// A sensor of words, bits or silences.
+    /// A sensor that sends words or bits, or may be silent.
     pub fn new(sensing: S, scheme: C, link: Link, ask: A) -> Self {
         Self {
             sensing,
@@ -76,7 +75,7 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
         }
     }
 
-    /// The same for a scheme that sends every measurement as a value: its health is judged by normalised innovations.
+    /// The same sensor, with a scheme that sends every measurement as a value. Its health is tested by normalised innovations.
     #[must_use]
     pub fn sending_values(self) -> Self {
         Self {
@@ -85,19 +84,19 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
         }
     }
 
-    /// The sensor's half: its scheme.
+    /// The scheme.
     pub fn scheme(&self) -> &C {
         &self.scheme
     }
 
-    /// How it senses.
+    /// The sensing model.
     pub fn sensing(&self) -> &S {
         &self.sensing
     }
 }
 
 impl<S, const D: usize> Reporting<S, fewbits_core::FullValue, fn(&Gaussian<D>, &Gaussian<1>), 1> {
-    /// A sensor that sends every measurement as a value: no feedback, no scheme to choose.
+    /// A sensor that sends every measurement as a value, without feedback.
     pub fn values(sensing: S, scheme: fewbits_core::FullValue, link: Link) -> Self {
         Self::new(sensing, scheme, link, (|_, _| ()) as fn(&Gaussian<D>, &Gaussian<1>)).sending_values()
     }
@@ -133,7 +132,7 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
     {
         let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), &slot.feedback)?;
         let observation = match &slot.observation {
-            // Bits that are no report of the scheme: sent, and not understood.
+            // Bits that are no report of the scheme: a report was sent, but not understood.
             Observation::Received(bits) => C::Report::from_bits(&self.scheme.report_format(), bits)
                 .map_or(Observation::Lost, Observation::Received),
             Observation::Nothing => Observation::Nothing,
@@ -181,8 +180,8 @@ where
     }
 }
 
-/// A sensor that works with probability `working` is one whose reports are lost more often without a trace:
-/// `1 - (1 - loss) working`. A known loss needs a sensor that works.
+/// A sensor that works with probability `working` is described by a link of larger loss, `1 - (1 - loss) working`. The erasure is also
+/// multiplied by `working`, since a known loss requires a working sensor.
 #[inline]
 fn supposed(link: &Link, working: f64) -> Result<Link, Error> {
     within("working", working, 0.0, 1.0)?;

@@ -1,21 +1,21 @@
-//! What goes into a centre and what comes out.
+//! Input and output types of a fusion centre.
 
 use crate::contract::Info;
 use fewbits_core::{BitString, Observation};
 
-/// One sensor in one slot: what it was told, and what was observed of it. A sensor that was not asked has no slot.
+/// The observation of one sensor in one slot, with the feedback that the sensor was told. A sensor that was not asked has no slot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slot {
     /// Number of the sensor.
     pub sensor: u32,
-    /// The feedback as it travelled.
+    /// The bits of the feedback as they were sent.
     pub feedback: BitString,
-    /// What was observed.
+    /// What the receiver observed.
     pub observation: Observation<BitString>,
 }
 
 impl Slot {
-    /// A slot of sensor `sensor`.
+    /// A slot of the sensor with number `sensor`.
     pub fn new(sensor: u32, feedback: BitString, observation: Observation<BitString>) -> Self {
         Self {
             sensor,
@@ -25,33 +25,33 @@ impl Slot {
     }
 }
 
-/// Something that the centre noticed.
+/// An event that the centre reports to its caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Event {
-    /// A sensor has been silent for so long that it is taken for dead. Its silence no longer says anything.
+    /// The sensor with this number is declared dead because of its silence, which carries no information from now on.
     Dead(u32),
-    /// A report came from a sensor that had been taken for dead.
+    /// A report came from a sensor that had been declared dead.
     Alive(u32),
-    /// A sensor's reports contradict the others': they are no longer used, but still watched.
+    /// The reports of this sensor contradict the others'. They are no longer used, but still tested.
     Excluded(u32),
-    /// An excluded sensor has agreed with the others for long and is used again.
+    /// An excluded sensor has agreed with the others for long enough and is used again.
     Readmitted(u32),
-    /// The model does not hold for the sensors together: observations are too unlikely, or residuals repeat. The track is lost, or a noise
-    /// is understated.
+    /// The model does not hold for all sensors together: observations are too unlikely, or residuals repeat. The track is lost, or a stated
+    /// noise is too small.
     Lost,
-    /// Observations are likelier than they should be, or residuals alternate: a noise is overstated.
+    /// Observations are likelier than predicted, or residuals alternate: a stated noise is too large.
     NoiseOverstated,
     /// The belief was replaced by the prior of [`FusionCentre::reacquire_from`](super::FusionCentre::reacquire_from).
     Reacquired,
 }
 
-/// What an update reveals.
+/// Results of an update other than the belief.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Received {
-    /// What the filter says.
+    /// Results of the filter's update.
     pub info: Info,
-    /// What the centre noticed.
+    /// Events of this instant.
     pub events: Vec<Event>,
 }

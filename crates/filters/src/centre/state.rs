@@ -1,4 +1,4 @@
-//! What a centre knows, as a value that is stored and goes on to the bit.
+//! The state of a centre as a value that can be stored; a restored centre gives the same bits.
 
 use super::health::Monitor;
 use super::presence::{Outage, Presence};
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// The version of the stored form.
 const VERSION: u32 = 2;
 
-/// What is known of one sensor.
+/// State of one sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MemberState {
@@ -23,7 +23,7 @@ pub(super) struct MemberState {
     #[serde(default, with = "fewbits_numerics::stored")]
     pub last_residual: Option<f64>,
     pub excluded: bool,
-    /// Observations since the last alarm.
+    /// Number of observations since the last alarm.
     pub quiet: u32,
 }
 
@@ -39,7 +39,7 @@ impl MemberState {
     }
 }
 
-/// The belief before an instant, and what was observed in it.
+/// The belief before an instant, and the slots of that instant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Checkpoint<B> {
@@ -49,7 +49,7 @@ pub(super) struct Checkpoint<B> {
     pub slots: Vec<StoredSlot>,
 }
 
-/// A slot, with what was supposed of its sensor.
+/// A slot, with the probability that its sensor worked and whether it was used.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StoredSlot {
@@ -77,10 +77,10 @@ impl StoredSlot {
     }
 }
 
-/// What a centre knows: everything but its models, its filter and its settings, which the program states again.
+/// The state of a centre: everything except its models, its filter and its settings, which the program must provide again.
 ///
-/// Stored as bytes ([`to_bytes`](Self::to_bytes)) or by any format of serde, a centre that is restored goes on with the same bits, given the
-/// same random stream: floats are stored exactly whatever the format does ([`mod@fewbits_numerics::stored`]).
+/// It can be stored as bytes ([`to_bytes`](Self::to_bytes)) or in any format of serde. A restored centre continues with the same bits,
+/// given the same random stream, because floats are stored exactly in every format ([`mod@fewbits_numerics::stored`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentreState<B> {
@@ -101,7 +101,7 @@ impl<B: Serialize> CentreState<B> {
     /// The compact binary form: a byte with the version, then CBOR (RFC 8949), in which a double takes at most 9 bytes.
     ///
     /// # Errors
-    /// If the belief has no such form.
+    /// If the belief cannot be serialised.
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
         let mut bytes = vec![VERSION as u8];
         match ciborium::into_writer(self, &mut bytes) {
@@ -112,10 +112,10 @@ impl<B: Serialize> CentreState<B> {
 }
 
 impl<B: DeserializeOwned> CentreState<B> {
-    /// Reads [`to_bytes`](Self::to_bytes).
+    /// Reads what [`to_bytes`](Self::to_bytes) wrote.
     ///
     /// # Errors
-    /// If the bytes are of another version, or no state of this kind of belief.
+    /// If the bytes are of another version, or do not encode a state with this type of belief.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let expected = format!("the bytes of a centre's state of version {VERSION}");
         let mut rest = match bytes.split_first() {
@@ -132,7 +132,7 @@ impl<B: DeserializeOwned> CentreState<B> {
 }
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// What the centre knows.
+    /// The present state.
     pub fn state(&self) -> CentreState<F::Belief> {
         CentreState {
             version: VERSION,
@@ -151,10 +151,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
     }
 
-    /// Goes on from a stored state. The same sensors must have joined.
+    /// Continues from a stored state. The same sensors must have joined.
     ///
     /// # Errors
-    /// If the state is of another version, a number in it is not finite, or it knows other sensors. The centre is then as it was.
+    /// If the state is of another version, a number in it is not finite, or its sensors differ. The centre is then unchanged.
     pub fn restore(&mut self, state: CentreState<F::Belief>) -> Result<(), Error> {
         if state.version != VERSION {
             return refuse("version", state.version, format!("{VERSION}"));

@@ -1,9 +1,9 @@
-//! Gaussian in, exact likelihood on a grid that adapts, Gaussian out.
+//! A filter with a Gaussian belief whose posterior moments are computed from the exact likelihood on an adaptive grid.
 //!
-//! For likelihoods of a few coordinates of the state, of any shape: sharp, wide, with edges, curved, with several modes. The grid
-//! follows the posterior until it resolves it; what it cannot resolve is an error and no number.
+//! For likelihoods that depend on a few coordinates of the state, of any shape: sharp, wide, discontinuous, curved, with several modes. The
+//! grid is adapted to the posterior until it resolves it. If that is not possible, an error is returned.
 //!
-//! Not here: beliefs that are no Gaussian ([`PointMassFilter`](crate::PointMassFilter)), more than
+//! Not for beliefs that are not Gaussian ([`PointMassFilter`](crate::PointMassFilter)), nor for more than
 //! about three observed coordinates ([`ParticleFilter`](crate::ParticleFilter)).
 
 mod on_axes;
@@ -21,42 +21,42 @@ use nalgebra::{Cholesky, SMatrix, SVector};
 use region::{Piece, Region};
 use serde::{Deserialize, Serialize};
 
-/// Deviations to each side that a grid covers by default.
+/// Default extent of a grid to each side, in standard deviations.
 const REACH: f64 = 4.0;
-/// Nodes per deviation of the posterior below which its moments are refused. A Gaussian has exact moments from one node per
-/// deviation on; edges of cells and curvature take more.
+/// Moments from fewer nodes per deviation of the posterior are not accepted. For a Gaussian one node per deviation is enough for exact
+/// moments; discontinuities and curvature need more.
 const MIN_NODES_PER_DEVIATION: f64 = 1.5;
-/// Nodes per deviation that a grid over `+- reach` deviations must have, so that the next grid, built for deviations that were
+/// Nodes per deviation that a grid over `+- reach` deviations must have at least, so that the next grid, scaled by deviations that were
 /// measured on this one, is still fine enough.
 const NOMINAL_NODES_PER_DEVIATION: f64 = 1.6;
-/// Smallest number of nodes on an axis that may be asked for.
+/// Smallest number of nodes per axis that can be set.
 const MIN_NODES: usize = 5;
 /// Largest number of nodes of one grid.
 const MAX_NODES: usize = 2_000_000;
-/// Nodes of one grid up to which a posterior is followed that a grid of the default number does not resolve: 241^2, 38^3.
+/// A posterior that a grid of the set number of nodes does not resolve is refined up to this number of nodes: 241^2, 38^3.
 const MAX_REFINED_NODES: usize = 60_000;
-/// Grids that one update may lay. Each pass narrows the grid by a factor of about two, so that six decades between prior and likelihood
-/// take about 20 passes; the rest is for several modes and for curved ridges.
+/// Largest number of grids of one update. Each pass narrows the grid by a factor of about two, so a likelihood that is 10^6 times narrower
+/// than the prior takes about 20 passes; the rest is for several modes and for curved ridges.
 const MAX_PASSES: usize = 200;
-/// Share of the evidence below which it does not matter whether a part of the posterior is resolved.
+/// Parts of the posterior with less than this fraction of the evidence need not be resolved.
 const NEGLIGIBLE_SHARE: f64 = 1e-3;
-/// `ln` of the ratio to a resolved part's evidence below which a part is dropped before it is resolved.
+/// A part is dropped before it is resolved if its log evidence is below that of a resolved part by more than this.
 const DROPPED: f64 = 14.0;
 
-/// An assumed-density filter whose moments come from a grid over the `K` coordinates that the likelihood depends on.
+/// An assumed-density filter whose moments are computed on a grid over the `K` coordinates on which the likelihood depends.
 ///
 /// ```text
 /// m, L L'     mean and covariance of those coordinates;  u = L^-1 (x - m) is standard normal
 /// grid:       centre c, orthogonal axes with deviations d;  n^K nodes over +-reach deviations;  first c = 0, d = 1
-/// pass:       w = exp(b (ln N(u; 0, I) + ln p(observed | x)));  b = 1 if w then is of at least 3^K effective nodes,
-///             otherwise the b that gives so many;  moments of u under w
+/// pass:       w = exp(b (ln N(u; 0, I) + ln p(observed | x)));  b = 1 if w then has at least 3^K effective nodes,
+///             otherwise the b that gives about 3^K;  moments of u under w
 ///             done if b = 1, the posterior has 1.5 nodes per deviation and lies inside the grid
 ///             otherwise: next grid along the principal axes of these moments, over +-reach of its deviations
 /// split:      if layers of nodes across the longest axis are empty between two modes: a grid for each side
 /// refine:     if the grid no longer narrows (a curved ridge): twice as many nodes on each axis
 /// the other coordinates follow by regression on the K
 /// ```
-/// Deterministic: no draws, no seeds. All nodes that receive the same reports hold the same belief, to the last bit.
+/// The filter is deterministic: no random numbers. Nodes that receive the same reports have the same belief to the last bit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
 pub struct GridFilter {
@@ -76,7 +76,7 @@ impl Default for GridFilter {
     }
 }
 
-/// Buffers of a grid, kept from step to step.
+/// Buffers of a grid, reused from step to step.
 #[derive(Debug, Clone)]
 pub struct GridWorkspace<const K: usize> {
     columns: [Vec<f64>; K],
@@ -102,37 +102,37 @@ impl<const K: usize> Default for GridWorkspace<K> {
     }
 }
 
-/// What an update reveals besides the new belief.
+/// Results of an update other than the new belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct GridInfo {
     /// `ln p(observed | past)`.
     pub log_likelihood: f64,
-    /// Nodes per deviation of the posterior along the principal axis that has fewest, of the part of it that has fewest.
+    /// Nodes per standard deviation of the posterior: the smallest over its principal axes and over its parts.
     pub nodes_per_deviation: f64,
-    /// Grids that were laid.
+    /// Number of grids that were evaluated.
     pub passes: usize,
-    /// Parts that the posterior was split into; 1 if it is compact.
+    /// Number of parts into which the posterior was split; 1 if it has no separated modes.
     pub parts: usize,
 }
 
 impl GridFilter {
-    /// A filter with `nodes` nodes on each axis, over 4 deviations to each side.
+    /// A filter with `nodes` nodes per axis, over 4 standard deviations to each side.
     ///
-    /// Fewer than 14 are laid as 14: they would have less than 1.6 nodes per deviation, too few for moments of a posterior with edges.
+    /// Fewer than 14 are replaced by 14: they would be fewer than 1.6 nodes per deviation, too few for discontinuous posteriors.
     ///
     /// # Errors
-    /// Unless there are 5 to 1001.
+    /// If `nodes` is not in 5 to 1001.
     pub fn new(nodes: usize) -> Result<Self, Error> {
         Self::with_nodes_and_reach(nodes, REACH)
     }
 
-    /// The same over `reach` deviations to each side: with many nodes, seven leave the moments exact.
+    /// The same filter over `reach` standard deviations to each side. With many nodes, 7 deviations leave the moments exact to rounding.
     ///
-    /// A grid of fewer than 1.6 nodes per deviation is laid with so many.
+    /// If this gives fewer than 1.6 nodes per deviation, the number of nodes is raised to it.
     ///
     /// # Errors
-    /// If it is outside 2 to 10.
+    /// If `reach` is not in 2 to 10.
     pub fn with_reach(self, reach: f64) -> Result<Self, Error> {
         Self::with_nodes_and_reach(self.nodes, reach)
     }
@@ -154,12 +154,11 @@ impl GridFilter {
         self.nodes
     }
 
-    /// Bayes' rule for any likelihood of `K` coordinates: those of the state that `axes` names, in the order in which the likelihood
-    /// reads them.
+    /// Measurement update for a likelihood of `K` coordinates. `axes` lists these coordinates of the state, in the order in which the
+    /// likelihood reads them.
     ///
-    /// # Errors
-    /// [`Error::Impossible`] if the observation has probability zero under the prediction, or so little that its density
-    /// underflows; [`Error::Unresolved`] if the posterior has fewer than 1.5 nodes per deviation; if `axes` are not different
+    /// [`Error::Impossible`] if the observation has probability zero under the prediction, or one that underflows;
+    /// [`Error::Unresolved`] if the posterior has fewer than 1.5 nodes per deviation; an argument error if `axes` are not different
     /// coordinates of the state, their covariance is singular, or the likelihood is NaN at every node.
     pub fn update<const D: usize, const K: usize>(
         &self,
@@ -180,7 +179,8 @@ impl GridFilter {
         };
         let (posterior, info) = self.posterior(&prior, observed, workspace)?;
 
-        // Regression of all coordinates on those observed: P_{:K} P_K^-1. What remains of the others is a sum of positives.
+        // Regression of all coordinates on the observed ones: P_{:K} P_K^-1. The residual covariance is computed as a sum of positive
+        // terms.
         let cross = SMatrix::<f64, K, D>::from_fn(|i, j| predicted.covariance()[(axes[i], j)]);
         let gain = factor.solve(&cross).transpose();
         let mut keep = SMatrix::<f64, D, D>::identity();
@@ -198,7 +198,7 @@ impl GridFilter {
         Ok((updated, info))
     }
 
-    /// Lays grids until all parts of the posterior are resolved, and joins their moments.
+    /// Evaluates grids until all parts of the posterior are resolved, and combines their moments.
     fn posterior<const K: usize>(
         &self,
         prior: &Prior<K>,
@@ -208,11 +208,12 @@ impl GridFilter {
         workspace.pieces.clear();
         workspace.regions.clear();
         workspace.regions.push(Region::whole(self.nodes));
+        // Take a region, evaluate its grid, then keep its moments, drop it, split it at a gap, refine it or narrow it.
         let mut passes = 0;
         while let Some(region) = workspace.regions.pop() {
             passes += 1;
             let found = self.pass(prior, &region, observed, workspace)?;
-            // Nothing of the posterior is on this side.
+            // The posterior is zero in this region.
             let Some(found) = found else { continue };
             let best = workspace.pieces.iter().map(|piece| piece.log_evidence);
             let best = best.fold(f64::NEG_INFINITY, f64::max);
@@ -241,6 +242,7 @@ impl GridFilter {
         if peak == f64::NEG_INFINITY {
             return Err(Error::Impossible);
         }
+        // Moments of the mixture of all parts, each weighted by its evidence.
         let shares = || {
             workspace
                 .pieces
@@ -275,19 +277,19 @@ fn unresolved<const K: usize>(found: &pass::Found<K>) -> Error {
     }
 }
 
-/// The predicted belief of the observed coordinates: `x = origin + lower u`, `u` standard normal.
+/// The predicted distribution of the observed coordinates: `x = origin + lower u`, `u` standard normal.
 struct Prior<const K: usize> {
     origin: SVector<f64, K>,
     lower: SMatrix<f64, K, K>,
 }
 
-/// Moments of `u`.
+/// Mean and covariance of `u`.
 struct Moments<const K: usize> {
     mean: SVector<f64, K>,
     covariance: SMatrix<f64, K, K>,
 }
 
-/// Refuses axes that are not `K` different coordinates of a state of `D`.
+/// Returns an error unless `axes` are `K` different coordinates of a state of `D`.
 fn check_axes<const D: usize, const K: usize>(axes: &[usize; K]) -> Result<(), Error> {
     at_least_one("axes", K)?;
     OnAxes::<(), D, K>::new((), *axes)?;

@@ -1,4 +1,4 @@
-//! The grid as a receiver's filter: all observations of one instant jointly.
+//! The grid filter under the receiver's contract: all observations of one instant jointly.
 
 use super::{GridFilter, GridWorkspace, check_axes};
 use crate::Error;
@@ -8,7 +8,7 @@ use fewbits_numerics::error::refuse;
 use nalgebra::SVector;
 use rand::Rng;
 
-/// [`GridFilter`] over the coordinates `axes` of the state: all observations of one instant jointly, without linearisation.
+/// [`GridFilter`] over the coordinates `axes` of the state. Processes all observations of one instant jointly, without linearisation.
 #[derive(Debug, Clone)]
 pub struct GridOnAxes<const D: usize, const K: usize> {
     grid: GridFilter,
@@ -17,10 +17,10 @@ pub struct GridOnAxes<const D: usize, const K: usize> {
 }
 
 impl<const D: usize, const K: usize> GridOnAxes<D, K> {
-    /// The filter for likelihoods that depend on no other coordinates than `axes`.
+    /// The filter for likelihoods that depend only on the coordinates `axes`.
     ///
     /// # Errors
-    /// If these are not different coordinates of a state of `D`.
+    /// If `axes` are not different coordinates of a state of `D`.
     pub fn new(grid: GridFilter, axes: [usize; K]) -> Result<Self, Error> {
         check_axes::<D, K>(&axes)?;
         Ok(Self {
@@ -31,7 +31,7 @@ impl<const D: usize, const K: usize> GridOnAxes<D, K> {
     }
 }
 
-/// Likelihoods of a state of `D` as one of the coordinates `axes`, the others at `state`.
+/// Likelihoods of a state of `D` as functions of the coordinates `axes`; the other coordinates are those of `state`.
 struct OnPlane<'a, const D: usize, const K: usize> {
     observed: &'a [&'a dyn StateLikelihood<D>],
     axes: [usize; K],
@@ -53,7 +53,7 @@ impl<const D: usize, const K: usize> Likelihood<K> for OnPlane<'_, D, K> {
         if !fewbits_core::columns::lengths_agree(&places, logs) {
             return;
         }
-        // Coordinates that nothing reads.
+        // Coordinates on which no likelihood depends.
         let constant: [[f64; BLOCK]; D] = std::array::from_fn(|d| [self.state[d]; BLOCK]);
         for (block, logs) in logs.chunks_mut(BLOCK).enumerate() {
             let (start, count) = (block * BLOCK, logs.len());
@@ -79,7 +79,7 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
         Ok(())
     }
 
-    /// Refuses likelihoods that read another coordinate than the grid's.
+    /// An error if a likelihood depends on a coordinate outside `axes`.
     fn update(
         &mut self,
         _: &mut dyn Rng,

@@ -1,4 +1,4 @@
-//! One grid: weights of its nodes, tempered if too few of them count, and the moments under them.
+//! Evaluation of one grid: weights of its nodes, tempered if too few have weight, and the moments under these weights.
 
 use super::region::{Piece, Region};
 use super::{GridFilter, GridWorkspace, MAX_NODES, MAX_REFINED_NODES, MIN_NODES_PER_DEVIATION, Prior};
@@ -11,53 +11,53 @@ use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
 
-/// Density of the posterior at its peak (logarithm, against that of a standard normal) below which it counts as underflown.
+/// Log ratio of the posterior's peak to that of a standard normal, below which the posterior is treated as underflowed.
 const UNDERFLOW: f64 = -690.0;
-/// Effective nodes per axis below which weights are tempered: with fewer, a
-/// mode that lies between nodes would lose its weight to one that lies on a node.
+/// Effective number of nodes per axis below which weights are tempered. With fewer, a
+/// mode between nodes would lose its weight to another one that is at a node.
 const MIN_EFFECTIVE_NODES: f64 = 3.0;
-/// Deviations of the posterior to each side of its mean that must lie inside the grid.
+/// The grid must cover this many deviations of the posterior to each side of its mean.
 const COVERED: f64 = 3.0;
-/// The same for the first grid, if it is wide against the posterior: a narrower one costs no more and covers more.
+/// The same for the first grid, if it is wide compared with the posterior: a narrower grid costs as much and covers less.
 const COVERED_BY_PREDICTION: f64 = 4.8;
-/// Deviations of the posterior, in those of the prediction, from which on the first grid's ends count as those of the prediction.
+/// If the posterior's deviation is at least this multiple of the predicted one, the ends of the first grid are those of the prediction.
 const BLUNT: f64 = 0.5;
-/// A grid is no longer narrowed if all principal axes of what it shows are longer than this, in its own deviations.
+/// A grid is no longer narrowed if all principal axes of the weights are longer than this, in its own deviations.
 const STALLED: f64 = 0.7;
-/// Neighbouring layers of nodes without weight, across the longest axis, that separate two modes.
+/// Number of successive empty layers of nodes, across the longest axis, that separate two modes.
 const GAP_LAYERS: usize = 3;
-/// Share of the weight below which a layer counts as empty.
+/// A layer with a smaller fraction of the weight is treated as empty.
 const EMPTY_LAYER: f64 = 1e-4;
-/// Share of the weight on either side of a gap that makes it a gap between modes.
+/// Smallest fraction of the weight on each side of a gap between modes.
 const MODE_SHARE: f64 = 0.05;
-/// Layers that buffers have room for from the beginning.
+/// Number of layers for which memory is reserved at first.
 const ROOM_FOR_LAYERS: usize = 256;
 /// Bisections of the tempering exponent, over at most twelve decades.
 const BISECTIONS: u32 = 24;
 
-/// What one grid shows, in its own coordinates.
+/// Results of one grid, in its own coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct Found<const K: usize> {
-    /// Exponent of the weights; 1 for the posterior itself.
+    /// Exponent to which the weights were raised; 1 for the posterior itself.
     exponent: f64,
     log_evidence: f64,
     log_peak: f64,
-    /// Distance of neighbouring nodes.
+    /// Distance between neighbouring nodes.
     pub step: f64,
     pub mean: SVector<f64, K>,
     pub covariance: SMatrix<f64, K, K>,
     /// Deviation along the shortest principal axis.
     shortest: f64,
-    /// Nodes per deviation of a Gaussian with as many effective nodes.
+    /// Nodes per deviation of a Gaussian with the same effective number of nodes.
     counted: f64,
     /// A plane `along' t = offset` in a gap between two modes.
     pub gap: Option<(SVector<f64, K>, f64)>,
 }
 
 impl<const K: usize> Found<K> {
-    /// Nodes per deviation of the posterior: along the shortest principal axis, and as the number of nodes that count says, whichever is
-    /// less. A posterior of edges, ridges or spikes has fewer nodes that count than a Gaussian of its moments. 0 if the weights are not
-    /// yet those of the posterior.
+    /// Nodes per deviation of the posterior: the smaller of the number along the shortest principal axis and the number from the effective
+    /// nodes. A posterior with edges, ridges or spikes has fewer effective nodes than a Gaussian of its moments. 0 if the weights are
+    /// tempered.
     pub fn nodes_per_deviation(&self) -> f64 {
         if self.is_tempered() {
             0.0
@@ -66,12 +66,12 @@ impl<const K: usize> Found<K> {
         }
     }
 
-    /// Whether more nodes are needed, and not only a grid along the principal axes.
+    /// Whether more nodes are needed. If not, a grid along the principal axes is enough.
     pub fn is_coarse(&self) -> bool {
         self.is_tempered() || self.counted < MIN_NODES_PER_DEVIATION
     }
 
-    /// Whether the posterior here is certainly below a share of `exp(-log_ratio)` of one with this evidence.
+    /// Whether the evidence of this region is certainly below `exp(-log_ratio)` times the given evidence.
     pub fn is_below(&self, region: &Region<K>, log_evidence: f64, log_ratio: f64) -> bool {
         !self.is_tempered() && self.log_evidence + region.log_volume() < log_evidence - log_ratio
     }
@@ -80,7 +80,7 @@ impl<const K: usize> Found<K> {
         self.exponent < 1.0
     }
 
-    /// Whether these are the moments of the posterior: all of it resolved and inside the grid.
+    /// Whether the moments are those of the posterior: resolved and inside the grid.
     pub fn is_done(&self, region: &Region<K>, reach: f64) -> bool {
         let widest = self.covariance.diagonal().max().sqrt();
         let covered = match region.is_prediction() {
@@ -114,7 +114,7 @@ impl<const K: usize> Found<K> {
 }
 
 impl GridFilter {
-    /// Lays one grid. `None` if the observation is impossible at all its nodes.
+    /// Evaluates one grid. `None` if the observation has probability zero at all nodes.
     pub(super) fn pass<const K: usize>(
         &self,
         prior: &Prior<K>,
@@ -143,7 +143,7 @@ impl GridFilter {
         };
         let node = |index: &[usize; K]| SVector::<f64, K>::from_fn(|k, _| step * index[k] as f64 - self.reach);
 
-        // Places and log prior of all nodes, then the log likelihood in one sweep.
+        // Positions and log prior of all nodes, then the log likelihood in one sweep.
         let basis = region.basis();
         let mut index = [0_usize; K];
         for n in 0..count {
@@ -160,7 +160,7 @@ impl GridFilter {
             advance(&mut index);
         }
         observed.add_log_likelihoods(columns.each_ref().map(Vec::as_slice), logs);
-        // A likelihood that is no number is no reason to believe in a node.
+        // A likelihood of NaN gives its node no weight.
         if logs.iter().all(|log| log.is_nan()) {
             return refuse("observed", "a log likelihood of NaN at every node", "numbers or -inf");
         }
@@ -175,13 +175,13 @@ impl GridFilter {
             return Ok(None);
         }
 
-        // Weights, tempered if fewer nodes count than tell where the posterior is.
+        // Weights. If too few nodes have weight to locate the posterior, temper: raise the weights to an exponent below one.
         let effective = |sums: kernels::ExpSums| sums.sum * sums.sum / sums.sum_of_squares;
         let mut sums = kernels::exp_minus(logs, peak, weights);
         let log_total = sums.sum.ln();
         let (fewest, mut exponent) = (MIN_EFFECTIVE_NODES.powi(K as i32), 1.0);
         if effective(sums) < fewest {
-            // The number of effective nodes falls with the exponent; at the lowest, neighbours differ by nothing that counts.
+            // The effective number of nodes decreases with the exponent. At the lowest exponent all nodes have nearly equal weight.
             let (mut low, mut high) = (-27.6, 0.0);
             for _ in 0..BISECTIONS {
                 let middle: f64 = 0.5 * (low + high);
@@ -247,14 +247,14 @@ impl GridFilter {
         Ok(Some(found))
     }
 
-    /// Makes room for `nodes` on each axis; returns their number.
+    /// Sets the buffers to `nodes` per axis; returns the total number of nodes.
     fn resize<const K: usize>(&self, nodes: usize, workspace: &mut GridWorkspace<K>) -> Result<usize, Error> {
         let Some(count) = nodes.checked_pow(K as u32).filter(|n| *n <= MAX_NODES) else {
             return refuse("nodes", format!("{nodes}^{K}"), format!("at most {MAX_NODES} nodes"));
         };
         let buffers = [&mut workspace.logs, &mut workspace.tempered, &mut workspace.weights];
         for buffer in workspace.columns.iter_mut().chain(buffers) {
-            // Room for one refinement, so that most steps allocate nothing.
+            // Reserve memory for one refinement, so that most steps allocate nothing.
             let room = (2 * self.nodes - 1).pow(K as u32).min(MAX_REFINED_NODES).max(count);
             buffer.reserve(room - buffer.len().min(room));
             buffer.resize(count, 0.0);
@@ -266,7 +266,7 @@ impl GridFilter {
     }
 }
 
-/// The middle of the widest run of empty layers between two modes, counted in layers from the lowest.
+/// The middle of the widest run of empty layers between two modes, in layers from the lowest.
 fn widest_gap(layers: &[f64]) -> Option<f64> {
     let (mut below, mut run, mut best) = (0.0, 0, (0, 0));
     for (i, weight) in layers.iter().enumerate() {

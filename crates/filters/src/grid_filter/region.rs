@@ -1,22 +1,22 @@
-//! A part of the posterior, and the grid that is laid over it.
+//! A region of the posterior, and the grid on it.
 
 use super::pass::Found;
 use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
 
-/// Splits that may lead to one part: up to 256 modes.
+/// Largest number of successive splits of a region: up to 256 modes.
 const MAX_CUTS: usize = 8;
-/// A grid that shows too few nodes per deviation this often, because edges of a cell fall between nodes, is laid closer from then on.
+/// After this many grids with too few nodes per deviation (because edges of a cell fall between nodes), the spacing is reduced.
 const RETRIES: u32 = 2;
-/// How much closer: 1.75 nodes per deviation become 2, and 3.5 deviations to each side remain inside.
+/// Factor of the spacing: 1.75 nodes per deviation become 2, and 3.5 deviations to each side remain inside.
 const CLOSER: f64 = 0.875;
 
-/// Nodes per deviation from which on more of them go into a wider grid, up to five deviations, whose ends cut off nothing that counts.
+/// With more nodes per deviation than this, the grid is made wider, up to five deviations, so that its ends cut off less.
 const NODES_PER_DEVIATION: f64 = 4.0;
 const WIDER: f64 = 1.25;
 
-/// A grid over a part of the whitened coordinates `u`: node `t` is at `centre + axes diag(deviations) t`.
+/// A grid on a region of the whitened coordinates `u`: node `t` is at `centre + axes diag(deviations) t`.
 #[derive(Debug, Clone)]
 pub(super) struct Region<const K: usize> {
     pub centre: SVector<f64, K>,
@@ -25,23 +25,23 @@ pub(super) struct Region<const K: usize> {
     deviations: SVector<f64, K>,
     /// Nodes on each axis.
     pub nodes: usize,
-    /// The splits that led to this part; the first `depth` of them.
+    /// The splits that led to this region; the first `depth` entries are used.
     cuts: [Cut<K>; MAX_CUTS],
     depth: usize,
-    /// How often the grid was laid anew although it no longer narrowed.
+    /// How often the grid was evaluated again although it no longer narrowed.
     retries: u32,
-    /// Whether the grid still lies over the prediction.
+    /// Whether the grid is still the one over the prediction.
     is_prediction: bool,
 }
 
-/// One side of a split: `normal' u >= offset`. There is nothing of the posterior near the cut.
+/// One side of a split: `normal' u >= offset`. The posterior is negligible near the plane.
 #[derive(Debug, Clone, Copy)]
 struct Cut<const K: usize> {
     normal: SVector<f64, K>,
     offset: f64,
 }
 
-/// Moments of `u` over one resolved part.
+/// Moments of `u` in one resolved region.
 #[derive(Debug, Clone)]
 pub(super) struct Piece<const K: usize> {
     pub log_evidence: f64,
@@ -51,7 +51,7 @@ pub(super) struct Piece<const K: usize> {
 }
 
 impl<const K: usize> Region<K> {
-    /// The whole prediction.
+    /// The region of the whole prediction.
     pub fn whole(nodes: usize) -> Self {
         let nothing = Cut {
             normal: SVector::zeros(),
@@ -69,7 +69,7 @@ impl<const K: usize> Region<K> {
         }
     }
 
-    /// Whether `u` belongs to this part.
+    /// Whether `u` is in this region.
     #[inline]
     pub fn holds(&self, u: &SVector<f64, K>) -> bool {
         self.cuts[..self.depth]
@@ -77,22 +77,22 @@ impl<const K: usize> Region<K> {
             .all(|cut| cut.normal.dot(u) >= cut.offset)
     }
 
-    /// `ln` of the volume of one grid unit in `u`.
+    /// `ln` of the volume in `u` of a unit cube of grid coordinates.
     pub fn log_volume(&self) -> f64 {
         self.deviations.iter().map(|d| d.ln()).sum()
     }
 
-    /// Whether the grid still lies over the prediction.
+    /// Whether the grid is still the one over the prediction.
     pub fn is_prediction(&self) -> bool {
         self.is_prediction
     }
 
-    /// Whether it may be split once more.
+    /// Whether another split is possible.
     pub fn can_split(&self) -> bool {
         self.depth < MAX_CUTS
     }
 
-    /// What takes grid coordinates to `u`: the deviations under the axes.
+    /// Matrix from grid coordinates to `u`.
     pub fn basis(&self) -> SMatrix<f64, K, K> {
         SMatrix::from_fn(|i, j| self.axes[(i, j)] * self.deviations[j])
     }
@@ -107,8 +107,8 @@ impl<const K: usize> Region<K> {
         (self.centre + basis * mean, symmetrised(&(basis * covariance * basis.transpose())))
     }
 
-    /// The grid along the principal axes of what was found. Where nodes are too far apart to tell a deviation, half a node is added
-    /// to it: the posterior may lie between them.
+    /// The next grid, along the principal axes of what was found. If the nodes are too far apart to measure a deviation, half a spacing is
+    /// added to it, since the posterior may be between nodes.
     pub fn narrowed(self, found: &Found<K>) -> Self {
         let slack = if found.is_tempered() { 0.25 } else { 1.0 / 48.0 };
         let spread = found.covariance + SMatrix::identity() * (slack * found.step * found.step);

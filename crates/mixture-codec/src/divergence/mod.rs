@@ -1,4 +1,4 @@
-//! Four divergences between densities, and the inequalities between them.
+//! Four divergences between densities, and inequalities between them.
 //!
 //! With `f = ln p - ln q`:
 //!
@@ -9,12 +9,12 @@
 //! | `ML[p, q]` | `sup abs(f)` |
 //! | `DR[p, q]` | `min_a sup abs(f + a) = (sup f - inf f) / 2` |
 //!
-//! `2 DR` is Hilbert's projective metric: it obeys the triangle inequality, and neither a Bayes update nor a Markov prediction
-//! makes it grow. As printed (minimum inside, maximum outside) it would be identically zero. For normalised densities
+//! `2 DR` is Hilbert's projective metric: it satisfies the triangle inequality, and neither a Bayes update nor a Markov prediction
+//! increases it. The printed formula (minimum inside, maximum outside) is identically zero. For normalised densities
 //! `L1^2 <= 2 KL <= 2 ML` and `DR <= ML <= 2 DR`.
 //!
-//! On all of `R^d` the ML and DR between an estimate and anything wider than its kernels are infinite. What is computed at
-//! finitely many points is therefore called `*_plugin`: an estimate, never a certificate.
+//! Over all of `R^d`, ML and DR between an estimate and anything wider than its kernels are infinite. Values that are computed at
+//! finitely many points are called `*_plugin`: they are estimates, not bounds.
 
 pub mod plug_in;
 pub mod quadrature;
@@ -27,12 +27,12 @@ use fewbits_numerics::factored::Factored;
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
-/// The four measures between two known laws.
+/// The four measures between two known distributions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Divergence {
-    /// Kullback-Leibler divergence in nats; infinite where `q` misses mass of `p`.
+    /// Kullback-Leibler divergence in nats; infinite if `q` is zero where `p` is not.
     pub kl: f64,
-    /// Total absolute difference.
+    /// Integral (sum) of the absolute difference, at most 2.
     pub l1: f64,
     /// Largest absolute log ratio.
     pub ml: f64,
@@ -40,17 +40,17 @@ pub struct Divergence {
     pub dr: f64,
 }
 
-/// The four measures between two discrete laws on the same points. Points that neither law gives mass are left out.
+/// The four measures between two discrete distributions on the same points. Points at which both are zero are left out.
 ///
 /// # Errors
-/// If the lengths differ or one is no probability vector.
+/// If the lengths differ, or one is not a probability vector.
 pub fn discrete(p: &[f64], q: &[f64]) -> Result<Divergence, Error> {
     probabilities("p", p)?;
     probabilities("q", q)?;
     entries("q", q.len(), p.len())?;
     let (mut kl, mut l1) = (0.0, 0.0);
     let (mut top, mut bottom) = (f64::NEG_INFINITY, f64::INFINITY);
-    // Where neither has mass the ratio is NaN, which maximum and minimum pass over.
+    // If both are zero, the ratio is NaN, which maximum and minimum ignore.
     for (p, q) in p.iter().zip(q) {
         let f = log_ratio(*p, *q);
         if *p > 0.0 {
@@ -77,28 +77,28 @@ fn log_ratio(p: f64, q: f64) -> f64 {
     }
 }
 
-/// Largest KL of two normalised densities whose `DR` is given: `phi(2 DR)` with
-/// `phi(h) = ln((e^h - 1)/h) - 1 + h/(e^h - 1)`. Attained. Infinite for an infinite argument, 0 for a negative one.
+/// Largest KL of two normalised densities with the given `DR`: `phi(2 DR)` with
+/// `phi(h) = ln((e^h - 1)/h) - 1 + h/(e^h - 1)`. Some densities attain it. Infinite for an infinite argument, 0 for a negative one.
 pub fn kl_from_dr(dr: f64) -> f64 {
     phi(2.0 * dr)
 }
 
-/// Hoeffding's simpler bound `KL <= DR^2 / 2`.
+/// Hoeffding's simpler bound of the KL, `KL <= DR^2 / 2`.
 pub fn kl_from_dr_hoeffding(dr: f64) -> f64 {
     0.5 * dr * dr
 }
 
-/// `L1 <= 2 tanh(DR / 2)`.
+/// Bound of the L1 by the DR, `L1 <= 2 tanh(DR / 2)`.
 pub fn l1_from_dr(dr: f64) -> f64 {
     2.0 * (0.5 * dr).tanh()
 }
 
-/// `KL <= ML tanh(ML / 2)`.
+/// Bound of the KL by the ML, `KL <= ML tanh(ML / 2)`.
 pub fn kl_from_ml(ml: f64) -> f64 {
     ml * (0.5 * ml).tanh()
 }
 
-/// `ln((e^h - 1)/h) - 1 + h/(e^h - 1)`, without cancellation at either end.
+/// `ln((e^h - 1)/h) - 1 + h/(e^h - 1)`, without cancellation for small or large `h`.
 pub fn phi(h: f64) -> f64 {
     if h == f64::INFINITY {
         return h;
@@ -116,7 +116,7 @@ pub fn phi(h: f64) -> f64 {
     h - h.ln() - 1.0 + gone.ln() + h * decay / gone
 }
 
-/// The printed accumulation of KL errors, `KL[p0, p1] + C KL[p1, p2]` with `C = max p0/p1`. **False**: with
+/// The printed bound for accumulated KL errors, `KL[p0, p1] + C KL[p1, p2]` with `C = max p0/p1`. **False**: for
 /// `p0 = (.6, .4), p1 = (.5, .5), p2 = (.49, .51)` it is .02038, below `KL[p0, p2] = .02434`.
 ///
 /// # Errors
@@ -127,8 +127,8 @@ pub fn kl_chain_printed(p0: &[f64], p1: &[f64], p2: &[f64]) -> Result<f64, Error
     Ok(first.kl + scaled(most, second.kl))
 }
 
-/// The corrected accumulation, `KL[p0, p2] <= KL[p0, p1] + C KL[p1, p2] + (C - c)/2 L1[p1, p2]` with `C` and `c` the largest and
-/// the smallest `p0/p1`.
+/// The corrected bound for accumulated KL errors, `KL[p0, p2] <= KL[p0, p1] + C KL[p1, p2] + (C - c)/2 L1[p1, p2]`, with `C` and `c` the
+/// largest and the smallest `p0/p1`.
 ///
 /// # Errors
 /// As [`discrete`].
@@ -138,14 +138,14 @@ pub fn kl_chain_corrected(p0: &[f64], p1: &[f64], p2: &[f64]) -> Result<f64, Err
     Ok(first.kl + scaled(most, second.kl) + scaled(0.5 * (most - least), second.l1))
 }
 
-/// `factor x`, where infinity times nothing is nothing.
+/// `factor x`, with infinity times zero equal to zero.
 fn scaled(factor: f64, x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { factor * x }
 }
 
-/// Smallest and largest `p/q` over the points that either law gives mass.
+/// Smallest and largest `p/q` over the points at which one of them is positive.
 pub fn ratio_range(p: &[f64], q: &[f64]) -> (f64, f64) {
-    // 0/0 is NaN, which minimum and maximum pass over.
+    // 0/0 is NaN, which minimum and maximum ignore.
     let ratios = p.iter().zip(q).map(|(p, q)| p / q);
     ratios.fold((f64::INFINITY, 0.0), |(low, high), r| (r.min(low), r.max(high)))
 }
@@ -157,7 +157,7 @@ pub fn ratio_range(p: &[f64], q: &[f64]) -> (f64, f64) {
 pub fn kl_centred_normals(a: f64, b: f64) -> Result<f64, Error> {
     fewbits_numerics::error::positive("a", a)?;
     fewbits_numerics::error::positive("b", b)?;
-    // With x = a^2/b^2 - 1 this is (x - ln(1 + x))/2. Quotients first: squares may leave the range of numbers.
+    // With x = a^2/b^2 - 1 this is (x - ln(1 + x))/2. The quotient is formed first, since squares may overflow.
     let x = ((a - b) / b) * (a / b + 1.0);
     if x.abs() < 1e-3 {
         return Ok(0.5 * x * x * (0.5 - x * (1.0 / 3.0 - x * (0.25 - x * (0.2 - x / 6.0)))));
@@ -168,20 +168,20 @@ pub fn kl_centred_normals(a: f64, b: f64) -> Result<f64, Error> {
     Ok(0.5 * (x - x.ln_1p()))
 }
 
-/// `ln sup p/q` of two Gaussians, the logarithm of the amplification `C`: with `S_q - S_p` positive definite it is
-/// `(ln det S_q - ln det S_p + d' (S_q - S_p)^-1 d)/2`, `d` the difference of the means; `+inf` where `p` is the wider one in some
-/// direction; 0 for equal ones.
+/// `ln sup p/q` of two Gaussians, the logarithm of the amplification `C`. If `S_q - S_p` is positive definite it is
+/// `(ln det S_q - ln det S_p + d' (S_q - S_p)^-1 d)/2` with `d` the difference of the means. It is `+inf` if `p` is wider in some
+/// direction, and 0 if they are equal.
 ///
-/// ML and DR need the infimum as well, which is `-inf` wherever the supremum is finite, unless the two are equal: between
-/// different Gaussians (and mixtures, whose widest components decide) over all of space both are infinite. Finite values exist for
-/// discrete laws ([`discrete`]) and on bounded sets alone.
+/// ML and DR also need the infimum, which is `-inf` whenever the supremum is finite, unless the two are equal. Between different Gaussians
+/// over all of space both are therefore infinite, and likewise between mixtures, whose widest components decide. They are finite for
+/// discrete distributions ([`discrete`]) and on bounded sets only.
 ///
 /// # Errors
 /// If a covariance is not positive definite.
 pub fn log_largest_ratio<const D: usize>(p: &Gaussian<D>, q: &Gaussian<D>) -> Result<f64, Error> {
     let own = Factored::new("p", p.covariance())?;
     let other = Factored::new("q", q.covariance())?;
-    // Where p is standard, q has the eigenvalues 1 + gain.
+    // In coordinates in which p is standard normal, q has the eigenvalues 1 + gain.
     let whiten = |m: &SMatrix<f64, D, D>| own.whitener * m * own.whitener.transpose();
     let (values, vectors) = symmetric_eigen(whiten(q.covariance()));
     let gap = vectors.transpose() * (own.whitener * (p.mean() - q.mean()));
@@ -197,7 +197,7 @@ pub fn log_largest_ratio<const D: usize>(p: &Gaussian<D>, q: &Gaussian<D>) -> Re
     Ok(0.5 * total.max(0.0))
 }
 
-/// Variances that differ by less than this share count as equal.
+/// Variances with a smaller relative difference are treated as equal.
 const EQUAL: f64 = 1e-12;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Errors of a kernel estimate's approximations, estimated at its centres or around them.
+//! Errors of approximations of a kernel estimate, estimated at its centres or around them.
 
 use super::Divergence;
 use crate::{Error, Tree};
@@ -10,8 +10,8 @@ use std::ops::Range;
 
 /// Estimates of the four error measures from the log ratios `f_i = ln p(x_i) - ln q(x_i)` at weighted points.
 ///
-/// All four are estimates: `ml` and `dr` are maxima over finitely many points of functions that are unbounded, and the KL at
-/// the centres alone is biased upwards for separated kernels (by up to `d/2`) and may be slightly negative for close ones.
+/// All four are estimates. `ml` and `dr` are maxima over finitely many points of functions that are unbounded. The KL from
+/// the centres alone is too large for separated kernels (by up to `d/2`) and may be slightly negative for close ones.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PlugIn {
     /// `max abs(f_i)`.
@@ -25,7 +25,7 @@ pub struct PlugIn {
 }
 
 impl PlugIn {
-    /// The estimates from pairs of weight and log ratio; the weights sum to one.
+    /// The estimates from pairs of weight and log ratio; the weights must sum to one.
     pub fn of(ratios: impl Iterator<Item = (f64, f64)>) -> Self {
         let (mut top, mut bottom) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut estimate = Self::default();
@@ -43,7 +43,7 @@ impl PlugIn {
     }
 }
 
-/// As if the estimates were the measures themselves; a KL below zero counts as zero.
+/// Uses the estimates as if they were the measures themselves; a KL below zero is replaced by zero.
 impl From<PlugIn> for Divergence {
     fn from(estimate: PlugIn) -> Self {
         Self {
@@ -55,7 +55,7 @@ impl From<PlugIn> for Divergence {
     }
 }
 
-/// Plug-in errors of `q` as an approximation of the estimate, at the estimate's centres. `n^2/2` kernels.
+/// Plug-in errors of `q` as an approximation of the estimate `p`, at the centres of `p`. Evaluates `n^2/2` kernels.
 pub fn plug_in<const D: usize>(p: &KernelEstimate<D>, q: &Mixture<D>) -> PlugIn {
     let own = p.log_pdf_at_centres();
     let mut other = vec![0.0; p.len()];
@@ -67,7 +67,7 @@ pub fn plug_in<const D: usize>(p: &KernelEstimate<D>, q: &Mixture<D>) -> PlugIn 
     PlugIn::of(ratios)
 }
 
-/// Points that stand for one Gaussian kernel in a sum over kernels.
+/// Sets of points that replace one Gaussian kernel in a sum over kernels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Cubature {
@@ -79,7 +79,7 @@ pub enum Cubature {
 }
 
 impl Cubature {
-    /// Offsets in units of the kernel and their weights, which sum to one.
+    /// Offsets in units of the kernel, and their weights, which sum to one.
     pub(crate) fn points<const D: usize>(self) -> Vec<(SVector<f64, D>, f64)> {
         match self {
             Self::Spherical => (0..2 * D)
@@ -107,13 +107,13 @@ impl Cubature {
     }
 }
 
-/// Errors of `q` estimated with several points per kernel instead of its centre alone: the KL comes out 12 to 35% low with
-/// spherical points, less with Gauss-Hermite points, at that many times the cost.
+/// Errors of `q`, estimated with several points per kernel instead of its centre alone. The KL is 12 to 35 % too low with
+/// spherical points, less with Gauss-Hermite points. The cost is multiplied by the number of points.
 pub fn cubature<const D: usize>(p: &KernelEstimate<D>, q: &Mixture<D>, rule: Cubature) -> PlugIn {
     CubatureTarget::new(p, rule).plug_in(q)
 }
 
-/// An estimate's cubature points and log densities, computed once to judge many approximations.
+/// The cubature points of an estimate and its log densities there, computed once to compare many approximations with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CubatureTarget<const D: usize> {
     columns: [Vec<f64>; D],
@@ -122,7 +122,7 @@ pub struct CubatureTarget<const D: usize> {
 }
 
 impl<const D: usize> CubatureTarget<D> {
-    /// All points of all kernels of positive weight: `n` kernels per point.
+    /// All points of all kernels of positive weight. Evaluates `n` kernels per point.
     pub fn new(estimate: &KernelEstimate<D>, rule: Cubature) -> Self {
         let weights = estimate.particles().weights();
         let centres = estimate.particles().columns();
@@ -145,7 +145,7 @@ impl<const D: usize> CubatureTarget<D> {
         }
     }
 
-    /// Errors of one approximation.
+    /// Plug-in errors of one approximation.
     pub fn plug_in(&self, q: &Mixture<D>) -> PlugIn {
         let mut other = vec![0.0; self.weights.len()];
         q.log_pdf_columns(self.columns.each_ref().map(Vec::as_slice), &mut other);
@@ -153,10 +153,11 @@ impl<const D: usize> CubatureTarget<D> {
     }
 }
 
-/// Plug-in errors of every node of a tree: of the node's own Gaussian as an approximation of the node's own (normalised) part of
-/// the estimate. A leaf's are exactly zero.
+/// Plug-in errors of every node of a tree: of the node's Gaussian as an approximation of the node's (normalised) part of
+/// the estimate. Those of a leaf are exactly zero.
 ///
-/// Kernels between two points are summed where their paths meet, so all nodes together cost `n^2/2` kernels, as the root alone.
+/// Kernels between two points are added at their lowest common ancestor. All nodes together therefore take `n^2/2` kernels, as the root
+/// alone does.
 pub fn node_errors<const D: usize>(estimate: &KernelEstimate<D>, tree: &Tree<D>) -> Result<Vec<PlugIn>, Error> {
     let order = tree.order();
     let weight: Vec<f64> = order.iter().map(|i| estimate.particles().weights()[*i]).collect();
@@ -166,7 +167,7 @@ pub fn node_errors<const D: usize>(estimate: &KernelEstimate<D>, tree: &Tree<D>)
         let column = estimate.particles().columns()[d];
         order.iter().map(|i| column[*i]).collect()
     });
-    // Kernel sums within the node that is being looked at; children before parents.
+    // Kernel sums within the present node; children are processed before their parents.
     let mut sums = weight.clone();
     let mut errors = vec![PlugIn::default(); tree.nodes().len()];
     for (index, node) in tree.nodes().iter().enumerate().rev() {
@@ -182,7 +183,7 @@ pub fn node_errors<const D: usize>(estimate: &KernelEstimate<D>, tree: &Tree<D>)
             (&part(&right), &weight[right.clone()], &mut upper[..right.len()]),
         );
         let factor = Factored::new("node covariance", &node.covariance)?;
-        // ln p = ln(sum / w) - ln det L_H and ln q = -q/2 - ln det L_S, both less the same constant.
+        // ln p = ln(sum / w) - ln det L_H and ln q = -q/2 - ln det L_S, both without the same constant.
         let offset = factor.half_log_det - estimate.kernel_factor().half_log_det - node.weight.ln();
         errors[index] = PlugIn::of(node.range.clone().map(|i| {
             let gap = SVector::<f64, D>::from_fn(|d, _| centres[d][i] - node.mean[d]);

@@ -6,7 +6,8 @@ use fewbits_densities::Mixture;
 use fewbits_numerics::error::{positive, refuse};
 use serde::{Deserialize, Serialize};
 
-/// KL and L1 by quadrature, and the mass that the grid saw of each density: how far it is from one tells how good the grid was.
+/// KL and L1 by quadrature, and the integral of each density over the grid. How close these are to one shows whether the grid is large
+/// enough.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Integrated {
     /// `int p ln(p/q)` in nats.
@@ -19,8 +20,8 @@ pub struct Integrated {
     pub mass_q: f64,
 }
 
-/// An axis-aligned box with equal steps along each axis, for the trapezoidal rule. For functions that have died out at its ends
-/// the rule converges faster than any power of the step.
+/// An axis-aligned box with equal steps along each axis, for the trapezoidal rule. If the integrand is negligible at the ends,
+/// the error falls faster than any power of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct QuadratureGrid<const D: usize> {
     lower: [f64; D],
@@ -53,7 +54,7 @@ impl<const D: usize> QuadratureGrid<D> {
         Ok(Self { lower, steps, counts })
     }
 
-    /// A grid that covers every component of both mixtures to `reach` standard deviations, with steps of `fineness` times the
+    /// A grid that covers every component of both mixtures up to `reach` standard deviations, with steps of `fineness` times the
     /// smallest standard deviation in any direction.
     ///
     /// # Errors
@@ -65,7 +66,7 @@ impl<const D: usize> QuadratureGrid<D> {
         for c in p.components().iter().chain(q.components()) {
             for d in 0..D {
                 let s = c.covariance()[(d, d)].sqrt();
-                // Standard deviation along the axis given the others: what the integrand's steepness follows.
+                // Standard deviation along the axis given the other coordinates: the integrand varies over this distance.
                 let narrow = 1.0 / c.factor().whitener.column(d).norm();
                 lower[d] = lower[d].min(c.mean()[d] - reach * s);
                 upper[d] = upper[d].max(c.mean()[d] + reach * s);
@@ -75,7 +76,7 @@ impl<const D: usize> QuadratureGrid<D> {
         Self::new(lower, upper, step)
     }
 
-    /// KL and L1 of two log densities given as sweeps over columns.
+    /// KL and L1 of two log densities, each given as a function that writes the log densities of columns of points.
     pub fn integrate(
         &self,
         p: impl Fn(Columns<'_, D>, &mut [f64]),
@@ -89,6 +90,7 @@ impl<const D: usize> QuadratureGrid<D> {
         }
         let (mut log_p, mut log_q) = (vec![0.0; row], vec![0.0; row]);
         let mut total = [0.0; 4];
+        // The index of the row, in mixed radix, gives the coordinates that are constant along it.
         for r in 0..rows {
             let mut rest = r;
             for d in (0..D - 1).rev() {
@@ -102,6 +104,7 @@ impl<const D: usize> QuadratureGrid<D> {
             let mut sums = [0.0; 4];
             for (lp, lq) in log_p.iter().zip(&log_q) {
                 let (a, b) = (lp.exp(), lq.exp());
+                // If p underflows, its term of the divergence is zero.
                 if a > 0.0 {
                     sums[0] += a * (lp - lq);
                 }
@@ -117,8 +120,8 @@ impl<const D: usize> QuadratureGrid<D> {
     }
 }
 
-/// KL and L1 of two mixtures by quadrature: the KL to about 1e-9, the L1 (whose integrand has kinks) to about 1e-4. The step
-/// follows the narrowest component and the width all of them.
+/// KL and L1 of two mixtures by quadrature: the KL with an error of about 1e-9, the L1, whose integrand has kinks, of about 1e-4. The step
+/// depends on the narrowest component, the width of the grid on all of them.
 ///
 /// # Errors
 /// If `D` is 0 or the grid would need over 5e7 nodes.

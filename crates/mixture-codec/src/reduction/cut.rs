@@ -1,4 +1,4 @@
-//! Cuts of a tree: which nodes' Gaussians stand for the whole, by greed or by dynamic programming.
+//! Cuts of a tree: a choice of nodes whose Gaussians replace the estimate, found greedily or by dynamic programming.
 
 use crate::divergence::plug_in::{PlugIn, node_errors};
 use crate::tree::ROOT;
@@ -8,21 +8,21 @@ use fewbits_numerics::error::{at_least_one, entries, refuse};
 use fewbits_numerics::factored::half_log_det;
 use serde::{Deserialize, Serialize};
 
-/// Which error a cut keeps small.
+/// The error that a cut minimises.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Criterion {
     /// The largest plug-in ML of a chosen node.
     Ml,
-    /// The weighted sum of plug-in KLs; negative ones count as 0.
+    /// The weighted sum of plug-in KLs; negative ones are replaced by 0.
     Kl,
     /// The weighted sum of plug-in L1s.
     L1,
-    /// The weighted sum of `(ln det S - ln det H)/2`, an upper bound of the KL in closed form: no kernels are evaluated.
+    /// The weighted sum of `(ln det S - ln det H)/2`, an upper bound of the KL in closed form that needs no kernel evaluations.
     LogDeterminant,
 }
 
-/// How the errors of the chosen nodes combine into a bound of the whole.
+/// How the errors of the chosen nodes combine to a bound for the whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Combine {
     Max,
@@ -38,7 +38,7 @@ impl Combine {
     }
 }
 
-/// Error of every node of a tree under one criterion, weights included where they belong.
+/// The error of every node of a tree under one criterion, multiplied by the node's weight if the criterion is a sum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeErrors {
     values: Vec<f64>,
@@ -46,11 +46,11 @@ pub struct NodeErrors {
 }
 
 impl NodeErrors {
-    /// Errors under a criterion. All but [`Criterion::LogDeterminant`] cost `n^2/2` kernels; see [`NodeErrors::from_plug_in`] for
-    /// several criteria at the price of one.
+    /// Errors under a criterion. All but [`Criterion::LogDeterminant`] need `n^2/2` kernels. For several criteria use
+    /// [`NodeErrors::from_plug_in`], which shares these evaluations.
     ///
     /// # Errors
-    /// Never for a tree of this estimate.
+    /// Does not occur for a tree of this estimate.
     pub fn new<const D: usize>(
         estimate: &KernelEstimate<D>,
         tree: &Tree<D>,
@@ -74,7 +74,7 @@ impl NodeErrors {
     /// Errors under a criterion from the plug-in errors of all nodes.
     ///
     /// # Errors
-    /// If there is not one per node, or the criterion is not a plug-in one.
+    /// If there is not one per node, or the criterion is [`Criterion::LogDeterminant`].
     pub fn from_plug_in<const D: usize>(
         tree: &Tree<D>,
         plug_in: &[PlugIn],
@@ -93,12 +93,12 @@ impl NodeErrors {
         Ok(Self { values, combine })
     }
 
-    /// Error of one node; sums already carry the node's weight.
+    /// Error of each node; for a sum it includes the node's weight.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// Bound `B(S)` of a cut: the largest error of its nodes or their sum.
+    /// Bound `B(S)` of a cut: the largest error of its nodes, or their sum.
     pub fn bound(&self, cut: &[usize]) -> f64 {
         cut.iter()
             .filter_map(|s| self.values.get(*s))
@@ -106,7 +106,7 @@ impl NodeErrors {
     }
 }
 
-/// A choice of nodes, one ancestor-or-self of every leaf, and its bound.
+/// A choice of nodes such that every leaf has exactly one of them as ancestor or is one itself, and its bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cut {
     /// The nodes, left to right.
@@ -119,7 +119,7 @@ impl Cut {
     /// The nodes' Gaussians, each with its node's weight.
     ///
     /// # Errors
-    /// If the cut is none of this tree.
+    /// If the cut is not one of this tree.
     pub fn mixture<const D: usize>(&self, tree: &Tree<D>) -> Result<Mixture<D>, Error> {
         tree.check_cut(&self.nodes)?;
         let components = self.nodes.iter().map(|s| tree.nodes()[*s].component());
@@ -127,11 +127,11 @@ impl Cut {
     }
 }
 
-/// Splits the worst node again and again while at most `components` nodes result, and returns the best cut on the way
-/// (Algorithm 1 with errata: the budget is tested before the split is made, and the weight stands inside the maximum).
+/// Repeatedly splits the node of largest error, as long as there are at most `components` nodes, and returns the best cut found
+/// (Algorithm 1 with errata: the number of nodes is tested before the split, and the weight is inside the maximum).
 ///
-/// The bound is not monotone under splitting, so the best cut may have fewer nodes than allowed. Where every leaf is allowed, all
-/// leaves are returned: their error is 0.
+/// A split can increase the bound, so the best cut may have fewer nodes than allowed. If every leaf is allowed, all
+/// leaves are returned, with error 0.
 ///
 /// # Errors
 /// If `components` is 0 or the errors are not of this tree.
@@ -140,11 +140,11 @@ pub fn greedy<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: u
     greedy_within(tree, errors, |_| 1.0, components as f64)
 }
 
-/// [`greedy`] with an additive price per node (a code length in bits, say) and a limit on the total. Children together must
-/// cost more than their parent. Where the leaves together are within the limit, they are the answer.
+/// As [`greedy`], with a price per node (such as a code length in bits) and a limit of their sum. Two children must
+/// together cost more than their parent. If all leaves are within the limit, they are the result.
 ///
 /// # Errors
-/// If the root alone is above the limit, or the errors are not of this tree.
+/// If the root alone exceeds the limit, or the errors are not of this tree.
 pub fn greedy_within<const D: usize>(
     tree: &Tree<D>,
     errors: &NodeErrors,
@@ -156,7 +156,7 @@ pub fn greedy_within<const D: usize>(
     if !matches!(total.partial_cmp(&limit), Some(std::cmp::Ordering::Less | std::cmp::Ordering::Equal)) {
         return refuse("limit", limit, format!("at least {total}, the price of the root"));
     }
-    // Plug-in errors of inner nodes may be 0 or below by chance: a stop at the worst node would come too early.
+    // Plug-in errors of inner nodes may happen to be 0 or negative, so the loop must not stop there.
     let leaves = leaves(tree);
     if leaves.nodes.iter().map(|leaf| price(*leaf)).sum::<f64>() <= limit {
         return Ok(leaves);
@@ -167,7 +167,7 @@ pub fn greedy_within<const D: usize>(
         nodes: cut.clone(),
     };
     loop {
-        // The first of the largest, as ties go to the first.
+        // Of equal errors the first is taken.
         let worst = (1..cut.len()).fold(0, |w, i| {
             if errors.values[cut[i]] > errors.values[cut[w]] {
                 i
@@ -193,8 +193,8 @@ pub fn greedy_within<const D: usize>(
     }
 }
 
-/// The cut of smallest bound among all with at most `components` nodes, by dynamic programming from the leaves up:
-/// `B(s, m) = min(e(s), min_a B(s_L, a) (+ or max) B(s_R, m - a))`. `O(n m^2)`. Where every leaf is allowed, all leaves are
+/// The cut of smallest bound among all with at most `components` nodes, by dynamic programming from the leaves to the root:
+/// `B(s, m) = min(e(s), min_a B(s_L, a) (+ or max) B(s_R, m - a))`. `O(n m^2)`. If every leaf is allowed, all leaves are
 /// returned.
 ///
 /// # Errors
@@ -206,7 +206,7 @@ pub fn optimal<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: 
     if components >= nodes[ROOT].range.len() {
         return Ok(leaves(tree));
     }
-    // For each node: the best bound with at most 1, 2, ... nodes, and how many of them go to the left child (0: no split).
+    // For each node and budget of 1, 2, ... nodes: the smallest bound, and how many nodes the left child gets (0: no split).
     let mut tables: Vec<Vec<(f64, usize)>> = vec![Vec::new(); nodes.len()];
     for (index, node) in nodes.iter().enumerate().rev() {
         let own = match node.children {
@@ -225,7 +225,8 @@ pub fn optimal<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: 
                         best = (bound, a);
                     }
                 }
-                // A split found with fewer nodes keeps its own share: remember how many it used by looking it up below.
+                // If no split into so many nodes improves the bound, the entry of the smaller budget is copied. Its share of the left child
+                // belongs to that smaller budget, which the reconstruction below therefore searches first.
                 table[m - 1] = best;
             }
         }
@@ -235,7 +236,7 @@ pub fn optimal<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: 
     let mut pending = vec![(ROOT, nodes[ROOT].range.len().min(components))];
     while let Some((index, m)) = pending.pop() {
         let table = &tables[index];
-        // The smallest number of nodes that reaches the same bound.
+        // The smallest budget that has the same bound.
         let m = (1..=m).find(|k| table[k - 1].0 <= table[m - 1].0).unwrap_or(m);
         match (table[m - 1].1, nodes[index].children) {
             (a, Some([left, right])) if a > 0 => {
@@ -251,7 +252,7 @@ pub fn optimal<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: 
     })
 }
 
-/// The cut of all leaves, left to right: the estimate itself.
+/// The cut of all leaves, left to right, which is the estimate itself.
 fn leaves<const D: usize>(tree: &Tree<D>) -> Cut {
     let nodes = tree.nodes();
     let mut leaves: Vec<usize> = (0..nodes.len()).filter(|s| nodes[*s].children.is_none()).collect();

@@ -1,4 +1,4 @@
-//! Mixtures made smaller by merging pairs of components, moments preserved.
+//! Reduction of mixtures by merging pairs of components; mean and covariance are kept.
 
 use crate::Error;
 use fewbits_densities::{Component, Mixture};
@@ -8,25 +8,25 @@ use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// Cost of merging a pair of components.
+/// The cost of merging a pair of components. The cheapest pair is merged first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum MergeCost {
-    /// `(w ln det S_ij - w_i ln det S_i - w_j ln det S_j)/2`, an upper bound of the KL lost (Runnalls 2007).
+    /// `(w ln det S_ij - w_i ln det S_i - w_j ln det S_j)/2`, an upper bound of the lost KL (Runnalls 2007).
     Runnalls,
     /// `w_i w_j/(w_i + w_j) (m_i - m_j)' C^-1 (m_i - m_j)` with `C` the covariance of the whole (Salmond 1990).
     Salmond,
-    /// The integrated squared error of the whole mixture against the one that was given (Williams and Maybeck 2003).
-    /// `O(n^4)`: for a few dozen components.
+    /// The integrated squared error between the merged and the original mixture (Williams and Maybeck 2003).
+    /// `O(n^4)`, so only for a few dozen components.
     Williams,
 }
 
-/// A mixture after merging and what it cost.
+/// A mixture after merging, and the cost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Merged<const D: usize> {
-    /// The smaller mixture, of the same mean and covariance.
+    /// The smaller mixture, with the same mean and covariance.
     pub mixture: Mixture<D>,
-    /// Sum of the merges' costs. For [`MergeCost::Runnalls`] an upper bound of the KL lost; for [`MergeCost::Williams`] the
+    /// Sum of the merges' costs. For [`MergeCost::Runnalls`] an upper bound of the lost KL; for [`MergeCost::Williams`] the
     /// integrated squared error of the result.
     pub cost: f64,
 }
@@ -58,10 +58,10 @@ impl<const D: usize> Part<D> {
     }
 }
 
-/// Merges the cheapest pair again and again until at most `components` are left.
+/// Merges the cheapest pair repeatedly until at most `components` components are left.
 ///
 /// # Errors
-/// If `components` is 0, the joint covariance of two components leaves the range of numbers, or that of the whole is singular to
+/// If `components` is 0, the joint covariance of two components overflows, or that of the whole mixture is singular to
 /// working precision ([`MergeCost::Salmond`]).
 pub fn merge<const D: usize>(mixture: &Mixture<D>, components: usize, cost: MergeCost) -> Result<Merged<D>, Error> {
     at_least_one("components", components)?;
@@ -86,7 +86,7 @@ pub fn merge<const D: usize>(mixture: &Mixture<D>, components: usize, cost: Merg
         MergeCost::Williams => williams(parts, components),
     };
     if parts.len() > components {
-        // No pair that is left has a finite price.
+        // No remaining pair has a finite cost.
         let given = format!("{} components that cannot be joined", parts.len());
         return refuse("mixture", given, "components whose joint covariances are finite");
     }
@@ -97,8 +97,8 @@ pub fn merge<const D: usize>(mixture: &Mixture<D>, components: usize, cost: Merg
     })
 }
 
-/// Merges by a cost that depends on the pair alone; each part remembers its cheapest partner behind it, so a merge costs
-/// `O(n)` in the mean.
+/// Merges by a cost that depends on the pair alone. Each component stores its cheapest partner among those after it, so a merge takes
+/// `O(n)` steps on average.
 fn pairwise<const D: usize>(
     mut parts: Vec<Part<D>>,
     components: usize,
@@ -112,6 +112,7 @@ fn pairwise<const D: usize>(
         }
     }
     let mut alive = vec![true; n];
+    // For each part the cheapest partner after it. A merge changes few of these, so that a step costs O(n), not O(n^2).
     let cheapest = |i: usize, costs: &[f64], alive: &[bool]| -> (f64, usize) {
         let mut best = (f64::INFINITY, usize::MAX);
         for j in i + 1..n {
@@ -137,6 +138,7 @@ fn pairwise<const D: usize>(
             costs[low * n + high] = cost(&parts[low], &parts[high]);
         }
         for k in (0..n).filter(|k| alive[*k]) {
+            // If the cheapest partner has changed or is gone, search again. Otherwise only the merged component can have become cheaper.
             let stale = k == i || best[k].1 == i || best[k].1 == j;
             if stale {
                 best[k] = cheapest(k, &costs, &alive);
@@ -153,7 +155,7 @@ fn pairwise<const D: usize>(
     (kept.collect(), total)
 }
 
-/// `N(a.mean; b.mean, a.covariance + b.covariance)` in the log domain.
+/// `ln N(a.mean; b.mean, a.covariance + b.covariance)`.
 fn log_overlap<const D: usize>(a: &Part<D>, b: &Part<D>) -> f64 {
     match Factored::new("covariance", &(a.covariance + b.covariance)) {
         Ok(f) => -0.5 * f.squared(&(a.mean - b.mean)) - f.half_log_det - D as f64 * LN_SQRT_2PI,
@@ -163,7 +165,7 @@ fn log_overlap<const D: usize>(a: &Part<D>, b: &Part<D>) -> f64 {
 
 fn williams<const D: usize>(original: Vec<Part<D>>, components: usize) -> (Vec<Part<D>>, f64) {
     let mut parts = original.clone();
-    // Overlaps span many orders in small units; the largest is taken out of all of them.
+    // Overlaps vary over many orders of magnitude in small units, so the largest is factored out.
     let scale = original
         .iter()
         .map(|p| log_overlap(p, p))
@@ -262,7 +264,7 @@ mod tests {
                 let pairs = fast.0.iter().zip(&slow.0);
                 assert!(fast.0.len() == slow.0.len() && pairs.clone().all(|(a, b)| a.mean == b.mean));
             }
-            // What no price can buy stays apart.
+            // A pair whose merging costs infinity is not merged.
             let (kept, total) = pairwise(parts, 3, |_, _| f64::INFINITY);
             assert_eq!((kept.len(), total), (14, 0.0));
         }

@@ -1,4 +1,4 @@
-//! From a kernel estimate to a mixture of few components: the methods of the paper, and a better one.
+//! Reductions of a kernel estimate to a mixture of few components: the recommended one and those of the paper.
 
 pub mod cut;
 pub mod merge;
@@ -15,7 +15,7 @@ use fewbits_numerics::error::at_least_one;
 use merge::{MergeCost, merge};
 use serde::{Deserialize, Serialize};
 
-/// How an estimate is reduced to a given number of components.
+/// A method that reduces an estimate to a given number of components.
 ///
 /// ```
 /// use fewbits_mixture_codec::Reduction;
@@ -31,30 +31,31 @@ use serde::{Deserialize, Serialize};
 pub enum Reduction {
     /// The Gaussian of the same mean and covariance.
     SingleGaussian,
-    /// A greedy cut of a tree (Algorithm 1 with errata); the paper's method with [`Split::KD`].
+    /// A greedy cut of a tree (Algorithm 1 with errata); with [`Split::KD`] it is the paper's method.
     Greedy {
         /// How the tree is built.
         split: Split,
-        /// What is kept small.
+        /// The error that the cut minimises.
         criterion: Criterion,
     },
-    /// The best cut of a tree.
+    /// The optimal cut of a tree.
     Optimal {
         /// How the tree is built.
         split: Split,
-        /// What is kept small.
+        /// The error that the cut minimises.
         criterion: Criterion,
     },
-    /// Pairwise merging of all kernels: `O(n^2)` costs, several times slower than the pipeline and no better.
+    /// Pairwise merging of all kernels. It evaluates `O(n^2)` costs, takes several times as long as the pipeline and is no better.
     Merging {
-        /// What a merge is charged.
+        /// The cost of a merge.
         cost: MergeCost,
     },
-    /// A greedy cut to `cut` nodes in closed form, Runnalls merging, and expectation-maximisation with a floor.
+    /// A greedy cut to `cut` nodes in closed form, then Runnalls merging, then expectation-maximisation with a lower limit of the
+    /// covariances.
     Pipeline {
-        /// Nodes left by the cut.
+        /// Number of nodes of the cut.
         cut: usize,
-        /// Iterations of expectation-maximisation.
+        /// Number of iterations of expectation-maximisation.
         iterations: usize,
     },
 }
@@ -70,7 +71,7 @@ impl Default for Reduction {
 }
 
 impl Reduction {
-    /// The paper's method under one of its three criteria.
+    /// The paper's method with one of its three criteria.
     pub const fn paper(criterion: Criterion) -> Self {
         Self::Greedy {
             split: Split::KD,
@@ -78,8 +79,8 @@ impl Reduction {
         }
     }
 
-    /// Reduces the estimate to at most `components` components. All methods but the pipeline keep mean and covariance exactly;
-    /// the pipeline keeps the mean to the accuracy of its cubature and the covariance up to its floor.
+    /// Reduces the estimate to at most `components` components. All methods but the pipeline keep mean and covariance exactly. The
+    /// pipeline keeps the mean to the accuracy of its cubature, and the covariance except where its lower limit applies.
     ///
     /// # Errors
     /// If `components` is 0.
@@ -104,6 +105,7 @@ impl Reduction {
             Self::Pipeline { cut, iterations } => {
                 let tree = Tree::new(estimate, Split::PRINCIPAL)?;
                 let errors = NodeErrors::new(estimate, &tree, Criterion::LogDeterminant)?;
+                // Cut to an intermediate number of components, merge pairs to the final number, then fit to the whole estimate.
                 let coarse = greedy(&tree, &errors, cut.max(components))?.mixture(&tree)?;
                 let merged = merge(&coarse, components, MergeCost::Runnalls)?.mixture;
                 let rule = if D <= 3 {

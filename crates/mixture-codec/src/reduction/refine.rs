@@ -1,4 +1,4 @@
-//! Expectation-maximisation towards a kernel estimate, with a floor under the covariances.
+//! Expectation-maximisation that fits a mixture to a kernel estimate, with a lower limit of the covariances.
 
 use crate::Error;
 use crate::divergence::plug_in::Cubature;
@@ -9,11 +9,11 @@ use fewbits_numerics::kernels::{LANES, folded, vectorised};
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
 
-/// Improves a mixture as an approximation of a kernel estimate by `iterations` steps of expectation-maximisation over the
-/// cubature points of every kernel. Each step lowers the KL of the points' law.
+/// Improves a mixture as an approximation of a kernel estimate by `iterations` steps of expectation-maximisation. The data are the
+/// cubature points of every kernel. Each step lowers the KL between the distribution of these points and the mixture.
 ///
-/// No eigenvalue of a component's covariance falls below the kernel's (in coordinates where the kernel is the identity):
-/// without that floor components collapse onto cubature points. Components that lose all mass are dropped.
+/// No eigenvalue of a component's covariance falls below one, in coordinates in which the kernel's covariance is the identity.
+/// Without this limit components could shrink to single cubature points. Components that lose all weight are dropped.
 ///
 /// ```text
 /// points y_p, v_p        = centres + kernel offsets, weights times shares     whitened: kernel = I
@@ -23,7 +23,7 @@ use nalgebra::{SMatrix, SVector};
 /// ```
 ///
 /// # Errors
-/// Never for a valid estimate and mixture.
+/// Does not occur for a valid estimate and mixture.
 pub fn refine<const D: usize>(
     estimate: &KernelEstimate<D>,
     mixture: &Mixture<D>,
@@ -33,6 +33,7 @@ pub fn refine<const D: usize>(
     let points = Points::new(estimate, rule);
     let origin = estimate.particles().mean();
     let white = estimate.kernel_factor();
+    // In coordinates in which the kernel's covariance is the identity.
     let mut parts: Vec<Component<D>> = mixture
         .components()
         .iter()
@@ -53,12 +54,12 @@ pub fn refine<const D: usize>(
     Mixture::new(back.collect::<Result<_, _>>()?)
 }
 
-/// Points of a block: what a block needs stays in the nearest cache.
+/// Number of points that are processed together, so that their data stay in the first-level cache.
 const BLOCK: usize = 32;
-/// Shares of a point that sum to less are taken again with the largest taken out.
+/// If the shares of a point sum to less, they are computed again relative to the largest.
 const TINY: f64 = 1e-250;
 
-/// The cubature points of all kernels in whitened coordinates, block by block. The last block is filled up with points of weight
+/// The cubature points of all kernels in whitened coordinates, in blocks. The last block is filled up with points of weight
 /// zero.
 struct Points<const D: usize> {
     blocks: Vec<([[f64; BLOCK]; D], [f64; BLOCK])>,
@@ -88,12 +89,12 @@ impl<const D: usize> Points<D> {
     }
 }
 
-/// `log2(w / sqrt(det S))`.
+/// `log2(w / sqrt(det S))`, the logarithm of a component's peak up to a constant.
 fn height<const D: usize>(part: &Component<D>) -> f64 {
     (part.weight().ln() - part.factor().half_log_det) * std::f64::consts::LOG2_E
 }
 
-/// Sums over a part's points, about the part's mean before the step: shares, first and second moments.
+/// Sums over a component's shares of the points, about its mean before the step: total, first and second moments.
 struct Sums<const D: usize> {
     share: [f64; LANES],
     first: [[f64; LANES]; D],
@@ -125,7 +126,7 @@ impl<const D: usize> Sums<D> {
     }
 }
 
-/// One step.
+/// One step of expectation-maximisation.
 fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Component<D>>) -> Result<(), Error> {
     let heights: Vec<f64> = parts.iter().map(height).collect();
     let top = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -146,6 +147,7 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Component<D>>) -> Re
                         total[j] += shares[j];
                     }
                 }
+                // Far from all components the densities underflow. Such points are computed relative to their own largest term.
                 if total.iter().any(|t| *t < TINY) {
                     far_shares(parts, &heights, columns, &mut gaps, &mut shares, &mut total);
                 }
@@ -162,6 +164,7 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Component<D>>) -> Re
             }
         },
     );
+    // A component without weight is dropped.
     let mut next = Vec::with_capacity(parts.len());
     for (part, sums) in parts.iter().zip(&sums) {
         if folded(sums.share) > f64::MIN_POSITIVE {
@@ -172,7 +175,7 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Component<D>>) -> Re
     Ok(())
 }
 
-/// Writes the gaps to a part's mean, and `below - log2` of the part's unnormalised density.
+/// Writes the differences from a component's mean, and `below - log2` of the component's density times its weight, unnormalised.
 #[inline(always)]
 fn exponents<const D: usize>(
     part: &Component<D>,
@@ -200,7 +203,7 @@ fn exponents<const D: usize>(
     }
 }
 
-/// The shares of a block that holds points far from every part: relative to the largest share of each point.
+/// The shares in a block with points far from every component: relative to the largest share of each point.
 #[cold]
 #[inline(never)]
 fn far_shares<const D: usize>(
@@ -225,7 +228,7 @@ fn far_shares<const D: usize>(
     }
 }
 
-/// Weight, mean and covariance from the sums, with the eigenvalue floor.
+/// Weight, mean and covariance from the sums, with the lower limit of the eigenvalues.
 fn moments<const D: usize>(part: &Component<D>, sums: &Sums<D>) -> Result<Component<D>, Error> {
     let weight = folded(sums.share);
     let shift = SVector::<f64, D>::from_fn(|d, _| folded(sums.first[d]) / weight);

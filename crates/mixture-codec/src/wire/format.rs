@@ -1,4 +1,4 @@
-//! The format that both ends of a link agree on beforehand.
+//! The format that sender and receiver agree on beforehand.
 
 use crate::Error;
 use fewbits_numerics::error::{all_finite, positive, refuse, within};
@@ -6,7 +6,7 @@ use fewbits_numerics::stored;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-/// The format that both ends of a link agree on: range of the means, unit, and resolutions of the quantiser.
+/// The format that sender and receiver agree on: range of the means, unit, and resolutions of the quantiser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredFormat<D>", into = "StoredFormat<D>")]
 pub struct WireFormat<const D: usize> {
@@ -17,8 +17,8 @@ pub struct WireFormat<const D: usize> {
 }
 
 impl<const D: usize> WireFormat<D> {
-    /// A format for beliefs whose mean lies within `half_width` of `centre` along each axis and whose standard deviations are
-    /// between `unit / 2981` and `2981 unit` (8 nepers), at one of the given resolutions: quantiser steps in standard deviations.
+    /// A format for beliefs whose mean is within `half_width` of `centre` along each axis and whose standard deviations are
+    /// between `unit / 2981` and `2981 unit` (8 nepers). The resolutions are quantiser steps in standard deviations.
     ///
     /// # Errors
     /// If a number is not finite; `half_width`, `unit` or a resolution is not above 0; a resolution is above 4 or below 1e-4; or
@@ -41,7 +41,7 @@ impl<const D: usize> WireFormat<D> {
         })
     }
 
-    /// A field of `40 unit` around the origin at one resolution.
+    /// A format with means within `40 unit` of the origin and one resolution.
     ///
     /// # Errors
     /// As [`WireFormat::new`].
@@ -49,7 +49,7 @@ impl<const D: usize> WireFormat<D> {
         Self::new(SVector::zeros(), 20.0 * positive("unit", unit)?, unit, &[resolution])
     }
 
-    /// The resolutions, by their number in a message.
+    /// The resolutions; a message contains the index of one.
     pub fn resolutions(&self) -> &[f64] {
         &self.resolutions
     }

@@ -1,27 +1,27 @@
-//! A mixture in a few bytes.
+//! Encoding of a mixture in a few bytes.
 //!
-//! Parameters are quantised in units of the component's own spread, and the integers are range coded under laws that both
-//! ends know, with 16-bit integer frequencies, so that every machine reads what every other wrote. Five components take about
+//! Parameters are quantised in units of the component's own spread. The integers are range coded with distributions that sender
+//! and receiver know, as 16-bit integer frequencies, so that every machine decodes the same numbers. Five components take about
 //! 136 bits at resolution 1/4, a seventh of their parameters as 32-bit floats.
 //!
-//! Format 1, in the order of the code (`r` is the resolution; `step, law` follow each number):
+//! Format 1, in the order of the code (`r` is the resolution; each number has a quantiser step and a distribution):
 //!
-//! | number | step | law |
+//! | number | step | distribution |
 //! |---|---|---|
 //! | components `K`, 1 to 63 (0 is reserved for later formats) | 1 | uniform, 6 bits |
-//! | which of the format's resolutions | 1 | uniform |
+//! | index of the resolution in the format | 1 | uniform |
 //! | `ln L_ii - ln unit` of the overall Gaussian, within 8 nepers | `r/2` | uniform |
 //! | `L_ij / L_ii`, `j < i` | `r` | logistic(0, 0.5) |
-//! | overall mean, within the field | `r L_ii / 2`; `r L_ii` if `K = 1` | uniform |
+//! | overall mean, within the format's range | `r L_ii / 2`; `r L_ii` if `K = 1` | uniform |
 //! | weights in decreasing order: `f_i = w_i / rest`, `g = ln((f - lo)/(1 - f))`, `lo = 0.98/(K - i)` | `2 r` | logistic(-1.2, 0.8) |
 //! | for each component, in coordinates `L^-1 (x - mean)`: `ln l_ii` | `r` | logistic(-0.62, 0.42) |
 //! | `l_ij / l_ii` | `r` | logistic(0, 0.3) |
 //! | mean | `1.4 r l_ii` | logistic(0, 0.55) |
-//! | mean of the last: what makes the weighted means sum to the overall mean | `1.4 r l_ii` | logistic(prediction, `0.35 l_ii + 0.05`) |
+//! | mean of the last, predicted from the overall mean and the other means | `1.4 r l_ii` | logistic(prediction, `0.35 l_ii + 0.05`) |
 //!
-//! Every logistic law is mixed 99:1 with one eight times as wide, and ends in an escape, so any finite mixture within the field
-//! can be sent. Decoding is total: any bits give a mixture with positive definite covariances or a typed error. It is also
-//! strict: the message must be, to the bit, what encoding the decoded mixture gives, so the code needs no end mark and no
+//! Every logistic distribution is mixed 99:1 with one eight times as wide, and has an escape symbol for values outside its table, so every
+//! finite mixture within the range can be encoded. For any bits, decoding gives a mixture with positive definite covariances or a typed
+//! error. It is also strict: the message must be exactly the encoding of the decoded mixture. The code therefore needs no end mark and no
 //! length field.
 
 mod format;
@@ -40,12 +40,12 @@ use fewbits_numerics::error::refuse;
 use range::{Coder, Law, Reader, Writer};
 use walk::{Decoder, Quantiser, walk};
 
-/// Number of the format. A changed byte is a new number and a line in the changelog.
+/// Version of the format. Every change of the encoding gets a new number and an entry in the changelog.
 pub const FORMAT: u32 = 1;
-/// The most components of a message.
+/// Largest number of components of a message.
 pub const MOST_COMPONENTS: usize = 63;
 
-/// A mixture as a message: what the receiver will decode, to the last bit.
+/// A quantised mixture as a message. It equals what the receiver decodes, to the last bit.
 ///
 /// ```
 /// use fewbits_core::Message;
@@ -69,11 +69,11 @@ pub struct CodedMixture<const D: usize> {
 }
 
 impl<const D: usize> CodedMixture<D> {
-    /// Quantises a mixture at the resolution of the given number. Components of weight zero are left out.
+    /// Quantises a mixture at the resolution with the given index. Components of weight zero are left out.
     ///
     /// # Errors
-    /// If there are more than 63 components, there is no such resolution, the mean lies outside the field or a standard
-    /// deviation outside the format's range.
+    /// If there are more than 63 components, there is no such resolution, the mean is outside the range, or a standard
+    /// deviation is outside the format's range.
     pub fn new(mixture: &Mixture<D>, format: &WireFormat<D>, resolution: usize) -> Result<Self, Error> {
         let kept = mixture.components().iter().filter(|c| c.weight() > 0.0).count();
         if kept > MOST_COMPONENTS {
@@ -105,7 +105,7 @@ impl<const D: usize> CodedMixture<D> {
 impl<const D: usize> Message for CodedMixture<D> {
     type Format = WireFormat<D>;
 
-    /// Under the format that the message was made for.
+    /// The format is that of the constructor; the argument is not used.
     fn encode(&self, _: &WireFormat<D>, writer: &mut BitWriter) -> Result<(), CodecError> {
         let mut code = Writer::new();
         for (law, n) in &self.symbols {
@@ -115,7 +115,7 @@ impl<const D: usize> Message for CodedMixture<D> {
     }
 
     fn decode(format: &WireFormat<D>, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        // No number takes over 60 bits.
+        // No number takes more than 60 bits.
         let most = 60 * (MOST_COMPONENTS + 1) * (D * D + D + 2);
         let mut source = Decoder {
             reader: Reader::new(reader, most)?,

@@ -1,4 +1,4 @@
-//! Symbols through a range coder, ended to the bit.
+//! A range coder for symbols, which ends with the smallest possible number of bits.
 
 use super::table::{Found, Table};
 use constriction::UnwrapInfallible;
@@ -6,30 +6,30 @@ use constriction::stream::queue::{EncoderSituation, RangeDecoder, RangeEncoder};
 use constriction::stream::{Decode, Encode};
 use fewbits_core::{BitReader, BitWriter, CodecError};
 
-/// Bits of one uniform digit.
+/// Number of bits of one uniform digit.
 const DIGIT: u32 = 12;
-/// Scales above this many steps are coded in two parts, the lower bits uniformly.
+/// If the scale exceeds this many steps, an integer is coded in two parts, the lower bits uniformly.
 const LARGEST_SCALE: f64 = 64.0;
-/// Integers are coded up to this size.
+/// Integers of at most this absolute value can be coded.
 pub(super) const LARGEST: f64 = 2_147_483_648.0;
 
 /// Distribution of one integer, in steps of its quantiser.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Law {
-    /// `0..count`.
+    /// Uniform on `0..count`.
     Uniform { count: u64 },
-    /// Around `location` with the given scale, any integer below 2^31 in size.
+    /// Logistic around `location` with the given scale; any integer below 2^31 in absolute value is possible.
     Logistic { location: f64, scale: f64 },
 }
 
 impl Law {
-    /// The logistic law's table and the number of low bits that are coded uniformly; `None` if the numbers are out of range.
+    /// The logistic distribution's table, and the number of low bits that are coded uniformly; `None` if the numbers are out of range.
     fn table(location: f64, scale: f64) -> Option<(Table, u32)> {
         let in_range = location.abs() < LARGEST && scale > 0.0 && scale < LARGEST;
         let mut low = 0;
         let (mut location, mut scale) = (location, scale.max(0.01));
         while in_range && scale > LARGEST_SCALE {
-            // `n = 2 h + l` with a fair bit `l`: `h` has half of the location, less a quarter, and half of the scale.
+            // `n = 2 h + l` with a uniform bit `l`: the distribution of `h` has half the location, less a quarter, and half the scale.
             (location, scale) = (0.5 * location - 0.25, 0.5 * scale);
             low += 1;
         }
@@ -45,12 +45,12 @@ fn out_of_range(what: &'static str, value: impl std::fmt::Display) -> CodecError
     }
 }
 
-/// One half of the coder, which writes symbols of tables or reads them.
+/// The operations that writer and reader share: code symbols by tables.
 pub(super) trait Coder {
-    /// Codes one symbol. A writer needs the one that is `wanted`, a reader finds it out.
+    /// Codes one symbol and returns it. A writer is given it as `wanted`; a reader decodes it.
     fn digit(&mut self, table: Table, wanted: Option<u32>) -> Result<u32, CodecError>;
 
-    /// The lowest `bits` of a number.
+    /// Codes the lowest `bits` bits of a number uniformly.
     fn uniform(&mut self, bits: u32, wanted: Option<u64>) -> Result<u64, CodecError> {
         let (mut value, mut left) = (0, bits);
         while left > 0 {
@@ -62,7 +62,7 @@ pub(super) trait Coder {
         Ok(value)
     }
 
-    /// One integer under a law.
+    /// Codes one integer with the distribution `law`.
     fn integer(&mut self, law: &Law, wanted: Option<i64>) -> Result<i64, CodecError> {
         match *law {
             Law::Uniform { count } => {
@@ -87,6 +87,7 @@ pub(super) trait Coder {
                     return Err(refuse());
                 };
                 let first = centre - i64::from(half);
+                // Numbers outside the table take the escape symbol and follow as 32 plain bits.
                 let index = wanted.map(|n| u32::try_from((n >> low) - first).map_or(escape, |index| index.min(escape)));
                 let index = self.digit(table, index)?;
                 if index < escape {
@@ -102,7 +103,7 @@ pub(super) trait Coder {
     }
 }
 
-/// Writes integers.
+/// Encodes integers.
 pub(super) struct Writer {
     encoder: RangeEncoder<u32, u64>,
 }
@@ -122,8 +123,8 @@ impl Writer {
         }
     }
 
-    /// Ends the code with the fewest bits that decode to the same symbols whatever follows them: at most two more than the
-    /// symbols' information.
+    /// Ends the code with the fewest bits that decode to the same symbols whatever bits follow. These are at most two more than the
+    /// information of the symbols.
     pub(super) fn finish(self, writer: &mut BitWriter) -> Result<(), CodecError> {
         const WHOLE: u128 = 1 << 64;
         let (bulk, state, situation) = self.encoder.into_raw_parts();
@@ -131,6 +132,7 @@ impl Writer {
         let high = low + u128::from(state.range().get());
         let mut length = 0;
         let mut point = 0;
+        // The shortest binary fraction whose whole interval is inside the coder's interval, so that any bits may follow it.
         for bits in 0..=64 {
             let unit = WHOLE >> bits;
             point = low.div_ceil(unit) * unit;
@@ -157,7 +159,7 @@ impl Writer {
     }
 }
 
-/// Number of symbols of the leading digit and bits below it, for a uniform law of `count` values, at least one.
+/// Number of values of the leading digit, and number of bits below it, for a uniform distribution of `count` values, at least one.
 fn digits(count: u64) -> (u32, u32) {
     let mut low = 0;
     while (count - 1) >> low >= 1 << DIGIT {
@@ -166,11 +168,11 @@ fn digits(count: u64) -> (u32, u32) {
     ((((count - 1) >> low) + 1) as u32, low)
 }
 
-/// Reads integers back.
+/// Decodes integers.
 pub(super) struct Reader {
     decoder: RangeDecoder<u32, u64, constriction::backends::Cursor<u32, Vec<u32>>>,
     available: usize,
-    /// Bits that the symbols so far took at least.
+    /// Lower bound of the number of bits that the symbols so far took.
     spent: usize,
 }
 
@@ -181,7 +183,8 @@ impl Coder for Reader {
             .decoder
             .decode_symbol(&found)
             .map_err(|_| out_of_range("code word", "past the last symbol"))?;
-        // A symbol of frequency 2^k to 2^(k+1) takes over 15 - k bits. Beyond the end there is nothing left to decode.
+        // A symbol of frequency 2^k to 2^(k+1) takes more than 15 - k bits. If more bits are spent than there are, decoding stops with an
+        // error.
         self.spent += 15_usize.saturating_sub(found.frequency.get().ilog2() as usize);
         if self.spent > self.available {
             let requested = (self.spent - self.available) as u32;
@@ -195,7 +198,7 @@ impl Coder for Reader {
 }
 
 impl Reader {
-    /// A reader of what is left of `reader`, up to `most` bits, followed by zeros.
+    /// A decoder for the remaining bits of `reader`, at most `most` of them, followed by zeros.
     pub(super) fn new(reader: &BitReader<'_>, most: usize) -> Result<Self, CodecError> {
         let mut reader = reader.clone();
         let bits = reader.remaining().min(most);

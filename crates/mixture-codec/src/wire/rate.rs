@@ -1,4 +1,4 @@
-//! Rate control: the best mixture within a number of bits.
+//! Rate control: the best mixture within a given number of bits.
 
 use super::{CodedMixture, WireFormat};
 use crate::divergence::plug_in::{Cubature, CubatureTarget};
@@ -9,7 +9,7 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use serde::{Deserialize, Serialize};
 
-/// Searches numbers of components and resolutions for the smallest KL within a budget of bits.
+/// Searches over numbers of components and resolutions for the smallest KL within a number of bits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RateControl {
     /// Numbers of components to try.
@@ -31,19 +31,19 @@ impl Default for RateControl {
     }
 }
 
-/// A message with its price and its error.
+/// A message with its length and its error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rated<const D: usize> {
     /// The message.
     pub message: CodedMixture<D>,
-    /// Its length.
+    /// Length in bits.
     pub bits: usize,
     /// Cubature estimate of `KL[estimate, decoded mixture]` in nats.
     pub kl: f64,
 }
 
 impl RateControl {
-    /// Every choice of components and resolution as a message, priced and judged.
+    /// A message for every combination of number of components and resolution, with its length and error.
     ///
     /// # Errors
     /// If there is no number of components, one is 0 or above 63, or the estimate does not fit the format.
@@ -67,10 +67,10 @@ impl RateControl {
         Ok(rated)
     }
 
-    /// The choice of smallest KL within `budget` bits.
+    /// The message of smallest KL among those of at most `budget` bits.
     ///
     /// # Errors
-    /// As [`table`](Self::table), or if nothing fits the budget.
+    /// As [`table`](Self::table), or if no message is within the budget.
     pub fn fit<const D: usize>(
         &self,
         estimate: &KernelEstimate<D>,

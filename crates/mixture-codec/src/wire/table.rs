@@ -1,30 +1,30 @@
-//! Integer frequency tables: the same on every machine.
+//! Integer frequency tables that are the same on every machine.
 
 use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
 use std::borrow::Borrow;
 use std::cell::Cell;
 use std::num::NonZeroU32;
 
-/// Bits of a frequency.
+/// Number of bits of a frequency.
 pub(super) const PRECISION: usize = 16;
 /// Sum of all frequencies of a table.
 pub(super) const TOTAL: u32 = 1 << PRECISION;
 
-/// Frequency of the escape: about 11 bits.
+/// Frequency of the escape symbol; it takes about 11 bits.
 const ESCAPE: u32 = 32;
-/// A logistic table ends this many scales from its centre; what lies beyond is escaped.
+/// A logistic table ends at this many scales from its centre; values beyond use the escape symbol.
 const REACH: f64 = 10.0;
-/// Share of the wide density in the mixture, and how much wider it is.
+/// Weight of the wide density in the mixture, and its scale relative to the narrow one.
 const WIDE_SHARE: f64 = 0.01;
 const WIDE: f64 = 8.0;
 
-/// Cumulative frequencies of the symbols `0..count`, out of 2^16, every symbol at least 1.
+/// Cumulative frequencies of the symbols `0..count`, out of 2^16; every symbol has at least 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Table {
-    /// `count` symbols, as equal as integers allow; `count` from 2 to 2^12.
+    /// `count` symbols with frequencies as equal as integers allow; `count` from 2 to 2^12.
     Uniform { count: u32 },
-    /// Integers `centre - half ..= centre + half` under a logistic law of the given location and scale mixed with one 8 times
-    /// as wide, then the escape.
+    /// Integers `centre - half ..= centre + half` with a logistic distribution of the given location and scale, mixed with one 8 times
+    /// as wide, then the escape symbol.
     Logistic {
         centre: i64,
         half: u32,
@@ -34,7 +34,7 @@ pub(super) enum Table {
 }
 
 impl Table {
-    /// A logistic table; `scale` at most 64.
+    /// A logistic table; `scale` is at most 64.
     pub(super) fn logistic(location: f64, scale: f64) -> Self {
         Self::Logistic {
             centre: libm::round(location) as i64,
@@ -51,7 +51,7 @@ impl Table {
         }
     }
 
-    /// Total frequency of the symbols below `index`, from a software exponential and IEEE arithmetic alone, so that every
+    /// Total frequency of the symbols below `index`. Uses only a software exponential and IEEE arithmetic, so that every
     /// machine gets the same bits.
     fn cumulative(&self, index: u32) -> u32 {
         match *self {
@@ -70,18 +70,18 @@ impl Table {
                 } else {
                     let edge = (centre - i64::from(half) + i64::from(index)) as f64 - 0.5;
                     let z = (edge - location) / scale;
-                    // `e^-z` is the eighth power of what the wide density needs.
+                    // `e^-z` is the eighth power of the exponential that the wide density needs.
                     let wide = libm::exp(-z / WIDE);
                     let fourth = (wide * wide) * (wide * wide);
                     let share = (1.0 - WIDE_SHARE) / (1.0 + fourth * fourth) + WIDE_SHARE / (1.0 + wide);
-                    // One for every symbol, the rest by the law.
+                    // Frequency one for every symbol; the rest is distributed by the density.
                     index + (f64::from(TOTAL - ESCAPE - symbols) * share) as u32
                 }
             }
         }
     }
 
-    /// The escape's index, if there is one.
+    /// Index of the escape symbol; `None` if the table has none.
     pub(super) fn escape(&self) -> Option<u32> {
         match *self {
             Self::Uniform { .. } => None,
@@ -107,7 +107,7 @@ impl EncoderModel<PRECISION> for Table {
 }
 
 impl Table {
-    /// Where the symbol of a quantile will be, about: only the search's length depends on it.
+    /// Approximate symbol of a quantile. Only the duration of the search depends on it.
     fn guess(&self, quantile: u32) -> u32 {
         match *self {
             Self::Uniform { count } => (quantile * count / TOTAL).min(count - 1),
@@ -124,9 +124,9 @@ impl Table {
         }
     }
 
-    /// The symbol of a quantile, the cumulative frequency below it and its frequency.
+    /// The symbol of a quantile, the cumulative frequency below it, and its frequency.
     pub(super) fn find(&self, quantile: u32) -> (u32, u32, NonZeroU32) {
-        // Brackets the last index whose cumulative frequency does not exceed the quantile, in growing strides from the guess.
+        // Brackets the last index whose cumulative frequency does not exceed the quantile, with growing steps from the guess.
         let count = self.count();
         let guess = self.guess(quantile);
         let (mut low, mut high) = (guess, guess);
@@ -162,7 +162,7 @@ impl Table {
     }
 }
 
-/// A table that notes the frequency of the symbol that was found in it.
+/// A table that stores the frequency of the last symbol that was looked up.
 pub(super) struct Found<'a> {
     table: &'a Table,
     pub(super) frequency: Cell<NonZeroU32>,

@@ -1,4 +1,4 @@
-//! The order and the laws of a message's numbers, walked alike by quantiser and decoder.
+//! The order and the distributions of a message's numbers, used by quantiser and decoder alike.
 
 use super::format::WireFormat;
 use super::range::{Coder, LARGEST, Law, Reader};
@@ -7,13 +7,13 @@ use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::factored::Factored;
 use nalgebra::{SMatrix, SVector};
 
-/// Where the integers of a message come from. They are noted with their laws.
+/// Supplies the integers of a message, and records them with their distributions.
 pub(super) trait Source {
-    /// The next integer under a law; `wanted` is the number to quantise, in steps, where there is one.
+    /// The next integer with the distribution `law`. `wanted` is the number to be quantised, in steps, if there is one.
     fn next(&mut self, law: &Law, wanted: Option<f64>) -> Result<i64, CodecError>;
 }
 
-/// Rounds wanted numbers.
+/// Quantises the numbers of a given mixture.
 #[derive(Default)]
 pub(super) struct Quantiser {
     pub(super) symbols: Vec<(Law, i64)>,
@@ -34,7 +34,7 @@ impl Source for Quantiser {
     }
 }
 
-/// Decodes integers.
+/// Decodes the numbers of a message.
 pub(super) struct Decoder {
     pub(super) reader: Reader,
     pub(super) symbols: Vec<(Law, i64)>,
@@ -56,19 +56,19 @@ fn invalid(what: &'static str, value: impl std::fmt::Display) -> CodecError {
     }
 }
 
-/// Nepers to either side of the unit that a standard deviation may lie.
+/// Largest distance of the logarithm of a standard deviation from that of the unit.
 const NEPERS: f64 = 8.0;
-/// A component's standard deviations are within this many nepers of the overall one's.
+/// Largest distance of the logarithm of a component's standard deviation from the overall one's.
 const COMPONENT_NEPERS: f64 = 40.0;
-/// Largest size of the logit of a weight.
+/// Largest absolute value of the logit of a weight.
 const LOGIT: f64 = 30.0;
 
-/// Exponential from IEEE arithmetic alone: what both ends compute must agree to the last bit.
+/// Exponential by IEEE arithmetic alone, so that sender and receiver get the same bits.
 fn exp(x: f64) -> f64 {
     libm::exp(x)
 }
 
-/// Walks through a message. With a target its numbers are offered for quantisation; without, they come from `symbols`.
+/// Goes through the numbers of a message. With a target, `symbols` quantises its numbers; without, `symbols` decodes them.
 pub(super) fn walk<const D: usize>(
     symbols: &mut impl Source,
     format: &WireFormat<D>,
@@ -117,7 +117,7 @@ pub(super) fn walk<const D: usize>(
     let weights = weights(symbols, r, k, &order)?;
     let white = Factored::from_lower(lower);
     let mut components = Vec::with_capacity(k);
-    // Weighted sum of the means so far and variance of its quantisation, in whitened coordinates.
+    // Weighted sum of the means so far, and variance of its quantisation error, in whitened coordinates.
     let (mut sum, mut noise) = (SVector::<f64, D>::zeros(), SVector::<f64, D>::zeros());
     for i in 0..k {
         let own = match order.get(i) {
@@ -154,12 +154,12 @@ pub(super) fn walk<const D: usize>(
     mixture(components)
 }
 
-/// Steps, laws and ranges of a Cholesky factor's numbers.
+/// Quantiser steps, distributions and ranges of the numbers of a Cholesky factor.
 struct Scales {
     unit: f64,
     log_step: f64,
     log_law: Law,
-    /// What integer 0 means.
+    /// The logarithm that integer 0 stands for.
     log_start: f64,
     log_range: f64,
     ratio_step: f64,
@@ -176,7 +176,7 @@ impl Scales {
                 count: (2.0 * NEPERS / log_step).ceil() as u64 + 1,
             },
             log_start: -NEPERS,
-            // Its law ends by itself.
+            // The range of this distribution is limited already.
             log_range: f64::INFINITY,
             ratio_step: r,
             ratio_scale: 0.5,
@@ -199,7 +199,7 @@ impl Scales {
     }
 }
 
-/// A lower triangular factor: logarithms of its diagonal, then each row over its diagonal entry.
+/// A lower triangular factor: the logarithms of its diagonal, then each row divided by its diagonal entry.
 fn cholesky<const D: usize>(
     symbols: &mut impl Source,
     wanted: Option<&SMatrix<f64, D, D>>,
@@ -221,6 +221,7 @@ fn cholesky<const D: usize>(
     for i in 1..D {
         for j in 0..i {
             let target = wanted.map(|l| l[(i, j)] / l[(i, i)] / scales.ratio_step);
+            // Entries left of the diagonal are coded relative to it, so their steps are fractions of the row's standard deviation.
             let ratio = scales.ratio_step * symbols.next(&law, target)? as f64;
             lower[(i, j)] = ratio * lower[(i, i)];
         }
@@ -228,7 +229,7 @@ fn cholesky<const D: usize>(
     Ok(lower)
 }
 
-/// Weights in decreasing order by stick breaking.
+/// Weights in decreasing order by stick breaking: each is coded as a fraction of the weight that remains.
 fn weights<const D: usize>(
     symbols: &mut impl Source,
     r: f64,
@@ -244,7 +245,7 @@ fn weights<const D: usize>(
     for i in 0..k - 1 {
         let low = 0.98 / (k - i) as f64;
         let target = order.get(i).map(|c| {
-            // What is left is summed from the small end, so that it cannot be lost to rounding.
+            // The remaining weight is summed from the smallest on, so that rounding cannot lose it.
             let rest: f64 = order[i..].iter().rev().map(|c| c.weight()).sum();
             let others: f64 = order[i + 1..].iter().rev().map(|c| c.weight()).sum();
             let g = (((c.weight() - low * rest) / rest).max(f64::MIN_POSITIVE) / (others / rest)).ln();

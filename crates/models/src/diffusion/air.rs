@@ -1,4 +1,4 @@
-//! A point source that releases at a constant rate: closed forms.
+//! Concentration of a point source that releases at a constant rate, in closed form.
 
 use super::axis::Axis;
 use super::half_space::{Flux, Wall};
@@ -11,29 +11,29 @@ use fewbits_numerics::normal::erfcx;
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
-/// Distances below this many metres count as this: the concentration has a pole at the source.
+/// Shorter distances are replaced by this one, in metres: the concentration is infinite at the source.
 const CLOSEST: f64 = 1e-3;
 const SQRT_PI: f64 = 1.772_453_850_905_516;
-/// Largest size, in SI units, of diffusivity, wind, distance and age, and the smallest of those that divide: no product of a closed
-/// form overflows. Beyond that distance there is no concentration; an age beyond it is the steady state.
+/// Largest absolute value, in SI units, of diffusivity, wind, distance and age; the smallest of divisors is its reciprocal. Within these
+/// limits no product of a closed form overflows. At larger distances the concentration is 0; a larger age gives the steady state.
 const LARGEST: f64 = 1e60;
 pub(super) const SMALLEST: f64 = 1e-60;
 
-/// Lower boundary of the air.
+/// Lower boundary of the medium.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ground {
     /// Nothing: the medium is unbounded.
     None,
     /// Ground at `z = 0` with the given wall law, `z >= 0`.
     Wall(Wall),
-    /// Ground at `z = 0` through which nothing passes: `Wall(Wall::IMPERMEABLE)`.
+    /// Impermeable ground at `z = 0`; the same as `Wall(Wall::IMPERMEABLE)`.
     Impermeable,
 }
 
-/// Unbounded air, or the half-space above the ground, with a uniform wind.
+/// Unbounded air, or the half-space `z >= 0` above ground, with a uniform wind.
 ///
-/// The concentration of a continuous unit-rate source is in closed form for open air and for impermeable or absorbing ground
-/// with a horizontal wind, and an integral (relative accuracy 1e-12) over permeable ground.
+/// The concentration of a continuous source of unit rate has a closed form for unbounded air, and for impermeable or absorbing ground
+/// under a horizontal wind. Over permeable ground it is an integral, computed to relative accuracy 1e-12.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
     diffusivity: f64,
@@ -41,7 +41,7 @@ pub struct Air {
     ground: Ground,
     closest: f64,
     space: Space,
-    /// Norm of the wind.
+    /// Norm of the wind, m/s.
     speed: f64,
     /// `1 / (2 diffusivity)` and `1 / (8 pi diffusivity)`.
     half_resistance: f64,
@@ -52,8 +52,8 @@ impl Air {
     /// Air of the given diffusivity (m^2/s) and wind (m/s).
     ///
     /// # Errors
-    /// If `diffusivity` is not in `[1e-60, 1e60]`, a component of `wind` not in `[-1e60, 1e60]`, or it blows across the ground:
-    /// compose a [`Space`] then, where the wall law says which flux it is about.
+    /// If `diffusivity` is not in `[1e-60, 1e60]`, a component of `wind` not in `[-1e60, 1e60]`, or the wind blows across the ground. For
+    /// the last case use a [`Space`], where the wall's condition states which flux it is about.
     pub fn new(diffusivity: f64, wind: Vector3<f64>, ground: Ground) -> Result<Self, Error> {
         within("diffusivity", positive("diffusivity", diffusivity)?, SMALLEST, LARGEST)?;
         for component in wind.iter() {
@@ -78,7 +78,7 @@ impl Air {
         })
     }
 
-    /// The same with another distance, in metres, below which distances count as this one (1 mm unless told).
+    /// The same air with another shortest distance, in metres: shorter distances are replaced by it. Default 1 mm.
     ///
     /// # Errors
     /// If `closest` is not in `[1e-60, 1e60]`.
@@ -107,12 +107,12 @@ impl Air {
         &self.wind
     }
 
-    /// The distance, m, below which distances count as this one.
+    /// The shortest distance, m; shorter ones are replaced by it.
     pub fn closest(&self) -> f64 {
         self.closest
     }
 
-    /// Sign of the image source below the ground, where the closed form has one.
+    /// Sign of the image source below the ground; `None` over permeable ground, where there is no image.
     fn image(&self) -> Option<f64> {
         match self.ground {
             Ground::None => Some(0.0),
@@ -127,7 +127,8 @@ impl Air {
         self.ground != Ground::None
     }
 
-    /// The age that closed forms take; `None` if there is no concentration: before the release, below the ground, or too far.
+    /// The age for the closed forms, limited to their range; `None` if the concentration is 0: before the release, below ground, too far
+    /// away.
     fn counted_age(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> Option<f64> {
         let below = self.has_ground() && (field.z < 0.0 || source.z < 0.0);
         if age < SMALLEST || below || (field - source).amax() > LARGEST {
@@ -157,7 +158,7 @@ impl Air {
         (direct + sign * self.terms(&(field - mirrored), age).sum).max(0.0)
     }
 
-    /// Concentration and its gradient with respect to the source position.
+    /// Concentration (as [`concentration`](Self::concentration)) and its gradient with respect to the source position, per metre.
     ///
     /// The derivative with respect to the height of a source **on** the ground is the one-sided limit, 0 over impermeable
     /// ground. Over permeable ground the gradient is a central difference of relative step 1e-5, good to about eight digits.
@@ -178,7 +179,7 @@ impl Air {
         } else {
             self.at_offset(&(field - mirrored), age)
         };
-        // The offset falls as the source moves; that of the image rises with its height.
+        // The offset decreases as the source moves up; that of the image increases with the source's height.
         let image_gradient = Vector3::new(-image_slope.x, -image_slope.y, image_slope.z);
         SourceGradient {
             value: value + sign * image,
@@ -199,7 +200,7 @@ impl Air {
         };
         let gradient = Vector3::from_fn(|i, _| {
             if i == 2 && source.z < step {
-                // One-sided, second order, for a source on the ground.
+                // For a source on the ground: one-sided, second order.
                 (4.0 * at(2, step) - at(2, 2.0 * step) - 3.0 * at(2, 0.0)) / (2.0 * step)
             } else {
                 (at(i, step) - at(i, -step)) / (2.0 * step)
@@ -211,11 +212,11 @@ impl Air {
         }
     }
 
-    /// Concentration in unbounded air at an offset `field - source`, and the parts of which it is made.
+    /// Concentration in unbounded air at an offset `field - source`, and the quantities that its gradient shares.
     ///
-    /// `c = e^{v.d/2k} [e^{-rV/2k} erfc(zm) + e^{rV/2k} erfc(zp)] / (8 pi k r)`, `zm, zp = (r -+ V t) / sqrt(4 k t)`. Both terms
-    /// hold the factor `g = exp(-|d - v t|^2 / 4 k t)`, which leaves `erfcx` of the arguments: nothing overflows. At most two
-    /// exponentials and two `erfcx`, one of each without wind.
+    /// `c = e^{v.d/2k} [e^{-rV/2k} erfc(zm) + e^{rV/2k} erfc(zp)] / (8 pi k r)`, `zm, zp = (r -+ V t) / sqrt(4 k t)`. The factor `g =
+    /// exp(-|d - v t|^2 / 4 k t)` of both terms is taken out; `erfcx` of the arguments remains, and nothing overflows. Takes at most two
+    /// exponentials and two `erfcx`, without wind one of each.
     #[inline(always)]
     fn terms(&self, offset: &Vector3<f64>, age: f64) -> Terms {
         let distance = offset.norm();
@@ -236,12 +237,12 @@ impl Air {
         }
         let mut along = self.wind.dot(offset);
         if distance < r {
-            // An offset moved out to the closest distance keeps its direction.
+            // An offset shorter than the closest distance is lengthened in its own direction.
             along *= if distance > 0.0 { r / distance } else { 0.0 };
         }
         let drift = self.speed * age;
         let (minus, plus) = ((r - drift) * narrowness, (r + drift) * narrowness);
-        // |d - v t|^2 = minus^2 spread^2 + 2 (r V - v.d) t, without the cancellation of the difference of vectors.
+        // |d - v t|^2 = minus^2 spread^2 + 2 (r V - v.d) t. The difference of the vectors would cancel.
         let lag = ((along - r * self.speed) * self.half_resistance).min(0.0);
         let g = exp(lag - minus * minus);
         let near = g * erfcx(minus.abs());
@@ -279,9 +280,9 @@ struct Terms {
     narrowness: f64,
     /// `exp(-|d - v t|^2 / 4 k t) / (8 pi k r)`.
     g: f64,
-    /// Concentration.
+    /// Concentration per unit rate.
     sum: f64,
-    /// The term of `zp` less that of `zm`.
+    /// The term of `zp` minus that of `zm`.
     difference: f64,
 }
 
@@ -307,9 +308,9 @@ impl SourceModel for Air {
         self.source_gradient(&receptor.place, source, age)
     }
 
-    /// The concentration grows by at most the factor `exp(slope * reach)`, with the largest slope of its logarithm within the square
-    /// (see [`Homogeneous`]). It is nowhere above that of a source straight upwind in open air at the square's least distance, twice
-    /// that over ground.
+    /// Upper bound from the largest slope of the log concentration within the square (see [`Homogeneous`]): the concentration grows at most
+    /// by `exp(slope * reach)`. It is also at most that of a source straight upwind in unbounded air at the smallest distance of the
+    /// square, or twice that over ground.
     fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
         let here = self.concentration(&receptor.place, source, age);
         if age < SMALLEST {
@@ -327,7 +328,7 @@ impl SourceModel for Air {
         let downwind = self.wind.try_normalize(0.0).unwrap_or_else(Vector3::x);
         let highest = if self.has_ground() { 2.0 } else { 1.0 } * self.terms(&(downwind * near), age).sum;
         let growth = (slope * reach).exp_m1();
-        // An infinite growth of nothing would be NaN.
+        // Zero concentration times infinite growth would be NaN.
         if growth * here < highest {
             growth * here
         } else {
@@ -335,7 +336,7 @@ impl SourceModel for Air {
         }
     }
 
-    /// `z >= 0` above ground.
+    /// True for squares above ground.
     fn admits(&self, source: &Vector3<f64>, _: f64) -> bool {
         !self.has_ground() || source.z >= 0.0
     }

@@ -1,4 +1,4 @@
-//! One coordinate of an environment.
+//! Diffusion along one coordinate.
 
 use super::half_space::{self, Flux, Wall};
 use crate::Error;
@@ -11,11 +11,11 @@ enum Bounds {
     Wall { wall: Wall, flux: Flux },
 }
 
-/// The Green's function of one coordinate: concentration (per metre) of a unit mass released at one point.
+/// The Green's function of one coordinate: concentration (per metre) after a unit mass was released at one point.
 ///
-/// With wind, `c = c* exp(v (z - z0) / 2 kappa - v^2 t / 4 kappa)` and `c*` diffuses without wind (equation 7). The transform
-/// changes the loss velocity of a wall that the wind crosses: to `loss + v/2` where the law is about the total flux, to
-/// `loss - v/2` where it is about the diffusive flux.
+/// With wind `v`, `c = c* exp(v (z - z0) / 2 kappa - v^2 t / 4 kappa)`, where `c*` diffuses without wind (equation 7 of the paper). If
+/// the wind crosses a wall, the loss velocity for `c*` becomes `loss + v/2` if the wall's condition is about the total flux, and
+/// `loss - v/2` if it is about the diffusive flux.
 ///
 /// ```
 /// use fewbits_models::diffusion::{Axis, Flux, Wall};
@@ -61,7 +61,7 @@ impl Axis {
         })
     }
 
-    /// The same with a wind along the coordinate, m/s.
+    /// The same coordinate with a wind along it, in m/s; `flux` states which flux the wall's condition is about.
     ///
     /// # Errors
     /// If `wind` is not finite.

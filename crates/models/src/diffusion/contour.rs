@@ -1,4 +1,4 @@
-//! Where the concentration on the ground exceeds a threshold.
+//! The region on the ground where the concentration exceeds a threshold.
 
 use super::air::{Air, Ground, SMALLEST};
 use super::space::ImpulseResponse;
@@ -8,8 +8,9 @@ use fewbits_numerics::roots::bracketed;
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
 
-/// Radius (m) on the ground within which a source on impermeable ground, without wind, exceeds `threshold` (kg/m^3) after `age`
-/// seconds at `rate` (kg/s): the root of `rate erfc(R / sqrt(4 kappa t)) / (2 pi kappa R) = threshold`. Zero at age zero.
+/// Radius (m) of the disk on impermeable ground, without wind, in which the concentration of a source exceeds `threshold` (kg/m^3), `age`
+/// seconds after it began to release `rate` (kg/s). It is the root `R` of `rate erfc(R / sqrt(4 kappa t)) / (2 pi kappa R) = threshold`;
+/// zero at age zero.
 ///
 /// # Errors
 /// If `rate`, `threshold` or `diffusivity` is not a positive number.
@@ -20,9 +21,9 @@ pub fn contour_radius(rate: f64, threshold: f64, age: f64, diffusivity: f64) -> 
     Ok(reach(&air, &Vector3::zeros(), &Vector3::x(), rate, threshold, age))
 }
 
-/// The contour `c = threshold` on the ground about a source, one point for each of `directions` equally spaced angles that start
-/// downwind (along x without wind). Every ray from the source crosses it exactly once, because the concentration of a
-/// continuous point source falls along every ray. The points coincide with the source where the threshold is nowhere reached.
+/// The contour `c = threshold` on the ground around a source, one point for each of `directions` equally spaced angles from the
+/// downwind direction (the x axis without wind). Every ray from the source crosses the contour exactly once, because the concentration of a
+/// continuous point source decreases along every ray. If the threshold is not exceeded anywhere, all points are at the source.
 ///
 /// # Errors
 /// If `rate` or `threshold` is not a positive number, or `directions` is zero.
@@ -50,17 +51,17 @@ pub fn contour(
         .collect())
 }
 
-/// Distance along a ray at which the concentration falls to the threshold.
+/// Distance along a ray at which the concentration equals the threshold.
 fn reach(air: &Air, source: &Vector3<f64>, ray: &Vector3<f64>, rate: f64, threshold: f64, age: f64) -> f64 {
     let excess = |log_radius: f64| {
         let field = source + ray * log_radius.exp();
         (rate * air.concentration(&field, source, age) / threshold).ln()
     };
-    // Without the loss of the second term c < rate / (2 pi kappa R), and with wind no more than that downwind.
+    // Upper bound: without the factor erfc, c < rate / (2 pi kappa R); wind increases c at most to this value, downwind.
     let high = rate / (2.0 * PI * air.diffusivity() * threshold);
     let low = air.closest().max(high * 1e-12).ln();
     if excess(low) > 0.0 {
-        // Where rounding leaves no change of sign the bound itself is reached.
+        // If rounding leaves no change of sign, the root is at the bound.
         bracketed(excess, low, high.ln(), 0.0).map_or(high, f64::exp)
     } else {
         0.0

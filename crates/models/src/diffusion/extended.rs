@@ -1,4 +1,4 @@
-//! Sources that move, and sources that cover an area.
+//! Moving sources and sources that cover an area.
 
 use super::air::Air;
 use crate::Error;
@@ -7,14 +7,14 @@ use fewbits_numerics::quadrature::Rule;
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
 
-/// Concentration per unit rate at `field`, `age` seconds after a source started at `start` and began to move with the given
-/// velocity (m/s) while releasing at a constant rate.
+/// Concentration per unit rate at `field`, `age` seconds after a source at `start` began to release at a constant rate and to move with
+/// the given velocity (m/s).
 ///
-/// In the frame of the source the wind is `wind - velocity`, so that the closed form of [`Air`] holds with the offset measured
-/// from where the source **now** is. The ground is that of `air`.
+/// In the frame of the source the wind is `wind - velocity`. The closed form of [`Air`] therefore holds, with the offset measured
+/// from the **present** position of the source. The ground is that of `air`.
 ///
 /// # Errors
-/// If `velocity` is not finite, or not horizontal above ground.
+/// If `velocity` is not finite, or has a vertical component above ground.
 pub fn moving_source(
     air: &Air,
     field: &Vector3<f64>,
@@ -27,10 +27,10 @@ pub fn moving_source(
     Ok(relative.concentration(field, &(start + velocity * age), age))
 }
 
-/// Concentration per unit of **total** rate of a uniform disk of the given radius (m) about `centre` on the plane `z = height`:
-/// Gauss-Legendre in the squared radius, `rings` points, and the trapezoidal rule in the angle, `2 rings` points.
+/// Concentration per unit of **total** rate of a uniform disk of the given radius (m) around `centre` in the plane `z = height`.
+/// Quadrature: Gauss-Legendre in the squared radius with `rings` points, trapezoid rule in the angle with `2 rings` points.
 ///
-/// Spectrally accurate while the field point is outside the disk: 16 rings give about ten digits at three radii.
+/// The error falls exponentially with `rings` while the field point is outside the disk: 16 rings give about ten digits at three radii.
 ///
 /// # Errors
 /// If `radius` is not a positive number or `rings` is zero.

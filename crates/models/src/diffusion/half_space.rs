@@ -1,4 +1,4 @@
-//! One coordinate `z > 0` above a wall at 0.
+//! Diffusion along a coordinate `z > 0` above a wall at 0.
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::non_negative;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 const SQRT_PI: f64 = 1.772_453_850_905_516;
-/// Above this argument `1 - sqrt(pi) x erfcx(x)` comes from its asymptotic series.
+/// Above this argument, `1 - sqrt(pi) x erfcx(x)` is computed by its asymptotic series.
 const SERIES_FROM: f64 = 12.0;
 
 /// Boundary condition of a wall.
@@ -19,13 +19,13 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// Nothing passes: `dc/dz = 0`.
+    /// Impermeable: no flux, `dc/dz = 0`.
     pub const IMPERMEABLE: Self = Self { loss: 0.0 };
-    /// Everything that arrives is taken away: `c = 0`.
+    /// Absorbing: `c = 0`.
     pub const ABSORBING: Self = Self { loss: f64::INFINITY };
 
-    /// A wall that takes away `loss * c` per unit of area and time: `kappa dc/dz = loss * c`, with `loss` in m/s.
-    /// 0 is impermeable, infinity absorbing.
+    /// A wall that absorbs `loss * c` per unit of area and time: `kappa dc/dz = loss * c`, with `loss` in m/s.
+    /// 0 is impermeable, infinity is absorbing.
     ///
     /// # Errors
     /// If `loss` is negative or NaN.
@@ -44,13 +44,13 @@ impl Wall {
     }
 }
 
-/// Quantity in the boundary condition of a wall across which wind blows.
+/// The flux that equals `loss * c` at a wall, if wind blows across the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Flux {
-    /// Diffusion and wind together carry `loss * c` into the wall: no mass appears from nowhere.
+    /// Diffusion and wind together. Mass is never created.
     #[default]
     Total,
-    /// Diffusion alone carries `loss * c`, as equation (4) of the paper is printed: wind away from the wall then creates mass.
+    /// Diffusion alone, as equation (4) of the paper is printed. Wind away from the wall then creates mass.
     Diffusive,
 }
 
@@ -68,7 +68,7 @@ impl From<Wall> for f64 {
     }
 }
 
-/// `1 - sqrt(pi) x erfcx(x)`, positive and without cancellation for large `x`.
+/// `1 - sqrt(pi) x erfcx(x)`, positive, without cancellation for large `x`.
 fn one_minus_scaled(x: f64) -> f64 {
     if x < SERIES_FROM {
         return 1.0 - SQRT_PI * x * erfcx(x);
@@ -83,7 +83,7 @@ fn one_minus_scaled(x: f64) -> f64 {
     sum
 }
 
-/// Green's function of equation (5) for the loss velocity after the wind transform, which may be negative, times `exp(shift)`.
+/// `exp(shift)` times the Green's function of equation (5). `loss` is the loss velocity after the wind transform and may be negative.
 ///
 /// `direct - image + 2 image (1 - sqrt(pi) H erfcx(H + w))`, `w = (z + z0) / sqrt(4 kappa t)`, `H = loss sqrt(t / kappa)`: the
 /// paper's formula with the terms paired so that none cancels.
@@ -106,7 +106,7 @@ pub(super) fn green(z: f64, z0: f64, age: f64, diffusivity: f64, loss: f64, shif
         // 1 - sqrt(pi) (x - w) erfcx(x)
         2.0 * (shift - w * w).exp() * (one_minus_scaled(x) + SQRT_PI * w * erfcx(x))
     } else {
-        // erfcx(x) exp(-w^2) = exp(h^2 + 2 h w) erfc(x): one exponent, because each alone may overflow.
+        // erfcx(x) exp(-w^2) = exp(h^2 + 2 h w) erfc(x): the exponents are added first, because each exponential alone may overflow.
         2.0 * ((shift - w * w).exp() - SQRT_PI * h * (shift + h * (h + 2.0 * w)).exp() * libm::erfc(x))
     };
     prefactor * (kept + wall)

@@ -2,11 +2,11 @@
 
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// Intervals are halved at most this often, one after the other.
+/// Largest number of times that an interval is halved.
 const DEEPEST: u32 = 40;
 
-/// `int_a^b f` to about `relative` of the integral of `|f|`: 16-point Gauss-Legendre panels, halved until two halves agree with
-/// their whole.
+/// `int_a^b f`, with an error of about `relative` times the integral of `|f|`: 16-point Gauss-Legendre panels, halved until the sum over
+/// two halves agrees with the whole.
 pub(super) fn integrate(f: &impl Fn(f64) -> f64, a: f64, b: f64, relative: f64) -> f64 {
     let rule = gauss_legendre::<16>();
     let whole = rule.composite(a, b, 4, f);
@@ -19,7 +19,7 @@ fn halve(f: &impl Fn(f64) -> f64, a: f64, b: f64, whole: f64, tolerance: f64, de
     let rule = gauss_legendre::<16>();
     let (left, right) = (rule.sum(a, middle, f), rule.sum(middle, b, f));
     let apart = (left + right - whole).abs();
-    // What is not a number stays so.
+    // A NaN cannot be improved by halving.
     if depth == 0 || apart <= tolerance || apart.is_nan() {
         return left + right;
     }

@@ -1,24 +1,24 @@
-//! How a substance released into air or water spreads: Green's functions of the diffusion equation, and the concentrations
-//! that sources of every shape cause.
+//! How a substance released into air or water spreads: Green's functions of the diffusion equation, and concentrations
+//! from sources that vary, move or cover an area.
 //!
-//! All of it solves `dc/dt = kappa lap c - v . grad c + release` (Zhao and Nehorai, IEEE Trans. Signal Processing 55 (2007)
-//! 2729, section II). Units are SI: metres, seconds, kilograms, kg/m^3; any other consistent set serves as well.
+//! The equation is `dc/dt = kappa lap c - v . grad c + release` (Zhao and Nehorai, IEEE Trans. Signal Processing 55 (2007)
+//! 2729, section II). Units are SI: metres, seconds, kilograms, kg/m^3. Any other consistent set works too.
 //!
-//! | question | answer |
+//! | task | item |
 //! |---|---|
-//! | one coordinate: open, one wall | [`Axis`] |
+//! | one coordinate, unbounded or with one wall | [`Axis`] |
 //! | three dimensions with wind | [`Space`] |
 //! | a source that releases at a constant rate, closed form, with gradient | [`Air`] |
 //! | a release that lasts, varies, moves, covers a disk | [`Release`], [`moving_source`], [`disk_source`] |
-//! | where the concentration exceeds a threshold | [`contour_radius`], [`contour`] |
-//! | the same response at many places | [`Profile`] |
+//! | the region where the concentration exceeds a threshold | [`contour_radius`], [`contour`] |
+//! | a table of the response, for many distances | [`Profile`] |
 //!
-//! Rooms, walls, slabs, vessels and media whose diffusivity varies have no closed form, or one for each shape: the crate
+//! Rooms, slabs, vessels and media of varying diffusivity have no closed form, or one for each shape. The crate
 //! `fewbits-diffusion` solves them by finite volumes.
 //!
-//! The central choice is that a Green's function takes field **and** source, `green(field, source, age)`: the difference
-//! `field - source` is enough only far from every wall, although equation (10) of the paper is written with it. The age counts
-//! from the release; nothing has arrived at age zero or before, so every response there is exactly 0.
+//! A Green's function takes field **and** source, `green(field, source, age)`. The difference `field - source` is enough only far from
+//! every wall, although equation (10) of the paper uses it. The age counts from the release; at age zero and before every response is
+//! exactly 0.
 //!
 //! ```
 //! use fewbits_models::diffusion::{Air, Ground};

@@ -5,15 +5,15 @@ use fewbits_numerics::error::{at_least_one, positive, refuse};
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-/// Coefficients of each polynomial: degree 9.
+/// Number of coefficients of each polynomial: degree 9.
 const ORDER: usize = 10;
 
 /// `K` smooth functions of a distance `0 <= r <= end`, each a polynomial of degree 9 on panels of equal width.
 ///
-/// Where nothing changes along the ground, the response to a source depends on the horizontal distance `r` alone, times
-/// `exp((v . d - V r) / 2 kappa)` with a horizontal wind of speed `V`: one table serves every place, and a look-up costs two
-/// fused polynomials instead of a handful of error functions. On panels of a quarter of the shortest diffusion length
-/// `sqrt(4 kappa t)` the tabulated functions are good to about 1e-12 of their largest value in the panel.
+/// If nothing changes along the ground, the response to a source is a function of the horizontal distance `r`, times `exp((v . d - V r) / 2
+/// kappa)` with a horizontal wind `v` of speed `V` and horizontal offset `d`. One table then serves all places, and a look-up costs the
+/// evaluation of polynomials instead of several error functions. On panels of a quarter of the shortest diffusion length `sqrt(4 kappa t)`
+/// the error is about 1e-12 of the largest value in the panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile<const K: usize> {
     coefficients: Vec<[[f64; ORDER]; K]>,
@@ -31,7 +31,7 @@ impl<const K: usize> Profile<K> {
         positive("width", width)?;
         let panels = at_least_one("panels", (end / width).ceil() as usize)?;
         let width = end / panels as f64;
-        // Both by cosines: once for all tables.
+        // Sums over cosines, computed once for all tables.
         static NODES: LazyLock<[f64; ORDER]> = LazyLock::new(|| std::array::from_fn(node));
         static TO_MONOMIALS: LazyLock<[[f64; ORDER]; ORDER]> = LazyLock::new(to_monomials);
         let (nodes, to_monomials) = (&*NODES, &*TO_MONOMIALS);
@@ -62,18 +62,18 @@ impl<const K: usize> Profile<K> {
         })
     }
 
-    /// Where the table ends.
+    /// Upper end of the tabulated range.
     pub fn end(&self) -> f64 {
         self.width * self.coefficients.len() as f64
     }
 
-    /// The functions at `r`, which is moved into `[0, end]`.
+    /// The functions at `r`; an `r` outside `[0, end]` is replaced by the nearer end.
     #[inline]
     pub fn at(&self, r: f64) -> [f64; K] {
         let position = (r * self.scale).max(0.0);
         let panel = (position as usize).min(self.coefficients.len() - 1);
         let x = (2.0 * (position - panel as f64) - 1.0).min(1.0);
-        // By reference: a `map` would copy the coefficients.
+        // By reference: `map` would copy the coefficients.
         let polynomials = &self.coefficients[panel];
         let mut sums = [0.0; K];
         for power in (0..ORDER).rev() {
@@ -92,7 +92,7 @@ fn node(i: usize) -> f64 {
 
 /// The matrix from values at the Chebyshev nodes to coefficients of powers.
 fn to_monomials() -> [[f64; ORDER]; ORDER] {
-    // Powers of the Chebyshev polynomials by their recurrence.
+    // Coefficients of the Chebyshev polynomials by their recurrence.
     let mut chebyshev = [[0.0; ORDER]; ORDER];
     chebyshev[0][0] = 1.0;
     chebyshev[1][1] = 1.0;

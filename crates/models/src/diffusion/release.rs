@@ -4,7 +4,7 @@ use super::integrate::integrate;
 use crate::Error;
 use fewbits_numerics::error::{all_finite, positive, refuse};
 
-/// A rate of release that is constant between given instants, and zero before the first and after the last.
+/// A release rate that is constant between given instants, and zero before the first and after the last.
 ///
 /// ```
 /// use fewbits_models::diffusion::{Air, Ground, Release};
@@ -25,7 +25,7 @@ pub struct Release {
 }
 
 impl Release {
-    /// A constant rate (kg/s) from `start` (s) on.
+    /// A constant rate (kg/s) from the instant `start` (s) on.
     ///
     /// # Errors
     /// If an argument is not finite, or the rate is negative.
@@ -33,7 +33,7 @@ impl Release {
         Self::during(start, f64::INFINITY, rate)
     }
 
-    /// A constant rate (kg/s) between two instants (s).
+    /// A constant rate (kg/s) between the instants `start` and `end` (s).
     ///
     /// # Errors
     /// As [`Release::piecewise`].
@@ -41,7 +41,7 @@ impl Release {
         Self::piecewise(vec![start, end], vec![rate])
     }
 
-    /// The given rates (kg/s) between increasing instants (s), of which the last may be infinite: one edge more than rates.
+    /// Rates (kg/s) between increasing instants (s): one edge more than rates. The last edge may be infinite.
     ///
     /// # Errors
     /// If the lengths do not fit, an edge is not finite or not above the one before, or a rate is negative or not finite.
@@ -61,7 +61,8 @@ impl Release {
         Ok(Self { edges, rates })
     }
 
-    /// Concentration at `time`, given the concentration per unit rate of a source that has released for `age` seconds.
+    /// Concentration (kg/m^3) at `time` (s). `per_unit_rate(age)` is the concentration per unit rate of a source that has released for
+    /// `age` seconds.
     pub fn concentration(&self, time: f64, per_unit_rate: impl Fn(f64) -> f64) -> f64 {
         let since = |edge: f64| if time > edge { per_unit_rate(time - edge) } else { 0.0 };
         let boxes = self.rates.iter().zip(self.edges.windows(2));
@@ -71,9 +72,9 @@ impl Release {
             .max(0.0)
     }
 
-    /// Concentration at `time` of any rate `mu(t)` (kg/s) that began at `start`, given the impulse response at each age and the
-    /// diffusivity and distance that say where it is alive: quadrature in `age^(-1/2)`, relative accuracy about 1e-12 where the
-    /// rate is smooth.
+    /// Concentration (kg/m^3) at `time` (s) of any rate `mu(t)` (kg/s) that began at `start`. `impulse(age)` is the impulse response.
+    /// Diffusivity and distance bound the ages at which it is not negligible. Quadrature in `age^(-1/2)`; relative accuracy about 1e-12 if
+    /// the rate is smooth.
     ///
     /// # Errors
     /// If `diffusivity` or `distance` is not a positive number.

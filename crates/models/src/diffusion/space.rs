@@ -1,4 +1,4 @@
-//! Three dimensions.
+//! Diffusion in three dimensions.
 
 use super::axis::Axis;
 use super::integrate::integrate;
@@ -6,10 +6,10 @@ use crate::Error;
 use fewbits_numerics::error::refuse;
 use nalgebra::Vector3;
 
-/// The concentration that a unit mass, released at one point at once, causes elsewhere later.
+/// The concentration after the instantaneous release of a unit mass at one point.
 ///
-/// Laws: zero at age zero and before; never negative or NaN; `green(a, b, t) = green(b, a, t)` without wind; the integral over
-/// the field is one where no wall takes anything away, and never grows elsewhere.
+/// Laws: `green` is zero at age zero and before, and never negative or NaN. Without wind `green(a, b, t) = green(b, a, t)`. Its integral
+/// over the field is one if no wall absorbs, and otherwise never grows.
 pub trait ImpulseResponse {
     /// Concentration at `field` (kg/m^3 per kg), `age` seconds after the release at `source`.
     fn green(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> f64;
@@ -18,7 +18,7 @@ pub trait ImpulseResponse {
     fn diffusivity(&self) -> f64;
 }
 
-/// An environment whose Green's function is a product of three coordinates: open or half-space geometry, with wind.
+/// An environment whose Green's function is the product of those of three coordinates: unbounded or half-space, with wind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Space {
     axes: [Axis; 3],
@@ -28,7 +28,7 @@ impl Space {
     /// The product of three coordinates.
     ///
     /// # Errors
-    /// If the diffusivities differ: the product is no solution then.
+    /// If the diffusivities differ: the product does not solve the diffusion equation then.
     pub fn new(axes: [Axis; 3]) -> Result<Self, Error> {
         let expected = axes[0].diffusivity();
         match axes.iter().find(|axis| axis.diffusivity() != expected) {
@@ -53,10 +53,10 @@ impl ImpulseResponse for Space {
     }
 }
 
-/// Concentration per unit rate of a source that has released at a constant rate for `age` seconds: the integral of the Green's
-/// function over its age, in `u = age^(-1/2)`, in which it is smooth. Relative accuracy 1e-12.
+/// Concentration per unit rate (kg/m^3 per kg/s) of a source that has released at a constant rate for `age` seconds: the integral of the
+/// Green's function over the age, computed in `u = age^(-1/2)`, in which it is smooth. Relative accuracy 1e-12.
 ///
-/// Source and field closer than `closest` metres are moved apart along x: the concentration has a pole at the source.
+/// If source and field are closer than `closest` metres, they are moved apart along x: the concentration is infinite at the source.
 pub fn step_response(
     response: &impl ImpulseResponse,
     field: &Vector3<f64>,
@@ -74,7 +74,7 @@ pub fn step_response(
         *field
     };
     let distance = distance.max(closest);
-    // Beyond, exp(-distance^2 u^2 / 4 kappa) is zero in floating point.
+    // For larger u, exp(-distance^2 u^2 / 4 kappa) underflows to zero.
     let last = (4.0 * response.diffusivity() * 745.0).sqrt() / distance;
     let first = age.sqrt().recip();
     if first >= last {

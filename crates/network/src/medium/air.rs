@@ -1,10 +1,10 @@
-//! Frames on air: the bytes of the protocol without the padding of their payload, and frames that are passed on within others.
+//! Frames as bits on air: without the padding of their payload, and frames that are relayed within others.
 
 use crate::units::SensorId;
 use fewbits_core::BitString;
 use fewbits_protocol::{CHECK_BYTES, Check, Frame, Kind};
 
-/// The bits of a frame as they travel: the bytes that it has over a socket, where the check follows the payload's last bit at once.
+/// The bits of a frame on air. They are its bytes without padding: the check follows the last bit of the payload directly.
 pub fn on_air(frame: &Frame<'_>, check: Check) -> BitString {
     let mut bytes = frame.to_bytes(check);
     let padding = 8 * frame.payload.bytes().len() - frame.payload.bits();
@@ -16,11 +16,11 @@ pub fn on_air(frame: &Frame<'_>, check: Check) -> BitString {
         }
     }
     let bits = 8 * bytes.len() - padding;
-    // The bytes hold that many bits by construction.
+    // The bytes contain that many bits by construction.
     BitString::from_bytes(bytes, bits).unwrap_or_default()
 }
 
-/// The bytes of a frame that has arrived, to be decoded. Any bits have some.
+/// The bytes of a frame that has arrived, to be decoded. Every bit string gives bytes.
 pub(crate) fn from_air(bits: &BitString) -> Vec<u8> {
     let mut bytes = bits.bytes().to_vec();
     let padding = 8 * bytes.len() - bits.bits();
@@ -34,7 +34,7 @@ pub(crate) fn from_air(bits: &BitString) -> Vec<u8> {
     bytes
 }
 
-/// A frame that carries another one, whose `bits` on air these are, to or from a sensor over several hops.
+/// A frame that contains another one, whose bits on air are `bits`, on its way to or from `sensor` over several hops.
 pub(crate) fn carrying<'a>(frame: &Frame<'_>, bits: &'a BitString, sensor: SensorId) -> Frame<'a> {
     Frame {
         destination: sensor.0,
@@ -42,7 +42,7 @@ pub(crate) fn carrying<'a>(frame: &Frame<'_>, bits: &'a BitString, sensor: Senso
     }
 }
 
-/// The bytes of the frame that `frame` carries to its destination for others, or away from it. It is of the same slot and digest; a belief is not.
+/// The bytes of the frame that `frame` contains, if it is relayed: slot and digest are the same. `None` for a belief.
 pub(crate) fn carried(frame: &Frame<'_>) -> Option<Vec<u8>> {
     if frame.kind != Kind::Handover {
         return None;
@@ -53,7 +53,7 @@ pub(crate) fn carried(frame: &Frame<'_>) -> Option<Vec<u8>> {
     carries.then_some(bytes)
 }
 
-/// Payload bits among the bits of a frame. The header of a frame within it is none.
+/// Number of payload bits among the bits of a frame. The header of a contained frame does not count.
 pub(crate) fn payload_bits(bits: &BitString) -> usize {
     let overhead = |kind: Kind| 8 * kind.overhead();
     let overhead = match Frame::kind_of(bits.bytes()) {

@@ -8,24 +8,24 @@ use fewbits_protocol::Check;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// Loss, inverted bits, delay, duplication and reordering of frames. Every frame and receiver is independent of the others, but for the state of [`Loss::Burst`]. Inverted bits are those of
-/// [`Frame`](crate::Frame)s; preambles and link headers are taken to be received.
+/// Loss, inverted bits, delay, duplication and reordering of frames. They are independent for every frame and receiver, except for the
+/// state of [`Loss::Burst`]. Only bits of [`Frame`](crate::Frame)s are inverted; preambles and link headers are always received.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
-    /// How likely a frame is lost.
+    /// Model of the loss of frames.
     pub loss: Loss,
     /// Probability that a bit is inverted.
     pub crossover: f64,
-    /// Delay of every frame, besides its time on air.
+    /// Delay of every frame after its time on air.
     pub delay: Seconds,
-    /// Mean of an exponential further delay.
+    /// Mean of an additional exponential delay.
     pub jitter: Seconds,
     /// Probability that a frame arrives twice, the second time after another delay.
     pub duplication: f64,
-    /// Probability that a frame is held back by `held`.
+    /// Probability that a frame is further delayed by [`held`](Self::held).
     pub reordering: f64,
-    /// How long a frame is held back, so that later ones overtake it.
+    /// Additional delay of such a frame; later frames overtake it.
     pub held: Seconds,
 }
 
@@ -41,10 +41,10 @@ impl Channel {
         held: Seconds::ZERO,
     };
 
-    /// Loses each frame with the given probability.
+    /// A channel that loses each frame with the given probability and does nothing else.
     ///
     /// # Errors
-    /// If it is outside `[0, 1]`.
+    /// If `loss` is outside `[0, 1]`.
     pub fn lossy(loss: f64) -> Result<Self, ArgumentError> {
         Self {
             loss: Loss::Fixed(loss),
@@ -53,10 +53,10 @@ impl Channel {
         .checked()
     }
 
-    /// Inverts each bit with the given probability.
+    /// A channel that inverts each bit with the given probability and does nothing else.
     ///
     /// # Errors
-    /// If it is outside `[0, 1/2]`.
+    /// If `crossover` is outside `[0, 1/2]`.
     pub fn flipping(crossover: f64) -> Result<Self, ArgumentError> {
         Self {
             crossover,
@@ -65,10 +65,10 @@ impl Channel {
         .checked()
     }
 
-    /// The channel, if its numbers are probabilities and lengths.
+    /// Returns the channel if its probabilities and delays are valid.
     ///
     /// # Errors
-    /// If one is not.
+    /// If one of them is not.
     pub fn checked(self) -> Result<Self, ArgumentError> {
         self.loss.checked()?;
         within("crossover", self.crossover, 0.0, 0.5)?;
@@ -77,17 +77,17 @@ impl Channel {
         Ok(self)
     }
 
-    /// The [`Link`] that a receiver assumes for the reports of one sensor, each sent once. `Link::loss` is the probability that nothing arrives where
-    /// a report would have been sent: the question did not arrive intact, or the report did not arrive at all.
+    /// The [`Link`] that a receiver assumes for the reports of one sensor, each sent once. `Link::loss` is the probability that nothing
+    /// arrives although a report would have been sent: the question did not arrive intact, or the report did not arrive.
     ///
-    /// A report that arrives damaged where `check` covers it is observed as `Lost`, whichever check that is: slots tell who sent it. Damage to
+    /// A report with damage in the part that its check covers is observed as `Lost`; its slot tells who sent it. Damage to
     /// a payload that the check does not cover is `Link::crossover`.
     ///
-    /// * `distance`: metres.
-    /// * `question_bits`: the question's whole frame, which a sensor must receive intact before it reports; `None` if nothing is asked.
+    /// * `distance`: distance between sensor and receiver in metres.
+    /// * `question_bits`: length of the question's whole frame, which the sensor must receive intact; `None` if nothing is asked.
     ///
     /// # Errors
-    /// None for a checked channel.
+    /// Never for a [`checked`](Self::checked) channel.
     pub fn link(&self, distance: f64, question_bits: Option<usize>, check: Check) -> Result<Link, ArgumentError> {
         let arrives = 1.0 - self.loss.probability(distance);
         let asked = question_bits.map_or(1.0, |bits| arrives * self.intact(bits));
@@ -103,7 +103,7 @@ impl Channel {
         (bits as f64 * (-self.crossover).ln_1p()).exp()
     }
 
-    /// Whether nothing ever happens to a frame under `loss` but the delay.
+    /// Whether the channel with `loss` only delays frames.
     pub(crate) fn is_clean(&self, loss: &Loss) -> bool {
         *loss == Loss::Fixed(0.0)
             && self.crossover == 0.0
@@ -112,7 +112,7 @@ impl Channel {
             && self.reordering == 0.0
     }
 
-    /// The copies that arrive of `bits` bits, which are lost with probability `loss`: none, one or two.
+    /// Draws the copies of a frame of `bits` bits that arrive: none, one or two. The frame is lost with probability `loss`.
     pub(crate) fn copies<R: Rng>(&self, rng: &mut R, loss: f64, bits: usize, copies: &mut Vec<ReceivedCopy>) {
         if rng.random::<f64>() < loss {
             return;
@@ -121,8 +121,10 @@ impl Channel {
         for _ in 0..1 + usize::from(twice) {
             let mut delay = self.delay.value();
             if self.jitter > Seconds::ZERO {
+                // An exponential delay by inversion; `ln_1p(-u)` keeps u near zero exact.
                 delay -= self.jitter.value() * (-rng.random::<f64>()).ln_1p();
             }
+            // A copy that is held back arrives after later frames.
             if self.reordering > 0.0 && rng.random::<f64>() < self.reordering {
                 delay += self.held.value();
             }

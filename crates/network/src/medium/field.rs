@@ -1,4 +1,4 @@
-//! Positions of the nodes, and who is in range of whom.
+//! Positions of the nodes, and which nodes are in range of each other.
 
 use crate::error::Error;
 use crate::units::SensorId;
@@ -9,10 +9,10 @@ use nalgebra::Vector2;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Nodes that a list of links may name.
+/// Largest number of nodes in a list of links.
 const MOST_NODES: u32 = 1 << 24;
 
-/// Nodes, and who is in range of whom: by positions in the plane and radios of one range, or by a list of links.
+/// The nodes, and which are in range of each other: from positions in the plane and one radio range, or from a list of links.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     nodes: Nodes,
@@ -23,7 +23,7 @@ pub struct Field {
 #[derive(Debug, Clone, PartialEq)]
 enum Nodes {
     Positions(Vec<Vector2<f64>>),
-    /// Lengths of the links, from the smaller number to the larger.
+    /// Length of each link, metres. The key has the smaller node number first.
     Links(BTreeMap<(u32, u32), f64>),
 }
 
@@ -40,14 +40,16 @@ impl Field {
         })
     }
 
-    /// The nodes of a list of links as CSV: `from,to,metres` in each line. Node numbers count from 0; each link holds in both directions. Metres
-    /// may be left out and are 1 then. A first line that does not begin with a digit is a header; empty lines are skipped.
+    /// The nodes of a list of links as CSV with the columns `from,to,metres`. Nodes are numbered from 0; each link works in both
+    /// directions. The metres may be missing and are then 1. A first line that does not begin with a digit is a header; empty lines are
+    /// skipped.
     ///
     /// # Errors
-    /// If a line is no link, joins a node to itself or stands twice, or there is none.
+    /// If a line is not a link, joins a node to itself or repeats a link, or there is no link.
     pub fn from_csv(links: &str) -> Result<Self, Error> {
         let mut lengths = BTreeMap::new();
         for (number, line) in (1..).zip(links.lines().map(str::trim)) {
+            // The first line may be a header.
             if line.is_empty() || number == 1 && !line.starts_with(|c: char| c.is_ascii_digit()) {
                 continue;
             }
@@ -61,6 +63,7 @@ impl Field {
                 .ok()
                 .filter(|metres| metres.is_finite() && *metres > 0.0 && cells.next().is_none());
             let metres = metres.ok_or_else(|| refused("metres above 0 as its third and last cell"))?;
+            // Links have no direction: the smaller number comes first in the key, and a link given twice is refused.
             if a == b || lengths.insert((a.min(b), a.max(b)), metres).is_some() {
                 return Err(refused("each link once, between two nodes").into());
             }
@@ -74,7 +77,7 @@ impl Field {
         })
     }
 
-    /// Node 0 in the middle and `sensors` around it on a circle of the given radius, all in range of each other.
+    /// Node 0 in the middle and `sensors` nodes on a circle of the given radius (metres) around it, all in range of each other.
     ///
     /// # Errors
     /// If there is no sensor or the radius is not a positive number.
@@ -89,7 +92,7 @@ impl Field {
         Self::new(&Deployment::given(positions)?, 2.5 * radius)
     }
 
-    /// `nodes` nodes on a circle of the given radius, all in range of each other.
+    /// `nodes` nodes on a circle of the given radius (metres), all in range of each other.
     ///
     /// # Errors
     /// If there is no node or the radius is not a positive number.
@@ -111,7 +114,7 @@ impl Field {
         self.graph.is_empty()
     }
 
-    /// Range of the radios, metres; the longest link of a list.
+    /// Range of the radios, metres. For a list it is the longest link.
     pub fn range(&self) -> f64 {
         self.range
     }
@@ -121,7 +124,7 @@ impl Field {
         &self.graph
     }
 
-    /// Distance between two nodes that exist, metres; the range where a list has no link between them.
+    /// Distance between two existing nodes, metres. If a list has no link between them, the range.
     pub(crate) fn distance(&self, from: u32, to: u32) -> f64 {
         match &self.nodes {
             Nodes::Positions(positions) => (positions[from as usize] - positions[to as usize]).norm(),
@@ -130,7 +133,7 @@ impl Field {
     }
 
     /// # Errors
-    /// [`Error::UnknownNode`].
+    /// [`Error::UnknownNode`] if there is no such node.
     pub(crate) fn check(&self, node: SensorId) -> Result<(), Error> {
         let (node, nodes) = (node.index(), self.len());
         if node < nodes {
@@ -158,7 +161,7 @@ impl Field {
     }
 
     /// # Errors
-    /// [`Error::UnknownNode`]; [`Error::Unheard`] if there are other nodes and none is in range of it.
+    /// [`Error::UnknownNode`]; [`Error::Unheard`] if there are other nodes but none is in range of it.
     pub(crate) fn check_heard(&self, node: SensorId) -> Result<(), Error> {
         self.check(node)?;
         if self.len() > 1 && self.graph.neighbours(node.index()).is_empty() {
@@ -168,10 +171,10 @@ impl Field {
         Ok(())
     }
 
-    /// Routes from a node to all others.
+    /// Shortest routes from a node to all others.
     ///
     /// # Errors
-    /// [`Error::UnknownNode`]; [`Error::Disconnected`] if one is not reached.
+    /// [`Error::UnknownNode`]; [`Error::Disconnected`] if a node cannot be reached.
     pub fn routes(&self, root: SensorId) -> Result<Hops, Error> {
         let hops = self.graph.hops_from(root.index())?;
         let (reached, nodes) = (hops.reached().len(), self.len());

@@ -1,4 +1,4 @@
-//! How likely a frame is lost: always alike, by distance, or in bursts.
+//! Models of the loss of frames: fixed, by distance, or in bursts.
 
 use crate::units::{Instant, Seconds};
 use fewbits_core::ArgumentError;
@@ -7,26 +7,26 @@ use fewbits_numerics::normal;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// How likely a frame is lost.
+/// Model of the loss of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Loss {
-    /// The same over every distance.
+    /// The same probability over every distance.
     Fixed(f64),
     /// Log-normal shadowing, drawn anew for each frame: received power falls by `10 n log10 d` dB with a normal deviation of `sigma` dB,
     /// so that `loss = Phi(10 n log10(d / d_half) / sigma)` (Rappaport, *Wireless communications*, 2nd edition, eqs. 4.69-4.72).
     Shadowing {
-        /// Distance at which every other frame is lost, metres.
+        /// Distance at which half of the frames are lost (`d_half`), metres.
         half: f64,
         /// Path-loss exponent `n`.
         exponent: f64,
         /// Standard deviation of the shadowing, dB.
         deviation: f64,
     },
-    /// Bursts: the link changes between a good and a bad state at exponential times, whether frames are sent or not (Gilbert, *Capacity of a
-    /// burst-noise channel*, Bell System Technical Journal 39, 1960; Elliott, the same journal 42, 1963; here in continuous time). Each
-    /// direction of each link has a state of its own.
+    /// Bursts: the link alternates between a good and a bad state. The durations are exponential and do not depend on traffic (Gilbert,
+    /// *Capacity of a burst-noise channel*, Bell System Technical Journal 39, 1960; Elliott, the same journal 42, 1963; here in continuous
+    /// time). Each direction of each link has its own state.
     Burst {
         /// Probability of loss in the good state.
         good: f64,
@@ -39,7 +39,7 @@ pub enum Loss {
     },
 }
 
-/// State of a link with [`Loss::Burst`] when a frame last crossed it.
+/// State of a link with [`Loss::Burst`] at the time of its last frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct BurstState {
     at: Instant,
@@ -78,8 +78,9 @@ impl Loss {
         Ok(self)
     }
 
-    /// Probability that a frame is lost now. Of a link with bursts the state is drawn, given the state at the last frame (`None` before the first):
-    /// `P(bad) = b + (was_bad - b) exp(-t (1 / mean_good + 1 / mean_bad))` after a time `t`, with the stationary share `b` of bad times.
+    /// Probability that a frame is lost now. For bursts it draws the state given the state at the last frame (`None` before the first):
+    /// `P(bad) = b + (was_bad - b) exp(-t (1 / mean_good + 1 / mean_bad))` after a time `t`, with the stationary probability `b` of the bad
+    /// state.
     pub(crate) fn drawn<R: Rng>(
         &self,
         rng: &mut R,
@@ -96,6 +97,8 @@ impl Loss {
         else {
             return (self.probability(distance), None);
         };
+        // The two-state Markov chain in continuous time (Gilbert-Elliott): the dependence on the state at the last frame has decayed
+        // exponentially.
         let share = mean_bad.value() / (mean_good.value() + mean_bad.value());
         let chance = burst().map_or(share, |before| {
             let elapsed = (now.since_start() - before.at.since_start()).value();
@@ -107,7 +110,7 @@ impl Loss {
         (if is_bad { bad } else { good }, Some(BurstState { at: now, is_bad }))
     }
 
-    /// Probability that a frame over `distance` metres is lost; over all states where there are bursts.
+    /// Probability that a frame over `distance` metres is lost. For bursts it is the average over both states.
     pub fn probability(&self, distance: f64) -> f64 {
         match *self {
             Self::Burst {

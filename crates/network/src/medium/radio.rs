@@ -10,33 +10,33 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::positive;
 use serde::{Deserialize, Serialize};
 
-/// Energy of the bits on air.
+/// Energy of the bits on air. Which formula applies depends on the radio model.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Transceiver {
-    /// Constant power while it sends, and while it receives.
+    /// Constant powers while the radio sends and receives.
     Powers {
-        /// While sending.
+        /// Power while sending.
         transmit: Watts,
-        /// While receiving.
+        /// Power while receiving.
         receive: Watts,
     },
     /// `E_elec k + eps k d^2` to send `k` bits over `d` metres, `E_elec k` to receive them.
     FirstOrder {
-        /// `E_elec`, per bit.
+        /// Energy `E_elec` of the electronics, per bit.
         electronics: Joules,
-        /// `eps`, per bit and square metre.
+        /// Energy `eps` of the amplifier, per bit and square metre.
         amplifier: Joules,
     },
 }
 
-/// A radio with its framing, and the node it sits on.
+/// A radio, its framing, and the power and battery of its node.
 ///
-/// A frame is sent as one link frame, or as several where it is longer than [`mtu`](Self::mtu) allows. Each link frame costs a preamble and a
-/// link-layer header besides its part of the bits. Sender and receivers pay a wake-up (sleep to active and back, at the power of
-/// receiving), and a turnaround before an acknowledgement. Nodes are synchronised to slots and sleep outside the frames that are for them;
-/// `guard` is how long a receiver listens before each.
+/// A frame is sent as one link frame, or as several if it is longer than [`mtu`](Self::mtu) allows. Each link frame adds a preamble and a
+/// link-layer header to its part of the bits. Sender and receivers pay a wake-up (from sleep to active and back, at the power of
+/// receiving), and a turnaround before an acknowledgement. Nodes are synchronised to slots. They sleep except during frames that are for
+/// them; `guard` is how long a receiver listens before each frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Radio {
@@ -44,40 +44,40 @@ pub struct Radio {
     pub bit_rate: f64,
     /// Energy of sending and receiving.
     pub transceiver: Transceiver,
-    /// Power asleep.
+    /// Power of the sleeping radio.
     pub sleep: Watts,
-    /// Power of the rest of the node, always.
+    /// Constant power of the rest of the node.
     pub baseline: Watts,
     /// Power during wake-up, turnaround and guard time.
     pub active: Watts,
-    /// Sending to receiving or back.
+    /// Time to change between sending and receiving.
     pub turnaround: Seconds,
-    /// Asleep to ready.
+    /// Time from sleep to ready.
     pub wake: Seconds,
-    /// Ready to asleep.
+    /// Time from ready to sleep.
     pub doze: Seconds,
-    /// Listening before each frame.
+    /// Time that a receiver listens before each frame.
     pub guard: Seconds,
-    /// Preamble, start delimiter and length.
+    /// Length of preamble, start delimiter and length field.
     pub preamble: Bits,
-    /// Link-layer header with addresses; the frame check is part of the frame itself.
+    /// Length of the link-layer header with addresses. The frame check is part of the frame itself.
     pub header: Bits,
-    /// An acknowledgement with its preamble.
+    /// Length of an acknowledgement with its preamble.
     pub acknowledgement: Bits,
     /// Longest link frame without preamble; `None` for no limit.
     pub mtu: Option<Bits>,
-    /// Energy of the batteries; `None` for a node on the mains.
+    /// Energy of the batteries; `None` for a node with mains power.
     pub battery: Option<Joules>,
 }
 
-/// Bits that each part of a frame carries where a frame is longer than a link frame: a fragment header (40 bits, RFC 4944, section 5.3) and the
+/// Overhead of each part of a frame that needs several link frames: a fragment header (40 bits, RFC 4944, section 5.3) and the
 /// frame check of IEEE 802.15.4 (16 bits).
 pub const FRAGMENT_OVERHEAD: Bits = Bits(56);
 
-/// Two AA cells.
+/// Energy of two AA cells.
 pub const TWO_AA_CELLS: Joules = Joules::trusted(18_720.0);
 
-/// Output powers of the CC2420 in dBm and what sending at them takes, mW.
+/// Output powers of the CC2420 in dBm, each with the power consumption while sending, mW.
 pub const CC2420_OUTPUT: [(f64, f64); 8] = [
     (0.0, 57.42),
     (-1.0, 54.45),
@@ -90,10 +90,10 @@ pub const CC2420_OUTPUT: [(f64, f64); 8] = [
 ];
 
 impl Radio {
-    /// The CC2420 on two AA cells, at an output power of [`CC2420_OUTPUT`].
+    /// The CC2420 with two AA cells, at an output power of [`CC2420_OUTPUT`].
     ///
     /// # Errors
-    /// If the output power is none of the eight.
+    /// If `output_dbm` is none of the eight.
     pub fn cc2420(output_dbm: f64) -> Result<Self, ArgumentError> {
         let milliwatts = CC2420_OUTPUT
             .iter()
@@ -122,7 +122,7 @@ impl Radio {
         })
     }
 
-    /// The first-order model: bits alone cost, nothing else does.
+    /// The first-order model: only bits cost energy.
     pub fn first_order() -> Self {
         Self {
             bit_rate: 1e6,
@@ -145,14 +145,14 @@ impl Radio {
         }
     }
 
-    /// The same radio on a node that is fed by the mains: its energy is counted, and it never dies of it.
+    /// The same radio on a node with mains power. Its energy is counted, but it never runs out.
     #[must_use]
     pub fn on_mains(self) -> Self {
         Self { battery: None, ..self }
     }
 
     /// # Errors
-    /// If the bit rate is not positive, or a link frame has no room for a bit of a fragment.
+    /// If the bit rate is not positive, or a link frame cannot hold one bit of a fragment.
     pub(crate) fn checked(self) -> Result<Self, ArgumentError> {
         positive("bit_rate", self.bit_rate)?;
         let least = self.header + FRAGMENT_OVERHEAD;
@@ -162,13 +162,13 @@ impl Radio {
         }
     }
 
-    /// Whether frames of one radio can be received by the other: bit rate and framing are the same.
+    /// Whether each radio can receive frames of the other: bit rate and framing are equal.
     pub(crate) fn understands(&self, other: &Self) -> bool {
         let framing = |radio: &Self| (radio.preamble, radio.header, radio.acknowledgement, radio.mtu);
         self.bit_rate == other.bit_rate && framing(self) == framing(other)
     }
 
-    /// How many link frames carry a frame (or a batch) of `body` bits.
+    /// Number of link frames for a frame or batch of `body` bits.
     pub fn link_frames(&self, body: Bits) -> u64 {
         match self.mtu {
             Some(mtu) if self.header + body > mtu => {
@@ -179,7 +179,7 @@ impl Radio {
         }
     }
 
-    /// All bits on air of a frame (or a batch) of `body` bits, preambles and headers included.
+    /// Number of bits on air of a frame or batch of `body` bits, with preambles and headers.
     pub fn on_air(&self, body: Bits) -> Bits {
         match self.link_frames(body) {
             1 => self.preamble + self.header + body,
@@ -187,12 +187,12 @@ impl Radio {
         }
     }
 
-    /// From the end of a frame to the end of its acknowledgement, both at once on air: turnaround and the acknowledgement itself.
+    /// Time from the end of a frame to the end of its acknowledgement without channel delay: turnaround and acknowledgement.
     pub fn answer_time(&self) -> Seconds {
         self.turnaround + self.duration(self.acknowledgement)
     }
 
-    /// Time on air.
+    /// Time on air of `bits` bits.
     pub fn duration(&self, bits: Bits) -> Seconds {
         Seconds::trusted(bits.0 as f64 / self.bit_rate)
     }
@@ -215,7 +215,7 @@ impl Radio {
         }
     }
 
-    /// Energy of waking up and going back to sleep.
+    /// Energy of waking up and returning to sleep.
     pub fn wake_up(&self) -> Joules {
         self.active * (self.wake + self.doze)
     }
@@ -225,7 +225,7 @@ impl Radio {
         self.active * self.turnaround
     }
 
-    /// Energy of listening before a frame.
+    /// Energy of listening during the guard time before a frame.
     pub fn listen(&self) -> Joules {
         self.active * self.guard
     }

@@ -1,4 +1,4 @@
-//! Who talks to whom: drivers that run the machines of `fewbits-protocol` over the simulator.
+//! Protocols: drivers that run the state machines of `fewbits-protocol` on the simulator.
 
 pub(crate) mod bit_star;
 pub(crate) mod walk;
@@ -8,13 +8,13 @@ use crate::note::Note;
 use crate::units::SensorId;
 use fewbits_protocol::{Check, Frame};
 
-/// The note of a frame that no machine takes.
+/// The note about a frame that no state machine accepts.
 fn malformed(with: SensorId, frame: &Frame<'_>) -> Note {
     let note = fewbits_protocol::Note::Malformed { slot: frame.slot };
     Note::Frame { with, note }
 }
 
-/// The frame that a machine has written.
+/// Decodes a frame that a state machine has written.
 fn decoded(bytes: &[u8]) -> Result<Frame<'_>, Error> {
     Frame::decode(bytes, Check::Whole).map_err(|error| Error::estimator("protocol", error))
 }

@@ -1,4 +1,5 @@
-//! A belief that travels, from leader to leader or along a chain of nodes, hop by hop: the machines of `fewbits-protocol` over the simulated radio.
+//! A belief that is sent from leader to leader or along a chain of nodes, hop by hop: the state machines of `fewbits-protocol` on the
+//! simulated radio.
 
 use super::{decoded, malformed};
 use crate::clock::Clock;
@@ -12,14 +13,14 @@ use fewbits_numerics::error::refuse;
 use fewbits_protocol::{Bearer, Errand, Frame, Leader, SLOT_BITS, Slot};
 use serde::{Deserialize, Serialize};
 
-/// A belief that walks over the network under a [`Leader`].
+/// A belief that is sent over the network from leader to leader, as a [`Leader`] decides.
 ///
 /// ```text
 /// slot k, leader:  belief = lead(message);  send it to the next leader, hop by hop along a shortest route, named slot k + 1
 ///         others:  a handover for somebody else goes on; one for oneself makes a leader; a second one of its slot is noted
 /// ```
-/// With acknowledgements, a node that gives up a handover leads itself and notes it: should the belief have arrived all the same,
-/// there are two leaders from then on, and where they meet the log has the disagreement. A leader draws from a stream of its slot.
+/// With acknowledgements, a node that gives up a handover leads itself and notes it. If the belief arrived nevertheless, there are two
+/// leaders from then on; when they meet, the log has a disagreement. A leader draws from the random stream of its slot.
 #[derive(Debug, Clone)]
 pub struct Walk<L> {
     leader: L,
@@ -33,28 +34,28 @@ pub struct Walk<L> {
 #[serde(deny_unknown_fields)]
 pub struct WalkNode {
     bearer: Bearer,
-    /// Handovers on their way, by the radio's tickets.
+    /// Handovers that are sent and not answered: the radio's ticket, and the name of the frame.
     tickets: Vec<(Ticket, (Slot, u32))>,
     estimates: Vec<(u32, Vec<f64>)>,
 }
 
 impl WalkNode {
-    /// The estimates that it made, each with its slot.
+    /// The estimates that this node made as a leader, each with its slot.
     pub fn estimates(&self) -> &[(u32, Vec<f64>)] {
         &self.estimates
     }
 
-    /// The slot in which it leads, if it does.
+    /// The slot in which it leads; `None` if it does not.
     pub fn leads(&self) -> Option<u32> {
         self.bearer.leads().map(Slot::number)
     }
 }
 
 impl<L: Leader> Walk<L> {
-    /// A walk of at most `slots` steps, fewer than 2^23; `stream` is what leaders draw from.
+    /// A walk of at most `slots` slots, fewer than 2^23. Leaders draw from `stream`.
     ///
     /// # Errors
-    /// If there are more slots.
+    /// If `slots` is 2^23 or more.
     pub fn new(leader: L, clock: Clock, slots: u32, stream: Stream) -> Result<Self, Error> {
         if slots >= 1 << (SLOT_BITS - 1) {
             return refuse("slots", slots, "fewer than 2^23");
@@ -70,7 +71,7 @@ impl<L: Leader> Walk<L> {
     /// The network before its first slot, in which `first` leads.
     ///
     /// # Errors
-    /// If the setup is out of range, `first` does not exist, or the field is not in one piece.
+    /// If the setup is out of range, `first` does not exist, or the field is not connected.
     pub fn simulate(self, field: Field, first: SensorId, setup: Setup) -> Result<Simulator<Self>, Error> {
         field.check(first)?;
         field.routes(first)?;
@@ -91,6 +92,7 @@ impl<L: Leader> Walk<L> {
 
     fn carry_out(&self, node: &mut WalkNode, context: &mut Context<'_>, mut errands: Vec<Errand>) -> Result<(), Error> {
         let now = context.now().0;
+        // An errand can lead to others: repeat until none is left.
         while !errands.is_empty() {
             let mut next = Vec::new();
             for errand in errands {
@@ -137,7 +139,7 @@ impl<L: Leader> Walk<L> {
         Ok(())
     }
 
-    /// Notes that a leader's step failed. Leaders change, so failures count over the whole run.
+    /// Notes that a leader's step failed. Different nodes lead, so failures are counted over the whole run.
     fn failed(&self, context: &mut Context<'_>, slot: u32, error: Cause) -> Result<(), Error> {
         let last = Note::failed(Stage::Lead, slot, &error);
         context.note(last.clone());
@@ -153,7 +155,7 @@ impl<L: Leader> Walk<L> {
     }
 }
 
-/// The neighbour that is next on a shortest route to a node; `None` if there is no route.
+/// The neighbour that is next on a shortest route to `destination`; `None` if there is no route.
 fn hop(context: &Context<'_>, destination: u32) -> Result<Option<SensorId>, Error> {
     let (id, field) = (context.id(), context.field());
     field.check(SensorId(destination))?;
@@ -206,7 +208,7 @@ impl<L: Leader> Protocol for Walk<L> {
         self.carry_out(node, context, errands)
     }
 
-    /// The belief is gone if it was here.
+    /// A restarted node loses the belief if it had it.
     fn on_restart(&self, node: &mut WalkNode, _: &mut Context<'_>) -> Result<(), Error> {
         node.bearer.on_memory_lost();
         node.tickets.clear();

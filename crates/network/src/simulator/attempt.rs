@@ -1,4 +1,4 @@
-//! One attempt to send frames: what arrives of it, what it costs, and when it arrives.
+//! One attempt to send frames: which copies arrive and when, and what the attempt costs.
 
 use super::core::{BufferPool, SimulatorCore};
 use super::log::{Detail, Entry, Reception, Transmission};
@@ -10,19 +10,19 @@ use fewbits_core::BitString;
 use fewbits_protocol::Frame;
 use rand::Rng;
 
-/// Bits of a frame's length in a batch.
+/// Bits of the length field of each frame in a batch.
 pub(super) const LENGTH_BITS: u64 = 16;
 
-/// Bits of a frame or batch.
+/// Numbers of bits of a frame or batch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Size {
     /// Payload bits.
     pub(super) payload: u64,
-    /// Bits of its frames.
+    /// Bits of its frames, headers and checks included.
     pub(super) own: usize,
-    /// Link frames that carry it.
+    /// Number of link frames.
     pub(super) link_frames: u64,
-    /// All bits on air.
+    /// Bits on air, with preambles and link headers.
     pub(super) air: Bits,
 }
 
@@ -32,18 +32,18 @@ pub(super) struct Attempt<'a> {
     pub(super) to: Option<SensorId>,
     pub(super) frames: &'a [BitString],
     pub(super) size: Size,
-    /// How many attempts there were before.
+    /// Number of earlier attempts for the same frames.
     pub(super) before: u32,
-    /// The sender is awake from the attempt before.
+    /// Whether the sender is still awake from the attempt before.
     pub(super) sender_awake: bool,
-    /// The receiver is awake from the attempt before.
+    /// Whether the receiver is still awake from the attempt before.
     pub(super) receiver_awake: bool,
-    /// The outgoing frame that an acknowledgement answers; `None` if none is wanted.
+    /// The outgoing frame that an acknowledgement answers; `None` without acknowledgement.
     pub(super) answer: Option<u32>,
 }
 
 impl SimulatorCore {
-    /// Bits of frames that travel together.
+    /// Numbers of bits of frames that are sent together.
     pub(super) fn size(&self, from: SensorId, frames: &[BitString]) -> Size {
         let radio = self.setup.radio_of(from);
         let own: usize = frames.iter().map(|frame| frame.bits()).sum();
@@ -61,8 +61,9 @@ impl SimulatorCore {
         }
     }
 
-    /// Sends once. True if a receiver listened.
+    /// Sends once. Returns whether a receiver listened.
     pub(super) fn attempt(&mut self, attempt: &Attempt<'_>) -> bool {
+        // Buffers of earlier transmissions are reused, so most frames need no allocation.
         let mut pool = std::mem::take(&mut self.pool);
         let mut receptions = self.draw(attempt, &mut pool);
         let listened = !receptions.is_empty();
@@ -92,7 +93,7 @@ impl SimulatorCore {
         listened
     }
 
-    /// Draws what arrives, at every node that could hear the attempt.
+    /// Draws the copies that arrive at every node that could receive the attempt.
     fn draw(&mut self, attempt: &Attempt<'_>, pool: &mut BufferPool) -> Vec<Reception> {
         let (from, size) = (attempt.from, attempt.size);
         let sent = u64::from(self.state.ledger.accounts[from.index()].frames);
@@ -115,7 +116,7 @@ impl SimulatorCore {
         receptions
     }
 
-    /// Draws the copies of one transmission at one receiver. A frame of several link frames is lost with any of them.
+    /// Draws the copies of one transmission at one receiver. A frame of several link frames is lost if any of them is.
     #[allow(clippy::too_many_arguments, reason = "the names of one random stream, and lengths")]
     pub(super) fn receive(
         &mut self,
@@ -135,9 +136,11 @@ impl SimulatorCore {
             });
             return;
         }
+        // Every pair of transmission and receiver has its own random stream: a change elsewhere does not alter the draws here.
         let stream = self.air.indexed(u64::from(from.0)).indexed(sent);
         let mut rng = stream.indexed(u64::from(to.0)).indexed(purpose).fast_rng();
         let lost = self.loss_now(&mut rng, from, to, &loss);
+        // A message of several link frames is lost if any of them is.
         let any_lost = match link_frames {
             1 => lost,
             several => 1.0 - (1.0 - lost).powf(several as f64),
@@ -155,15 +158,15 @@ impl SimulatorCore {
         probability
     }
 
-    /// Enters an attempt into the ledger. Returns the energies of sending and receiving, of all nodes.
+    /// Adds an attempt to the ledger. Returns the energies of sending and of receiving, summed over nodes.
     fn charge(&mut self, attempt: &Attempt<'_>, receptions: &[Reception]) -> (Joules, Joules) {
         let (from, air) = (attempt.from, attempt.size.air);
         let radio = self.setup.radio_of(from);
         let reach = match (&radio.transceiver, attempt.to) {
-            // Its power is the same over every distance.
+            // Constant power: the energy does not depend on the distance.
             (Transceiver::Powers { .. }, _) => 0.0,
             (Transceiver::FirstOrder { .. }, Some(to)) => self.field.distance(from.0, to.0),
-            // Without power control a broadcast reaches the whole range.
+            // A broadcast is sent with the power for the whole range.
             (Transceiver::FirstOrder { .. }, None) => self.field.range(),
         };
         let frame_time = radio.duration(air);
@@ -213,7 +216,7 @@ impl SimulatorCore {
         (sending, receiving)
     }
 
-    /// Schedules the arrivals.
+    /// Schedules the arrivals of all copies.
     fn launch(&mut self, attempt: &Attempt<'_>, receptions: &[Reception]) {
         let on_air = self
             .state
@@ -237,7 +240,7 @@ impl SimulatorCore {
                 let mut answer = attempt.answer.filter(|_| self.is_intact(attempt.frames, copy));
                 for bits in frames_of(attempt.frames, copy) {
                     let from = attempt.from;
-                    // One answer for all frames of a batch.
+                    // One acknowledgement for all frames of a batch.
                     let answer = answer.take();
                     let place = self.deliver(at, reception.to, Arrival { from, answer, bits });
                     if self.contends() {

@@ -1,4 +1,4 @@
-//! Carrier sense: who waits, who hears whom, and which frames destroy each other.
+//! Carrier sense: waiting, listening, and collisions.
 
 use super::core::{OnAir, Outgoing, SimulatorCore};
 use super::queue::EventKind;
@@ -7,12 +7,12 @@ use crate::units::{Bits, Instant, SensorId};
 use rand::RngExt;
 
 impl SimulatorCore {
-    /// Whether nodes contend for the air.
+    /// Whether nodes use carrier sense.
     pub(super) fn contends(&self) -> bool {
         self.setup.access != Access::Scheduled
     }
 
-    /// How often a node listens before it gives a frame up.
+    /// How often a node listens before it drops a frame.
     pub(super) fn tries(&self) -> u32 {
         match self.setup.access {
             Access::CarrierSense(sense) => sense.tries,
@@ -20,13 +20,13 @@ impl SimulatorCore {
         }
     }
 
-    /// Waits at random before listening.
+    /// Schedules the next listening after a random wait.
     pub(super) fn contend(&mut self, number: u32, outgoing: Outgoing) {
         let Access::CarrierSense(sense) = self.setup.access else {
             return;
         };
         let exponent = sense.least.saturating_add(outgoing.heard).min(sense.most);
-        // The last index tells these streams from those of frames.
+        // The last index separates these streams from those of frames.
         let stream = self.air.indexed(u64::from(outgoing.from.0)).indexed(u64::from(number));
         let stream = stream
             .indexed(u64::from(outgoing.attempts))
@@ -39,7 +39,7 @@ impl SimulatorCore {
         self.schedule(at, from, EventKind::Transmit(number));
     }
 
-    /// Whether a node that listens now hears a transmission. It hears its own, too.
+    /// Whether a node that listens now hears a transmission, its own included.
     pub(super) fn hears_others(&self, node: SensorId) -> bool {
         let Access::CarrierSense(sense) = self.setup.access else {
             return false;
@@ -57,7 +57,7 @@ impl SimulatorCore {
         self.field.graph().neighbours(from.index()).binary_search(&to.0).is_ok()
     }
 
-    /// A node begins to send: destroys what is on its way to nodes in range of it, and to itself. Returns who else is sending.
+    /// A node begins to send. Destroys all frames on their way to nodes in range of it, and to itself. Returns the other senders.
     pub(super) fn collide(&mut self, sender: SensorId) -> Vec<SensorId> {
         if !self.contends() {
             return Vec::new();
@@ -75,12 +75,12 @@ impl SimulatorCore {
         senders
     }
 
-    /// Whether a node cannot understand a frame that begins now, since it sends or hears one of `senders`.
+    /// Whether a node cannot receive a frame that begins now, because it sends or hears one of `senders`.
     pub(super) fn is_garbled(&self, senders: &[SensorId], to: SensorId) -> bool {
         senders.iter().any(|from| *from == to || self.reaches(*from, to))
     }
 
-    /// Puts a transmission on air that begins at `start`.
+    /// Records a transmission on air that begins at `start`.
     pub(super) fn occupy(&mut self, from: SensorId, start: Instant, air: Bits, arrivals: Vec<(SensorId, u32)>) {
         if self.contends() {
             let end = start.after(self.setup.radio_of(from).duration(air));

@@ -11,22 +11,22 @@ use serde::{Serialize, de::DeserializeOwned};
 
 /// Behaviour of the nodes: one small state machine per node, all under one protocol.
 ///
-/// Handlers see their own node and the [`Context`], never another node: whatever passes between nodes is bits. An error of a
-/// handler ends the run; what may happen in a faulty network is no error but a [`Note`].
+/// Handlers see their own node and the [`Context`], never another node: only bits pass between nodes. An error of a
+/// handler ends the run. Events that a faulty network can cause are no errors; handlers write a [`Note`].
 pub trait Protocol {
     /// State of one node.
     type Node;
 
-    /// A timer has fired that the node set, or that started it.
+    /// A timer has fired that the node or the start of the simulation set.
     ///
     /// # Errors
-    /// An error ends the run.
+    /// If the run must end.
     fn on_timer(&self, node: &mut Self::Node, context: &mut Context<'_>, token: u32) -> Result<(), Error>;
 
     /// A frame has arrived and passed its check.
     ///
     /// # Errors
-    /// An error ends the run.
+    /// If the run must end.
     fn on_frame(
         &self,
         node: &mut Self::Node,
@@ -35,53 +35,54 @@ pub trait Protocol {
         frame: &Frame<'_>,
     ) -> Result<(), Error>;
 
-    /// A frame has arrived and failed its check. Slots tell who sent it.
+    /// A frame has arrived and failed its check. The slot tells who sent it.
     ///
     /// # Errors
-    /// An error ends the run.
+    /// If the run must end.
     fn on_damaged(&self, _: &mut Self::Node, _: &mut Context<'_>, _: SensorId) -> Result<(), Error> {
         Ok(())
     }
 
-    /// The acknowledgement of a frame has arrived. Only if the setup has acknowledgements ([`Setup::retries`](crate::Setup::retries)), and never for broadcasts.
+    /// The acknowledgement of a frame has arrived. This needs acknowledgements in the setup ([`Setup::retries`](crate::Setup::retries));
+    /// broadcasts have none.
     ///
     /// # Errors
-    /// An error ends the run.
+    /// If the run must end.
     fn on_ack(&self, _: &mut Self::Node, _: &mut Context<'_>, _: Ticket) -> Result<(), Error> {
         Ok(())
     }
 
-    /// No acknowledgement of a frame has arrived, and no repetition is left. The frame may have arrived all the same. Exactly one of this and
-    /// [`on_ack`](Self::on_ack) is called for each acknowledged frame, unless its sender restarts or dies before.
+    /// No acknowledgement of a frame has arrived, and no repetition is left. The frame itself may have arrived. For each acknowledged frame
+    /// either this or [`on_ack`](Self::on_ack) is called once, unless its sender restarts or dies before.
     ///
     /// # Errors
-    /// An error ends the run.
+    /// If the run must end.
     fn on_give_up(&self, _: &mut Self::Node, _: &mut Context<'_>, _: Ticket) -> Result<(), Error> {
         Ok(())
     }
 
-    /// The node has lost its memory and begins anew. Timers that it set still fire.
+    /// The node has lost its memory and starts again. Timers that it set before still fire.
     ///
     /// # Errors
-    /// An error ends the run.
+    /// If the run must end.
     fn on_restart(&self, node: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error>;
 }
 
 /// A protocol whose nodes can be stored in a snapshot.
 pub trait Storable: Protocol {
-    /// A node as it is stored.
+    /// The stored form of a node.
     type Stored: Serialize + DeserializeOwned;
 
-    /// The node as it is stored.
+    /// Converts a node to its stored form.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the node cannot be stored.
     fn store(&self, node: &Self::Node) -> Result<Self::Stored, Cause>;
 
-    /// The node with this index as it was stored.
+    /// Makes the node `index` from its stored form.
     ///
     /// # Errors
-    /// If what was stored is no such node.
+    /// If the stored form is not that of such a node.
     fn revive(&self, index: usize, stored: Self::Stored) -> Result<Self::Node, Cause>;
 }
 
@@ -97,7 +98,7 @@ impl<'a> Context<'a> {
         Self { core, node }
     }
 
-    /// The node that handles the event.
+    /// Index of the node that handles the event.
     pub fn id(&self) -> SensorId {
         self.node
     }
@@ -112,19 +113,19 @@ impl<'a> Context<'a> {
         &self.core.field
     }
 
-    /// Sets a timer by the node's own clock; one in the past fires now.
+    /// Sets a timer at a time of the node's own clock. If that is past, it fires now. `token` is passed to [`Protocol::on_timer`].
     pub fn at(&mut self, time: Instant, token: u32) {
         let time = self.core.when(self.node, time);
         self.core.schedule(time, self.node, EventKind::Timer(token));
     }
 
-    /// Sets a timer.
+    /// Sets a timer that fires after `duration`.
     pub fn after(&mut self, duration: Seconds, token: u32) {
         self.at(self.now().after(duration), token);
     }
 
-    /// Sends to a neighbour, perhaps later in a batch. Returns at once; with acknowledgements, [`Protocol::on_ack`] or
-    /// [`Protocol::on_give_up`] is called with the ticket later.
+    /// Sends to a neighbour, possibly later in a batch. With acknowledgements, [`Protocol::on_ack`] or
+    /// [`Protocol::on_give_up`] is called later with the returned ticket.
     ///
     /// # Errors
     /// [`Error::UnknownNode`], [`Error::SelfLink`], [`Error::OutOfRange`].
@@ -133,7 +134,7 @@ impl<'a> Context<'a> {
         Ok(self.core.submit(self.node, Some(to), frame))
     }
 
-    /// Sends to a neighbour as soon as the air is free, alone.
+    /// Sends to a neighbour as soon as the medium is free, not in a batch.
     ///
     /// # Errors
     /// As [`Context::send`].
@@ -142,17 +143,17 @@ impl<'a> Context<'a> {
         Ok(self.core.send(self.node, Some(to), frame))
     }
 
-    /// Sends to all neighbours, perhaps later in a batch. Nobody acknowledges it.
+    /// Sends to all neighbours, possibly later in a batch. Broadcasts are not acknowledged.
     pub fn broadcast(&mut self, frame: &Frame<'_>) {
         self.core.submit(self.node, None, frame);
     }
 
-    /// Whether frames to one receiver are acknowledged.
+    /// Whether frames to a single receiver are acknowledged.
     pub fn has_acknowledgements(&self) -> bool {
         self.core.setup.retries.is_some()
     }
 
-    /// How many steps of estimators and sensors have failed so far, in the whole network.
+    /// Number of failed steps of estimators and sensors so far, in the whole network.
     pub(crate) fn failures(&self) -> u64 {
         self.core.state.ledger.faults.failures
     }

@@ -1,6 +1,6 @@
 //! State of a running simulation that nodes cannot read directly: time, event queue, ledger of bits and joules, log, and which nodes work.
 //!
-//! [`Simulator`](super::Simulator) takes events from here; [`Context`](super::Context) is the part that a protocol may use. What is sent is in
+//! [`Simulator`](super::Simulator) takes events from here; [`Context`](super::Context) is the part that a protocol may use. Sending is in
 //! `transmission`.
 
 use super::ledger::{Account, Ledger};
@@ -19,23 +19,23 @@ use fewbits_protocol::{Check, Kind, Note as FrameNote};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Names a frame that a node sent, for [`Protocol::on_ack`](super::Protocol::on_ack) and
-/// [`Protocol::on_give_up`](super::Protocol::on_give_up). No two frames of a run have the same.
+/// Identifies a frame that a node sent, for [`Protocol::on_ack`](super::Protocol::on_ack) and
+/// [`Protocol::on_give_up`](super::Protocol::on_give_up). It is unique in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Ticket(pub(super) u64);
 
-/// Frames to one receiver that wait for others.
+/// Frames to one receiver that wait until they are sent together.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Batch {
-    /// The timer of the batch names this number. A batch that is full is sent before its timer fires, and the next batch has another number.
+    /// Number of the batch, which its timer names. A full batch is sent before its timer fires; the next batch has another number.
     pub(super) number: u32,
     pub(super) frames: Vec<BitString>,
     pub(super) tickets: Vec<Ticket>,
 }
 
-/// Frames that wait for the air or for an acknowledgement.
+/// Frames that wait for the medium or for an acknowledgement.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Outgoing {
@@ -43,14 +43,14 @@ pub(super) struct Outgoing {
     pub(super) to: Option<SensorId>,
     pub(super) frames: Vec<BitString>,
     pub(super) tickets: Vec<Ticket>,
-    /// Attempts so far.
+    /// Number of attempts so far.
     pub(super) attempts: u32,
     /// How often its sender has heard others in the present attempt.
     #[serde(default)]
     pub(super) heard: u32,
-    /// The sender is awake from the attempt before.
+    /// Whether the sender is still awake from the attempt before.
     pub(super) sender_awake: bool,
-    /// The receiver is awake from the attempt before.
+    /// Whether the receiver is still awake from the attempt before.
     pub(super) receiver_awake: bool,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct OnAir {
     pub(super) from: SensorId,
     pub(super) start: Instant,
     pub(super) end: Instant,
-    /// Arrivals to come: receiver, and place in the queue.
+    /// Arrivals to come: the receiver, and the position in the queue's list of arrivals.
     pub(super) arrivals: Vec<(SensorId, u32)>,
 }
 
@@ -71,15 +71,15 @@ pub(super) struct OnAir {
 pub(super) struct State {
     pub(super) now: Instant,
     pub(super) queue: Queue,
-    /// For each node whether it lives. Every event asks for it; the ledger says the same, spread over more memory.
+    /// For each node whether it is alive. The ledger has the same information; this list is compact, because every event reads it.
     pub(super) alive: Vec<bool>,
     /// For each node the end of its last outage.
     pub(super) out_until: Vec<Instant>,
-    /// For each node until when the air about it is taken.
+    /// For each node the time until which the medium around it is in use.
     pub(super) busy_until: Vec<Instant>,
     pub(super) batches: BTreeMap<(SensorId, Option<SensorId>), Batch>,
     pub(super) outgoing: BTreeMap<u32, Outgoing>,
-    /// Batches and outgoing frames are numbered together.
+    /// Next number of a batch or outgoing frame; they share one sequence.
     pub(super) next_number: u32,
     pub(super) next_ticket: u64,
     /// Transmissions that others may hear; only under carrier sense.
@@ -90,7 +90,7 @@ pub(super) struct State {
     pub(super) log: Log,
 }
 
-/// Memory of transmissions that are over, used again.
+/// Buffers of finished transmissions, for reuse.
 #[derive(Debug, Default)]
 pub(super) struct BufferPool {
     pub(super) receptions: Vec<Reception>,
@@ -140,7 +140,7 @@ impl SimulatorCore {
         Ok(core)
     }
 
-    /// Goes on with a stored state.
+    /// Continues with a stored state.
     pub(super) fn resume(&mut self, state: State) -> Result<(), Error> {
         let nodes = self.field.len();
         let known = |id: SensorId| id.index() < nodes;
@@ -148,6 +148,7 @@ impl SimulatorCore {
             Some(to) => self.field.check_link(from, to).is_ok(),
             None => known(from),
         };
+        // A stored state may be wrong: an index beyond the nodes would panic only much later.
         let consistent = state.ledger.accounts.len() == nodes
             && state.alive.len() == nodes
             && (0..nodes).all(|node| state.alive[node] == state.ledger.accounts[node].died.is_none())
@@ -176,7 +177,7 @@ impl SimulatorCore {
     pub(super) fn local(&self, node: SensorId, time: Instant) -> Instant {
         match self.setup.drift.get(&node) {
             None => time,
-            // A rate of at least -1/2: no clock goes back.
+            // The rate is at least -1/2, so a clock never runs backwards.
             Some(rate) => Instant(time.0.saturating_add_signed((time.0 as f64 * rate).round() as i64)),
         }
     }
@@ -186,6 +187,7 @@ impl SimulatorCore {
         let Some(rate) = self.setup.drift.get(&node) else {
             return local;
         };
+        // Division and rounding may be off by a nanosecond: correct by `local`.
         let mut time = Instant((local.0 as f64 / (1.0 + rate)) as u64);
         while time.0 > 0 && self.local(node, Instant(time.0 - 1)) >= local {
             time.0 -= 1;
@@ -201,7 +203,7 @@ impl SimulatorCore {
         self.state.queue.push(time.max(self.state.now), node, kind);
     }
 
-    /// The next event up to `end`; time moves on to it.
+    /// Takes the next event up to `end` and advances the time to it.
     #[inline]
     pub(super) fn next(&mut self, end: Instant) -> Option<Event> {
         let event = self.state.queue.pop(end)?;
@@ -247,7 +249,7 @@ impl SimulatorCore {
         }
     }
 
-    /// Lets a fault happen. True if the node begins anew.
+    /// Applies a fault. Returns whether the node restarts.
     pub(super) fn fault(&mut self, index: usize) -> bool {
         let Some(fault) = self.setup.faults.get(index).copied() else {
             return false;
@@ -258,6 +260,7 @@ impl SimulatorCore {
         match fault.kind {
             FaultKind::Death => self.kill(fault.node, self.state.now),
             FaultKind::Outage(duration) => {
+                // Overlapping outages last until the later end.
                 let until = self.state.now.after(duration);
                 let out = &mut self.state.out_until[fault.node.index()];
                 *out = until.max(*out);
@@ -271,7 +274,7 @@ impl SimulatorCore {
         false
     }
 
-    /// Drops all frames that a node's radio has not sent, or not been acknowledged.
+    /// Drops all frames of a node that are not sent or not acknowledged yet.
     fn forget(&mut self, node: SensorId) {
         self.state.batches.retain(|(from, _), _| *from != node);
         self.state.outgoing.retain(|_, frame| frame.from != node);
@@ -288,7 +291,7 @@ impl SimulatorCore {
         self.state.queue.deliver(at.max(self.state.now), to, arrival)
     }
 
-    /// A node whose batteries are empty dies. If it has only idled since, it died when they were.
+    /// Lets a node die whose battery is empty. If it was idle since, the time of death is when the battery became empty.
     #[inline]
     pub(super) fn drain(&mut self, node: SensorId) {
         let radio = self.setup.radio_of(node);
@@ -304,12 +307,13 @@ impl SimulatorCore {
     fn exhaust(&mut self, node: SensorId, overspent: Joules) {
         let radio = self.setup.radio_of(node);
         let idle = (radio.baseline + radio.sleep).value();
+        // The overspent energy divided by the idle power is the time since the battery became empty.
         let since = if idle > 0.0 { overspent.value() / idle } else { 0.0 };
         let now = self.state.now.since_start().value();
         self.kill(node, Instant::default().after(Seconds::trusted((now - since).max(0.0))));
     }
 
-    /// All nodes whose batteries are empty die.
+    /// Applies [`drain`](Self::drain) to all nodes.
     pub(super) fn drain_all(&mut self) {
         (0..self.field.len() as u32).for_each(|node| self.drain(SensorId(node)));
     }

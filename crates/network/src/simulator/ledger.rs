@@ -1,4 +1,4 @@
-//! Bits and joules spent, by node and by message.
+//! Bits and joules spent, per node and over all messages.
 
 use crate::medium::Radio;
 use crate::units::{Bits, Instant, Joules, Seconds};
@@ -8,42 +8,42 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Account {
-    /// Payload bits that it sent, repetitions not counted.
+    /// Payload bits sent, without repetitions.
     pub payload: Bits,
-    /// All bits that it put on air: preambles, headers, checks, acknowledgements, repetitions.
+    /// All bits sent on air: preambles, headers, checks, acknowledgements, repetitions.
     pub air: Bits,
-    /// Frames that it sent, repetitions included, acknowledgements not.
+    /// Number of frames sent, with repetitions, without acknowledgements.
     pub frames: u32,
-    /// Acknowledgements that it sent.
+    /// Number of acknowledgements sent.
     pub acknowledgements: u32,
     /// Energy of sending.
     pub sending: Joules,
-    /// Energy of receiving, useful or not.
+    /// Energy of receiving, also of frames that were for others or damaged.
     pub receiving: Joules,
-    /// Time neither asleep nor dead.
+    /// Time in which the radio was awake.
     pub awake: Seconds,
-    /// When its radio last stopped for good.
+    /// When the node died; `None` while it lives.
     pub died: Option<Instant>,
 }
 
 impl Account {
-    /// Energy of the rest: the baseline always, the sleeping radio when it was not awake.
+    /// Idle energy until `now`: the baseline power, and the sleeping radio while it was not awake.
     pub fn idle(&self, radio: &Radio, now: Instant) -> Joules {
         let alive = self.died.map_or(now, |died| died.min(now)).since_start();
         radio.baseline * alive + radio.sleep * (alive - self.awake)
     }
 
-    /// All energy until now.
+    /// Total energy until `now`: sending, receiving and idle.
     pub fn total(&self, radio: &Radio, now: Instant) -> Joules {
         self.sending + self.receiving + self.idle(radio, now)
     }
 }
 
-/// Cost of all messages, summed message by message.
+/// Cost of all messages, summed over messages.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Totals {
-    /// Messages: a batch is one, repetitions and acknowledgements are none.
+    /// Number of messages. A batch counts as one; repetitions and acknowledgements do not count.
     pub messages: u64,
     /// Payload bits.
     pub payload: Bits,
@@ -59,29 +59,29 @@ pub struct Totals {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Faults {
-    /// Frames that no check accepted: malformed, truncated, damaged.
+    /// Frames that failed their check or could not be decoded: malformed, truncated, damaged.
     pub damaged: u64,
-    /// Transmissions that never arrived: lost, or sender or receiver was out or dead. Acknowledgements too.
+    /// Transmissions and acknowledgements that never arrived: lost on the channel, or sender or receiver out of service or dead.
     pub lost: u64,
-    /// Messages whose sender gave up after all repetitions.
+    /// Messages that were not acknowledged after all repetitions.
     pub given_up: u64,
     /// Steps of estimators and sensors that failed.
     pub failures: u64,
-    /// Updates that succeeded only without the sensors of which nothing arrived.
+    /// Updates that succeeded only without the sensors from which nothing arrived.
     pub silence_ignored: u64,
-    /// Frames that came a second time.
+    /// Frames that arrived a second time.
     pub duplicates: u64,
-    /// Frames that came too late.
+    /// Frames that arrived too late.
     pub late: u64,
-    /// Times that two ends saw that they disagree.
+    /// How often a node detected that the other end had another state.
     pub disagreements: u64,
-    /// Times that a replica took the state of another.
+    /// How often a replica took over the state of another node.
     pub resynchronisations: u64,
 }
 
-/// One account per node, and the same spending counted by messages.
+/// One account per node, and the same costs summed over messages.
 ///
-/// Law: bits and energy of all accounts are those of all messages, and what is left of the energy is idle.
+/// Invariant: bits and energies summed over accounts equal those summed over messages. The remaining energy is idle energy.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ledger {

@@ -1,4 +1,4 @@
-//! The message log: what was sent, what arrived of it, and what the nodes noticed. It can be written and read.
+//! The message log: what was sent, what of it arrived, and what the nodes noted. It can be written to a file and read back.
 
 use crate::error::Error;
 use crate::medium::ReceivedCopy;
@@ -12,12 +12,12 @@ use std::io::{Read, Write};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Detail {
-    /// Nothing: counters only.
+    /// Only counters.
     Nothing,
-    /// Notes of the nodes.
+    /// Counters and notes of the nodes.
     #[default]
     Notes,
-    /// Every transmission too.
+    /// Counters, notes and every transmission.
     Everything,
 }
 
@@ -41,19 +41,19 @@ pub struct Transmission {
     pub from: SensorId,
     /// The receiver; `None` for a broadcast.
     pub to: Option<SensorId>,
-    /// Its bits: the frames of a batch, each as a string.
+    /// The bits of each frame of the batch.
     pub frames: Vec<BitString>,
-    /// Which attempt to send these frames this is, from 0.
+    /// Number of the attempt to send these frames, from 0.
     pub attempt: u32,
-    /// Payload bits among its bits.
+    /// Number of payload bits among its bits.
     pub payload: u64,
     /// Bits on air, with preambles and headers.
     pub air: u64,
     /// Arrivals at each receiver.
     pub receptions: Vec<Reception>,
-    /// Energy of sending. Listening for an acknowledgement is part of `receiving`.
+    /// Energy of sending. Listening for an acknowledgement is counted in `receiving`.
     pub sending: Joules,
-    /// Energy of receiving, of all nodes.
+    /// Energy of receiving, summed over nodes.
     pub receiving: Joules,
 }
 
@@ -61,21 +61,21 @@ pub struct Transmission {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Acknowledgement {
-    /// When the frame that it answers had arrived.
+    /// When the frame that it acknowledges had arrived.
     pub at: Instant,
-    /// Who acknowledges.
+    /// The node that acknowledges.
     pub from: SensorId,
     /// Sender of the acknowledged frame.
     pub to: SensorId,
-    /// Its bits on air.
+    /// Bits on air.
     pub air: u64,
     /// The copies that arrived.
     pub copies: Vec<ReceivedCopy>,
-    /// Energy of sending it. What receiving it takes is part of each [`Transmission`].
+    /// Energy of sending it. The energy of receiving it is part of each [`Transmission`].
     pub sending: Joules,
 }
 
-/// One line of the log.
+/// One entry of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Entry {
@@ -83,13 +83,13 @@ pub enum Entry {
     Sent(Transmission),
     /// An acknowledgement.
     Answered(Acknowledgement),
-    /// Something that a node noticed or that happened to it.
+    /// A note of a node.
     Noted {
-        /// When.
+        /// Time of the note.
         at: Instant,
         /// The node.
         node: SensorId,
-        /// What.
+        /// The note.
         note: Note,
     },
 }
@@ -98,7 +98,7 @@ pub enum Entry {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Log {
-    /// The entries.
+    /// The entries, in the order of the events.
     pub entries: Vec<Entry>,
 }
 
@@ -130,7 +130,7 @@ impl Log {
     /// Writes the log as CBOR.
     ///
     /// # Errors
-    /// [`Error::Unwritable`].
+    /// [`Error::Unwritable`] if writing fails.
     pub fn write(&self, to: impl Write) -> Result<(), Error> {
         ciborium::into_writer(self, to).map_err(unwritable)
     }
@@ -138,7 +138,7 @@ impl Log {
     /// Reads a log.
     ///
     /// # Errors
-    /// [`Error::Unreadable`] if the bytes are no log.
+    /// [`Error::Unreadable`] if the bytes are not a log.
     pub fn read(from: impl Read) -> Result<Self, Error> {
         ciborium::from_reader(from).map_err(unreadable)
     }

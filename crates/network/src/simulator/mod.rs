@@ -1,6 +1,6 @@
-//! The event-driven simulator: what nodes may do, and the run itself.
+//! The event-driven simulator: the interface of protocols, and the run itself.
 //!
-//! `core` has the state that nodes cannot read, `transmission` puts frames on air.
+//! `core` has the state that nodes cannot read; `transmission` sends frames.
 
 mod attempt;
 mod contention;
@@ -33,11 +33,11 @@ use log::{unreadable, unwritable};
 use queue::{Arrival, Event, EventKind};
 use std::io::{Read, Write};
 
-/// A network at some instant.
+/// A network at one instant.
 ///
-/// The air is divided by an ideal schedule ([`Access::Scheduled`]) or by carrier sense ([`Access::CarrierSense`]). By the schedule a transmission begins when the air
-/// is free about its sender and about all nodes that hear it; requests are
-/// served in the order in which they were made, and who waits sleeps. Acknowledgements follow their frames after a turnaround.
+/// Access to the medium is by an ideal schedule ([`Access::Scheduled`]) or by carrier sense ([`Access::CarrierSense`]). By the schedule a
+/// transmission begins when the medium is free around its sender and around all nodes that hear it. Requests are
+/// served in the order in which they were made, and a waiting node sleeps. An acknowledgement follows its frame after a turnaround.
 #[derive(Debug)]
 pub struct Simulator<P: Protocol> {
     protocol: P,
@@ -46,10 +46,10 @@ pub struct Simulator<P: Protocol> {
 }
 
 impl<P: Protocol> Simulator<P> {
-    /// A network of one node state for each node of the field; nothing has happened yet and no timer is set.
+    /// A network with one node state for each node of the field, at time 0 and without timers.
     ///
     /// # Errors
-    /// If numbers of the setup are out of range, a fault befalls a node that does not exist, or there is not one state for each
+    /// If a number of the setup is out of range, a fault names a node that does not exist, or there is not one state per
     /// node.
     pub fn new(protocol: P, nodes: Vec<P::Node>, field: Field, setup: Setup) -> Result<Self, Error> {
         entries("nodes", nodes.len(), field.len())?;
@@ -60,7 +60,7 @@ impl<P: Protocol> Simulator<P> {
         })
     }
 
-    /// Starts a node's first timer, by its own clock.
+    /// Sets a node's first timer, at a time of its own clock.
     ///
     /// # Errors
     /// [`Error::UnknownNode`]; [`Error::Unheard`] if there are other nodes and none is in range.
@@ -71,7 +71,7 @@ impl<P: Protocol> Simulator<P> {
         Ok(())
     }
 
-    /// Lets arbitrary bits arrive at a node, as if `from` had sent them: what a stranger's radio does. Nothing is charged.
+    /// Lets arbitrary bits arrive at a node, as if `from` had sent them. It simulates a foreign radio; nothing is charged.
     ///
     /// # Errors
     /// [`Error::UnknownNode`].
@@ -83,11 +83,11 @@ impl<P: Protocol> Simulator<P> {
         Ok(())
     }
 
-    /// Handles all events up to and including `end`, in the order of their times; of one time, in the order in which they were
-    /// scheduled. Returns how many there were.
+    /// Handles all events up to and including `end`, in the order of their times. Events of the same time are handled in the order in which
+    /// they were scheduled. Returns the number of events.
     ///
     /// # Errors
-    /// Those of the protocol.
+    /// If a handler of the protocol returns an error.
     pub fn run_until(&mut self, end: Instant) -> Result<u64, Error> {
         let mut events = 0;
         while let Some(event) = self.core.next(end) {
@@ -99,10 +99,10 @@ impl<P: Protocol> Simulator<P> {
         Ok(events)
     }
 
-    /// Handles the next `count` events, or all that there are; returns how many there were.
+    /// Handles the next `count` events, or fewer if there are fewer. Returns the number of events.
     ///
     /// # Errors
-    /// Those of the protocol.
+    /// If a handler of the protocol returns an error.
     pub fn run_events(&mut self, count: u64) -> Result<u64, Error> {
         for handled in 0..count {
             match self.core.next(Instant(u64::MAX)) {
@@ -161,6 +161,7 @@ impl<P: Protocol> Simulator<P> {
             self.core.state.ledger.faults.lost += 1;
             return Ok(());
         }
+        // The radio acknowledges an intact frame before the protocol looks at it.
         if let Some(frame) = answer {
             self.core.answer(frame, id, from);
         }
@@ -178,7 +179,7 @@ impl<P: Protocol> Simulator<P> {
         }
     }
 
-    /// Tells a node that lives what became of its frames.
+    /// Calls `handler` for each of the tickets, if the node is alive.
     fn tell(
         &mut self,
         id: SensorId,
@@ -194,17 +195,17 @@ impl<P: Protocol> Simulator<P> {
         Ok(())
     }
 
-    /// The nodes.
+    /// The states of all nodes, by index.
     pub fn nodes(&self) -> &[P::Node] {
         &self.nodes
     }
 
-    /// The time.
+    /// The simulated time.
     pub fn now(&self) -> Instant {
         self.core.state.now
     }
 
-    /// Bits, joules and faults, counted.
+    /// Bits, energies and numbers of faults so far.
     pub fn ledger(&self) -> &Ledger {
         &self.core.state.ledger
     }
@@ -214,7 +215,7 @@ impl<P: Protocol> Simulator<P> {
         &self.core.state.log
     }
 
-    /// All energy of a node until now.
+    /// Total energy of a node until now.
     ///
     /// # Errors
     /// [`Error::UnknownNode`].
@@ -229,7 +230,7 @@ impl<P: Protocol> Simulator<P> {
         node.index() < self.nodes.len() && self.core.is_alive(node)
     }
 
-    /// Whether an outage keeps a node from sending and receiving.
+    /// Whether an outage of its radio keeps a node from sending and receiving.
     pub fn is_out(&self, node: SensorId) -> bool {
         self.is_alive(node) && !self.core.listens(node)
     }
@@ -253,12 +254,12 @@ impl<P: Protocol> Simulator<P> {
         Summary::new(now.since_start(), self.ledger(), energy, first)
     }
 
-    /// Bytes that the network holds: nodes (their own heap memory not counted), queue, frames on air, books, field.
+    /// Bytes of memory of the network: nodes (without their own heap memory), queue, frames on air, ledger, field.
     pub fn memory(&self) -> usize {
         self.nodes.capacity() * size_of::<P::Node>() + self.core.memory()
     }
 
-    /// Writes the whole run as CBOR: nodes, queue, frames on air, books, log. Protocol, field and setup are not part of it.
+    /// Writes the state of the run as CBOR: nodes, queue, frames on air, ledger, log. Protocol, field and setup are not included.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
@@ -272,10 +273,10 @@ impl<P: Protocol> Simulator<P> {
         ciborium::into_writer(&(nodes, &self.core.state), to).map_err(unwritable)
     }
 
-    /// A run as it was when the snapshot was taken, under the same protocol, field and setup.
+    /// The run in the state of the snapshot. Protocol, field and setup must be those of the original run.
     ///
     /// # Errors
-    /// [`Error::Unreadable`] if it is no snapshot; [`Error::SnapshotOfOtherNetwork`]; as [`Simulator::new`].
+    /// [`Error::Unreadable`] if the bytes are not a snapshot; [`Error::SnapshotOfOtherNetwork`]; as [`Simulator::new`].
     pub fn restore(protocol: P, field: Field, setup: Setup, from: impl Read) -> Result<Self, Error>
     where
         P: Storable,

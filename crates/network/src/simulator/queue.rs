@@ -1,4 +1,4 @@
-//! Events to come, in order, and the frames that are on their way.
+//! The event queue, and the frames that are on their way.
 
 use crate::units::{Instant, SensorId};
 use fewbits_core::BitString;
@@ -10,22 +10,22 @@ use std::collections::BinaryHeap;
 pub(crate) enum EventKind {
     /// A timer of the protocol, with its token.
     Timer(u32),
-    /// Bits arrive; the place where the queue keeps them.
+    /// Bits arrive. The number is the position in the list of arrivals.
     Arrival(u32),
-    /// A fault, by its index in the setup.
+    /// A fault, by its index in the setup's list.
     Fault(u32),
-    /// The hold time of a batch is over. Without effect if the batch of this number was sent before.
+    /// The hold time of a batch is over. No effect if the batch of this number was sent before.
     Flush(u32),
-    /// The air is free for an attempt of an outgoing frame.
+    /// The medium is free for an attempt of an outgoing frame.
     Transmit(u32),
     /// The acknowledgement of an outgoing frame arrives at its sender.
     Acknowledged(u32),
-    /// The sender has waited long enough for the acknowledgement of an outgoing frame. Without effect if it came.
+    /// The sender's wait for the acknowledgement of an outgoing frame is over. No effect if it arrived.
     AckTimeout(u32),
 }
 
 impl EventKind {
-    /// A number below 8 for the kind, and the argument.
+    /// The kind as a number below 8, and the argument.
     fn parts(self) -> (u64, u32) {
         match self {
             Self::Timer(token) => (0, token),
@@ -39,8 +39,8 @@ impl EventKind {
     }
 }
 
-/// Events are ordered by time, then by when they were scheduled. Small, since the queue moves them: `rank` is the place in the order of
-/// scheduling, then three bits of its kind.
+/// Events are ordered by time, then by the order of scheduling. They are small, because the queue moves them: `rank` holds the place in
+/// the order of scheduling, then three bits for the kind.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct Event {
     pub(crate) time: Instant,
@@ -104,12 +104,12 @@ pub(crate) struct Arrival {
     pub(crate) bits: BitString,
 }
 
-/// Events, and the bits of those that are arrivals.
+/// The events, and the bits of those that are arrivals.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Queue {
     sequence: u64,
-    /// An event before all of the heap: most frames arrive before anything else happens.
+    /// An event that precedes all others: most frames arrive before anything else happens, so it need not enter the heap.
     front: Option<Event>,
     heap: BinaryHeap<Reverse<Event>>,
     arrivals: Vec<Option<Arrival>>,
@@ -131,7 +131,7 @@ impl Queue {
         self.heap.push(Reverse(event));
     }
 
-    /// The next event up to `end`.
+    /// Takes the next event up to `end`.
     #[inline]
     pub(crate) fn pop(&mut self, end: Instant) -> Option<Event> {
         match (self.front, self.heap.peek()) {
@@ -141,7 +141,7 @@ impl Queue {
         }
     }
 
-    /// Bits that arrive at a node. Returns the place where they are kept.
+    /// Schedules the arrival of bits at a node. Returns their position in the list of arrivals.
     pub(crate) fn deliver(&mut self, at: Instant, to: SensorId, arrival: Arrival) -> u32 {
         let arrival = Some(arrival);
         let place = if let Some(place) = self.free.pop() {
@@ -155,21 +155,21 @@ impl Queue {
         place
     }
 
-    /// Destroys bits on their way. True if there were any.
+    /// Destroys bits on their way. Returns whether there were any.
     pub(crate) fn destroy(&mut self, place: u32) -> bool {
         self.arrivals
             .get_mut(place as usize)
             .is_some_and(|arrival| arrival.take().is_some())
     }
 
-    /// Takes what has arrived; nothing if it was destroyed.
+    /// Takes the bits that have arrived; `None` if they were destroyed.
     pub(crate) fn take(&mut self, place: u32) -> Option<Arrival> {
         let arrival = self.arrivals.get_mut(place as usize)?.take();
         self.free.push(place);
         arrival
     }
 
-    /// Whether a queue that was read is in order and among nodes that exist.
+    /// Whether a queue that was read from a snapshot is in order and names only existing nodes.
     pub(crate) fn is_consistent(&self, known: impl Fn(SensorId) -> bool) -> bool {
         let mut events = self.heap.iter().map(|event| event.0);
         self.front.is_none_or(|front| known(front.node))
@@ -178,7 +178,7 @@ impl Queue {
             && self.arrivals.iter().flatten().all(|arrival| known(arrival.from))
     }
 
-    /// Bytes that the queue holds.
+    /// Bytes of memory of the queue.
     pub(crate) fn memory(&self) -> usize {
         self.heap.capacity() * size_of::<Reverse<Event>>()
             + self.arrivals.capacity() * size_of::<Option<Arrival>>()

@@ -1,4 +1,4 @@
-//! Everything about a simulated network except the behaviour of its nodes.
+//! All settings of a simulated network except the behaviour of its nodes.
 
 use super::log::Detail;
 use crate::error::Error;
@@ -10,14 +10,14 @@ use fewbits_protocol::Check;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Frames to one receiver wait until `max_frames` of them are there, at most `hold` after the first, and share one preamble and link header.
-/// A frame that would make the batch longer than a link frame starts the next batch.
+/// Frames to one receiver wait until `max_frames` of them are there, at most `hold` after the first. They then share one preamble and
+/// link header. A frame that would make the batch longer than a link frame starts the next batch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Batching {
-    /// Frames of a full batch.
+    /// Number of frames of a full batch.
     pub max_frames: usize,
-    /// How long the first frame waits.
+    /// Longest wait of the first frame.
     pub hold: Seconds,
 }
 
@@ -29,15 +29,16 @@ impl Batching {
     };
 }
 
-/// How nodes share the air.
+/// How nodes share the medium.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Access {
-    /// An ideal schedule: a transmission begins when the air is free about its sender and about all nodes that hear it. Nothing collides.
+    /// An ideal schedule: a transmission begins when the medium is free around its sender and around all nodes that hear it. There are no
+    /// collisions.
     #[default]
     Scheduled,
-    /// Nodes wait at random, listen, and send if they hear nobody: see [`CarrierSense`].
+    /// Nodes wait at random, listen, and send if they hear no transmission: see [`CarrierSense`].
     CarrierSense(CarrierSense),
 }
 
@@ -48,25 +49,26 @@ pub enum Access {
 /// repeat tries times:  wait 0 to 2^e - 1 units;  if nobody is heard: send;  e = min(e + 1, most)
 /// the frame is lost
 /// ```
-/// A transmission that began less than `blind` ago is not heard. What two nodes send at once is lost at every node in range of both, and at a node that sends
-/// itself. Acknowledgements are sent without listening; they are heard and destroy other frames, and are not destroyed themselves.
+/// A transmission that began less than `blind` ago is not heard. If two nodes send at once, both frames are lost at every node in range of
+/// both, and at a node that sends itself. Acknowledgements are sent without listening. They are heard and destroy other frames, but are
+/// not destroyed themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CarrierSense {
-    /// Unit of waiting.
+    /// Unit of the random waits.
     pub unit: Seconds,
-    /// Exponent of the first wait.
+    /// Exponent `e` of the first wait, which is 0 to `2^e - 1` units.
     pub least: u32,
-    /// Largest exponent, at most 16.
+    /// Largest exponent of a wait, at most 16.
     pub most: u32,
-    /// How often to listen, at least once.
+    /// How often a node listens before it drops the frame, at least once.
     pub tries: u32,
-    /// From listening to sending.
+    /// Time from listening to sending.
     pub blind: Seconds,
 }
 
 impl CarrierSense {
-    /// The defaults of IEEE 802.15.4 at 2.4 GHz: units of 320 us, exponents 3 to 5, five tries, a turnaround of 192 us.
+    /// The defaults of IEEE 802.15.4 at 2.4 GHz: units of 320 us, exponents 3 to 5, five tries, 192 us from listening to sending.
     pub const IEEE_802_15_4: Self = Self {
         unit: Seconds::trusted(320e-6),
         least: 3,
@@ -82,54 +84,54 @@ impl CarrierSense {
 pub struct Fault {
     /// Time since the start of the run.
     pub at: Seconds,
-    /// The node.
+    /// The node affected.
     pub node: SensorId,
-    /// What happens to it.
+    /// Kind of the fault.
     pub kind: FaultKind,
 }
 
-/// What can happen to a node.
+/// Kinds of faults.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum FaultKind {
     /// The node dies.
     Death,
-    /// The node loses its memory, and frames that its radio has not sent, and begins anew.
+    /// The node loses its memory and all frames that are not sent yet, and starts again.
     Restart,
-    /// The node's radio neither sends nor receives for this time.
+    /// The node's radio neither sends nor receives for this duration.
     Outage(Seconds),
 }
 
-/// Everything about a network except the behaviour of its nodes.
+/// All settings of a network except the behaviour of its nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setup {
     /// The radio of every node that is not in `radios`.
     pub radio: Radio,
-    /// Radios of single nodes. Bit rate and framing must be those of `radio`.
+    /// Radios of single nodes. Their bit rate and framing must equal those of `radio`.
     pub radios: BTreeMap<SensorId, Radio>,
     /// Loss, inverted bits and delay of every link.
     pub channel: Channel,
-    /// Loss of single links, from the first node to the second, in place of the channel's. Loss of acknowledgements too.
+    /// Loss of single links, from the first node to the second. It replaces the channel's, also for acknowledgements.
     pub link_loss: BTreeMap<(SensorId, SensorId), Loss>,
-    /// Repetitions of a frame to one receiver until it is acknowledged; `None` for no acknowledgements.
+    /// Largest number of repetitions of a frame that is not acknowledged; `None` for no acknowledgements.
     pub retries: Option<u32>,
-    /// From the end of a frame until its sender gives up waiting for the acknowledgement. `None`: one nanosecond more than an acknowledgement needs
-    /// over a channel with the fixed delay of `channel` and no jitter.
+    /// Time from the end of a frame until its sender stops waiting for the acknowledgement. `None`: one nanosecond more than an
+    /// acknowledgement needs over a channel with the fixed delay of `channel` and no jitter.
     pub ack_timeout: Option<Seconds>,
-    /// How nodes share the air.
+    /// How nodes share the medium.
     pub access: Access,
     /// Whether frames to one receiver are sent together.
     pub batching: Batching,
-    /// What the check of a report covers. Other frames are checked whole.
+    /// What the check of a report covers. The check of other frames covers the whole frame.
     pub report_check: Check,
-    /// Rates of the nodes' clocks, less one: a clock with 1e-5 gains 10 us in a second. Others are exact.
+    /// Rate errors of the nodes' clocks: a clock with 1e-5 gains 10 us per second. Other clocks are exact.
     pub drift: BTreeMap<SensorId, f64>,
     /// Faults of the nodes.
     pub faults: Vec<Fault>,
     /// How much is logged.
     pub detail: Detail,
-    /// All randomness of the network: every frame has a stream of its own.
+    /// Root of all randomness of the network. Every frame has its own stream.
     pub stream: Stream,
 }
 
@@ -172,8 +174,8 @@ impl Setup {
     }
 
     /// # Errors
-    /// If a number is out of range, a node does not exist, a link has nodes that are not in range of each other, or two radios do not understand
-    /// each other.
+    /// If a number is out of range, a node does not exist, a link has nodes out of range of each other, or two radios have different bit
+    /// rates or framings.
     pub(super) fn check(&self, field: &Field) -> Result<(), Error> {
         self.radio.checked()?;
         self.channel.checked()?;
@@ -181,6 +183,7 @@ impl Setup {
         for (node, radio) in &self.radios {
             field.check(*node)?;
             radio.checked()?;
+            // Receivers are charged the duration that the sender computed, so all radios must give the same.
             if !radio.understands(&self.radio) {
                 let expected = "bit rate, preamble, header, acknowledgement and mtu of the others";
                 return refuse("radios", format!("another radio at {node}"), expected);

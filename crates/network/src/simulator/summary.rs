@@ -11,19 +11,20 @@ use std::fmt;
 pub struct Summary {
     /// Simulated time.
     pub time: Seconds,
-    /// Messages, each with all its repetitions.
+    /// Number of messages; repetitions do not count.
     pub messages: u64,
     /// Payload bits.
     pub payload: Bits,
-    /// Bits on air with everything.
+    /// Bits on air, with preambles, headers, acknowledgements and repetitions.
     pub air: Bits,
     /// Energy of all nodes, idle energy included.
     pub energy: Joules,
-    /// The node whose batteries end first, and when: when it died, or at the mean power of the run. `None` if no node has batteries.
+    /// The node whose battery is empty first, and when: the time of its death, or the extrapolation with the mean power of the run. `None`
+    /// if no node has a battery.
     pub lifetime: Option<(Seconds, SensorId)>,
     /// Numbers of faults by kind.
     pub faults: Faults,
-    /// Error of the estimates, if truths were given.
+    /// Error of the estimates; `None` without [`with_errors`](Self::with_errors).
     pub error: Option<EstimateError>,
 }
 
@@ -31,13 +32,13 @@ pub struct Summary {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct EstimateError {
-    /// Slots that have a truth and an estimate.
+    /// Number of slots with a truth and an estimate.
     pub slots: usize,
-    /// Slots that have a truth and no estimate.
+    /// Number of slots with a truth and without estimate.
     pub missing: usize,
-    /// Root mean squared distance of estimate and truth, over the slots that have both.
+    /// Root mean squared distance between estimate and truth, over the slots that have both.
     pub rmse: f64,
-    /// Its standard error; `None` with fewer than four slots.
+    /// Standard error of `rmse`; `None` for fewer than four slots.
     pub standard_error: Option<f64>,
 }
 
@@ -56,9 +57,9 @@ impl Summary {
         }
     }
 
-    /// The same with the error of `estimates`, slot by slot; an empty estimate is a slot that was missed.
+    /// The summary with the error of `estimates`, slot by slot. An empty estimate means that the slot has none.
     ///
-    /// Errors of neighbouring slots are dependent. The standard error is that of `floor(sqrt(n))` means over consecutive slots.
+    /// Errors of successive slots are dependent. The standard error is therefore that of `floor(sqrt(n))` means over consecutive slots.
     ///
     /// # Errors
     /// If a truth and its estimate have different lengths, or no slot has both.

@@ -1,4 +1,4 @@
-//! Puts frames on air: batches, waiting for free air, attempts, acknowledgements, and what each of them costs.
+//! Sending of frames: batches, waiting for the medium, attempts, acknowledgements, and their costs.
 //!
 //! ```text
 //! submit:        frame -> batch -> (full, or its hold time is over) -> dispatch
@@ -7,8 +7,8 @@
 //! arrival:       the receiver's radio answers an intact frame after a turnaround; Acknowledged when the answer is back
 //! AckTimeout:    dispatch again, or give up after the last repetition
 //! ```
-//! The air is divided by an ideal schedule: a transmission begins when the air about the sender and about all nodes that hear it is free. Requests are
-//! served in the order in which they were made. Who waits sleeps.
+//! By the ideal schedule a transmission begins when the medium is free around the sender and around all nodes that hear it. Requests are
+//! served in the order in which they were made. A waiting node sleeps.
 
 use super::attempt::{Attempt, LENGTH_BITS};
 use super::core::{Batch, Outgoing, SimulatorCore, Ticket};
@@ -20,7 +20,7 @@ use fewbits_core::BitString;
 use fewbits_protocol::Frame;
 
 impl SimulatorCore {
-    /// Sends a frame, perhaps later in a batch.
+    /// Sends a frame, possibly later in a batch.
     pub(super) fn submit(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Ticket {
         let batching = self.setup.batching;
         if batching.max_frames <= 1 {
@@ -35,6 +35,7 @@ impl SimulatorCore {
                 .chain([&bits])
                 .map(|f| f.bits() as u64 + LENGTH_BITS)
                 .sum();
+            // A batch that needs a second link frame saves nothing: send the waiting frames first.
             if radio.link_frames(Bits(together)) > 1 {
                 self.send_batch(from, to);
             }
@@ -47,6 +48,7 @@ impl SimulatorCore {
                 ..Batch::default()
             };
             self.state.batches.insert((from, to), batch);
+            // The first frame of a batch starts its timer.
             let at = self.state.now.after(batching.hold);
             self.schedule(at, from, EventKind::Flush(number));
         }
@@ -59,7 +61,7 @@ impl SimulatorCore {
         ticket
     }
 
-    /// Sends a frame as soon as the air is free, alone.
+    /// Sends a frame as soon as the medium is free, not in a batch.
     pub(super) fn send(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Ticket {
         let bits = on_air(frame, self.check_of(Some(frame.kind)));
         let ticket = self.next_ticket();
@@ -67,7 +69,7 @@ impl SimulatorCore {
         ticket
     }
 
-    /// The hold time of a batch is over. A batch that was sent before has another number than the one that waits now.
+    /// The hold time of a batch is over. If the batch was sent before, the waiting one has another number.
     pub(super) fn flush(&mut self, from: SensorId, number: u32) {
         let mut own = self
             .state
@@ -85,7 +87,7 @@ impl SimulatorCore {
         }
     }
 
-    /// Books the air for frames and sends them when it is free.
+    /// Reserves the medium for frames and sends them when it is free.
     fn dispatch(&mut self, from: SensorId, to: Option<SensorId>, frames: &[BitString], tickets: &[Ticket]) {
         self.drain(from);
         let acknowledged = self.is_acknowledged(to);
@@ -99,6 +101,7 @@ impl SimulatorCore {
             true => self.state.now,
             false => self.book(from, size.air, acknowledged),
         };
+        // The common case of a free medium needs no entry among the outgoing frames.
         if !contends && !acknowledged && start == self.state.now {
             self.attempt(&Attempt {
                 from,
@@ -138,7 +141,7 @@ impl SimulatorCore {
         self.schedule(start, from, EventKind::Transmit(number));
     }
 
-    /// The air is free for an outgoing frame.
+    /// The medium is free for an outgoing frame: makes an attempt.
     pub(super) fn transmit(&mut self, number: u32) {
         let Some(mut outgoing) = self.state.outgoing.remove(&number) else {
             return;
@@ -172,7 +175,7 @@ impl SimulatorCore {
         } else {
             self.state.ledger.faults.lost += 1;
         }
-        // The attempt may have taken the last of the batteries.
+        // The attempt may have emptied the battery.
         if acknowledged && self.is_alive(from) {
             let at = self.ack_deadline(from, size.air);
             self.schedule(at, from, EventKind::AckTimeout(number));
@@ -182,8 +185,8 @@ impl SimulatorCore {
         }
     }
 
-    /// The acknowledgement of an outgoing frame is back. Returns the frames that it acknowledges: none if the sender does not hear it, or if an
-    /// acknowledgement came before.
+    /// An acknowledgement has arrived. Returns the tickets of the frames that it acknowledges: none if the sender cannot receive, or
+    /// they were acknowledged before.
     pub(super) fn acknowledged(&mut self, sender: SensorId, number: u32) -> Vec<Ticket> {
         self.drain(sender);
         if !self.listens(sender) {
@@ -196,7 +199,7 @@ impl SimulatorCore {
             .map_or_else(Vec::new, |frame| frame.tickets)
     }
 
-    /// No acknowledgement came in time: repeats the frame, or returns the frames that are given up.
+    /// No acknowledgement came in time. Repeats the frames, or returns the tickets of those that are given up.
     pub(super) fn ack_timeout(&mut self, number: u32) -> Vec<Ticket> {
         let Some(outgoing) = self.state.outgoing.get(&number) else {
             return Vec::new();
@@ -218,7 +221,7 @@ impl SimulatorCore {
         }
         let air = self.size(from, &outgoing.frames).air;
         let start = self.book(from, air, true);
-        // Who must wait for the air sleeps until then.
+        // A sender that must wait for the medium sleeps until then.
         if start > self.state.now
             && let Some(outgoing) = self.state.outgoing.get_mut(&number)
         {
@@ -234,7 +237,7 @@ impl SimulatorCore {
         let mut copies = Vec::new();
         let sent = u64::from(self.state.ledger.accounts[by.index()].acknowledgements);
         let bits = usize::try_from(radio.acknowledgement.0).unwrap_or(usize::MAX);
-        // The last index tells these streams from those of frames.
+        // The last index separates these streams from those of frames.
         self.receive(by, to, sent, 1, bits, 1, &mut copies);
         let begins = self.state.now.after(radio.turnaround);
         self.occupy(by, begins, radio.acknowledgement, Vec::new());
@@ -291,7 +294,7 @@ impl SimulatorCore {
         number
     }
 
-    /// Takes the air about the sender and all nodes that hear it, from when it is free there. Returns that instant.
+    /// Reserves the medium around the sender and all nodes that hear it, from the time at which it is free. Returns that time.
     fn book(&mut self, from: SensorId, air: Bits, acknowledged: bool) -> Instant {
         let radio = self.setup.radio_of(from);
         let neighbours = self.field.graph().neighbours(from.index());
@@ -310,13 +313,13 @@ impl SimulatorCore {
         start
     }
 
-    /// Until when the sender of a frame that begins now waits for its acknowledgement.
+    /// Time until which the sender of a frame that begins now waits for its acknowledgement.
     fn ack_deadline(&self, from: SensorId, air: Bits) -> Instant {
         let (radio, delay) = (self.setup.radio_of(from), self.setup.channel.delay);
         let end = self.state.now.after(radio.duration(air));
         match self.setup.ack_timeout {
             Some(timeout) => end.after(timeout),
-            // The same roundings as on the way of the acknowledgement, and a nanosecond more: it is in time.
+            // The same roundings as for the acknowledgement's own time, plus a nanosecond: it arrives in time.
             None => {
                 let answered = end
                     .after(delay)
@@ -328,7 +331,7 @@ impl SimulatorCore {
     }
 }
 
-/// Time on air of frames of the given lengths, one after the other, with what every one of them needs besides.
+/// Total time on air of frames of the given lengths, one after the other, with the overheads of each.
 pub(crate) fn air_time(radio: &Radio, bodies: impl IntoIterator<Item = Bits>) -> Seconds {
     bodies.into_iter().map(|body| radio.duration(radio.on_air(body))).sum()
 }

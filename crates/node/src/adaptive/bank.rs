@@ -1,4 +1,4 @@
-//! The bank of models: 24 steady-state filters of the index, weighted by what they predicted.
+//! The bank of models: 24 steady-state filters of the lattice index, weighted by the probabilities that they gave to past indices.
 //!
 //! Models are random walks and velocities that decay by 0.6 and 0.95 a slot, each driven by noise of `2^-6 .. 2^8` steps in
 //! factors of 4. The cell of the index is taken as a measurement with variance `0.15^2 + 1/12` steps^2, so the gains are
@@ -10,10 +10,10 @@
 //! w <- w P(cell) / sum;   (x, v) <- (x, v) + d (g0, g1);   w <- (1 - 0.005) w + 0.005 / 24
 //! ```
 //!
-//! All is in `f32`, which small processors have in hardware: positions are relative to the last index, so nothing is lost by it. Only IEEE
-//! arithmetic, square roots and the power of [`elementary`](crate::elementary) (the same bits on every machine) are used, sums in a
-//! fixed order: two ends that see the same indices hold the same bits. Models are taken eight at a time, one family, which fills vector
-//! registers where there are any and needs little memory where there are none.
+//! All numbers are `f32`, which small processors support in hardware. Positions are relative to the last index, so the precision suffices.
+//! Only IEEE arithmetic, square roots and the power of [`elementary`](crate::elementary) are used, with sums in a fixed order. Therefore
+//! two ends that see the same indices compute the same bits. The eight models of one family are processed at a time. That fills vector
+//! registers if there are any, and needs little memory otherwise.
 
 use super::family::{DECAYS, FAMILIES, Family, MODELS, SCALES};
 use super::steady::{STEADY, UPDATED};
@@ -22,16 +22,16 @@ use fewbits_numerics::kernels::vectorised;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Share of the weights that is spread evenly after each slot.
+/// Share of the weight that is distributed evenly over all models after each slot.
 const SWITCHING: f32 = 0.005;
-/// Beyond this many doublings the tails are flat.
+/// Distance, in doublings of the odds, beyond which a tail is constant.
 const FARTHEST: f32 = 60.0;
-/// The least evidence, so that a wild value does not decide everything.
+/// Smallest probability of an index under a model, so that an outlier does not decide the weights alone.
 const LEAST: f32 = 1e-15;
-/// Longer gaps between samples count as this many slots.
+/// Largest gap between samples in slots; longer gaps count as this many.
 pub(super) const LONGEST_GAP: u32 = 64;
 
-/// Positions from the last index, velocities and weights of the models, in steps of the lattice.
+/// Positions relative to the last index, velocities and weights of the models. Unit: steps of the lattice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Bank {
@@ -43,18 +43,18 @@ pub struct Bank {
     w: [f32; MODELS],
 }
 
-/// Eight models in place.
+/// One number for each of the eight models of a family.
 type Eight = [f32; SCALES];
 
 impl Bank {
-    /// Zeros, so that memory before the first sample is cleared and not copied from flash.
+    /// The bank before the first sample: all zeros, so that no image of it is needed in flash memory.
     pub(super) const UNSET: Self = Self {
         x: [0.0; MODELS],
         v: [0.0; MODELS],
         w: [0.0; MODELS],
     };
 
-    /// Back to index 0; `believed` has half of the weight, if any does.
+    /// Sets the bank to index 0. The model `believed`, if there is one, gets half of the weight.
     pub(super) fn restart(&mut self, believed: Option<usize>) {
         *self = Self::UNSET;
         let one = believed.filter(|best| *best < MODELS);
@@ -80,19 +80,19 @@ impl Bank {
         best.0
     }
 
-    /// Whether numbers that were stored are those of a bank.
+    /// Whether stored numbers can be those of a bank.
     pub fn is_valid(&self) -> bool {
         let finite = self.x.iter().chain(&self.v).all(|x| x.abs() < 1e30);
         finite && self.w.iter().all(|w| *w > 0.0 && *w < 1.0 + 1e-9)
     }
 
-    /// The time update over `elapsed` slots.
+    /// Predicts `elapsed` slots ahead.
     pub(super) fn predict(&mut self, elapsed: u32) -> Ahead {
         let slots = elapsed.clamp(1, LONGEST_GAP);
         let (x, v) = (self.x.as_chunks_mut::<SCALES>().0, self.v.as_chunks_mut::<SCALES>().0);
         // The first family's velocities are 0.
         for ((x, v), decay) in x.iter_mut().zip(v).zip(&DECAYS).skip(1) {
-            // As wide as what is read next, which else waits until both halves are in memory.
+            // Written in the width in which it is read next: otherwise the read waits until both halves are in memory.
             vectorised(
                 #[inline(always)]
                 || {
@@ -111,8 +111,8 @@ impl Bank {
         Ahead { slots, mean }
     }
 
-    /// The measurement update with the index `step` from the last, from which positions are counted then; returns the probability of its
-    /// cell.
+    /// Updates with the index `step` from the last; positions are then relative to the new index. Returns the probability that the bank
+    /// gave to its cell.
     pub(super) fn update(&mut self, ahead: &Ahead, step: f32) -> f32 {
         let mut total = 0.0;
         let eights = self
@@ -130,6 +130,7 @@ impl Bank {
                 ahead.with_family(family, |shape| update_each(shape, step, [x, v, w], |w| total += w));
             }
         }
+        // Each model keeps a smallest share, so that its weight can grow again.
         let inverse = (1.0 - SWITCHING) / total;
         for w in &mut self.w {
             *w = *w * inverse + SWITCHING / MODELS as f32;
@@ -137,8 +138,8 @@ impl Bank {
         total
     }
 
-    /// The probabilities below `at - 1/2` and above `at + 1/2`, where `at` is so many steps from the last index; each is accurate relative
-    /// to itself.
+    /// The probabilities below `at - 1/2` and above `at + 1/2`; `at` is in steps from the last index. Each has a small relative error, even
+    /// if it is tiny.
     pub(super) fn outside(&self, ahead: &Ahead, at: f32) -> [f32; 2] {
         let mut sums = [0.0; 2];
         let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
@@ -148,8 +149,8 @@ impl Bank {
         sums
     }
 
-    /// The probability below `edge` (above it, if `side` is -1), each model's times `scale` as a whole number: a sum that falls nowhere
-    /// where none of its terms does.
+    /// The probability below `edge` (above it, if `side` is -1). Each model's share is multiplied by `scale` and rounded to an integer
+    /// before the sum, so the sum is monotonic in `edge` if each share is.
     pub(super) fn counted(&self, ahead: &Ahead, edge: f32, side: f32, scale: f32) -> u32 {
         let mut sum = 0_u32;
         let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
@@ -162,8 +163,8 @@ impl Bank {
     }
 }
 
-/// Where there are vector registers, eight models are taken to memory of their own first, so that nothing forbids to take them at once, and
-/// sums are taken apart from what is summed.
+/// With vector registers, eight models are first copied to local memory, so that the compiler can process them at once, and the terms of
+/// sums are computed apart from the sums.
 const VECTORS: bool = cfg!(feature = "std");
 
 /// [`update_each`] of all models.
@@ -184,8 +185,8 @@ fn update_families<'a>(
     );
 }
 
-/// Moves eight models to the index `step` from the last, and multiplies their weights by what they predicted. Gives the weights to `take`,
-/// the first first.
+/// Moves eight models to the index `step` from the last, and multiplies their weights by the probabilities that they gave to it. Passes the
+/// weights to `take` in order.
 #[inline(always)]
 fn update_each(shape: &Family, step: f32, [x, v, w]: [&mut Eight; 3], mut take: impl FnMut(f32)) {
     for m in 0..SCALES {
@@ -199,7 +200,7 @@ fn update_each(shape: &Family, step: f32, [x, v, w]: [&mut Eight; 3], mut take: 
     }
 }
 
-/// Adds the tails of eight models below and above the cell at `at` to sums, the first first.
+/// Adds the tails of eight models, below and above the cell at `at`, to the two sums in order.
 fn add_both_tails([lower, upper]: &mut [f32; 2], shape: &Family, at: f32, x: &Eight, w: &Eight) {
     if !VECTORS {
         for m in 0..SCALES {
@@ -231,7 +232,7 @@ fn both_tails(shape: &Family, m: usize, at: f32, x: &Eight, w: &Eight) -> [f32; 
     [w[m] / (1.0 + low), w[m] * high / (1.0 + high)]
 }
 
-/// Tails of eight models below `edge` (above it, if `side` is -1), each times `scale` as a whole number, added.
+/// Sum of the tails of eight models below `edge` (above it, if `side` is -1), each multiplied by `scale` and rounded to an integer.
 fn counted_tails(sharpness: &Eight, [edge, side, scale]: [f32; 3], x: &Eight, w: &Eight) -> u32 {
     vectorised(
         #[inline(always)]
@@ -247,11 +248,11 @@ fn counted_tails(sharpness: &Eight, [edge, side, scale]: [f32; 3], x: &Eight, w:
     )
 }
 
-/// A slot ahead of the last update.
+/// Predictions of the bank for the next slot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ahead {
     pub(super) slots: u32,
-    /// Mean of the bank.
+    /// Mean of the bank, in steps from the last index.
     pub(super) mean: f32,
 }
 
@@ -273,7 +274,7 @@ impl Ahead {
         }
     }
 
-    /// Apart from the steady state, so that its memory on the stack is taken only where samples are irregular.
+    /// A function of its own, so that its stack memory is used only if samples are irregular.
     #[cold]
     #[inline(never)]
     fn with_computed<T>(&self, family: usize, work: impl FnOnce(&Family) -> T) -> T {

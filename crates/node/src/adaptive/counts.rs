@@ -1,22 +1,22 @@
-//! Adaptive frequencies: of residuals, and of values that return.
+//! Adaptive frequencies of residuals, and of values that occur repeatedly.
 
 use fewbits_numerics::kernels::vectorised;
 
-/// Residuals counted one by one.
+/// Largest size of a residual that has its own count.
 const WINDOW: i64 = 64;
-/// Counts of residuals.
+/// Number of counts of residuals.
 const COUNTS: usize = 2 * WINDOW as usize + 1;
-/// Totals at which all counts are halved, so that the past fades.
+/// Total at which all counts are halved, so that old residuals lose weight.
 const MOST: u32 = 1 << 15;
 /// Weight of the geometric prior: `PRIOR / 2 x 2^-|k|` for residual `k`.
 const PRIOR: f32 = 0.5;
 
-/// Exact powers of one half.
+/// `2^-power`, exactly.
 fn half_to(power: i64) -> f32 {
     f32::from_bits(((127 - power.clamp(0, 100)) as u32) << 23)
 }
 
-/// How often each residual `k != 0` occurred.
+/// How often each residual `k != 0` occurred. Old occurrences lose weight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residuals {
     counts: [u16; COUNTS],
@@ -29,12 +29,12 @@ impl Residuals {
         total: 0,
     };
 
-    /// Counts of the residuals from -64 to 64, and how many residuals there were.
+    /// Counts of the residuals from -64 to 64, and the number of all residuals.
     pub fn to_counts(&self) -> (&[u16], u32) {
         (&self.counts, self.total)
     }
 
-    /// From [`to_counts`](Self::to_counts), if they are.
+    /// The inverse of [`to_counts`](Self::to_counts); `None` if the numbers cannot be its result.
     pub fn from_counts(counts: &[u16], total: u32) -> Option<Self> {
         let sum: u32 = counts.iter().map(|c| u32::from(*c)).sum();
         let counts = counts.try_into().ok()?;
@@ -81,23 +81,24 @@ impl Residuals {
     }
 }
 
-/// Values remembered.
+/// Largest number of remembered indices.
 pub const CAPACITY: usize = 240;
-/// Weight of a reported value; a silent slot counts one.
+/// Weight of a reported index; that of a silent slot has weight one.
 pub const REPORTED: u32 = 10;
 /// Total at which all counts are halved.
 const MOST_SEEN: u32 = 1 << 22;
 
-/// Bits of a count less one: a count is at most `2^22` and one weight more, before it is halved.
+/// Bits of a count minus one: before it is halved, a count is at most `2^22` plus one weight.
 const COUNT_BITS: u32 = 23;
 const COUNT_MASK: u64 = (1 << COUNT_BITS) - 1;
-/// Indices are stored from here up to `-LOWEST - 1`. The two beyond that a sensor can have, and those of a receiver that went astray,
-/// are taken as the nearest, at both ends alike.
+/// Smallest stored index; the largest is `-LOWEST - 1`. A sensor can have two indices beyond, and a receiver after undetected damage
+/// others. Both ends store them as the nearest allowed index.
 const LOWEST: i64 = -(1 << 40);
 
-/// How often each index occurred, for the indices worth remembering, in increasing order.
+/// How often each index occurred, for at most 240 indices, in increasing order.
 ///
-/// An index and its count share a word of 64 bits, the index above: the table takes 1,920 bytes, and is ordered as its words are.
+/// An index and its count share a word of 64 bits, with the index in the higher bits. The table takes 1,920 bytes, and words are in the
+/// order of their indices.
 #[derive(Debug, Clone)]
 pub struct Values {
     entries: [u64; CAPACITY],
@@ -105,14 +106,14 @@ pub struct Values {
     total: u32,
 }
 
-/// What was forgotten does not count.
+/// Only the remembered indices are compared.
 impl PartialEq for Values {
     fn eq(&self, other: &Self) -> bool {
         self.stored() == other.stored()
     }
 }
 
-/// The least entry of an index.
+/// The smallest word with this index.
 fn entry_of(j: i64) -> u64 {
     ((j.clamp(LOWEST, -LOWEST - 1) - LOWEST) as u64) << COUNT_BITS
 }
@@ -134,7 +135,8 @@ impl Values {
         self.stored().iter().map(move |entry| (index(*entry), count_of(*entry)))
     }
 
-    /// From what [`iter`](Self::iter) gives, if it is: at most 240 increasing indices, counts above zero and not too large.
+    /// The inverse of [`iter`](Self::iter). `None` unless there are at most 240 increasing indices with counts above zero and not too
+    /// large.
     pub fn from_counts(counts: impl IntoIterator<Item = (i64, u32)>) -> Option<Self> {
         let mut values = Self::NONE;
         let mut before = None;
@@ -194,7 +196,7 @@ impl Values {
     pub(super) fn add(&mut self, j: i64, weight: u32) {
         let mut at = self.rank(j);
         match self.entries.get_mut(..self.len).and_then(|stored| stored.get_mut(at)) {
-            // It fits: the count is at most the total, which was at most `MOST_SEEN`.
+            // No overflow: the count is at most the total, which was at most `MOST_SEEN`.
             Some(entry) if (*entry ^ entry_of(j)) >> COUNT_BITS == 0 => *entry += u64::from(weight),
             _ => {
                 while self.len >= CAPACITY {
@@ -202,7 +204,7 @@ impl Values {
                     at = self.rank(j);
                 }
                 self.len += 1;
-                // The new entry pushes those behind it on, each to the place of the next.
+                // Insert the new word: every later word moves to the next place.
                 let mut pushed = entry_of(j) + u64::from(weight - 1);
                 for place in self.entries.iter_mut().take(self.len).skip(at) {
                     core::mem::swap(place, &mut pushed);

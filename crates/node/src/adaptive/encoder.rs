@@ -9,25 +9,25 @@ use super::{MODELS, push_number};
 use crate::error::{Error, finite};
 use crate::packet::Packet;
 
-/// Bits that name a model in a refresh.
+/// Bits of a model's number in a refresh.
 pub const MODEL_BITS: u32 = 5;
 const _: () = assert!(MODELS <= 1 << MODEL_BITS);
 
-/// What a sensor sends in one slot.
+/// The report of one slot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
-    /// The whole bits that travel.
+    /// The bits that are sent.
     pub packet: Packet,
-    /// Bits that are written as they are: header, number, far residual.
+    /// Number of bits that are not entropy coded: header, whole number, far residual.
     pub raw_bits: u32,
-    /// Frequency of the coded symbol, of `2^24`; `2^24` if none was coded. The ideal length is `raw_bits + 24 - log2(frequency)` bits.
+    /// Frequency of the coded symbol out of `2^24`; `2^24` if none was coded. The ideal length is `raw_bits + 24 - log2(frequency)` bits.
     pub frequency: u32,
     /// Whether a receiver can start here.
     pub refresh: bool,
 }
 
-/// The sensor's half: samples in, reports or silence out. It holds all its memory itself.
+/// The sensor's half. It takes samples and returns reports or silence. It needs no memory outside itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Encoder {
     config: Config,
@@ -52,10 +52,10 @@ impl Encoder {
         }
     }
 
-    /// An encoder that goes on where another one stopped. `replica` is `None` before the first sample.
+    /// An encoder that continues where another one stopped. `replica` is `None` before the first sample.
     ///
     /// # Errors
-    /// If the replica is none that an encoder with this agreement can have left.
+    /// If an encoder with this configuration cannot have had this replica.
     pub fn restored(
         config: Config,
         replica: Option<Replica>,
@@ -77,22 +77,22 @@ impl Encoder {
         Ok(encoder)
     }
 
-    /// The agreement with the receiver.
+    /// The configuration that the receiver has too.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// What the receiver holds if it lost nothing; `None` before the first sample.
+    /// The state of a receiver that lost nothing; `None` before the first sample.
     pub fn replica(&self) -> Option<&Replica> {
         self.started.then_some(&self.replica)
     }
 
-    /// Slots so far.
+    /// Number of slots so far.
     pub fn slot(&self) -> u64 {
         self.slot
     }
 
-    /// Number of the next packet.
+    /// Counter of the next packet.
     pub fn sequence(&self) -> u32 {
         self.sequence
     }
@@ -102,29 +102,29 @@ impl Encoder {
         self.refresh_requested
     }
 
-    /// What the receiver, if it lost nothing, believes the last sample to be; `None` before the first.
+    /// The reconstruction of the last sample at a receiver that lost nothing; `None` before the first.
     pub fn reconstruction(&self) -> Option<f64> {
         self.replica().map(Replica::value)
     }
 
-    /// Makes the next report a refresh. Without effect unless the configuration is resilient.
+    /// Makes the next report a refresh. No effect unless the configuration is resilient.
     pub fn request_refresh(&mut self) {
         self.refresh_requested = self.config.is_resilient();
     }
 
-    /// A sample one slot after the last; `None` is silence.
+    /// Encodes a sample one slot after the last. `None` is silence.
     ///
     /// # Errors
-    /// If the sample is not finite; the encoder is then as it was.
+    /// If the sample is not finite. The encoder is then unchanged.
     pub fn encode(&mut self, sample: f64) -> Result<Option<Report>, Error> {
         self.encode_after(1, sample)
     }
 
-    /// A sample `elapsed` slots after the last. Both ends know when samples are taken: for irregular time stamps, choose a slot
-    /// no longer than the shortest gap.
+    /// Encodes a sample `elapsed` slots after the last. Both ends must know when samples are taken. For irregular times choose a slot that
+    /// is not longer than the shortest gap.
     ///
     /// # Errors
-    /// If the sample is not finite or `elapsed` is 0; the encoder is then as it was.
+    /// If the sample is not finite or `elapsed` is 0. The encoder is then unchanged.
     pub fn encode_after(&mut self, elapsed: u32, sample: f64) -> Result<Option<Report>, Error> {
         let sample = self.reduced(elapsed, sample)?;
         if !self.started || self.refresh_requested || is_scheduled(&self.config, self.slot) {
@@ -132,6 +132,7 @@ impl Encoder {
         }
         self.slot = self.slot.wrapping_add(1);
         let slot = self.replica.predict(elapsed);
+        // The sample is within the bound of the prediction: silence.
         let Some(content) = Content::of(&self.replica, &slot, sample) else {
             self.replica.silent(&slot);
             return Ok(None);
@@ -151,8 +152,8 @@ impl Encoder {
         }))
     }
 
-    /// A slot whose report the caller writes elsewhere than in a packet: `write` gets what to say, if anything. The first sample starts
-    /// the lattice and is not given to `write`.
+    /// Encodes a slot whose report the caller writes in another form than a packet. `write` receives the content of the report, `None` for
+    /// silence. The first sample starts the lattice and is not passed to `write`.
     ///
     /// # Errors
     /// As [`encode_after`](Self::encode_after).
@@ -188,7 +189,7 @@ impl Encoder {
         Some((replica, slot))
     }
 
-    /// The sample as the receiver wants it.
+    /// The sample, checked and reduced to the circle if there is one.
     fn reduced(&self, elapsed: u32, sample: f64) -> Result<f64, Error> {
         finite("sample", sample)?;
         if elapsed == 0 {
@@ -197,7 +198,7 @@ impl Encoder {
         Ok(Lattice::reduce(&self.config, sample))
     }
 
-    /// Apart on small processors, so that silence does not take its memory on the stack.
+    /// A function of its own on small processors, so that silence does not need its stack memory.
     #[cfg_attr(not(feature = "std"), inline(never))]
     fn refresh(&mut self, sample: f64) -> Report {
         let mut packet = header(&self.config, self.sequence, true);
@@ -226,7 +227,7 @@ impl Encoder {
     }
 }
 
-/// Whether a refresh is due in a slot whatever happened.
+/// Whether a refresh is due in this slot by the schedule.
 pub fn is_scheduled(config: &Config, slot: u64) -> bool {
     config.refresh_every().is_some_and(|every| slot.is_multiple_of(every))
 }
@@ -235,12 +236,12 @@ fn largest_sequence(config: &Config) -> u32 {
     (1 << config.sequence_bits()) - 1
 }
 
-/// The number after `sequence`.
+/// The counter that follows `sequence`.
 pub fn next_sequence(config: &Config, sequence: u32) -> u32 {
     (sequence + 1) & largest_sequence(config)
 }
 
-/// The beginning of a packet: number and flag where packets can be lost, nothing otherwise.
+/// The beginning of a packet: counter and refresh flag if the configuration is resilient, otherwise nothing.
 pub fn header(config: &Config, sequence: u32, refresh: bool) -> Packet {
     let mut packet = Packet::default();
     if config.is_resilient() {

@@ -1,4 +1,4 @@
-//! What follows from the covariances of the bank's models: laws and gains, eight models of one family at once.
+//! Constants that follow from the covariances of the bank's models: predictive laws and gains, for one family of eight models at a time.
 
 use crate::elementary::exp2;
 use crate::math::sqrt_f32;
@@ -11,11 +11,11 @@ pub(super) const DECAYS: [f32; 3] = [0.0, 0.6, 0.95];
 pub(super) const FAMILIES: usize = DECAYS.len();
 /// Models of one family, by increasing scale.
 pub const SCALES: usize = MODELS / FAMILIES;
-/// Standard deviation of the sensing noise, in steps, beyond that of the cell.
+/// Standard deviation of the measurement noise, in steps, in addition to that of the cell.
 const NOISE: f32 = 0.15;
-/// Variance of an index as a measurement.
+/// Variance of an index as a measurement, in steps squared: noise and uniform cell.
 const CELL: f32 = NOISE * NOISE + 1.0 / 12.0;
-/// `pi / sqrt(3) log2 e`: doublings in one standard deviation of the logistic law.
+/// `pi / sqrt(3) log2 e`: doublings of the odds per standard deviation of the logistic law.
 const DOUBLINGS: f32 = 2.6167593;
 
 /// Standard deviation of the driving noise of a scale, in steps of `2 delta`.
@@ -37,12 +37,12 @@ fn propagate([a, b, d]: Covariance, decay: f32, q: f32) -> Covariance {
 /// What follows from the predicted covariances of one family.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Family {
-    /// Doublings of the odds of the predictive law in one step.
+    /// Doublings of the odds of the predictive law per step.
     pub(super) sharpness: [f32; SCALES],
-    /// `C - 1/C` and `C + 1/C`, where `C` are the odds of half a step.
+    /// `C - 1/C` and `C + 1/C`; `C` is the factor of the odds for half a step.
     pub(super) difference: [f32; SCALES],
     pub(super) sum: [f32; SCALES],
-    /// `1/C^2`: what a step does to the odds.
+    /// `1/C^2`, the factor of the odds for one step.
     pub(super) beyond: [f32; SCALES],
     pub(super) gain_x: [f32; SCALES],
     pub(super) gain_v: [f32; SCALES],

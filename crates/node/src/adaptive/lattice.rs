@@ -1,4 +1,4 @@
-//! Where reconstructions lie: a lattice through the first sample.
+//! The lattice of reconstructions through the first sample.
 
 use super::Config;
 use crate::math::{ceil, rem_euclid, round};
@@ -6,12 +6,12 @@ use crate::packet::TENS;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Indices beyond this size are no longer exact sums: such samples travel whole.
+/// Largest size of an index. Beyond it sums are no longer exact, and samples are sent as whole numbers.
 pub(super) const LARGEST: i64 = 1 << 40;
-/// The step is this much shorter than `2 delta`, so that rounding never takes a reconstruction out of its bound.
+/// Share by which the step is shorter than `2 delta`, so that rounding cannot move a reconstruction out of its bound.
 const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
 
-/// Points `anchor + step j` with whole `j`; around the circle there are `cells` of them.
+/// Points `anchor + step j` with integer `j`; on a circle there are `cells` of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Lattice {
@@ -27,7 +27,7 @@ pub struct Lattice {
     decimal: Option<Decimal>,
 }
 
-/// Points that are decimal numbers to the last bit: `(anchor + step j) / ten`.
+/// A lattice whose points are decimal numbers to the last bit: `(anchor + step j) / ten`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 struct Decimal {
@@ -38,7 +38,7 @@ struct Decimal {
 }
 
 impl Decimal {
-    /// The fewest decimals that write both numbers, if fifteen digits do.
+    /// The smallest number of decimals with which both numbers can be written in at most fifteen digits.
     fn find(step: f64, anchor: f64) -> Option<Self> {
         let whole = |x: f64, ten: f64| {
             let digits = round(x * ten);
@@ -68,7 +68,7 @@ impl Lattice {
         decimal: None,
     };
 
-    /// The lattice of an agreement through `anchor`.
+    /// The lattice of a configuration through `anchor`.
     pub fn new(config: &Config, anchor: f64) -> Self {
         let longest = 2.0 * config.delta() * (1.0 - SLACK);
         let decimal = config
@@ -91,7 +91,7 @@ impl Lattice {
         }
     }
 
-    /// The sample as the receiver wants it: on the circle, if there is one.
+    /// The sample, reduced to `[0, period)` if there is a circle.
     pub fn reduce(config: &Config, sample: f64) -> f64 {
         match config.period() {
             None => sample,
@@ -99,12 +99,12 @@ impl Lattice {
         }
     }
 
-    /// Points on the circle.
+    /// Number of points on the circle, if there is one.
     pub fn cells(&self) -> Option<i64> {
         self.circle.map(|(_, cells)| cells)
     }
 
-    /// One name for each point: around the circle, `0..cells`.
+    /// The unique index of a point: `0..cells` on a circle.
     pub fn canonical(&self, j: i64) -> i64 {
         self.cells().map_or(j, |cells| j.checked_rem_euclid(cells).unwrap_or(0))
     }
@@ -115,12 +115,12 @@ impl Lattice {
             Some(decimal) => decimal.value(j),
             None => self.anchor + self.step * self.canonical(j) as f64,
         };
-        // Damaged reports can mean indices that no sample has.
+        // After damage an index may exceed those of samples.
         let value = value.clamp(f64::MIN, f64::MAX);
         self.circle.map_or(value, |(period, _)| wrap(value, period))
     }
 
-    /// A difference of indices, the shortest way around the circle.
+    /// A difference of indices; on a circle the shorter way.
     pub fn shortest(&self, difference: i64) -> i64 {
         self.cells().map_or(difference, |cells| {
             let k = difference.checked_rem_euclid(cells).unwrap_or(0);
@@ -128,7 +128,7 @@ impl Lattice {
         })
     }
 
-    /// The index nearest to a sample (of its names around the circle, the one nearest to `near`); `None` if no point of the
+    /// The index nearest to a sample; on a circle, of its equivalent indices the one nearest to `near`. `None` if no point of the
     /// lattice is within `delta` of it or its index is too large.
     pub fn index(&self, sample: f64, near: i64) -> Option<i64> {
         let offset = (sample - self.anchor) / self.step;
@@ -148,7 +148,7 @@ impl Lattice {
             .map_or(straight, |(period, _)| straight.min((period - straight).abs()))
     }
 
-    /// Whether numbers that were stored are those of a lattice of this agreement.
+    /// Whether stored numbers can be those of a lattice of this configuration.
     pub fn is_valid(&self, config: &Config) -> bool {
         let agreed = self.delta == config.delta() && self.circle.map(|circle| circle.0) == config.period();
         let numbers = [self.anchor, self.step].iter().all(|x| x.is_finite());

@@ -1,11 +1,11 @@
-//! The adaptive encoder: any signal within a guaranteed error, in few bits.
+//! The adaptive encoder: codes a signal within a guaranteed error in few bits, without training.
 //!
 //! Sensor and receiver run the same bank of models and hold the same frequencies of past reports. Silence means that the sample is
-//! within `delta` of what both predict; otherwise the residual is coded under the law that both predict for it. This module has what both
-//! hold ([`Replica`], [`Law`]) and the sensor's half ([`Encoder`]); the receiver's half stands in `fewbits-adaptive`.
+//! within `delta` of the prediction of both. Otherwise the residual is coded under the probability law that both compute. This module has
+//! the shared state ([`Replica`], [`Law`]) and the sensor's half ([`Encoder`]); the receiver's half is in `fewbits-adaptive`.
 //!
-//! Replicas hold integers: reconstructions lie on a lattice through the first sample, and both ends update from the same indices by
-//! arithmetic that is the same on every machine.
+//! The shared state is updated only by integers: reconstructions lie on a lattice through the first sample. Both ends use arithmetic that
+//! gives the same bits on every machine.
 
 mod bank;
 mod config;

@@ -1,4 +1,4 @@
-//! What both ends hold and move alike: the lattice, the bank, the predictors and the frequencies.
+//! The state that sensor and receiver share and update identically: lattice, bank, predictors and frequencies.
 
 use super::Config;
 use super::bank::{Ahead, Bank, LONGEST_GAP};
@@ -7,23 +7,23 @@ use super::lattice::Lattice;
 use super::law::Law;
 use crate::elementary::{greater, lesser, round};
 
-/// Ways to predict the next index: the bank's mean, the last index, the line through the last two.
+/// Number of predictors of the next index: the bank's mean, the last index, the line through the last two.
 pub(super) const PREDICTORS: usize = 3;
-/// Share of the predictors' weights that is spread evenly after each slot.
+/// Share of the predictors' weight that is distributed evenly after each slot.
 const PREDICTOR_SWITCHING: f32 = 0.01;
-/// The least factor of a predictor's weight in one slot, `2^-40`.
+/// Smallest factor of a predictor's weight in one slot, `2^-40`.
 const LEAST_FACTOR: f32 = 1.0 / (1_u64 << 40) as f32;
-/// Coders: the bank, the residuals' frequencies, the values' frequencies.
+/// Number of coders: the bank, the residuals' frequencies, the values' frequencies.
 pub(super) const CODERS: usize = 3;
 const FIRST_CODERS: [f32; CODERS] = [0.4, 0.4, 0.2];
-/// Share of the coders' weights that is spread evenly after each report.
+/// Share of the coders' weight that is distributed evenly after each report.
 const CODER_SWITCHING: f32 = 0.02;
-/// Unwrapped indices of a circular signal are brought back beyond this size.
+/// Indices of a circular signal that exceed this size are reduced by whole turns.
 const TURN: i64 = 1 << 38;
 
-/// Predictions are no larger: far beyond any index, and far from the ends of an `i64`.
+/// Largest size of a prediction: far beyond any index, and far below the limits of an `i64`.
 const FARTHEST: i64 = 1 << 42;
-/// Steps from the last index to the bank's mean are within this: where `f32` still has halves, and rounds to even.
+/// Largest size of the step from the last index to the bank's mean: `f32` still represents halves there and rounds to even.
 const FARTHEST_STEP: f32 = 4e6;
 
 /// The state that sensor and receiver share.
@@ -38,7 +38,7 @@ pub struct Replica {
     pub(super) bank: Bank,
     pub(super) last: i64,
     pub(super) before: i64,
-    /// Slots between them.
+    /// Slots between the last two indices.
     pub(super) gap: u32,
     pub(super) predictors: [f32; PREDICTORS],
     pub(super) residuals: [Residuals; PREDICTORS],
@@ -46,25 +46,25 @@ pub struct Replica {
     pub(super) coders: [f32; CODERS],
 }
 
-/// One slot ahead of the last update.
+/// Predictions for the next slot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slot {
     pub(super) ahead: Ahead,
     candidates: [i64; PREDICTORS],
-    /// The predictor that is believed.
+    /// Number of the predictor with the largest weight.
     pub(super) pick: usize,
     pub(super) prediction: i64,
 }
 
 impl Slot {
-    /// The prediction: silence means this index.
+    /// The predicted index, which silence stands for.
     pub fn prediction(&self) -> i64 {
         self.prediction
     }
 }
 
 impl Replica {
-    /// Zeros: memory before the first sample, which [`restart`](Self::restart) makes a replica.
+    /// All zeros: memory before the first sample. [`restart`](Self::restart) makes it a replica.
     pub const UNSET: Self = Self {
         lattice: Lattice::UNSET,
         bank: Bank::UNSET,
@@ -77,14 +77,14 @@ impl Replica {
         coders: [0.0; CODERS],
     };
 
-    /// A replica at index 0 of a lattice; the model `believed` has half of the weight, if there is one.
+    /// A replica at index 0 of a lattice. The model `believed`, if there is one, has half of the weight.
     pub fn new(lattice: Lattice, believed: Option<usize>) -> Self {
         let mut replica = Self::UNSET;
         replica.restart(lattice, believed);
         replica
     }
 
-    /// As if made anew, in the memory that it has.
+    /// As [`new`](Self::new), in the same memory.
     pub fn restart(&mut self, lattice: Lattice, believed: Option<usize>) {
         self.move_to(lattice);
         self.bank.restart(believed);
@@ -98,7 +98,7 @@ impl Replica {
         &self.bank
     }
 
-    /// Takes the bank back to a copy of before: undoes [`predict`](Self::predict).
+    /// Replaces the bank by an earlier copy, which undoes [`predict`](Self::predict).
     pub fn restore_bank(&mut self, saved: Bank) {
         self.bank = saved;
     }
@@ -113,7 +113,7 @@ impl Replica {
         self.lattice.value(self.last)
     }
 
-    /// The time update over `elapsed` slots.
+    /// Predicts `elapsed` slots ahead.
     pub fn predict(&mut self, elapsed: u32) -> Slot {
         let ahead = self.bank.predict(elapsed);
         let step = round(greater(lesser(ahead.mean, FARTHEST_STEP), -FARTHEST_STEP)) as i32;
@@ -138,23 +138,23 @@ impl Replica {
         }
     }
 
-    /// The law of the residual of a report in this slot.
+    /// The probability law of the residual of a report in this slot.
     pub fn law<'a>(&'a self, slot: &'a Slot) -> Law<'a> {
         Law::new(self, slot)
     }
 
-    /// Frequencies of the residuals from the predictor that a slot believes.
+    /// Frequencies of the residuals from the predictor of this slot.
     pub(super) fn residuals(&self, slot: &Slot) -> &Residuals {
         let [first, ..] = &self.residuals;
         self.residuals.get(slot.pick).unwrap_or(first)
     }
 
-    /// Everything that follows from a silent slot.
+    /// Updates with a silent slot.
     pub fn silent(&mut self, slot: &Slot) {
         self.update(slot, slot.prediction, 1.0);
     }
 
-    /// Everything that follows from the index of this slot; `outside` is the bank's probability of a report.
+    /// Updates with the index of this slot. `outside` is the bank's probability of a report.
     pub(super) fn update(&mut self, slot: &Slot, j: i64, outside: f32) {
         let reported = j != slot.prediction;
         let name = self.lattice.canonical(j);
@@ -168,6 +168,7 @@ impl Replica {
             let found = [from_bank, from_residuals, from_values];
             spread(&mut self.coders, found, CODER_SWITCHING);
         }
+        // A predictor that was right keeps its weight; another one's is multiplied by the probability of its error.
         let mut factors = [1.0; PREDICTORS];
         let predictors = slot.candidates.iter().zip(&mut self.residuals);
         for (factor, (candidate, residuals)) in factors.iter_mut().zip(predictors) {
@@ -181,13 +182,14 @@ impl Replica {
         self.values.add(name, if reported { REPORTED } else { 1 });
         (self.before, self.last, self.gap) = (self.last, j, slot.ahead.slots);
         if let (Some(cells), true) = (self.lattice.cells(), j.abs() > TURN) {
+            // Subtract whole turns before the index becomes large.
             let turns = j - j.checked_rem_euclid(cells).unwrap_or(0);
             self.last -= turns;
             self.before -= turns;
         }
     }
 
-    /// A sample that no lattice point represents becomes the origin of a new lattice. What was learned of residuals stays.
+    /// Starts a new lattice at a sample that no point of the old one represents. The frequencies of residuals are kept.
     pub(super) fn move_to(&mut self, lattice: Lattice) {
         self.lattice = lattice;
         let best = self.bank.best();
@@ -196,7 +198,7 @@ impl Replica {
         (self.last, self.before, self.gap) = (0, 0, 1);
     }
 
-    /// Whether numbers that were stored are those of a replica of this agreement.
+    /// Whether stored numbers can be those of a replica of this configuration.
     pub fn is_valid(&self, config: &Config) -> bool {
         let weights = self.predictors.iter().chain(&self.coders);
         let indices = [self.last, self.before].iter().all(|j| j.abs() <= 2 * FARTHEST);
@@ -208,7 +210,7 @@ impl Replica {
     }
 }
 
-/// Bayes' rule, then an even share for every expert, so that none is ever given up.
+/// Bayes' rule, then a share that is distributed evenly, so that no weight becomes zero.
 fn spread<const N: usize>(weights: &mut [f32; N], factors: [f32; N], share: f32) {
     let mut total = 0.0;
     for (weight, factor) in weights.iter_mut().zip(factors) {

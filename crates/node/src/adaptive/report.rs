@@ -1,4 +1,4 @@
-//! From an index to bits.
+//! Encoding of the report of a slot as bits.
 
 use super::Config;
 use super::lattice::{LARGEST, Lattice};
@@ -7,14 +7,14 @@ use super::replica::{Replica, Slot};
 use crate::error::Error;
 use crate::packet::{Packet, push_number};
 
-/// What a slot says: an index, or a number that no index represents.
+/// Content of a report: an index, or a number that no index represents.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Content {
-    /// A residual that the law has a frequency for.
+    /// A residual that has its own frequency.
     Near(i64),
-    /// A residual beyond them.
+    /// A larger residual.
     Far(i64),
-    /// A sample as it is; the lattice moves there.
+    /// The sample as a number; a new lattice starts there.
     Whole(f64),
 }
 
@@ -23,10 +23,10 @@ fn zigzag(k: i64) -> u64 {
 }
 
 impl Content {
-    /// Bits of the length of a far residual.
+    /// Bits of the length field of a far residual.
     pub const LENGTH: u32 = 6;
 
-    /// What to say of a sample; `None` if silence says it.
+    /// The content of the report of a sample; `None` for silence.
     pub fn of(replica: &Replica, slot: &Slot, sample: f64) -> Option<Self> {
         match replica.lattice.index(sample, slot.prediction) {
             None => Some(Self::Whole(sample)),
@@ -38,7 +38,7 @@ impl Content {
         }
     }
 
-    /// Where its symbol lies among the frequencies.
+    /// The interval of its symbol in the cumulative frequencies.
     pub fn place(&self, law: &Law<'_>) -> Place {
         law.place(match self {
             Self::Near(k) => Law::symbol(*k),
@@ -46,8 +46,7 @@ impl Content {
         })
     }
 
-    /// What follows the symbol of the law: of a far residual `0`, the length and the residual in zigzag order, of a sample `1` and the
-    /// number.
+    /// Appends what follows the symbol. Far residual: `0`, the length, and the residual in zigzag order. Sample: `1` and the number.
     pub fn push_rest(&self, packet: &mut Packet) {
         match self {
             Self::Near(_) => {}
@@ -65,10 +64,10 @@ impl Content {
         }
     }
 
-    /// Moves the replica to what was said; `outside` is the bank's probability of a report.
+    /// Updates the replica with the content. `outside` is the bank's probability of a report.
     ///
     /// # Errors
-    /// If no sensor says this; the replica is then as it was.
+    /// If no sensor can have sent this content. The replica is then unchanged.
     pub fn apply(&self, config: &Config, replica: &mut Replica, slot: &Slot, outside: f32) -> Result<(), Error> {
         match self {
             Self::Near(k) | Self::Far(k) => {
@@ -88,7 +87,7 @@ impl Content {
         Ok(())
     }
 
-    /// The word of its symbol: value and length. That of a near residual ends the packet.
+    /// The word of its symbol: value and length. The word of a near residual ends the packet.
     pub fn word(&self, place: &Place) -> (u32, u32) {
         match self {
             Self::Near(_) => place.last_word(),
@@ -97,7 +96,7 @@ impl Content {
     }
 }
 
-/// Appends a report as whole bits; returns the place of its symbol, and how many bits follow it as they are.
+/// Appends a report. Returns the interval of its symbol, and the number of bits that follow the symbol uncoded.
 pub fn push(content: &Content, law: &Law<'_>, packet: &mut Packet) -> (Place, u32) {
     let place = content.place(law);
     let (value, bits) = content.word(&place);

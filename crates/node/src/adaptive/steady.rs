@@ -1,8 +1,8 @@
-//! The steady state of the bank, computed once: `family`'s test iterates the covariances to it.
+//! Constants of the bank in steady state. The test of `family` computes them by iterating the covariances.
 
 use super::family::{Covariance, Family, MODELS};
 
-/// One slot ahead, by families.
+/// Predictive laws and gains one slot ahead, by families.
 #[rustfmt::skip]
 pub(super) static STEADY: [Family; 3] = [
     Family {

@@ -1,17 +1,17 @@
-//! The probability of a cell, without branches.
+//! The probability of an interval ("cell") under the standard normal distribution, without branches.
 //!
-//! A cell is first reflected so that it leans to the left. Then one of three forms holds, none of which cancels:
+//! A cell whose middle is right of zero is first reflected to the left. Then one of three forms is used, none of which cancels:
 //! - narrow cells (`width max(|middle|, 1) < 1`): `width phi(middle) S`, `S` a power series in the half width;
 //! - cells left of zero: `exp(-upper^2/2) [T(|upper|) - T(|lower|) exp((upper^2 - lower^2)/2)]`;
 //! - cells around zero: `1 - Phi(lower) - Phi(-upper)`.
 //!
-//! All three are computed and one is kept: that is what lets the sweep run in vector registers.
+//! All three are computed and one is kept. The loop over a slice then has no branches and runs in vector registers.
 
 use super::elementary::{exp_sum, half_square, ln_corrected, select};
 use super::tail::scaled_tail;
 use crate::constants::INV_SQRT_2PI;
 
-/// Cells narrower than this, in local decay lengths, are summed as a series.
+/// Cells with `width max(|middle|, 1)` below this are summed as a series.
 const NARROW: f64 = 1.0;
 /// Terms of the series after the first; with [`NARROW`] the next is below 1e-17.
 const TERMS: usize = 11;
@@ -69,8 +69,8 @@ fn thin(lower: f64, upper: f64) -> Parts {
     }
 }
 
-/// `WIDE` promises that no cell is narrow: the series is then left out. `ALONE` computes only the form that is kept. The bits are the
-/// same.
+/// `WIDE`: the caller guarantees `b - a >= 1`, and the series for narrow cells is left out. `ALONE`: only the form that is kept is
+/// computed, by branches. Both give the same bits as `<false, false>`.
 #[inline(always)]
 fn parts<const WIDE: bool, const ALONE: bool>(a: f64, b: f64) -> Parts {
     let leans_right = a + b > 0.0;
@@ -112,16 +112,16 @@ fn parts<const WIDE: bool, const ALONE: bool>(a: f64, b: f64) -> Parts {
     }
 }
 
-/// Least width of a cell for the functions `*_wide`, with a margin for rounded edges.
+/// Least width of a cell for the functions `*_wide`: one, and a margin for rounding of the edges.
 pub const WIDE: f64 = 1.0 + 1e-9;
 
-/// `ln(Phi(b) - Phi(a))`: within eight units in the last place for cells given exactly; `-inf` for `a >= b`.
+/// `ln(Phi(b) - Phi(a))`; `-inf` for `a >= b`. Error at most eight units in the last place if `a` and `b` are exact.
 #[inline(always)]
 pub fn log_interval(a: f64, b: f64) -> f64 {
     log_interval_of::<false, false>(a, b)
 }
 
-/// The same result to the bit. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
+/// As [`log_interval`], with the same bits. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
 #[inline(always)]
 pub fn log_interval_wide(a: f64, b: f64) -> f64 {
     log_interval_of::<true, false>(a, b)
@@ -135,13 +135,13 @@ pub(crate) fn log_interval_of<const WIDE: bool, const ALONE: bool>(a: f64, b: f6
     select(a >= b, f64::NEG_INFINITY, value)
 }
 
-/// `Phi(b) - Phi(a)`: within ten units in the last place for cells given exactly; 0 for `a >= b`.
+/// `Phi(b) - Phi(a)`; 0 for `a >= b`. Error at most ten units in the last place if `a` and `b` are exact.
 #[inline(always)]
 pub fn interval(a: f64, b: f64) -> f64 {
     interval_of::<false, false>(a, b)
 }
 
-/// The same result to the bit. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
+/// As [`interval`], with the same bits. Precondition: `b - a` is at least [`WIDE`] before rounding; skips the series for narrow cells.
 #[inline(always)]
 pub fn interval_wide(a: f64, b: f64) -> f64 {
     interval_of::<true, false>(a, b)

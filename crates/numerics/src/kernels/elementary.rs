@@ -8,9 +8,9 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
 /// The rest of `ln 2`.
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-/// Here and below the exponential rounds to zero.
+/// At and below this argument the exponential rounds to zero.
 const LOWEST: f64 = -746.0;
-/// Here and above it overflows.
+/// At and above this argument it overflows.
 const HIGHEST: f64 = 710.0;
 /// The mantissa of one, as a pattern of bits.
 const ONE: u64 = 1.0_f64.to_bits();
@@ -29,13 +29,13 @@ const EXP: [f64; 10] = [
     2.510_526_023_051_927_8e-8,
 ];
 
-/// `yes` or `no`, both computed: a branch here would be copied into what follows and double the work of a sweep.
+/// `yes` or `no`; both were computed. A branch would be duplicated into the code that follows and would double the work of a loop.
 #[inline(always)]
 pub(crate) fn select(condition: bool, yes: f64, no: f64) -> f64 {
     core::hint::select_unpredictable(condition, yes, no)
 }
 
-/// Horner's scheme on four interleaved parts: short chains that run side by side, for a sweep is as slow as its longest chain.
+/// Horner's scheme on four interleaved parts. Four short dependency chains run in parallel, where one long chain would limit the speed.
 #[inline(always)]
 pub(crate) fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
     let square = x * x;
@@ -45,7 +45,7 @@ pub(crate) fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> f64
     let mut part = [at(last), at(last + 1), at(last + 2), at(last + 3)];
     for i in (0..last / 4).rev() {
         for k in 0..4 {
-            // The last group may be short: nothing is multiplied by its zeros.
+            // The last group may be short; the coefficients that it lacks are not multiplied.
             let high = if i == last / 4 - 1 && last + k >= N {
                 0.0
             } else {
@@ -86,7 +86,7 @@ pub fn exp(x: f64) -> f64 {
     exp_sum(x, 0.0)
 }
 
-/// `exp(-t^2/2)`, accurate relative to itself: the square is taken in two parts.
+/// `exp(-t^2/2)` with a small relative error for large `t`: the square is split into two parts.
 #[cfg(feature = "std")]
 #[inline(always)]
 pub(crate) fn exp_minus_half_square(t: f64) -> f64 {
@@ -124,6 +124,7 @@ const LN: [f64; 7] = [
 /// `ln(x) + correction`, where the correction is below the last place of `x` (relative to it).
 #[inline(always)]
 pub(crate) fn ln_corrected(x: f64, correction: f64) -> f64 {
+    // `x = 2^e m` with `m` in `[sqrt(1/2), sqrt(2))`; `ln x = e ln 2 + ln m`, and `ln m` is a series in `s = (m - 1)/(m + 1)`.
     let small = x < f64::MIN_POSITIVE;
     let scaled = select(small, x * TWO_54, x);
     let shifted = scaled.to_bits().wrapping_add(ONE - SQRT_HALF);
@@ -146,12 +147,12 @@ pub fn ln(x: f64) -> f64 {
     ln_corrected(x, 0.0)
 }
 
-/// `ln(1 - y)` for `y` in `[0, 0.65]`, accurate relative to itself; `-0.0` never, `0.0` at zero.
+/// `ln(1 - y)` for `y` in `[0, 0.65]`, with a small relative error near zero; the result at `y = 0` is `0.0`, never `-0.0`.
 #[cfg(feature = "std")]
 #[inline(always)]
 pub(crate) fn ln_one_minus(y: f64) -> f64 {
     let rest = 1.0 - y;
-    // What rounding took away, over `rest`: the reciprocal is needed to a few per cent only where it matters.
+    // Rounding error of `rest`, divided by `rest`. A few per cent accuracy of the reciprocal is enough.
     let lost = (1.0 - rest) - y;
     ln_corrected(rest, lost * (2.0 - rest))
 }

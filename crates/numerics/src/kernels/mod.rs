@@ -1,27 +1,25 @@
-//! Vectorised kernels.
+//! Functions over whole slices in vector registers, and the scalar functions that they apply to each element.
 //!
-//! A particle filter evaluates the same likelihood at ten thousand points, so what counts is the cost per element of a whole
-//! slice. The central choice: **every function exists once, as a scalar function without branches, calls or tables**
-//! ([`scalar`]), and a sweep is a plain loop over it, compiled for each instruction set and dispatched once per slice
-//! ([`vectorised`]). The compiler turns the loop into vector code because nothing in it forbids that; selects take the place
-//! of branches, so both sides of a case distinction are computed and one is kept; single calls of [`normal`](crate::normal) branch
-//! where that saves work. The gain: scalar functions, sweeps of any length and machines of any width give **the same bits**, since
-//! elementwise arithmetic is the same in a vector register, nothing is contracted to fused multiply-adds, and reductions run in
-//! a fixed number of lanes.
+//! A particle filter evaluates the same likelihood at ten thousand points, so the cost per element of a slice matters. Design rule:
+//! **every function exists once, as a scalar function without branches, calls or tables** ([`scalar`]). A sweep is a plain loop over this
+//! function, compiled for each instruction set; the instruction set is chosen once per slice ([`vectorised`]). The compiler can turn
+//! such a loop into vector code. Where a function has several cases, all are computed and one is kept. Single calls of
+//! [`normal`](crate::normal) branch instead where that saves work. Scalar functions, sweeps of any length and machines of any register
+//! width give **the same bits**: elementwise arithmetic does not depend on the width, no multiplication and addition are fused, and
+//! reductions use a fixed number of lanes.
 //!
-//! | kernel | result | bound in units of the last place |
+//! | function | result | largest error in units of the last place |
 //! |---|---|---|
 //! | [`exp`], [`ln`] | in place | 1 (subnormal results 1.5) |
 //! | [`cdf`], [`log_cdf`] | in place | 6 |
 //! | [`interval`], [`log_interval`] | in place of the lower edges | 10, 8 |
-//! | [`sum`], [`dot`], [`largest`], [`largest_number`], [`log_sum_exp`] | a number | as a sum in eight lanes |
-//! | [`StandardNormals`] | independent draws, exact in law | |
+//! | [`sum`], [`dot`], [`largest`], [`largest_number`], [`log_sum_exp`] | a number | that of a sum in eight lanes |
+//! | [`StandardNormals`] | independent draws with exactly the normal distribution | |
 //! | [`exp_minus`] | weights from log weights, with their sum and sum of squares | 1 each |
 //!
-//! The bounds are measured against values with 40 digits, in `tests/it/kernels.rs`: tails, subnormal numbers, infinities and
-//! NaN included.
+//! The errors are measured against values with 40 digits in `tests/it/kernels.rs`, including tails, subnormal numbers, infinities and NaN.
 //!
-//! A factor writes its own sweep the same way:
+//! A likelihood of your own can be written in the same way:
 //!
 //! ```
 //! use fewbits_numerics::kernels::{scalar, vectorised};
@@ -55,8 +53,8 @@ pub use reduce::{
     ExpSums, LANES, dot, exp_minus, folded, largest, largest_number, log_sum_exp, sum, weighted_covariance,
 };
 
-/// The functions of the slices one element at a time: no branches, no calls, always inlined. For loops under [`vectorised`];
-/// elsewhere [`normal`](crate::normal) has the same functions under the same names.
+/// The functions of the slices, for one element: no branches, no calls, always inlined. Use them in loops under [`vectorised`].
+/// For single calls use [`normal`](crate::normal), which has functions of the same names and results.
 pub mod scalar {
     #[cfg(feature = "std")]
     pub use super::cell::{WIDE, interval, interval_wide, log_interval, log_interval_wide};
@@ -67,7 +65,7 @@ pub mod scalar {
     pub use super::tail::{cdf, erfcx, inverse_mills, log_cdf, pdf};
 }
 
-/// Runs `work` compiled for the widest vector instructions of this machine.
+/// Runs `work`, compiled for the widest vector instructions of this machine, and returns its result.
 ///
 /// `work` is a loop over slices that calls [`scalar`] functions; give the closure `#[inline(always)]`. Without the feature `std`
 /// `work` is compiled for the target's own instructions.
@@ -135,12 +133,12 @@ macro_rules! over_cells {
 
 #[cfg(feature = "std")]
 over_cells! {
-    /// `Phi(upper_i) - Phi(lower_i)` over the shorter of the two, written over the lower edges.
+    /// Replaces `lower_i` by `Phi(upper_i) - Phi(lower_i)`, as far as both slices go.
     interval
-    /// The same results to the bit. Precondition: no cell is narrower than [`scalar::WIDE`]; skips the series for narrow cells.
+    /// As [`interval`], to the last bit. Precondition: no cell is narrower than [`scalar::WIDE`]; skips the series for narrow cells.
     interval_wide
-    /// `ln(Phi(upper_i) - Phi(lower_i))` over the shorter of the two, written over the lower edges.
+    /// Replaces `lower_i` by `ln(Phi(upper_i) - Phi(lower_i))`, as far as both slices go.
     log_interval
-    /// The same results to the bit. Precondition: no cell is narrower than [`scalar::WIDE`]; skips the series for narrow cells.
+    /// As [`log_interval`], to the last bit. Precondition: no cell is narrower than [`scalar::WIDE`]; skips the series for narrow cells.
     log_interval_wide
 }

@@ -1,16 +1,16 @@
 //! Blocks of standard normal draws.
 //!
-//! One draw at a time waits for its generator. Here the words of a block come from a counter through a mixing function,
-//! SplitMix64 with a step of its own for each source (Steele, Lea and Flood 2014): no word waits for another, so they are
-//! made in vector registers. The ziggurat (Marsaglia and Tsang 2000, with uniform and layer from disjoint bits) turns them
-//! into draws. The law is exact, tails included, and the draws do not depend on the width of the machine.
+//! A sequential generator must finish one random word before the next. Here the words come from a counter and a mixing function (SplitMix64
+//! with an increment of its own for each source; Steele, Lea and Flood 2014). The words are independent of each other and are
+//! computed in vector registers. The ziggurat method (Marsaglia and Tsang 2000, with uniform number and layer from disjoint bits) turns
+//! them into draws. The distribution is exact, tails included, and the draws do not depend on the machine's register width.
 
 use super::elementary::{exp, ln};
 use super::vectorised;
 use rand::{Rng, RngExt};
 use std::sync::OnceLock;
 
-/// Words made at once.
+/// Random words computed in one pass.
 const BLOCK: usize = 256;
 const LAYERS: usize = 256;
 /// Right edge of the lowest layer, and the area of each (Marsaglia and Tsang 2000, for 256 layers).
@@ -41,7 +41,7 @@ fn ziggurat() -> &'static Ziggurat {
     })
 }
 
-/// A counter, its odd step, and the mixing that makes random words of it.
+/// A counter, its odd increment, and the mixing function that makes random words of the counter.
 #[derive(Debug, Clone)]
 struct Words {
     counter: u64,
@@ -51,7 +51,7 @@ struct Words {
 impl Words {
     fn seeded<R: Rng + ?Sized>(rng: &mut R) -> Self {
         let step = rng.random::<u64>() | 1;
-        // Steps with long runs of equal bits mix badly.
+        // Increments with long runs of equal bits mix badly.
         let even = (step ^ (step >> 1)).count_ones() < 24;
         Self {
             counter: rng.random(),
@@ -59,7 +59,7 @@ impl Words {
         }
     }
 
-    /// Word `i` from here on.
+    /// Word `i`, counted from the current position.
     #[inline(always)]
     fn word(&self, i: u64) -> u64 {
         let z = self.counter.wrapping_add(self.step.wrapping_mul(i + 1));
@@ -97,7 +97,7 @@ impl Words {
         ((self.next() >> 12) as f64 + 0.5) * f64::EPSILON
     }
 
-    /// A draw, given the proposal `x` in `layer` outside the rectangle below the next.
+    /// A draw, given the proposal `x` in `layer` that is outside the rectangle below the next layer.
     #[cold]
     #[inline(never)]
     fn settled(&mut self, table: &Ziggurat, mut layer: usize, mut x: f64) -> f64 {
@@ -118,7 +118,7 @@ impl Words {
         }
     }
 
-    /// A draw beyond the edge (Marsaglia 1964).
+    /// A draw beyond the right edge of the lowest layer (Marsaglia 1964).
     fn tail(&mut self) -> f64 {
         loop {
             let x = -ln(self.uniform()) / EDGE;
@@ -130,7 +130,7 @@ impl Words {
     }
 }
 
-/// A source of standard normal draws in blocks, seeded once from the stream of its logical unit.
+/// A source of standard normal draws in blocks, seeded from a random stream.
 ///
 /// ```
 /// use fewbits_numerics::kernels::StandardNormals;
@@ -154,13 +154,13 @@ impl StandardNormals {
         }
     }
 
-    /// Fills `out` with independent `N(0, 1)` draws, which depend on the seed and on the lengths asked for, nothing else.
+    /// Fills `out` with independent `N(0, 1)` draws. They depend only on the seed and on the lengths of this and earlier calls.
     pub fn fill(&mut self, out: &mut [f64]) {
         let table = ziggurat();
         let mut words = [0_u64; BLOCK];
         for block in out.chunks_mut(BLOCK) {
             self.words.fill(&mut words[..block.len()]);
-            // Vector registers would have to gather from the table; a branch that is taken one time in eighty is cheaper.
+            // Looking up the table in vector registers would need gathers; a branch that is taken one time in eighty is cheaper.
             for (z, word) in block.iter_mut().zip(&words) {
                 let (layer, uniform) = split(*word);
                 let x = uniform * table.x[layer];

@@ -1,6 +1,6 @@
-//! Powers of one half: the exponential of kernel sums, where results too small to matter may be cut off.
+//! Powers of one half, for sums of Gaussian kernels whose far tails do not matter.
 
-/// Exponents of two beyond this count as this: such a kernel is `2^-1020`.
+/// Larger exponents are replaced by this one: the smallest result is `2^-1020`.
 const FARTHEST: f64 = 1020.0;
 /// `2^52 + 2^51`: adding it leaves the nearest integer in the low bits of the mantissa.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
@@ -19,8 +19,8 @@ const EXP2: [f64; 11] = [
     7.072_585_949_269_223e-9,
 ];
 
-/// `2^-s` for `s >= 0`, within three units in the last place down to `2^-1020`, where it stays. A third of the work of a whole
-/// exponential: neither subnormal results nor a second part of the argument.
+/// `2^-s` for `s >= 0`, within three units in the last place. For `s > 1020` the result is `2^-1020`. Takes a third of the work of
+/// an exponential, since results are never subnormal and the argument is not split into two parts.
 #[inline(always)]
 pub fn power_of_half(s: f64) -> f64 {
     let s = if s < FARTHEST { s } else { FARTHEST };

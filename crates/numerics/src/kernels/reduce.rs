@@ -1,21 +1,21 @@
-//! Reductions in eight lanes: faster than one chain of additions, closer to the true sum, and in a fixed order.
+//! Sums and maxima in eight lanes: faster than one chain of additions, closer to the true sum, and in a fixed order.
 
 use super::elementary;
 use super::vectorised;
 
-/// Lanes of every reduction, whatever the machine: the order of additions is part of the result.
+/// Lanes of every reduction on every machine: the order of additions determines the rounding of the result.
 pub const LANES: usize = 8;
 
-/// Elements of a block; a multiple of [`LANES`].
+/// Elements that are processed together; a multiple of [`LANES`].
 const BLOCK: usize = 512;
 
-/// Adds the lanes in a fixed tree.
+/// Sum of the lanes, added in a fixed order.
 #[inline(always)]
 pub fn folded(lane: [f64; LANES]) -> f64 {
     ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]))
 }
 
-/// `sum a_i b_i` over the shorter of the two.
+/// `sum a_i b_i` over the length of the shorter slice.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     vectorised(
         #[inline(always)]
@@ -36,7 +36,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     )
 }
 
-/// `sum w_i (a_i - mean_a) (b_i - mean_b)` over the weights; columns must be at least as long, shorter ones end the sum.
+/// `sum w_i (a_i - mean_a) (b_i - mean_b)` over the length of the shortest of the three slices. Not divided by the sum of weights.
 pub fn weighted_covariance(weights: &[f64], (a, mean_a): (&[f64], f64), (b, mean_b): (&[f64], f64)) -> f64 {
     vectorised(
         #[inline(always)]
@@ -76,7 +76,7 @@ pub fn sum(a: &[f64]) -> f64 {
     )
 }
 
-/// The largest entry; `-inf` of nothing. NaN is passed over.
+/// The largest entry, entries of NaN ignored; `-inf` of an empty slice.
 pub fn largest(a: &[f64]) -> f64 {
     vectorised(
         #[inline(always)]
@@ -96,7 +96,7 @@ pub fn largest(a: &[f64]) -> f64 {
     )
 }
 
-/// The largest entry, `-inf` of nothing; `None` if an entry is NaN. One pass.
+/// The largest entry; `-inf` of an empty slice; `None` if an entry is NaN. One pass.
 pub fn largest_number(a: &[f64]) -> Option<f64> {
     vectorised(
         #[inline(always)]
@@ -119,7 +119,7 @@ pub fn largest_number(a: &[f64]) -> Option<f64> {
     )
 }
 
-/// Sums of a column of exponentials.
+/// Sums of the exponentials `e_i` of [`exp_minus`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExpSums {
     /// `sum e_i`.
@@ -128,15 +128,15 @@ pub struct ExpSums {
     pub sum_of_squares: f64,
 }
 
-/// Writes `e_i = exp(logs[i] - offset)` to `out[i]` over the shorter of the two and returns their sums: weights, their total
-/// and what the effective sample size needs, in one pass.
+/// Writes `e_i = exp(logs[i] - offset)` to `out[i]` over the length of the shorter slice and returns `sum e_i` and `sum e_i^2` (weights,
+/// their total, and the sum that the effective sample size needs) in one pass.
 pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
     vectorised(
         #[inline(always)]
         || {
             let count = logs.len().min(out.len());
             let (mut lane, mut square) = ([0.0; LANES], [0.0; LANES]);
-            // In blocks that stay in the nearest cache: a loop that only exponentiates, then one that only adds.
+            // Blocks that stay in the first-level cache: one loop computes the exponentials, the next one adds them.
             for (out, logs) in out[..count].chunks_mut(BLOCK).zip(logs[..count].chunks(BLOCK)) {
                 for (out, log) in out.iter_mut().zip(logs) {
                     *out = elementary::exp(log - offset);
@@ -161,8 +161,10 @@ pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
     )
 }
 
-/// `ln sum exp(logs[i])` without overflow: `-inf` of nothing or of zeros alone, `+inf` if an entry is, NaN if an entry is NaN.
+/// `ln sum exp(logs[i])` without overflow. `-inf` if the slice is empty or all entries are `-inf`; `+inf` if an entry is `+inf`; NaN if
+/// an entry is NaN.
 pub fn log_sum_exp(logs: &[f64]) -> f64 {
+    // The largest entry is subtracted, so that the largest exponential is 1.
     let offset = largest(logs);
     if !offset.is_finite() {
         return if logs.iter().any(|x| x.is_nan()) {

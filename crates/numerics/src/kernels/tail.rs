@@ -1,4 +1,4 @@
-//! The normal distribution from one scaled tail, without branches.
+//! The normal distribution computed from one scaled tail probability, without branches.
 //!
 //! `T(t) = Phi(-t) exp(t^2/2)` for `t >= 0` falls from one half to zero as `1/(t sqrt(2 pi))`. It never underflows, and `Phi`,
 //! `ln Phi`, `phi/Phi` and `erfcx` are each an exponential or a logarithm away from it.
@@ -7,11 +7,11 @@ use super::elementary::{exp_minus_half_square, exp_sum, half_square, ln_correcte
 use crate::constants::INV_SQRT_2PI;
 use std::f64::consts::SQRT_2;
 
-/// Where the variable `q = (t - 5)/(t + 5)` of the approximation is zero.
+/// The polynomial's variable is `q = (t - 5)/(t + 5)`.
 const CENTRE: f64 = 5.0;
 
-/// `(1 + t) T(t)` as a polynomial in `q`, from its Chebyshev series with 60 digits (relative error 1e-17). The
-/// first is moved by two last places so that the rounded polynomial gives one half at zero.
+/// `(1 + t) T(t)` as a polynomial in `q`, from its Chebyshev series with 60 digits (relative error 1e-17). The first coefficient
+/// is changed by two units in the last place so that the polynomial gives exactly one half at `t = 0`.
 const TAIL: [f64; 24] = [
     0.461_515_829_850_037_86,
     -0.091_552_281_834_009_04,
@@ -61,7 +61,7 @@ pub fn pdf(x: f64) -> f64 {
     INV_SQRT_2PI * exp_minus_half_square(x)
 }
 
-/// Quantities that all functions of one truncation need.
+/// Quantities that `cdf`, `log_cdf` and `inverse_mills` at `x` share.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cut {
     /// `T(|x|)`.
@@ -72,7 +72,7 @@ pub(crate) struct Cut {
     pub outside: f64,
 }
 
-/// One scaled tail and one exponential serve all functions of a cut at `x`.
+/// Computes the shared quantities with one scaled tail and one exponential.
 #[inline(always)]
 pub(crate) fn cut(x: f64) -> Cut {
     let scaled = scaled_tail(x.abs());
@@ -92,7 +92,8 @@ impl Cut {
 
     #[inline(always)]
     pub(crate) fn log_cdf(self, x: f64) -> f64 {
-        // One logarithm for both sides, of what is at least 1/2 on the right and free of the exponential on the left.
+        // One logarithm for both signs of `x`: of a number above 1/2 on the right, and of the scaled tail, without the exponential, on the
+        // left.
         let rest = 1.0 - self.outside;
         let lost = ((1.0 - rest) - self.outside) * (2.0 - rest);
         let right = x > 0.0;
@@ -108,7 +109,7 @@ impl Cut {
     }
 }
 
-/// `Phi(x)`: within six units in the last place, both tails of the logarithm included.
+/// `Phi(x)`: within six units in the last place in both tails.
 #[inline(always)]
 pub fn cdf(x: f64) -> f64 {
     cut(x).cdf(x)

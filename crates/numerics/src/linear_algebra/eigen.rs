@@ -2,9 +2,10 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations: for the two or three dimensions of a
-/// measurement as fast as anything, exact in small eigenvalues, and free of the dimension arithmetic that nalgebra's own
-/// solver would impose on every caller.
+/// Eigenvalues and eigenvectors (columns, in the order of the eigenvalues) of a symmetric matrix, by Jacobi rotations.
+///
+/// Suited to the two or three dimensions of a measurement. Small eigenvalues keep their relative accuracy, and callers need none of the
+/// bounds on dimensions that nalgebra's solver requires.
 pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
     let mut vectors = SMatrix::<f64, M, M>::identity();
     for _sweep in 0..32 {
@@ -16,6 +17,7 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
                 if entry == 0.0 {
                     continue;
                 }
+                // The rotation in the plane (p, q) that makes the entry zero; the smaller of the two possible angles.
                 let half = (a[(q, q)] - a[(p, p)]) / (2.0 * entry);
                 let tangent = half.signum() / (half.abs() + half.hypot(1.0));
                 let cosine = 1.0 / tangent.hypot(1.0);
@@ -30,6 +32,7 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
                 vectors *= turn;
             }
         }
+        // All entries off the diagonal were exactly zero in this sweep.
         if off == 0.0 {
             break;
         }
@@ -37,7 +40,8 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
     (a.diagonal(), vectors)
 }
 
-/// A covariance whose eigenvalues, in coordinates where the given variances are one, are at least one.
+/// Raises the eigenvalues of `covariance` to at least one, in coordinates scaled so that the variances `least` are one. Returns
+/// `covariance` unchanged if all are at least one already, or if an entry of `least` is not positive.
 pub fn raised<const D: usize>(covariance: SMatrix<f64, D, D>, least: &SVector<f64, D>) -> SMatrix<f64, D, D> {
     if least.iter().any(|v| *v <= 0.0) {
         return covariance;

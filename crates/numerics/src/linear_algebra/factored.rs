@@ -20,7 +20,7 @@ pub struct Factored<const D: usize> {
 }
 
 impl<const D: usize> Factored<D> {
-    /// Factors a covariance. Its diagonal is scaled to one first, so that rows of very different units are judged alike.
+    /// Factors a covariance. Its diagonal is scaled to one first, so that the test of definiteness does not depend on units.
     ///
     /// # Errors
     /// If an entry is not finite, the matrix is not symmetric (by the deviations of row and column), or it is not positive definite:
@@ -72,7 +72,7 @@ impl<const D: usize> Factored<D> {
         Some(Self::from_lower(lower))
     }
 
-    /// From a lower triangular factor with a positive diagonal.
+    /// The factored covariance `L L'` from a lower triangular `L` with a positive diagonal.
     pub fn from_lower(lower: SMatrix<f64, D, D>) -> Self {
         let mut whitener = SMatrix::<f64, D, D>::zeros();
         let mut half_log_det = 0.0;
@@ -108,8 +108,8 @@ impl<const D: usize> Factored<D> {
         total
     }
 
-    /// Writes `offset - (x - mean)' C^-1 (x - mean) / 2` of every point to `out`. `columns` hold one coordinate each. For use under
-    /// [`vectorised`](crate::kernels::vectorised): plain loops over columns.
+    /// Writes `offset - (x - mean)' C^-1 (x - mean) / 2` of every point `x` to `out`. `columns[d][i]` is coordinate `d` of point `i`.
+    /// Call it inside [`vectorised`](crate::kernels::vectorised): it consists of plain loops over columns.
     #[inline(always)]
     pub fn log_forms(&self, mean: &SVector<f64, D>, offset: f64, columns: &[&[f64]; D], out: &mut [f64]) {
         const BLOCK: usize = 256;

@@ -3,18 +3,19 @@
 use crate::error::{self, ArgumentError};
 use nalgebra::{ArrayStorage, Cholesky, Const, SMatrix, SVector};
 
-/// Pivots below this share of the variance of their own coordinate count as zero.
+/// Pivots below this multiple of the variance of their own coordinate count as zero.
 const SEMIDEFINITE_TOLERANCE: f64 = 1e-12;
-/// Asymmetries above this share of the standard deviations of their row and column are refused.
+/// Asymmetries above this multiple of the product of the standard deviations of row and column are refused.
 const SYMMETRY_TOLERANCE: f64 = 1e-9;
 
 /// `(m + m')/2`.
 pub fn symmetrised<const D: usize>(m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    // Halves first, since the largest number has no double; equal entries as they are, since the smallest has no half.
+    // Each entry is halved before adding, since the largest number cannot be doubled. Equal entries are kept, since the smallest cannot be
+    // halved.
     m.zip_map(&m.transpose(), |a, b| if a == b { a } else { 0.5 * a + 0.5 * b })
 }
 
-/// `a b'`. Zeros of `b`, of which the matrices of models are full, cost nothing.
+/// `a b'`. Zeros of `b`, which are frequent in matrices of models, are skipped.
 #[inline(always)]
 pub fn times_transposed<const M: usize, const K: usize, const N: usize>(
     a: &SMatrix<f64, M, K>,
@@ -44,7 +45,7 @@ pub fn congruence<const M: usize, const D: usize>(
     congruence_of(a, &times_transposed(p, a))
 }
 
-/// The same from `half = p a'`.
+/// `a p a'` of a symmetric `p`, symmetric to the last bit, from `half = p a'`.
 #[inline(always)]
 pub fn congruence_of<const M: usize, const D: usize>(
     a: &SMatrix<f64, M, D>,
@@ -59,15 +60,14 @@ pub fn congruence_of<const M: usize, const D: usize>(
     out
 }
 
-/// Whether the entries `(i, j)` and `(j, i)` agree to rounding, relative to the standard deviations of their row and column. The one
-/// rule of symmetry: a tolerance relative to the largest entry would let a coordinate of a large unit hide an asymmetry among
-/// small ones.
+/// Whether the entries `(i, j)` and `(j, i)` agree to rounding, relative to the standard deviations of their row and column. All tests of
+/// symmetry use this function. A tolerance relative to the largest entry would miss an asymmetry among coordinates of small units.
 pub(crate) fn agree(below: f64, above: f64, row: f64, column: f64) -> bool {
     (below / row / column - above / row / column).abs() <= SYMMETRY_TOLERANCE
 }
 
-/// A symmetric positive definite matrix, symmetric to the last bit, with its lower Cholesky factor. Whoever draws with the factor and
-/// weighs with the matrix then uses the same covariance.
+/// A symmetric positive definite matrix, made symmetric to the last bit, with its lower Cholesky factor. Draws with the factor and
+/// densities with the matrix then use the same covariance.
 ///
 /// # Errors
 /// If `m` has an entry that is not finite, is not symmetric (by the deviations of row and column), or is not positive definite.
@@ -93,9 +93,9 @@ pub fn definite_factor<const D: usize>(
 
 /// A square root `S` with `S S' = m` of a symmetric positive **semi**definite matrix, by Cholesky with diagonal pivoting.
 ///
-/// Unlike a plain Cholesky factor it exists for singular matrices (rank-1 process noise, a known start). The matrix is scaled
-/// to a unit diagonal first and every judgement (symmetry, rank, definiteness) is made on that correlation matrix: a
-/// coordinate in metres and one in nanoseconds both survive, and so do `diag(1e8, 1e-5)` and its like.
+/// Unlike a plain Cholesky factor it exists for singular matrices too (process noise of rank one, a state known exactly). The matrix is
+/// scaled to a unit diagonal first, and symmetry, rank and definiteness are tested on this correlation matrix. The result therefore does
+/// not depend on units: `diag(1e8, 1e-5)` keeps full rank.
 ///
 /// # Errors
 /// If `m` has an entry that is not finite, is not symmetric, or is not positive semidefinite: a negative variance, a
@@ -132,7 +132,7 @@ pub fn semidefinite_factor<const D: usize>(
     for column in 0..D {
         let (pivot, variance) = rest.diagonal().argmax();
         if variance <= SEMIDEFINITE_TOLERANCE {
-            // What is left must be zero up to rounding, negative pivots included.
+            // The remainder must be zero up to rounding, negative pivots included.
             if rest.amax() > 10.0 * SEMIDEFINITE_TOLERANCE {
                 return Err(indefinite());
             }
@@ -147,14 +147,14 @@ pub fn semidefinite_factor<const D: usize>(
     Ok(factor)
 }
 
-/// Share of a variance below which a Cholesky pivot is rounding.
+/// Cholesky pivots below this multiple of the variance count as rounding.
 const PIVOT: f64 = 1e-11;
 
-/// Solves `S X = B` for a covariance `S` and columns of `B` in its range, in the sense of the pseudo-inverse where `S` is
-/// singular to rounding. Rows are scaled by their standard deviations first, so that no unit matters.
+/// Solves `S X = B` for a covariance `S` and columns of `B` in its range. Where `S` is singular to rounding, the pseudo-inverse is used.
+/// Rows are scaled by their standard deviations first, so that the result does not depend on units.
 ///
 /// # Errors
-/// If `S` is no covariance, or the solution is not finite: an argument is not, or the quotient overflows.
+/// If `S` is not a covariance, or if the solution is not finite (an argument is not finite, or a quotient overflows).
 pub fn solve_semidefinite<const D: usize, const N: usize>(
     covariance: &SMatrix<f64, D, D>,
     right: &SMatrix<f64, D, N>,
@@ -297,7 +297,7 @@ mod tests {
         assert!(refused(&Matrix3::from_diagonal(&Vector3::new(1.0, -1e-300, 1.0))));
         // A correlation of 1.5 between the small coordinates.
         assert!(refused(&Matrix3::new(1e-8, 1.5e-8, 0.0, 1.5e-8, 1e-8, 0.0, 0.0, 0.0, 1e10)));
-        // What is known exactly varies with nothing.
+        // A coordinate of variance zero has no covariance with any other.
         assert!(refused(&Matrix3::new(0.0, 1e-9, 0.0, 1e-9, 1.0, 0.0, 0.0, 0.0, 1.0)));
         assert!(refused(&Matrix3::from_element(f64::NAN)));
     }

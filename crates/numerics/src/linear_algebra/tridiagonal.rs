@@ -4,7 +4,8 @@ use crate::error::ArgumentError;
 
 /// Solves `below[i-1] x[i-1] + diagonal[i] x[i] + above[i] x[i+1] = right[i]` by elimination with partial pivoting.
 ///
-/// `below` and `above` have one entry fewer than `diagonal` and `right`. Backward stable for every matrix; `O(n)`.
+/// `below` and `above` have one entry fewer than `diagonal` and `right`. The method is backward stable for every matrix and takes `O(n)`
+/// steps.
 ///
 /// # Errors
 /// If lengths do not fit, an entry is not finite, or the matrix is singular in working precision.

@@ -4,7 +4,7 @@ use super::{INV_SQRT_2PI, inverse_mills};
 use crate::kernels::elementary::polynomial;
 use crate::kernels::tail::{cut, scaled_tail};
 
-/// Where the rational approximation in the cut hands over to the one in its inverse square.
+/// Below this cut the rational approximation in the cut is used, above it the one in the inverse square of the cut.
 const SPLIT: f64 = 4.0;
 
 // Rational interpolation of Var[X | X > t] at Chebyshev nodes of t in [0, 4], computed with 80 digits; relative error 2e-17.
@@ -78,22 +78,22 @@ pub fn one_sided_variance(x: f64) -> f64 {
 /// The variance by its formula, for a cut left of the mean.
 #[inline]
 fn variance_with_mean(x: f64, mean: f64) -> f64 {
-    // Where the mean has underflowed, x may be infinite, and their product is 0 all the same.
+    // If the mean has underflowed, x may be infinite; their product is 0 in the limit.
     if mean == 0.0 { 1.0 } else { 1.0 - mean * (mean + x) }
 }
 
-/// Probability and moments of a standard normal variable that exceeds `-x`.
+/// Probability of the event `X > -x` for a standard normal variable `X`, and the moments of `X` given this event.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OneSided {
     /// `ln Phi(x)`, as [`log_cdf`](super::log_cdf) gives it, to rounding.
     pub log_probability: f64,
-    /// Its mean `phi(x)/Phi(x)`, as [`inverse_mills`] gives it.
+    /// Mean of `X` given the event, `phi(x)/Phi(x)`, as [`inverse_mills`] gives it.
     pub mean: f64,
-    /// Its variance, as [`one_sided_variance`] gives it.
+    /// Variance of `X` given the event, as [`one_sided_variance`] gives it.
     pub variance: f64,
 }
 
-/// Probability, mean and variance beyond a cut together, for the price of one scaled tail and at most one exponential.
+/// Probability, mean and variance given `X > -x`. Takes one scaled tail and at most one exponential for all three.
 #[inline]
 pub fn one_sided(x: f64) -> OneSided {
     if x <= 0.0 {

@@ -63,19 +63,19 @@ const FAR_DENOMINATOR: [f64; 8] = [
     1.421_511_758_316_446e-7,
     2.044_263_103_389_939_8e-15,
 ];
-/// Probabilities this close to one half belong to the middle.
+/// Probabilities within this distance of one half use the approximation around the median.
 const MIDDLE: f64 = 0.425;
 
 /// Quantile `Phi^-1(p)` for `p` in `[0, 1]`, relative error below 1e-15 for every `p`, next to one half and subnormal included;
 /// infinite at the ends, NaN outside.
 pub fn quantile(p: f64) -> f64 {
-    // Exact wherever it matters: `p` is then within a factor of two of one half.
+    // The difference is exact where its rounding would matter, since `p` is then within a factor of two of one half.
     let q = p - 0.5;
     if q.abs() <= MIDDLE {
         let r = MIDDLE * MIDDLE - q * q;
         return q * polynomial(&MIDDLE_NUMERATOR, r) / polynomial(&MIDDLE_DENOMINATOR, r);
     }
-    // Above the median p itself limits the accuracy, and 1 - p is exact there.
+    // Above the median the accuracy is limited by that of `p` itself; `1 - p` is computed without error there.
     let tail = if q < 0.0 { p } else { 1.0 - p };
     if tail == 0.0 {
         return f64::INFINITY.copysign(q);

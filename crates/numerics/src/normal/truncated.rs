@@ -1,4 +1,4 @@
-//! A standard normal variable known to lie in a cell.
+//! Moments and draws of a standard normal variable that is known to be in an interval ("cell").
 
 use super::{INV_SQRT_2PI, cdf, log_pdf, quantile};
 use crate::error::ArgumentError;
@@ -8,7 +8,7 @@ use crate::quadrature::gauss_legendre;
 use rand::distr::Open01;
 use rand::{Rng, RngExt};
 
-/// Probability of a cell under `N(0, 1)`, and mean and variance in it.
+/// Probability of a cell under `N(0, 1)`, and mean and variance of the variable given the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TruncatedMoments {
@@ -22,16 +22,16 @@ pub struct TruncatedMoments {
 
 /// The closed form of the variance needs a cell at least this wide ...
 const CLOSED_FORM_WIDTH: f64 = 0.5;
-/// ... whose inner edge is at most this far from zero; else it cancels.
+/// ... whose edge nearest zero is at most this far from zero. Otherwise the closed form cancels.
 const CLOSED_FORM_EDGE: f64 = 5.0;
-/// Decay lengths beyond which the rest of an unbounded cell is below rounding.
+/// Width, in multiples of the distance over which the density falls by `e`, beyond which the rest of an unbounded cell is below rounding.
 const CUT: f64 = 48.0;
 
 /// Moments of `N(0, 1)` restricted to `[lower, upper)`; either end may be infinite.
 ///
 /// With `Z = Phi(b) - Phi(a)`: mean `(phi(a) - phi(b))/Z`, variance `1 + (a phi(a) - b phi(b))/Z - mean^2`. For narrow or
-/// far cells these cancel, and 64 Gauss-Legendre nodes of the density, scaled by its value at the edge nearest zero, replace
-/// them. Relative error of the variance below 1e-12.
+/// far cells these formulas cancel. There the moments are computed by Gauss-Legendre quadrature with at most 64 nodes, with the density
+/// divided by its value at the edge nearest zero. Relative error of the variance below 1e-12.
 ///
 /// # Errors
 /// If `lower < upper` does not hold (NaN included).
@@ -40,7 +40,7 @@ pub fn truncated_moments(lower: f64, upper: f64) -> Result<TruncatedMoments, Arg
     if !ordered || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
         return Err(ArgumentError::new("cell", format!("[{lower}, {upper})"), "lower < upper"));
     }
-    // Only cells that lean to the right are computed, so that mirrored cells have mirrored moments to the last bit.
+    // Cells left of zero are mirrored, so that mirrored cells have mirrored moments to the last bit.
     if lower + upper < 0.0 {
         let mirrored = leaning_right(-upper, -lower);
         Ok(TruncatedMoments {
@@ -68,14 +68,14 @@ fn right_moments(lower: f64, upper: f64) -> TruncatedMoments {
     if upper - lower > CLOSED_FORM_WIDTH && lower <= CLOSED_FORM_EDGE {
         closed_form(lower, upper)
     } else {
-        // A width, not an end: far out `lower + CUT / lower` rounds to `lower`.
+        // The width is limited, not the upper end: for large `lower`, `lower + CUT / lower` rounds to `lower`.
         by_quadrature(lower, (upper - lower).min(CUT / lower.max(1.0)))
     }
 }
 
 fn closed_form(lower: f64, upper: f64) -> TruncatedMoments {
     let (near, far) = (cut(lower), cut(upper));
-    // Everything as multiples of exp(-lower^2 / 2) where that is what the cell's probability falls with.
+    // Densities and `Z` are divided by exp(-lower^2 / 2) if the cell's probability is proportional to it; they do not underflow then.
     let (unit, decay, mass, log_probability) = if lower >= 0.0 {
         let decay = far.decay / near.decay;
         let mass = near.scaled - far.scaled * decay;
@@ -138,16 +138,16 @@ fn by_quadrature(lower: f64, width: f64) -> TruncatedMoments {
     }
 }
 
-/// Beyond this edge inversion gives way to exponential rejection.
+/// If the edge nearest zero is farther out than this, rejection from an exponential proposal is used in place of inversion.
 const REJECTION_EDGE: f64 = 8.0;
 
-/// Draws from `N(0, 1)` restricted to `[lower, upper]`; either end may be infinite. A cell of one point gives that point.
+/// Draws from `N(0, 1)` restricted to `[lower, upper]`; either end may be infinite. If `lower = upper` this number is returned.
 ///
 /// Inverts the distribution function in the tail where it is accurate; beyond eight standard deviations an exponential
 /// proposal at the inner edge is accepted with probability above 0.98 (Robert 1995).
 ///
 /// # Errors
-/// If the cell holds no number: `lower > upper`, an end that is NaN, or both ends the same infinity.
+/// If the cell is empty: `lower > upper`, an end that is NaN, or both ends the same infinity.
 pub fn sample_truncated<R: Rng + ?Sized>(rng: &mut R, lower: f64, upper: f64) -> Result<f64, ArgumentError> {
     let ordered = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
     if !ordered {
@@ -172,7 +172,7 @@ fn sample_left<R: Rng + ?Sized>(rng: &mut R, lower: f64, upper: f64) -> f64 {
     if upper < -REJECTION_EDGE {
         let edge = -upper;
         let width = upper - lower;
-        // Mass of the exponential proposal inside the cell, so that no draw falls outside.
+        // The proposal is restricted to the cell, so that no draw is outside.
         let inside = -(-edge * width).exp_m1();
         loop {
             let t = -(-rng.random::<f64>() * inside).ln_1p() / edge;
@@ -182,7 +182,7 @@ fn sample_left<R: Rng + ?Sized>(rng: &mut R, lower: f64, upper: f64) -> f64 {
         }
     }
     let (from, to) = (cdf(lower), cdf(upper));
-    // An open interval: a uniform number of zero would be minus infinity in an unbounded cell.
+    // The uniform number is from an open interval: zero would give minus infinity in an unbounded cell.
     let u: f64 = rng.sample(Open01);
     quantile(from + u * (to - from)).clamp(lower, upper)
 }

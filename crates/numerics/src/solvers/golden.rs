@@ -3,11 +3,13 @@
 /// `(sqrt(5) - 1) / 2`.
 const RATIO: f64 = 0.618_033_988_749_894_9;
 
-/// The argument at which `f` is largest on `[low, high]`, by golden-section search until the bracket is `tolerance` of its first width, and the value
-/// there. `f` must rise to one peak and fall after it. A maximum at an end of the interval is found too.
+/// The point of `[low, high]` at which `f` is largest, and the value there, by golden-section search.
 ///
-/// One evaluation per step, each of which leaves 0.618 of the bracket. Below the root of the machine's precision (1e-8) differences of
-/// `f` are rounding, so a smaller `tolerance` gains nothing.
+/// The search ends when the bracket is `tolerance` times `high - low`. `f` must increase up to one peak and decrease after it. A maximum
+/// at an end of the interval is found too.
+///
+/// Each step takes one evaluation and leaves 0.618 of the bracket. A `tolerance` below the root of the machine's precision (1e-8) gains
+/// nothing, since differences of `f` are rounding errors there.
 ///
 /// ```
 /// let (x, value) = fewbits_numerics::golden::maximum(|x| -(x - 0.3) * (x - 0.3), 0.0, 1.0, 1e-9);

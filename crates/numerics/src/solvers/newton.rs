@@ -1,16 +1,16 @@
 //! A root by Newton's method inside a bracket.
 
-/// Bisections by the middle of the bracket: Newton's method takes over long before, unless the root is next to zero.
+/// So many bisections take the middle of the bracket. Newton's method converges long before, unless the root is next to zero.
 const MOST_MIDDLES: usize = 60;
-/// Steps after which the last point is returned. Beyond [`MOST_MIDDLES`] bisections halve the number of doubles in the bracket: 64 of
-/// them leave one.
+/// After so many steps the last point is returned. Bisections after the first [`MOST_MIDDLES`] halve the number of doubles in the bracket;
+/// 64 of them leave one double.
 const MOST_STEPS: usize = 200;
 
-/// The root of an increasing function between `lower` and `upper`: Newton's method from `start`, with bisection wherever a step
-/// would leave the shrinking bracket, so that it never fails.
+/// The root of an increasing function between `lower` and `upper`. Newton's method from `start`; a step that would leave the current
+/// bracket is replaced by a bisection, so that the method always converges.
 ///
-/// `f` returns the value and the derivative. The iteration ends when a step is at most `tolerance`. Where `f` does not change its
-/// sign the answer is the nearer end; a value that is NaN counts as too far right.
+/// `f` returns the value and the derivative. The iteration ends when a step is at most `tolerance`. If `f` does not change its
+/// sign, the result is the end of the bracket nearest to a root. A value of NaN is treated as positive (too far right).
 ///
 /// ```
 /// use fewbits_numerics::newton::increasing;
@@ -42,13 +42,13 @@ pub fn increasing(mut f: impl FnMut(f64) -> (f64, f64), lower: f64, upper: f64, 
     x
 }
 
-/// The place of a double among all doubles, zero at zero: neighbours differ by one.
+/// The position of a double in the order of all doubles; that of zero is zero, and neighbours differ by one.
 fn rank(x: f64) -> i64 {
     let bits = (x.to_bits() & (u64::MAX >> 1)) as i64;
     if x.is_sign_negative() { -bits } else { bits }
 }
 
-/// The double of a rank.
+/// The double at a position; inverse of [`rank`].
 fn from_rank(rank: i64) -> f64 {
     let size = f64::from_bits(rank.unsigned_abs());
     if rank < 0 { -size } else { size }
@@ -82,7 +82,7 @@ mod tests {
             assert!((increasing(f, -0.3, 5.0, start, 1e-14) - 3f64.ln()).abs() < 1e-15);
             assert!(calls <= most, "{calls} from {start}");
         }
-        // The tolerance is about the step, and what is asked for loosely is found at once.
+        // The tolerance limits the step, so a large tolerance ends at once.
         let mut calls = 0;
         let loose = increasing(
             |x| {

@@ -3,9 +3,9 @@
 use crate::error::{self, ArgumentError};
 use thiserror::Error;
 
-/// The bracket is never narrowed below this share of its first width: a root at zero has no last place of its own.
+/// The bracket is not narrowed below this multiple of its first width. A root at zero would otherwise need bisection through all exponents.
 const FLOOR: f64 = 1e-30;
-/// Evaluations after which a search gives up. Bisection to [`FLOOR`] takes 100; the method needs at most three times as many.
+/// Evaluations after which the search stops. Bisection to [`FLOOR`] takes 100; this method needs at most three times as many.
 const MOST_EVALUATIONS: usize = 400;
 
 /// Why no root was found.
@@ -20,19 +20,19 @@ pub enum RootError {
         "no sign change: f({lower}) = {at_lower}, f({upper}) = {at_upper}: expected one value on each side of zero"
     )]
     NotBracketed {
-        /// Lower end.
+        /// Lower end of the bracket.
         lower: f64,
-        /// Value there.
+        /// Value at the lower end.
         at_lower: f64,
-        /// Upper end.
+        /// Upper end of the bracket.
         upper: f64,
-        /// Value there.
+        /// Value at the upper end.
         at_upper: f64,
     },
     /// The function is NaN inside the bracket.
     #[error("f({at}) is NaN: expected a number")]
     NotANumber {
-        /// Argument at which it was met.
+        /// Argument at which the value was NaN.
         at: f64,
     },
     /// The bracket did not become small enough.
@@ -40,9 +40,9 @@ pub enum RootError {
     NotConverged {
         /// Lower end of the remaining bracket.
         lower: f64,
-        /// Upper end.
+        /// Upper end of the remaining bracket.
         upper: f64,
-        /// Evaluations spent.
+        /// Number of evaluations of the function.
         evaluations: usize,
     },
 }
@@ -50,8 +50,9 @@ pub enum RootError {
 /// The root of `f` between `lower` and `upper`, where `f` has different signs, by Chandrupatla's method (1997): inverse
 /// quadratic interpolation where three points support it, bisection elsewhere.
 ///
-/// The answer lies within `tolerance` (in the unit of the argument) of a change of sign, or within four units in its last
-/// place, or within 1e-30 of the bracket's width where the root is next to zero; `tolerance = 0.0` asks for the latter. Infinite values of `f` count as signs.
+/// The result is within `tolerance` (in the unit of the argument) of a change of sign, or within four units in its last place, or, if the
+/// root is next to zero, within 1e-30 of the bracket's width. `tolerance = 0.0` asks for the last two. Infinite values of `f` count
+/// as signs.
 ///
 /// ```
 /// use fewbits_numerics::roots::bracketed;
@@ -61,8 +62,8 @@ pub enum RootError {
 /// ```
 ///
 /// # Errors
-/// If `lower < upper` does not hold or an end is not finite, `tolerance` is negative, the signs at the ends are equal, `f` is
-/// NaN somewhere, or (for pathological functions) after 400 evaluations.
+/// If `lower < upper` does not hold, an end is not finite, `tolerance` is negative, the signs at the ends are equal, `f` is NaN at a point
+/// that is evaluated, or the bracket is still too wide after 400 evaluations (only pathological functions).
 pub fn bracketed(mut f: impl FnMut(f64) -> f64, lower: f64, upper: f64, tolerance: f64) -> Result<f64, RootError> {
     error::finite("lower", lower)?;
     error::finite("upper", upper)?;
@@ -95,7 +96,7 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lower: f64, upper: f64, toleranc
             at_upper: at_a,
         });
     }
-    // Halves first: the width of a bracket may exceed the largest number.
+    // Each end is halved before adding: the width of a bracket may exceed the largest number.
     let floor = FLOOR * (0.5 * upper - 0.5 * lower);
     let mut share = 0.5;
     for _ in 2..MOST_EVALUATIONS {
@@ -125,7 +126,7 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lower: f64, upper: f64, toleranc
         share = if interpolates {
             let quadratic = at_a / (at_b - at_a) * at_c / (at_b - at_c)
                 + (c - a) / (b - a) * at_a / (at_c - at_a) * at_b / (at_c - at_b);
-            // Steps shorter than the tolerance would not move the other end.
+            // A step shorter than the tolerance might never cross the root, and the other end of the bracket would stay where it is.
             let shortest = (0.25 * reached / half.abs()).min(0.5);
             if quadratic.is_nan() {
                 0.5

@@ -1,4 +1,4 @@
-//! How fast Gibbs sweeps over the labels of a product forget where they began, exactly.
+//! Exact convergence of Gibbs sweeps over the labels of a product of mixtures.
 
 use crate::Error;
 use crate::product;
@@ -7,21 +7,21 @@ use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
 use nalgebra::DMatrix;
 
-/// The chain of label choices of a product of mixtures under systematic sweeps, as a matrix.
+/// The Markov chain of label choices of a product of mixtures under systematic Gibbs sweeps, as a transition matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelChain {
-    /// From row to column.
+    /// Transition probabilities of one sweep, from row to column.
     transition: DMatrix<f64>,
     start: Vec<f64>,
     target: Vec<f64>,
     means: Vec<Vec<f64>>,
 }
 
-/// Most label choices.
+/// Largest number of label choices.
 const MOST: usize = 1000;
 
 impl LabelChain {
-    /// The chain of the product of `factors`; labels start from the weights.
+    /// The chain of the product of `factors`. The first labels are drawn by the components' weights.
     ///
     /// # Errors
     /// If there is no factor, a weight is zero, or there are more than 1000 choices.
@@ -77,7 +77,7 @@ impl LabelChain {
         })
     }
 
-    /// Law of the labels after `sweeps` sweeps.
+    /// Probabilities of the label choices after `sweeps` sweeps.
     pub fn law(&self, sweeps: usize) -> Vec<f64> {
         let mut law = nalgebra::RowDVector::from_row_slice(&self.start);
         for _ in 0..sweeps {
@@ -86,7 +86,7 @@ impl LabelChain {
         law.iter().copied().collect()
     }
 
-    /// Total variation between the law after `sweeps` sweeps and that of the product.
+    /// Total variation distance between the labels after `sweeps` sweeps and those of the product.
     pub fn total_variation(&self, sweeps: usize) -> f64 {
         0.5 * self
             .law(sweeps)
@@ -96,8 +96,8 @@ impl LabelChain {
             .sum::<f64>()
     }
 
-    /// Mean of a draw after `sweeps` sweeps, minus that of the product, along each axis: the bias of any average of draws,
-    /// however many.
+    /// Mean of a draw after `sweeps` sweeps minus the mean of the product, along each axis. Averaging more draws does not reduce this
+    /// bias.
     pub fn bias(&self, sweeps: usize) -> Vec<f64> {
         let law = self.law(sweeps);
         let axes = self.means.first().map_or(0, Vec::len);
@@ -112,7 +112,7 @@ impl LabelChain {
             .collect()
     }
 
-    /// Second largest modulus of the chain's eigenvalues: the factor by which a sweep forgets in the long run.
+    /// Second largest modulus of the chain's eigenvalues: after many sweeps, each further sweep multiplies the distance by it.
     pub fn second_eigenvalue(&self) -> f64 {
         let mut moduli: Vec<f64> = self.transition.complex_eigenvalues().iter().map(|e| e.norm()).collect();
         moduli.sort_by(f64::total_cmp);
@@ -120,8 +120,8 @@ impl LabelChain {
     }
 }
 
-/// Second moment of the printed ratio weights for components `N(m_j, sigma^2)` of equal weight: with one draw from each component,
-/// and with all draws from the first. Equal weights have 1.
+/// Second moment of the printed ratio weights for components `N(m_j, sigma^2)` of equal weight, if one point is drawn from each
+/// component, and if all points are drawn from the first. Equal weights have second moment 1.
 pub fn ratio_second_moments(means: &[f64], sigma: f64) -> (f64, f64) {
     let n = means.len() as f64;
     let of = |i: f64| {

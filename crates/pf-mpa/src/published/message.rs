@@ -1,4 +1,4 @@
-//! Messages of particle message passing: points under a common kernel.
+//! Messages of particle message passing: weighted points under a common kernel.
 
 use crate::Error;
 use fewbits_core::columns::set_state;
@@ -9,25 +9,25 @@ use nalgebra::{Matrix2, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// How the kernel of a message is chosen: a covariance `lambda C`, `C` the weighted covariance of the points.
+/// How the kernel of a message is chosen. Its covariance is `lambda C`, `C` the weighted covariance of the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KernelRule {
-    /// `lambda = N^(-1/6)`, the printed factor: that of the standard deviation in two dimensions (erratum `mpa-5`).
+    /// `lambda = N^(-1/6)`, as printed: in two dimensions the factor for the standard deviation, not the covariance (erratum `mpa-5`).
     Printed,
     /// `lambda = (4 / ((d + 2) N))^(2/(d + 4))` with the effective sample size.
     Silverman,
-    /// For rings, as narrow as the spacing of their points; the prediction by Silverman's rule.
+    /// Rings: kernels as narrow as the spacing of the points. The prediction: Silverman's rule.
     Narrow,
 }
 
-/// From which bearings a ring message is drawn.
+/// From which bearings the points of a ring message are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ring {
-    /// All around, as printed.
+    /// All bearings, as printed.
     Full,
-    /// Those where the prediction is.
+    /// The bearings towards the predicted position.
     Local,
 }
 
@@ -35,9 +35,9 @@ pub enum Ring {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RingWeight {
-    /// All the same: a uniform bearing makes the plane density proportional to `l(d) / d` (erratum `mpa-3`).
+    /// Equal weights. With a uniform bearing the density over the plane is then proportional to `l(d) / d` (erratum `mpa-3`).
     Uniform,
-    /// The radius, so that the message is the likelihood `l(d)` over the plane.
+    /// Proportional to the radius, so that the message is the likelihood `l(d)` over the plane.
     Jacobian,
     /// The printed ratio `sum_j f(x_i | X_j) / f(x_i | X_i)`.
     PrintedRatio,
@@ -47,9 +47,9 @@ pub enum RingWeight {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DynamicsWeight {
-    /// All the same: one draw from each component is an exact stratified sample (erratum `mpa-4`).
+    /// Equal weights: one draw from each component is an exact stratified sample (erratum `mpa-4`).
     Uniform,
-    /// The printed ratio, evaluated on the position, where the transition has a density (erratum `mpa-16`).
+    /// The printed ratio, evaluated on the position, for which the transition has a density (erratum `mpa-16`).
     PrintedRatio,
 }
 
@@ -57,13 +57,13 @@ pub enum DynamicsWeight {
 #[derive(Debug, Clone)]
 pub(crate) struct KernelMessage<const D: usize> {
     pub(crate) points: [Vec<f64>; D],
-    /// Logarithms of the weights; any offset until [`KernelMessage::finish`], normalised after it.
+    /// Logarithms of the weights, up to a constant before [`KernelMessage::finish`], normalised after it.
     pub(crate) log_weights: Vec<f64>,
     pub(crate) cumulative: Vec<f64>,
     pub(crate) kernel: SMatrix<f64, D, D>,
-    /// `1 / sum w^2`.
+    /// Effective sample size `1 / sum w^2`.
     pub(crate) effective: f64,
-    /// Points in the coordinates that whiten their own kernel plus the rest of the product.
+    /// Points, whitened by the covariance of their kernel plus that of the product of the other messages.
     pub(crate) white: Vec<SVector<f64, D>>,
 }
 
@@ -105,7 +105,7 @@ impl<const D: usize> KernelMessage<D> {
         self.white.resize(count, SVector::zeros());
     }
 
-    /// Moves all points.
+    /// Adds `by` to all points.
     pub(crate) fn shift(&mut self, by: &SVector<f64, D>) {
         for (column, by) in self.points.iter_mut().zip(by.iter()) {
             column.iter_mut().for_each(|x| *x += by);
@@ -121,12 +121,13 @@ impl<const D: usize> KernelMessage<D> {
         self.cumulative[i] - before
     }
 
-    /// Normalises the weights and returns mean and covariance of the points. Weights that underflow altogether count as equal;
-    /// the second number says so.
+    /// Normalises the weights and returns mean and covariance of the points, and the number of fallbacks: 1 if all weights underflowed and
+    /// were replaced by equal ones, else 0.
     pub(crate) fn finish(&mut self) -> (SVector<f64, D>, SMatrix<f64, D, D>, u32) {
         let count = self.len();
         let largest = kernels::largest(&self.log_weights);
         let mut fallbacks = 0;
+        // All weights zero: equal ones replace them, and the fallback is counted.
         if !largest.is_finite() {
             self.log_weights.fill(0.0);
             fallbacks = 1;
@@ -151,7 +152,7 @@ impl<const D: usize> KernelMessage<D> {
         (mean, covariance, fallbacks)
     }
 
-    /// A label by its weight.
+    /// Draws the index of a point with the probability of its weight.
     pub(crate) fn label<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
         let u: f64 = rng.random();
         self.cumulative
@@ -159,7 +160,7 @@ impl<const D: usize> KernelMessage<D> {
             .min(self.cumulative.len().saturating_sub(1))
     }
 
-    /// Systematic draws by weight; equal weights give every point once.
+    /// Systematic draws of indices by weight. Equal weights give every index once.
     pub(crate) fn resample<R: Rng + ?Sized>(&self, rng: &mut R, labels: &mut [usize]) {
         let (offset, count, last) = (rng.random::<f64>(), labels.len() as f64, self.len().saturating_sub(1));
         let mut label = 0;
@@ -175,17 +176,17 @@ impl<const D: usize> KernelMessage<D> {
         SVector::from_fn(|d, _| self.points[d][i])
     }
 
-    /// As a mixture of the densities crate.
+    /// The message as a [`Mixture`].
     pub(crate) fn mixture(&self) -> Result<Mixture<D>, Error> {
         let components = (0..self.len()).map(|i| Component::new(self.weight(i), self.point(i), self.kernel));
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
 }
 
-/// Scales a covariance to a kernel. One without spread in some direction is widened by a millionth of its trace.
+/// `lambda` times a covariance. If it is singular, a millionth of its trace is added first, and the second number is 1.
 ///
 /// # Errors
-/// If the covariance is zero or no number.
+/// If the covariance is zero or not finite.
 pub(crate) fn kernel_of(covariance: &Matrix2<f64>, lambda: f64) -> Result<(Matrix2<f64>, u32), Error> {
     let kernel = covariance * lambda;
     let trace = kernel.trace();
@@ -199,8 +200,8 @@ pub(crate) fn kernel_of(covariance: &Matrix2<f64>, lambda: f64) -> Result<(Matri
     Ok((kernel, 0))
 }
 
-/// Integrated squared error of a kernel estimate of `n` draws from the standard normal density in `d` dimensions, its kernel of
-/// covariance `lambda I`, in expectation; exact.
+/// Exact expected integrated squared error of a kernel estimate from `n` draws of the standard normal density in `d` dimensions. The
+/// kernel has covariance `lambda I`.
 pub fn kernel_error(n: f64, d: u32, lambda: f64) -> f64 {
     let power = |x: f64| x.powf(-0.5 * f64::from(d));
     let sum = power(lambda) / n + (1.0 - 1.0 / n) * power(1.0 + lambda) - 2.0 * power(1.0 + 0.5 * lambda) + 1.0;

@@ -1,4 +1,4 @@
-//! Particle message passing, Algorithm 6 of the thesis, with its errata as settings.
+//! Particle message passing, Algorithm 6 of the thesis. Its errata are settings.
 
 use crate::Error;
 use crate::chain::draw;
@@ -29,27 +29,27 @@ use std::f64::consts::{PI, TAU};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MessagePassing {
-    /// `N`, at least 2.
+    /// Number of particles `N`, at least 2.
     pub particles: usize,
-    /// Bearings of the rings.
+    /// Bearings from which ring messages are drawn.
     pub ring: Ring,
-    /// Weights on the rings.
+    /// Weights of the points on the rings.
     pub ring_weight: RingWeight,
-    /// Weights of the prediction.
+    /// Weights of the predicted points.
     pub dynamics_weight: DynamicsWeight,
-    /// Kernels.
+    /// Kernels of all messages.
     pub kernel: KernelRule,
-    /// The velocity's update.
+    /// How the velocity is updated.
     pub velocity: Velocity,
-    /// How the product is drawn.
+    /// How the product of the messages is drawn.
     pub sampler: ProductSampler,
 }
 
-/// Buffers kept from step to step.
+/// Buffers that are reused from step to step.
 #[derive(Debug, Clone, Default)]
 pub struct MessageWorkspace {
     states: [Vec<f64>; 4],
-    /// Means of the predicted positions, for the printed ratio; ranges and radii of a ring.
+    /// First the means of the predicted positions (for the printed ratio), then ranges and radii of a ring.
     means: [Vec<f64>; 2],
     logs: Vec<f64>,
     messages: Vec<KernelMessage<2>>,
@@ -59,7 +59,7 @@ pub struct MessageWorkspace {
 }
 
 impl MessagePassing {
-    /// As published: full rings, printed ratios, the printed kernel, transferred velocities. Loses the target.
+    /// As published: full rings, printed ratios, the printed kernel, velocities not corrected. It loses the target.
     ///
     /// # Errors
     /// If there are fewer than two particles.
@@ -76,7 +76,7 @@ impl MessagePassing {
         .checked()
     }
 
-    /// With the errata mended: local rings weighed by the radius, equal weights, Silverman's kernel, joint velocities.
+    /// With the errata corrected: local rings weighted by the radius, equal weights, Silverman's kernel, joint velocities.
     ///
     /// # Errors
     /// If there are fewer than two particles.
@@ -100,7 +100,7 @@ impl MessagePassing {
         Ok(self)
     }
 
-    /// The prediction's message; returns its mean, its covariance over all four coordinates and the kernel's `lambda`.
+    /// Forms the prediction's message. Returns its mean, its covariance over all four coordinates, and the kernel's `lambda`.
     fn predict<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -129,6 +129,7 @@ impl MessagePassing {
         let law = target.chain().law(k);
         let values = target.chain().values();
         for i in 0..n {
+            // Position and velocity share one acceleration and one noise per axis.
             for axis in 0..2 {
                 let a = draw(rng, &law, &values);
                 let noise = deviation * rng.sample::<f64, _>(StandardNormal);
@@ -145,6 +146,7 @@ impl MessagePassing {
             .for_each(|(to, from)| to.copy_from_slice(from));
         message.log_weights.fill(0.0);
         let spread = half * half * target.noise_variance();
+        // Without the printed ratio all weights are equal: one draw from each component is an exact stratified sample (erratum `mpa-4`).
         if self.dynamics_weight == DynamicsWeight::PrintedRatio && spread > 0.0 {
             let log_density = |i: usize, j: usize| {
                 let (dx, dy) = (states[0][i] - means[0][j], states[1][i] - means[1][j]);
@@ -162,13 +164,13 @@ impl MessagePassing {
 
     fn lambda(&self, effective: f64) -> f64 {
         match self.kernel {
-            // The printed rule is given the number of particles, whatever their weights.
+            // The printed rule uses the number of particles and ignores their weights.
             KernelRule::Printed => (self.particles as f64).powf(-1.0 / 6.0),
             KernelRule::Silverman | KernelRule::Narrow => effective.powf(-1.0 / 3.0),
         }
     }
 
-    /// The message of one range; false where it says nothing.
+    /// Forms the message of one range. Returns the number of fallbacks; `None` if the range carries no information.
     fn ring<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -190,6 +192,7 @@ impl MessagePassing {
         let (at, noise) = (range.sensing.position(), range.factor.noise());
         let offset = predicted - at;
         let distance = offset.norm();
+        // Bearings all around the sensor, or only the arc that the prediction can reach.
         let (bearing, half) = match self.ring {
             Ring::Full => (0.0, PI),
             Ring::Local => {
@@ -210,6 +213,7 @@ impl MessagePassing {
             message.points[0][i] = at[0] + d * angle.cos();
             message.points[1][i] = at[1] + d * angle.sin();
             message.log_weights[i] = match self.ring_weight {
+                // Uniform bearings give a density over the plane that falls as 1/d; the weight d cancels that.
                 RingWeight::Jacobian => d.abs().max(1e-9 * upper).ln(),
                 RingWeight::Uniform | RingWeight::PrintedRatio => 0.0,
             };
@@ -333,7 +337,7 @@ impl GaussianTracker for MessagePassing {
                 let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
                 velocity += slope * (place - behind) + kernel * z;
             }
-            // Velocities of the draws go where the rings' ranges were.
+            // The buffers of the rings are free now and take the velocities of the draws.
             (means[0][i], means[1][i]) = (velocity[0], velocity[1]);
             sum += Vector4::new(place[0], place[1], velocity[0], velocity[1]);
         }

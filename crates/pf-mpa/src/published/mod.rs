@@ -1,11 +1,11 @@
-//! Particle message passing as published and with its errata mended, to reproduce its tables. [`GridFilter`](crate::GridFilter) is better at a
-//! tenth of the cost.
+//! Particle message passing as published and with its errata corrected, to reproduce the thesis's tables.
+//! [`GridFilter`](crate::GridFilter) has smaller errors at a tenth of the cost.
 //!
 //! | part | item |
 //! |---|---|
 //! | Algorithm 6 | [`MessagePassing`] |
 //! | its messages, their kernels and weights | [`Ring`], [`RingWeight`], [`DynamicsWeight`], [`KernelRule`], [`RingBias`] |
-//! | draws from products of messages | [`ProductSampler`]; how far Gibbs chains of labels are from mixing, [`LabelChain`] |
+//! | draws from products of messages; convergence of Gibbs sweeps over their labels | [`ProductSampler`]; [`LabelChain`] |
 //! | factor graphs, sum-product over finite alphabets | [`graph`] |
 
 pub mod graph;

@@ -1,4 +1,4 @@
-//! How the product of several messages is drawn.
+//! Draws from the product of several messages.
 
 use crate::Error;
 use crate::product;
@@ -20,19 +20,19 @@ use serde::{Deserialize, Serialize};
 pub enum ProductSampler {
     /// Gibbs sweeps over the labels, one chain per draw.
     Gibbs {
-        /// Sweeps.
+        /// Number of sweeps per draw.
         sweeps: usize,
     },
-    /// Draws from the first message, weighed by all others and resampled.
+    /// Draws from the first message, weighted by the densities of all others and resampled.
     MixtureImportance {
-        /// Draws from the first message.
+        /// Number of draws from the first message.
         draws: usize,
     },
-    /// Every choice of labels written out; at most a million.
+    /// Enumeration of all label choices, at most a million.
     Exact,
 }
 
-/// What the sampler keeps from step to step.
+/// Buffers that are reused from step to step.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ProductWorkspace<const D: usize> {
     logs: Vec<f64>,
@@ -43,26 +43,26 @@ pub(crate) struct ProductWorkspace<const D: usize> {
     log_weights: Vec<f64>,
 }
 
-/// What does not change with the labels, of one message.
+/// The quantities of one message that do not depend on the labels.
 #[derive(Debug, Clone)]
 struct Part<const D: usize> {
     /// `S_l^-1`.
     precision: SMatrix<f64, D, D>,
-    /// `(J - S_l^-1)^-1`; zero where the message is alone.
+    /// `(J - S_l^-1)^-1`; zero if there is no other message.
     rest: SMatrix<f64, D, D>,
-    /// Whitens `rest + S_l`.
+    /// Whitens the covariance `rest + S_l`.
     whitener: SMatrix<f64, D, D>,
 }
 
-/// Points drawn from the product of messages, and the label of the first message behind each.
+/// Points drawn from the product of messages, and for each the label of the first message that it came from.
 pub(crate) struct Drawn<'a, const D: usize> {
     pub(crate) points: ColumnsMut<'a, D>,
     pub(crate) labels: &'a mut [usize],
 }
 
 impl ProductSampler {
-    /// `count` draws of the product of mixtures, the components of each with one covariance. Gibbs sweeps reach a total variation of
-    /// 0.006 in five sweeps of moderately overlapping mixtures, but do not mix between well separated modes.
+    /// `count` draws from the product of mixtures. All components of one mixture must have the same covariance. For moderately overlapping
+    /// mixtures five Gibbs sweeps reach a total variation of 0.006; between well separated modes they do not mix.
     ///
     /// # Errors
     /// If there is no factor or no draw, or the covariances of a factor differ.
@@ -86,7 +86,7 @@ impl ProductSampler {
         Particles::uniform(points)
     }
 
-    /// Fills `out` with draws of the product of `messages`, all finished and with kernels.
+    /// Fills `out` with draws from the product of `messages`, which are finished and have their kernels.
     pub(crate) fn draw<const D: usize, R: Rng + ?Sized>(
         self,
         rng: &mut R,
@@ -118,8 +118,8 @@ fn whitener<const D: usize>(m: &SMatrix<f64, D, D>) -> Result<SMatrix<f64, D, D>
     solved.ok_or(Error::Impossible)
 }
 
-/// Gibbs sweeps with what the shared kernels allow: all precisions are the same for every choice of labels, so that a label's
-/// conditional is one sweep over whitened points.
+/// Gibbs sweeps over the labels. Because a message's kernels are equal, all precisions are the same for every choice of labels, and the
+/// conditional probabilities of one label follow from distances between whitened points.
 fn gibbs<const D: usize, R: Rng + ?Sized>(
     rng: &mut R,
     messages: &mut [KernelMessage<D>],
@@ -130,6 +130,7 @@ fn gibbs<const D: usize, R: Rng + ?Sized>(
     let Some(first) = messages.first() else {
         return refuse("messages", 0, "at least one");
     };
+    // Coordinates relative to a point of the first message: products of large coordinates would cancel.
     let origin = first.point(0);
     let ProductWorkspace {
         logs, labels, parts, ..
@@ -153,6 +154,7 @@ fn gibbs<const D: usize, R: Rng + ?Sized>(
         if alone {
             continue;
         }
+        // For the conditional of one label given the others: the product of their kernels is one Gaussian of covariance `rest`.
         part.rest = inverse(&(total - part.precision))?;
         part.whitener = whitener(&(part.rest + message.kernel))?;
         for i in 0..message.len() {
@@ -167,6 +169,7 @@ fn gibbs<const D: usize, R: Rng + ?Sized>(
             labels.push(label);
             shift += part.precision * message.point(label);
         }
+        // Sweeps over the labels, each drawn given all others.
         for _ in 0..if alone { 0 } else { sweeps } {
             for (l, (message, part)) in messages.iter().zip(parts.iter()).enumerate() {
                 shift -= part.precision * message.point(labels[l]);
@@ -186,7 +189,7 @@ fn gibbs<const D: usize, R: Rng + ?Sized>(
     Ok(())
 }
 
-/// A label given the others: `ln w~_i = ln w_i - |white_i - centre|^2 / 2`.
+/// Draws a label given the others: `ln w~_i = ln w_i - |white_i - centre|^2 / 2`.
 #[inline]
 fn conditional<const D: usize, R: Rng + ?Sized>(
     rng: &mut R,
@@ -227,7 +230,7 @@ fn conditional<const D: usize, R: Rng + ?Sized>(
     chosen
 }
 
-/// Systematic draws from the first message, weighed by the densities of the others, resampled.
+/// Systematic draws from the first message, weighted by the densities of the others and resampled.
 fn importance<const D: usize, R: Rng + ?Sized>(
     rng: &mut R,
     messages: &[KernelMessage<D>],
@@ -258,6 +261,7 @@ fn importance<const D: usize, R: Rng + ?Sized>(
         let z = SVector::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
         places[n] = first.point(chosen[n]) + spread * z;
     }
+    // Weights of the draws: the densities of the other messages.
     for message in others {
         let white = whitener(&message.kernel)?;
         logs.resize(message.len(), 0.0);
@@ -273,6 +277,7 @@ fn importance<const D: usize, R: Rng + ?Sized>(
         return Err(Error::Impossible);
     }
     let total: f64 = log_weights.iter().map(|l| (l - largest).exp()).sum();
+    // Systematic resampling of the draws by these weights.
     let (step, mut cumulative, mut n) = (total / out.labels.len() as f64, (log_weights[0] - largest).exp(), 0);
     let offset: f64 = rng.random();
     for k in 0..out.labels.len() {
@@ -294,7 +299,7 @@ fn exact<const D: usize, R: Rng + ?Sized>(
 ) -> Result<(), Error> {
     let mixtures: Vec<Mixture<D>> = messages.iter().map(KernelMessage::mixture).collect::<Result<_, _>>()?;
     let product = product::exact(&mixtures.iter().collect::<Vec<_>>())?.belief;
-    // Labels of the first message vary slowest; those of zero weight are left out.
+    // The first message's labels vary slowest. Labels of weight zero are left out.
     let kept: Vec<usize> = (0..messages[0].len())
         .filter(|i| messages[0].weight(*i) > 0.0)
         .collect();

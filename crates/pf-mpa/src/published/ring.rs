@@ -1,4 +1,4 @@
-//! The message of a range over the plane: what a ring of uniform bearings gets wrong, exactly.
+//! The exact error of drawing a range's message over the plane from a ring of uniform bearings.
 
 use crate::Error;
 use fewbits_numerics::error::refuse;
@@ -6,26 +6,25 @@ use fewbits_numerics::error::{finite, positive};
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// Radial laws of the message of a range in `[a, b)` with noise of constant deviation, `l(d) = P(d + v in [a, b))`, `d > 0`.
+/// Radial densities of the message of a range in `[a, b)` with noise of constant deviation. `l(d) = P(d + v in [a, b))` for `d > 0`.
 ///
-/// As printed, points are drawn with a uniform bearing and a radius of density `l`: over the plane that is `l(d) / d`. The
-/// message is `l(d)` over the plane, a radial density proportional to `d l(d)` (erratum `mpa-3`).
+/// As printed, points are drawn with a uniform bearing and a radius of density `l`; over the plane this is `l(d) / d`. Correct is
+/// `l(d)` over the plane, whose radial density is proportional to `d l(d)` (erratum `mpa-3`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingBias {
     /// Mean radius as printed.
     pub printed: f64,
-    /// Mean radius of the message.
+    /// Correct mean radius.
     pub exact: f64,
-    /// Total variation between the two radial laws.
+    /// Total variation distance between the two radial densities.
     pub total_variation: f64,
 }
 
 impl RingBias {
-    /// The laws for the cell `[a, b)` and noise of the given deviation.
+    /// The bias for the cell `[a, b)` and noise of the given deviation.
     ///
     /// # Errors
-    /// If an end is not finite, `a < b` does not hold, `b` is not above zero or the deviation is not; if a moment leaves the range of
-    /// numbers.
+    /// If an end is not finite, `a < b` does not hold, `b` or the deviation is not positive, or a moment is not finite.
     pub fn new(a: f64, b: f64, deviation: f64) -> Result<Self, Error> {
         finite("a", a)?;
         positive("b", b)?;
@@ -48,7 +47,7 @@ impl RingBias {
         let moment = |power: i32| panels(0.0, &|d: f64| d.powi(power) * likelihood(d));
         let (mass, first, second) = (moment(0), moment(1), moment(2));
         let printed = first / mass;
-        // The exact law is the larger one beyond the printed mean.
+        // Beyond the printed mean the correct density is the larger one.
         let beyond = panels(printed, &|d: f64| likelihood(d) * (d / first - 1.0 / mass));
         if ![printed, second / first, beyond].iter().all(|x| x.is_finite()) {
             return refuse(

@@ -1,14 +1,14 @@
-//! Tracking from ranges that come one at a time, at any time, from any anchor: recordings, and live radios of the kind.
+//! Tracking from single ranges at arbitrary times and from arbitrary anchors, as in recordings and from real radios.
 //!
-//! Real ranges are all too long by a common bias, some are outliers, anchors fall silent, nobody knows the speed, and the first position
-//! has to be found. [`RangeTracker`] does all of it, on a [`FusionCentre`]:
+//! Real ranges have a common bias and outliers, anchors stop sending, and speed and first position are unknown. [`RangeTracker`]
+//! estimates all of these on a [`FusionCentre`]:
 //!
 //! ```text
-//! state        [x, vx, y, vy, bias]; velocities that are forgotten within `persistence`, a bias that hardly moves
-//! acquisition  the first range of each anchor travels in full; three anchors or more give a position by the adaptive grid
-//! tracking     each range travels as the level of its innovation, or in full; with probability `outliers` it says nothing
-//! speed        a bank of filters over speeds, weighed by evidence: also with 1 bit, since each filter predicts the other's bits
-//! lost         the centre's own test, or `silence` seconds without a range: acquisition again
+//! state        [x, vx, y, vy, bias]; a velocity is forgotten within `persistence`, the bias changes slowly
+//! acquisition  the first range of each anchor is sent in full; three anchors or more give a position by the adaptive grid
+//! tracking     each range is sent as the level of its innovation, or in full; with probability `outliers` it is unrelated to the state
+//! speed        a bank of filters over speeds, weighted by evidence; works with 1 bit too
+//! lost         by the centre's own test, or after `silence` seconds without a range: acquisition starts again
 //! ```
 
 mod scheme;
@@ -32,45 +32,45 @@ use rand::Rng;
 use scheme::{Tolerant, stray_level};
 use std::collections::BTreeMap;
 
-/// Coordinates of position and bias in the state.
+/// Indices of x, y and bias in the state.
 const AXES: [usize; 3] = [0, 2, 4];
-/// How often the speed may change, per range: once in a few minutes.
+/// Probability per range that the speed changes: once in a few minutes.
 const SWITCHING: f64 = 0.003;
-/// Losses that are found where there are none, per range. A lost track of one bit shows slowly, in its residuals only, so that the rate is
-/// higher; errors of real ranges are alike for seconds, which a low rate forgives.
+/// Probability of a false alarm of the test for a lost track, per range. With one bit a lost track shows only slowly, so the rate is
+/// higher. With more bits it is low, because errors of successive real ranges are correlated for seconds.
 const ONE_BIT_ALARMS: f64 = 3e-3;
 const ALARMS: f64 = 1e-6;
-/// Bits of a range in full.
+/// Bits of a range that is sent in full.
 const FULL_BITS: usize = 32;
 
-/// How a range travels.
+/// How a range is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Travel {
-    /// In full.
+    /// As a number of 32 bits.
     Full,
-    /// As the level of its innovation, this many bits.
+    /// As the level of its innovation with this many bits, 1 to 8.
     Bits(u32),
 }
 
-/// What is known after a range.
+/// The estimate after one range.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RangeEstimate {
-    /// Position and its covariance.
+    /// Position, in metres.
     pub position: Vector2<f64>,
-    /// See `position`.
+    /// Covariance of the position, in square metres.
     pub covariance: Matrix2<f64>,
-    /// Bias of all ranges.
+    /// Common bias of the ranges, in metres.
     pub bias: f64,
-    /// Deviation of the velocity along an axis, as it was learnt: [`RangeSettings::speed`] times the root of the bank's noise scale, which is the
-    /// geometric mean under the probabilities of its filters.
+    /// Estimated standard deviation of the velocity along an axis: [`RangeSettings::speed`] times the root of the bank's noise scale,
+    /// which is the geometric mean over the bank's filters, weighted by their probabilities.
     pub speed: f64,
-    /// Whether the track was found to be lost with this range; acquisition begins anew.
+    /// Whether this range showed that the track was lost. Acquisition then starts again.
     pub lost: bool,
 }
 
 impl RangeEstimate {
-    /// Squared error of the position in units of its covariance, per coordinate: 1 on average if the covariance is right. `None` if the
+    /// Squared error of the position divided by its covariance, per coordinate. On average 1 if the covariance is right. `None` if the
     /// covariance is singular.
     pub fn normalised_error(&self, truth: &Vector2<f64>) -> Option<f64> {
         let error = self.position - truth;
@@ -80,7 +80,7 @@ impl RangeEstimate {
 
 type Filter = NoiseBank<5, MomentFilter>;
 
-/// An anchor: its number at the centre, how it senses, and its own half.
+/// An anchor: its number at the centre, its sensor model, and its own half of the scheme.
 struct Anchor {
     number: u32,
     sensor: RangeSensor,
@@ -94,9 +94,9 @@ pub struct RangeTracker {
     settings: RangeSettings,
     noise: RangeNoise,
     centre: Option<FusionCentre<5, Filter>>,
-    /// Time of the centre's zero.
+    /// Time, in seconds, that the centre counts as zero.
     origin: f64,
-    /// Ranges in full since acquisition began: the latest of each anchor.
+    /// The latest range in full of each anchor since acquisition began: time, place of the anchor, range.
     collected: BTreeMap<u32, (f64, Vector2<f64>, f64)>,
     bias: (f64, f64),
     last: f64,
@@ -144,20 +144,20 @@ impl RangeTracker {
         })
     }
 
-    /// Bits of all ranges so far.
+    /// Total bits of all ranges so far.
     pub fn bits(&self) -> usize {
         self.bits
     }
 
-    /// How often the track was lost.
+    /// Number of times that the track was lost.
     pub fn losses(&self) -> usize {
         self.losses
     }
 
-    /// Takes in one range in metres at `time` (seconds, not before the last). `None` while the position is being looked for.
+    /// Processes one range in metres at `time` (seconds, not before the last). `None` during acquisition.
     ///
     /// # Errors
-    /// If there is no such anchor, a number is not finite, or the time is before the last range's.
+    /// If there is no such anchor, a number is not finite, or `time` is before the last range's.
     pub fn push(
         &mut self,
         rng: &mut dyn Rng,
@@ -191,7 +191,7 @@ impl RangeTracker {
         let slot = Slot::new(anchor.number, feedback, report.into());
         let lost = match centre.receive(rng, &[slot]) {
             Ok(received) => received.events.contains(&Event::Lost),
-            // Nothing of the belief explains the range, not even as an outlier.
+            // The range has probability zero under the belief, even as an outlier: the track is lost.
             Err(Error::Impossible) => true,
             Err(error) => return Err(error),
         };
@@ -216,11 +216,11 @@ impl RangeTracker {
         }
     }
 
-    /// Looks for the position anew; what is known of the bias stays.
+    /// Starts acquisition again. The estimate of the bias is kept.
     fn forget(&mut self) {
         if let Some(centre) = self.centre.take() {
             let belief = centre.estimate();
-            // A lost track says little about the bias.
+            // The bias of a lost track is uncertain: raise its variance by one square metre.
             let variance = belief.covariance()[(4, 4)] + 1.0;
             if variance.is_finite() && belief.mean()[4].abs() < 3.0 * self.settings.bias {
                 self.bias = (belief.mean()[4], variance.min(self.settings.bias * self.settings.bias));
@@ -229,7 +229,7 @@ impl RangeTracker {
         self.collected.clear();
     }
 
-    /// The belief that the collected ranges leave, by the adaptive grid over the anchors' surroundings.
+    /// Computes the belief from the collected ranges by the adaptive grid, and starts the centre with it if there is one.
     fn acquire(&mut self, rng: &mut dyn Rng, time: f64) -> Result<(), Error> {
         let places = || self.anchors.values().map(|anchor| *anchor.sensor.position());
         let count = self.anchors.len() as f64;
@@ -238,14 +238,14 @@ impl RangeTracker {
         let speed = self.settings.speed;
         let (mut mean, mut variances) = (SVector::<f64, 5>::zeros(), SVector::<f64, 5>::repeat(speed * speed));
         (mean[0], mean[2], mean[4]) = (middle[0], middle[1], self.bias.0);
-        // Targets move among their anchors, and somewhat beyond.
+        // Prior: the target is somewhere among the anchors or a little outside.
         (variances[0], variances[2], variances[4]) = (spread, spread, self.bias.1);
         let prior = Gaussian::from_trusted_parts(mean, SMatrix::from_diagonal(&variances));
-        // Ranges that have no common place within their noise, or only a ridge: once more with a larger one, then wait for others.
+        // If no place fits the ranges within their noise, or the posterior is a thin ridge, try larger noise; then wait for more ranges.
         let (mut found, mut workspace) = (None, GridWorkspace::default());
         for inflation in [1.0, 2.0, 4.0] {
             let ranges = self.collected.values().map(|(then, place, range)| {
-                // Since then the target may have moved on.
+                // The target may have moved since the range was taken.
                 let deviation = inflation * self.settings.noise.hypot(speed * (time - then));
                 let noise = RangeNoise::constant(deviation)?;
                 let factor = RangeFactor::value(*range, noise)?;
@@ -307,7 +307,7 @@ impl RangeTracker {
 
 fn quantizer(bits: u32, noise: RangeNoise) -> Result<QuantizedRange, Error> {
     within("bits", f64::from(bits), 1.0, 8.0)?;
-    // All nodes that hear the reports compute the references themselves: they do not travel.
+    // All nodes that hear the reports compute the references themselves, so they are not sent.
     Ok(QuantizedRange::new(1 << bits, noise)?.with_format(NumberFormat::Double))
 }
 

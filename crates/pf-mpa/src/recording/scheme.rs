@@ -1,4 +1,4 @@
-//! Ranges of which some are outliers.
+//! A scheme for ranges of which some are outliers.
 
 use crate::quantized::RangeReference;
 use fewbits_core::factor::Robust;
@@ -6,7 +6,7 @@ use fewbits_core::{Error, Link, MeasurementNoise, Memoryless, Message, Observati
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix1, Vector1};
 
-/// What a level has on average if its range is stray: such a range seldom falls into an inner cell.
+/// Probability of a level if its range is an outlier, uniform over a width of `stray` metres. It seldom falls into an inner cell.
 pub(super) fn stray_level(levels: usize, stray: f64, reference: &RangeReference, level: &Symbol) -> f64 {
     let inner = (2.0 * reference.half_width / stray).min(1.0) / levels as f64;
     if level.0 == 0 || level.0 + 1 == levels {
@@ -16,13 +16,13 @@ pub(super) fn stray_level(levels: usize, stray: f64, reference: &RangeReference,
     }
 }
 
-/// A range that may have nothing to do with the distance: `(1 - e) p + e c`.
+/// A scheme whose report is an outlier with probability `e`: the likelihood is `(1 - e) p + e c`.
 #[derive(Clone)]
 pub(super) struct Tolerant<C, S> {
     pub scheme: C,
-    /// `e`.
+    /// Probability `e` of an outlier.
     pub outliers: f64,
-    /// `c`: what a report has on average if its range is stray.
+    /// `c`: density or probability of a report that is an outlier.
     pub stray: S,
 }
 
@@ -58,7 +58,7 @@ impl<C: Memoryless<1>, S: Fn(&C::Feedback, &C::Report) -> f64> Memoryless<1> for
         let factor = self.scheme.meaning_of(feedback, observation, link)?;
         let (share, density) = match observation {
             Observation::Received(report) => (self.outliers, (self.stray)(feedback, report)),
-            // A report that did not come is no outlier.
+            // A missing report is no outlier.
             Observation::Nothing | Observation::Lost => (0.0, 0.0),
         };
         Ok(Robust::new(factor, share, density * link.arrival())?)

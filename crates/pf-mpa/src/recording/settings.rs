@@ -1,37 +1,37 @@
-//! What is known of the ranges before the first one.
+//! Settings of the range tracker.
 
 use crate::Error;
 use fewbits_models::ContinuousLinear;
 use fewbits_numerics::error::{positive, within};
 use nalgebra::{SMatrix, SVector};
 
-/// What is known of the ranges before the first one.
+/// What is assumed about ranges and target before the first range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeSettings {
-    /// Deviation of a range's error, in metres. Errors of neighbouring ranges are alike, so take it above their spread.
+    /// Standard deviation of a range's error, in metres. Errors of successive ranges are correlated, so use more than their spread.
     pub noise: f64,
-    /// Share of ranges that have nothing to do with the distance, and the width of where they lie, in metres.
+    /// Share of outliers: ranges that do not depend on the distance.
     pub outliers: f64,
-    /// See `outliers`.
+    /// Width of the interval over which outliers are spread, in metres.
     pub stray: f64,
-    /// Deviation of the velocity along each axis, in metres per second.
+    /// Standard deviation of the velocity along each axis, in metres per second.
     pub speed: f64,
-    /// How well `speed` is known: to this factor, 1 or more. The speed is learnt within it, by a [`NoiseBank`](fewbits_filters::NoiseBank) of
-    /// speeds from `speed / speed_factor` to `speed * speed_factor`, each at most twice the one before. At `v` times `speed` the
-    /// process noise has `v^2` times its covariance, the drift of the bias included.
+    /// Uncertainty of `speed` as a factor, 1 or more. The tracker estimates the speed within it, by a
+    /// [`NoiseBank`](fewbits_filters::NoiseBank) of speeds from `speed / speed_factor` to `speed * speed_factor`, each at most twice
+    /// the one before. At `v` times `speed` the covariance of the process noise, with the drift of the bias, is multiplied by `v^2`.
     pub speed_factor: f64,
-    /// How long a velocity lasts, in seconds.
+    /// Correlation time of the velocity, in seconds.
     pub persistence: f64,
-    /// Deviation of the bias before the first range, in metres, and the growth of its variance, in square metres per second.
+    /// Standard deviation of the bias before the first range, in metres.
     pub bias: f64,
-    /// See `bias`.
+    /// Growth of the variance of the bias, in square metres per second.
     pub drift: f64,
-    /// Seconds without a range after which the position is looked for anew.
+    /// Seconds without a range after which acquisition starts again.
     pub silence: f64,
 }
 
 impl Default for RangeSettings {
-    /// Radios of a metre's error on something that walks or drives slowly.
+    /// For radios with an error of about a metre on a target that walks or drives slowly.
     fn default() -> Self {
         Self {
             noise: 1.8,
@@ -65,8 +65,8 @@ impl RangeSettings {
         Ok(())
     }
 
-    /// Scales of the process noise's covariance in the bank, the squares of those of the speed: steps of at most two in speed, which cost a few
-    /// percent of the error.
+    /// Factors of the process noise's covariance in the bank, the squares of the factors of the speed. Speeds differ by a factor of at most
+    /// two, which raises the error by a few percent.
     pub(super) fn scales(&self) -> Vec<f64> {
         let steps = self.speed_factor.log2().ceil() as i32;
         let step = if steps > 0 {
@@ -77,7 +77,7 @@ impl RangeSettings {
         (-steps..=steps).map(|i| (step * f64::from(i)).exp()).collect()
     }
 
-    /// `[x, vx, y, vy, bias]`.
+    /// Dynamics of the state `[x, vx, y, vy, bias]`.
     pub(super) fn world(&self) -> Result<ContinuousLinear<5>, Error> {
         let (rate, speed) = (1.0 / self.persistence, self.speed);
         let (mut drift, mut density) = (SMatrix::<f64, 5, 5>::zeros(), SMatrix::<f64, 5, 5>::zeros());

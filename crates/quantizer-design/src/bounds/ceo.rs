@@ -1,26 +1,26 @@
-//! The quadratic Gaussian CEO problem.
+//! The quadratic Gaussian CEO problem: a lower bound for separate sensors with limited rates.
 
 use super::{independent_variances, prior_variance};
 use crate::error::{Error, refuse};
 use crate::observation_model::{Noise, Prior};
 use nalgebra::{DMatrix, DVector};
 
-/// Most sensors of a CEO bound: every subset is a constraint.
+/// Largest number of sensors: every subset of sensors is a constraint.
 const CEO_MAX_SENSORS: usize = 12;
 
-/// Least mean squared error of the quadratic Gaussian CEO problem: sensor `n` measures `X + W_n`, the noises
-/// independent, and may spend `bits[n]` a sample.
+/// Least mean squared error of the quadratic Gaussian CEO problem. Sensor `n` measures `X + W_n` with
+/// independent noises and may send `bits[n]` bits per sample.
 ///
-/// `D` is achievable if and only if rates `r_n >= 0` (what each sensor says about its own noise) exist with, for every subset
-/// `A` of sensors (Oohama 2005; Prabhakaran, Tse and Ramchandran 2004),
+/// A distortion `D` is achievable if and only if there are rates `r_n >= 0` (the rate that each sensor spends on its own noise) with, for
+/// every subset `A` of sensors (Oohama 2005; Prabhakaran, Tse and Ramchandran 2004),
 ///
 /// ```text
 /// sum_A R_n >= sum_A r_n + 1/2 ln(1/D) - 1/2 ln( 1/s_x^2 + sum_{not A} (1 - exp(-2 r_n)) / s_n^2 ).
 /// ```
 ///
-/// All subsets are kept: with unequal noise the sum-rate constraint alone gives a wrong value. The largest `ln(1/D)` is a
-/// concave maximin problem in `r`, solved here by a logarithmic barrier; the point reached is feasible, and weak duality bounds
-/// how far from the optimum it can be ([`CeoBound::gap`]).
+/// All subsets are needed: with unequal noise the sum-rate constraint alone gives a wrong value. The largest `ln(1/D)` is a
+/// concave maximin problem in `r`. It is solved by a logarithmic barrier method; the result is feasible, and weak duality bounds
+/// its distance from the optimum ([`CeoBound::gap`]).
 ///
 /// # Errors
 /// If the prior is not Gaussian, the noise is correlated, there is not one rate per sensor, there are more than 12 sensors, or a
@@ -37,7 +37,7 @@ pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error
         let given = format!("{n} noise variances, {} rates", bits.len());
         return refuse("sensors", given, format!("as many of each, 1 to {CEO_MAX_SENSORS}"));
     }
-    // A sensor without a budget says nothing.
+    // A sensor of rate zero does not contribute.
     let reporting: Vec<usize> = (0..n).filter(|i| bits[*i] > 0.0).collect();
     if reporting.is_empty() {
         return Ok(CeoBound {
@@ -46,7 +46,7 @@ pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error
         });
     }
     let problem = Ceo {
-        // In units of the prior variance.
+        // From here on in units of the prior variance.
         precision: reporting.iter().map(|i| prior_variance / noise_variances[*i]).collect(),
         rate: reporting.iter().map(|i| bits[*i] * std::f64::consts::LN_2).collect(),
     };
@@ -69,17 +69,17 @@ pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error
 /// Largest relative gap of a CEO bound that is returned.
 const LARGEST_GAP: f64 = 1e-6;
 
-/// The least distortion of a CEO problem, with a certificate of how well it is known.
+/// The least distortion of a CEO problem, with a bound of its numerical error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CeoBound {
-    /// A distortion that codes can attain.
+    /// A distortion that is achievable.
     pub distortion: f64,
-    /// No codes can attain less than `distortion * exp(-gap)`; proved by weak duality.
+    /// No code achieves less than `distortion * exp(-gap)`, by weak duality.
     pub gap: f64,
 }
 
 impl CeoBound {
-    /// The largest distortion that is proved to be out of reach.
+    /// A distortion below which no code can be: `distortion * exp(-gap)`.
     pub fn lower(&self) -> f64 {
         self.distortion * (-self.gap).exp()
     }
@@ -87,12 +87,12 @@ impl CeoBound {
 
 struct Ceo {
     precision: Vec<f64>,
-    /// Nats.
+    /// Rate of each sensor, in nats.
     rate: Vec<f64>,
 }
 
 impl Ceo {
-    /// `2 sum_A (R - r) + ln(1 + sum_{not A} (1 - exp(-2 r)) precision)`, its gradient, and the curvature of its logarithm.
+    /// `2 sum_A (R - r) + ln(1 + sum_{not A} (1 - exp(-2 r)) precision)`, its gradient, and the curvature of the logarithm in it.
     fn constraint(&self, subset: usize, r: &[f64]) -> (f64, DVector<f64>, DVector<f64>, f64) {
         let n = r.len();
         let (mut linear, mut inside) = (0.0, 1.0);
@@ -118,15 +118,16 @@ impl Ceo {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// The largest `tau` below all constraints for some `r >= 0`, and a proved upper bound on it.
+    /// The largest `tau` that is below all constraints for some `r >= 0`, and a proved upper bound of it.
     fn solve(&self) -> Result<(f64, f64), Error> {
         let n = self.rate.len();
         let mut r: Vec<f64> = self.rate.iter().map(|r| 0.5 * r).collect();
         let mut tau = self.least(&r) - 1.0;
-        // Late on the path the slacks have few digits left, and with them the duals: the best certificate may come before.
+        // Late in the iteration the slacks, and with them the dual variables, lose digits. The best bound may therefore come from an
+        // earlier step.
         let mut above = f64::INFINITY;
-        // One nat of slack a constraint at first; small factors keep every point near the central path, away from which the
-        // curved constraints allow tiny steps only.
+        // Start with one nat of slack per constraint. Small factors keep every point near the central path; elsewhere the
+        // curved constraints allow only tiny steps.
         let mut weight = (1u64 << n) as f64;
         while weight < 4e12 {
             weight *= 2.0;
@@ -137,7 +138,7 @@ impl Ceo {
                     let trial: Vec<f64> = (0..n).map(|i| r[i] + share * step[i]).collect();
                     let trial_tau = tau + share * step[n];
                     let gain = weight * share * step[n] + self.barrier_change(&r, tau, &trial, trial_tau);
-                    // Close to the centre rounding hides the gain, and the full step is safe.
+                    // Close to the centre the gain is below rounding, and the full step is safe.
                     if gain > 0.01 * share * decrement || (decrement < 0.1 && gain > f64::NEG_INFINITY) {
                         (r, tau) = (trial, trial_tau);
                         break;
@@ -156,8 +157,8 @@ impl Ceo {
         Ok((self.least(&r), above))
     }
 
-    /// Weak duality: for any weights of the constraints that sum to one, no `r` has all of them above the largest value of
-    /// their weighted sum, which being concave is below its tangent at `r`. No rate above a sensor's budget is of use.
+    /// Upper bound by weak duality. For any weights of the constraints with sum one, the smallest constraint is at most their weighted sum.
+    /// This sum is concave in `r`, so it is below its tangent at `r`. Rates above a sensor's budget are not useful.
     fn upper(&self, r: &[f64], tau: f64) -> f64 {
         let n = r.len();
         let subsets = || (0..1usize << n).map(|subset| self.constraint(subset, r));
@@ -174,7 +175,7 @@ impl Ceo {
                 .sum::<f64>()
     }
 
-    /// Change of the logarithmic barrier from one point to another, formed from ratios so that nothing cancels.
+    /// Change of the logarithmic barrier between two points, computed from ratios to avoid cancellation.
     fn barrier_change(&self, r: &[f64], tau: f64, trial: &[f64], trial_tau: f64) -> f64 {
         if trial.iter().any(|r| *r <= 0.0) {
             return f64::NEG_INFINITY;
@@ -190,7 +191,7 @@ impl Ceo {
         change
     }
 
-    /// Newton step of the barrier in `(r, tau)`, and its decrement.
+    /// Newton step of the barrier function in `(r, tau)`, and its decrement.
     fn newton_step(&self, r: &[f64], tau: f64, weight: f64) -> Result<(DVector<f64>, f64), Error> {
         let n = r.len();
         let mut gradient = DVector::zeros(n + 1);
@@ -200,6 +201,7 @@ impl Ceo {
             gradient[i] = 1.0 / r[i];
             hessian[(i, i)] = 1.0 / (r[i] * r[i]);
         }
+        // Barrier terms: the logarithm of the slack of every subset constraint.
         for subset in 0..1 << n {
             let (value, slope, bend, inside) = self.constraint(subset, r);
             let slack = value - tau;
@@ -220,6 +222,7 @@ impl Ceo {
             change: 1.0 / weight,
         };
         let step = hessian.cholesky().ok_or(stalled)?.solve(&gradient);
+        // The Newton decrement bounds the distance of the barrier function from its maximum.
         let decrement = step.dot(&gradient);
         Ok((step, decrement))
     }

@@ -1,13 +1,13 @@
-//! The information of the symbols about a fixed value of the unknown.
+//! Fisher information in the symbols, and the Bayesian Cramer-Rao bound.
 
 use super::prior_variance;
 use crate::error::{Error, refuse};
 use crate::law::Active;
 use crate::system::System;
 
-/// Fisher information about `x` in the received symbols at each value of the model, for independent noise.
+/// Fisher information about `x` in the received symbols, at each value `x` of the model, for independent noise.
 ///
-/// `J(x) = sum_sensors sum_t (dP_t(x)/dx)^2 / P_t(x)`; symbols of vanishing probability contribute nothing.
+/// `J(x) = sum_sensors sum_t (dP_t(x)/dx)^2 / P_t(x)`; symbols of probability zero are left out.
 ///
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated.
@@ -23,7 +23,7 @@ pub fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
         let densities = entry.densities(entry.breakpoints()).0;
         for (t, p) in entry.symbols(entry.breakpoints()).chunks_exact(nodes).enumerate() {
             for (k, total) in information.iter_mut().enumerate() {
-                // Raising x is lowering all breakpoints.
+                // Raising x by an amount has the same effect as lowering all breakpoints by it.
                 let slope: f64 = entry.exchange.iter().zip(&densities).map(|(c, d)| c[t] * d[k]).sum();
                 if p[k] > 0.0 {
                     *total += entry.compositions.total as f64 * slope * (slope / p[k]);
@@ -47,7 +47,7 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
         .sum())
 }
 
-/// `1 / (E J(X) + 1 / s_x^2)`: no estimator from these symbols has a smaller mean squared error (van Trees 1968).
+/// `1 / (E J(X) + 1 / s_x^2)`: no estimator from these symbols has a smaller mean squared error (van Trees 1968). In squared units of `X`.
 ///
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated or the prior is not Gaussian.

@@ -1,14 +1,14 @@
-//! Lower bounds on the mean squared error that quantized sensors can reach.
+//! Lower bounds on the mean squared error from quantized sensors.
 //!
 //! | bound | holds for | function |
 //! |---|---|---|
 //! | remote distortion-rate (2.15) | any code of one noisy source, any block length | [`remote_distortion_rate`] |
 //! | quadratic Gaussian CEO | any codes at separate sensors with independent noise | [`ceo`] |
-//! | unquantised samples | any quantizers at all | [`unquantised`] |
+//! | unquantised samples | any quantizers | [`unquantised`] |
 //! | Bayesian Cramer-Rao (van Trees, constant weight) | these quantizers, any estimator | [`bayesian_cramer_rao`] |
 //!
-//! The Cramer-Rao bound `1 / J(x)` concerns unbiased estimators of a fixed `x`. The posterior mean is biased towards the prior
-//! and beats it; for a random unknown the van Trees inequality takes its place.
+//! The Cramer-Rao bound `1 / J(x)` is for unbiased estimators of a fixed `x`. The posterior mean is biased towards the prior
+//! and can have a smaller error. For a random unknown use the van Trees inequality.
 
 mod ceo;
 mod fisher;
@@ -22,8 +22,8 @@ pub use unquantised::unquantised;
 use crate::error::{Error, refuse};
 use crate::observation_model::{Noise, Prior};
 
-/// `D(R) = s_x^2 - s_x^4 / (s_x^2 + s^2) (1 - 2^{-2R})`: least squared error in `X` from `R` bits about the samples of sensors that are
-/// encoded together, (2.15); independent noises combine to `1 / s^2 = sum_n 1 / s_n^2`.
+/// `D(R) = s_x^2 - s_x^4 / (s_x^2 + s^2) (1 - 2^{-2R})` (2.15): the least squared error in `X` from `R` bits about the samples of sensors
+/// that are encoded together. Independent noises combine to `1 / s^2 = sum_n 1 / s_n^2`.
 ///
 /// # Errors
 /// If the prior is not Gaussian, the noise is correlated, or `bits` is negative or not finite.
@@ -32,7 +32,7 @@ pub fn remote_distortion_rate(prior: &Prior, noise: &Noise, bits: f64) -> Result
     let precision: f64 = independent_variances(noise)?.iter().map(|s2| 1.0 / s2).sum();
     let s2 = fewbits_numerics::error::positive("noise variance", 1.0 / precision)?;
     let bits = fewbits_numerics::error::non_negative("bits", bits)?;
-    // The error of the noise alone plus what is left of the rest: no difference, so no digit is lost.
+    // The error from the noise alone plus the remaining part: no difference, so no digits are lost.
     Ok(sx2 / (sx2 + s2) * (s2 + sx2 * (-2.0 * bits).exp2()))
 }
 
@@ -44,7 +44,7 @@ fn prior_variance(prior: &Prior) -> Result<f64, Error> {
     Ok(fewbits_numerics::error::positive("prior variance", prior.deviation() * prior.deviation())?)
 }
 
-/// Variance of each sensor's noise, if they are independent.
+/// Variance of each sensor's noise; an error if the noise is correlated.
 fn independent_variances(noise: &Noise) -> Result<Vec<f64>, Error> {
     if !noise.is_independent() {
         return refuse("noise", "correlated noise", "independent noise");

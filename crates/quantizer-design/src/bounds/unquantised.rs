@@ -1,4 +1,4 @@
-//! The criterion's value if the fusion centre had the samples themselves.
+//! The value of a criterion if the fusion centre had the samples themselves.
 
 use crate::criterion::Criterion;
 use crate::error::Error;
@@ -6,15 +6,15 @@ use crate::observation_model::ObservationModel;
 
 /// Step of the sum over the sufficient statistic, in standard deviations of its noise.
 const STEP: f64 = 0.25;
-/// Reach beyond the values of the unknown.
+/// Standard deviations beyond the values of the unknown at which the sum ends.
 const REACH: f64 = 8.0;
-/// Most terms of the double sum.
+/// Largest number of terms of the double sum.
 const MAX_TERMS: f64 = 2e7;
 
-/// The value of a criterion if all samples arrived unquantised: no design of any number of bits is better.
+/// The value of a criterion if all samples arrived unquantised. No design with any number of bits is better.
 ///
-/// The samples of all sensors tell of the unknown what one sample in noise of variance `1 / 1' Sigma^-1 1` tells. `None` if
-/// that noise is so small against the prior that the sum would be too long.
+/// All samples together have the same information about the unknown as one sample with noise variance `1 / 1' Sigma^-1 1`. `None` if
+/// this noise is so small compared with the prior that the sum would be too long.
 ///
 /// # Errors
 /// As [`ObservationModel::new`].
@@ -28,6 +28,7 @@ pub fn unquantised(model: &ObservationModel, criterion: Criterion) -> Result<Opt
     if !(deviation > 0.0 && count * values.len() as f64 <= MAX_TERMS) {
         return Ok(None);
     }
+    // The weighted mean of all samples is a sufficient statistic, so one integral over it is enough.
     let (step, mean) = (STEP * deviation, model.sample_mean());
     let (mut explained, mut information, mut correct) = (0.0, 0.0, 0.0);
     for i in 0..=count as usize {

@@ -1,4 +1,4 @@
-//! The posterior mean as a table.
+//! The posterior mean as a look-up table.
 
 use crate::error::{Error, refuse};
 use crate::law::{Reports, symbol_tables};
@@ -21,10 +21,10 @@ pub struct Estimate {
     pub variance: f64,
 }
 
-/// Look-up table of the posterior mean: exact, constant time, bounded in size.
+/// Look-up table of the posterior mean for every joint outcome. A look-up takes constant time.
 ///
-/// Sensors of a group are counted, not told apart, so nine identical sensors of four levels take 220 entries. Where some
-/// sensors' symbols are missing, the posterior given the others is computed at the nodes instead, in a time proportional to
+/// Only the counts of symbols in a group matter, so nine identical sensors of four levels need 220 entries. If symbols of some
+/// sensors are missing, the posterior given the others is computed at the quadrature nodes instead, in a time proportional to
 /// the number of sensors.
 ///
 /// ```
@@ -47,7 +47,7 @@ pub struct MmseDecoder {
     layout: Layout,
     /// Probability, mean and variance of each outcome.
     entries: Vec<[f64; 3]>,
-    /// Symbol probabilities of a sensor of each group at the nodes.
+    /// Symbol probabilities at the nodes, for one sensor of each group.
     symbols: Vec<Table>,
 }
 
@@ -57,10 +57,10 @@ stored! { MmseDecoder as StoredDecoder |decoder| {
 } => MmseDecoder::new(&system, limit), Error }
 
 impl MmseDecoder {
-    /// Tabulates the posterior of every joint outcome, at most `limit` of them.
+    /// Computes the posterior of every joint outcome, if there are at most `limit`.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] beyond `limit`: decode such systems by a filter on the likelihoods instead.
+    /// [`Error::TooLarge`] if there are more. Such systems can be decoded by a filter on the likelihoods.
     pub fn new(system: &System, limit: usize) -> Result<Self, Error> {
         Error::at_most("decoder", system.outcomes(), limit as u64)?;
         let model = system.model();
@@ -83,7 +83,7 @@ impl MmseDecoder {
         })
     }
 
-    /// Variances as differences of moments about the prior mean, for tables too large to hold all likelihoods.
+    /// Variances as differences of moments about the prior mean; used if a table of all likelihoods would be too large.
     fn entries_by_moments(model: &ObservationModel, reports: &Reports) -> Vec<[f64; 3]> {
         let mut square = vec![0.0; model.nodes()];
         for ((given, w), x) in model.given.iter().zip(&model.weights).zip(&model.values) {
@@ -113,18 +113,18 @@ impl MmseDecoder {
         self.entries.len()
     }
 
-    /// The estimate of every joint outcome, `None` for one that cannot be received. Outcomes are in the order of
-    /// [`JointTable::outcome`]: the first group slowest, and sensors that are alone in their groups by their symbols.
+    /// The estimate of every joint outcome; `None` for an outcome of probability zero. The order is that of
+    /// [`JointTable::outcome`]: the first group varies slowest, and groups of one sensor are ordered by symbol.
     pub fn estimates(&self) -> impl ExactSizeIterator<Item = Option<Estimate>> + '_ {
         self.entries.iter().map(|entry| Self::estimate(*entry).ok())
     }
 
-    /// The estimate from one observation per sensor. These sensors always report, so that nothing received, like an erasure, says
-    /// nothing about the unknown.
+    /// The estimate from one observation per sensor. The sensors always report, so a missing report, like an erasure, carries no
+    /// information about the unknown.
     ///
     /// # Errors
     /// [`Error::Argument`] if there is not one observation per sensor or a symbol is out of range; [`Error::ImpossibleOutcome`] if
-    /// the outcome has probability 0 under the model, in which case the caller's belief should stand.
+    /// the outcome has probability 0 under the model. The caller should then keep its belief.
     pub fn decode(&self, observations: &[Observation<Symbol>]) -> Result<Estimate, Error> {
         let received: Vec<usize> = observations.iter().filter_map(|o| o.received().map(|s| s.0)).collect();
         if received.len() == observations.len() {
@@ -139,6 +139,7 @@ impl MmseDecoder {
                     return refuse("symbol", symbol.0, format!("a number below {}", symbols.rows()));
                 }
                 product.iter_mut().zip(symbols.row(symbol.0)).for_each(|(p, s)| *p *= s);
+                // Normalised after each factor, since the product of many probabilities underflows.
                 let largest = product.iter().copied().fold(0.0, f64::max);
                 if largest > 0.0 {
                     product.iter_mut().for_each(|p| *p /= largest);
@@ -153,7 +154,7 @@ impl MmseDecoder {
         Self::estimate(posterior(model, &q))
     }
 
-    /// The estimate when symbol `symbols[n]` was received from sensor `n`.
+    /// The estimate if symbol `symbols[n]` was received from sensor `n`.
     ///
     /// # Errors
     /// As [`MmseDecoder::decode`].
@@ -170,7 +171,7 @@ impl MmseDecoder {
     }
 }
 
-/// Probability, posterior mean and variance from the likelihoods of the values, all sums of positive terms.
+/// Probability, posterior mean and variance from the likelihoods of the values, computed as sums of positive terms.
 fn posterior(model: &ObservationModel, likelihood: &[f64]) -> [f64; 3] {
     let terms = || model.weights.iter().zip(likelihood).zip(&model.values);
     let mass: f64 = terms().map(|((w, q), _)| w * q).sum();

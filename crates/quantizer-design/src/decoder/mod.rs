@@ -1,4 +1,4 @@
-//! What the fusion centre does with the symbols: estimate, decide, or test.
+//! Decoders at the fusion centre: estimates and tests.
 
 mod mmse;
 mod neyman_pearson;

@@ -8,24 +8,24 @@ use fewbits_core::Observation;
 use fewbits_numerics::error::entries;
 use fewbits_quantizers::Symbol;
 
-/// The randomised Neyman-Pearson test between two values of the unknown on the joint outcome.
+/// The randomised Neyman-Pearson test between two values of the unknown, given the joint outcome.
 ///
-/// Outcomes are accepted for the second value in decreasing order of their likelihood ratio until the false-alarm budget is
-/// spent; the outcome on which it runs out is accepted with a probability.
+/// The second value is accepted for the outcomes of largest likelihood ratio, as many as the false-alarm probability allows. For the
+/// outcome at the limit it is accepted at random with a certain probability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeymanPearson {
     table: JointTable,
     false_alarm: f64,
-    /// Probability of accepting the second value, an outcome.
+    /// Probability of accepting the second value, for each outcome.
     acceptance: Vec<f64>,
     detection: f64,
 }
 
 impl NeymanPearson {
-    /// The most powerful test of the second value of the prior against the first with false-alarm probability `false_alarm`.
+    /// The most powerful test of the second value of the prior against the first, with the given false-alarm probability.
     ///
     /// # Errors
-    /// Unless the prior has exactly two values and `false_alarm` is inside (0, 1); [`Error::TooLarge`] as [`JointTable::new`].
+    /// If the prior does not have exactly two values or `false_alarm` is not inside (0, 1); [`Error::TooLarge`] as [`JointTable::new`].
     pub fn new(system: &System, false_alarm: f64) -> Result<Self, Error> {
         if !(false_alarm > 0.0 && false_alarm < 1.0) {
             return refuse("false_alarm", false_alarm, "a probability inside (0, 1)");
@@ -34,7 +34,7 @@ impl NeymanPearson {
             return refuse("prior", "not two hypotheses", "a discrete prior on two values");
         }
         let table = JointTable::new(system)?;
-        // ln P1 - ln P0: a key of each outcome, so a total order, and finite where the probabilities underflow.
+        // ln P1 - ln P0: finite even if the probabilities underflow.
         let logs = log_likelihoods(system)?;
         let key = |outcome: usize| logs[2 * outcome + 1] - logs[2 * outcome];
         let mut order: Vec<usize> = (0..table.outcomes()).filter(|t| !key(*t).is_nan()).collect();
@@ -58,15 +58,15 @@ impl NeymanPearson {
         })
     }
 
-    /// Probability of accepting the second value when it is true.
+    /// Probability of accepting the second value if it is true.
     pub fn detection_probability(&self) -> f64 {
         self.detection
     }
 
-    /// Probability with which to accept the second value given one observation per sensor: 0 or 1 but for one outcome.
+    /// Probability of accepting the second value given one observation per sensor: 0 or 1 except for one outcome.
     ///
-    /// Where symbols are missing (these sensors always report, so that nothing received says no more than an erasure) it is that
-    /// of the most powerful test on the sensors that are left, of the same false-alarm probability, which is made anew.
+    /// If symbols are missing (the sensors always report, so a missing report carries no information), the most powerful test
+    /// on the remaining sensors with the same false-alarm probability is computed and used.
     ///
     /// # Errors
     /// If there is not one observation per sensor, or a symbol is out of range.
@@ -149,7 +149,7 @@ mod tests {
         assert!(NeymanPearson::new(&system, 1.0).is_err());
     }
 
-    /// Where the wrong value's probability is among the smallest numbers, its share of the entropy is nothing, not infinite.
+    /// If the probability of the wrong value is among the smallest numbers, its term of the entropy is zero, not infinite.
     #[test]
     fn equivocation_is_finite_where_probabilities_are_subnormal() {
         for tenth in 700..800 {

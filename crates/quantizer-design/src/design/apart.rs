@@ -1,9 +1,9 @@
-//! Second derivatives over the breakpoints of every sensor, where sensors of a group share theirs.
+//! Second derivatives for moves in which the sensors of a group do not share their breakpoints.
 //!
-//! The Hessian over the shared breakpoints does not see what happens if two sensors of a group move against each other. By
-//! symmetry the Hessian over all their breakpoints has two different blocks, `A` for one sensor and `B` for two, and its
-//! eigenvalues are those of `A + (N - 1) B`, which moves all alike, and of `A - B`. Moves of the second kind do not
-//! mix with those of another group. Two sensors of the group told apart are enough to find `A` and `B`.
+//! The Hessian over shared breakpoints does not show what happens if two sensors of a group move in opposite directions. By
+//! symmetry the Hessian over all their breakpoints has two different blocks, `A` for one sensor and `B` for two. Its
+//! eigenvalues are those of `A + (N - 1) B`, for equal moves, and of `A - B`, for opposite moves. Opposite moves do not
+//! mix with those of another group. `A` and `B` are found from two sensors of the group that are treated as different.
 
 use crate::criterion::Criterion;
 use crate::error::Error;
@@ -12,19 +12,19 @@ use crate::problem::Problem;
 use crate::system::{SensorGroup, System};
 use nalgebra::{DVector, SymmetricEigen};
 
-/// The steepest change that moves the sensors of one group against each other.
+/// The opposite move of the sensors of one group with the largest curvature.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Opposed {
     /// Curvature of the signed criterion per unit of `direction` at each of two sensors.
     pub(super) curvature: f64,
-    /// One entry per breakpoint, of length one.
+    /// Unit vector with one entry per breakpoint.
     pub(super) direction: DVector<f64>,
 }
 
-/// The largest curvature over moves of the sensors of `group` against each other; `None` for a single sensor.
+/// The opposite move of largest curvature for the sensors of `group`; `None` for a single sensor.
 ///
 /// # Errors
-/// [`Error::TooLarge`] if two sensors told apart make more outcomes than the system allows.
+/// [`Error::TooLarge`] if treating two sensors as different makes more outcomes than the system allows.
 pub(super) fn opposed(system: &System, group: usize, criterion: Criterion) -> Result<Option<Opposed>, Error> {
     let entry = system.group(group)?;
     let [first, second, rest @ ..] = entry.sensors() else {
@@ -44,7 +44,7 @@ pub(super) fn opposed(system: &System, group: usize, criterion: Criterion) -> Re
     }))
 }
 
-/// The system with `group` in two halves that are moved against each other along `direction`, the larger step `length` at most.
+/// The system with `group` split into two halves that are moved in opposite directions along `direction`, by at most `length`.
 pub(super) fn halved(system: &System, group: usize, direction: &DVector<f64>, length: f64) -> Result<System, Error> {
     let entry = system.group(group)?;
     let (one, other) = entry.sensors().split_at(entry.sensors().len() / 2);
@@ -56,20 +56,20 @@ pub(super) fn halved(system: &System, group: usize, direction: &DVector<f64>, le
             .quantizer()
             .with_breakpoints(breakpoints.map(|(b, d)| b + share * step * d).collect())
     };
-    // The mean stays: the smaller half moves further.
+    // The mean over all sensors stays, so the smaller half moves further.
     let mut share = 1.0;
     loop {
         let against = -share * one.len() as f64 / other.len() as f64;
         match (moved(share), moved(against)) {
             (Ok(one), Ok(other)) => return apart.with_quantizer(group, one)?.with_quantizer(group + 1, other),
-            // Breakpoints met: a shorter step keeps their order.
+            // Two breakpoints have met: a shorter step keeps their order.
             (Err(error), _) | (_, Err(error)) if share < 1e-9 => return Err(error.into()),
             _ => share *= 0.5,
         }
     }
 }
 
-/// The system with one group replaced by groups of some of its sensors.
+/// The system with one group replaced by several groups of its sensors.
 fn regrouped(system: &System, group: usize, parts: impl Iterator<Item = Vec<usize>>) -> Result<System, Error> {
     let entry = system.group(group)?;
     let mut groups = system.groups().to_vec();

@@ -1,4 +1,4 @@
-//! All breakpoints at once, or one sensor after the other, by Newton's method.
+//! Newton's method over all breakpoints at once, or over one sensor after the other.
 
 use super::apart::{Opposed, halved, opposed};
 use crate::criterion::Criterion;
@@ -13,19 +13,19 @@ use fewbits_quantizers::Quantizer;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-/// How far breakpoints move off a saddle, in standard deviations of the sample.
+/// Length of a step away from a saddle, in standard deviations of the sample.
 const STEP_OFF: f64 = 0.05;
-/// A design whose rarest cell is rarer than this has lost a level.
+/// If the least probable cell of a design has a smaller probability, a level is lost.
 const VANISHED: f64 = 1e-12;
 
-/// The breakpoints over which a [`Certificate`] holds.
+/// The breakpoints for which a [`Certificate`] holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scope {
-    /// The breakpoints of every sensor that was designed, each by itself.
+    /// The breakpoints of all designed sensors, each moving independently.
     EverySensor,
-    /// The breakpoints that the sensors of a group share. Whether it is better to let them differ is not known: there are too many
-    /// joint outcomes to find out.
+    /// The breakpoints that the sensors of a group share. Whether different breakpoints are better was not tested, because there are too
+    /// many joint outcomes.
     SharedBreakpoints,
 }
 
@@ -38,15 +38,15 @@ pub struct Design {
     /// Value of the criterion: nats, squared units, or a probability.
     #[serde(deserialize_with = "crate::error::stored_size")]
     pub value: f64,
-    /// Largest eigenvalue of the Hessian of the criterion, signed so that a local optimum has none above 0.
+    /// Largest eigenvalue of the Hessian of the criterion (signed so that larger is better): not above 0 at a local optimum.
     pub largest_curvature: f64,
-    /// What the second derivatives prove.
+    /// The conclusion from the second derivatives.
     pub certificate: Certificate,
-    /// Over which breakpoints they were taken.
+    /// The breakpoints for which the second derivatives were computed.
     pub scope: Scope,
-    /// Newton iterations.
+    /// Number of Newton iterations.
     pub iterations: usize,
-    /// Evaluations of the criterion, with or without derivatives.
+    /// Number of evaluations of the criterion, with or without derivatives.
     pub evaluations: usize,
 }
 
@@ -62,21 +62,21 @@ impl Design {
     }
 }
 
-/// The stationary point of `criterion` over the breakpoints of all groups (4.2), started from the system's own quantizers.
+/// The stationary point of `criterion` over the breakpoints of all groups (4.2), reached from the system's own quantizers.
 ///
-/// Newton's method finds a *local* optimum; the joint criterion may have several, and from a symmetric start the symmetric one
-/// may be a saddle. See [`AtSaddle`](crate::AtSaddle) and [`multi_start`]. The sensors of a group share their breakpoints, unless
-/// letting them differ is better to second order and [`AtSaddle::StepOff`](crate::AtSaddle::StepOff) is asked for: then the design
-/// has the group in two halves.
+/// Newton's method finds a *local* optimum. The criterion may have several, and from a symmetric start the symmetric one
+/// may be a saddle; see [`AtSaddle`](crate::AtSaddle) and [`multi_start`]. The sensors of a group share their breakpoints. If different
+/// breakpoints are better to second order and [`AtSaddle::StepOff`](crate::AtSaddle::StepOff) is set, the group is split into
+/// two halves.
 ///
 /// # Errors
-/// [`Error::NotConverged`]; [`Error::VanishingCell`] if a level is squeezed out, as happens behind poor channels;
+/// [`Error::NotConverged`]; [`Error::VanishingCell`] if a cell becomes empty, as happens with poor channels;
 /// [`Error::TooLarge`] and [`Error::Argument`] as [`System::value`].
 pub fn joint(system: &System, criterion: Criterion, newton: &Newton) -> Result<Design, Error> {
     joint_until(system, criterion, newton, Deadline::NEVER)
 }
 
-/// As [`joint`]; not converged if the time is over first.
+/// As [`joint`]; [`Error::NotConverged`] if the time limit is reached first.
 pub(crate) fn joint_until(
     system: &System,
     criterion: Criterion,
@@ -90,6 +90,8 @@ pub(crate) fn joint_until(
         && let Some((group, opposed)) = steepest.filter(|(_, opposed)| opposed.curvature > 0.0)
     {
         let length = STEP_OFF * breakpoint_scale(&design.system, &[group]);
+        // At a saddle at which the sensors of a group should differ, the group is split along the direction of ascent, and both halves are
+        // optimised.
         let Ok(apart) = halved(&design.system, group, &opposed.direction, length) else {
             break;
         };
@@ -108,7 +110,7 @@ pub(crate) fn joint_until(
     Ok(design)
 }
 
-/// As [`joint`], over the breakpoints of the groups `active` with all others fixed.
+/// As [`joint`], over the breakpoints of the groups `active`; all others are fixed.
 ///
 /// # Errors
 /// As [`joint`]; also if `active` is empty or names a group that is not there.
@@ -121,7 +123,7 @@ pub fn optimise_groups(
     Ok(optimise_until(system, active, criterion, newton, Deadline::NEVER)?.0)
 }
 
-/// A design, and the group whose sensors gain most to second order if they move against each other.
+/// A design, and the group whose sensors gain most to second order by opposite moves.
 fn optimise_until(
     system: &System,
     active: &[usize],
@@ -149,6 +151,7 @@ fn optimise_until(
     }
     let designed = problem.system_at(&found.point)?;
     let unit = problem.unit(found.value);
+    // A maximum among equal quantizers can be a saddle if they may differ, so this curvature is tested too.
     let (steepest, scope) = steepest_opposed(&designed, active, criterion)?;
     let largest_curvature = steepest
         .iter()
@@ -165,7 +168,7 @@ fn optimise_until(
     Ok((design, steepest))
 }
 
-/// The largest curvature over moves of the sensors of a group against each other, and whether all groups were looked at.
+/// The opposite move of largest curvature over all groups, and whether all groups could be tested.
 fn steepest_opposed(
     system: &System,
     groups: &[usize],
@@ -185,7 +188,7 @@ fn steepest_opposed(
     Ok((steepest, scope))
 }
 
-/// The size of the breakpoints of some groups: the least standard deviation of their samples.
+/// Length scale of the breakpoints of some groups: the smallest standard deviation of their samples.
 fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
     groups
         .iter()
@@ -194,13 +197,13 @@ fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The greedy chain (4.4): sensor by sensor in the given order, each designed for the criterion of the sensors so far.
+/// The greedy design (4.4): sensor by sensor in the given order, each for the criterion of the sensors up to it.
 ///
-/// Returns one design a stage; stage `n` is a system of `n + 1` sensors. The first sensor's quantizer depends neither on how
-/// many follow nor on their noise.
+/// Returns one design per stage; stage `n` is a system of `n + 1` sensors. The first sensor's quantizer does not depend on the
+/// later sensors or on their noise.
 ///
 /// # Errors
-/// As [`joint`]; also unless every group of `system` is a single sensor and `order` names groups at most once.
+/// As [`joint`]; also if a group of `system` has more than one sensor, or `order` lists a group twice.
 pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &Newton) -> Result<Vec<Design>, Error> {
     if order.is_empty() {
         return refuse("order", "empty", "at least one group");
@@ -216,6 +219,7 @@ pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &N
                 return refuse("system", format!("{} sensors in group {g}", group.sensors().len()), "single sensors");
             }
             sensors.push(group.sensors()[0]);
+            // Earlier sensors keep their design; only the last one is optimised.
             let designed = stages.last().and_then(|d| d.system.groups().get(stage));
             quantizers.push(designed.unwrap_or(group).quantizer().clone());
             channels.push(group.channel().clone());
@@ -227,13 +231,13 @@ pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &N
     Ok(stages)
 }
 
-/// The best of [`joint`] from the system's own quantizers and from `starts` random ones, labels and channels kept.
+/// The best of the results of [`joint`] from the system's own quantizers and from `starts` random ones, with the same labels and channels.
 ///
 /// Start `i` draws the breakpoints of each group as ordered standard normal samples, scaled by 1.3 standard deviations of the
-/// group's sample, from the fixed stream (`seed`, `i`). Starts that fail to converge are passed over.
+/// group's sample, from a random stream fixed by (`seed`, `i`). Starts that do not converge are left out.
 ///
 /// # Errors
-/// The error of the first start if none converged.
+/// If no start converged; the error is that of the first.
 pub fn multi_start(
     system: &System,
     criterion: Criterion,
@@ -248,6 +252,7 @@ pub fn multi_start(
         };
         let better = match &best {
             Ok(design) => {
+                // A maximum is preferred to a saddle, even if the saddle has the better value.
                 let saddle = (design.is_saddle(), candidate.is_saddle());
                 criterion.sense() * (candidate.value - design.value) > 0.0 && saddle != (false, true)
                     || saddle == (true, false)

@@ -1,12 +1,12 @@
 //! The model of the observations: the prior of a scalar unknown and the noise of each sensor, on quadrature nodes.
 //!
-//! `Y_n = X + a_n U + d_n V_n` with `U` and all `V_n` standard normal: given `X` and the shared factor `U` the sensors are
-//! independent. Every joint probability is then a sum of products of one-dimensional cell probabilities with positive
-//! weights, which keeps relative accuracy in far cells where differences of bivariate distribution functions lose it.
+//! `Y_n = X + a_n U + d_n V_n` with `U` and all `V_n` standard normal. Given `X` and the shared factor `U` the sensors are
+//! independent, so every joint probability is a sum of products of one-dimensional cell probabilities with positive
+//! weights. This keeps relative accuracy in far cells, where differences of bivariate distribution functions lose it.
 //!
-//! A Gaussian prior, a mixture and the smooth density of a sample are integrated by the trapezoid rule, which converges faster
-//! than any power of the step for these integrands; Gauss-Hermite rules need many more nodes once the noise is narrower than the
-//! prior. Densities on an interval take Gauss-Legendre panels. A finite prior is its own rule.
+//! Gaussian priors, mixtures and the smoothed density of a sample are integrated by the trapezoid rule, whose error falls faster
+//! than any power of the step for these integrands; Gauss-Hermite rules need many more nodes if the noise is narrower than the
+//! prior. Densities on an interval use Gauss-Legendre panels. A discrete prior is its own rule.
 
 mod nodes;
 mod noise;
@@ -26,15 +26,15 @@ use nodes::PRIOR_STEP;
 use resolution::{NODE_LIMIT, grid, too_fine};
 use serde::{Deserialize, Serialize};
 
-/// Half-width of the shared factor's rule.
+/// Half-width of the quadrature rule for the shared factor, in its standard deviations.
 const FACTOR_REACH: f64 = 8.5;
-/// Largest step of the prior's rule in units of the narrowest noise. Folded cells put the zeros of `P(x)`, where `P ln P` is
-/// singular, close to the real axis: at 0.4 their information is off by 3e-8 in noise of 0.3, at 0.2 by 3e-12 (measured).
+/// Largest step of the prior's rule in units of the narrowest noise. With folded cells, zeros of `P(x)`, at which `P ln P` is
+/// singular, are close to the real axis. In noise of 0.3 the error of information is 3e-8 with step 0.4 and 3e-12 with 0.2 (measured).
 const ENTROPY_STEP: f64 = 0.2;
-/// The same for products of cell probabilities of two sensors, which are entire functions; more sensors make them sharper.
+/// The same for products of cell probabilities of two sensors, which are entire functions. With more sensors they are sharper.
 const PRODUCT_STEP: f64 = 0.4;
 
-/// A weighted range of nodes: a linear functional of functions on the nodes.
+/// Weights on a range of nodes: a linear functional of functions on the nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Feature {
     pub(crate) start: usize,
@@ -56,19 +56,19 @@ pub struct ObservationModel {
     /// Values of `X` and their probabilities.
     pub(crate) values: Vec<f64>,
     pub(crate) weights: Vec<f64>,
-    /// Given a node the sensors are independent: sensor `n` has mean `base + loading_n * factor`.
+    /// Given a node the sensors are independent, and sensor `n` has mean `base + loading_n * factor`.
     nodes: Vec<Node>,
     /// `P(node | x_k)`.
     pub(crate) given: Vec<Feature>,
     /// Sums over the prior: `sum_k w_k P(node | x_k)` and the same with `w_k (x_k - mean)`.
     pub(crate) mass: Feature,
     pub(crate) moment: Feature,
-    /// Prior mean, from which moments are measured, and variance.
+    /// Prior mean, about which moments are taken, and variance.
     pub(crate) mean: f64,
     pub(crate) variance: f64,
 }
 
-/// A value of the unknown, or of the unknown plus shared noise, and of the shared factor.
+/// A value of the unknown (or of the unknown plus shared noise), and one of the shared factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Node {
     base: f64,
@@ -81,11 +81,11 @@ stored! { ObservationModel as StoredModel |model| {
 } => ObservationModel::new(prior, noise), Error }
 
 impl ObservationModel {
-    /// Discretises a prior and the noise of all sensors.
+    /// Discretises a prior and the noise of all sensors on quadrature nodes.
     ///
     /// # Errors
     /// If the noise is so much narrower than the prior that more than a million nodes would be needed, or squares of the
-    /// prior's values are beyond the range of numbers.
+    /// prior's values overflow.
     pub fn new(prior: Prior, noise: Noise) -> Result<Self, Error> {
         Self::resolved(prior, noise, Resolution::FULL)
     }
@@ -96,6 +96,7 @@ impl ObservationModel {
     }
 
     fn resolved(prior: Prior, noise: Noise, resolution: Resolution) -> Result<Self, Error> {
+        // The product over many sensors is narrower than one factor: the step shrinks with the root of their number.
         let crowd = (noise.sensors().max(2) as f64 / 2.0).sqrt();
         let narrowest = (0..noise.sensors())
             .map(|n| noise.deviation(n))
@@ -144,7 +145,7 @@ impl ObservationModel {
         })
     }
 
-    /// A Gaussian prior seen by sensors with independent noise, all given by their standard deviations.
+    /// A Gaussian prior and sensors with independent noise, all given by their standard deviations.
     ///
     /// # Errors
     /// As [`Prior::gaussian_with_deviation`], [`Noise::independent_with_deviations`] and [`ObservationModel::new`].
@@ -188,12 +189,12 @@ impl ObservationModel {
         self.prior.deviation().hypot(self.noise.deviation(n))
     }
 
-    /// Mean of every sample: the prior's.
+    /// Mean of every sample, equal to that of the prior.
     pub fn sample_mean(&self) -> f64 {
         self.mean
     }
 
-    /// The same prior seen by some of the sensors only.
+    /// The same prior with only some of the sensors.
     ///
     /// # Errors
     /// As [`Noise::subset`].
@@ -229,7 +230,7 @@ impl ObservationModel {
         )
     }
 
-    /// Whether two sensors have the same law.
+    /// Whether two sensors have the same noise.
     pub(crate) fn interchangeable(&self, m: usize, n: usize) -> bool {
         self.noise.loadings[m] == self.noise.loadings[n] && self.noise.residuals[m] == self.noise.residuals[n]
     }
@@ -238,8 +239,8 @@ impl ObservationModel {
 /// Nodes, and the probability of the nodes given each value.
 type Resolved = (Vec<Node>, Vec<Feature>);
 
-/// Nodes of `s = x + a u`, on which alone everything depends where all loadings `a` are equal. `None` where they are not, the
-/// prior is discrete, or two axes take fewer nodes: a faint shared factor blurs less than the nodes of one axis resolve.
+/// Nodes of `s = x + a u`. If all loadings `a` are equal, everything depends on `s` only. `None` if they are not, if the
+/// prior is discrete, or if two axes need fewer nodes because the shared factor is small.
 fn on_one_axis(
     prior: &Prior,
     noise: &Noise,
@@ -260,7 +261,7 @@ fn on_one_axis(
     }
     let offsets = grid(half_width, step)?;
     let given = values.iter().map(|x| {
-        // About the mean, so that an offset costs no digit.
+        // Relative to the mean, so that an offset costs no digits.
         let x = x - mean;
         let start = offsets.partition_point(|s| *s < x - reach);
         let end = offsets.partition_point(|s| *s <= x + reach);

@@ -6,17 +6,17 @@ use crate::error::Error;
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// Half-width of the Gaussian prior's rule, in standard deviations, and of a bell's support.
+/// Half-width of the Gaussian prior's rule, and of the range of a mixture component, in standard deviations.
 const REACH: f64 = 9.0;
 /// Largest step in units of the Gaussian prior's standard deviation.
 pub(super) const PRIOR_STEP: f64 = 0.25;
-/// Largest step of the trapezoid rule in units of the narrowest bell: its error is below 1e-30.
+/// Largest step of the trapezoid rule in units of the narrowest mixture component: its error is below 1e-30.
 const BELL_STEP: f64 = 0.5;
 /// Nodes of a Gauss-Legendre panel on a bounded support.
 const PANEL_NODES: usize = 8;
 
 impl Prior {
-    /// Nodes of which neighbours are about `step` apart at most, and weights, not normalised.
+    /// Nodes at most about `step` apart, and their weights, not normalised.
     pub(super) fn nodes(&self, step: f64, resolution: Resolution) -> Result<(Vec<f64>, Vec<f64>), Error> {
         match &self.shape {
             Shape::Gaussian { mean, deviation } => {
@@ -25,7 +25,7 @@ impl Prior {
                 Ok(offsets.iter().map(|x| (mean + x, normal::pdf(x / deviation))).unzip())
             }
             Shape::Uniform { low, high } => panels(*low, *high, step, 1, |_| 1.0),
-            // Half of the panels of the table resolve what they have been found to resolve.
+            // Half of the stored panels are enough, since their resolution was tested when the table was made.
             Shape::Table { low, high, densities } => {
                 panels(*low, *high, step, TABLE_PANELS / 2, |x| interpolated(*low, *high, densities, x))
             }
@@ -34,7 +34,7 @@ impl Prior {
         }
     }
 
-    /// The trapezoid rule over all bells.
+    /// The trapezoid rule over all mixture components.
     fn nodes_of_bells(&self, step: f64) -> Result<(Vec<f64>, Vec<f64>), Error> {
         let bells = self.bells();
         let narrowest = bells.iter().map(|b| b.2).fold(f64::INFINITY, f64::min);
@@ -48,6 +48,7 @@ impl Prior {
         let values: Vec<f64> = (0..=count as usize).map(|i| low + i as f64 * step).collect();
         let mut weights = vec![0.0; values.len()];
         for (weight, centre, deviation) in bells {
+            // Beyond `REACH` standard deviations a component is negligible.
             let first = ((centre - REACH * deviation - low) / step).max(0.0) as usize;
             let last = ((centre + REACH * deviation - low) / step).ceil() as usize;
             let range = first..(last + 1).min(values.len());
@@ -58,7 +59,7 @@ impl Prior {
         Ok((values, weights))
     }
 
-    /// A quadrature's range: what is outside has no mass worth counting.
+    /// The range of the quadrature; the probability outside is negligible.
     pub(super) fn support(&self, resolution: Resolution) -> (f64, f64) {
         match &self.shape {
             Shape::Uniform { low, high } | Shape::Table { low, high, .. } => (*low, *high),
@@ -72,7 +73,7 @@ impl Prior {
     }
 }
 
-/// The range of intervals given by their middles and half-widths.
+/// The union of intervals given by their middles and half-widths, as one range.
 fn range(parts: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     parts.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (middle, reach)| {
         (low.min(middle - reach), high.max(middle + reach))
@@ -95,7 +96,7 @@ fn panels(
     Ok(nodes.map(|(x, w)| (x, w * density(x).max(0.0))).unzip())
 }
 
-/// The table's polynomial at `x`, in barycentric form.
+/// The polynomial of the stored values at `x`, in barycentric form.
 fn interpolated(low: f64, high: f64, densities: &[f64], x: f64) -> f64 {
     let width = (high - low) / TABLE_PANELS as f64;
     let panel = (((x - low) / width) as usize).min(TABLE_PANELS - 1);

@@ -6,10 +6,10 @@ use fewbits_numerics::stored;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Entries of a covariance matrix are compared within this share of its largest one.
+/// Entries of a covariance matrix are compared to this fraction of its largest entry.
 const COVARIANCE_TOLERANCE: f64 = 1e-10;
 
-/// Additive normal noise of all sensors: `a_n U + d_n V_n`.
+/// Additive normal noise of all sensors: `a_n U + d_n V_n`, with a shared factor `U`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredNoise", into = "StoredNoise")]
 pub struct Noise {
@@ -43,7 +43,8 @@ impl Noise {
         Self::independent_with_deviations(&deviations)
     }
 
-    /// Noise of the given standard deviations and the same correlation between any two sensors; negative only for two.
+    /// Noise of the given standard deviations and the same correlation between any two sensors. A negative correlation is possible for two
+    /// only.
     ///
     /// # Errors
     /// If a standard deviation is not a positive number, `|rho| >= 1`, or `rho < 0` with three sensors or more.
@@ -84,7 +85,7 @@ impl Noise {
         })
     }
 
-    /// Noise with the given covariance matrix, if it is diagonal plus one factor (always so for two sensors).
+    /// Noise with the given covariance matrix, which must be diagonal plus one factor (this is always so for two sensors).
     ///
     /// # Errors
     /// If the matrix is not square, symmetric and finite with positive variances and correlations inside (-1, 1), or
@@ -99,7 +100,7 @@ impl Noise {
             fewbits_numerics::error::positive("variance", matrix[(i, i)])?;
         }
         let deviations: Vec<f64> = (0..n).map(|i| matrix[(i, i)].sqrt()).collect();
-        // Correlations have no unit: sensors in metres and in nanoseconds are judged alike.
+        // Correlations have no unit, so sensors of very different units are tested alike.
         let matrix = &DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (deviations[i] * deviations[j]));
         let tolerance = COVARIANCE_TOLERANCE;
         if (matrix - matrix.transpose()).amax() > tolerance {
@@ -138,7 +139,7 @@ impl Noise {
         self.loadings[n].hypot(self.residuals[n])
     }
 
-    /// `1' Sigma^-1 1`: the inverse of the least variance of a weighted mean of the samples.
+    /// `1' Sigma^-1 1`: the inverse of the smallest variance of a weighted mean of the samples.
     pub fn precision_of_mean(&self) -> f64 {
         let pairs = || self.loadings.iter().zip(&self.residuals);
         let own: f64 = self.residuals.iter().map(|d| 1.0 / (d * d)).sum();
@@ -158,7 +159,7 @@ impl Noise {
         Self::one_factor_with_deviations(&pick(&self.loadings), &pick(&self.residuals))
     }
 
-    /// The noise in units in which it is `factor` times as large.
+    /// The noise multiplied by `factor`.
     pub(crate) fn rescaled(&self, factor: f64) -> Result<Self, Error> {
         let times = |v: &[f64]| -> Vec<f64> { v.iter().map(|x| factor * x).collect() };
         Self::one_factor_with_deviations(&times(&self.loadings), &times(&self.residuals))
@@ -169,7 +170,7 @@ impl Noise {
     }
 }
 
-/// Loadings that explain the off-diagonal entries if one factor can: from the largest entry and its best third.
+/// Loadings of one factor that explain the off-diagonal entries, if there are such: from the largest entry and a suitable third sensor.
 fn shared_factor(matrix: &DMatrix<f64>, tolerance: f64) -> Vec<f64> {
     let n = matrix.nrows();
     let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
@@ -196,7 +197,7 @@ fn shared_factor(matrix: &DMatrix<f64>, tolerance: f64) -> Vec<f64> {
             loadings[p] = pivot;
         }
         None => {
-            // Only this pair is correlated: share the factor in proportion to the standard deviations.
+            // Only this pair is correlated: both loadings are in proportion to the standard deviations.
             let ratio = (matrix[(p, p)] / matrix[(q, q)]).sqrt().sqrt();
             let root = size(p, q).sqrt();
             (loadings[p], loadings[q]) = (root * ratio, root / ratio * matrix[(p, q)].signum());

@@ -1,4 +1,4 @@
-//! The unknown before anything is received.
+//! The distribution of the unknown before any observation.
 
 use super::sample::{SampleFit, drawn_together, fitted};
 use crate::error::{Error, refuse};
@@ -7,10 +7,10 @@ use fewbits_numerics::quadrature::gauss_legendre;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// Panels and nodes per panel by which a function is stored.
+/// Number of panels, and of nodes per panel, of the table in which a density function is stored.
 pub(super) const TABLE_PANELS: usize = 64;
 pub(super) const TABLE_NODES: usize = 12;
-/// Largest relative difference of the integrals by half the panels and by all: a rougher function is refused.
+/// Largest relative difference between the integrals by half of the panels and by all; a rougher function is an error.
 const ROUGHNESS: f64 = 1e-6;
 
 /// Prior of the scalar unknown, in any unit.
@@ -40,7 +40,7 @@ pub struct Prior {
     fit: Option<SampleFit>,
 }
 
-/// What a prior is stored as.
+/// The serialised form of a prior.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum Shape {
@@ -84,6 +84,7 @@ impl TryFrom<Shape> for Prior {
 
     fn try_from(mut shape: Shape) -> Result<Self, Error> {
         let mut fit = None;
+        // Check the parts of each shape, and compute its mean and standard deviation.
         let (mean, deviation) = match &mut shape {
             Shape::Gaussian { mean, deviation } => (finite("mean", *mean)?, *deviation),
             Shape::Uniform { low, high } => {
@@ -163,8 +164,9 @@ impl Prior {
         Shape::Uniform { low, high }.try_into()
     }
 
-    /// The smooth density of a sample: a normal bell at every value, of a width that shrinks with their number (Silverman), drawn
-    /// together so that mean and variance are the sample's. [`Prior::sample_fit`](Self::sample_fit) says how large the errors are.
+    /// The smoothed density of a sample: a normal density at every value, of Silverman's bandwidth, which decreases with the number of
+    /// values. The centres are moved towards the mean so that mean and variance are the sample's. [`Prior::sample_fit`](Self::sample_fit)
+    /// gives the errors.
     ///
     /// # Errors
     /// If there are fewer than five values, one is not finite, or all are equal.
@@ -177,7 +179,7 @@ impl Prior {
 
     /// The density proportional to `density` on the interval `support`.
     ///
-    /// The function is evaluated at once, at some thousand places, and stored as a table.
+    /// The function is evaluated once, at 64 panels of 12 nodes, and stored as a table.
     ///
     /// # Errors
     /// If the interval is empty or not finite, or the function is negative, not finite, zero, or not smooth: its integral by 64
@@ -210,8 +212,8 @@ impl Prior {
         .try_into()
     }
 
-    /// Finitely many values with probabilities: hypotheses, or the nodes and weights of a quadrature rule for a density. Which of
-    /// the two it is the caller says by the criterion.
+    /// Finitely many values with probabilities: hypotheses, or the nodes and weights of a quadrature rule for a density. The
+    /// criterion decides which of the two is meant.
     ///
     /// # Errors
     /// If the lengths differ, a value is not finite, or the probabilities are negative or do not sum to 1 within 1e-9.
@@ -219,7 +221,7 @@ impl Prior {
         Shape::Discrete { values, probabilities }.try_into()
     }
 
-    /// The two hypotheses 0 and `signal`, the latter with probability `probability`.
+    /// The two hypotheses 0 and `signal`; the latter has probability `probability`.
     ///
     /// # Errors
     /// If `signal` is not finite or `probability` not in `[0, 1]`.
@@ -267,12 +269,12 @@ impl Prior {
         matches!(self.shape, Shape::Gaussian { .. })
     }
 
-    /// How well the smooth density of a sample stands for the sample and the sample for its source; `None` for other priors.
+    /// Errors of the smoothed density of a sample; `None` for other priors.
     pub fn sample_fit(&self) -> Option<&SampleFit> {
         self.fit.as_ref()
     }
 
-    /// Weight, mean and standard deviation of every Gaussian of a mixture or of the smooth density of a sample.
+    /// Weight, mean and standard deviation of every Gaussian of a mixture or of a smoothed sample.
     pub(super) fn bells(&self) -> Vec<(f64, f64, f64)> {
         match (&self.shape, &self.fit) {
             (
@@ -304,13 +306,13 @@ fn check_interval(low: f64, high: f64) -> Result<(), Error> {
     Ok(())
 }
 
-/// Weighted mean, formed about the first value, so that an offset shared by all costs no digit.
+/// Weighted mean, computed relative to the first value, so that a common offset costs no digits.
 fn mean_of(values: &[f64], weights: &[f64], total: f64) -> f64 {
     let first = values[0];
     first + weights.iter().zip(values).map(|(w, x)| w * (x - first)).sum::<f64>() / total
 }
 
-/// Normalises a table of densities; mean and standard deviation.
+/// Normalises a table of densities; returns mean and standard deviation.
 fn tabulated(low: f64, high: f64, densities: &mut [f64]) -> Result<(f64, f64), Error> {
     check_interval(low, high)?;
     all_finite("density", densities)?;

@@ -1,11 +1,11 @@
-//! How finely a model is discretised.
+//! Resolution of the quadrature rules.
 
 use crate::error::Error;
 
-/// Most nodes a rule may take; less noise than this resolves asks for another method.
+/// Largest number of nodes of a rule.
 pub(super) const NODE_LIMIT: usize = 1 << 20;
 
-/// Steps and half-widths of the quadrature rules, in units of those that are exact to 1e-12.
+/// Step and half-width of the quadrature rules, relative to those with errors of 1e-12.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Resolution {
     pub(super) step: f64,
@@ -13,11 +13,11 @@ pub(crate) struct Resolution {
 }
 
 impl Resolution {
-    /// Exact to 1e-12.
+    /// Errors of about 1e-12.
     pub(crate) const FULL: Self = Self { step: 1.0, reach: 1.0 };
-    /// To about 1e-5, for searches.
+    /// Errors of about 1e-5, for searches.
     pub(crate) const COARSE: Self = Self { step: 2.0, reach: 0.7 };
-    /// To about one per cent, for searches over many joint symbols.
+    /// Errors of about one per cent, for searches over many joint symbols.
     pub(crate) const ROUGH: Self = Self { step: 3.0, reach: 0.42 };
 }
 

@@ -1,21 +1,21 @@
-//! The smooth density of a sample: bells at its values.
+//! The smoothed density of a sample: a normal density at each value.
 
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::all_finite;
 use fewbits_numerics::normal;
 
-/// Fewest values of a sample.
+/// Smallest number of values of a sample.
 const MIN_SAMPLE: usize = 5;
 
 /// Errors of a prior that was estimated from a sample: by smoothing, and because the sample is finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleFit {
-    /// Standard deviation of the bell at each value, in the unit of the sample.
+    /// Standard deviation of the normal density at each value, in the unit of the sample.
     pub bandwidth: f64,
-    /// Largest difference of the distribution functions of the smooth density and of the sample: what smoothing changes.
+    /// Largest difference between the distribution functions of the smoothed density and of the sample.
     pub smoothing_error: f64,
-    /// With a probability of 95 % no distribution function of the source differs from the sample's by more than this
-    /// (Kolmogorov): what is not known because the sample is finite.
+    /// With probability 95 % the distribution function of the source differs from the sample's by no more than this
+    /// (Kolmogorov). It is the error from the finite size of the sample.
     pub sampling_error: f64,
     /// Standard error of the mean, in the unit of the sample.
     pub mean_standard_error: f64,
@@ -23,7 +23,7 @@ pub struct SampleFit {
     pub deviation_standard_error: f64,
 }
 
-/// Where the bells of a sample stand: so close to the mean that the density has the sample's variance.
+/// Centres of the normal densities: moved towards the mean so that the smoothed density has the sample's variance.
 pub(super) fn drawn_together(
     values: &[f64],
     mean: f64,
@@ -34,7 +34,7 @@ pub(super) fn drawn_together(
     values.iter().map(move |x| mean + shrink * (x - mean))
 }
 
-/// Sorts a sample; its fit by bells of Silverman's width `0.9 min(s, IQR / 1.34) n^(-1/5)`, its mean and its standard deviation.
+/// Sorts a sample; returns its fit with Silverman's bandwidth `0.9 min(s, IQR / 1.34) n^(-1/5)`, its mean and its standard deviation.
 pub(super) fn fitted(values: &mut [f64]) -> Result<(SampleFit, f64, f64), Error> {
     all_finite("values", values)?;
     let count = values.len();
@@ -52,12 +52,12 @@ pub(super) fn fitted(values: &mut [f64]) -> Result<(SampleFit, f64, f64), Error>
     let deviation = variance.sqrt();
     let quartile = |share: f64| values[((n - 1.0) * share).round() as usize];
     let spread = (quartile(0.75) - quartile(0.25)) / 1.34;
-    // Where half of the values are equal the quartiles say nothing.
+    // If half of the values are equal, the interquartile range is zero and is not used.
     let spread = if spread > 0.0 { spread.min(deviation) } else { deviation };
     let bandwidth = 0.9 * spread * n.powf(-0.2);
     let centres: Vec<f64> = drawn_together(values, mean, deviation, bandwidth).collect();
     let smooth = |y: f64| centres.iter().map(|c| normal::cdf((y - c) / bandwidth)).sum::<f64>() / n;
-    // 200 places find the largest difference to well below the sampling error.
+    // 200 points find the largest difference with an error well below the sampling error.
     let smoothing_error = values.iter().step_by(count.div_ceil(200)).fold(0.0, |worst: f64, y| {
         let here = smooth(*y);
         let first = values.partition_point(|x| x < y) as f64;

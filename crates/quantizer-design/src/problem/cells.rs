@@ -26,7 +26,7 @@ impl Problem<'_> {
             joint.fill(0.0);
             own.fill(0.0);
             for b in a + 1..edges {
-                // Slivers are added up, never differenced, so far cells keep their relative accuracy.
+                // Small intervals are added up, never subtracted, so that far cells keep their relative accuracy.
                 for (other, m) in joint.chunks_exact_mut(width).enumerate() {
                     let at = (other * (edges - 1) + b - 1) * width;
                     m.iter_mut().zip(&sums[at..at + width]).for_each(|(m, s)| *m += s);

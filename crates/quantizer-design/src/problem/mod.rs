@@ -1,4 +1,4 @@
-//! A criterion as a function of the breakpoints of some groups, the others being fixed: value, gradient and Hessian.
+//! A criterion as a function of the breakpoints of some groups, with the others fixed: value, gradient and Hessian.
 //!
 //! For a group of `N` identical sensors with received-symbol probabilities `P_t` the reports enter through multinomial
 //! probabilities `R_N(n)`. A breakpoint moves probability between two neighbouring cells, so `dP_t/db_i = c_{t,i} phi_i` with
@@ -10,8 +10,8 @@
 //!                       + [i = j] N sum_t c_{t,i} phi_i' R_{N-1}(n - e_t)
 //! ```
 //!
-//! The node sums therefore run over the few functions `R_N`, `phi_i R_{N-1}`, `phi_i' R_{N-1}` and `phi_i phi_j R_{N-2}`; the
-//! channel's coefficients act on the results. No term divides by a cell probability, so empty cells are harmless.
+//! The node sums are therefore needed only for the functions `R_N`, `phi_i R_{N-1}`, `phi_i' R_{N-1}` and `phi_i phi_j R_{N-2}`; the
+//! channel's coefficients are applied to the results. There is no division by a cell probability, so empty cells do no harm.
 
 mod cells;
 mod second_order;
@@ -25,7 +25,7 @@ use crate::moments::{Table, dot, moments};
 use crate::newton::Objective;
 use crate::system::System;
 
-/// A criterion (signed so that larger is better) over the breakpoints of the active groups.
+/// A criterion (signed so that larger is better) as a function of the breakpoints of the active groups.
 #[derive(Debug, Clone)]
 pub(crate) struct Problem<'a> {
     system: &'a System,
@@ -33,7 +33,7 @@ pub(crate) struct Problem<'a> {
     active: Vec<Active<'a>>,
     /// Report probabilities of each fixed group.
     fixed: Vec<Table>,
-    /// Log multiplicity of every joint outcome, fixed groups slowest.
+    /// Log multiplicity of every joint outcome; fixed groups vary slowest.
     log_multiplicity: Vec<f64>,
     constant: f64,
 }
@@ -71,7 +71,7 @@ impl Objective for Problem<'_> {
 }
 
 impl<'a> Problem<'a> {
-    /// The criterion over the breakpoints of the groups `active` (increasing, may be empty).
+    /// The criterion over the breakpoints of the groups `active` (increasing indices, possibly none).
     pub(crate) fn new(system: &'a System, criterion: Criterion, active: &[usize]) -> Result<Self, Error> {
         system.check_outcomes()?;
         let model = system.model();
@@ -90,6 +90,7 @@ impl<'a> Problem<'a> {
             if scored.has_separable_entropy() {
                 constant += entry.group.sensors().len() as f64 * negative_entropy(&symbols, &model.mass.weights);
             }
+            // Groups that stay fixed enter through the probabilities of their reports.
             fixed.push(reports);
             log_multiplicity = sums(&log_multiplicity, &entry.compositions.log_multiplicity);
         }
@@ -106,7 +107,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// The breakpoints of the active groups as they are in the system.
+    /// The breakpoints of the active groups in the system.
     pub(crate) fn start(&self) -> Vec<f64> {
         self.active.iter().flat_map(|a| a.breakpoints().to_vec()).collect()
     }
@@ -121,7 +122,7 @@ impl<'a> Problem<'a> {
             })
     }
 
-    /// Least probability of a cell of an active group: `(group, cell, probability)`.
+    /// The least probable cell of the active groups: `(group, cell, probability)`.
     pub(crate) fn rarest_cell(&self, b: &[f64]) -> Option<(usize, usize, f64)> {
         let mass = &self.system.model().mass.weights;
         let cells = self.active.iter().zip(self.split(b)).flat_map(|(a, b)| {
@@ -173,7 +174,7 @@ impl<'a> Problem<'a> {
             .sum()
     }
 
-    /// Moments over all joint outcomes, some groups' reports replaced; the rows of a replaced group are `(i, m)`.
+    /// Moments over all joint outcomes, with the reports of some groups replaced; the rows of a replaced group are `(i, m)`.
     fn node_sums(&self, slots: &[Slots], replaced: &[(usize, Slot)]) -> Vec<f64> {
         let mut tables: Vec<&Table> = self.fixed.iter().collect();
         for (g, slots) in slots.iter().enumerate() {
@@ -185,7 +186,7 @@ impl<'a> Problem<'a> {
                 Some(Slot::Second) => (Some(&slots.pairs), &slots.reports[2]),
             };
             tables.extend(factor);
-            // With no sensor left the reports are a single row of ones.
+            // Without sensors the reports are a single row of ones.
             if factor.is_none() || others.rows() > 1 {
                 tables.push(others);
             }

@@ -41,7 +41,7 @@ impl Problem<'_> {
             offset += b.len();
         }
 
-        // Moments of every outcome, and what a change of each is worth.
+        // Moments of every outcome, and the derivatives of the score with respect to them.
         let full = self.node_sums(&slots, &[]);
         value += self.score(&full);
         let mut worth = vec![0.0; full.len()];
@@ -87,7 +87,7 @@ impl Problem<'_> {
                 }
                 for (h, crossed) in (g + 1..self.active.len()).zip(&crossed) {
                     let other = &self.active[h];
-                    // The axis of h in tables whose axis g has one report fewer.
+                    // The axis of h in tables in which axis g has one report fewer.
                     let plain = self.axis(h, width);
                     let shrunk = Axis {
                         outer: plain.outer / a.compositions.len() * below,
@@ -119,7 +119,7 @@ impl Problem<'_> {
             }
         }
 
-        // Second derivatives of the score along pairs of changes.
+        // Second derivatives of the score for pairs of breakpoint changes.
         let mut bent = vec![0.0; full.len()];
         for p in 0..total {
             let outcomes = full.chunks_exact(width).zip(changes[p].chunks_exact(width));
@@ -151,6 +151,7 @@ impl Problem<'_> {
         let mut gradient = DVector::zeros(n);
         let mut hessian = DMatrix::zeros(n, n);
         let mut worth = vec![0.0; nodes];
+        // A moving breakpoint transfers probability from one cell to its neighbour; `exchange` has the sign for each symbol.
         for i in 0..n {
             worth.fill(0.0);
             for (t, c) in a.exchange[i].iter().enumerate().filter(|(_, c)| **c != 0.0) {

@@ -1,20 +1,20 @@
-//! Alternating maximisation for one sensor (Algorithm 7, with its stop rule mended).
+//! Alternating maximisation for one sensor (Algorithm 7, with its stopping rule corrected).
 //!
 //! ```text
 //! b <- initial breakpoints;  I_old <- I(b)
 //! repeat
 //!     score(t, x) <- ln p(t | x) / p(t) under b                       # the decoder for the present cells
-//!     D_z(y)      <- E[ sum_t C[t, z] score(t', t, X) ; Y = y ]       # what reporting y as z is worth
+//!     D_z(y)      <- E[ sum_t C[t, z] score(t', t, X) ; Y = y ]       # gain of reporting y as z
 //!     cells       <- { y : argmax_z D_z(y) }                          # edges to machine precision
 //!     I_new       <- I(b)
 //! until |I_new - I_old| <= tolerance * I_new and no breakpoint moved by more than breakpoint_tolerance
 //! ```
 //!
-//! Each half step cannot lower the criterion, so it climbs, linearly: 25 steps to 1e-12 for four levels in unit noise and 85
-//! for eight, where Newton's method ([`joint`](crate::design::joint)) takes five and seven. Its merit is that it finds the cells by
-//! itself, contiguous or not. The printed algorithm stops when the *un-normalised* objective `E ln p(x | z)` changes
-//! relatively little; that objective is negative in common cases and depends on the unit of `x`, so mutual information itself
-//! is used here (errata). Edges are found by root search; deciding cell by cell on a fixed grid of `y` stalls up to 10 % short.
+//! No half step can lower the criterion. Convergence is linear: 25 steps to 1e-12 for four levels in unit noise and 85
+//! for eight, where Newton's method ([`joint`](crate::design::joint)) takes five and seven. Its advantage is that it finds the cells by
+//! itself, contiguous or not. The printed algorithm stops if the *un-normalised* objective `E ln p(x | z)` has a small relative
+//! change. That objective is negative in common cases and depends on the unit of `x`, so mutual information
+//! is used here (errata). Edges are found by root search; decisions cell by cell on a fixed grid of `y` stop up to 10 % short.
 
 use super::cells::{level_gains, single_sensor};
 use crate::AllowedCells;
@@ -26,20 +26,20 @@ use crate::system::System;
 use fewbits_numerics::newton;
 use fewbits_quantizers::Quantizer;
 
-/// Scan of the sample axis: this many standard deviations either side, in this many steps.
+/// Range of the sample axis that is scanned, in standard deviations to either side, and number of steps.
 const REACH: f64 = 7.0;
 const SCAN: usize = 560;
 
-/// Stop rule of [`alternate`].
+/// Stopping rule of [`alternate`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alternating {
-    /// Relative change of the criterion that ends the iteration.
+    /// The iteration ends at this relative change of the criterion.
     pub tolerance: f64,
-    /// Change of every breakpoint that is allowed at the end, in standard deviations of the sample.
+    /// Largest change of a breakpoint that is allowed at the end, in standard deviations of the sample.
     pub breakpoint_tolerance: f64,
-    /// Most steps.
+    /// Largest number of steps.
     pub max_iterations: usize,
-    /// Which cells are accepted.
+    /// Whether a level may have several intervals.
     pub cells: AllowedCells,
 }
 
@@ -61,15 +61,15 @@ pub struct Alternated {
     pub system: System,
     /// Value of the criterion.
     pub value: f64,
-    /// Steps taken.
+    /// Number of steps.
     pub iterations: usize,
 }
 
-/// Designs the quantizer of the single sensor in group `group` by alternating maximisation, the others fixed.
+/// Designs the quantizer of the single sensor in group `group` by alternating maximisation; all others are fixed.
 ///
 /// # Errors
-/// [`Error::NotConverged`] at the iteration limit; [`Error::NotContiguous`] if contiguous cells were asked for and are not
-/// best; [`Error::VanishingCell`] if a level is best nowhere; [`Error::Argument`] if the group is not a single sensor.
+/// [`Error::NotConverged`] at the iteration limit; [`Error::NotContiguous`] if contiguous cells were asked for but are not the
+/// best; [`Error::VanishingCell`] if a level is the best one nowhere; [`Error::Argument`] if the group is not a single sensor.
 pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alternating) -> Result<Alternated, Error> {
     let mut current = system.clone();
     let mut value = current.value(criterion)?;
@@ -85,6 +85,7 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
                 labels: quantizer.labels().to_vec(),
             });
         }
+        // Breakpoints can be compared only as long as the cells keep their labels.
         let moved = if old.labels() == quantizer.labels() {
             let pairs = old.breakpoints().iter().zip(quantizer.breakpoints());
             pairs.fold(0.0, |m, (a, b)| f64::max(m, (a - b).abs()))
@@ -110,7 +111,7 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
     })
 }
 
-/// One step of [`alternate`]: the best cells for the decoder of the present ones.
+/// One step of [`alternate`]: the best cells for the decoder that belongs to the present cells.
 ///
 /// # Errors
 /// As [`alternate`].
@@ -129,9 +130,9 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
     let (channel, values) = (entry.channel(), model.values.len());
     let (outputs, inner) = (channel.outputs(), system.groups()[group + 1..].iter().map(|g| g.outcomes() as usize));
     let inner: usize = inner.product();
-    // Logarithms of the likelihoods, and the place of an outcome among them.
+    // Log likelihoods, and the index of an outcome in their table.
     let (logs, is_by_group) = if model.is_discrete() {
-        // Hypotheses may be so far apart that the probability of a wrong symbol underflows: its logarithm counts.
+        // If hypotheses are far apart, the probability of a wrong symbol underflows, but its logarithm is needed.
         (log_likelihoods(system)?, true)
     } else {
         let symbols = Table::new(own.symbols(own.breakpoints()), nodes);
@@ -174,7 +175,7 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
     Ok(Quantizer::with_labels(breakpoints, labels)?)
 }
 
-/// The functions `D_z(y)`: sums over the nodes of gains times the density of the sample, which far out is in logarithms only.
+/// The functions `D_z(y)`: sums over the nodes of gain times density of the sample. Far out, the density is available as a logarithm only.
 struct Worth<'a> {
     gains: &'a Table,
     means: &'a [f64],
@@ -189,7 +190,7 @@ impl Worth<'_> {
     }
 
     fn best(&self, y: f64) -> usize {
-        // Relative to the likeliest node: far from all means every density underflows.
+        // Relative to the likeliest node, since far from all means every density underflows.
         let logs: Vec<f64> = self.means.iter().map(|m| self.log_density(y, *m)).collect();
         let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let density: Vec<f64> = logs.iter().map(|l| (l - largest).exp()).collect();
@@ -203,10 +204,10 @@ impl Worth<'_> {
         best.0
     }
 
-    /// Where level `after` overtakes level `before`, which is the better one at `low` and the worse at `high`.
+    /// The sample at which level `after` becomes better than level `before`, which is the better one at `low` and the worse one at `high`.
     ///
-    /// The root of `ln A - ln B`, where `A` is the sum over the nodes at which `after` gains and `B` that over the nodes at
-    /// which it loses. For two hypotheses this is a straight line.
+    /// The root of `ln A - ln B`, where `A` is the sum over the nodes at which `after` gains and `B` the sum over the nodes at
+    /// which it loses. For two hypotheses this function is a straight line.
     fn crossing(&self, before: usize, after: usize, low: f64, high: f64) -> f64 {
         let pairs = self.gains.row(after).iter().zip(self.gains.row(before));
         let (mut gained, mut lost) = (Vec::new(), Vec::new());

@@ -1,7 +1,7 @@
-//! The gain of reporting a sample as one level or another, for fixed other sensors and a fixed decoder.
+//! The gain of each level for a sample, for fixed other sensors and a fixed decoder.
 //!
-//! With the decoder's scores held fixed every criterion is linear in the sensor's decisions, so the best level at a sample `y`
-//! is the largest of a few functions `D_z(y)`, on which the alternating algorithm rests.
+//! For fixed scores of the decoder every criterion is linear in the sensor's decisions. The best level for a sample `y`
+//! is then the one with the largest of a few functions `D_z(y)`. The alternating algorithm uses this.
 
 use crate::criterion::{Criterion, LOG_FLOOR};
 use crate::error::{Error, refuse};
@@ -10,7 +10,7 @@ use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
 use fewbits_quantizers::Channel;
 
-/// The logarithm that stands for the probability of what cannot happen: finite, so that a weight of zero removes it.
+/// Stands for the logarithm of probability zero. It is finite, so that a weight of zero removes it.
 const LOG_IMPOSSIBLE: f64 = -1e12;
 
 /// The group if it is a single sensor.
@@ -24,9 +24,9 @@ pub(super) fn single_sensor(system: &System, group: usize) -> Result<&SensorGrou
 
 /// `lambda_z(node) = sum_k w_k P(node | x_k) sum_t' P(t' | node) sum_t C[t, z] score(t', t, x_k)`, levels by nodes.
 ///
-/// `others` holds the joint report probabilities of the other sensors, a row per report. The score is `ln p(t', t | x) / p(t', t)`, minus
-/// the squared error of the posterior mean, or minus one for a wrong decision. It follows from `log_likelihood(i)`, one number per value of
-/// the unknown, of the outcome `i = other * outputs + symbol`. Probabilities may underflow, their logarithms may not.
+/// `others` holds the joint report probabilities of the other sensors, one row per report. The score is `ln p(t', t | x) / p(t', t)`, or
+/// minus the squared error of the posterior mean, or minus one for a wrong decision. It is computed from `log_likelihood(i)` of the outcome
+/// `i = other * outputs + symbol`, one number per value of the unknown. Probabilities may underflow; their logarithms must not.
 pub(super) fn level_gains<'a>(
     model: &ObservationModel,
     criterion: Criterion,
@@ -49,6 +49,7 @@ pub(super) fn level_gains<'a>(
             }
         }
     }
+    // The gain of a level is the mean gain of the symbols into which the channel turns it.
     let mut gains = vec![0.0; channel.inputs() * nodes];
     for (z, row) in gains.chunks_exact_mut(nodes).enumerate() {
         for (t, symbol) in per_symbol.chunks_exact(nodes).enumerate() {
@@ -61,12 +62,12 @@ pub(super) fn level_gains<'a>(
     Table::new(gains, nodes)
 }
 
-/// Score of the decoder's answer to one outcome, for each value of the unknown.
+/// Score of the decoder for one outcome, for each value of the unknown.
 fn scores(model: &ObservationModel, criterion: Criterion, log_likelihood: &[f64], out: &mut [f64]) {
     // Relative to the most likely value, so that the largest number is 1.
     let largest = log_likelihood.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if largest == f64::NEG_INFINITY {
-        // An outcome that no value can cause.
+        // An outcome that has probability zero for all values.
         out.fill(0.0);
         return;
     }

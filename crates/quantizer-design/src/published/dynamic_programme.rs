@@ -1,18 +1,18 @@
-//! The best contiguous quantizer of one sensor on a grid of candidate breakpoints, the others being fixed.
+//! The best contiguous quantizer of one sensor on a grid of candidate breakpoints, with the others fixed.
 //!
-//! Behind an ideal channel every criterion is a sum over cells, so the best partition into intervals follows by dynamic
+//! Behind an ideal channel every criterion is a sum over cells, so the best partition into intervals is found by dynamic
 //! programming over the right edge of the last cell:
 //!
 //! ```text
-//! v(a, b)   <- worth of the cell (e_a, e_b]
+//! v(a, b)   <- contribution of the cell [e_a, e_b)
 //! V_1(b)    <- v(0, b)
 //! V_l(b)    <- max over a < b of V_{l-1}(a) + v(a, b)      for l = 2..L
 //! partition <- trace back from V_L(end)
 //! ```
 //!
-//! This is globally optimal among contiguous quantizers of that sensor on the grid, and for a binary unknown among all
-//! quantizers of it, since the best cells are then intervals of the likelihood ratio. It says nothing about several sensors
-//! at once: coordinate-wise optima abound where their noise is correlated.
+//! The result is the global optimum among contiguous quantizers of that sensor on the grid. For a binary unknown it is the optimum among
+//! all its quantizers, since the best cells are then intervals of the likelihood ratio. It is no global optimum for several sensors
+//! together: if their noise is correlated, there are many coordinate-wise optima.
 
 use super::cells::single_sensor;
 use crate::criterion::Criterion;
@@ -21,10 +21,10 @@ use crate::problem::Problem;
 use crate::system::System;
 use fewbits_quantizers::Quantizer;
 
-/// Most candidates: the work grows with their square.
+/// Largest number of candidates; the work grows with its square.
 const MAX_CANDIDATES: usize = 2000;
 
-/// The best quantizer of the sensor in `group` with breakpoints among `candidates`, and the criterion's value with it.
+/// The best quantizer of the sensor in `group` with breakpoints among `candidates`, and the value of the criterion with it.
 ///
 /// # Errors
 /// [`Error::Argument`] if the group is not a single sensor behind an ideal channel, or the candidates are not increasing
@@ -44,7 +44,7 @@ pub fn best_contiguous(
         let count = format!("{} candidates", candidates.len());
         return refuse("candidates", count, format!("{} to {MAX_CANDIDATES} numbers", levels - 1));
     }
-    // The checks of a quantizer are those of a candidate grid.
+    // Candidates must satisfy the same conditions as the breakpoints of a quantizer.
     Quantizer::new(candidates.to_vec())?;
     let problem = Problem::new(system, criterion, &[group])?;
     let cells = problem.cell_values(candidates);

@@ -1,9 +1,9 @@
-//! Which words, and how many cells, for sensors that report over a binary symmetric channel.
+//! Assignments of words to cells for sensors that report over a binary symmetric channel.
 //!
-//! Inverting the same bit of every word, or exchanging two bit positions, changes nothing on a symmetric channel. Up to that
-//! there are few assignments of words to the cells of a short quantizer (three for four cells and two bits: natural, Gray and
-//! one more), so they are all designed and compared. Fewer cells than words is an assignment too: behind a poor channel it is
-//! the best one, and the design of the full number of cells squeezes cells out.
+//! On a symmetric channel nothing changes if the same bit of every word is inverted or two bit positions are exchanged. Without these
+//! equivalents a short quantizer has few assignments of words to cells (three for four cells and two bits: natural, Gray and
+//! one more), so all of them are designed and compared. Assignments with fewer cells than words are included: with a poor channel one of
+//! them is the best, and a design of the full number of cells makes cells empty.
 
 use crate::criterion::Criterion;
 use crate::design::{Design, joint};
@@ -17,12 +17,12 @@ use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::lloyd_max;
 use std::ops::RangeInclusive;
 
-/// Longest word whose assignments are enumerated: `8! / 48` of them.
+/// Longest word for which assignments are enumerated: `8! / 48` of them.
 const MAX_BITS: u32 = 3;
-/// Largest number of classes combined over sensors.
+/// Largest number of combinations of assignments over the sensors.
 const MAX_COMBINATIONS: u64 = 20_000;
 
-/// An assignment of words and the design found for it.
+/// An assignment of words and its design.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WordsDesign {
     /// Word of each cell from left to right, for each group of the design.
@@ -31,17 +31,17 @@ pub struct WordsDesign {
     pub design: Design,
 }
 
-/// Whether sensors may use different words.
+/// Whether the sensors may use different words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Words {
     /// All sensors use the same words.
     Shared,
-    /// Each sensor may use its own.
+    /// Each sensor may use words of its own.
     PerSensor,
 }
 
-/// One representative of every class of injective assignments of `bits`-bit words to `cells` cells: the smallest sequence that bit
-/// inversions and exchanges of bit positions lead to.
+/// One representative of every equivalence class of assignments of `bits`-bit words to `cells` cells: the smallest sequence that
+/// inverting bits and exchanging bit positions can give.
 ///
 /// # Errors
 /// If `bits` is not in `1..=3` or `cells` is not in `2..=2^bits`.
@@ -58,13 +58,13 @@ fn word_classes(bits: u32, cells: usize) -> Result<Vec<Vec<u32>>, Error> {
         let image = |order: &Vec<u32>| words.iter().map(|w| permuted(w ^ words[0], order)).collect::<Vec<_>>();
         orders.iter().all(|order| image(order) >= *words)
     };
-    // Complementing bits brings any first word to 0.
+    // Inverting bits turns any first word into 0.
     let mut words = arrangements(1 << bits, cells);
     words.retain(|words| words[0] == 0 && is_smallest(words));
     Ok(words)
 }
 
-/// All sequences of so many different numbers below `count`, in lexicographic order.
+/// All sequences of `length` different numbers below `count`, in lexicographic order.
 fn arrangements(count: u32, length: usize) -> Vec<Vec<u32>> {
     (0..length).fold(vec![Vec::new()], |lists: Vec<Vec<u32>>, _| {
         let longer = |list: Vec<u32>| {
@@ -75,16 +75,15 @@ fn arrangements(count: u32, length: usize) -> Vec<Vec<u32>> {
     })
 }
 
-/// Designs the sensors of `model` for every class of assignments, best first.
+/// Designs the sensors of `model` for every equivalence class of assignments; results are sorted, best first.
 ///
-/// Every sensor sends words of `bits` bits over its own binary symmetric channel of the given crossover. `cells` bounds the
-/// number of cells. Each design is the
-/// joint Newton optimum from Lloyd-Max quantizers of the samples; assignments whose design loses a cell or does not converge
-/// are left out, since one with fewer cells stands for them.
+/// Every sensor sends words of `bits` bits over its own binary symmetric channel of the given crossover. `cells` is the range of the
+/// number of cells. Each design is the joint Newton optimum from Lloyd-Max quantizers of the samples. Assignments whose design loses a
+/// cell or does not converge are left out; an assignment with fewer cells is in the list instead.
 ///
 /// # Errors
-/// [`Error::Argument`] if `bits` is not in `1..=3`, `cells` not in `2..=2^bits`, or the crossover no probability up to 1/2; [`Error::TooLarge`] for more than
-/// 20000 combinations of mixed assignments.
+/// [`Error::Argument`] if `bits` is not in `1..=3`, `cells` is not in `2..=2^bits`, or the crossover is not in `[0, 1/2]`;
+/// [`Error::TooLarge`] for more than 20000 combinations of assignments.
 pub fn assign_words(
     model: &ObservationModel,
     bits: u32,
@@ -103,7 +102,7 @@ pub fn assign_words(
         Error::at_most("list of assignments", needed, MAX_COMBINATIONS)?;
         (0..sensors).fold(vec![Vec::new()], |lists: Vec<Vec<usize>>, n| {
             let longer = |list: &Vec<usize>| {
-                // Sensors of one law may be exchanged: keep their classes in order.
+                // Sensors of equal noise may be exchanged, so their classes are kept in order.
                 let first = if n > 0 && model.interchangeable(n - 1, n) {
                     list[n - 1]
                 } else {

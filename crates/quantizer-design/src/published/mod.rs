@@ -1,13 +1,13 @@
-//! Algorithms of the publications, for comparison with their tables, and searches beside which a request is judged. To design
+//! Algorithms of the publications, for reproducing their tables, and searches with which a request is compared. To design
 //! quantizers, use [`Request`](crate::Request).
 //!
 //! | item | source |
 //! |---|---|
 //! | [`alternate`], [`alternating_step`] | Algorithm 7: one sensor, with its stop rule corrected |
 //! | [`best_contiguous`] | the best intervals of one sensor on a grid, by dynamic programming |
-//! | [`separate`], [`Separation`] | quantizers that keep two hypotheses apart (Poor and Thomas) |
+//! | [`separate`], [`Separation`] | quantizers with the largest distance between two hypotheses (Poor and Thomas) |
 //! | [`assign_words`] | Table 4.5 for every assignment of words |
-//! | [`symmetry_breaking`] | where equal quantizers stop being an optimum |
+//! | [`symmetry_breaking`] | the noise at which equal quantizers stop being an optimum |
 
 mod alternating;
 mod cells;

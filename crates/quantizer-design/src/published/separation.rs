@@ -1,4 +1,4 @@
-//! Quantizers that keep two hypotheses apart, one sensor at a time (Poor and Thomas).
+//! Quantizers with the largest distance between two hypotheses, one sensor at a time (Poor and Thomas).
 
 use crate::criterion::LOG_FLOOR;
 use crate::deadline::Deadline;
@@ -17,19 +17,19 @@ use nalgebra::{DMatrix, DVector};
 pub enum Separation {
     /// `sum (sqrt p0 - sqrt p1)^2 = 2 (1 - sum sqrt(p0 p1))`.
     Matusita,
-    /// `-ln sum sqrt(p0 p1)`: a function of the Matusita distance, so with the same optimum.
+    /// `-ln sum sqrt(p0 p1)`: a function of the Matusita distance, so it has the same optimum.
     Bhattacharyya,
     /// `sum (p1 - p0) ln(p1 / p0)`.
     JDivergence,
 }
 
-/// Bhattacharyya coefficient: 1 if the distributions are equal, 0 if they never meet.
+/// Bhattacharyya coefficient: 1 if the distributions are equal, 0 if no symbol has positive probability under both.
 fn affinity(p0: &[f64], p1: &[f64]) -> f64 {
     p0.iter().zip(p1).map(|(a, b)| (a * b).sqrt()).sum()
 }
 
 impl Separation {
-    /// The distance of two distributions; infinite for a J-divergence where only one of them vanishes.
+    /// The distance of two distributions; the J-divergence is infinite if a symbol has probability zero under only one of them.
     pub fn of(self, p0: &[f64], p1: &[f64]) -> f64 {
         match self {
             Self::Matusita => p0.iter().zip(p1).map(|(a, b)| (a.sqrt() - b.sqrt()).powi(2)).sum(),
@@ -43,7 +43,7 @@ impl Separation {
         }
     }
 
-    /// First and second derivatives of a symbol's share with respect to `p0` and `p1`.
+    /// First and second derivatives of a symbol's term with respect to `p0` and `p1`.
     fn bend(self, a: f64, b: f64) -> ([f64; 2], [f64; 3]) {
         let (a, b) = (a.max(LOG_FLOOR), b.max(LOG_FLOOR));
         match self {
@@ -60,10 +60,10 @@ impl Separation {
     }
 }
 
-/// The quantizer of one sensor that separates the hypotheses 0 and `signal` best, and the distance reached.
+/// The quantizer of one sensor with the largest distance between the hypotheses 0 and `signal`, and the distance.
 ///
-/// `start` gives the number of levels, the labels and the first breakpoints; `deviation` is the noise's standard deviation. Under
-/// equal noise the optimum is symmetric about `signal / 2`.
+/// `start` gives the number of levels, the labels and the first breakpoints; `deviation` is the noise's standard deviation. With
+/// equal noise under both hypotheses the optimum is symmetric about `signal / 2`.
 ///
 /// # Errors
 /// [`Error::NotConverged`]; [`Error::Argument`] if `signal` is 0 or not finite, `deviation` is not positive, or the channel does not
@@ -105,7 +105,7 @@ impl Objective for Separated<'_> {
     fn value(&self, b: &[f64]) -> f64 {
         let (p0, p1) = self.distributions(b);
         match self.distance {
-            // Both grow as the coefficient falls, which keeps its digits where the distance is close to its limit.
+            // Both distances increase as the coefficient decreases. The coefficient keeps its digits if the distance is close to its limit.
             Separation::Matusita | Separation::Bhattacharyya => -2.0 * affinity(&p0, &p1),
             Separation::JDivergence => self.distance.of(&p0, &p1),
         }

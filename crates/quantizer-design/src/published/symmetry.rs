@@ -5,22 +5,23 @@ use crate::error::{Error, refuse};
 use crate::system::System;
 use nalgebra::SymmetricEigen;
 
-/// Bisections: enough to exhaust the precision of the bracket.
+/// Number of bisections; enough to reach the precision of the bracket.
 const BISECTIONS: usize = 60;
 
-/// The parameter between `low` and `high` at which the largest curvature of `criterion` changes its sign.
+/// The parameter between `low` and `high` at which the largest curvature of `criterion` changes sign.
 ///
-/// `family(parameter)` is a system at a stationary point of the criterion, such as two sign quantizers at zero in noise of
-/// that standard deviation; beyond the returned parameter some asymmetric change improves it.
+/// `family(parameter)` must be a system at a stationary point of the criterion, such as two sign quantizers at zero in noise of
+/// that standard deviation. Beyond the returned parameter some asymmetric change improves the criterion.
 ///
 /// # Errors
-/// [`Error::Argument`] if the curvature has the same sign at both ends; whatever `family` raises.
+/// [`Error::Argument`] if the curvature has the same sign at both ends; errors of `family`.
 pub fn symmetry_breaking(
     mut low: f64,
     mut high: f64,
     criterion: Criterion,
     family: impl Fn(f64) -> Result<System, Error>,
 ) -> Result<f64, Error> {
+    // The largest eigenvalue of the Hessian at the symmetric design; positive if an asymmetric change improves it.
     let curvature = |parameter: f64| -> Result<f64, Error> {
         let found = family(parameter)?.derivatives(criterion)?;
         Ok(SymmetricEigen::new(found.hessian * criterion.sense()).eigenvalues.max())

@@ -6,11 +6,11 @@ use crate::error::{Error, refuse};
 use fewbits_numerics::error::{entries, finite};
 use std::ops::RangeInclusive;
 
-/// Most bits of a converter.
+/// Largest number of bits of a converter.
 const MAX_CONVERTER_BITS: u32 = 24;
 
-/// A converter of evenly spaced codes: code `k` stands for the samples from `low + k step` up to the next code. Samples outside
-/// the range saturate.
+/// A converter with evenly spaced codes: code `k` stands for the samples from `low + k step` up to the next code. Samples outside
+/// the range get the first or last code.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adc {
     bits: u32,
@@ -19,7 +19,7 @@ pub struct Adc {
 }
 
 impl Adc {
-    /// A converter of so many bits over a range, in the unit of the unknown.
+    /// A converter of `bits` bits over a range, in the unit of the unknown.
     ///
     /// # Errors
     /// If `bits` is not in `1..=24`, or the range is empty or not finite.
@@ -39,7 +39,7 @@ impl Adc {
         self.bits
     }
 
-    /// Width of a code, in the unit of the unknown.
+    /// Width of the interval of a code, in the unit of the unknown.
     pub fn step(&self) -> f64 {
         (self.high - self.low) / f64::from(1u32 << self.bits)
     }
@@ -51,26 +51,27 @@ impl Adc {
         (((sample - self.low) / self.step()).floor() as u32).min(largest)
     }
 
-    /// The smallest sample of a code above 0.
+    /// The smallest sample with this code, for a code above 0.
     pub fn threshold(&self, code: u32) -> f64 {
         self.low + f64::from(code) * self.step()
     }
 
-    /// The code at whose edge a breakpoint is nearest.
+    /// The code whose lower edge is nearest to a breakpoint.
     fn nearest(&self, breakpoint: f64) -> u32 {
         let largest = (1u32 << self.bits) - 1;
         (((breakpoint - self.low) / self.step()).round() as u32).clamp(1, largest)
     }
 }
 
-/// A design whose breakpoints are codes.
+/// A design whose breakpoints are edges of converter codes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rounded {
     /// The converter of each sensor.
     pub adcs: Vec<Adc>,
-    /// Thresholds of each sensor: a sample belongs to the cell whose number is how many thresholds its code reaches.
+    /// Thresholds of each sensor, as codes: the cell of a sample is the number of thresholds that its code reaches.
     pub thresholds: Vec<Vec<u32>>,
-    /// The design with these breakpoints, its value and its decoder. Its certificate is void.
+    /// The design with these breakpoints, its value and its decoder. Its certificate is
+    /// [`Certificate::Unproved`](crate::Certificate::Unproved).
     pub solution: Solution,
 }
 
@@ -83,10 +84,10 @@ impl Rounded {
 }
 
 impl Solution {
-    /// The design with every breakpoint moved to the nearest edge of a code, one converter per sensor. Breakpoints that meet there
-    /// are one, and the cell between them is gone.
+    /// The design with every breakpoint moved to the nearest edge of a code, with one converter per sensor. Breakpoints that meet
+    /// become one, and the cell between them is removed.
     ///
-    /// The value of the result is exact: the cells are those of the codes.
+    /// The value of the result is exact, since it is computed for the cells of the codes.
     ///
     /// # Errors
     /// If there is not one converter per sensor.
@@ -98,7 +99,7 @@ impl Solution {
             for (breakpoint, word) in sensor.breakpoints.iter().zip(&sensor.words[1..]) {
                 let code = adc.nearest(*breakpoint);
                 if codes.last() == Some(&code) {
-                    // The cell before has no code left: the next word takes its place.
+                    // The previous cell has no code left, so it gets the next word.
                     words.pop();
                 } else {
                     codes.push(code);

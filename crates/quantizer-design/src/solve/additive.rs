@@ -1,4 +1,4 @@
-//! A decoder that takes little memory: one number per symbol of each sensor, added up.
+//! A decoder that needs little memory: the estimate is a sum of one number per sensor.
 
 use super::solution::Solution;
 use crate::error::{Error, refuse};
@@ -7,7 +7,8 @@ use crate::moments::{Table, dot, moments};
 use fewbits_numerics::error::entries;
 use nalgebra::{DMatrix, DVector};
 
-/// Singular values below this share of the largest count as zero: the symbols' indicators sum to one for every sensor.
+/// Singular values below this fraction of the largest are treated as zero. They occur because the indicators of a sensor's symbols sum to
+/// one.
 const RANK_TOLERANCE: f64 = 1e-12;
 
 /// The best estimate of the form `offset + sum_n weight_n[symbol_n]`.
@@ -15,7 +16,7 @@ const RANK_TOLERANCE: f64 = 1e-12;
 pub struct AdditiveDecoder {
     /// Mean of the unknown.
     pub offset: f64,
-    /// A number per symbol, for every sensor.
+    /// For every sensor, a number per symbol.
     pub weights: Vec<Vec<f64>>,
     /// Mean squared error of these estimates, in squared units.
     pub mean_squared_error: f64,
@@ -39,10 +40,10 @@ impl AdditiveDecoder {
 }
 
 impl Solution {
-    /// The additive decoder of least mean squared error: normal equations from the joint probabilities of pairs of symbols.
+    /// The additive decoder of least mean squared error, by normal equations from the joint probabilities of pairs of symbols.
     ///
     /// # Errors
-    /// If a symbol table cannot be formed; cannot happen for a design that has a value.
+    /// If a symbol table cannot be computed, which cannot happen for a design that has a value.
     pub fn additive_decoder(&self) -> Result<AdditiveDecoder, Error> {
         let (system, model) = (self.system(), self.system().model());
         let mut tables: Vec<Table> = vec![Table::default(); model.sensors()];
@@ -62,7 +63,7 @@ impl Solution {
         for (m, first) in tables.iter().zip(&firsts) {
             for t in 0..m.rows() {
                 moment[first + t] = dot(&model.moment.weights, m.row(t));
-                // A sensor sends one symbol: the block of its own is diagonal.
+                // A sensor sends one symbol at a time, so its own block of the matrix is diagonal.
                 gram[(first + t, first + t)] = dot(&model.mass.weights, m.row(t));
             }
         }

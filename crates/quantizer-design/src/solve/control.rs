@@ -3,20 +3,20 @@
 use crate::deadline::Deadline;
 use std::time::{Duration, Instant};
 
-/// How far a design has come, for a display.
+/// Progress of a design, for a display.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// The present stage.
     pub stage: Stage,
-    /// Parts of the stage that are done.
+    /// Number of finished parts of the stage.
     pub done: usize,
-    /// Parts of the stage.
+    /// Number of parts of the stage.
     pub parts: usize,
     /// Time since the start.
     pub elapsed: Duration,
 }
 
-/// A part of a design. Each has a share of the time limit; what one leaves, the next may use.
+/// A stage of a design. Each has a fraction of the time limit; time that one leaves is available to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Each sensor by itself.
@@ -30,7 +30,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// The part of the time after which this stage ends.
+    /// The fraction of the time at which this stage ends.
     fn end(self) -> f64 {
         match self {
             Self::SingleSensors => 0.2,
@@ -46,7 +46,7 @@ pub(super) struct Control<'a> {
     started: Instant,
     limit: Option<Duration>,
     deadline: Deadline,
-    /// The part of the limit that is used at all.
+    /// The fraction of the time limit that is used.
     portion: f64,
     progress: Option<&'a mut dyn FnMut(Progress)>,
     pub(super) is_cut_short: bool,
@@ -67,13 +67,13 @@ impl<'a> Control<'a> {
         }
     }
 
-    /// The stages from here on end at this portion of the time limit.
+    /// From now on the stages share this fraction of the time limit.
     pub(super) fn end_with(&mut self, portion: f64) {
         self.portion = portion;
         self.enter(Stage::Certificate, 1);
     }
 
-    /// Goes on to one of `parts` equal parts of the time that is left of a stage.
+    /// Begins one of `parts` parts of a stage, which share the stage's remaining time equally.
     pub(super) fn enter(&mut self, stage: Stage, parts: usize) {
         let now = self.started.elapsed();
         let end = |limit: Duration| {
@@ -83,19 +83,19 @@ impl<'a> Control<'a> {
         self.deadline = Deadline::after(self.started, self.limit.map(end));
     }
 
-    /// When the present share of the time ends.
+    /// The end of the present part.
     pub(super) fn deadline(&self) -> Deadline {
         self.deadline
     }
 
-    /// Whether there is time left in the present share.
+    /// Whether time is left in the present part.
     pub(super) fn go_on(&mut self) -> bool {
         let is_over = self.deadline.is_over();
         self.is_cut_short |= is_over;
         !is_over
     }
 
-    /// Counts a step of the search. Whether there is time left for it.
+    /// Counts a step of the search. Returns whether time is left.
     pub(super) fn step(&mut self) -> bool {
         self.steps += 1;
         self.go_on()

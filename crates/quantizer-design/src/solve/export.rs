@@ -1,4 +1,4 @@
-//! A design as JSON, as a C header and as Rust constants.
+//! Export of a design as JSON, as a C header and as Rust constants.
 
 use super::adc::Rounded;
 use super::additive::AdditiveDecoder;
@@ -10,24 +10,24 @@ use serde_json::json;
 /// The JSON schema of [`Export::to_json`].
 pub const JSON_SCHEMA: &str = include_str!("design.schema.json");
 
-/// Bytes of a number in a decoder's table.
+/// Bytes per number in a decoder's table.
 const NUMBER_BYTES: usize = 8;
 
-/// A design with its decoder, ready to be written.
+/// A design with its decoder, for export.
 ///
-/// The decoder is a table over all joint symbols if that fits the memory limit, otherwise the best additive one.
+/// The decoder is a table over all joint symbols if that fits the memory limit, otherwise the best additive decoder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Export {
     name: String,
     solution: Solution,
     decoder: Decoder,
-    /// Thresholds in codes of a converter, one list per sensor.
+    /// Thresholds as codes of a converter, one list per sensor.
     codes: Option<Vec<Vec<u32>>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 enum Decoder {
-    /// Posterior means and standard deviations, the first sensor's symbol slowest.
+    /// Posterior means and standard deviations; the first sensor's symbol varies slowest.
     Joint {
         means: Vec<f64>,
         deviations: Vec<f64>,
@@ -36,10 +36,11 @@ enum Decoder {
 }
 
 impl Solution {
-    /// The design with a decoder whose estimates take at most `max_bytes`. `name` begins the names of all constants and functions.
+    /// The design with a decoder whose estimates take at most `max_bytes` bytes. The names of all constants and functions begin with
+    /// `name`.
     ///
     /// # Errors
-    /// If `name` is no identifier of C; [`Error::TooLarge`] if not even the additive decoder fits.
+    /// If `name` is not an identifier of C; [`Error::TooLarge`] if even the additive decoder needs more memory.
     pub fn export(&self, name: &str, max_bytes: usize) -> Result<Export, Error> {
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
         if !name.chars().all(letters) || !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
@@ -75,7 +76,7 @@ impl Solution {
             }
             let (mean, variance) = match decoder.decode_symbols(&symbols) {
                 Ok(estimate) => (estimate.mean, estimate.variance),
-                // What cannot be received leaves the prior.
+                // An outcome of probability zero gets the prior mean and deviation.
                 Err(Error::ImpossibleOutcome) => (model.mean, model.variance),
                 Err(error) => return Err(error),
             };
@@ -87,7 +88,7 @@ impl Solution {
 }
 
 impl Rounded {
-    /// As [`Solution::export`], with thresholds in codes beside the breakpoints.
+    /// As [`Solution::export`], with thresholds as converter codes in addition to the breakpoints.
     ///
     /// # Errors
     /// As [`Solution::export`].
@@ -111,7 +112,7 @@ impl Export {
         }
     }
 
-    /// The estimate from one symbol per sensor: the received word, or `2^bits` for a word that is missing.
+    /// The estimate from one symbol per sensor: the received word, or `2^bits` if the word is missing.
     ///
     /// # Errors
     /// If there is not one symbol per sensor, or a symbol is out of range.
@@ -133,7 +134,7 @@ impl Export {
         }
     }
 
-    /// The design as JSON, of the form that [`JSON_SCHEMA`] says.
+    /// The design as JSON, in the form of [`JSON_SCHEMA`].
     ///
     /// # Errors
     /// As [`Solution::mean_squared_error`].
@@ -176,7 +177,7 @@ impl Export {
         Ok(format!("{document:#}\n"))
     }
 
-    /// The design as a C header: tables, an encoder per sensor and a decoder, all `static`, C99, no other header needed.
+    /// The design as a C99 header without includes: tables, an encoder per sensor and a decoder, all `static`.
     pub fn to_c_header(&self) -> String {
         let (name, upper) = (&self.name, self.name.to_uppercase());
         let sensors = self.solution.sensors();
@@ -221,7 +222,7 @@ impl Export {
         let (name, count) = (&self.name, sensor.breakpoints.len());
         let encoder = |function: &str, kind: &str, argument: &str, edges: &str| {
             let body = if count == 0 {
-                // C has no empty arrays. A sensor behind a useless link may send one word only.
+                // C has no empty arrays. A sensor behind a useless link may use only one word.
                 format!("    (void){argument};\n    return {};\n", sensor.words[0])
             } else {
                 format!(
@@ -250,8 +251,8 @@ impl Export {
         text
     }
 
-    /// The design as constants of a Rust module without the standard library. With `fewbits-node` a sensor's word is
-    /// `WORDS_0[cell_of(&BREAKPOINTS_0, sample)?]`, or that of `THRESHOLDS_0` for the code of a converter.
+    /// The design as constants of a Rust module that does not need the standard library. With `fewbits-node` the word of a sensor is
+    /// `WORDS_0[cell_of(&BREAKPOINTS_0, sample)?]`, or the same with `THRESHOLDS_0` and the code of a converter.
     pub fn to_rust(&self) -> String {
         let mut text = String::from("// Quantizers and decoder, designed by fewbits.\n");
         for (n, s) in self.solution.sensors().iter().enumerate() {
@@ -279,7 +280,7 @@ impl Export {
     }
 }
 
-/// A table in C; nothing if it is empty.
+/// A table in C; an empty string if it has no entries.
 fn c_array<T: std::fmt::Debug>(kind: &str, name: &str, values: &[T]) -> String {
     if values.is_empty() {
         return String::new();
@@ -295,7 +296,7 @@ fn rust_array<T: std::fmt::Debug>(doc: &str, name: &str, kind: &str, values: &[T
     format!("/// {doc}\npub const {name}: [{kind}; {}] = [{}];\n", values.len(), list(values))
 }
 
-/// Numbers that read back as they were.
+/// Numbers, printed so that they read back exactly.
 fn list<T: std::fmt::Debug>(values: &[T]) -> String {
     values.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>().join(", ")
 }

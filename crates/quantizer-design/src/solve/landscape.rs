@@ -1,8 +1,8 @@
-//! A criterion as a function of which word each cell of a grid is sent as.
+//! A criterion as a function of the words that are assigned to the cells of a grid.
 //!
-//! The sample axis of every sensor is cut into a few dozen grid cells. Given the symbols of the other sensors, the moments of
-//! each grid cell are a table, the *block* of that sensor. With the block at hand neither the breakpoints nor the words of the
-//! sensor need the quadrature nodes again: a change costs a few thousand multiplications.
+//! The sample axis of every sensor is divided into a few dozen grid cells. Given the symbols of the other sensors, the moments of
+//! each grid cell form a table, the *block* of that sensor. With the block, changes of the sensor's breakpoints or words
+//! need no sums over quadrature nodes: a change takes a few thousand multiplications.
 
 use crate::criterion::{Criterion, LOG_FLOOR, Scored};
 use crate::deadline::Deadline;
@@ -12,14 +12,14 @@ use crate::moments::{Table, dot, moments_until};
 use crate::observation_model::{Feature, ObservationModel, Resolution};
 use fewbits_numerics::kernels;
 
-/// Reach of the table of a sample, in its standard deviations.
+/// Half-width of the table of a sample, in its standard deviations.
 pub(super) const REACH: f64 = 4.5;
-/// Steps of that table.
+/// Number of steps of that table.
 const PLACES: usize = 400;
-/// Sweeps over the cells of a sensor that a block serves, about.
+/// Assumed number of sweeps over the cells of a sensor per block, for estimates of the work.
 const SWEEPS: f64 = 5.0;
 
-/// Transition probabilities from sent words to received symbols, a row per symbol.
+/// Transition probabilities from sent words to received symbols, one row per symbol.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct WordLaw {
     pub(super) words: usize,
@@ -33,7 +33,7 @@ impl WordLaw {
     }
 }
 
-/// One way the world may be, on coarse nodes.
+/// One observation model, on coarse nodes.
 #[derive(Debug, Clone)]
 struct Scenario {
     weight: f64,
@@ -41,17 +41,17 @@ struct Scenario {
     features: Vec<Feature>,
 }
 
-/// The grid of one sensor: edges, and the probability of each cell at each node, scenario by scenario.
+/// The grid of one sensor: edges, and the probability of each cell at each node, for each scenario.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     pub(super) edges: Vec<f64>,
     cells: Vec<Table>,
 }
 
-/// Which word each grid cell is sent as.
+/// The word of each grid cell.
 pub(super) type Words = Vec<usize>;
 
-/// The criterion of a model, or of a mixture of models, and the words' laws.
+/// The criterion of a model, or of a mixture of models, and the channels of the words.
 #[derive(Debug, Clone)]
 pub(super) struct Landscape {
     scenarios: Vec<Scenario>,
@@ -60,7 +60,7 @@ pub(super) struct Landscape {
     samples: Vec<Sample>,
 }
 
-/// The distribution of a sensor's sample under the first scenario, tabulated.
+/// The distribution of a sensor's sample under the first scenario, as a table.
 #[derive(Debug, Clone)]
 pub(super) struct Sample {
     pub(super) mean: f64,
@@ -89,7 +89,7 @@ impl Sample {
         }
     }
 
-    /// The `parts - 1` inner quantiles.
+    /// The `parts - 1` quantiles that divide the sample into parts of equal probability.
     pub(super) fn quantiles(&self, parts: usize) -> Vec<f64> {
         (1..parts)
             .map(|i| {
@@ -116,7 +116,7 @@ pub(super) struct Block {
 }
 
 impl Landscape {
-    /// `models` are weighted; more than one only for squared error. Each is put on fewer nodes here.
+    /// `models` come with weights; more than one is possible only for the squared error. Each is discretised on fewer nodes here.
     pub(super) fn new(
         models: &[(f64, &ObservationModel)],
         criterion: Criterion,
@@ -134,7 +134,7 @@ impl Landscape {
             .zip(models)
             .map(|(model, (weight, _))| {
                 let features = if criterion == Criterion::MeanSquaredError {
-                    // Moments of all scenarios are about one point.
+                    // The moments of all scenarios are taken about the same point.
                     let (offset, mass) = (model.mean - reference, &model.mass.weights);
                     let moment = model.moment.weights.iter().zip(mass).map(|(m, w)| m + offset * w);
                     vec![model.mass.clone(), Feature::of_all(moment.collect())]
@@ -161,12 +161,12 @@ impl Landscape {
         self.scenarios.iter_mut().zip(weights).for_each(|(s, w)| s.weight = *w);
     }
 
-    /// Moments of an outcome.
+    /// Number of moments of an outcome.
     pub(super) fn width(&self) -> usize {
         self.scenarios[0].features.len()
     }
 
-    /// Multiplications that one round over the sensors takes: their blocks, and the sweeps over cells and words with each.
+    /// Multiplications of one round over the sensors: their blocks, and the sweeps over cells and words.
     pub(super) fn work(&self, grid: usize) -> f64 {
         let outcomes: f64 = self.laws.iter().map(|l| l.outputs as f64).product();
         let nodes: f64 = self
@@ -179,7 +179,7 @@ impl Landscape {
         self.laws.iter().map(block).sum()
     }
 
-    /// Tabulates a grid for one sensor.
+    /// Computes the cell probabilities of a grid for one sensor.
     pub(super) fn grid(&self, sensor: usize, edges: Vec<f64>) -> Grid {
         let cells = self.scenarios.iter().map(|scenario| {
             let (means, deviation) = scenario.model.sample_law(sensor);
@@ -196,7 +196,7 @@ impl Landscape {
         &self.samples[sensor]
     }
 
-    /// Probability of each symbol of a sensor at each node, scenario by scenario.
+    /// Probability of each symbol of a sensor at each node, for each scenario.
     pub(super) fn symbols(&self, sensor: usize, grid: &Grid, words: &[usize]) -> Vec<Table> {
         grid.cells
             .iter()
@@ -204,7 +204,7 @@ impl Landscape {
             .collect()
     }
 
-    /// The same in one scenario, given the probabilities of the grid's cells.
+    /// As [`symbols`](Self::symbols), in one scenario, given the probabilities of the grid's cells.
     fn symbols_in(&self, cells: &Table, sensor: usize, words: &[usize]) -> Table {
         let law = &self.laws[sensor];
         let nodes = cells.nodes;
@@ -221,7 +221,7 @@ impl Landscape {
         Table::new(symbols, nodes)
     }
 
-    /// The block of a sensor, given the symbols of all (its own are not used); `None` if the time is over first.
+    /// The block of a sensor, given the symbols of all sensors (its own are not used); `None` if the time limit is reached first.
     pub(super) fn block(
         &self,
         sensor: usize,
@@ -231,6 +231,8 @@ impl Landscape {
     ) -> Option<Block> {
         let mut total: Vec<f64> = Vec::new();
         for (s, scenario) in self.scenarios.iter().enumerate() {
+            // Moments of every outcome of the other sensors with every cell of this one. After this, assignments of words are evaluated by
+            // additions.
             let others = symbols
                 .iter()
                 .enumerate()
@@ -250,7 +252,7 @@ impl Landscape {
         })
     }
 
-    /// The signed criterion without constants, and without what the other sensors add to a conditional entropy.
+    /// The signed criterion, without constants and without the other sensors' part of the conditional entropy.
     pub(super) fn value(&self, block: &Block, grid: &Grid, words: &[usize]) -> f64 {
         let levels = self.levels(block, words);
         let identity: Vec<usize> = (0..self.laws[block.sensor].words).collect();
@@ -271,7 +273,7 @@ impl Landscape {
         levels
     }
 
-    /// The value if word `w` of the table is sent as `renamed[w]`.
+    /// The value if the word `w` is sent as `renamed[w]`.
     pub(super) fn value_of_levels(
         &self,
         block: &Block,
@@ -284,6 +286,7 @@ impl Landscape {
         let (width, count) = (self.width(), law.words);
         let mut outcome = vec![0.0; width];
         let mut value = 0.0;
+        // For every outcome of the other sensors, the link mixes the words to symbols, and each symbol has its value.
         for other in levels.chunks_exact(count * width) {
             for t in 0..law.outputs {
                 outcome.fill(0.0);
@@ -305,7 +308,7 @@ impl Landscape {
         negative_entropy(&symbols.values, &self.scenarios[0].model.mass.weights)
     }
 
-    /// The value of a whole design; `None` if the time is over first.
+    /// The value of a whole design; `None` if the time limit is reached first.
     pub(super) fn total(
         &self,
         grids: &[Grid],
@@ -322,12 +325,12 @@ impl Landscape {
         Some(value)
     }
 
-    /// Size against which a change of a value counts.
+    /// Scale with which changes of a value are compared.
     pub(super) fn unit(&self, value: f64) -> f64 {
         self.scored.unit(value, &self.scenarios[0].model)
     }
 
-    /// Gain of sending each grid cell as each word for a fixed decoder: `[cell][word]`.
+    /// Gain of each word for each grid cell, for a fixed decoder: `[cell][word]`.
     pub(super) fn worth(&self, block: &Block, grid: &Grid, words: &[usize]) -> Vec<f64> {
         let law = &self.laws[block.sensor];
         let (width, count, outputs) = (self.width(), law.words, law.outputs);
@@ -341,6 +344,7 @@ impl Landscape {
                 for (w, level) in own.chunks_exact(width).enumerate() {
                     add_scaled(&mut outcome, law.probability(t, w), level);
                 }
+                // For a fixed decoder the criterion is linear in the outcome, and its slope gives the gain of a cell for each symbol.
                 self.scored.slope(&outcome, 0.0, slope);
             }
             let cells = &block.moments[other * block.cells * width..(other + 1) * block.cells * width];

@@ -1,24 +1,24 @@
-//! Designs on request: who measures what, how many bits each may send, over which links, and to what end.
+//! Design of quantizers from a description of the problem: the sensors, the bits of each, the links, and the criterion.
 //!
-//! [`Request`] takes the question and [`Solutions`] holds the answers, best first. A [`Solution`] has the cells and the words of
-//! every sensor, its value, a bound, the gap to it, and a certificate; it leaves the library as thresholds of an
+//! [`Request`] is the problem and [`Solutions`] the results, best first. A [`Solution`] has the cells and words of
+//! every sensor, the value of the criterion, a bound, the gap to it, and a certificate. It can be exported as thresholds of an
 //! analogue-to-digital converter ([`Adc`]), tables, JSON, a C header or Rust constants ([`Export`]). [`Mismatch`] and
-//! [`minimax`] are about priors and noise that are not known exactly.
+//! [`minimax`] are for priors and noise that are not known exactly.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
-//! | `request`, `solution` | question and answer |
-//! | `pipeline`, `control` | from the question to the answer; time limit and progress |
+//! | `request`, `solution` | problem and result |
+//! | `pipeline`, `control` | the steps of a design; time limit and progress |
 //! | `participant`, `landscape` | sensors with cells and words; the criterion on grids |
-//! | `search`, `starts` | cells and words searched together; from which starts |
-//! | `polish`, `share` | Newton's method; shares of a total |
-//! | `adc`, `export`, `additive` | what leaves the library |
-//! | `robust` | other models than the one of the design |
+//! | `search`, `starts` | joint search of cells and words; its starts |
+//! | `polish`, `share` | Newton's method; distribution of a total number of bits |
+//! | `adc`, `export`, `additive` | export |
+//! | `robust` | models that differ from that of the design |
 //!
-//! Cells and words are searched together because over a link that inverts bits neither can be chosen first: which cells are
-//! worth having depends on which words are confused, and behind a poor link some words are better not used. Newton's method
-//! alone meets that as a cell that vanishes. Here the cells of a grid are given to words, so that a cell without use is
-//! merged by the way.
+//! Cells and words are searched together, since over a link that inverts bits neither can be chosen first: the best cells
+//! depend on which words are confused, and with a poor link some words should not be used. In Newton's method
+//! alone such a word appears as a cell that becomes empty. Here the cells of a grid are assigned to words, so a cell without use is
+//! merged with a neighbour.
 
 mod adc;
 mod additive;

@@ -1,4 +1,4 @@
-//! The sensors that take part in a design, their cells and words, and the system that these make.
+//! The sensors that take part in a design, their cells and words, and the system that they form.
 
 use super::landscape::{WordLaw, Words};
 use crate::error::Error;
@@ -10,14 +10,14 @@ use fewbits_quantizers::{Channel, Quantizer, lloyd_max};
 /// A sensor that takes part.
 #[derive(Debug, Clone)]
 pub(super) struct Participant {
-    /// Number in the request's model.
+    /// Index of the sensor in the request's model.
     pub(super) sensor: usize,
     pub(super) bits: u32,
     pub(super) link: Link,
 }
 
 impl Participant {
-    /// The sensors that have bits.
+    /// The sensors with at least one bit.
     pub(super) fn all(bits: &[u32], links: &[Link]) -> Vec<Self> {
         let pairs = bits.iter().zip(links).enumerate().filter(|(_, (bits, _))| **bits > 0);
         pairs
@@ -29,7 +29,7 @@ impl Participant {
             .collect()
     }
 
-    /// Transition probabilities from words to received symbols: the words, and one more symbol "missing" if the link loses words.
+    /// Transition probabilities from words to received symbols: the words, and one more symbol "missing" if the link can lose words.
     pub(super) fn law(&self) -> WordLaw {
         let words = 1usize << self.bits;
         let missing = missing(&self.link);
@@ -47,7 +47,7 @@ impl Participant {
     }
 }
 
-/// Probability that a word is not received. Whether that is noticed makes no difference: these sensors always report.
+/// Probability that a word is not received. It does not matter whether the loss is noticed, since these sensors always report.
 pub(super) fn missing(link: &Link) -> f64 {
     link.loss() + link.erasure()
 }
@@ -60,7 +60,7 @@ pub(super) struct WordedCells {
 }
 
 impl WordedCells {
-    /// Runs of equal words on a grid.
+    /// The cells of a grid, with runs of equal words joined.
     pub(super) fn of(edges: &[f64], words: &[usize]) -> Self {
         let changes: Vec<usize> = (1..words.len()).filter(|c| words[*c] != words[c - 1]).collect();
         Self {
@@ -71,7 +71,7 @@ impl WordedCells {
         }
     }
 
-    /// The words of the cells of a grid, each that of its middle.
+    /// The words of the cells of a grid, each the word at the middle of the grid cell.
     pub(super) fn on(&self, edges: &[f64]) -> Words {
         (0..=edges.len())
             .map(|c| {
@@ -87,7 +87,7 @@ impl WordedCells {
     }
 }
 
-/// Lloyd-Max cells of a normal sample with the word of each level.
+/// Lloyd-Max cells of a normal sample, with a word for each level.
 pub(super) fn plain(
     model: &ObservationModel,
     participants: &[Participant],
@@ -104,17 +104,17 @@ pub(super) fn plain(
     participants.iter().enumerate().map(of).collect()
 }
 
-/// Gray words.
+/// Gray code word of a level.
 pub(super) fn gray(level: usize) -> usize {
     level ^ (level >> 1)
 }
 
-/// Natural words.
+/// The word equal to the level's number.
 pub(super) fn natural(level: usize) -> usize {
     level
 }
 
-/// The system of these cells and words; symbols are the received words, and one more if a word may be missing.
+/// The system of these cells and words. Symbols are the received words, and one more if a word may be missing.
 pub(super) fn system_of(
     model: &ObservationModel,
     participants: &[Participant],
@@ -123,6 +123,7 @@ pub(super) fn system_of(
 ) -> Result<System, Error> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for n in 0..participants.len() {
+        // Sensors of equal design, link and noise form a group, whose outcomes are counts.
         let alike = groups.iter_mut().find(|group| {
             let first = group[0];
             !apart
@@ -142,7 +143,7 @@ pub(super) fn system_of(
     System::new(model.clone(), groups.collect::<Result<_, _>>()?)
 }
 
-/// Quantizer and channel of one sensor. A sensor with a single cell gets a second one that is sent as the same word.
+/// Quantizer and channel of one sensor. A sensor with a single cell gets a second cell with the same word.
 fn parts_of(
     model: &ObservationModel,
     participant: &Participant,
@@ -158,6 +159,7 @@ fn parts_of(
         labels.push(at);
     }
     let mut breakpoints = cells.breakpoints.clone();
+    // A quantizer has at least two cells: a sensor with one cell gets two with the same word.
     if used.len() == 1 {
         used.push(used[0]);
         (labels, breakpoints) = (vec![0, 1], vec![model.sample_mean()]);

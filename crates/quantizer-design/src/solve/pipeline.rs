@@ -1,4 +1,4 @@
-//! From a request to solutions: shares of a total, the search, Newton's method.
+//! The steps from a request to its solutions: bits per sensor, search, Newton's method.
 
 use super::control::{Control, Stage};
 use super::participant::{Participant, WordedCells, gray, plain};
@@ -12,11 +12,11 @@ use crate::error::{Error, refuse};
 use fewbits_numerics::error::entries;
 
 impl Request<'_> {
-    /// Makes the design: several, best first.
+    /// Computes the designs, best first.
     ///
     /// # Errors
-    /// If a number of bits is above [`MAX_BITS`], all are zero, their number is not that of the sensors, or more bits are to be
-    /// shared out than the sensors can send; [`Error::TooLarge`] if the sensors have more joint symbols than can be enumerated.
+    /// If a number of bits is above [`MAX_BITS`], all are zero, there is not one per sensor, or the total is more than
+    /// the sensors can send; [`Error::TooLarge`] if the sensors have more joint symbols than can be enumerated.
     pub fn run(mut self) -> Result<Solutions, Error> {
         let mut control = Control::new(self.time_limit, self.progress.take());
         let bits = self.checked_bits(&mut control)?;
@@ -48,6 +48,7 @@ impl Request<'_> {
         if let Some(bits) = bits.iter().find(|b| **b > MAX_BITS) {
             return refuse("bits", bits, format!("at most {MAX_BITS} bits per sensor"));
         }
+        // The words of a given start must fit the bits of their sensors.
         for (bits, cells) in bits.iter().zip(self.start.iter().flatten()) {
             if let Some(word) = cells.words.iter().find(|w| **w >= 1 << bits) {
                 return refuse("word", word, format!("a word of {bits} bits"));
@@ -78,7 +79,7 @@ impl Request<'_> {
         let mut searched = search.run(control)?;
         control.enter(Stage::Certificate, 1);
         if self.criterion == Criterion::BayesError {
-            // The error probability has kinks and many flat places: the design of most information is a good start.
+            // The error probability has kinks and flat regions; the design of largest information is a good start.
             let cells = plain(&model, &participants, gray)?;
             let deadline = control.deadline();
             let informed = polish(&model, Criterion::MutualInformation, &participants, cells, false, deadline)?;

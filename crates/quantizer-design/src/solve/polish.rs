@@ -1,4 +1,4 @@
-//! Newton's method on the breakpoints of a design found on grids, on the full nodes; a cell that vanishes is merged.
+//! Newton's method on the full nodes for the breakpoints of a design found on grids; a cell that becomes empty is merged.
 
 use super::participant::{Participant, WordedCells, system_of};
 use super::solution::Solution;
@@ -9,37 +9,37 @@ use crate::error::Error;
 use crate::newton::{Certificate, Newton};
 use crate::observation_model::{ObservationModel, Resolution};
 
-/// Newton's method is left out where the second derivatives take more multiplications than this.
+/// Newton's method is left out if the second derivatives need more multiplications than this.
 const MAX_HESSIAN_WORK: f64 = 1e8;
-/// A design whose evaluation takes more multiplications than this stays on coarse nodes, where its value is known to 1e-5.
+/// If evaluating a design needs more multiplications than this, coarse nodes are used, on which its value has an error of 1e-5.
 const MAX_VALUE_WORK: f64 = 1e9;
-/// The same when the time is over.
+/// The same after the time limit.
 const LATE_VALUE_WORK: f64 = 1e8;
-/// When the time is over, and one evaluation on coarse nodes takes more than this, the value is taken on rough ones.
+/// After the time limit, if one evaluation on coarse nodes needs more than this, rough nodes are used for the value.
 const LATE_COARSE_WORK: f64 = 3e8;
 
-/// Whether Newton's method on the full nodes is worth its time.
+/// Whether there is enough time for Newton's method on the full nodes.
 pub(super) fn is_affordable(model: &ObservationModel, criterion: Criterion, outcomes: f64) -> bool {
-    // A table as large as that of the outcomes for each sensor, twice, and for each pair.
+    // A table as large as that of the outcomes: twice for each sensor, and once for each pair.
     let sensors = model.sensors() as f64;
     let tables = 1.0 + 2.0 * sensors + 0.5 * sensors * (sensors - 1.0);
     tables * evaluation_work(model, criterion, outcomes) <= MAX_HESSIAN_WORK
 }
 
-/// Whether designs can be compared after the time is over.
+/// Whether designs can be compared after the time limit.
 pub(super) fn is_quick(model: &ObservationModel, criterion: Criterion, outcomes: f64) -> Result<bool, Error> {
     Ok(evaluation_work(&model.at(Resolution::COARSE)?, criterion, outcomes) <= LATE_COARSE_WORK)
 }
 
-/// Multiplications that one evaluation takes.
+/// Multiplications of one evaluation.
 pub(super) fn evaluation_work(model: &ObservationModel, criterion: Criterion, outcomes: f64) -> f64 {
     let per_outcome = Scored::new(criterion, model)
         .map_or(f64::INFINITY, |s| s.features().iter().map(|f| f.weights.len() as f64).sum::<f64>());
     outcomes * per_outcome
 }
 
-/// Climbs to the stationary point next to a design. Where Newton's method does not converge, or would take too long, the design
-/// stays as it is and its certificate says so. A design too large for the full nodes is evaluated on fewer.
+/// Moves to the stationary point next to a design. If Newton's method does not converge or would take too long, the design
+/// is unchanged and its certificate says so. A design too large for the full nodes is evaluated on fewer.
 pub(super) fn polish(
     model: &ObservationModel,
     criterion: Criterion,
@@ -53,7 +53,7 @@ pub(super) fn polish(
     } else {
         Scope::SharedBreakpoints
     };
-    // Most of the way goes on coarse nodes, which are a tenth as many.
+    // Most of the iterations use coarse nodes, which are a tenth as many.
     let coarse = model.at(Resolution::COARSE)?;
     let unproved = |cells: Vec<WordedCells>| {
         let mut system = system_of(model, participants, &cells, apart)?;
@@ -102,21 +102,21 @@ pub(super) fn polish(
                 }
             }
             Err(Error::NotConverged { .. }) if is_coarse => is_coarse = false,
-            // A group that Newton's method took apart, or a point that it could not leave.
+            // Newton's method has split a group, or did not converge.
             Ok(_) | Err(Error::NotConverged { .. } | Error::TooLarge { .. }) => return unproved(cells),
             Err(error) => return Err(error),
         }
     }
 }
 
-/// Gives a cell to a neighbour, unless only two cells are left.
+/// Joins a cell to a neighbour; false if there are only two cells.
 fn merge(cells: &mut WordedCells, cell: usize) -> bool {
     if cells.words.len() <= 2 || cell >= cells.words.len() {
         return false;
     }
     cells.words.remove(cell);
     cells.breakpoints.remove(cell.min(cells.breakpoints.len() - 1));
-    // Its neighbours may have been one cell.
+    // If its two neighbours have the same word, they become one cell.
     if cells.words.len() > 2 {
         *cells = WordedCells::of(&cells.breakpoints, &cells.words);
     }

@@ -1,4 +1,4 @@
-//! A request: the problem and the options of a design.
+//! A request: the design problem and its options.
 
 use super::control::Progress;
 use super::participant::WordedCells;
@@ -10,23 +10,23 @@ use fewbits_numerics::error::entries;
 use fewbits_quantizers::quantizer::check_increasing;
 use std::time::Duration;
 
-/// Longest word of a sensor. More bits need no joint design: a Lloyd-Max quantizer loses next to nothing.
+/// Largest number of bits of a word. For longer words a Lloyd-Max quantizer is nearly optimal.
 pub const MAX_BITS: u32 = 6;
-/// Most bits that are shared out.
+/// Largest total number of bits that is distributed over the sensors.
 pub(super) const MAX_TOTAL: u32 = 40;
 
-/// How many bits the sensors may send.
+/// The numbers of bits that the sensors may send.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BitBudget {
-    /// Every sensor this many.
+    /// The same number for every sensor.
     Each(u32),
-    /// Every sensor its own number, zero for a sensor that is not used.
+    /// A number for each sensor, in order; zero for a sensor that is not used.
     PerSensor(Vec<u32>),
-    /// All sensors together this many; who sends how many is part of the design.
+    /// The total over all sensors. The design chooses the number of each sensor.
     Total(u32),
 }
 
-/// A design to be made: who measures what, how many bits each may send, over which links, and to what end.
+/// A design problem: the model, the bits, the links and the criterion.
 ///
 /// ```
 /// use fewbits_core::Link;
@@ -49,15 +49,15 @@ pub struct Request<'a> {
     pub(super) criterion: Criterion,
     pub(super) cells: AllowedCells,
     pub(super) starts: usize,
-    /// Breakpoints and words of every sensor to start from.
+    /// Breakpoints and words of every sensor, as an additional start.
     pub(super) start: Option<Vec<WordedCells>>,
     pub(super) time_limit: Option<Duration>,
     pub(super) progress: Option<&'a mut dyn FnMut(Progress)>,
 }
 
 impl<'a> Request<'a> {
-    /// Quantizers, words and decoder for the estimate of least mean squared error. The prior may be any, discrete ones included:
-    /// their values are taken as numbers to be estimated, not as hypotheses.
+    /// Quantizers, words and decoder for the estimate of least mean squared error. The prior may also be discrete;
+    /// its values are then numbers to be estimated, not hypotheses.
     pub fn estimation(model: ObservationModel, bits: BitBudget, link: Link) -> Self {
         Self {
             links: vec![link; model.sensors()],
@@ -72,7 +72,7 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Quantizers, words and decoder for the decision between the values of a discrete prior with the least error probability.
+    /// Quantizers, words and decoder for deciding between the values of a discrete prior with the smallest error probability.
     ///
     /// # Errors
     /// If the prior is not discrete.
@@ -86,14 +86,14 @@ impl<'a> Request<'a> {
         })
     }
 
-    /// Asks for the most information between the unknown and the symbols instead.
+    /// Uses the mutual information between the unknown and the symbols as criterion.
     #[must_use]
     pub fn by_information(mut self) -> Self {
         self.criterion = Criterion::MutualInformation;
         self
     }
 
-    /// A link for each sensor.
+    /// Sets a link for each sensor.
     ///
     /// # Errors
     /// If their number is not that of the sensors.
@@ -103,23 +103,23 @@ impl<'a> Request<'a> {
         Ok(self)
     }
 
-    /// Whether a word may stand for several intervals (default: one interval per word). Folded cells pay where noise is shared or
-    /// small; they are harder to explain.
+    /// Sets whether a word may stand for several intervals (default: one interval per word). Folded cells help if noise is shared or
+    /// small; they are harder to interpret.
     #[must_use]
     pub fn with_cells(mut self, cells: AllowedCells) -> Self {
         self.cells = cells;
         self
     }
 
-    /// Starts of the search over all sensors (default 60), besides those with one sensor's cells folded where that is allowed; fewer
-    /// where a start is expensive. The result depends on nothing else unless a time limit is met.
+    /// Number of starts of the search over all sensors (default 60). Starts with one sensor's cells folded come in addition if folded cells
+    /// are allowed. Fewer are used if a start is expensive. The result is reproducible unless a time limit is reached.
     #[must_use]
     pub fn with_starts(mut self, starts: usize) -> Self {
         self.starts = starts.max(1);
         self
     }
 
-    /// Tries a design of the caller's as a start, too: breakpoints and the word of each cell, for every sensor of the model.
+    /// Adds a given design as a start: breakpoints, and the word of each cell, for every sensor of the model.
     ///
     /// # Errors
     /// If there is not one entry per sensor, breakpoints do not increase, or there is not one word per cell.
@@ -136,8 +136,8 @@ impl<'a> Request<'a> {
         Ok(self)
     }
 
-    /// Ends the search after this time with the best design so far. Its value comes on top: a fraction of a second, or some seconds
-    /// for a million joint symbols with correlated unequal noise.
+    /// Ends the search after this time and returns the best design so far. Computing its value takes additional time: a fraction of a
+    /// second, or some seconds for a million joint symbols with correlated unequal noise.
     #[must_use]
     pub fn with_time_limit(mut self, limit: Duration) -> Self {
         self.time_limit = Some(limit);

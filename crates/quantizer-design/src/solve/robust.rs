@@ -1,4 +1,4 @@
-//! Priors and noise that are not known exactly.
+//! Designs for priors and noise that are not known exactly.
 
 use super::control::Control;
 use super::landscape::{Grid, Landscape, WordLaw};
@@ -13,17 +13,17 @@ use crate::observation_model::{ObservationModel, Resolution};
 use crate::system::System;
 use fewbits_numerics::error::{non_negative, within};
 
-/// Rounds in which the weights of the models move.
+/// Number of rounds in which the weights of the models are changed.
 const ROUNDS: usize = 40;
-/// How strongly a model of more than average error gains weight in the first round.
+/// Rate at which a model of more than average error gains weight in the first round.
 const LEARNING: f64 = 4.0;
-/// Grid cells of a sensor.
+/// Number of grid cells of a sensor.
 const GRID: usize = 96;
 
-/// A design used under another observation model than its own.
+/// The error of a design under another observation model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mismatch {
-    /// Mean squared error with the decoder of the design, which was made for the first model.
+    /// Mean squared error with the decoder of the design, which assumes its own model.
     pub mean_squared_error: f64,
     /// Mean squared error of the same cells and words with the decoder for the other model.
     pub with_best_decoder: f64,
@@ -34,14 +34,14 @@ pub struct Mismatch {
 pub struct Sensitivity {
     /// Name of the changed quantity.
     pub what: &'static str,
-    /// The relative change; of the mean, in standard deviations of the prior.
+    /// The relative change; for the mean, the change in standard deviations of the prior.
     pub change: f64,
     /// Errors after the change.
     pub mismatch: Mismatch,
 }
 
 impl Solution {
-    /// The mean squared error of this design in another model of the same sensors.
+    /// The mean squared error of this design under another model of the same sensors.
     ///
     /// # Errors
     /// If the model has another number of sensors; [`Error::TooLarge`] for too many joint symbols.
@@ -54,8 +54,8 @@ impl Solution {
         })
     }
 
-    /// The mean squared error if one number of the model is a share `change` larger or smaller than the design supposes: the
-    /// prior's standard deviation, its mean (by `change` standard deviations), the noise.
+    /// The mean squared error if one number of the model is larger or smaller by the fraction `change` than the design assumes: the
+    /// prior's standard deviation, its mean (by `change` standard deviations), or the noise.
     ///
     /// # Errors
     /// If `change` is not in `[0, 0.9]`; as [`Solution::in_model`].
@@ -81,14 +81,14 @@ impl Solution {
     }
 }
 
-/// The model with its prior moved and stretched about its mean, and its noise stretched.
+/// The model with its prior shifted and scaled about its mean, and its noise scaled.
 fn varied(model: &ObservationModel, offset: f64, prior: f64, noise: f64) -> Result<ObservationModel, Error> {
     let mean = model.prior().mean();
     let moved = model.prior().affine(offset + mean - prior * mean, prior)?;
     ObservationModel::new(moved, model.noise().rescaled(noise)?)
 }
 
-/// Probability, and moment about the prior mean, of every joint symbol, first sensor slowest.
+/// Probability and moment about the prior mean of every joint symbol; the first sensor varies slowest.
 fn outcome_moments(system: &System) -> Result<Vec<f64>, Error> {
     let model = system.model();
     Ok(Reports::of(system)?.moments(&[model.mass.clone(), model.moment.clone()]))
@@ -109,27 +109,27 @@ fn error_of(system: &System, estimates: &[f64]) -> Result<f64, Error> {
     Ok((model.variance + change).max(0.0))
 }
 
-/// A design for the worst model of a box.
+/// The design for the worst model of a box of models.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimax {
     /// Cells and words of the sensors that take part.
     pub sensors: Vec<SensorDesign>,
-    /// The estimate for every joint symbol, the first sensor's symbol slowest.
+    /// The estimate for every joint symbol; the first sensor's symbol varies slowest.
     pub estimates: Vec<f64>,
     /// Largest mean squared error over the corners and the centre of the box.
     pub worst_case: f64,
-    /// The same for the design that trusts the request's model.
+    /// The same for the design that assumes the request's model.
     pub nominal_worst_case: f64,
-    /// The error of the best design found against the mixture of models that is worst for it. If that search missed nothing,
-    /// no design has a smaller worst case.
+    /// A lower bound of the worst case, if the search found the optimum: the error of the best design found against the least favourable
+    /// mixture of models.
     pub bound: f64,
-    /// The share of each model in that mixture: the centre first, then the corners.
+    /// The weight of each model in that mixture: the centre first, then the corners.
     pub weights: Vec<f64>,
 }
 
-/// The design of least worst-case mean squared error over a box of models: the prior's mean may be off by
-/// `mean_offset` (in the unit of the unknown), its deviation and all noise deviations by the given shares. Cells, words and
-/// decoder are one for all models.
+/// The design of smallest worst-case mean squared error over a box of models. The prior's mean may differ by
+/// `mean_offset` (in the unit of the unknown), its deviation and all noise deviations by the given fractions. Cells, words and
+/// decoder are the same for all models.
 ///
 /// ```text
 /// weights <- equal, over the corners of the box and its centre
@@ -137,11 +137,11 @@ pub struct Minimax {
 ///     design  <- best against the mixture of models, from the last design
 ///     errors  <- of that design in each model
 ///     weights <- weights * exp(rate * (error / mean error - 1)), normalised
-/// answer  <- the design with the least largest error
+/// answer  <- the design with the smallest maximum error
 /// ```
 ///
 /// # Errors
-/// If the request is not one of estimation, an offset is negative or a share is not in `[0, 0.9]`; as [`Request::run`].
+/// If the request is not for estimation, an offset is negative or a fraction is not in `[0, 0.9]`; as [`Request::run`].
 pub fn minimax(
     request: Request<'_>,
     mean_offset: f64,
@@ -199,7 +199,7 @@ pub fn minimax(
                 weights: weights.clone(),
             });
         }
-        // Smaller steps later: the weights settle.
+        // Smaller steps later, so that the weights converge.
         let rate = LEARNING / (1.0 + 0.2 * round as f64);
         weights
             .iter_mut()
@@ -217,7 +217,7 @@ pub fn minimax(
     }
 }
 
-/// The centre of a box and its corners, those that coincide once.
+/// The centre of a box and its corners, without duplicates.
 fn corners(sizes: [f64; 3]) -> Vec<[f64; 3]> {
     let mut all = vec![[0.0; 3]];
     for corner in 0..8 {
@@ -230,7 +230,7 @@ fn corners(sizes: [f64; 3]) -> Vec<[f64; 3]> {
     all
 }
 
-/// The cells that a climb from the present ones leads to.
+/// The cells to which a local search from the present ones leads.
 fn best_cells(landscape: &Landscape, cells: &[WordedCells]) -> Vec<WordedCells> {
     let grids: Vec<Grid> = (0..cells.len())
         .map(|n| grid_with(landscape, n, GRID, &cells[n].breakpoints))
@@ -256,7 +256,7 @@ fn worst(errors: &[f64]) -> f64 {
     errors.iter().copied().fold(0.0, f64::max)
 }
 
-/// The posterior mean for every joint symbol under a mixture of models; the first prior mean for what cannot happen.
+/// The posterior mean for every joint symbol under a mixture of models; the first prior mean for symbols of probability zero.
 fn estimates(systems: &[System], weights: &[f64]) -> Result<Vec<f64>, Error> {
     let reference = systems[0].model().mean;
     let mut sums: Vec<[f64; 2]> = Vec::new();

@@ -1,20 +1,20 @@
-//! Search for cells and words together, on grids.
+//! Joint local search for cells and words, on grids.
 //!
 //! ```text
 //! for each start
 //!     repeat
 //!         for each sensor
-//!             block <- moments of its grid cells, the other sensors as they are
+//!             block <- moments of its grid cells, with the other sensors fixed
 //!             repeat
-//!                 words of the cells <- best for the decoder as it is          # cells merge where they should
-//!                 an unused word enters wherever it is worth it
-//!                 two words are exchanged if that is better
+//!                 words of the cells <- best for the present decoder           # neighbours with the same word become one cell
+//!                 insert an unused word if that is better
+//!                 exchange two words if that is better
 //!     until a round over the sensors gains nothing
-//! for the best few results: finer grids about their breakpoints, and again
+//! for the best few results: the same on finer grids around their breakpoints
 //! ```
 //!
-//! Every step raises the criterion or is not taken, and a word that no cell is best sent as is simply not used: nothing can
-//! fail to converge.
+//! A step is taken only if it raises the criterion. A word that is the best one for no cell is not used. The search
+//! therefore always ends with a valid design.
 
 use super::control::Control;
 use super::landscape::{Block, Grid, Landscape, REACH, Words};
@@ -25,25 +25,25 @@ use crate::moments::Table;
 use fewbits_monte_carlo::Stream;
 use rand::RngExt;
 
-/// A gain below this share of the criterion's size ends a loop.
+/// A loop ends if its gain is below this fraction of the criterion's scale.
 const GAIN: f64 = 1e-10;
-/// A round over the sensors that gains less than this share ends a descent.
+/// A search ends if a round over the sensors gains less than this fraction.
 const ROUND_GAIN: f64 = 1e-7;
-/// Share of the reach of a sample's table that the evenly spread edges cover.
+/// Fraction of the half-width of a sample's table that evenly spaced edges cover.
 const EVEN_SHARE: f64 = 0.75;
-/// Grid cells on either side of a breakpoint on a finer grid.
+/// Number of grid cells on either side of a breakpoint on a finer grid.
 const FINER: i32 = 3;
-/// Exchanges of words are left out if trying all of them once takes more multiplications than this.
+/// Exchanges of words are left out if trying all of them once needs more multiplications than this.
 const MAX_EXCHANGE_WORK: f64 = 3e8;
 
-/// Points that are kept for the next stage.
+/// Number of points that are kept for the next stage.
 const KEPT: usize = 4;
-/// Rounds over the sensors, or over cells and words of one sensor, after which a climb ends.
+/// Largest number of rounds over the sensors, or over cells and words of one sensor.
 const MAX_ROUNDS: usize = 60;
-/// Sweeps after which a loop over cells or words ends.
+/// Largest number of sweeps in a loop over cells or words.
 const MAX_SWEEPS: usize = 40;
 
-/// A point of the search: a grid and its words for every sensor.
+/// A point of the search: for every sensor a grid and the words of its cells.
 #[derive(Debug, Clone)]
 pub(super) struct Point {
     pub(super) grids: Vec<Grid>,
@@ -61,7 +61,7 @@ pub(super) fn cells_of(point: &Point) -> Vec<WordedCells> {
         .collect()
 }
 
-/// The first grid of a sensor, with some more edges.
+/// The first grid of a sensor, with some additional edges.
 pub(super) fn grid_with(landscape: &Landscape, sensor: usize, cells: usize, more: &[f64]) -> Grid {
     let mut edges = first_edges(landscape, sensor, cells);
     edges.extend(more);
@@ -70,7 +70,7 @@ pub(super) fn grid_with(landscape: &Landscape, sensor: usize, cells: usize, more
     landscape.grid(sensor, edges)
 }
 
-/// Edges spread half evenly and half by probability over a sensor's sample.
+/// Edges of which half are evenly spaced and half at equal probabilities of a sensor's sample.
 fn first_edges(landscape: &Landscape, sensor: usize, cells: usize) -> Vec<f64> {
     let sample = landscape.sample(sensor);
     let (even, reach) = (cells / 2, EVEN_SHARE * REACH * sample.deviation);
@@ -83,7 +83,7 @@ fn first_edges(landscape: &Landscape, sensor: usize, cells: usize) -> Vec<f64> {
     edges
 }
 
-/// Starting words on a grid: `cells` intervals of equal probability with the given words.
+/// Starting words on a grid: intervals of equal probability, one for each of the given words.
 pub(super) fn start(landscape: &Landscape, sensor: usize, grid: &Grid, words: &[usize]) -> Words {
     let worded = WordedCells {
         breakpoints: landscape.sample(sensor).quantiles(words.len()),
@@ -92,7 +92,8 @@ pub(super) fn start(landscape: &Landscape, sensor: usize, grid: &Grid, words: &[
     worded.on(&grid.edges)
 }
 
-/// Starting words of random cells: a random number of them, at random places, in random order. Folded cells are more than words.
+/// Random starting words: a random number of cells, at random places, in random order. If folded cells are allowed, there are more cells
+/// than words.
 pub(super) fn random_start(
     landscape: &Landscape,
     sensor: usize,
@@ -109,7 +110,7 @@ pub(super) fn random_start(
     }
     words.truncate(count);
     if shape == AllowedCells::Any && all > 1 {
-        // Each cell another word than the one before it.
+        // Each cell gets another word than the one before it.
         let count = rng.random_range(count..=2 * all + 1);
         while words.len() < count {
             let step = rng.random_range(1..all);
@@ -124,8 +125,8 @@ pub(super) fn random_start(
     WordedCells { breakpoints, words }.on(&grid.edges)
 }
 
-/// Words of which neighbours differ in one bit, in random order, until none is left that does. Over links that invert bits the best words of
-/// neighbouring cells are often such, and there are more of these sequences than Gray's.
+/// A random sequence of words in which neighbours differ in one bit; it ends if no unused word is left that does. Over links that invert
+/// bits the best words of neighbouring cells are often of this kind. There are more such sequences than Gray codes.
 pub(super) fn gray_walk(words: usize, stream: Stream) -> Vec<usize> {
     let mut rng = stream.rng();
     let mut walk = vec![rng.random_range(0..words)];
@@ -144,7 +145,7 @@ pub(super) fn gray_walk(words: usize, stream: Stream) -> Vec<usize> {
     }
 }
 
-/// Climbs from the words of a point until a round over the sensors gains nothing, or the time is over; `None` if there is no time
+/// Local search from a point until a round over the sensors gains nothing or the time limit is reached; `None` if there is no time
 /// to evaluate the first point.
 pub(super) fn climb(
     landscape: &Landscape,
@@ -160,11 +161,13 @@ pub(super) fn climb(
     let mut value = landscape.total(&grids, &words, &symbols, deadline)?;
     for _ in 0..MAX_ROUNDS {
         let before = value;
+        // One sensor at a time, given all others. A round cannot lower the value.
         for n in 0..grids.len() {
             let block = control
                 .step()
                 .then(|| landscape.block(n, &grids[n], &symbols, deadline))
                 .flatten();
+            // No time or steps left: the present design is valid.
             let Some(block) = block else {
                 return Some(Point { grids, words, value });
             };
@@ -190,7 +193,7 @@ pub(super) fn climb(
     Some(Point { grids, words, value })
 }
 
-/// The point on finer grids about its breakpoints, a third as wide as `spacing`, climbed again.
+/// Local search on finer grids around the breakpoints of a point; the new spacing is a third of `spacing`.
 pub(super) fn refine(
     landscape: &Landscape,
     point: Point,
@@ -205,6 +208,7 @@ pub(super) fn refine(
         for b in &cells.breakpoints {
             edges.extend((-FINER..=FINER).map(|i| b + *spacing * f64::from(i) / f64::from(FINER)));
         }
+        // Neighbouring breakpoints can have the same candidates.
         edges.sort_by(f64::total_cmp);
         edges.dedup_by(|b, a| *b - *a < 1e-3 * *spacing);
         if edges.is_empty() {
@@ -217,12 +221,12 @@ pub(super) fn refine(
     climb(landscape, grids, words, shape, control).unwrap_or(point)
 }
 
-/// The largest distance between neighbouring breakpoint candidates that matter: how far a breakpoint may be off.
+/// The largest distance between neighbouring candidates for breakpoints: the possible error of a breakpoint.
 pub(super) fn spacing(landscape: &Landscape, sensor: usize, cells: usize) -> f64 {
     2.0 * EVEN_SHARE * REACH * landscape.sample(sensor).deviation / (cells / 2) as f64
 }
 
-/// The best points, those of nearly equal value once.
+/// The best points; of those of nearly equal value only one.
 pub(super) fn best_of(mut points: Vec<Point>, same: f64) -> Vec<Point> {
     points.sort_by(|a, b| b.value.total_cmp(&a.value));
     points.dedup_by(|b, a| (a.value - b.value).abs() <= same);
@@ -230,7 +234,7 @@ pub(super) fn best_of(mut points: Vec<Point>, same: f64) -> Vec<Point> {
     points
 }
 
-/// One sensor, the others as they are.
+/// Local search over one sensor, with the others fixed.
 struct Sensor<'a> {
     landscape: &'a Landscape,
     grid: &'a Grid,
@@ -255,7 +259,7 @@ impl Sensor<'_> {
         }
     }
 
-    /// Takes `words` if they are better.
+    /// Replaces the words if `words` are better.
     fn accept(&mut self, words: Words) -> bool {
         if words == self.words {
             return false;
@@ -268,7 +272,7 @@ impl Sensor<'_> {
         better
     }
 
-    /// Sends each grid cell as its best word, the decoder as it is, and repeats with the new decoder.
+    /// Assigns each grid cell its best word for the present decoder, and repeats with the new decoder.
     fn move_cells(&mut self) {
         for _ in 0..MAX_SWEEPS {
             let worth = self.landscape.worth(self.block, self.grid, &self.words);
@@ -289,7 +293,7 @@ impl Sensor<'_> {
             .collect()
     }
 
-    /// The best intervals whose words stand in their present order, with at most one unused word put in.
+    /// The best intervals with the words in their present order and at most one unused word inserted.
     fn best_intervals(&self, worth: &[f64]) -> Words {
         let count = self.landscape.laws[self.block.sensor].words;
         let order = WordedCells::of(&self.grid.edges, &self.words).words;
@@ -313,7 +317,7 @@ impl Sensor<'_> {
         pairs * (law.outputs * law.words) as f64 * (self.block.others * self.landscape.width()) as f64
     }
 
-    /// Exchanges two words wherever that is better.
+    /// Exchanges two words if that is better, for all pairs.
     fn exchange_words(&mut self) {
         let count = self.landscape.laws[self.block.sensor].words;
         for _ in 0..MAX_SWEEPS {
@@ -326,6 +330,7 @@ impl Sensor<'_> {
                     if !used[a] && !used[b] || self.deadline.is_over() {
                         continue;
                     }
+                    // Two words are exchanged if that raises the value: over a noisy link the distance between words matters.
                     renamed.swap(a, b);
                     let value = self
                         .landscape
@@ -346,7 +351,7 @@ impl Sensor<'_> {
     }
 }
 
-/// Dynamic programme over the cells of a grid: intervals with words in this order, any of which may be left out.
+/// Dynamic programme over the cells of a grid: intervals with words in the given order; words may be left out.
 fn in_order(worth: &[f64], count: usize, order: &[usize]) -> (f64, Words) {
     let cells = worth.len() / count;
     let mut best = vec![0.0; order.len()];
@@ -355,7 +360,7 @@ fn in_order(worth: &[f64], count: usize, order: &[usize]) -> (f64, Words) {
         let (mut leader, mut next) = (0, vec![0.0; order.len()]);
         let mut came = vec![0; order.len()];
         for (j, word) in order.iter().enumerate() {
-            // On ties the later word, which is the one that went on.
+            // If values are equal, the later word is taken.
             if best[j] >= best[leader] {
                 leader = j;
             }

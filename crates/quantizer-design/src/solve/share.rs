@@ -1,15 +1,15 @@
-//! A total number of bits shared out among sensors.
+//! Distribution of a total number of bits over the sensors.
 //!
 //! ```text
 //! bits <- 0 for every sensor
-//! repeat until all are given
-//!     one bit more to the sensor where the design gains most
+//! repeat until all bits are distributed
+//!     one bit more to the sensor for which the design gains most
 //! repeat while that gains
-//!     one bit from one sensor to another
+//!     move one bit from one sensor to another
 //! ```
 //!
-//! Each step is a short search over all sensors. When its share of the time is over, each bit that is left goes to the sensor
-//! of the largest signal-to-noise ratio, where a bit counts as half of it.
+//! Each step is a short search over all sensors. If the time for this stage is over, each remaining bit goes to the sensor
+//! with the largest signal-to-noise ratio, which is halved for each bit that a sensor has.
 
 use super::control::Control;
 use super::participant::Participant;
@@ -19,12 +19,12 @@ use crate::criterion::AllowedCells;
 use crate::error::Error;
 use std::collections::BTreeMap;
 
-/// Portion of the time limit that sharing out may take.
+/// Largest fraction of the time limit for this stage.
 const SHARE: f64 = 0.4;
-/// Moves of single bits after which the shares stay.
+/// Largest number of moves of single bits.
 const MAX_MOVES: usize = 20;
 
-/// Bits of every sensor.
+/// Number of bits of every sensor.
 pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Control<'_>) -> Result<Vec<u32>, Error> {
     control.end_with(SHARE);
     let sensors = request.model.sensors();
@@ -33,6 +33,7 @@ pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Contro
         values: BTreeMap::new(),
     };
     let (mut bits, mut value) = (vec![0; sensors], f64::NEG_INFINITY);
+    // Greedy: each bit goes to the sensor where it helps most.
     for _ in 0..total {
         let more: Vec<Vec<u32>> = (0..sensors)
             .filter(|n| bits[*n] < MAX_BITS)
@@ -43,6 +44,7 @@ pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Contro
             None => (value, moved(&bits, None, next_sensor(request, &bits))),
         };
     }
+    // Then bits move from one sensor to another as long as that helps.
     for _ in 0..MAX_MOVES {
         let pairs = (0..sensors).flat_map(|from| (0..sensors).map(move |to| (from, to)));
         let exchanged: Vec<Vec<u32>> = pairs
@@ -58,7 +60,7 @@ pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Contro
     Ok(bits)
 }
 
-/// One bit more for sensor `to`, from sensor `from` if there is one.
+/// The bits with one more for sensor `to`, and one less for sensor `from` if it is given.
 fn moved(bits: &[u32], from: Option<usize>, to: usize) -> Vec<u32> {
     let mut bits = bits.to_vec();
     if let Some(from) = from {
@@ -68,7 +70,7 @@ fn moved(bits: &[u32], from: Option<usize>, to: usize) -> Vec<u32> {
     bits
 }
 
-/// The sensor of the largest signal-to-noise ratio, halved once for each bit that it has.
+/// The sensor with the largest signal-to-noise ratio, halved once for each bit that it has.
 fn next_sensor(request: &Request<'_>, bits: &[u32]) -> usize {
     let model = &request.model;
     let left = |n: usize| {
@@ -79,14 +81,14 @@ fn next_sensor(request: &Request<'_>, bits: &[u32]) -> usize {
     open.max_by(|a, b| left(*a).total_cmp(&left(*b))).unwrap_or(0)
 }
 
-/// The shares that were tried, with their signed values.
+/// The distributions that were tried, with their signed values.
 struct Tried<'a, 'b> {
     request: &'a Request<'b>,
     values: BTreeMap<Vec<u32>, f64>,
 }
 
 impl Tried<'_, '_> {
-    /// The best of some shares, with its signed value; `None` if there is none or the time is over.
+    /// The best of some distributions, with its signed value; `None` if there is none or the time limit is reached.
     fn best_of(&mut self, shares: &[Vec<u32>], control: &mut Control<'_>) -> Result<Option<(f64, Vec<u32>)>, Error> {
         let mut best: Option<(f64, Vec<u32>)> = None;
         for bits in shares {
@@ -120,7 +122,7 @@ impl Tried<'_, '_> {
             given: None,
         };
         let value = search.run(control)?.value;
-        // Too many joint symbols to compare: such a share is not taken.
+        // Too many joint symbols: this distribution is not used.
         Ok(if value.is_nan() { f64::NEG_INFINITY } else { value })
     }
 }

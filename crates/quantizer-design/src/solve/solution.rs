@@ -1,4 +1,4 @@
-//! A finished design: cells and words of every sensor, the criterion's value, a bound and a certificate.
+//! A finished design: cells and words of every sensor, the value of the criterion, a bound and a certificate.
 
 use super::participant::{Participant, WordedCells, missing, system_of};
 use crate::bounds;
@@ -19,8 +19,8 @@ use std::fmt::Write;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solutions {
     pub(super) all: Vec<Solution>,
-    /// Steps of the search. In each, cells and words of one sensor were improved with the other sensors as they were. The number
-    /// depends on the request alone, unless a time limit ended the search.
+    /// Number of steps of the search. In each, cells and words of one sensor were improved with the other sensors fixed. The number
+    /// depends only on the request, unless a time limit ended the search.
     pub steps: usize,
     /// Whether the time limit ended the search.
     pub is_cut_short: bool,
@@ -29,7 +29,7 @@ pub struct Solutions {
 impl Solutions {
     /// The best design.
     pub fn best(&self) -> &Solution {
-        // A request that runs returns one design at least.
+        // A successful request has at least one design.
         &self.all[0]
     }
 
@@ -50,7 +50,7 @@ pub struct SensorDesign {
     pub breakpoints: Vec<f64>,
     /// Word of each cell, one more than breakpoints.
     pub words: Vec<usize>,
-    /// The link that the words cross.
+    /// The link over which the words are sent.
     pub link: Link,
 }
 
@@ -63,7 +63,7 @@ impl SensorDesign {
         Ok(self.words[cell_of(&self.breakpoints, sample)?])
     }
 
-    /// Symbols that can be received: all words, and one more behind them, "nothing", if a word may be missing.
+    /// Number of symbols that can be received: all words, and one more after them, "nothing", if a word may be missing.
     pub fn symbols(&self) -> usize {
         (1 << self.bits) + usize::from(missing(&self.link) > 0.0)
     }
@@ -78,33 +78,33 @@ pub struct Bound {
     pub kind: BoundKind,
 }
 
-/// Where a bound comes from.
+/// How a bound was obtained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum BoundKind {
-    /// Quadratic Gaussian CEO problem: codes of any length at separate sensors, links at their capacity.
+    /// Quadratic Gaussian CEO problem: codes of any length at separate sensors, with the links' capacities as rates.
     Ceo,
-    /// All sensors encoded together, links at their capacity.
+    /// All sensors encoded together, with the links' capacities as rates.
     Together,
-    /// The samples themselves.
+    /// The samples themselves, without quantization.
     Unquantised,
-    /// The links' capacity.
+    /// The capacity of the links.
     Capacity,
 }
 
-/// One design: the whole answer to a request.
+/// One design: a complete result of a request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     system: System,
     sensors: Vec<SensorDesign>,
-    /// What was optimised.
+    /// The criterion that was optimised.
     pub criterion: Criterion,
-    /// Value of the criterion: squared units, nats, or a probability. Exact to 1e-12, or to 1e-5 for a design with so many joint
-    /// symbols and nodes that one evaluation would take seconds; to some parts in a thousand if, besides, a time limit is over.
+    /// Value of the criterion: squared units, nats, or a probability. The error is 1e-12. It is 1e-5 for designs with so many joint
+    /// symbols and nodes that one evaluation would take seconds, and some parts in a thousand if, in addition, a time limit was reached.
     pub value: f64,
     /// A bound on the criterion over all designs with these bits and links, if one is known.
     pub bound: Option<Bound>,
-    /// What the second derivatives with respect to the breakpoints prove. Words, the number of cells and their order were
-    /// searched; nothing is proved about them.
+    /// The conclusion from the second derivatives with respect to the breakpoints. Words, the number of cells and their order were
+    /// searched; the certificate does not cover them.
     pub certificate: Certificate,
     /// The breakpoints over which the certificate holds.
     pub scope: Scope,
@@ -138,13 +138,13 @@ impl Solution {
         })
     }
 
-    /// The sensors that take part.
+    /// The sensors that take part, with their cells and words.
     pub fn sensors(&self) -> &[SensorDesign] {
         &self.sensors
     }
 
-    /// The sensors with their quantizers and channels, as the other tools of this crate take them. Symbol `t` is the received word
-    /// `t`; the last symbol is "nothing received" if a word may be missing. Sensors without bits are not in it.
+    /// The sensors with their quantizers and channels, for the other functions of this crate. Symbol `t` is the received word
+    /// `t`; the last symbol is "nothing received" if a word may be missing. Sensors without bits are left out.
     pub fn system(&self) -> &System {
         &self.system
     }
@@ -157,7 +157,7 @@ impl Solution {
         self.system.value(Criterion::MeanSquaredError)
     }
 
-    /// How far the value is from the bound, relative to the bound: 0 would be perfect.
+    /// Relative distance of the value from the bound; 0 is optimal. `None` without a bound.
     pub fn gap(&self) -> Option<f64> {
         self.bound.map(|b| (self.value - b.value).abs() / b.value)
     }
@@ -175,7 +175,7 @@ impl Solution {
             .collect()
     }
 
-    /// The decoder of least squared error, as a table of at most `limit` entries.
+    /// The decoder of least squared error, a table of at most `limit` entries.
     ///
     /// # Errors
     /// As [`MmseDecoder::new`].
@@ -183,7 +183,7 @@ impl Solution {
         MmseDecoder::new(&self.system, limit)
     }
 
-    /// The same sensors with other breakpoints; the certificate is void.
+    /// The same sensors with other breakpoints; the certificate becomes [`Certificate::Unproved`].
     ///
     /// # Errors
     /// If there is not one list per sensor, or a list has another length or is not increasing.
@@ -217,7 +217,7 @@ impl Solution {
         parts.collect()
     }
 
-    /// The system of these cells and words in another model of as many sensors.
+    /// The system of these cells and words under another model of as many sensors.
     pub(super) fn system_in(&self, model: &ObservationModel) -> Result<System, Error> {
         if model.sensors() != self.sensors.len() {
             let expected = format!("{}, those that take part", self.sensors.len());
@@ -235,7 +235,7 @@ impl Solution {
         cells.collect()
     }
 
-    /// The design as a table for reading: sensors, cells, words, value, bound and certificate.
+    /// The design as a text table: sensors, cells, words, value, bound and certificate.
     pub fn table(&self) -> String {
         let mut text = String::new();
         let unit = match self.criterion {
@@ -269,7 +269,7 @@ impl Solution {
     }
 }
 
-/// The tightest of the bounds that hold for a system.
+/// The tightest bound that is valid for a system.
 fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterion) -> Result<Option<Bound>, Error> {
     let model = system.model();
     let capacities: Vec<f64> = sensors.iter().map(|s| capacity(&s.link, s.bits)).collect();
@@ -284,7 +284,7 @@ fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterio
             let prior = model.prior_variance();
             let left = 1.0 / (1.0 / prior + model.noise().precision_of_mean());
             found.push((left + (prior - left) * (-2.0 * total).exp2(), BoundKind::Together));
-            // Not for correlated noise or too many sensors; a bound that does not converge is no bound.
+            // No CEO bound for correlated noise, too many sensors, or if it does not converge.
             let ceo = bounds::ceo(model.prior(), model.noise(), &capacities);
             found.extend(ceo.ok().map(|bound| (bound.lower(), BoundKind::Ceo)));
         }
@@ -295,7 +295,7 @@ fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterio
     Ok(tightest.map(|(value, kind)| Bound { value, kind }))
 }
 
-/// Bits per word that a link can carry: words arrive with their bits inverted, or not at all.
+/// Capacity of a link in bits per word: the bits of a word are inverted at random, or the word does not arrive.
 fn capacity(link: &Link, bits: u32) -> f64 {
     let share = |p: f64| if p > 0.0 { -p * p.log2() } else { 0.0 };
     let flips = share(link.crossover()) + share(1.0 - link.crossover());

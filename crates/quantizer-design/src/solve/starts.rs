@@ -1,4 +1,4 @@
-//! The search over all sensors: single sensors first, then all of them from several starts, then finer grids.
+//! The search over all sensors: single sensors first, then all together from several starts, then finer grids.
 
 use super::control::{Control, Stage};
 use super::landscape::{Grid, Landscape, WordLaw, Words};
@@ -11,36 +11,36 @@ use crate::observation_model::{ObservationModel, Resolution};
 use crate::system::OUTCOME_LIMIT;
 use fewbits_monte_carlo::Stream;
 
-/// The joint search is left out where one round over the sensors takes more multiplications than this.
+/// The joint search is left out if one round over the sensors needs more multiplications than this.
 const MAX_JOINT_WORK: f64 = 2e10;
-/// Above this the joint search goes over rough nodes.
+/// Above this number the joint search uses rough nodes.
 const MAX_COARSE_WORK: f64 = 5e8;
-/// Multiplications that the starts of the joint search may take together, as far as they can be foreseen.
+/// Approximate number of multiplications for all starts of the joint search together.
 const START_WORK: f64 = 6e8;
-/// Rounds over the sensors that a climb takes, about.
+/// Assumed number of rounds of a local search.
 const CLIMB_ROUNDS: f64 = 10.0;
-/// Climbs that should fit into a time limit; otherwise they go over rough nodes.
+/// If fewer local searches than this fit into the time limit, rough nodes are used.
 const LEAST_CLIMBS: f64 = 4.0;
-/// Times that grids are refined, each by a factor of three: breakpoints end within 1e-3 of a standard deviation, from where
-/// Newton's method takes over.
+/// Number of refinements of the grids, each by a factor of three. Breakpoints are then within 1e-3 of a standard deviation, close enough
+/// for Newton's method.
 const REFINEMENTS: usize = 3;
-/// Without Newton's method: within 1e-5.
+/// The same if Newton's method is not used; breakpoints are then within 1e-5.
 const MORE_REFINEMENTS: usize = 7;
-/// Results closer than this share of the criterion's size are one.
+/// Results closer than this fraction of the criterion's scale are treated as equal.
 const SAME: f64 = 1e-6;
 /// The same after refinement.
 const SAME_REFINED: f64 = 1e-9;
-/// Results further from the best than this share of the criterion's size are not certified.
+/// Results worse than the best by more than this fraction of the criterion's scale are not certified.
 const CLOSE: f64 = 1e-3;
-/// Half-width of the range over which folded starts spread their cells, in standard deviations of a sample.
+/// Half-width of the range of the cells in folded starts, in standard deviations of a sample.
 const FOLDED_REACH: f64 = 2.25;
 
-/// Cells and words of the designs that are worth polishing, best first.
+/// Cells and words of the designs that Newton's method refines, best first.
 pub(super) struct Searched {
     pub(super) designs: Vec<Vec<WordedCells>>,
-    /// The best value on coarse nodes, signed; NaN if the sensors were not searched together.
+    /// The best signed value on coarse nodes; NaN if the sensors were not searched together.
     pub(super) value: f64,
-    /// Whether sensors may have different cells: there are few enough joint symbols.
+    /// Whether sensors may have different cells, that is, whether there are few enough joint symbols.
     pub(super) apart: bool,
 }
 
@@ -51,9 +51,9 @@ pub(super) struct Search<'a> {
     pub(super) criterion: Criterion,
     pub(super) participants: &'a [Participant],
     pub(super) shape: AllowedCells,
-    /// Starts of all sensors together.
+    /// Number of starts of all sensors together.
     pub(super) starts: usize,
-    /// A design to start from, besides.
+    /// A given design as an additional start.
     pub(super) given: Option<&'a [WordedCells]>,
 }
 
@@ -89,7 +89,7 @@ impl Search<'_> {
             let rough = model.at(Resolution::ROUGH)?;
             landscape = Landscape::new(&[(1.0, model)], self.criterion, laws, Resolution::ROUGH)?;
             work = landscape.work(largest(&cells));
-            // Where few climbs are possible the first one starts from the best design at hand.
+            // If only few local searches are possible, the first one starts from the best design available.
             first = self.best_at_hand(&rough, first, control)?;
             search.given = self.given.or(Some(&first));
         }
@@ -99,7 +99,7 @@ impl Search<'_> {
             search.joint_points(&landscape, &cells, &singles, work, control)
         };
         control.enter(Stage::Refinement, 1);
-        // Newton's method needs a close start; where it is not affordable the grids alone do it.
+        // Newton's method needs a start that is close; if it is not affordable, the grids are refined further.
         let refinements = if polish::is_affordable(model, self.criterion, outcomes) {
             REFINEMENTS
         } else {
@@ -111,7 +111,7 @@ impl Search<'_> {
         refined.retain(|p| best - p.value <= CLOSE * unit);
         let mut designs: Vec<Vec<WordedCells>> = refined.iter().map(cells_of).collect();
         if designs.is_empty() || work_is_large || control.is_cut_short {
-            // What the search has seen is rough or cut short: the exact values decide between its best and plain designs.
+            // The values from the search are rough or incomplete: exact values decide between its best design and plain ones.
             designs.truncate(1);
             if designs.is_empty() {
                 designs.push(first.clone());
@@ -128,7 +128,7 @@ impl Search<'_> {
         })
     }
 
-    /// The best on rough nodes of a design and the plain ones, as far as there is time to evaluate them.
+    /// The best of a design and the plain ones on rough nodes, as far as there is time to evaluate them.
     fn best_at_hand(
         &self,
         rough: &ObservationModel,
@@ -151,7 +151,7 @@ impl Search<'_> {
         Ok(best.1)
     }
 
-    /// Results of the climbs from all starts, as many as there is time for.
+    /// Results of the local searches from all starts, as many as there is time for.
     fn joint_points(
         &self,
         landscape: &Landscape,
@@ -192,7 +192,7 @@ impl Search<'_> {
         points
     }
 
-    /// The best points on finer grids, as far as there is time; the best first, which has more of it.
+    /// The best points refined on finer grids, as far as there is time. The best one is first and gets more time.
     fn refined(
         &self,
         landscape: &Landscape,
@@ -203,6 +203,7 @@ impl Search<'_> {
         shown_as: Option<Stage>,
     ) -> Vec<Point> {
         let unit = size_of(landscape, &points);
+        // Refine the grids of each different point in turn; afterwards points that have become equal are dropped again.
         let points = best_of(points, SAME * unit);
         let parts = points.len() * refinements;
         let mut refined = Vec::new();
@@ -222,10 +223,10 @@ impl Search<'_> {
         best_of(refined, SAME_REFINED * unit)
     }
 
-    /// The best designs of every sensor by itself, best first.
+    /// The best designs of every sensor alone, best first.
     fn single_sensors(&self, laws: &[WordLaw], control: &mut Control<'_>) -> Result<Vec<Vec<WordedCells>>, Error> {
         let (model, participants) = (self.model, self.participants);
-        // A single sensor's decisions need few levels: what it tells is what counts beside other sensors.
+        // The decision of a single sensor needs few levels only. Beside other sensors the information of its word matters.
         let criterion = match self.criterion {
             Criterion::BayesError if participants.len() > 1 => Criterion::MutualInformation,
             other => other,
@@ -267,11 +268,11 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// Start `i` of all sensors: the best of each, Gray words, natural words, mixed, then random ones.
+    /// Start `i` of all sensors: first the best designs of each, Gray words, natural words and mixtures of these, then random ones.
     fn joint_start(&self, landscape: &Landscape, grids: &[Grid], singles: &[Vec<WordedCells>], i: usize) -> Vec<Words> {
         let of = |n: usize, kind: usize| match kind {
             0 | 3 | 4 => {
-                // Later starts take other good designs of single sensors, a different one for each sensor.
+                // Later starts use other good designs of single sensors, a different one for each sensor.
                 let rank = if kind == 0 { 0 } else { (n + kind) % singles[n].len() };
                 singles[n][rank].on(&grids[n].edges)
             }
@@ -282,7 +283,7 @@ impl Search<'_> {
         (0..grids.len())
             .map(|n| match i {
                 0..=4 => of(n, i),
-                // Other Gray codes; one sensor random, the others good; or all random.
+                // Other Gray codes; or one sensor random and the others good; or all random.
                 _ if i % 2 == 1 => of(n, 6),
                 _ if i.is_multiple_of(4) && n != i % grids.len() => of(n, 0),
                 _ => of(n, 5),
@@ -291,7 +292,7 @@ impl Search<'_> {
     }
 }
 
-/// Size of the criterion at some points.
+/// Scale of the criterion at some points.
 fn size_of(landscape: &Landscape, points: &[Point]) -> f64 {
     let sizes = points.iter().map(|p| landscape.unit(p.value));
     sizes.fold(f64::MIN_POSITIVE, f64::max)
@@ -316,8 +317,8 @@ fn stream(sensor: usize, i: usize) -> Stream {
         .indexed(i as u64)
 }
 
-/// One sensor folded, the others as they are best alone: every sensor in turn, with one to `levels + 1` cells more than levels,
-/// whose levels run round or to and fro. No sequence of improvements leads from intervals to most of these.
+/// Starts with one sensor folded and the others as they are best alone. Each sensor in turn has one to `levels + 1` more cells than levels,
+/// whose levels repeat cyclically or back and forth. Most of these cannot be reached from intervals by improving steps.
 fn folded_starts(
     landscape: &Landscape,
     participants: &[Participant],
@@ -328,6 +329,7 @@ fn folded_starts(
         let levels = 1usize << participant.bits;
         let turn = 2 * levels - 2;
         let sample = landscape.sample(folded);
+        // Evenly spaced cells over the range; the levels repeat cyclically, or go up and down.
         for cells in levels + 1..=2 * levels + 1 {
             let share = |cut: usize| 2.0 * cut as f64 / cells as f64 - 1.0;
             let breakpoints: Vec<f64> = (1..cells)
@@ -350,7 +352,7 @@ fn folded_starts(
     starts
 }
 
-/// Cells of a grid for words of so many bits.
+/// Number of grid cells for words of `bits` bits.
 fn grid_cells(bits: u32) -> usize {
     match bits {
         ..=3 => 64,

@@ -1,4 +1,4 @@
-//! Sensors that share a design.
+//! Groups of sensors with the same design.
 
 use crate::compositions::count;
 use crate::error::{Error, refuse};
@@ -6,7 +6,7 @@ use fewbits_numerics::stored;
 use fewbits_quantizers::{Channel, Quantizer};
 use serde::{Deserialize, Serialize};
 
-/// Sensors of one law that share a quantizer design and a channel law.
+/// Sensors of equal noise that share a quantizer design and a channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredGroup", into = "StoredGroup")]
 pub struct SensorGroup {
@@ -25,7 +25,7 @@ impl SensorGroup {
     /// The sensors with the given numbers, each with this quantizer, each behind its own copy of the channel.
     ///
     /// # Errors
-    /// If the channel's inputs are not the quantizer's levels, or there is no sensor.
+    /// If the channel's number of inputs is not the quantizer's number of levels, or there is no sensor.
     pub fn new(quantizer: Quantizer, channel: Channel, sensors: Vec<usize>) -> Result<Self, Error> {
         if channel.inputs() != quantizer.levels() {
             let levels = quantizer.levels();
@@ -51,7 +51,7 @@ impl SensorGroup {
         &self.channel
     }
 
-    /// Numbers of the sensors in the model.
+    /// Indices of the sensors in the model.
     pub fn sensors(&self) -> &[usize] {
         &self.sensors
     }
@@ -61,7 +61,7 @@ impl SensorGroup {
         self.channel.probability(t, self.quantizer.labels()[cell])
     }
 
-    /// Different joint reports of the group, up to who reported what.
+    /// Number of different joint reports of the group, if only the counts of symbols matter.
     pub(crate) fn outcomes(&self) -> u64 {
         count(self.sensors.len(), self.channel.outputs())
     }

@@ -1,4 +1,4 @@
-//! Several sensors with their quantizers and channels, seen by one fusion centre.
+//! Several sensors with their quantizers and channels, and one fusion centre.
 
 mod group;
 
@@ -14,7 +14,7 @@ use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::lloyd_max;
 use serde::{Deserialize, Serialize};
 
-/// Most joint outcomes a computation may enumerate unless told otherwise.
+/// Default for the largest number of joint outcomes that a computation may enumerate.
 pub const OUTCOME_LIMIT: u64 = 1 << 20;
 
 /// A model and, for each of its sensors, a quantizer and a channel.
@@ -44,7 +44,7 @@ impl System {
     /// A system of groups.
     ///
     /// # Errors
-    /// Unless every sensor of the model is in exactly one group and the sensors of a group have the same noise.
+    /// If some sensor of the model is not in exactly one group, or the sensors of a group differ in noise.
     pub fn new(model: ObservationModel, groups: Vec<SensorGroup>) -> Result<Self, Error> {
         let mut seen = vec![false; model.sensors()];
         for group in &groups {
@@ -69,7 +69,7 @@ impl System {
         })
     }
 
-    /// A quantizer and a channel for each sensor.
+    /// A system with a quantizer and a channel for each sensor.
     ///
     /// # Errors
     /// If the numbers of sensors, quantizers and channels differ, or a channel does not fit its quantizer.
@@ -89,7 +89,7 @@ impl System {
         Self::new(model, groups)
     }
 
-    /// A quantizer for each sensor, received as sent.
+    /// A system with a quantizer for each sensor and ideal channels.
     ///
     /// # Errors
     /// As [`System::distinct`].
@@ -101,20 +101,20 @@ impl System {
         Self::distinct(model, quantizers, channels)
     }
 
-    /// One quantizer for all sensors, which must have the same noise, received as sent: outcomes are counts.
+    /// A system with one quantizer for all sensors, which must have equal noise, and ideal channels. Outcomes are counts.
     ///
     /// # Errors
-    /// If the sensors differ.
+    /// If the sensors differ in noise.
     pub fn identical(model: ObservationModel, quantizer: Quantizer) -> Result<Self, Error> {
         let sensors = (0..model.sensors()).collect();
         let channel = Channel::ideal(quantizer.levels())?;
         Self::new(model, vec![SensorGroup::new(quantizer, channel, sensors)?])
     }
 
-    /// The Lloyd-Max quantizer of its own sample for each sensor, received as sent: independent designs, and the usual start.
+    /// A system in which each sensor has the Lloyd-Max quantizer of its own sample and an ideal channel: the usual start of a design.
     ///
     /// # Errors
-    /// Unless `levels` is in `2..=4096`.
+    /// If `levels` is not in `2..=4096`.
     pub fn lloyd_max(model: ObservationModel, levels: usize) -> Result<Self, Error> {
         let standard = lloyd_max::gaussian(levels)?;
         let quantizers = (0..model.sensors())
@@ -123,7 +123,7 @@ impl System {
         Self::ideal(model, quantizers)
     }
 
-    /// The system of some of the sensors only, in the given order.
+    /// The system of some of the sensors, in the given order.
     ///
     /// # Errors
     /// If `sensors` is empty, names a sensor that is not there, or one twice.
@@ -162,20 +162,20 @@ impl System {
         self.groups.iter().map(|g| g.quantizer.clone()).collect()
     }
 
-    /// Joint outcomes up to permutations within groups.
+    /// Number of joint outcomes, if only the counts of symbols matter within a group.
     pub fn outcomes(&self) -> u64 {
         self.groups.iter().fold(1, |n: u64, g| n.saturating_mul(g.outcomes()))
     }
 
-    /// Most joint outcomes a computation may enumerate.
+    /// Largest number of joint outcomes that a computation may enumerate.
     pub fn outcome_limit(&self) -> u64 {
         self.outcome_limit
     }
 
-    /// Refuses tables of more outcomes than allowed.
+    /// An error if a table would have more outcomes than allowed.
     pub(crate) fn check_outcomes(&self) -> Result<(), Error> {
         Error::at_most("joint outcome table", self.outcomes(), self.outcome_limit)?;
-        // Counts of fewer reports are tabulated on the way.
+        // Tables for fewer reports are computed as intermediate results.
         self.groups.iter().try_for_each(|group| {
             let needed = count(group.sensors.len(), group.channel.outputs() + 1);
             Error::at_most("table of counts", needed, self.outcome_limit)
@@ -205,7 +205,7 @@ impl System {
             .try_fold(self.clone(), |system, (g, q)| system.with_quantizer(g, q))
     }
 
-    /// The same quantizers behind other channels.
+    /// The same quantizers with other channels.
     ///
     /// # Errors
     /// If a channel does not fit its quantizer or their number differs from the groups'.

@@ -1,4 +1,4 @@
-//! Probability densities on the line, as far as quantization needs them.
+//! Probability densities of a scalar, with the integrals that quantizer design needs.
 
 mod normal;
 mod smooth;
@@ -8,13 +8,13 @@ pub use normal::Normal;
 pub use smooth::SmoothDensity;
 pub use uniform::Uniform;
 
-/// Cells of the grid on which the high-rate starting point is inverted.
+/// Number of cells of the grid on which the companding function is inverted.
 const START_GRID: usize = 4000;
 
-/// Mass of a cell `[a, b)`, and how far its centroid lies from its edges.
+/// Probability of a cell `[a, b)`, and the distances of its centroid from its edges.
 ///
-/// Distances rather than places: the midpoint equations of a quantizer need `(b - c_i) - (c_{i+1} - b)`, which loses no digit
-/// in narrow cells when each distance is known on its own.
+/// The midpoint equations of a quantizer need `(b - c_i) - (c_{i+1} - b)`. Stored as distances, the terms keep all digits even
+/// in narrow cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellMoments {
     /// Probability of the cell.
@@ -26,8 +26,8 @@ pub struct CellMoments {
 }
 
 impl CellMoments {
-    /// Of the cell `[a, b)` of a density that lives on a part `[low, high]` of it, from the mass there and the integral of
-    /// `(x - low)` times the density.
+    /// The moments of a cell `[a, b)`, if the density is zero outside a part `[low, high]` of it. `mass` is the probability of this part,
+    /// `moment` the integral of `(x - low)` times the density.
     pub fn clipped((a, b): (f64, f64), (low, high): (f64, f64), mass: f64, moment: f64) -> Self {
         let inside = if mass > 0.0 { moment / mass } else { 0.5 * (high - low) };
         Self {
@@ -37,7 +37,7 @@ impl CellMoments {
         }
     }
 
-    /// The moments in a unit in which lengths are `factor` times as large.
+    /// The moments after a change of unit that multiplies lengths by `factor`.
     fn scaled(self, factor: f64) -> Self {
         Self {
             mass: self.mass,
@@ -47,34 +47,34 @@ impl CellMoments {
     }
 }
 
-/// A probability density on the line.
+/// A probability density of a scalar.
 ///
-/// Every place `x`, `a`, `b` is measured **from [`centre`](Density::centre)**, so that nothing depends on how far from zero the
-/// density lies. Edges may be infinite.
+/// All positions `x`, `a`, `b` are measured **from [`centre`](Density::centre)**, so that rounding does not depend on how far from zero the
+/// density is. Edges may be infinite.
 ///
-/// Laws: masses of adjoining cells add up and that of the line is 1; centroids are those of `pdf`; `squared_error` is the
+/// Laws: masses of adjacent cells add, and the mass of the whole line is 1; centroids are those of `pdf`; `squared_error` is the
 /// integral of `(x - point)^2 pdf(x)`.
 pub trait Density {
     /// The point from which the other functions measure: the mean, or close to it.
     fn centre(&self) -> f64;
     /// Density at `centre + x`.
     fn pdf(&self, x: f64) -> f64;
-    /// Mass and centroid of the cell `[a, b)`; the middle stands for the centroid of an empty cell.
+    /// Probability and centroid of the cell `[a, b)`. An empty cell has its middle as centroid.
     fn cell(&self, a: f64, b: f64) -> CellMoments;
-    /// All cells that increasing breakpoints part the line into, one more than breakpoints.
+    /// All cells between increasing breakpoints, one more than breakpoints.
     fn cells(&self, breakpoints: &[f64], cells: &mut [CellMoments]) {
         for (i, cell) in cells.iter_mut().enumerate() {
             let (lower, upper) = edges(breakpoints, i);
             *cell = self.cell(lower, upper);
         }
     }
-    /// Integral of `(x - point)^2 pdf(x)` over `[a, b)`: what reproducing the cell by `point` costs.
+    /// Integral of `(x - point)^2 pdf(x)` over `[a, b)`: the squared error if the cell is reproduced by `point`.
     fn squared_error(&self, a: f64, b: f64, point: f64) -> f64;
-    /// The standard deviation, if the density is normal about its centre: a kept table then is the design's start.
+    /// The standard deviation if the density is normal about its centre, else `None`. A design then starts from a stored table.
     fn normal_deviation(&self) -> Option<f64> {
         None
     }
-    /// An interval outside which the cube root of the density is negligible.
+    /// An interval outside of which the cube root of the density is negligible.
     fn extent(&self) -> (f64, f64);
 
     /// Breakpoints of `levels` cells of equal mass under the cube root of the density: the companding solution, optimal for

@@ -6,14 +6,14 @@ use fewbits_numerics::error::{finite, positive};
 use fewbits_numerics::quadrature::gauss_legendre;
 use fewbits_numerics::{kernels, normal};
 
-/// Cells over which a normal density changes by less than a factor of `exp(2)` take eight nodes, exact to rounding.
+/// In cells over which a normal density changes by less than a factor of `exp(2)`, eight quadrature nodes are exact to rounding.
 const NARROW: f64 = 1.0;
-/// Nodes of a narrow cell.
+/// Number of nodes in a narrow cell.
 const NODES: usize = 8;
-/// Cells whose nodes go through the exponential at once.
+/// Number of cells whose exponentials are computed together.
 const BATCH: usize = 16;
 
-/// Normal density.
+/// The normal density.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normal {
     mean: f64,
@@ -21,7 +21,7 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// Mean 0, standard deviation 1.
+    /// The density of mean 0 and standard deviation 1.
     pub const STANDARD: Self = Self {
         mean: 0.0,
         deviation: 1.0,
@@ -55,7 +55,7 @@ impl Density for Normal {
         standard_cell(a / s, b / s).scaled(s)
     }
 
-    /// The exponentials of narrow cells are taken many at a time.
+    /// The exponentials of narrow cells are computed many at a time.
     fn cells(&self, breakpoints: &[f64], cells: &mut [CellMoments]) {
         let s = self.deviation;
         for (batch, cells) in cells.chunks_mut(BATCH).enumerate() {
@@ -103,7 +103,7 @@ impl Density for Normal {
     }
 
     fn extent(&self) -> (f64, f64) {
-        // The cube root has standard deviation sqrt(3).
+        // The cube root of the density has standard deviation sqrt(3).
         (-14.0 * self.deviation, 14.0 * self.deviation)
     }
 
@@ -120,14 +120,14 @@ impl Density for Normal {
     }
 }
 
-/// Middle and half width of a cell that [`NARROW`] describes.
+/// Middle and half width of a cell that is narrow in the sense of [`NARROW`]; `None` for others.
 #[inline]
 fn narrow(a: f64, b: f64) -> Option<(f64, f64)> {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     (half * (middle.abs() + half) < NARROW).then_some((middle, half))
 }
 
-/// A cell of the standard normal density.
+/// Moments of a cell of the standard normal density.
 fn standard_cell(a: f64, b: f64) -> CellMoments {
     match narrow(a, b) {
         Some((middle, half)) => {
@@ -149,7 +149,7 @@ fn log_densities(middle: f64, half: f64) -> [f64; NODES] {
     logs
 }
 
-/// A narrow cell, given the density at its nodes relative to that in its middle.
+/// Moments of a narrow cell, given the density at its nodes relative to that in its middle.
 #[inline]
 fn narrow_cell(middle: f64, half: f64, densities: &[f64; NODES]) -> CellMoments {
     let rule = gauss_legendre::<NODES>();
@@ -167,7 +167,7 @@ fn narrow_cell(middle: f64, half: f64, densities: &[f64; NODES]) -> CellMoments 
     }
 }
 
-/// A cell that is not narrow.
+/// Moments of a cell that is not narrow.
 fn wide_cell(a: f64, b: f64) -> CellMoments {
     let (from_lower, to_upper) = if b == f64::INFINITY {
         (normal::inverse_mills(-a) - a, f64::INFINITY)
@@ -176,7 +176,7 @@ fn wide_cell(a: f64, b: f64) -> CellMoments {
     } else {
         match normal::truncated_moments(a, b) {
             Ok(inside) => (inside.mean - a, b - inside.mean),
-            // The middle of an empty cell.
+            // An empty cell: its middle.
             Err(_) => (0.5 * (b - a), 0.5 * (b - a)),
         }
     };

@@ -4,7 +4,7 @@ use super::{CellMoments, Density, Uniform};
 use crate::error::{Error, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
 
-/// Any smooth density given as a function, integrated by Gauss-Legendre panels.
+/// A smooth density given as a function, integrated by Gauss-Legendre panels.
 #[derive(Debug, Clone)]
 pub struct SmoothDensity<F> {
     density: F,
@@ -16,9 +16,9 @@ pub struct SmoothDensity<F> {
 }
 
 impl<F: Fn(f64) -> f64> SmoothDensity<F> {
-    /// The density proportional to `density` on `[low, high]`; what lies outside is cut off and the rest normalised.
+    /// The density proportional to `density` on `[low, high]` and zero outside.
     ///
-    /// `panels` is the number of 20-point Gauss-Legendre panels that resolve it (1 to 10000).
+    /// `panels` (1 to 10000) is the number of 20-point Gauss-Legendre panels; they must resolve the function.
     ///
     /// # Errors
     /// If the interval is empty or not finite, `panels` is out of range, or the integral is not positive and finite.

@@ -1,9 +1,9 @@
-//! Lloyd-Max quantizers: least mean squared error for one scalar and a given number of levels.
+//! Lloyd-Max quantizers: the smallest mean squared error for one scalar and a given number of levels.
 //!
-//! The optimal breakpoints lie midway between the centroids of the two cells they part (Lloyd 1957, Max 1960). The usual
-//! sweep "centroids, midpoints, centroids, ..." converges linearly and slowly (some 180 sweeps for 8 levels and 670 for 16
-//! to a step of 1e-12). A centroid depends on the two edges of its own cell only, so the midpoint equations have a
-//! tridiagonal Jacobian and Newton's method costs no more a step than a sweep:
+//! The optimal breakpoints are midway between the centroids of the two adjacent cells (Lloyd 1957, Max 1960). The usual
+//! iteration "centroids, midpoints, centroids, ..." converges linearly and slowly (some 180 iterations for 8 levels and 670 for 16
+//! to a step of 1e-12). A centroid depends only on the two edges of its own cell, so the midpoint equations have a
+//! tridiagonal Jacobian, and a Newton step costs no more than one such iteration:
 //!
 //! ```text
 //! b <- edges of equal mass under density^(1/3)            # the companding solution of Panter and Dite
@@ -14,14 +14,14 @@
 //!                          and  dc_i/db_{i-1} = p(b_{i-1}) (c_i - b_{i-1}) / P_i
 //!     step <- J^-1 F, halved until b - step is increasing and |F| falls
 //!     b    <- b - step
-//! until the step is so small against the narrowest cell that the next one is below rounding
+//! until the step is so small compared with the narrowest cell that the next one is below rounding
 //! ```
 //!
-//! Only a density whose logarithm is concave has a single solution. Any other one is also solved from the best partition on a
-//! fine grid (dynamic programming), and the solution of less error is returned. Every answer is a local optimum without empty
-//! cells: that is checked.
+//! The solution is unique only if the logarithm of the density is concave. Other densities are also solved from the best partition on a
+//! fine grid (dynamic programming), and the solution with the smaller error is returned. Each result is checked to be a local optimum
+//! without empty cells.
 //!
-//! Everything is measured from the density's centre and moved in the end, so that a density far from zero has the same
+//! Positions are measured from the density's centre and shifted at the end, so that a density far from zero has the same
 //! quantizer as one at zero.
 //!
 //! ```
@@ -43,15 +43,15 @@ use crate::error::{Error, refuse};
 use crate::quantizer::check_increasing;
 use std::sync::OnceLock;
 
-/// Largest number of levels: beyond it a linear quantizer with dither serves as well.
+/// Largest number of levels. For more levels a uniform quantizer with dither is as good.
 pub const MAX_LEVELS: usize = 4096;
 
 /// The Lloyd-Max quantizer of `density` with `levels` levels.
 ///
 /// # Errors
-/// [`Error::Argument`] unless `levels` is in `2..=MAX_LEVELS`, or if the density lies so far from zero that breakpoints
-/// coincide; [`Error::NotConverged`] if the density is too rough for an optimum to be found; [`Error::NotOptimal`] if the density
-/// has no use for so many levels.
+/// [`Error::Argument`] if `levels` is not in `2..=MAX_LEVELS`, or if the density is so far from zero that breakpoints
+/// coincide; [`Error::NotConverged`] if the density is too rough for an optimum to be found; [`Error::NotOptimal`] if so many levels leave
+/// a cell empty.
 pub fn design(density: &impl Density, levels: usize) -> Result<LloydMax, Error> {
     checked_levels(levels)?;
     if let Some(deviation) = density.normal_deviation() {
@@ -77,10 +77,10 @@ pub fn design(density: &impl Density, levels: usize) -> Result<LloydMax, Error> 
     }
 }
 
-/// Quantizers of the standard normal density up to this many levels are designed once and kept.
+/// Quantizers of the standard normal density up to this many levels are designed once and stored.
 const KEPT_LEVELS: usize = 256;
 
-/// The Lloyd-Max quantizer of the standard normal density: from the kept tables up to 256 levels, designed beyond.
+/// The Lloyd-Max quantizer of the standard normal density: stored up to 256 levels, designed at each call for more.
 ///
 /// # Errors
 /// As [`design`].
@@ -92,8 +92,8 @@ pub fn gaussian(levels: usize) -> Result<LloydMax, Error> {
     }
 }
 
-/// As [`design`], from breakpoints of the caller's: those of a similar density, or of a design stored before. The answer is the
-/// local optimum that they lead to. If they lead to none (a cell runs empty), it is that of [`design`].
+/// As [`design`], started from given breakpoints, such as those of a similar density or of an earlier design. The result is the
+/// local optimum that they lead to. If a cell becomes empty on the way, the result is that of [`design`].
 ///
 /// # Errors
 /// As [`design`]; also if the breakpoints are not finite and strictly increasing.
@@ -121,7 +121,7 @@ fn checked_levels(levels: usize) -> Result<usize, Error> {
 fn standard(levels: usize) -> Result<LloydMax, Error> {
     checked_levels(levels)?;
     let mut quantizer = newton::solve(&Normal::STANDARD, Normal::STANDARD.companding(levels))?;
-    // The optimum is odd; averaging removes the last rounding error and makes the middle edge 0 exactly.
+    // The optimum is an odd function; averaging removes the last rounding error and makes the middle edge exactly 0.
     symmetrise(&mut quantizer.breakpoints);
     symmetrise(&mut quantizer.centroids);
     Ok(quantizer)
@@ -144,7 +144,7 @@ fn symmetrise(values: &mut [f64]) {
     }
 }
 
-/// Largest word length kept by [`gaussian_table`].
+/// Largest word length stored by [`gaussian_table`].
 const TABLE_BITS: usize = 8;
 
 /// The standard normal quantizer of `2^bits` levels, designed at first use and kept for the life of the process.
@@ -238,7 +238,7 @@ mod tests {
             let exact = gaussian(levels).unwrap().mean_squared_error();
             assert!((q.mean_squared_error() / exact - 1.0).abs() < 1e-12, "{levels}");
         }
-        // Where the numbers cannot hold the breakpoints apart, that is an error.
+        // An error if the breakpoints are equal after rounding.
         assert!(design(&Normal::with_deviation(1e17, 1.0).unwrap(), 8).is_err());
         assert!(gaussian(8).unwrap().affine(1e17, 1.0).is_err());
     }

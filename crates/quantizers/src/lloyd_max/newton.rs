@@ -1,4 +1,4 @@
-//! Newton's method on the midpoint equations.
+//! Newton's method for the midpoint equations.
 
 use super::table::LloydMax;
 use crate::density::{CellMoments, Density, edges};
@@ -7,20 +7,20 @@ use crate::quantizer::{check_increasing, increasing};
 use fewbits_numerics::error::all_finite;
 use fewbits_numerics::tridiagonal;
 
-/// Newton steps below this share of the narrowest cell leave, squared, an error below rounding.
+/// After a Newton step below this fraction of the narrowest cell, the error is its square and below rounding.
 const LAST_STEP: f64 = 3e-8;
-/// Steps below this share of the narrowest cell that no longer shrink have met the rounding of the equations.
+/// Steps below this fraction of the narrowest cell that no longer shrink are rounding errors of the equations.
 const ROUNDING_STEP: f64 = 1e-5;
-/// Residuals below this share of the density's extent count as no worse than any other.
+/// Residuals below this fraction of the density's extent are treated as equal.
 const RESIDUAL_TOLERANCE: f64 = 1e-13;
-/// A cell of less probability holds nothing: the 4096 cells of a normal density hold 1e-10 and more.
+/// A cell of smaller probability is treated as empty: the 4096 cells of a normal density have 1e-10 and more.
 const EMPTY_CELL: f64 = 1e-15;
-/// A pivot of the Hessian below the negative of this marks a saddle; rounding leaves 1e-13 where it is zero.
+/// A pivot of the Hessian below the negative of this indicates a saddle; rounding gives 1e-13 where it is zero.
 const FLAT_PIVOT: f64 = 1e-9;
-/// Newton needs 4 to 15 steps; what needs more is not a density with a unique optimum.
+/// Newton's method needs 4 to 15 steps. More are needed only for densities without a unique optimum.
 const MAX_ITERATIONS: usize = 200;
 
-/// The quantizer of least squared error near the increasing breakpoints `b`, which are measured from the density's centre: a
+/// The quantizer of smallest squared error near the increasing breakpoints `b`, which are measured from the density's centre: a
 /// local optimum without empty cells, or an error.
 pub(super) fn solve(density: &impl Density, mut b: Vec<f64>) -> Result<LloydMax, Error> {
     let (low, high) = density.extent();
@@ -45,7 +45,7 @@ pub(super) fn solve(density: &impl Density, mut b: Vec<f64>) -> Result<LloydMax,
             }
             share *= 0.5;
             if share < 1e-6 {
-                // Newton has no descent here: one sweep of the fixed point always has.
+                // The Newton step does not reduce the residual here: take one fixed-point iteration, which always reduces the error.
                 solver.enter(density, &b);
                 solver.residual();
                 for ((t, b), r) in trial.iter_mut().zip(&b).zip(&solver.residual) {
@@ -60,7 +60,7 @@ pub(super) fn solve(density: &impl Density, mut b: Vec<f64>) -> Result<LloydMax,
         std::mem::swap(&mut b, &mut trial);
         before = after;
         if !increasing(&b) {
-            // A density that is not a number somewhere.
+            // The density is NaN somewhere.
             break;
         }
         let narrowest = b.windows(2).map(|w| w[1] - w[0]).fold(0.5 * (high - low), f64::min);
@@ -99,12 +99,12 @@ impl Solver {
         }
     }
 
-    /// Takes the cells between the breakpoints `b`.
+    /// Computes the cells between the breakpoints `b`.
     pub(super) fn enter(&mut self, density: &impl Density, b: &[f64]) {
         density.cells(b, &mut self.cells);
     }
 
-    /// `b_i - (c_i + c_{i+1}) / 2` for all `i`; returns the largest size.
+    /// Computes `b_i - (c_i + c_{i+1}) / 2` for all `i`; returns the largest absolute value.
     pub(super) fn residual(&mut self) -> f64 {
         let mut largest = 0.0;
         for (r, pair) in self.residual.iter_mut().zip(self.cells.windows(2)) {
@@ -114,10 +114,10 @@ impl Solver {
         largest
     }
 
-    /// Refuses empty cells and saddles at the stationary point `b`.
+    /// Returns an error if a cell is empty or the stationary point `b` is a saddle.
     ///
-    /// The Hessian of the error is the Jacobian with its rows scaled by positive numbers, so that it is positive semidefinite
-    /// exactly if no pivot of the Jacobian is negative.
+    /// The Hessian of the error is the Jacobian with its rows scaled by positive numbers. It is therefore positive semidefinite
+    /// if and only if no pivot of the Jacobian is negative.
     fn certify(&self, density: &impl Density, b: &[f64]) -> Result<(), Error> {
         let masses = self.cells.iter().map(|c| c.mass).enumerate();
         let (cell, probability) = masses.min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((0, 0.0));
@@ -139,7 +139,7 @@ impl Solver {
         })
     }
 
-    /// Solves the tridiagonal Newton system at `b`; where it is singular the step is a sweep of the fixed point.
+    /// Solves the tridiagonal Newton system at `b`. If it is singular, the step is a fixed-point iteration.
     fn newton_step(&mut self, density: &impl Density, b: &[f64]) {
         let (below, diagonal, above) = self.jacobian(density, b);
         match tridiagonal::solve(&below, &diagonal, &above, &self.residual) {
@@ -152,7 +152,7 @@ impl Solver {
     fn jacobian(&self, density: &impl Density, b: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let n = b.len();
         let densities: Vec<f64> = b.iter().map(|b| density.pdf(*b)).collect();
-        // Influence of an edge on the centroid of a cell, at the given distance from each other.
+        // Derivative of a cell's centroid with respect to an edge at the given distance from it.
         let pull = |cell: &CellMoments, edge: usize, distance: f64| {
             if cell.mass > 0.0 {
                 0.5 * densities[edge] * distance / cell.mass
@@ -169,7 +169,7 @@ impl Solver {
     }
 }
 
-/// Moves the cells to their place and adds up what they cost, all terms positive.
+/// The quantizer in the density's own position, with its error as a sum of positive terms.
 fn finish(density: &impl Density, b: &[f64], cells: &[CellMoments]) -> Result<LloydMax, Error> {
     let centre = density.centre();
     let (mut centroids, mut error) = (Vec::with_capacity(cells.len()), 0.0);

@@ -1,4 +1,4 @@
-//! The best partition of a density on a grid: a start from which no cell is empty.
+//! The best partition of a density on a grid, as a start without empty cells.
 //!
 //! The squared error of a partition is a sum over its cells, so the best partition into `l` cells follows from the best ones into
 //! `l - 1` cells:
@@ -9,24 +9,24 @@
 //! V_l(b)     <- min over a < b of V_{l-1}(a) + cost(a, b)
 //! ```
 //!
-//! The best `a` does not fall as `b` grows, so each layer takes `O(n log n)` steps by halving the range of `b`.
+//! The best `a` does not decrease as `b` increases, so each layer takes `O(n log n)` steps by bisecting the range of `b`.
 
 use crate::density::Density;
 
-/// Cells of the grid.
+/// Number of cells of the grid.
 const GRID: usize = 2000;
-/// Each cell of the partition has this many grid cells on average, or the grid is no help.
+/// Smallest average number of grid cells per cell of the partition; with fewer the grid is not used.
 const MIN_GRID_CELLS: usize = 8;
 
-/// Breakpoints of the partition of least squared error whose edges lie on a grid over the density's extent, measured from its
-/// centre. `None` if the grid is too coarse for so many levels or the density has no mass on it.
+/// Breakpoints, measured from the density's centre, of the partition of smallest squared error whose edges are on a grid over the density's
+/// extent. `None` if the grid is too coarse for so many levels, or the density has no mass on it.
 pub(super) fn best_on_grid(density: &impl Density, levels: usize) -> Option<Vec<f64>> {
     if levels * MIN_GRID_CELLS > GRID {
         return None;
     }
     let (low, high) = density.extent();
     let width = (high - low) / GRID as f64;
-    // Cumulative mass, moment and square of the grid cells, in units of the grid and about its middle.
+    // Cumulative mass, first and second moment of the grid cells, in grid units about the middle of the grid.
     let mut sums = vec![[0.0; 3]; GRID + 1];
     for i in 0..GRID {
         let place = i as f64 + 0.5 - 0.5 * GRID as f64;
@@ -66,7 +66,7 @@ pub(super) fn best_on_grid(density: &impl Density, levels: usize) -> Option<Vec<
     Some(edges)
 }
 
-/// One layer of the dynamic programme.
+/// One layer (number of cells) of the dynamic programme.
 struct Layer<'a, C> {
     before: &'a [f64],
     cost: &'a C,
@@ -75,7 +75,7 @@ struct Layer<'a, C> {
 }
 
 impl<C: Fn(usize, usize) -> f64> Layer<'_, C> {
-    /// The entries `b` of a range, whose best `a` lies in another range.
+    /// Computes the entries `b` of a range, whose best `a` is known to be in another range.
     fn fill(&mut self, (first, last): (usize, usize), (low, high): (usize, usize)) {
         if first > last {
             return;

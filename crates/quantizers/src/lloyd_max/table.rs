@@ -6,7 +6,7 @@ use fewbits_numerics::error::{all_finite, finite, non_negative, positive, probab
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
-/// A least-squares scalar quantizer: cells `[b_{i-1}, b_i)` and the centroid of each.
+/// A scalar quantizer of smallest squared error: cells `[b_{i-1}, b_i)` and the centroid of each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Table", into = "Table")]
 pub struct LloydMax {
@@ -24,7 +24,7 @@ stored! { LloydMax as Table |quantizer| {
 } => LloydMax { breakpoints, centroids, probabilities, mean_squared_error }.checked(), Error }
 
 impl LloydMax {
-    /// A stored quantizer, if its parts fit together.
+    /// Checks that the parts of a stored quantizer are consistent.
     fn checked(self) -> Result<Self, Error> {
         let (breakpoints, centroids) = (&self.breakpoints, &self.centroids);
         check_increasing(breakpoints)?;
@@ -70,7 +70,7 @@ impl LloydMax {
         self.mean_squared_error
     }
 
-    /// Entropy of the cell index in bits: what an ideal entropy coder would spend.
+    /// Entropy of the cell index in bits: the mean length with an ideal entropy coder.
     pub fn entropy_bits(&self) -> f64 {
         -self
             .probabilities
@@ -84,7 +84,7 @@ impl LloydMax {
     ///
     /// # Errors
     /// If `mean` is not finite, `deviation` is not a positive number, the mean is so large that breakpoints coincide,
-    /// or a centroid leaves the range of numbers.
+    /// or a centroid overflows.
     pub fn affine(&self, mean: f64, deviation: f64) -> Result<Self, Error> {
         finite("mean", mean)?;
         positive("deviation", deviation)?;
@@ -101,7 +101,7 @@ impl LloydMax {
         })
     }
 
-    /// Index of the cell that holds `x`, 0 to `levels - 1`: the number of breakpoints at or below it.
+    /// Index of the cell that contains `x`, 0 to `levels - 1`: the number of breakpoints at or below `x`.
     ///
     /// # Errors
     /// If `x` is NaN.

@@ -1,7 +1,7 @@
-//! Blocks: rows that are decoded alone, with nothing but the header.
+//! Blocks: groups of rows that can be decoded with nothing but the header.
 //!
-//! `docs/record.md` says each byte. A block has sections of bytes for columns that are coded alone, then one arithmetic code for special
-//! cells and all columns behind their starts: a code has one end, and needs no length.
+//! `docs/record.md` describes each byte. A block has one section of bytes per column that is coded alone. Then follows one arithmetic code
+//! for special cells and all columns that use their starts: one code has one end and needs no lengths.
 
 mod read;
 mod shared;
@@ -17,15 +17,15 @@ pub(crate) use write::encode;
 /// The cells of one column; `None` is a gap.
 pub type Cells = Vec<Option<f64>>;
 
-/// Rows as they were restored, or are to be stored.
+/// Rows of a recording, restored or to be stored.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Block {
     /// The tick of each row.
     pub ticks: Vec<i64>,
-    /// One list of cells per column; `None` is a gap. A column that was not asked for is empty.
+    /// One list of cells per column; `None` is a gap. The list of a column that was not requested is empty.
     pub columns: Vec<Cells>,
-    /// For columns with a share of the range: the bound in this block in units of the column; 0 means lossless. `None` for others.
+    /// For columns with a share of the range, the bound in this block in units of the column; 0 means lossless. `None` for others.
     pub share_bounds: Vec<Option<f64>>,
 }
 
@@ -42,12 +42,12 @@ const SPECIALS_FOLLOW: u64 = 16;
 const BOUND_FOLLOWS: u8 = 0x20;
 const OTHERS_FOLLOW: u8 = 0x40;
 const DESCRIPTOR_BITS: u8 = 15 | BOUND_FOLLOWS | OTHERS_FOLLOW;
-/// Columns with starts have bytes of their own.
+/// Flag of a block: columns with starts have bytes of their own, and there is no shared code.
 const APART: u64 = 32;
-/// A reader of one column decodes all columns of a shared code before it, so wide tables have none.
+/// Largest number of columns of a shared code. To read one column, all columns before it must be decoded, so wide tables have none.
 const SHARED_COLUMNS: usize = 16;
 
-/// The descriptor of a column that has none.
+/// The descriptor that applies to a column if none is stored.
 fn plain(header: &Header, apart: bool, column: usize) -> u8 {
     match header.start(column, None) {
         Some(_) if !apart => CodecId::Shared as u8,
@@ -61,7 +61,7 @@ pub(crate) fn aligned(cells: &[Option<f64>], has_value: &[bool]) -> Vec<f64> {
     kept.map(|(cell, _)| cell.unwrap_or(f64::NAN)).collect()
 }
 
-/// The most bytes that a block of a recording may have: twice what raw samples take. A longer one is not a block.
+/// Largest length of a block in bytes: twice that of raw samples. Anything longer is not a block.
 pub(crate) fn max_bytes(header: &Header) -> usize {
     let cells = (header.schema.columns.len() + 1) * header.schema.rows_per_block;
     64 + 32 * header.schema.columns.len() + 24 * cells
@@ -70,7 +70,7 @@ pub(crate) fn max_bytes(header: &Header) -> usize {
 /// The length in bytes of the block that begins here.
 ///
 /// # Errors
-/// [`Damage::CutOff`] if the slice ends before the block does, others if no block begins here.
+/// [`Damage::CutOff`] if the slice ends before the block does; others if no block begins here.
 pub(crate) fn length(header: &Header, bytes: &[u8]) -> Result<usize, Damage> {
     let mut reader = Bytes(bytes);
     let length = reader.varint().map_err(|damage| match damage {

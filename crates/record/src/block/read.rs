@@ -1,4 +1,4 @@
-//! Reading a block.
+//! Decoding of a block.
 
 use super::{
     APART, BOUND_FOLLOWS, Block, Cells, DESCRIPTOR_BITS, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW,
@@ -13,7 +13,7 @@ use crate::time::{self, TimeKind};
 use crate::wire::{Bytes, push_varint};
 use fewbits_adaptive::arithmetic::Reader;
 
-/// Decodes one block whose checksum was found right; columns that are not `wanted` stay empty.
+/// Decodes one block whose checksum was verified. Columns that are not `wanted` stay empty.
 pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Damage> {
     let mut reader = Bytes(bytes);
     let length = reader.count(bytes.len(), "length")?;
@@ -74,7 +74,7 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
         body.finish()?;
     }
     specials.resize(columns, Specials::new());
-    // Columns that a wanted one was predicted from are decoded too; they stand before it. Of a shared code all before it are.
+    // The columns that a wanted one was predicted from must be decoded too; they are before it. In a shared code, all columns before it.
     let mut needed: Vec<bool> = (0..columns).map(&wanted).collect();
     for i in (0..columns).rev() {
         if needed[i] {
@@ -111,7 +111,7 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
     })
 }
 
-/// The bytes of one column, taken apart.
+/// The parts of the bytes of one column.
 struct Section<'a> {
     id: CodecId,
     own: Option<f64>,

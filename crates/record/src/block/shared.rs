@@ -15,14 +15,14 @@ use crate::specials::{self, Specials};
 use fewbits_adaptive::Effort;
 use fewbits_adaptive::arithmetic::{Coder, Reader, Writer};
 
-/// Probabilities in units of `2^-16`: special cells, others.
+/// Probabilities, in units of `2^-16`: that a block has special cells, and (`OTHERS`) that a column is predicted from others.
 const SPECIALS: u32 = 1 << 15;
 const OTHERS: u32 = 1 << 13;
-/// Bits of the number of other columns, and of how far before a column another one stands.
+/// Bits of the number of other columns, and of the distance to each.
 const NUMBER_BITS: u32 = 2;
 const DISTANCE_BITS: u32 = 4;
 
-/// A column's points of its start's grid, and their samples; `None` where it needs bytes of its own.
+/// The samples of a column as indices on its start's grid, and the samples; `None` if it needs bytes of its own.
 pub(super) fn indices(
     header: &Header,
     column: usize,
@@ -70,7 +70,7 @@ fn others<C: Coder>(coder: &mut C, column: usize, wanted: &[usize]) -> Result<Ve
     (0..count).map(other).collect()
 }
 
-/// The code of all columns that have indices.
+/// The arithmetic code of all columns that have indices.
 pub(super) fn encode(
     header: &Header,
     cells: &[Cells],
@@ -80,7 +80,7 @@ pub(super) fn encode(
     effort: Effort,
 ) -> Vec<u8> {
     let mut writer = Writer::new(Vec::new());
-    // Only a reader finds what no writer codes.
+    // Only a reader can fail here.
     let _ = self::specials(&mut writer, Some(specials), cells.len(), cells[0].len());
     for (column, wanted) in indices.iter().enumerate() {
         let (Some(wanted), Some(start)) = (wanted, header.start(column, None)) else {
@@ -110,7 +110,7 @@ pub(super) fn encode(
     writer.finish()
 }
 
-/// The next column of a shared code, which the cells of all columns before it stand for.
+/// Decodes the next column of a shared code. `before` are the cells of all columns before it.
 pub(super) fn decode(
     header: &Header,
     reader: &mut Reader<'_>,

@@ -1,4 +1,4 @@
-//! Writing a block.
+//! Encoding of a block.
 
 use super::read::decode;
 use super::{
@@ -15,16 +15,16 @@ use fewbits_adaptive::Effort;
 
 struct CodedColumn {
     descriptor: u8,
-    /// Bound and others.
+    /// The bound and the numbers of other columns.
     head: Vec<u8>,
     bytes: Vec<u8>,
-    /// Points of the start's grid, for the code that columns share.
+    /// Indices on the start's grid, for the shared code.
     indices: Option<Vec<i64>>,
     specials: Specials,
     restored: Cells,
 }
 
-/// One column of a block. `before` are the columns before it as a reader will restore them.
+/// Encodes one column of a block. `before` are the columns before it as a reader will restore them.
 fn encode_column(
     header: &Header,
     cells: &[Option<f64>],
@@ -65,7 +65,7 @@ fn encode_column(
     if !coded.uses_others {
         others.clear();
     }
-    // Samples whose restored value breaks the promise are stored whole.
+    // Samples whose restored value is outside the bound are stored in full.
     let mut values = samples.iter().zip(&coded.restored);
     for special in specials.iter_mut().filter(|special| special.is_none()) {
         if let Some((sample, value)) = values.next()
@@ -107,7 +107,7 @@ pub(crate) fn encode(
 ) -> (Vec<u8>, Vec<Cells>) {
     let may_share = columns.len() <= SHARED_COLUMNS;
     let (bytes, restored, shares) = encode_as(header, ticks, columns, own_bounds, effort, may_share);
-    // Columns with bytes of their own were decoded one by one.
+    // Columns with bytes of their own were verified one by one.
     let is_read = || {
         let read = decode(header, &bytes, |_| true)
             .map(|block| block.columns)
@@ -128,7 +128,7 @@ pub(crate) fn encode(
     (bytes, restored)
 }
 
-/// As [`encode`], without the check of the shared code, which there may be none of; whether there is one.
+/// As [`encode`], without verifying the shared code. The third value says whether there is one.
 fn encode_as(
     header: &Header,
     ticks: &[i64],
@@ -204,7 +204,7 @@ fn encode_as(
     (framed(header, body), restored, shares)
 }
 
-/// Length, body, checksum.
+/// A block as it is written: length, content, checksum.
 fn framed(header: &Header, body: Vec<u8>) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(body.len() + 9);
     push_varint(&mut bytes, body.len() as u64);

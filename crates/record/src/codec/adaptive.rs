@@ -1,4 +1,4 @@
-//! The adaptive codec's blocks (`fewbits-adaptive`), for every promise.
+//! Blocks of the adaptive codec (`fewbits-adaptive`), for every bound.
 
 use super::{Context, Target};
 use crate::bound::{Promise, TENS};
@@ -6,7 +6,7 @@ use crate::error::Damage;
 use fewbits_adaptive::{BlockCodec, Config, Effort, Start};
 use std::borrow::Cow;
 
-/// The codec of a promise. Decimals are rounded before, and then return exactly.
+/// The codec for a bound. For decimals, samples are rounded before and then restored exactly.
 pub(crate) fn codec(target: &Target) -> Option<BlockCodec> {
     let delta = match target.promise {
         Promise::Exact | Promise::Decimals(_) => return Some(BlockCodec::lossless()),
@@ -20,11 +20,11 @@ pub(crate) fn codec(target: &Target) -> Option<BlockCodec> {
     Some(BlockCodec::new(config))
 }
 
-/// The nearest number of so many decimals; numbers whose digits are no exact double stay as they are.
+/// The nearest number of `places` decimals. If its digits are not an exact double, the sample itself.
 fn rounded(sample: f64, places: u8) -> f64 {
     let ten = TENS.get(usize::from(places)).copied().unwrap_or(1.0);
     let digits = (sample * ten).round();
-    // Zero added: the negative zero is no number of its own here.
+    // Adding zero converts the negative zero.
     if digits.abs() < 9e15 {
         digits / ten + 0.0
     } else {
@@ -32,7 +32,7 @@ fn rounded(sample: f64, places: u8) -> f64 {
     }
 }
 
-/// The samples as the codec gets them.
+/// The samples that are passed to the codec.
 pub(crate) fn prepared<'a>(samples: &'a [f64], target: &Target) -> Cow<'a, [f64]> {
     match target.promise {
         Promise::Decimals(places) => samples.iter().map(|sample| rounded(*sample, places)).collect(),
@@ -40,7 +40,7 @@ pub(crate) fn prepared<'a>(samples: &'a [f64], target: &Target) -> Cow<'a, [f64]
     }
 }
 
-/// What blocks of a column with samples like these may begin with.
+/// The start for blocks of a column with samples like these.
 pub(crate) fn start(samples: &[f64], target: &Target) -> Option<Start> {
     codec(target)?.start(&prepared(samples, target))
 }
@@ -50,7 +50,7 @@ pub(crate) fn read_start(bytes: &mut &[u8], target: &Target) -> Result<Start, Da
     start.ok_or(Damage::Content("start of blocks"))
 }
 
-/// The bytes, and whether they are predicted from other columns.
+/// The coded bytes, and whether other columns are needed to decode them.
 pub(super) fn encode(samples: &[f64], context: Context<'_>, effort: Effort) -> Option<(Vec<u8>, bool)> {
     let codec = codec(context.target)?.with_effort(effort);
     let samples = prepared(samples, context.target);
@@ -59,7 +59,7 @@ pub(super) fn encode(samples: &[f64], context: Context<'_>, effort: Effort) -> O
         return Some((block.bytes, block.joint));
     }
     let bytes = codec.encode_with(&samples, context.others).ok()?;
-    // Bit 6 of a block's first byte.
+    // Bit 6 of a block's first byte says so.
     let joint = bytes.first().is_some_and(|head| head & 0x40 != 0);
     Some((bytes, joint))
 }

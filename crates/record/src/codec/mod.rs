@@ -1,14 +1,14 @@
-//! The seam between the container and the codecs of values: finite numbers in, bytes and what they decode to out.
+//! Interface between the container and the codecs: finite numbers in; bytes, and the numbers that they decode to, out.
 //!
-//! A new codec is a new id with a pair of functions in a file of its own. The container stores the id beside the bytes, repairs
-//! what a codec did not promise (see [`Coded::restored`]) and knows nothing else of it.
+//! A new codec is a new id and a pair of functions in its own file. The container stores the id beside the bytes. It stores samples in full
+//! that a codec does not restore within the bound (see [`Coded::restored`]), and depends on nothing else of the codec.
 //!
 //! | id | bytes | used for |
 //! |---|---|---|
-//! | 0 | doubles, little-endian | what nothing makes smaller |
-//! | 1 | the first bytes of one double, highest first | all samples alike within the promise |
+//! | 0 | doubles, little-endian | samples that no codec makes smaller |
+//! | 1 | the first bytes of one double, highest first | samples that are all within the bound of one number |
 //! | 2 | a block of `fewbits-adaptive` | everything else |
-//! | 3 | none: the column is a part of the block's shared code | what lies on the grid of the column's start |
+//! | 3 | none: the column is in the block's shared code | samples on the grid of the column's start |
 
 pub(crate) mod adaptive;
 mod plain;
@@ -40,7 +40,7 @@ impl CodecId {
     }
 }
 
-/// What a column promises in one block.
+/// The bound of a column in one block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Target {
     pub(crate) promise: Promise,
@@ -79,15 +79,15 @@ impl<'a> Context<'a> {
 pub(crate) struct Coded {
     pub(crate) id: CodecId,
     pub(crate) bytes: Vec<u8>,
-    /// What the bytes decode to, found by decoding them.
+    /// The numbers that the bytes decode to, found by decoding them.
     pub(crate) restored: Vec<f64>,
-    /// How many of them break the promise; the container stores those samples whole.
+    /// How many of them are outside the bound. The container stores those samples in full.
     pub(crate) broken: usize,
-    /// Whether other columns are needed to decode them.
+    /// Whether other columns are needed to decode the bytes.
     pub(crate) uses_others: bool,
 }
 
-/// Bytes of a sample that the container stores whole.
+/// Bytes of a sample that the container stores in full.
 const REPAIR_BYTES: usize = 10;
 
 impl Coded {
@@ -111,7 +111,7 @@ impl Coded {
     }
 }
 
-/// A small code of the samples, all finite. It was decoded once, so that what it restores is known.
+/// A short code of the samples, which are all finite. It has been decoded once, so the restored numbers are known.
 pub(crate) fn encode(samples: &[f64], context: Context<'_>, effort: Effort) -> Coded {
     let constant = plain::constant(samples, context.target)
         .and_then(|bytes| Coded::verified(CodecId::Constant, bytes, samples, Context::alone(context.target)))
@@ -134,10 +134,10 @@ pub(crate) fn encode(samples: &[f64], context: Context<'_>, effort: Effort) -> C
     })
 }
 
-/// The `count` numbers that the bytes stand for, all finite; `context` as it was given to [`encode`].
+/// Decodes `count` finite numbers; `context` must be the one that was passed to [`encode`].
 ///
 /// # Errors
-/// If they are not what [`encode`] writes. Total: any bytes give numbers or an error.
+/// If the bytes are not what [`encode`] writes. Any bytes give numbers or an error.
 pub(crate) fn decode(id: CodecId, bytes: &[u8], count: usize, context: Context<'_>) -> Result<Vec<f64>, Damage> {
     let values = match id {
         CodecId::Raw => plain::decode_raw(bytes, count),

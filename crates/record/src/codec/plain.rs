@@ -1,4 +1,4 @@
-//! Codes that need no model: doubles as they are, one number for all.
+//! Codes without a model: the doubles themselves, or one number for all samples.
 
 use super::Target;
 use crate::bound::Promise;
@@ -16,8 +16,8 @@ pub(super) fn decode_raw(bytes: &[u8], count: usize) -> Result<Vec<f64>, Damage>
     Ok(chunks.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect())
 }
 
-/// The number with the fewest bytes that keeps the promise for all samples, if there may be one: the middle, rounded to as few bits
-/// as it can be, or the first where all are the same.
+/// The number with the fewest bytes that may be within the bound of all samples: the middle of their range, rounded to as few bits
+/// as possible, or the first sample if all are equal. `None` if there is none.
 pub(super) fn constant(samples: &[f64], target: &Target) -> Option<Vec<u8>> {
     let first = *samples.first()?;
     let keeps = |value: f64| samples.iter().all(|sample| target.holds(*sample, value));

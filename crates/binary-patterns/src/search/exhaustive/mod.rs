@@ -1,4 +1,4 @@
-//! All sets of linear patterns, by depth-first search over multisets.
+//! Exhaustive search over sets of linear patterns, depth first over multisets.
 
 mod setting;
 mod walk;
@@ -12,20 +12,19 @@ use crate::patterns::linear::Span;
 use fewbits_numerics::ArgumentError;
 use walk::Walk;
 
-/// Candidates that are evaluated again on the fine nodes.
+/// Number of candidates that are evaluated again on the fine nodes.
 const FINALISTS: usize = 16;
-/// Relative difference below which two sets are equally good, and the lower masks are preferred.
+/// Relative difference below which two sets are equally good; the one with lower masks is taken.
 const TIE: f64 = 1e-12;
-/// Most sets that a ranking may list.
+/// Largest number of sets of a ranking.
 const MAX_RANKED: u128 = 1 << 26;
-/// Most sets that a search may visit: hours of work.
+/// Largest number of sets of a search, which takes hours.
 const MAX_SETS: u128 = 1 << 32;
 impl LinearSearch {
-    /// The best set. Its error is exact to `1e-12`; among equals the lowest masks win.
+    /// The best set. Its error is exact to `1e-12`; among equally good sets the one with the lowest masks is returned.
     ///
-    /// # Errors
-    /// If full rank is required of fewer sensors than bits, there are too many outcomes to enumerate, or more than `2^32` sets;
-    /// [`Descent`](super::Descent) is for those.
+    /// If full rank is required with fewer sensors than bits, there are too many outcomes to enumerate, or more than `2^32` sets
+    /// (use [`Descent`](super::Descent) for these).
     pub fn best(&self) -> Result<MaskSet, Error> {
         let mut finalists = self.run(FINALISTS)?;
         for set in &mut finalists {
@@ -42,7 +41,7 @@ impl LinearSearch {
             })
     }
 
-    /// All sets, the best first, with errors good to `1e-9` of the source's variance.
+    /// All sets, best first, with errors accurate to `1e-9` of the source's variance.
     ///
     /// # Errors
     /// As [`Self::best`], or if there are more than `2^26` sets.
@@ -53,7 +52,7 @@ impl LinearSearch {
 
     fn run(&self, keep: usize) -> Result<Vec<MaskSet>, Error> {
         Error::at_most("the list of sets of masks", self.sets()?, MAX_SETS)?;
-        // Distinct masks give the most outcomes.
+        // Distinct masks give the largest number of outcomes.
         let distinct = self.sensors.min((1 << self.bits) - 1) as u32;
         let repeats = (self.sensors as u128 / u128::from(distinct)).saturating_add(1);
         let outcomes = repeats.saturating_add(1).saturating_pow(distinct);

@@ -5,7 +5,7 @@ use crate::patterns::linear::{check_mask, grid_bits, sensors_of};
 use crate::{Bank, CellGrid, Error, Mask, Source};
 use fewbits_numerics::error::{at_least_one, positive};
 
-/// A set of masks, one a sensor, in increasing order, with the error it achieves.
+/// A set of masks, one per sensor, in increasing order, with its error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MaskSet {
     /// The masks.
@@ -25,10 +25,9 @@ pub struct MaskSet {
 ///         search(j, r - m, W x [C(m,k) P1j^k P0j^(m-k)])
 /// ```
 ///
-/// A mask that `m` sensors share has `m + 1` outcomes, not `2^m`. On a symmetric grid `x -> -x` flips the bit of masks of odd
-/// weight and keeps the others, so that half of the nodes carry everything: the integral over the other half is that of
-/// the mirrored outcome. The first levels of the tree are shared among the threads of the current rayon pool; the result
-/// does not depend on their number.
+/// `m` sensors with the same mask have `m + 1` outcomes, not `2^m`. On a symmetric grid the reflection `x -> -x` inverts the bit of masks
+/// of odd weight and keeps the others, so half of the nodes are enough: the integral over the other half is that of the mirrored outcome.
+/// The first levels of the tree are distributed over the threads of the current rayon pool; the result does not depend on their number.
 #[derive(Debug, Clone)]
 pub struct LinearSearch {
     pub(super) source: Source,
@@ -41,10 +40,10 @@ pub struct LinearSearch {
 }
 
 impl LinearSearch {
-    /// A search for masks of full rank.
+    /// A search for sets of masks with full rank.
     ///
     /// # Errors
-    /// If the grid has not `2^B` cells, the noise is not positive and finite, or there is no sensor.
+    /// If the grid does not have `2^B` cells, the noise is not positive and finite, or there is no sensor.
     pub fn with_deviation(source: Source, grid: CellGrid, noise_deviation: f64, sensors: usize) -> Result<Self, Error> {
         let bits = grid_bits(&grid)?;
         at_least_one("sensors", sensors)?;
@@ -59,14 +58,14 @@ impl LinearSearch {
         })
     }
 
-    /// Drops the constraint that the masks separate all cells. In noise it costs up to a third of the error.
+    /// Removes the condition that the masks distinguish all cells. With noise this condition can increase the error by up to a third.
     #[must_use]
     pub fn any_rank(mut self) -> Self {
         self.full_rank = false;
         self
     }
 
-    /// Requires these masks to be in the set, as often as they are listed. With the Gray basis: strategy 1.
+    /// Requires these masks in every set, as often as they are listed. With the Gray basis this is strategy 1.
     ///
     /// # Errors
     /// If a mask is out of range or there are more of them than sensors.
@@ -79,7 +78,7 @@ impl LinearSearch {
         Ok(self)
     }
 
-    /// Number of sets without regard to forced masks.
+    /// Number of sets, without regard to required masks.
     ///
     /// # Errors
     /// If full rank is required of fewer sensors than bits, or the number exceeds 128 bits.
@@ -91,10 +90,10 @@ impl LinearSearch {
         }
     }
 
-    /// The bank that a set of masks makes with this source, grid and noise.
+    /// The bank of a set of masks with this source, grid and noise.
     ///
     /// # Errors
-    /// If a mask is out of range or there is none.
+    /// If a mask is out of range or there is no mask.
     pub fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
         Bank::new(self.source, sensors_of(masks, &self.grid, self.noise_deviation)?)
     }

@@ -1,4 +1,4 @@
-//! The tree of all multisets of masks.
+//! Search through the tree of all multisets of masks.
 
 use super::setting::{LinearSearch, MaskSet};
 use crate::observation::bank::CountTable;
@@ -8,14 +8,14 @@ use crate::{BinaryQuantizer, Error, Mask, linear_pattern};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Levels of the search tree whose branches are shared among threads.
+/// Levels of the search tree whose branches are distributed over threads.
 const PARALLEL_LEVELS: usize = 2;
 
 /// The best sets so far.
 pub(super) struct Top {
     keep: usize,
     pub(super) sets: Vec<MaskSet>,
-    /// Sets worse than this cannot enter.
+    /// Sets with a larger error cannot enter.
     bar: f64,
 }
 
@@ -66,9 +66,9 @@ pub(super) struct Walk<'a> {
     variance: f64,
     /// `tables[j][m - 1]`: probabilities of the counts of `m` sensors with mask `j + 1`.
     tables: Vec<Vec<CountTable>>,
-    /// `leaves[r - 1]`: the integrands of all masks at `r` sensors.
+    /// `leaves[r - 1]`: the integrands of all masks for `r` remaining sensors.
     leaves: Vec<DMatrix<f64>>,
-    /// Sensors whose masks are forced, from mask `j + 1` on.
+    /// Number of sensors whose masks are required, from mask `j + 1` on.
     forced_from: Vec<usize>,
 }
 
@@ -88,6 +88,7 @@ impl<'a> Walk<'a> {
         let leaves = (0..search.sensors)
             .map(|r| candidates.integrands(tables.iter().map(|t| &t[r])))
             .collect();
+        // Number of sensors that must still get a required mask from j on; branches with fewer remaining sensors are cut.
         let mut forced_from = vec![0; kinds + 1];
         for j in (0..kinds).rev() {
             forced_from[j] = forced_from[j + 1] + search.forced[j];
@@ -103,7 +104,7 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// All sets that continue `chosen` with `left` sensors of masks from `first` on.
+    /// Evaluates all sets that continue `chosen` with `left` more sensors, whose masks are `first` or later.
     pub(super) fn branch(
         &self,
         first: usize,
@@ -119,6 +120,7 @@ impl<'a> Walk<'a> {
             let needed = self.search.forced[j].max(1);
             for m in needed..left {
                 let next = span.with(j as Mask + 1);
+                // Each remaining sensor can raise the rank by at most one.
                 let possible = !self.search.full_rank || next.rank() + (left - m) >= self.search.bits;
                 if possible && left - m >= self.forced_from[j + 1] && j + 1 < self.tables.len() {
                     steps.push((j, m, next));
@@ -134,6 +136,7 @@ impl<'a> Walk<'a> {
             let level = level.with(&self.tables[j][m - 1], self.candidates.flips[j]);
             self.branch(j + 1, left - m, next, &chosen, level)
         };
+        // Merged in the order of the branches, so that the result does not depend on the number of threads.
         if chosen.len() < PARALLEL_LEVELS {
             let parts: Vec<Top> = steps.par_iter().map(descend).collect();
             parts.into_iter().fold(found, Top::merge)
@@ -142,7 +145,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Evaluates all sets in which the `left` sensors share one last mask.
+    /// Evaluates all sets in which the `left` remaining sensors share one mask.
     fn close(
         &self,
         first: usize,
@@ -165,6 +168,7 @@ impl<'a> Walk<'a> {
         };
         let rows_each = (left + 1) * 2;
         let rows = (until - from) * rows_each;
+        // All candidates for the last mask in one matrix product.
         let sums = level.integrals(&self.leaves[left - 1].rows(from * rows_each, rows));
         for j in (from..until).filter(|&j| allowed(j)) {
             let at = [rows, (j - from) * rows_each];

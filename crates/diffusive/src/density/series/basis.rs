@@ -1,4 +1,4 @@
-//! Orthonormal Hermite polynomials and the quadrature that they need.
+//! Orthonormal Hermite polynomials and the Gauss-Hermite quadrature.
 
 use super::polynomials::HIGHEST_DEGREE;
 use nalgebra::{DMatrix, SVector};
@@ -37,7 +37,7 @@ pub(super) fn row_of_polynomials(x: f64, row: &mut [f64]) {
     }
 }
 
-/// Points at which [`sums_of_polynomials`] are found together.
+/// Number of points that [`sums_of_polynomials`] evaluates together.
 pub(super) const LANES: usize = 8;
 
 /// `sum_n c_n he_n(x) / sqrt(n!)` at each point, or of the absolute values of these terms.

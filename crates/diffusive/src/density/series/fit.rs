@@ -1,4 +1,4 @@
-//! The best series for a belief over cells: the Galerkin projection of the root of its density.
+//! The best series for a belief over cells: the Galerkin projection of the square root of its density.
 
 use super::basis::hermite_products;
 use super::{Lpg, Term};
@@ -9,10 +9,10 @@ use fewbits_densities::Component;
 use fewbits_numerics::error::refuse;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Pivots of the Gram matrix below this mean that its Gaussians are too much alike.
+/// If a pivot of the Gram matrix is below this, the Gaussians are nearly linearly dependent.
 const DEPENDENT: f64 = 1e-6;
 
-/// Logarithms of roots below this are negligible.
+/// Logarithms of the square root below this are negligible.
 pub(super) const NEGLIGIBLE: f64 = -80.0;
 
 /// A fit and its quality.
@@ -45,8 +45,8 @@ impl<const D: usize> Lpg<D> {
         })
     }
 
-    /// The projection of a root that is a sum of parts, one for each weight. `inner` writes the inner products of a part and a term's
-    /// polynomials, or returns false if they are negligible.
+    /// The projection of a square root that is a sum of parts, one per weight. `inner` writes the inner products of one part with the
+    /// polynomials of one term, or returns false if they are negligible.
     pub(super) fn galerkin(
         gaussians: &[Component<D>],
         degree: usize,
@@ -54,6 +54,7 @@ impl<const D: usize> Lpg<D> {
         mut inner: impl FnMut(&Self, &Term<D>, usize, f64, &mut [f64]) -> bool,
     ) -> Result<LpgFit<D>, Error> {
         let belief = Self::skeleton(gaussians, degree)?;
+        // Coefficients solve `G c = b`: `G` has the inner products of the basis, `b` those of the density with it.
         let gram = belief.gram()?;
         let mut b = DVector::zeros(gram.nrows());
         let mut products = vec![0.0; belief.indices.len()];
@@ -72,7 +73,7 @@ impl<const D: usize> Lpg<D> {
 
     /// The belief whose coefficients are the projection `G^-1 b`, normalised.
     fn project(mut self, gram: &DMatrix<f64>, b: &DVector<f64>) -> Result<LpgFit<D>, Error> {
-        // The basis of each Gaussian is orthonormal: the diagonal is one, and a tiny pivot is rounding.
+        // The basis of each Gaussian is orthonormal: the diagonal is one, and a tiny pivot is a rounding error.
         let independent = |factor: &Cholesky<f64, Dyn>| factor.l_dirty().diagonal().min() > DEPENDENT;
         let Some(factor) = gram.clone().cholesky().filter(independent) else {
             return refuse("gaussians", "a dependent set", "Gaussians that differ");
@@ -84,7 +85,7 @@ impl<const D: usize> Lpg<D> {
         self.settle()?;
         Ok(LpgFit {
             belief: self,
-            // Before it was normalised the projection had the norm of its inner product with what was projected.
+            // Before normalisation, the squared norm of the projection equals its inner product with the root.
             affinity: b.dot(&c).sqrt(),
         })
     }

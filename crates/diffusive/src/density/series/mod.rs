@@ -1,4 +1,4 @@
-//! Linear combinations of polynomial Gaussians.
+//! Squared sums of Gaussians times polynomials (linear combinations of polynomial Gaussians, LPG).
 
 mod basis;
 mod fit;
@@ -23,13 +23,13 @@ use rand::{Rng, RngExt};
 /// A belief `s(x)^2` with `s(x) = sum_l sum_nu c_l,nu sqrt(phi_l(x)) h_nu(u_l)`: Gaussians `phi_l`, whitened coordinates
 /// `u_l = L_l^-1 (x - m_l)`, and products `h_nu` of orthonormal Hermite polynomials of total degree up to `k`.
 ///
-/// The space spanned is that of the paper's polynomials `He_nu(z; W)`, but the coordinates are well conditioned, and the square
-/// can never be negative. One component of degree `k` costs `5 + (k + 1)(k + 2) / 2` numbers in the plane: the Gaussian and the
-/// coefficients. (The paper's factors `lambda_l` repeat the scale of the coefficients and are not sent.)
+/// The space spanned is that of the paper's polynomials `He_nu(z; W)`. The coordinates here are better conditioned, and the square
+/// cannot be negative. In the plane one component of degree `k` needs `5 + (k + 1)(k + 2) / 2` numbers: the Gaussian and the
+/// coefficients. (The paper's factors `lambda_l` duplicate the scale of the coefficients and are not sent.)
 ///
-/// The coefficients are the Galerkin projection of `sqrt(p)`, `c = G^-1 b` with the Gram matrix `G` of the basis and
-/// `b = int basis sqrt(p)`: where `p` is zero, so is the fit, without any point having been placed there. Its affinity with `p`,
-/// `int s sqrt(p)`, comes for free and says how good it is.
+/// The coefficients are the Galerkin projection of `sqrt(p)`: `c = G^-1 b` with the Gram matrix `G` of the basis and
+/// `b = int basis sqrt(p)`. Where `p` is zero the fit is small, although no points are placed there. The projection also gives the
+/// affinity `int s sqrt(p)`, a measure of the quality.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lpg<const D: usize> {
     terms: Vec<Term<D>>,
@@ -43,14 +43,13 @@ pub struct Lpg<const D: usize> {
 struct Term<const D: usize> {
     gaussian: Component<D>,
     half_log_peak: f64,
-    /// Norm of the whitener.
+    /// Norm of the matrix that whitens coordinates.
     steepness: f64,
     coefficients: Vec<f64>,
 }
 
 impl<const D: usize> Lpg<D> {
-    /// A belief from its Gaussians and coefficients, one list for each Gaussian in the order of
-    /// [`multi_indices`]; normalised.
+    /// A belief from its Gaussians and coefficients: one list per Gaussian, in the order of [`multi_indices`]. It is normalised.
     ///
     /// # Errors
     /// If there is no component, `degree` exceeds 20, a list has the wrong length or an entry that is not finite, or the square
@@ -107,20 +106,20 @@ impl<const D: usize> Lpg<D> {
         self.degree
     }
 
-    /// How many numbers describe the belief: of each component a mean, a covariance and the coefficients; one less for the norm.
+    /// How many numbers describe the belief: mean, covariance and coefficients of each component, minus one for the normalisation.
     pub fn scalars(&self) -> usize {
         self.terms.len() * (D + D * (D + 1) / 2 + self.indices.len()) - 1
     }
 
-    /// The log density at `x`, and the logarithm of a bound of it anywhere within `half_width` of `x` in every coordinate:
-    /// Gaussians widened by the cell and polynomials by their absolute values. `scratch` is room for the polynomials.
+    /// The log density at `x`, and the logarithm of an upper bound within `half_width` of `x` in every coordinate. The bound widens the
+    /// Gaussians by the cell and takes absolute values of the polynomials. `scratch` is a buffer.
     pub fn log_density_and_bound(&self, x: &SVector<f64, D>, half_width: f64, scratch: &mut Vec<f64>) -> (f64, f64) {
         scratch.resize(self.indices.len(), 0.0);
         let (mut bound, mut highest) = (LogSum::default(), f64::NEG_INFINITY);
         let (mut largest, mut sum) = (f64::NEG_INFINITY, 0.0);
         for term in &self.terms {
             let u = term.whitened(x);
-            // How far a corner of the cell is in whitened coordinates.
+            // Distance from the centre to a corner of the cell, in whitened coordinates.
             let reach = half_width * (D as f64).sqrt() * term.steepness;
             let length = u.norm();
             let near = (length - reach).max(0.0);
@@ -204,7 +203,7 @@ impl<const D: usize> Lpg<D> {
         Ok(())
     }
 
-    /// Normalises, and finds mean and covariance.
+    /// Normalises the coefficients and computes mean and covariance.
     fn settle(&mut self) -> Result<(), Error> {
         let size = self.indices.len();
         let mut values = vec![0.0; size];
@@ -216,6 +215,7 @@ impl<const D: usize> Lpg<D> {
                 values.iter().zip(&term.coefficients).map(|(v, c)| v * c).sum::<f64>()
             };
             let product = at(&self.terms[l], ul) * at(&self.terms[m], um);
+            // Each pair of terms is visited once; pairs of different terms count twice.
             let w = weight * product * if l == m { 1.0 } else { 2.0 };
             let d = x - origin;
             mass += w;
@@ -252,8 +252,8 @@ impl<const D: usize> Belief<D> for Lpg<D> {
         self.covariance
     }
 
-    /// Rejection from a widened mixture of the Gaussians with a bound found on 1000 trial points times three; a point above the
-    /// bound is accepted as it is.
+    /// Rejection sampling from a widened mixture of the Gaussians. The bound is three times the largest ratio at 1000 trial points; a
+    /// point above the bound is accepted.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
         let widened = |rng: &mut R| {
             let term = &self.terms[rng.random_range(0..self.terms.len())];
@@ -261,7 +261,7 @@ impl<const D: usize> Belief<D> for Lpg<D> {
             term.gaussian.mean() + term.gaussian.factor().lower * g * WIDER
         };
         let mut values = Vec::new();
-        // Up to a constant, which the bound has too.
+        // Up to a constant, which the bound contains too.
         let log_proposal = |x: &SVector<f64, D>| {
             let parts = self
                 .terms
@@ -289,7 +289,7 @@ impl<const D: usize> Belief<D> for Lpg<D> {
     }
 }
 
-/// Widening of the proposal of the rejection sampler.
+/// Factor of the deviations of the rejection sampler's proposal.
 const WIDER: f64 = 1.6;
 impl<const D: usize> Density<D> for Lpg<D> {
     fn log_density(&self, state: &SVector<f64, D>) -> f64 {

@@ -1,4 +1,4 @@
-//! Polynomial Gaussians over a plane and one more coordinate, beside beliefs that are cells over the plane.
+//! Polynomial Gaussians over position and rate, together with beliefs that are cells over the position.
 
 use super::basis::{LANES, gauss_hermite, row_of_polynomials, sums_of_polynomials};
 use super::fit::{LpgFit, NEGLIGIBLE};
@@ -13,15 +13,15 @@ use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{Vector2, Vector3};
 
-/// A belief over three coordinates at one place of the first two: `s(t)^2` along the third, with
+/// A belief over three coordinates at a fixed place of the first two: `s(t)^2` along the third, with
 /// `s(t) = sum_l exp(height_l - u_l^2 / 4) sum_k d_lk h_k(u_l)`, `u_l = (t - centre_l) / deviation_l`.
 ///
-/// Made to be used again for place after place: [`Lpg::slice`] overwrites it.
+/// One value is reused for many places: [`Lpg::slice`] overwrites it.
 #[derive(Debug, Clone, Default)]
 pub struct Slice {
     terms: Vec<SliceTerm>,
     degree: usize,
-    /// Sums of absolute values, which bound `|s|`.
+    /// If set, the sums are of absolute values, which bound `|s|`.
     absolute: bool,
 }
 
@@ -44,18 +44,18 @@ pub struct SliceMoments {
     pub variance: f64,
 }
 
-/// A Gaussian times a polynomial of the degrees in use ends here, in standard deviations.
+/// Half width, in standard deviations, beyond which a Gaussian times a polynomial is negligible.
 const ENDS: f64 = 8.5;
-/// A panel of the quadrature along a slice is at most so many standard deviations wide, and a stretch has at least so many panels.
+/// Largest width of a quadrature panel, in standard deviations; also the smallest number of panels of an interval.
 const PANEL: f64 = 2.5;
 const LEAST_PANELS: usize = 6;
 const MOST_PANELS: usize = 200;
-/// Terms this many nats below the largest are left out.
+/// Terms this many nats below the largest are omitted.
 const FAINT: f64 = 60.0;
 
 impl Lpg<3> {
-    /// The best approximation of a belief that is cells over the first two coordinates and, in each cell, a normal of the third
-    /// with the given mean and variance: as [`Lpg::fit`], the third coordinate integrated in closed form.
+    /// The best approximation of a belief that has cells over the first two coordinates and, in each cell, a normal density of the third
+    /// with the given mean and variance. As [`Lpg::fit`]; the third coordinate is integrated in closed form.
     ///
     /// # Errors
     /// If there is no Gaussian, `degree` exceeds 20, the lengths differ, or the basis is singular (two equal Gaussians).
@@ -70,7 +70,7 @@ impl Lpg<3> {
             return refuse("means", means.len(), format!("{}, one for each cell", cells.len()));
         }
         check_degree(degree)?;
-        // Exact for polynomials of this degree.
+        // The rule is exact for polynomials of this degree.
         let rule = gauss_hermite(degree / 2 + 1);
         let columns = cells.columns();
         let (mut first, mut second, mut third, mut row) =
@@ -78,7 +78,7 @@ impl Lpg<3> {
         Self::galerkin(gaussians, degree, cells.weights(), |belief, term, i, weight, out| {
             let (mean, variance) = (means[i], variances[i]);
             if variance.is_nan() || variance <= 0.0 {
-                // No width: no overlap.
+                // A normal of variance zero does not overlap the series.
                 return false;
             }
             let (u, centre, deviation) = term.at_place(&state_at(&columns, i));
@@ -108,8 +108,8 @@ impl Lpg<3> {
         })
     }
 
-    /// Writes the belief along the third coordinate at a place of the other two to `slice`. With a `half_width` above zero, about the
-    /// most that it is anywhere within that of the place: Gaussians widened by the cell, polynomials by their absolute values.
+    /// Writes the belief along the third coordinate, at a place of the other two, to `slice`. If `half_width` is positive, it writes an
+    /// approximate upper bound within that distance of the place: Gaussians widened by the cell, absolute values of the polynomials.
     pub fn slice(&self, place: &Vector2<f64>, half_width: f64, slice: &mut Slice) {
         let degree = self.degree;
         slice.terms.clear();
@@ -129,7 +129,7 @@ impl Lpg<3> {
                 let value = c * first[*i] * second[*j];
                 coefficients[*k] += match slice.absolute {
                     false => value,
-                    // A coarse cell: near the middle the polynomials are about one.
+                    // For a coarse cell: near the centre the polynomials are about one.
                     true if reach > 0.5 => value.abs().max(c.abs()),
                     true => value.abs(),
                 };
@@ -157,9 +157,9 @@ impl Term<3> {
 
 impl Slice {
     /// Moments over `low <= t <= high` of the slice times `exp(-(energy - 2 correlation t + response t^2) / 2)`, to about eight
-    /// digits: Gauss-Legendre panels over where each term's product with the likelihood has its mass.
+    /// digits, by Gauss-Legendre panels over the intervals where the product of a term and the likelihood is not negligible.
     ///
-    /// The logarithm of the mass is `-inf` where there is none.
+    /// The logarithm of the mass is `-inf` if the product is zero everywhere.
     pub fn tilted(&self, [response, correlation, energy]: [f64; 3], [low, high]: [f64; 2]) -> SliceMoments {
         let likelihood = |t: f64| -0.5 * (energy - t * (2.0 * correlation - t * response));
         let mut stretches: Vec<Stretch> = Vec::with_capacity(self.terms.len());
@@ -186,7 +186,7 @@ impl Slice {
         let (mut mass, mut first, mut second) = (0.0, 0.0, 0.0);
         let mut rest = stretches.as_slice();
         while let Some((head, tail)) = rest.split_first() {
-            // Stretches that overlap are integrated as one.
+            // Intervals that overlap are joined.
             let mut whole = *head;
             let mut others = tail;
             while let Some((next, further)) = others.split_first().filter(|(next, _)| next.from < whole.to) {

@@ -1,4 +1,4 @@
-//! The fusion centre of a star: what its machine asks for is done on the simulated radio.
+//! The fusion centre of a star: carries out the actions of its state machine on the simulated radio.
 
 use super::super::decoded;
 use super::node::CentreNode;
@@ -40,6 +40,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                 Action::Predict { slot } if slot > u64::from(slots) => {}
                 Action::Predict { slot } => match predict_and_ask(&mut centre.receiver, &self.members, slot) {
                     Ok((feedback, state)) => {
+                        // The machine answers a prediction with frames and timers, which are carried out before the next action.
                         let mut sent = Vec::new();
                         centre.machine.on_predicted(&feedback, state.as_ref(), &mut sent);
                         self.carry_out(centre, context, sent)?;

@@ -1,4 +1,4 @@
-//! Events of the simulator as those of the machines, and nodes as a snapshot has them.
+//! Passes events of the simulator to the state machines, and stores nodes in snapshots.
 
 use super::super::{decoded, malformed};
 use super::node::{BitNode, CentreNode, SensingNode, StoredBitNode, StoredNode};
@@ -36,7 +36,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                         slot: Slot::of_count(u64::from(token >> 1)),
                     },
                 };
-                // By the sensor's own clock, as the centre's frames have set it.
+                // Time by the sensor's own clock, which the centre's frames have set.
                 let settings = sensor.machine.settings();
                 let count = settings
                     .schedule
@@ -64,7 +64,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                 Some(origin) => (origin, inner, true),
                 None => return Ok(()),
             },
-            // In a star no belief walks.
+            // A star has no handovers.
             (Kind::Handover, None) => {
                 context.note(malformed(from, frame));
                 return Ok(());
@@ -76,7 +76,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                 let Some(sensor) = from.index().checked_sub(1) else {
                     return Ok(());
                 };
-                // A relay's broadcast: what the centre has sent itself.
+                // A relay repeats a broadcast that the centre itself has sent: ignore it there.
                 if !addressed && self.routes.is_some() && is_for_all(frame.kind) {
                     return Ok(());
                 }
@@ -88,7 +88,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                 centre.machine.on_decoded(sensor, frame, &mut actions);
                 self.carry_out(centre, context, actions)
             }
-            // Frames of other sensors are in range, and for the centre.
+            // Frames of other sensors are received too, but are meant for the centre.
             BitNode::Sensor(_) if from != CENTRE && from != self.parent(context) => Ok(()),
             BitNode::Sensor(sensor) => {
                 if !addressed {
@@ -100,7 +100,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
         }
     }
 
-    /// Slots tell whose report it was: it is known to be lost.
+    /// The slot tells which sensor sent the report, so the report is known to be lost.
     fn on_damaged(&self, node: &mut Self::Node, _: &mut Context<'_>, from: SensorId) -> Result<(), Error> {
         if let (BitNode::Centre(centre), Some(sensor)) = (node, from.index().checked_sub(1)) {
             centre.machine.on_damaged(sensor);
@@ -108,7 +108,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
         Ok(())
     }
 
-    /// The centre begins with what it knew before the first slot; a sensor knows that it must ask.
+    /// The centre starts again with its belief before the first slot. A sensor must ask for the state.
     fn on_restart(&self, node: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error> {
         match node {
             BitNode::Centre(centre) => {

@@ -1,7 +1,7 @@
-//! A star whose nodes run the state machines of `fewbits-protocol`: the machines of real sensors.
+//! A star network. Its nodes run the state machines of `fewbits-protocol`, as real sensors do.
 //!
-//! `driver` hands the simulator's events to the machines, `centre` and `sensor` do what these ask for, `relay` passes frames on along
-//! `routes`, `node` has what they hold.
+//! `driver` passes the simulator's events to the machines. `centre` and `sensor` carry out their actions. `relay` forwards frames along
+//! `routes`. `node` has the state of the nodes.
 
 mod centre;
 mod driver;
@@ -31,21 +31,21 @@ use routes::{CENTRE, Routes};
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-/// Timers of nodes: a slot begins; the deadline of a centre, or a missing acknowledgement (with the slot above) of a sensor.
+/// Timers of nodes: a slot begins; other values are a centre's deadline, or a sensor's missing acknowledgement (with the slot above).
 const SLOT_BEGINS: u32 = 0;
 const OTHER: u32 = 1;
 
-/// A fusion centre (node 0) and its sensors (nodes 1, 2, ...), of which nothing is known but bits: any [`Receiver`] at the centre, any
-/// [`SensorNode`] at the sensors.
+/// A fusion centre (node 0) and its sensors (nodes 1, 2, ...). They see each other's messages only as bits: any [`Receiver`] at the centre,
+/// any [`SensorNode`] at the sensors.
 ///
 /// ```text
 /// slot k, centre:  predict;  broadcast feedback or echo, with a digest
 ///         sensor:  check the digest;  measure;  report, with the digest of what it was told
 ///         centre, at the deadline:  update with the reports of the right slot and digest
 /// ```
-/// The nodes are driven as `fewbits-link` drives them over sockets. The receiver of a real centre and the sensors' halves run here unchanged.
-/// Where an update fails (nothing came over a link that is thought to lose nothing), the sensors of which nothing came are left out, and that is
-/// noted. A node that fails in more than half of the slots ends the run.
+/// The nodes are driven as `fewbits-link` drives them over sockets. The receiver of a real centre and the sensors' halves run here
+/// unchanged. If an update fails (for example because nothing came over a link that is assumed to lose nothing), it is repeated without the
+/// sensors from which nothing came, and a note is written. A node that fails in more than half of the slots ends the run.
 pub struct BitStar<R, const M: usize> {
     receiver: Arc<MakeReceiver<R>>,
     members: Vec<Member>,
@@ -56,7 +56,7 @@ pub struct BitStar<R, const M: usize> {
     arrives: Option<Arc<Arrives>>,
     routes: Option<Arc<OnceLock<Routes>>>,
     announce_every: u32,
-    /// Offset of the first sensor that reports by the clock, and from one to the next.
+    /// Time from the slot's beginning to the first report by the clock, and between successive sensors.
     offsets: [Seconds; 2],
 }
 
@@ -87,11 +87,11 @@ impl<R, const M: usize> fmt::Debug for BitStar<R, M> {
 }
 
 impl<R: Receiver, const M: usize> BitStar<R, M> {
-    /// A star in which all sensors learn what they must know in the same way. `receiver` makes the estimator before its first slot, which a
-    /// restarted centre begins with too; `node` makes the half of a sensor (the first is 0).
+    /// A star in which all sensors have the same kind of feedback and length of reports. `receiver` makes the estimator before its first
+    /// slot; a restarted centre begins with it too. `node` makes the half of a sensor (numbered from 0).
     ///
     /// # Errors
-    /// If the estimator cannot be made, a slot of a table has not one measurement per sensor, or there are 2^23 slots or more.
+    /// If `receiver` fails, a slot of a table has not one measurement per sensor, or there are 2^23 slots or more.
     pub fn new(
         receiver: impl Fn() -> Result<R, BoxError> + Send + Sync + 'static,
         feedback: Feedback,
@@ -120,7 +120,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         })
     }
 
-    /// A star whose sensors are told what they must know and all report by one scheme.
+    /// A star whose sensors are sent their feedback and all report by one scheme.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -139,7 +139,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         Self::new(receiver, Feedback::Told, ReportLength::Varying, node, measurements, clock, stream)
     }
 
-    /// Gives one sensor (the first is 0) another kind of feedback or another length of reports.
+    /// Gives one sensor (numbered from 0) another kind of feedback or another length of reports.
     ///
     /// # Errors
     /// If there is no such sensor.
@@ -150,22 +150,22 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         Ok(self)
     }
 
-    /// Adds recorded losses: a report reaches the centre only if `arrives(slot, sensor)`. The channel's losses come on top.
+    /// Adds recorded losses: a report reaches the centre only if `arrives(slot, sensor)`. The channel's losses are added to them.
     #[must_use]
     pub fn with_recorded_losses(mut self, arrives: impl Fn(u32, usize) -> bool + Send + Sync + 'static) -> Self {
         self.arrives = Some(Arc::new(arrives));
         self
     }
 
-    /// Lets sensors out of range of the centre send through others, along shortest routes. What the centre sends to all is passed on by
-    /// every sensor on whose way others are; a frame that is passed on has the sensor's number and a header of its own besides.
+    /// Lets sensors out of range of the centre send through others, along shortest routes. Every sensor on a route forwards the centre's
+    /// broadcasts. A forwarded frame has a second header with the sensor's number.
     #[must_use]
     pub fn relaying(mut self) -> Self {
         self.routes = Some(Arc::default());
         self
     }
 
-    /// Lets the centre send a heartbeat every `every` slots in which it sends nothing else to all, by which sensors set their clocks.
+    /// Lets the centre send a heartbeat every `every` slots if it broadcasts nothing else. Sensors set their clocks by it.
     #[must_use]
     pub fn announcing(self, every: u32) -> Self {
         Self {
@@ -174,8 +174,8 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         }
     }
 
-    /// Sets when sensors that report by the clock do so: the first one `first` after the slot's beginning, and each other `spacing` after the one
-    /// before it. A clock may be ahead by `first`.
+    /// Sets when sensors report by the clock: the first one `first` after the slot's beginning, each next one `spacing` later. A sensor's
+    /// clock may be ahead by at most `first`.
     #[must_use]
     pub fn reporting_at(self, first: Seconds, spacing: Seconds) -> Self {
         Self {
@@ -184,7 +184,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         }
     }
 
-    /// The network before its first slot: the centre in the middle of its sensors, `radius` metres away.
+    /// The network before its first slot: the centre in the middle, the sensors on a circle of `radius` metres.
     ///
     /// # Errors
     /// As [`simulate_on`](Self::simulate_on); if the radius is out of range.
@@ -193,7 +193,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         self.simulate_on(field, setup)
     }
 
-    /// The network before its first slot, on a field of one's own: node 0 is the centre, and every sensor must reach it, directly or by
+    /// The network before its first slot, on a given field: node 0 is the centre, and every sensor must reach it, directly or by
     /// [`relaying`](Self::relaying).
     ///
     /// # Errors
@@ -201,6 +201,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
     /// [`Error::Disconnected`] if a sensor does not reach the centre; [`Error::SlotTooShort`] if a slot has no time for a report of every sensor.
     pub fn simulate_on(self, field: Field, setup: Setup) -> Result<Simulator<Self>, Error> {
         let sensors = 1..=self.members.len() as u32;
+        // Without routes every sensor must hear the centre itself.
         let hops = match self.routes {
             Some(_) => {
                 field.routes(CENTRE)?;
@@ -237,6 +238,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             })));
         }
         let first = self.clock.start(1);
+        // Sensors that report by the clock start on their own; the others wait for the centre.
         let clocked = |(_, member): &(usize, &Member)| member.feedback == Feedback::Clock;
         let clocked = self.members.iter().enumerate().filter(clocked);
         let starts: Vec<_> = clocked
@@ -259,19 +261,19 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             .0
     }
 
-    /// The estimator before its first slot.
+    /// A new estimator before the first slot.
     fn started(&self) -> Result<R, Error> {
         (self.receiver)().map_err(|error| Error::estimator("receiver", error))
     }
 
-    /// The estimator of a sensor that follows the centre.
+    /// The copy of the estimator at a sensor that follows by echo; `None` for others.
     fn replica(&self, sensor: usize) -> Result<Option<R>, Error> {
         let follows = self.members.get(sensor).is_some_and(|m| m.feedback == Feedback::Echoed);
         follows.then(|| self.started()).transpose()
     }
 
-    /// Checks that a slot has time for what the centre sends in the first slot, and for a report of each sensor. Echoes are counted with a bit
-    /// per sensor, reports without payload, since their lengths are not known beforehand.
+    /// Checks that a slot has time for the centre's frames of the first slot and for a report of each sensor. The lengths of echoes and
+    /// reports are not known beforehand: an echo counts one bit per sensor, a report has no payload.
     fn check_fits(&self, setup: &Setup, hops: &[usize]) -> Result<(), Error> {
         let mut receiver = self.started()?;
         let (told, state) =
@@ -281,11 +283,13 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             .filter(|(member, _)| member.feedback == Feedback::Told)
             .map(|(_, told)| (8 * Kind::Feedback.overhead() + told.bits()) as u64)
             .collect();
+        // The same message to all is broadcast once.
         if bodies.len() == told.len() && told.windows(2).all(|pair| pair[0] == pair[1]) {
             bodies.truncate(1);
         }
         bodies.extend(state.map(|_| (8 * Kind::Echo.overhead() + told.len()) as u64));
         let (report, relayed) = (8 * Kind::Report.overhead() as u64, 8 * Kind::Handover.overhead() as u64);
+        // A report is sent again over every hop, with the header of a relayed frame if there is more than one.
         for hops in hops.iter().copied() {
             bodies.extend(std::iter::repeat_n(report + if hops > 1 { relayed } else { 0 }, hops));
         }

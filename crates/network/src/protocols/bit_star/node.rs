@@ -8,7 +8,7 @@ use fewbits_protocol::{BoxError, Centre, Receiver, Sensor};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Mean and standard deviation of each coordinate after a slot.
+/// A slot, and mean and standard deviation of each coordinate after it.
 pub type SlotEstimate = (u32, Vec<(f64, f64)>);
 
 /// A node of a [`BitStar`](super::BitStar).
@@ -20,7 +20,7 @@ pub enum BitNode<R, const M: usize> {
     Sensor(Box<SensingNode<R, M>>),
 }
 
-/// A fusion centre: its machine and its estimator.
+/// State of a fusion centre: its state machine and its estimator.
 #[derive(Debug)]
 pub struct CentreNode<R> {
     pub(super) machine: Centre,
@@ -29,19 +29,19 @@ pub struct CentreNode<R> {
     pub(super) failures: Failures,
 }
 
-/// A sensor: its machine, its half of the scheme, and the centre's estimator where it follows by echo.
+/// State of a sensor: its state machine, its half of the scheme, and a copy of the centre's estimator if it follows by echo.
 pub struct SensingNode<R, const M: usize> {
     pub(super) machine: Sensor,
     pub(super) half: Box<dyn SensorNode<M>>,
-    /// The last slot that the half knows of.
+    /// The last slot that the sensor's half was told of.
     pub(super) counted: u32,
     pub(super) replica: Option<R>,
-    /// The last slot whose broadcast it passed on.
+    /// The last slot whose broadcast the sensor forwarded.
     pub(super) passed: u32,
     pub(super) failures: Failures,
 }
 
-/// A [`BitNode`] as a snapshot holds it.
+/// The stored form of a [`BitNode`] in a snapshot.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct StoredBitNode(pub(super) StoredNode);
@@ -100,7 +100,7 @@ impl<R, const M: usize> BitNode<R, M> {
         }
     }
 
-    /// The last slot in which a sensor answered, or began to; `None` before the first, and at the centre.
+    /// The last slot in which a sensor answered or began to. `None` before the first, and at the centre.
     pub fn answered(&self) -> Option<u32> {
         match self {
             Self::Centre(_) => None,
@@ -132,7 +132,7 @@ impl<R: Receiver, const M: usize> BitNode<R, M> {
     }
 }
 
-/// Slots in which one node failed.
+/// Number of slots in which one node failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Failures(u32);

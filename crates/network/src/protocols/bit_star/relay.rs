@@ -1,4 +1,4 @@
-//! Frames over several hops: what sensors pass on for others.
+//! Frames over several hops: what sensors forward for others.
 
 use super::super::malformed;
 use super::BitStar;
@@ -11,7 +11,7 @@ use crate::simulator::Context;
 use crate::units::SensorId;
 use fewbits_protocol::{Check, Frame, Kind};
 
-/// Whether sensors send frames of this kind to the centre, and not the other way.
+/// Whether frames of this kind go from sensors to the centre; others go from the centre to sensors.
 fn goes_up(kind: Kind) -> bool {
     matches!(kind, Kind::Report | Kind::Request | Kind::Heartbeat)
 }
@@ -45,7 +45,7 @@ impl<R, const M: usize> BitStar<R, M> {
         }
     }
 
-    /// Sends a frame of the centre to one sensor. Where sensors relay it is always addressed: others are for all.
+    /// Sends a frame of the centre to one sensor. If sensors relay, the frame is always addressed; a frame without address is for all.
     pub(super) fn send_down(&self, context: &mut Context<'_>, to: SensorId, frame: &Frame<'_>) -> Result<(), Error> {
         match self.routes(context.field()).map(|routes| routes.down(CENTRE, to)) {
             None => context.send(to, frame).map(drop),
@@ -56,7 +56,8 @@ impl<R, const M: usize> BitStar<R, M> {
         }
     }
 
-    /// A frame has arrived that carries another one, `inner`. Returns whom that is from where it has come to its end; passes it on elsewhere.
+    /// Handles a frame that contains another one, `inner`. At its destination it returns the original sender, elsewhere it forwards the
+    /// frame.
     pub(super) fn relay(
         &self,
         context: &mut Context<'_>,
@@ -76,7 +77,7 @@ impl<R, const M: usize> BitStar<R, M> {
             (true, _) => drop(context.send(routes.parent(id), frame)?),
             (false, _) => {
                 let hop = routes.down(id, sensor);
-                // A frame that strayed from its route ends here.
+                // A frame at a node outside its route is dropped.
                 if context.field().check_link(id, hop).is_ok() {
                     context.send(hop, frame)?;
                 }
@@ -85,7 +86,7 @@ impl<R, const M: usize> BitStar<R, M> {
         Ok(None)
     }
 
-    /// Passes on what the centre sends to all, once a slot.
+    /// Forwards a broadcast of the centre, once per slot.
     pub(super) fn pass_on(
         &self,
         sensor: &mut SensingNode<R, M>,

@@ -1,4 +1,4 @@
-//! Who sends to the centre through whom.
+//! Routes of a star with several hops: through which sensor each sensor sends.
 
 use crate::medium::Field;
 use crate::units::SensorId;
@@ -6,7 +6,7 @@ use crate::units::SensorId;
 /// The fusion centre's node.
 pub(crate) const CENTRE: SensorId = SensorId(0);
 
-/// For each node the next one on its way to the centre, and whether others send through it.
+/// For each node the next one on its route to the centre, and whether others send through it.
 #[derive(Debug)]
 pub(super) struct Routes {
     parents: Vec<SensorId>,

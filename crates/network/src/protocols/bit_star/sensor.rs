@@ -1,4 +1,4 @@
-//! A sensor of a star: what its machine asks for is done with its half of the scheme and the simulated radio.
+//! A sensor of a star: carries out the tasks of its state machine with its half of the scheme and the simulated radio.
 
 use super::node::SensingNode;
 use super::routes::CENTRE;
@@ -30,7 +30,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             context.note(Note::Frame { with: CENTRE, note });
         }
         match reaction.task {
-            // The radio repeats by itself.
+            // The simulated radio repeats frames itself.
             Task::Wait | Task::SendAgain => Ok(()),
             Task::Send(frame) => self.send_up(context, &frame),
             Task::Follow { slot, kind, payload } => {
@@ -50,7 +50,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         }
     }
 
-    /// The report of a slot; `None` for silence, and where there is no measurement or a step failed.
+    /// The report of a slot. `None` for silence, without a measurement, and if a step failed.
     fn sample(
         &self,
         sensor: &mut SensingNode<R, M>,
@@ -62,7 +62,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         let slots = self.measurements.slots();
         let feedback = match &mut sensor.replica {
             None => Ok(told),
-            // What is shared is asked as it would travel.
+            // The replica's feedback is used as it would have been sent.
             Some(replica) => replica.predict(u64::from(slot)).and_then(|()| replica.feedback(index)),
         };
         let feedback = match feedback {
@@ -96,12 +96,12 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         }
     }
 
-    /// Brings a replica to the end of the slot before `slot`, and returns its state.
+    /// Advances a replica to the end of the slot before `slot` and returns its state.
     fn followed(&self, replica: &mut R, slot: Slot, kind: Kind, told: BitString) -> Result<BitString, BoxError> {
         if kind == Kind::Snapshot {
             replica.restore(&told)?;
         } else if slot.number() > 1 {
-            // The replica has predicted into that slot when it was asked.
+            // The replica already predicted into that slot when it gave its feedback.
             let lengths: Vec<_> = self.members.iter().map(|member| member.report).collect();
             update_or_drop(replica, &reports_of(&told, &lengths)?);
         }

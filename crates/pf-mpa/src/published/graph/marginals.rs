@@ -12,7 +12,7 @@ impl FactorGraph {
         }
     }
 
-    /// The marginal of every variable, exactly, by messages to and from all nodes: `O(sum |table|)`.
+    /// The exact marginal of every variable, by messages to and from all nodes. Time `O(sum |table|)`.
     ///
     /// ```text
     /// variable to function: product of all other incoming messages
@@ -32,7 +32,7 @@ impl FactorGraph {
             .iter()
             .map(|f| f.scope.iter().map(ones).collect())
             .collect();
-        // to_variable[f][slot] and to_function[f][slot]; a tree settles within as many rounds as it has functions.
+        // to_variable[f][slot] and to_function[f][slot]. On a tree the messages are final after as many rounds as there are functions.
         let (mut to_variable, mut to_function) = (start.clone(), start);
         for _ in 0..=self.functions.len() {
             for (f, function) in self.functions.iter().enumerate() {
@@ -83,7 +83,7 @@ impl FactorGraph {
     }
 }
 
-/// The next choice, the last entry fastest.
+/// Advances to the next choice of states, the last entry fastest.
 fn advance(choice: &mut [usize], sizes: &[usize]) {
     for (c, size) in choice.iter_mut().zip(sizes).rev() {
         *c += 1;

@@ -1,4 +1,4 @@
-//! Factor graphs: variables, functions, exact sum-product over finite alphabets, and their pictures.
+//! Factor graphs: variables and functions, exact sum-product for finite alphabets, and lists of nodes and edges for drawing.
 
 mod marginals;
 
@@ -28,7 +28,7 @@ pub struct FactorGraph {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Variable {
     name: String,
-    /// Size of the alphabet; 0 where only the structure is known.
+    /// Size of the alphabet; 0 if only the structure is known.
     states: usize,
 }
 
@@ -36,14 +36,14 @@ struct Variable {
 struct Function {
     name: String,
     scope: Vec<usize>,
-    /// Values, the last variable of the scope fastest.
+    /// Values for every choice of states, the last variable of the scope fastest.
     table: Vec<f64>,
 }
 
-/// A node as it is listed.
+/// A node in the list of [`FactorGraph::nodes`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Node<'a> {
-    /// Its name.
+    /// Name of the node.
     pub name: &'a str,
     /// Whether it is a variable.
     pub is_variable: bool,
@@ -57,10 +57,10 @@ impl FactorGraph {
         Self::default()
     }
 
-    /// Adds a variable with `states` values, and returns its number. With 0, only the structure is meant.
+    /// Adds a variable with `states` values and returns its number. With 0 the graph describes only the structure.
     ///
     /// # Errors
-    /// If the name is taken.
+    /// If the name is already used.
     pub fn variable(&mut self, name: &str, states: usize) -> Result<usize, Error> {
         self.check_name(name)?;
         self.variables.push(Variable {
@@ -70,11 +70,11 @@ impl FactorGraph {
         Ok(self.variables.len() - 1)
     }
 
-    /// Adds a non-negative function of the variables `scope`, its values listed with the last variable fastest.
+    /// Adds a non-negative function of the variables `scope`. `table` lists its values with the last variable fastest. Returns its number.
     ///
     /// # Errors
-    /// If the name is taken, the scope is empty, repeats a variable or names none, or the table has not one finite non-negative
-    /// value per choice.
+    /// If the name is already used, the scope is empty, repeats a variable or has an unknown one, or the table has not one finite
+    /// non-negative value per choice of states.
     pub fn function(&mut self, name: &str, scope: &[usize], table: &[f64]) -> Result<usize, Error> {
         self.check_name(name)?;
         at_least_one("scope", scope.len())?;
@@ -100,7 +100,7 @@ impl FactorGraph {
         Ok(self.functions.len() - 1)
     }
 
-    /// Adds a function of which only the scope is known, to a graph of structure.
+    /// Adds a function of which only the scope is known.
     ///
     /// # Errors
     /// As [`function`](Self::function), for variables without states.
@@ -149,9 +149,9 @@ impl FactorGraph {
             .collect()
     }
 
-    /// Whether there is exactly one path between any two connected nodes: sum-product is then exact.
+    /// Whether there is at most one path between any two nodes. Sum-product is then exact.
     pub fn is_tree(&self) -> bool {
-        // A forest has as many edges as nodes, less its components.
+        // A forest has as many edges as nodes minus components.
         let count = self.variables.len() + self.functions.len();
         let mut group: Vec<usize> = (0..count).collect();
         fn root(group: &mut [usize], mut i: usize) -> usize {
@@ -177,7 +177,7 @@ impl FactorGraph {
 /// The example of the thesis's Figure 2.1: five variables, four functions, eight edges.
 ///
 /// # Errors
-/// None.
+/// Never: the graph is fixed.
 pub fn example() -> Result<FactorGraph, Error> {
     let mut graph = FactorGraph::new();
     for i in 1..=5 {
@@ -189,8 +189,8 @@ pub fn example() -> Result<FactorGraph, Error> {
     Ok(graph)
 }
 
-/// The graph of one tracking step (Figure 3.2): the state before, the acceleration, the state now and its position, with one
-/// likelihood per sensor. The position's variable has one edge per sensor and one to the dynamics.
+/// The graph of one tracking step (Figure 3.2): the state before, the acceleration, the new state and its position, with one
+/// likelihood per sensor. The position has one edge per sensor and one to the dynamics.
 ///
 /// # Errors
 /// If there is no sensor.
@@ -215,7 +215,7 @@ pub fn tracking_step(sensors: usize) -> Result<FactorGraph, Error> {
 /// The graph of the association step (Figure 3.6): two targets, two measurements, their order.
 ///
 /// # Errors
-/// None.
+/// Never: the graph is fixed.
 pub fn association_step() -> Result<FactorGraph, Error> {
     let mut graph = FactorGraph::new();
     let ids = ["T1", "T2", "zA", "zB", "r"].map(|name| graph.variable(name, 0));
