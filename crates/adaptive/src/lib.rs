@@ -50,7 +50,6 @@
 mod block;
 mod config;
 mod coset;
-mod error;
 mod fixed_rate;
 mod packet;
 mod receiver;
@@ -64,7 +63,7 @@ pub use block::coder as arithmetic;
 pub use block::{BlockCodec, Effort, JOINT_COLUMNS, Start, StartedBlock};
 pub use config::Config;
 pub use coset::{CosetConfig, CosetReceiver, CosetSensor, TOLERATED};
-pub use error::Error;
+pub use fewbits_core::Error;
 pub use fewbits_node::adaptive::{MODELS, SCALES};
 pub use fixed_rate::{FixedRate, Word};
 pub use packet::Packet;

@@ -104,7 +104,7 @@ impl Factor<1> for SlotFactor {
         }
     }
 
-    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, fewbits_core::Error> {
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         match self {
             Self::Cells(factor) => factor.tilted(prior),
             Self::Sample { value, log_arrival } => {
@@ -138,7 +138,7 @@ impl Scheme<1> for SlotScheme {
         (): &mut (),
         measurement: &Vector1<f64>,
         (): &(),
-    ) -> Result<Option<Packet>, fewbits_core::Error> {
+    ) -> Result<Option<Packet>, Error> {
         let sample = finite("measurement", measurement[0])?;
         Ok(Content::of(&self.replica, &self.slot, sample).map(|content| {
             let mut packet = self.sensor.next_header();
@@ -147,12 +147,7 @@ impl Scheme<1> for SlotScheme {
         }))
     }
 
-    fn factor(
-        &self,
-        (): &(),
-        observation: &Observation<Packet>,
-        link: &Link,
-    ) -> Result<SlotFactor, fewbits_core::Error> {
+    fn factor(&self, (): &(), observation: &Observation<Packet>, link: &Link) -> Result<SlotFactor, Error> {
         if link.crossover() > 0.0 {
             let expected = "0: a packet with a wrong bit must be erased by a checksum of the link";
             return Err(ArgumentError::new("crossover", link.crossover(), expected).into());

@@ -119,7 +119,11 @@ impl Sensor {
     /// # Errors
     /// If the sample is not finite or `elapsed` is 0. The sensor is then unchanged.
     pub fn encode_after(&mut self, elapsed: u32, sample: f64) -> Result<Option<Report>, Error> {
-        Ok(self.encoder.encode_after(elapsed, sample)?.map(Report::from))
+        Ok(self
+            .encoder
+            .encode_after(elapsed, sample)
+            .map_err(ArgumentError::from)?
+            .map(Report::from))
     }
 
     /// Encodes a sample into a stream instead of a packet. Streams are for reliable storage: they have no headers and no refreshes.
@@ -129,7 +133,8 @@ impl Sensor {
     pub fn write_after(&mut self, elapsed: u32, sample: f64, stream: &mut StreamWriter) -> Result<(), Error> {
         let written = self
             .encoder
-            .write_after(elapsed, sample, |content, replica, slot| stream.put(content, replica, slot))?;
+            .write_after(elapsed, sample, |content, replica, slot| stream.put(content, replica, slot))
+            .map_err(ArgumentError::from)?;
         match written {
             Some(written) => Ok(written?),
             // The first sample, reduced to the circle if there is one.

@@ -33,7 +33,6 @@
 
 pub mod bounds;
 mod decoding;
-mod error;
 mod observation;
 mod patterns;
 pub mod published;
@@ -41,7 +40,7 @@ pub mod search;
 
 pub use decoding::decoder::Decoder;
 pub use decoding::table::LookupTable;
-pub use error::Error;
+pub use fewbits_quantizers::Error;
 pub use observation::bank::{Bank, IMPOSSIBLE};
 pub use observation::sensor::PatternSensor;
 pub use observation::source::{Nodes, Source, Threshold};

@@ -42,13 +42,13 @@ impl Missing {
         rule: &CensoringRule<M>,
         mu: &SVector<f64, M>,
         covariance: &SMatrix<f64, M, M>,
-    ) -> Result<EllipsoidMoments<M>, fewbits_core::Error> {
+    ) -> Result<EllipsoidMoments<M>, Error> {
         let under = rule.region().under(covariance)?;
         // A silence is either a censored measurement or a lost report.
         let loss = match self {
             Self::Nothing { loss } => loss,
             Self::Lost { scale } => {
-                let mut outside = under.moments_outside(mu).ok_or(fewbits_core::Error::Impossible)?;
+                let mut outside = under.moments_outside(mu).ok_or(Error::Impossible)?;
                 outside.log_mass += scale.ln();
                 return Ok(outside);
             }
@@ -61,7 +61,7 @@ impl Missing {
                     covariance: *covariance,
                 })
             } else {
-                Err(fewbits_core::Error::Impossible)
+                Err(Error::Impossible)
             };
         };
         if loss == 0.0 {
@@ -138,22 +138,21 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
         add_mapped(means, log_weights, add, |logs| mix(floor, log_share, logs));
     }
 
-    /// The posterior follows from the innovation `nu = m + n - prediction`, whose covariance is `S = V + R`. Let `E`, `C` be its mean and
-    /// covariance given that the report is missing, `E0 nu` its prior mean and `K = V S^-1`. Then the mean is `mu + K (E - E0 nu)` and the
-    /// covariance `(I - K) V (I - K)' + K R K' + K C K'`.
-    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, fewbits_core::Error> {
+    /// With `nu = m + n - prediction` of covariance `S = V + R` and moments `E`, `C` given that the report is missing, `K = V S^-1`:
+    /// mean `mu + K (E - E0 nu)`, covariance `(I - K) V (I - K)' + K R K' + K C K'`.
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         let spread = prior.covariance();
         let total = symmetrised(&(spread + self.noise));
         let mu = prior.mean() - self.prediction;
         let after = self.missing.innovation_moments(&self.rule, &mu, &total)?;
         let what = "the posterior of a missing report";
-        let factor = Cholesky::new(total).ok_or(fewbits_core::Error::NotANumber { what })?;
+        let factor = Cholesky::new(total).ok_or(Error::NotANumber { what })?;
         let gain = factor.solve(spread).transpose();
         let keep = SMatrix::<f64, M, M>::identity() - gain;
         let mean = prior.mean() + gain * (after.mean - mu);
         let covariance = keep * spread * keep.transpose() + gain * (self.noise + after.covariance) * gain.transpose();
         if mean.iter().chain(covariance.iter()).any(|x| !x.is_finite()) {
-            return Err(fewbits_core::Error::NotANumber { what });
+            return Err(Error::NotANumber { what });
         }
         Ok(Tilted {
             log_evidence: after.log_mass,
@@ -382,7 +381,7 @@ impl<const M: usize> Factor<M> for Censored<M> {
         }
     }
 
-    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, fewbits_core::Error> {
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         let mut tilted = match &self.kind {
             Kind::Value(factor) => factor.tilted(prior),
             Kind::Ellipsoid(factor) => factor.tilted(prior),
@@ -401,17 +400,8 @@ impl<const M: usize> Factor<M> for Censored<M> {
         tilted.log_evidence += self.log_scale;
         if !tilted.log_evidence.is_finite() {
             let what = "the evidence of a censored value";
-            return Err(fewbits_core::Error::unlikely_or_no_number(tilted.log_evidence, what));
+            return Err(Error::unlikely_or_no_number(tilted.log_evidence, what));
         }
         Ok(tilted)
-    }
-}
-
-/// The error as one of the core. The number of the sensor is dropped.
-pub(crate) fn as_core(error: Error) -> fewbits_core::Error {
-    match error {
-        Error::Core(error) => error,
-        Error::Argument(error) => error.into(),
-        other => ArgumentError::new("report", other.to_string(), "a report that the rule sends").into(),
     }
 }

@@ -1,7 +1,6 @@
 //! Censoring sensors and their fusion centre with messages as bits: an [`Estimator`], and the sensors' half.
 
 use crate::Error;
-use crate::censored::as_core;
 use crate::network::Network;
 use crate::no_feedback::advance;
 use crate::rule::{CensoringRule, OwnRecursion, Weighing};
@@ -219,7 +218,7 @@ pub struct CensoringNode<S, const D: usize, const M: usize> {
 /// Length of the slot number in the stored state of a sensor, in bits.
 const SLOT_BITS: u32 = 64;
 
-fn refused(name: &'static str, error: CodecError) -> fewbits_core::Error {
+fn refused(name: &'static str, error: CodecError) -> Error {
     ArgumentError::new(name, error, "bits of the agreed format").into()
 }
 
@@ -231,22 +230,20 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         rng: &mut dyn Rng,
         measurement: &SVector<f64, M>,
         feedback: &BitString,
-    ) -> Result<Option<BitString>, fewbits_core::Error> {
+    ) -> Result<Option<BitString>, Error> {
         let (slot, format) = (self.slot.saturating_add(1), self.network.format());
         let sensors = self.network.sensors();
         let unknown = || ArgumentError::new("sensor", self.sensor, format!("below {}", sensors.len()));
         let sensing = sensors.get(self.sensor).ok_or_else(unknown)?.clone();
         let told = Broadcast::<D>::from_bits(&self.weighing, feedback).map_err(|e| refused("feedback", e))?;
         let (mean, rule) = match &told {
-            Broadcast::Belief(predicted) => {
-                (predicted.mean(), self.network.rule_under(self.sensor, predicted).map_err(as_core)?)
-            }
+            Broadcast::Belief(predicted) => (predicted.mean(), self.network.rule_under(self.sensor, predicted)?),
             Broadcast::Mean(mean) => {
                 let rule = in_slot(&self.rules, slot)?.get(self.sensor);
                 (mean, rule.ok_or_else(unknown)?.clone())
             }
         };
-        let scheme = Censoring::new(sensing, rule, format).map_err(as_core)?;
+        let scheme = Censoring::new(sensing, rule, format)?;
         let report = scheme.encode(rng, &mut (), measurement, mean)?;
         let bits = report.map(|report| report.to_bits(&format)).transpose();
         let bits = bits.map_err(|error| refused("report", error))?;
@@ -264,7 +261,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         Some(writer.finish())
     }
 
-    fn restore(&mut self, memory: &BitString) -> Result<(), fewbits_core::Error> {
+    fn restore(&mut self, memory: &BitString) -> Result<(), Error> {
         let mut reader = BitReader::new(memory);
         let slot = reader.read(SLOT_BITS).and_then(|slot| reader.finish().map(|()| slot));
         self.slot = slot.map_err(|error| refused("memory", error))?;

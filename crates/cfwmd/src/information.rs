@@ -12,7 +12,7 @@
 //! divergence weighs the innovation by `S^-1 (S - R) R^-1`.
 
 use crate::Error;
-use fewbits_numerics::error::{finite, positive};
+use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::normal;
 use serde::{Deserialize, Serialize};
 
@@ -33,10 +33,8 @@ fn line(direction: Direction, s: f64, r: f64) -> Result<(f64, f64), Error> {
     positive("innovation_variance", s)?;
     positive("noise_variance", r)?;
     if s <= r {
-        return Err(Error::Uninformative {
-            innovation_variance: s,
-            noise_variance: r,
-        });
+        let expected = format!("more than the noise variance {r}, or the measurement says nothing about the state");
+        return refuse("innovation_variance", s, expected);
     }
     let excess = s - r;
     let log_ratio = (excess / r).ln_1p();
@@ -53,7 +51,7 @@ fn line(direction: Direction, s: f64, r: f64) -> Result<(f64, f64), Error> {
 /// Divergence, in nats, between the beliefs before and after a scalar Kalman update with this innovation.
 ///
 /// # Errors
-/// If a variance is not positive; [`Error::Uninformative`] for `s <= r`.
+/// If a variance is not positive, or `s <= r`.
 pub fn divergence(
     direction: Direction,
     innovation: f64,

@@ -58,7 +58,6 @@
 pub mod censored;
 pub mod centre;
 pub mod ellipsoid;
-mod error;
 pub mod information;
 pub mod network;
 pub mod no_feedback;
@@ -68,5 +67,5 @@ pub mod schedule;
 pub mod scheme;
 pub mod threshold;
 
-pub use error::Error;
+pub use fewbits_core::Error;
 pub use {nalgebra, rand};

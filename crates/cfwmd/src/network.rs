@@ -7,7 +7,7 @@ use crate::scheme::{Censoring, rule_under};
 use fewbits_core::{Gaussian, LinearSensing, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, non_negative};
+use fewbits_numerics::error::{at_least_one, entries, non_negative};
 use nalgebra::SVector;
 use rand::Rng;
 
@@ -85,10 +85,13 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     /// `S = R + H P H'`, `P` the predicted covariance and `H` the Jacobian at the predicted mean.
     ///
     /// # Errors
-    /// [`Error::UnknownSensor`]; if `S` is not positive definite.
+    /// If there is no sensor `i`, or `S` is not positive definite.
     pub fn rule_under(&self, i: usize, predicted: &Gaussian<D>) -> Result<CensoringRule<M>, Error> {
-        let sensors = self.sensors.len();
-        let sensor = self.sensors.get(i).ok_or(Error::UnknownSensor { sensor: i, sensors })?;
+        let expected = || format!("an index below {}, the number of sensors", self.sensors.len());
+        let sensor = self
+            .sensors
+            .get(i)
+            .ok_or_else(|| ArgumentError::new("i", i, expected()))?;
         rule_under(sensor, predicted, self.threshold)
     }
 
@@ -130,14 +133,8 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     }
 
     pub(crate) fn count(&self, rules: usize, observations: usize) -> Result<(), Error> {
-        let sensors = self.sensors.len();
-        if rules != sensors {
-            return Err(ArgumentError::new("rules", rules, format!("{sensors} rules, one per sensor")).into());
-        }
-        if observations != sensors {
-            return Err(Error::ObservationCount { observations, sensors });
-        }
-        Ok(())
+        entries("rules", rules, self.sensors.len())?;
+        Ok(entries("observations", observations, self.sensors.len())?)
     }
 
     /// The observations as a likelihood for particle and grid filters. There is one entry per group of identical scalar sensors that
@@ -208,7 +205,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
     /// Missing reports of identical scalar sensors are fused in one exact step, those of other sensors one after the other.
     ///
     /// # Errors
-    /// As [`Network::likelihood`]; [`fewbits_core::Error::Impossible`] if the observations have probability zero.
+    /// As [`Network::likelihood`]; [`Error::Impossible`] if the observations have probability zero.
     pub fn fuse(
         &self,
         predicted: &Gaussian<D>,

@@ -5,7 +5,7 @@ use crate::ellipsoid::Ellipsoid;
 use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics, Sensing};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::LinearSensor;
-use fewbits_numerics::error::positive;
+use fewbits_numerics::error::{positive, refuse};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -103,11 +103,12 @@ impl<const M: usize> CensoringRule<M> {
             })
             .sum();
         if (statistic.sqrt() + slack).powi(2) < self.threshold() * (1.0 - 1e-9) {
-            return Err(Error::ProtocolViolation {
-                sensor,
-                statistic,
-                threshold: self.threshold(),
-            });
+            let value = format!("a value of sensor {sensor} with normalised innovation squared {statistic}");
+            return refuse(
+                "report",
+                value,
+                format!("at least the threshold {}, below which it is silent", self.threshold()),
+            );
         }
         Ok(())
     }

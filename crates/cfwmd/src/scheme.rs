@@ -1,7 +1,7 @@
 //! Censoring sensors with feedback: the sensor's half, and the likelihood of its reports and silences.
 
 use crate::Error;
-use crate::censored::{Censored, MissingReports, as_core};
+use crate::censored::{Censored, MissingReports};
 use crate::rule::CensoringRule;
 use fewbits_core::{Gaussian, LinearSensing, Link, MeasurementNoise, Memoryless, NumberFormat, Observation, Sensing};
 use fewbits_numerics::ArgumentError;
@@ -73,7 +73,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
             let innovation = value - prediction;
             return factor.or_else(|_| {
                 self.rule.check(sensor, &innovation, &SVector::zeros())?;
-                Err(Error::IMPOSSIBLE)
+                Err(Error::Impossible)
             });
         }
         self.check_value(sensor, &prediction, value, link)?;
@@ -124,7 +124,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Memoryless<M> for Censori
         &self,
         measurement: &SVector<f64, M>,
         broadcast: &SVector<f64, D>,
-    ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
+    ) -> Result<Option<SVector<f64, M>>, Error> {
         let prediction = self.sensing.mean(broadcast);
         all_finite("prediction", prediction.as_slice())?;
         send_if(&self.rule, measurement, &prediction, &self.format)
@@ -135,13 +135,12 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Memoryless<M> for Censori
         broadcast: &SVector<f64, D>,
         observation: &Observation<SVector<f64, M>>,
         link: &Link,
-    ) -> Result<Censored<M>, fewbits_core::Error> {
+    ) -> Result<Censored<M>, Error> {
         match observation {
             Observation::Received(value) => self.received(0, broadcast, value, link),
             Observation::Nothing => self.missing(broadcast, link, MissingReports { nothing: 1, lost: 0 }),
             Observation::Lost => self.missing(broadcast, link, MissingReports { nothing: 0, lost: 1 }),
         }
-        .map_err(as_core)
     }
 }
 
@@ -151,7 +150,7 @@ pub(crate) fn send_if<const M: usize>(
     measurement: &SVector<f64, M>,
     prediction: &SVector<f64, M>,
     format: &NumberFormat,
-) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
+) -> Result<Option<SVector<f64, M>>, Error> {
     all_finite("measurement", measurement.as_slice())?;
     if !rule.sends(&(measurement - prediction)) {
         return Ok(None);
@@ -241,8 +240,8 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for
         &self,
         measurement: &SVector<f64, M>,
         broadcast: &Gaussian<D>,
-    ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
-        let sensor = self.under(broadcast).map_err(as_core)?;
+    ) -> Result<Option<SVector<f64, M>>, Error> {
+        let sensor = self.under(broadcast)?;
         sensor.report_of(measurement, broadcast.mean())
     }
 
@@ -251,8 +250,8 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for
         broadcast: &Gaussian<D>,
         observation: &Observation<SVector<f64, M>>,
         link: &Link,
-    ) -> Result<Censored<M>, fewbits_core::Error> {
-        let sensor = self.under(broadcast).map_err(as_core)?;
+    ) -> Result<Censored<M>, Error> {
+        let sensor = self.under(broadcast)?;
         sensor.meaning_of(broadcast.mean(), observation, link)
     }
 }

@@ -5,6 +5,7 @@
 
 use crate::arguments::BenchOptions;
 use crate::error::Error;
+use crate::input::Cells;
 use crate::pack::{Counted, schema};
 use crate::{Ending, output};
 use fewbits_record::{Bound, Effort, Playback, Recorder, Schema};
@@ -38,8 +39,6 @@ fn line(codec: &'static str, promise: &'static str, bytes: usize, samples: usize
         decode_samples_per_second: samples as f64 / decode,
     }
 }
-
-type Cells = Vec<Vec<Option<f64>>>;
 
 fn ours(
     codec: &'static str,
@@ -115,20 +114,7 @@ fn indices(schema: &Schema, finite: &[Vec<f64>]) -> Option<Vec<Vec<i64>>> {
 /// Runs the task.
 pub(crate) fn run(options: &BenchOptions) -> Result<Ending, Error> {
     let (mut table, schema) = schema(&options.table, &options.bounds)?;
-    let (mut ticks, mut columns): (Vec<i64>, Cells) = (Vec::new(), vec![Vec::new(); table.names.len()]);
-    while let Some((tick, cells)) = table.next(schema.time())? {
-        ticks.push(tick.unwrap_or(ticks.len() as i64));
-        columns
-            .iter_mut()
-            .zip(cells)
-            .for_each(|(column, cell)| column.push(cell));
-    }
-    if ticks.is_empty() {
-        return Err(Error::Empty {
-            file: table.file().to_owned(),
-            what: "rows",
-        });
-    }
+    let (ticks, columns) = table.rows(schema.time(), usize::MAX)?;
     let file = table.file().to_owned();
     let samples = columns.len() * ticks.len();
     let finite: Vec<Vec<f64>> = columns

@@ -11,6 +11,9 @@ use std::io::{IsTerminal, Read, Seek};
 /// A row: its tick (`None` if rows are numbered) and its cells.
 pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
 
+/// A column of cells for each name.
+pub(crate) type Cells = Vec<Vec<Option<f64>>>;
+
 /// Cells that mean a missing sample.
 const GAPS: [&str; 8] = ["", "NA", "N/A", "n/a", "null", "NULL", "None", "?"];
 /// Names of a first column that is taken as time.
@@ -291,6 +294,27 @@ impl Table {
             .map(|column| self.cell(*column))
             .collect::<Result<_, _>>()?;
         Ok(Some((tick, cells)))
+    }
+
+    /// The next rows, at least one and at most `limit`: their ticks (or numbers), and a column of cells for each name.
+    pub(crate) fn rows(&mut self, time: TimeBase, limit: usize) -> Result<(Vec<i64>, Cells), Error> {
+        let (mut ticks, mut columns) = (Vec::new(), vec![Vec::new(); self.names.len()]);
+        while ticks.len() < limit
+            && let Some((tick, cells)) = self.next(time)?
+        {
+            ticks.push(tick.unwrap_or(ticks.len() as i64));
+            columns
+                .iter_mut()
+                .zip(cells)
+                .for_each(|(column, cell): (&mut Vec<_>, _)| column.push(cell));
+        }
+        if ticks.is_empty() {
+            return Err(Error::Empty {
+                file: self.file().to_owned(),
+                what: "rows",
+            });
+        }
+        Ok((ticks, columns))
     }
 
     fn cell(&self, column: usize) -> Result<Option<f64>, Error> {

@@ -137,25 +137,8 @@ pub(crate) fn run(options: &PlanOptions) -> Result<Ending, Error> {
     };
     let mut table = Table::open(&options.table)?;
     let time = table.time_base(&options.table, survey.as_ref())?;
-    let mut columns: Vec<Vec<Option<f64>>> = vec![Vec::new(); table.names.len()];
-    let (mut ticks, mut cut) = (Vec::new(), false);
-    while let Some((tick, cells)) = table.next(time)? {
-        if ticks.len() == MAX_ROWS {
-            cut = true;
-            break;
-        }
-        ticks.push(tick.unwrap_or(ticks.len() as i64));
-        columns
-            .iter_mut()
-            .zip(cells)
-            .for_each(|(column, cell)| column.push(cell));
-    }
-    if ticks.is_empty() {
-        return Err(Error::Empty {
-            file: table.file().to_owned(),
-            what: "rows",
-        });
-    }
+    let (ticks, columns) = table.rows(time, MAX_ROWS)?;
+    let cut = ticks.len() == MAX_ROWS && table.next(time)?.is_some();
     let failed = Error::recording(table.file());
     let rows_per_block = options.rows_per_block;
     let planned = table

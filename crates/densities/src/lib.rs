@@ -59,13 +59,12 @@ macro_rules! own_log_pdf {
 
 use {own_log_pdf, own_moments};
 
-mod error;
 mod grids;
 mod kernel_estimate;
 mod mixture;
 mod particles;
 
-pub use error::Error;
+pub use fewbits_core::Error;
 pub use grids::{PointMass, UniformGrid};
 pub use kernel_estimate::{Bandwidth, BandwidthRule, KernelEstimate, SampleSize, Shape, add_cross_sums};
 pub use mixture::{Component, Mixture, ellipse, moment_matched};

@@ -138,7 +138,7 @@ impl Envelope {
     ///
     /// # Errors
     /// If `threshold` is not a positive number, `angle` is not finite, `age` is NaN, `level` is outside `[0, 1]`, or
-    /// [`Error::NotHomogeneous`].
+    /// the model changes along the ground.
     pub fn reach(
         &self,
         origin: &Vector2<f64>,
@@ -153,7 +153,7 @@ impl Envelope {
         within("level", level, 0.0, 1.0)?;
         all_finite("origin", origin.as_slice())?;
         let Some(medium) = self.sensor.model().homogeneous() else {
-            return Err(Error::NotHomogeneous);
+            return refuse("model", "one with concentrations at its receptors only", "a homogeneous one");
         };
         let ray = Vector2::new(angle.cos(), angle.sin());
         let along = |p: &Point| (p.position - origin).dot(&ray);

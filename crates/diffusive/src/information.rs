@@ -224,6 +224,14 @@ pub enum Unknown {
     Bias,
 }
 
+fn no_diffusivity() -> ArgumentError {
+    ArgumentError::new(
+        "unknowns",
+        "the diffusivity",
+        "a model with `diffusivity_slope`: this one has not one diffusivity",
+    )
+}
+
 /// Fisher information of all nodes together about the parameters `unknowns`, in this order. The derivative by the start of the release
 /// is a finite difference with a step of 1e-5 of the shortest age.
 ///
@@ -257,7 +265,7 @@ pub fn fisher_information(
                     Unknown::Rate => at.value,
                     Unknown::Diffusivity => {
                         let slope = sensor.model().diffusivity_slope(&receptor, &place, *age);
-                        rate * slope.ok_or(Error::NoDiffusivity)?
+                        rate * slope.ok_or_else(no_diffusivity)?
                     }
                     Unknown::Start => rate * (shifted[1][j] - shifted[0][j]) / (2.0 * step),
                     Unknown::Bias => 1.0,

@@ -316,5 +316,5 @@ fn read_gaussian<const D: usize>(weight: f64, numbers: &[f64]) -> Result<Compone
         (0..=i).for_each(|j| lower[(i, j)] = row[j]);
         rest = others;
     }
-    Ok(Component::new(weight, SVector::from_column_slice(mean), lower * lower.transpose())?)
+    Component::new(weight, SVector::from_column_slice(mean), lower * lower.transpose())
 }

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use fewbits_models::{Homogeneous, Receptor, SourceGradient, SourceModel};
-use fewbits_numerics::error::{all_finite, at_least_one, finite, non_negative, positive};
+use fewbits_numerics::error::{all_finite, at_least_one, finite, non_negative, positive, refuse};
 use nalgebra::{Vector2, Vector3};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -72,11 +72,11 @@ impl SourceSensor {
     /// The same sensors with a release that began at `start`, s.
     ///
     /// # Errors
-    /// If it is not finite, or [`Error::NothingReleased`] if no instant of sampling is after it.
+    /// If it is not finite, or no instant of sampling is after it.
     pub fn with_start(self, start: f64) -> Result<Self, Error> {
         finite("start", start)?;
         if self.instants.iter().all(|t| *t <= start) {
-            return Err(Error::NothingReleased { start });
+            return refuse("start", start, "a time before the last instant of sampling");
         }
         let ages = self.instants.iter().map(|t| t - start).collect();
         Ok(Self { ages, start, ..self })
@@ -181,7 +181,7 @@ impl SourceSensor {
     /// If `node` is not finite, or the model has no concentrations there.
     pub fn receptor(&self, node: &Vector2<f64>) -> Result<Receptor, Error> {
         all_finite("node", node.as_slice())?;
-        Ok(self.model.receptor(&Vector3::new(node.x, node.y, self.sensor_height))?)
+        self.model.receptor(&Vector3::new(node.x, node.y, self.sensor_height))
     }
 
     /// Concentrations per unit rate at a receptor, one for each instant: kg/m^3 per kg/s.

@@ -228,7 +228,7 @@ impl Report {
     pub(crate) fn correct(self, predicted: &Gaussian<1>) -> Result<(Gaussian<1>, StepInfo), Error> {
         let mean = predicted.mean()[0] + self.correction;
         if !(mean.is_finite() && self.variance.is_finite() && self.log_likelihood.is_finite()) {
-            return Err(Error::IMPOSSIBLE);
+            return Err(Error::Impossible);
         }
         let info = StepInfo {
             predicted: *predicted,
@@ -310,7 +310,7 @@ mod tests {
             assert_eq!(info.log_likelihood, log_likelihood);
         }
         // Nothing cannot come out of a link that loses nothing.
-        assert_eq!(filter.step(&belief, &Observation::Nothing), Err(Error::IMPOSSIBLE));
+        assert_eq!(filter.step(&belief, &Observation::Nothing), Err(Error::Impossible));
     }
 
     #[test]
@@ -327,7 +327,7 @@ mod tests {
         assert_eq!(useless.step(&belief, &above).unwrap().0, useless.predict(&belief));
         let huge = Gaussian::scalar(f64::MAX, f64::MAX).unwrap();
         let plant = ScalarPlant::new_unstable(2.0, 1.0, 1.0).unwrap();
-        assert_eq!(DymboFilter::new(plant).step(&huge, &above), Err(Error::IMPOSSIBLE));
+        assert_eq!(DymboFilter::new(plant).step(&huge, &above), Err(Error::Impossible));
         // At a = 1 the steady step is sigma_u.
         let walk = DymboFilter::new(ScalarPlant::new(1.0, 0.49, 1.7).unwrap());
         assert!((walk.steady_step().unwrap() - 0.7).abs() < 1e-14);

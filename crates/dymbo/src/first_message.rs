@@ -174,17 +174,12 @@ impl Memoryless<1> for RoundedSample {
         self.bits
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, fewbits_core::Error> {
+    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, Error> {
         Ok(Some(self.round(measurement[0])?))
     }
 
-    /// Over a link that inverts bits only words of up to 12 bits are accepted.
-    fn meaning_of(
-        &self,
-        (): &(),
-        observation: &Observation<Multiple>,
-        link: &Link,
-    ) -> Result<Scalar, fewbits_core::Error> {
+    /// Over a link that inverts bits, words of up to 12 bits.
+    fn meaning_of(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, Error> {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };

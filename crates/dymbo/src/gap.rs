@@ -24,7 +24,7 @@ pub fn exact_filter(plant: &ScalarPlant, steps: usize) -> Result<PointMassFilter
         widest = widest.max(variance);
     }
     let spacing = SPACING * plant.process_variance().min(plant.measurement_variance()).sqrt();
-    Ok(PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(REACH * widest.sqrt(), spacing)?)?)
+    PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(REACH * widest.sqrt(), spacing)?)
 }
 
 /// One simulated run: the true state, the filter's belief, and the exact density given the same reports.

@@ -166,11 +166,7 @@ impl Memoryless<1> for InnovationWord {
     }
 
     #[inline]
-    fn report_of(
-        &self,
-        measurement: &Vector1<f64>,
-        prediction: &Prediction,
-    ) -> Result<Option<CellIndex>, fewbits_core::Error> {
+    fn report_of(&self, measurement: &Vector1<f64>, prediction: &Prediction) -> Result<Option<CellIndex>, Error> {
         Ok(Some(self.word(measurement[0], prediction)?))
     }
 
@@ -179,7 +175,7 @@ impl Memoryless<1> for InnovationWord {
         prediction: &Prediction,
         observation: &Observation<CellIndex>,
         link: &Link,
-    ) -> Result<Scalar, fewbits_core::Error> {
+    ) -> Result<Scalar, Error> {
         let edges = self.edges(prediction)?;
         let Observation::Received(word) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());

@@ -46,7 +46,6 @@
 
 mod centre;
 pub mod chain;
-mod error;
 mod filter;
 mod first_message;
 pub mod gap;
@@ -61,7 +60,7 @@ pub mod tree;
 mod vector;
 
 pub use centre::{ParallelEstimator, ScalarEstimator};
-pub use error::Error;
+pub use fewbits_core::Error;
 pub use filter::{DymboFilter, ScalarFilter, StepInfo};
 pub use first_message::{FirstMessageValue, Multiple, RoundedSample, first_message_mse, first_message_value};
 pub use innovation_word::{CellIndex, InnovationWord, Prediction};

@@ -56,6 +56,14 @@ impl ScalarPlant {
         Self::new(coefficient, noise_ratio, 1.0)
     }
 
+    /// Refuses a plant that corrections of bounded size cannot hold.
+    ///
+    /// # Errors
+    /// If `|a| > 1`: an error beyond `gain / (|a| - 1)` then grows for ever, although the computed variance stays finite.
+    pub(crate) fn refuse_unstable(&self) -> Result<(), Error> {
+        Ar1::new(self.coefficient(), self.process_variance()).map(drop)
+    }
+
     fn of(dynamics: Ar1, measurement_variance: f64) -> Result<Self, Error> {
         Ok(Self {
             dynamics,
@@ -107,12 +115,7 @@ impl ScalarPlant {
     /// # Errors
     /// If `information` is outside `[0, 1]`, or there is no finite steady state.
     pub fn steady_state(&self, information: f64) -> Result<ScalarSteadyState, Error> {
-        Ok(scalar_steady_state(
-            self.coefficient(),
-            self.process_variance(),
-            self.measurement_variance(),
-            information,
-        )?)
+        scalar_steady_state(self.coefficient(), self.process_variance(), self.measurement_variance(), information)
     }
 }
 
@@ -144,7 +147,7 @@ mod tests {
     #[test]
     fn refuses_plants_it_cannot_hold() {
         let unstable = ScalarPlant::new(1.2, 0.5, 1.0);
-        assert_eq!(unstable, Err(Error::UnstablePlant { coefficient: 1.2 }));
+        assert!(matches!(&unstable, Err(Error::Argument(e)) if e.name == "coefficient"));
         assert!(unstable.unwrap_err().to_string().contains("1.2"));
         assert!(ScalarPlant::new_unstable(-1.2, 0.5, 1.0).is_ok());
         for bad in [

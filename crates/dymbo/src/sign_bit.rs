@@ -76,18 +76,13 @@ impl Memoryless<1> for SignBit {
     fn report_format(&self) {}
 
     #[inline]
-    fn report_of(&self, measurement: &Vector1<f64>, threshold: &f64) -> Result<Option<Sign>, fewbits_core::Error> {
+    fn report_of(&self, measurement: &Vector1<f64>, threshold: &f64) -> Result<Option<Sign>, Error> {
         let reached = fewbits_node::sign_bit(measurement[0], *threshold).map_err(ArgumentError::from)?;
         Ok(Some(if reached { Sign::Above } else { Sign::Below }))
     }
 
     #[inline]
-    fn meaning_of(
-        &self,
-        threshold: &f64,
-        observation: &Observation<Sign>,
-        link: &Link,
-    ) -> Result<Scalar, fewbits_core::Error> {
+    fn meaning_of(&self, threshold: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, Error> {
         finite("threshold", *threshold)?;
         match observation {
             Observation::Received(bit) => {

@@ -122,7 +122,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
             return if log_likelihood.is_finite() {
                 Ok((*predicted, info))
             } else {
-                Err(Error::IMPOSSIBLE)
+                Err(Error::Impossible)
             };
         };
         let (sensor, clean) = (self.sensor(sensor)?, 1.0 - 2.0 * self.link.crossover());
@@ -139,7 +139,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         let posterior = Gaussian::from_symmetric_parts(mean, covariance);
         if !posterior.is_finite() {
             let what = "the posterior (from the belief or the sensor)";
-            return Err(fewbits_core::Error::NotANumber { what }.into());
+            return Err(Error::NotANumber { what });
         }
         Ok((posterior, info))
     }
@@ -180,7 +180,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         let posterior = Gaussian::from_trusted_parts(predicted.mean() + gain * signs, covariance);
         if !(posterior.is_finite() && info.log_likelihood.is_finite()) {
             let what = "the posterior (from the belief or the sensors)";
-            return Err(fewbits_core::Error::unlikely_or_no_number(info.log_likelihood, what).into());
+            return Err(Error::unlikely_or_no_number(info.log_likelihood, what));
         }
         Ok((posterior, info))
     }
@@ -230,7 +230,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         let covariance = predicted.covariance() - gain * with_state.transpose();
         if covariance.iter().any(|v| !v.is_finite()) {
             let what = "the covariance of the bits (from the belief or the sensors)";
-            return Err(fewbits_core::Error::NotANumber { what }.into());
+            return Err(Error::NotANumber { what });
         }
         Ok((gain, covariance))
     }
@@ -279,7 +279,8 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         }
         Err(Error::NotConverged {
             what: "the covariance recursion",
-            iterations: MOST_STEPS,
+            steps: MOST_STEPS,
+            unit: "iterations",
         })
     }
 }
@@ -400,7 +401,7 @@ mod tests {
         let filter = SignFilter::new(dynamics(), [ScalarSensor::scalar(Vector2::new(1.0, 0.5), 1.0).unwrap()]);
         assert!(matches!(filter.threshold(&belief(), 1), Err(Error::Argument(_))));
         assert!(matches!(filter.update(&belief(), 1, &ABOVE), Err(Error::Argument(_))));
-        assert_eq!(filter.update(&belief(), 0, &Observation::Nothing), Err(Error::IMPOSSIBLE));
+        assert_eq!(filter.update(&belief(), 0, &Observation::Nothing), Err(Error::Impossible));
     }
 
     #[test]

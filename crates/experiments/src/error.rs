@@ -77,24 +77,10 @@ macro_rules! failed {
     };
 }
 failed!(
-    fewbits_adaptive::Error,
-    fewbits_binary_patterns::Error,
-    fewbits_cfwmd::Error,
     fewbits_core::CodecError,
     fewbits_core::Error,
-    fewbits_densities::Error,
     fewbits_diffusion::Error,
-    fewbits_diffusive::Error,
-    fewbits_dymbo::Error,
-    fewbits_filters::Error,
-    fewbits_handoff::Error,
-    fewbits_mixture_codec::Error,
-    fewbits_models::Error,
     fewbits_network::Error,
     fewbits_numerics::ArgumentError,
-    fewbits_pf_mpa::Error,
-    fewbits_quantizer_design::Error,
     fewbits_quantizers::Error,
-    fewbits_sensor_assignment::Error,
-    fewbits_topology::Error,
 );

@@ -90,7 +90,7 @@ pub fn evidence_through<const D: usize, const M: usize>(
     let correction = tilted.mean - prior.mean();
     if !(tilted.log_evidence.is_finite() && correction.iter().all(|x| x.is_finite())) {
         let what = "the evidence (from the belief, the sensing model or the factor)";
-        return Err(fewbits_core::Error::unlikely_or_no_number(tilted.log_evidence, what).into());
+        return Err(Error::unlikely_or_no_number(tilted.log_evidence, what));
     }
     Ok((tilted.log_evidence, correction))
 }
@@ -105,7 +105,7 @@ fn measured<const D: usize, const M: usize>(
     let prior = Gaussian::from_symmetric_parts(predicted, congruence_of(matrix, cross));
     if !prior.is_finite() {
         let what = "the predicted measurement (from the belief or the sensing model)";
-        return Err(fewbits_core::Error::NotANumber { what }.into());
+        return Err(Error::NotANumber { what });
     }
     Ok(prior)
 }
@@ -135,7 +135,7 @@ fn update_at<const D: usize, const M: usize>(
     let posterior = Gaussian::from_symmetric_parts(mean, covariance);
     if !(posterior.is_finite() && info.log_likelihood.is_finite()) {
         let what = "the posterior (from the belief, the sensing model or the factor)";
-        return Err(fewbits_core::Error::unlikely_or_no_number(info.log_likelihood, what).into());
+        return Err(Error::unlikely_or_no_number(info.log_likelihood, what));
     }
     Ok((posterior, info))
 }

@@ -258,8 +258,7 @@ pub(crate) fn weigh<const D: usize>(
     for (mode, p) in belief.modes.iter().zip(&belief.probabilities) {
         let (next, log_evidence) = match update(mode) {
             Ok(updated) => updated,
-            // A mode under which the observation is impossible gets probability zero. It is an error only if all modes do.
-            Err(Error::Core(fewbits_core::Error::Impossible)) => (*mode, f64::NEG_INFINITY),
+            Err(Error::Impossible) => (*mode, f64::NEG_INFINITY),
             Err(error) => return Err(error),
         };
         workspace.modes.push(next);
@@ -268,7 +267,7 @@ pub(crate) fn weigh<const D: usize>(
     let logs = &mut workspace.probabilities;
     let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if !peak.is_finite() {
-        return Err(fewbits_core::Error::unlikely_or_no_number(peak, "the evidence of a model").into());
+        return Err(Error::unlikely_or_no_number(peak, "the evidence of a model"));
     }
     logs.iter_mut().for_each(|log| *log = (*log - peak).exp());
     let total: f64 = logs.iter().sum();

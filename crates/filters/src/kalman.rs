@@ -104,7 +104,7 @@ fn log_product(factors: &[f64], numbers: f64, measurement: &[f64]) -> Result<f64
         return Ok(log);
     }
     let what = "the posterior (from the belief, the sensing model or the measurement)";
-    Err(fewbits_core::Error::NotANumber { what }.into())
+    Err(Error::NotANumber { what })
 }
 
 /// `a (l l')^-1` for a lower triangular `l`, with one division per column of `l`.
@@ -301,7 +301,7 @@ mod tests {
     fn overflow_is_an_error_and_no_belief() {
         let sensing = LinearSensor::scalar(SVector::<f64, 1>::new(1e10), 1.0).unwrap();
         let wide = Gaussian::scalar(0.0, 1e300).unwrap();
-        let no_number = |error: Error| matches!(error, Error::Core(fewbits_core::Error::NotANumber { .. }));
+        let no_number = |error: Error| matches!(error, Error::NotANumber { .. });
         assert!(no_number(update(&sensing, &wide, &SVector::from([1.0])).unwrap_err()));
         let far = Gaussian::scalar(1e300, 1.0).unwrap();
         assert!(no_number(update(&sensing, &far, &SVector::from([1.0])).unwrap_err()));

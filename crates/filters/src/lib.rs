@@ -37,7 +37,6 @@ pub mod assumed_density;
 pub mod centre;
 pub mod contract;
 pub mod cramer_rao;
-mod error;
 mod grid_filter;
 mod guided;
 mod imm;
@@ -52,7 +51,7 @@ mod steady_state;
 mod switching;
 
 pub use contract::{Info, LinearScalar, MomentFilter, StateFilter, StateLikelihood};
-pub use error::Error;
+pub use fewbits_core::Error;
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
 pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};
 pub use guided::GuidedFilter;

@@ -78,7 +78,7 @@ impl ParticleFilter {
         workspace.ancestors.resize(count, 0);
         self.resampling
             .ancestors_of_normalised(rng, belief.weights(), &mut workspace.ancestors);
-        Ok(belief.select(&workspace.ancestors)?)
+        belief.select(&workspace.ancestors)
     }
 
     /// Resamples if the schedule says so, then draws the next state of every particle.
@@ -150,7 +150,7 @@ pub(crate) fn weigh<const D: usize>(
 ) -> Result<Info, Error> {
     let finite = |column: &&[f64]| column.iter().fold(true, |finite, x| finite & x.is_finite());
     if !belief.columns().iter().all(finite) {
-        return Err(fewbits_core::Error::NotANumber { what: "a particle" }.into());
+        return Err(Error::NotANumber { what: "a particle" });
     }
     let log_likelihood = belief.reweigh(change)?;
     Ok(Info {
@@ -191,7 +191,7 @@ impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
     type Belief = Particles<D>;
 
     fn start(&mut self, mut rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
-        Ok(Particles::from_belief(&mut rng, prior, self.count)?)
+        Particles::from_belief(&mut rng, prior, self.count)
     }
 
     fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Particles<D>) -> Result<(), Error> {

@@ -233,7 +233,7 @@ impl PointMassFilter {
             // Only the ratios matter; normalisation keeps a long product from underflowing.
             let peak = message.iter().copied().fold(0.0, f64::max);
             if !(peak > 0.0 && peak.is_finite()) {
-                return Err(Error::IMPOSSIBLE);
+                return Err(Error::Impossible);
             }
             message.iter_mut().for_each(|m| *m /= peak);
         }
@@ -275,7 +275,7 @@ impl StateFilter<1> for PointMasses {
     type Belief = PointMass;
 
     fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<1>) -> Result<PointMass, Error> {
-        Ok(PointMass::normal(self.grid, prior.mean()[0], prior.covariance()[0])?)
+        PointMass::normal(self.grid, prior.mean()[0], prior.covariance()[0])
     }
 
     fn predict(&mut self, _: &mut dyn Rng, motion: Move<'_, 1>, belief: &mut PointMass) -> Result<(), Error> {

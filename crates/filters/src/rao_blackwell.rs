@@ -66,10 +66,9 @@ impl RaoBlackwellised {
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
         let shared = kalman::predict(dynamics, &shared);
         if !shared.is_finite() {
-            return Err(fewbits_core::Error::NotANumber {
+            return Err(Error::NotANumber {
                 what: "the predicted covariance",
-            }
-            .into());
+            });
         }
         self.filter
             .resample(rng, belief.means_mut(), &mut workspace.particles)?;
@@ -209,7 +208,7 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
     type Belief = GaussianCloud<D>;
 
     fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<D>) -> Result<GaussianCloud<D>, Error> {
-        Ok(GaussianCloud::agreed(prior, self.count)?)
+        GaussianCloud::agreed(prior, self.count)
     }
 
     fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut GaussianCloud<D>) -> Result<(), Error> {

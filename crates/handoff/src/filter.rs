@@ -108,7 +108,7 @@ impl<R> HandoffFilter<R> {
         } else {
             kept
         };
-        Ok(KernelEstimate::new(centres, kernel)?)
+        KernelEstimate::new(centres, kernel)
     }
 
     /// One leader's step: returns the belief that is sent on, and further results.
@@ -155,5 +155,5 @@ pub fn trimmed<const D: usize>(particles: &Particles<D>, trim: f64) -> Result<Pa
         .columns()
         .map(|column| kept.iter().map(|i| column[*i]).collect());
     let logs: Vec<f64> = kept.iter().map(|i| particles.log_weights()[*i]).collect();
-    Ok(Particles::new(columns, &logs)?)
+    Particles::new(columns, &logs)
 }

@@ -34,13 +34,12 @@
 //!
 //! Not in this crate: the choice of the leader (by the simulated network), the true state, energy.
 
-mod error;
 mod filter;
 mod leaders;
 pub mod published;
 mod reducer;
 
-pub use error::Error;
+pub use fewbits_core::Error;
 pub use filter::{HandoffFilter, HandoffInfo, trimmed};
 pub use leaders::Leaders;
 pub use reducer::{Coded, Components, Handover, RateLimited, Reducer, Whole};

@@ -36,9 +36,9 @@ impl<const D: usize> Handover<D> {
     }
 
     fn coded(message: &CodedMixture<D>, format: &WireFormat<D>) -> Result<Self, Error> {
-        let bits = message.to_bits(format).map_err(fewbits_mixture_codec::Error::from)?;
+        let bits = message.to_bits(format)?;
         let decode = |bits: &BitString| Ok::<_, CodecError>(CodedMixture::from_bits(format, bits)?.into_mixture());
-        Ok(Self::received(bits, decode).map_err(fewbits_mixture_codec::Error::from)?)
+        Ok(Self::received(bits, decode)?)
     }
 
     /// The belief of the next leader.

@@ -34,7 +34,6 @@
 //! Not in this crate: the densities themselves (`fewbits-densities`), and which node sends to which (`fewbits-handoff`).
 
 pub mod divergence;
-mod error;
 pub mod published;
 pub mod reduction;
 pub mod tree;
@@ -42,7 +41,7 @@ pub mod wire;
 
 pub use divergence::plug_in::{Cubature, PlugIn};
 pub use divergence::{plug_in, quadrature};
-pub use error::Error;
+pub use fewbits_core::Error;
 pub use reduction::cut::{Criterion, Cut, NodeErrors};
 pub use reduction::merge::MergeCost;
 pub use reduction::{Reduction, cut, merge, refine};

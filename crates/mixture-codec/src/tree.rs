@@ -72,7 +72,7 @@ impl<const D: usize> Node<D> {
     /// # Errors
     /// If the node's covariance is not positive definite, which cannot happen for a node of a tree.
     pub fn component(&self) -> Result<Component<D>, Error> {
-        Ok(Component::new(self.weight, self.mean, self.covariance)?)
+        Component::new(self.weight, self.mean, self.covariance)
     }
 }
 
@@ -99,7 +99,7 @@ impl<const D: usize> Tree<D> {
         let weights = estimate.particles().weights();
         let order: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
         if order.is_empty() {
-            return Err(fewbits_core::Error::Impossible.into());
+            return Err(Error::Impossible);
         }
         let mut tree = Self {
             nodes: Vec::with_capacity(2 * order.len()),

@@ -2,7 +2,7 @@
 
 use crate::{Error, LinearGaussian};
 use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
-use fewbits_numerics::error::{finite, non_negative};
+use fewbits_numerics::error::{finite, non_negative, refuse};
 use fewbits_numerics::kernels::{StandardNormals, vectorised};
 use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
@@ -29,11 +29,13 @@ impl Ar1 {
     /// The model with coefficient `a` in `[-1, 1]` and noise variance `q >= 0` (state units squared).
     ///
     /// # Errors
-    /// [`Error::UnstablePlant`] for `|a| > 1`; see [`Ar1::new_unstable`].
+    /// If `|a| > 1`; see [`Ar1::new_unstable`].
     pub fn new(coefficient: f64, noise_variance: f64) -> Result<Self, Error> {
         let model = Self::new_unstable(coefficient, noise_variance)?;
         if coefficient.abs() > 1.0 {
-            return Err(Error::UnstablePlant { coefficient });
+            let expected =
+                "a number in [-1, 1]: beyond, the state outruns corrections of few bits (`new_unstable` accepts it)";
+            return refuse("coefficient", coefficient, expected);
         }
         Ok(model)
     }
@@ -69,14 +71,14 @@ impl Ar1 {
     /// Variance of the stationary distribution, `q / (1 - a^2)`.
     ///
     /// # Errors
-    /// [`Error::NotStationary`] for `|a| >= 1`.
+    /// [`Error::NoSteadyState`] for `|a| >= 1`.
     pub fn stationary_variance(&self) -> Result<f64, Error> {
         let a = self.coefficient();
         if a.abs() < 1.0 {
             // The factored form keeps the digits of 1 - a^2 for |a| near 1.
             Ok(self.noise_variance() / ((1.0 - a) * (1.0 + a)))
         } else {
-            Err(Error::NotStationary)
+            Err(Error::NoSteadyState)
         }
     }
 }
@@ -145,12 +147,12 @@ mod tests {
     #[test]
     fn refuses_what_would_explode() {
         assert!(Ar1::new(-1.0, 0.0).is_ok());
-        assert_eq!(Ar1::new(1.2, 0.5), Err(Error::UnstablePlant { coefficient: 1.2 }));
+        assert!(matches!(Ar1::new(1.2, 0.5), Err(Error::Argument(e)) if e.name == "coefficient" && e.value == "1.2"));
         assert!(Ar1::new_unstable(1.2, 0.5).is_ok());
         for (a, q) in [(f64::NAN, 1.0), (0.5, -1e-9), (f64::INFINITY, 1.0), (0.5, f64::NAN)] {
             assert!(matches!(Ar1::new_unstable(a, q), Err(Error::Argument(_))));
         }
-        assert_eq!(Ar1::new(1.0, 1.0).unwrap().stationary_variance(), Err(Error::NotStationary));
+        assert_eq!(Ar1::new(1.0, 1.0).unwrap().stationary_variance(), Err(Error::NoSteadyState));
     }
 
     #[test]

@@ -119,7 +119,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
             let expected = "a transition whose stationary covariance is a number";
             return refuse("transition", format!("{:?}", self.transition), expected);
         }
-        Err(Error::NotStationary)
+        Err(Error::NoSteadyState)
     }
 }
 
@@ -236,7 +236,7 @@ mod tests {
         assert!((again - covariance).amax() < 1e-12 * covariance.amax());
         for scale in [1.0, 1.5] {
             let model = LinearGaussian::with_covariance(rotation(scale), q).unwrap();
-            assert_eq!(model.stationary_covariance(), Err(Error::NotStationary));
+            assert_eq!(model.stationary_covariance(), Err(Error::NoSteadyState));
         }
         // An overflow must not give NaN.
         let huge = LinearGaussian::with_covariance(Matrix2::new(0.5, 1e200, 0.0, 0.5), q).unwrap();

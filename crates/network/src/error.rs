@@ -120,13 +120,3 @@ impl Error {
         }
     }
 }
-
-impl From<fewbits_topology::Error> for Error {
-    fn from(error: fewbits_topology::Error) -> Self {
-        match error {
-            fewbits_topology::Error::NoSuchNode { node, nodes } => Self::UnknownNode { node, nodes },
-            fewbits_topology::Error::Argument(error) => Self::Argument(error),
-            other => Self::estimator("topology", other),
-        }
-    }
-}

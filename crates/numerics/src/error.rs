@@ -29,33 +29,6 @@ impl ArgumentError {
     }
 }
 
-/// Implements `From` for errors of crates below, so that `?` turns them into variants of this crate's `Error`. An argument error becomes
-/// `Error::Argument`. With `with Core`, an error of the core becomes `Error::Core`.
-#[macro_export]
-macro_rules! lift {
-    ($below:ident with Core => $variant:ident) => {
-        impl From<$below::Error> for Error {
-            fn from(error: $below::Error) -> Self {
-                match error {
-                    $below::Error::Argument(argument) => Self::Argument(argument),
-                    $below::Error::Core(error) => Self::Core(error),
-                    other => Self::$variant(other),
-                }
-            }
-        }
-    };
-    ($($below:ident => $variant:ident),+ $(,)?) => {
-        $(impl From<$below::Error> for Error {
-            fn from(error: $below::Error) -> Self {
-                match error {
-                    $below::Error::Argument(argument) => Self::Argument(argument),
-                    other => Self::$variant(other),
-                }
-            }
-        })+
-    };
-}
-
 /// Returns an argument error as the error type of any crate: `Err(ArgumentError::new(name, value, expected).into())`.
 pub fn refuse<T, E: From<ArgumentError>>(
     name: &'static str,

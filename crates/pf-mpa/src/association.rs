@@ -65,7 +65,7 @@ impl AssociationRule {
 /// `value`, or an error if it is NaN.
 fn number(value: f64, what: &'static str) -> Result<f64, Error> {
     if value.is_nan() {
-        return Err(fewbits_core::Error::NotANumber { what }.into());
+        return Err(Error::NotANumber { what });
     }
     Ok(value)
 }
@@ -230,7 +230,7 @@ impl Hypotheses {
             .all(|h| !h.0.is_nan() && h.1.iter().all(Gaussian::is_finite));
         if !(finite && largest.is_finite()) {
             let what = "the hypotheses (from the targets or the measurements)";
-            return Err(fewbits_core::Error::unlikely_or_no_number(largest, what).into());
+            return Err(Error::unlikely_or_no_number(largest, what));
         }
         let total: f64 = next.iter().map(|h| (h.0 - largest).exp()).sum();
         // Sum before the list is shortened: entries of even index have the measurements in the given order.

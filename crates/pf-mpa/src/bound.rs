@@ -1,13 +1,13 @@
 //! Bounds on the error of any tracker: Fisher information of a range, and the posterior Cramer-Rao recursion.
 
 use crate::Error;
-use crate::error::refuse;
 use crate::factor::log_inside;
 use crate::quantized::RangeReference;
 use crate::sensor::{RangeNoise, RangeSensor};
 use crate::target::Target;
 use fewbits_filters::cramer_rao;
 use fewbits_numerics::error::positive;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::normal;
 use nalgebra::{Matrix4, Vector2};
 

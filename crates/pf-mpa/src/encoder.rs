@@ -1,12 +1,12 @@
 //! How all nodes compute the same quantizer cells for the ranges.
 
 use crate::Error;
-use crate::error::refuse;
 use crate::quantized::RangeReference;
 use crate::sensor::RangeNoise;
 use crate::target::Target;
 use fewbits_core::{Gaussian, Sensing};
 use fewbits_numerics::error::positive;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::{golden, normal};
 use serde::{Deserialize, Serialize};
 

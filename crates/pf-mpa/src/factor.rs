@@ -3,7 +3,7 @@
 use crate::sensor::RangeNoise;
 use fewbits_core::columns::lengths_agree;
 use fewbits_core::factor::{Factor, Feature, InCell, Tilted, Value, tilted_by_quadrature};
-use fewbits_core::{Cell, Columns, Gaussian};
+use fewbits_core::{Cell, Columns, Error, Gaussian};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, within};
 use fewbits_numerics::kernels::{scalar, vectorised};
@@ -291,7 +291,7 @@ impl Factor<1> for RangeFactor {
         }
     }
 
-    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, fewbits_core::Error> {
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         if let Kind::Constant(p) = self.kind {
             return Tilted::unchanged(prior, p.ln());
         }

@@ -18,12 +18,11 @@ impl GaussianTracker for GridFilter {
         step: Step<'_>,
         workspace: &mut GridWorkspace<2>,
     ) -> Result<(Gaussian<4>, StepInfo), Error> {
-        use fewbits_filters::Error::Unresolved;
         let predicted = step.predicted(Manoeuvres::AsNoise);
         let updated = self.update(&predicted, POSITION, step.observed, workspace);
-        match updated.map_err(Error::from) {
+        match updated {
             Ok((next, info)) => Ok((next, StepInfo::of(info.log_likelihood))),
-            Err(Error::Core(fewbits_core::Error::Impossible) | Error::Filter(Unresolved { .. })) => {
+            Err(Error::Impossible | Error::Unresolved { .. }) => {
                 let (next, info) = Linearised::MESSAGE_PASSING.update(&predicted, step.observed)?;
                 Ok((next, StepInfo { fallbacks: 1, ..info }))
             }

@@ -1,12 +1,12 @@
 //! Gaussian beliefs, updated by a few weighted draws from a proposal that depends on the observations.
 
 use crate::Error;
-use crate::error::refuse;
 use crate::linearised::Linearised;
 use crate::target::Manoeuvres;
 use crate::tracker::{GaussianTracker, Ranged, Step, StepInfo};
 use fewbits_core::columns::set_state;
 use fewbits_core::{Gaussian, Likelihood};
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
 use fewbits_numerics::stored;
@@ -135,7 +135,7 @@ impl GaussianTracker for GuidedGaussian {
         let predicted = step.predicted(Manoeuvres::AsNoise);
         let (guide, guess) = Linearised::MESSAGE_PASSING.update(&predicted, step.observed)?;
         if !guide.is_finite() {
-            return Err(Error::IMPOSSIBLE);
+            return Err(Error::Impossible);
         }
         let updated = self.update(rng, &predicted, &guide, step.observed, workspace)?;
         Ok(updated.unwrap_or((guide, StepInfo { fallbacks: 1, ..guess })))

@@ -1,9 +1,9 @@
 //! Which sensor leads the next step, what the leaders hand over, and how many bits both cost.
 
 use crate::Error;
-use crate::error::refuse;
 use fewbits_core::{BitReader, BitWriter, CodecError, Gaussian, Message, NumberFormat};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::refuse;
 use nalgebra::{Matrix4, SMatrix, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 

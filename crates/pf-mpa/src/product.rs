@@ -110,7 +110,7 @@ pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<D>, Erro
     }
     let largest = gaussians.iter().fold(f64::NEG_INFINITY, |m, g| m.max(g.0));
     if !largest.is_finite() {
-        return Err(Error::IMPOSSIBLE);
+        return Err(Error::Impossible);
     }
     let total: f64 = gaussians.iter().map(|g| (g.0 - largest).exp()).sum();
     let components = gaussians.into_iter().map(|(log, mean, covariance)| {

@@ -1,13 +1,13 @@
 //! The sensor's half of a quantized range, and the likelihood of its levels.
 
 use crate::Error;
-use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::sensor::RangeNoise;
 use fewbits_core::{
     BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Memoryless, Message, NumberFormat,
     Observation,
 };
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_quantizers::{Labelling, Symbol};
 use nalgebra::{Matrix1, Vector1, Vector2};
@@ -212,11 +212,7 @@ impl Memoryless<1> for QuantizedRange {
         self.labelling.clone()
     }
 
-    fn report_of(
-        &self,
-        measurement: &Vector1<f64>,
-        reference: &RangeReference,
-    ) -> Result<Option<Symbol>, fewbits_core::Error> {
+    fn report_of(&self, measurement: &Vector1<f64>, reference: &RangeReference) -> Result<Option<Symbol>, Error> {
         Ok(Some(self.level(measurement[0], reference)?))
     }
 
@@ -225,7 +221,7 @@ impl Memoryless<1> for QuantizedRange {
         reference: &RangeReference,
         observation: &Observation<Symbol>,
         link: &Link,
-    ) -> Result<RangeFactor, fewbits_core::Error> {
+    ) -> Result<RangeFactor, Error> {
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
             missing => return Ok(RangeFactor::constant(link.delivery(missing), self.noise)?),

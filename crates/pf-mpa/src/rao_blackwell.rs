@@ -1,7 +1,6 @@
 //! Particles whose velocity is a Gaussian given the positions (Rao-Blackwellised).
 
 use crate::Error;
-use crate::error::refuse;
 use crate::linearised::LinearRange;
 use crate::target::{Target, WithManoeuvre};
 use crate::tracker::{Ranged, StepInfo, Tracker};
@@ -10,6 +9,7 @@ use fewbits_core::{Gaussian, Likelihood};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
 use fewbits_numerics::stored;
 use nalgebra::{Cholesky, Matrix2, SMatrix, Vector2, Vector6};
@@ -143,7 +143,7 @@ impl Tracker for RaoBlackwellGuided {
         let velocity_variance = (s + ts * ts * q - gain * cross).max(0.0);
         if !(WithManoeuvre::estimate(next).is_finite() && velocity_variance.is_finite()) {
             let what = "a moment of the posterior (from the belief or the ranges)";
-            return Err(fewbits_core::Error::NotANumber { what }.into());
+            return Err(Error::NotANumber { what });
         }
         std::mem::swap(&mut belief.particles, next);
         belief.velocity_variance = velocity_variance;

@@ -1,9 +1,9 @@
 //! A node that measures its distance to the target, and the noise of that range.
 
 use crate::Error;
-use crate::error::refuse;
 use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, OnAxes, Sensing};
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{all_finite, finite, non_negative};
 use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::stored;

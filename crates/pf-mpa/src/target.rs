@@ -86,7 +86,7 @@ impl Target {
     pub fn dynamics(&self, additional_variance: f64) -> Result<LinearGaussian<4, 2>, Error> {
         non_negative("additional_variance", additional_variance)?;
         let variance = self.noise_variance + additional_variance;
-        Ok(LinearGaussian::new(self.transition(), self.gain(), SVector::repeat(variance))?)
+        LinearGaussian::new(self.transition(), self.gain(), SVector::repeat(variance))
     }
 
     /// The belief after step `k`, counted from zero, before any observation. `manoeuvres` says how manoeuvres enter.
@@ -211,11 +211,11 @@ impl WithManoeuvre {
     pub fn cloud<R: Rng + ?Sized>(rng: &mut R, prior: &Gaussian<4>, count: usize) -> Result<Particles<6>, Error> {
         let states: Particles<4> = Particles::from_belief(rng, prior, count)?;
         let mut next = 0;
-        Ok(Particles::from_draws(count, || {
+        Particles::from_draws(count, || {
             let state = states.point(next).unwrap_or_else(|| *prior.mean());
             next += 1;
             Self::start(&state)
-        })?)
+        })
     }
 
     /// Mean and covariance of position and velocity.

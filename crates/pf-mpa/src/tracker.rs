@@ -2,13 +2,13 @@
 
 use crate::Error;
 use crate::encoder::Encoder;
-use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::RangeSensor;
 use crate::target::{Manoeuvres, Target};
 use fewbits_core::{Gaussian, Observed};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::refuse;
 use nalgebra::Vector2;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -165,7 +165,7 @@ impl<T: GaussianTracker> Tracker for T {
         };
         let (next, info) = self.advance(rng, step, workspace)?;
         if !next.is_finite() {
-            return Err(Error::IMPOSSIBLE);
+            return Err(Error::Impossible);
         }
         *belief = next;
         Ok(info)

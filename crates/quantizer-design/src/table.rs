@@ -2,7 +2,7 @@
 
 use crate::compositions::rank;
 use crate::criterion::most_probable;
-use crate::error::{Error, at_most, refuse};
+use crate::error::{Error, refuse};
 use crate::law::Reports;
 use crate::observation_model::ObservationModel;
 use crate::system::System;
@@ -72,7 +72,7 @@ impl JointTable {
     /// [`Error::TooLarge`] beyond the system's outcome limit or 33 million entries.
     pub fn new(system: &System) -> Result<Self, Error> {
         let needed = system.outcomes().saturating_mul(system.model().values().len() as u64);
-        at_most("joint outcome table", needed, ENTRY_LIMIT)?;
+        Error::at_most("joint outcome table", needed, ENTRY_LIMIT)?;
         let reports = Reports::of(system)?;
         Ok(Self {
             layout: Layout::new(system),

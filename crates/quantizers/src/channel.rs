@@ -72,13 +72,7 @@ impl Channel {
             return refuse("rows", "empty", "at least one channel output");
         }
         let needed = (inputs as u64).saturating_mul(outputs as u64);
-        if needed > MAX_ENTRIES {
-            return Err(Error::TooLarge {
-                table: "transition matrix of a channel",
-                needed,
-                limit: MAX_ENTRIES,
-            });
-        }
+        Error::at_most("transition matrix of a channel", needed, MAX_ENTRIES)?;
         // Fill the table, then check that entries are probabilities and columns sum to one.
         let transition: Vec<f64> = (0..outputs)
             .flat_map(|t| (0..inputs).map(move |z| (t, z)))

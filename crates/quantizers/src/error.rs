@@ -1,4 +1,4 @@
-//! The error of this crate.
+//! The error of quantizers and their design.
 
 use fewbits_numerics::ArgumentError;
 
@@ -41,6 +41,54 @@ pub enum Error {
         /// Number of entries allowed.
         limit: u64,
     },
+    /// The noise of three sensors or more needs more than one shared factor.
+    #[error(
+        "unsupported correlation: the noise of these {sensors} sensors is not independent noise plus one shared factor"
+    )]
+    UnsupportedCorrelation {
+        /// Number of sensors.
+        sensors: usize,
+    },
+    /// A design drives a cell out of existence: fewer levels serve as well.
+    #[error(
+        "cell {cell} of quantizer {quantizer} vanishes (its probability falls to {probability:e}): design fewer levels"
+    )]
+    VanishingCell {
+        /// Which quantizer of the system.
+        quantizer: usize,
+        /// Which of its cells.
+        cell: usize,
+        /// Its probability when the design stopped.
+        probability: f64,
+    },
+    /// The best cells of a level are not one interval, and a contiguous quantizer was asked for.
+    #[error("the best cells are labelled {labels:?}: no contiguous quantizer is a fixed point here")]
+    NotContiguous {
+        /// Labels of the best cells from left to right.
+        labels: Vec<usize>,
+    },
+    /// Symbols arrived together that cannot do so under the model.
+    #[error("these symbols cannot be received together under the model: nothing follows from them")]
+    ImpossibleOutcome,
+}
+
+impl Error {
+    /// Refuses a table of more than `limit` entries.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`].
+    pub fn at_most(table: &'static str, needed: impl Into<u128>, limit: impl Into<u128>) -> Result<(), Self> {
+        let (needed, limit) = (needed.into(), limit.into());
+        if needed <= limit {
+            return Ok(());
+        }
+        let saturated = |number| u64::try_from(number).unwrap_or(u64::MAX);
+        Err(Self::TooLarge {
+            table,
+            needed: saturated(needed),
+            limit: saturated(limit),
+        })
+    }
 }
 
 pub(crate) use fewbits_numerics::error::refuse;
@@ -50,8 +98,12 @@ impl From<Error> for fewbits_core::Error {
     fn from(error: Error) -> Self {
         match error {
             Error::Argument(argument) => Self::Argument(argument),
-            Error::NotConverged { iterations, .. } => Self::NotConverged {
-                evaluations: iterations,
+            Error::NotConverged {
+                algorithm, iterations, ..
+            } => Self::NotConverged {
+                what: algorithm,
+                steps: iterations,
+                unit: "iterations",
             },
             Error::NotOptimal { cell, levels, .. } => ArgumentError::new(
                 "levels",
@@ -62,6 +114,8 @@ impl From<Error> for fewbits_core::Error {
             Error::TooLarge { table, needed, limit } => {
                 ArgumentError::new("table", format!("{table} of {needed} entries"), format!("at most {limit}")).into()
             }
+            Error::ImpossibleOutcome => Self::Impossible,
+            other => ArgumentError::new("design", other, "another setting").into(),
         }
     }
 }

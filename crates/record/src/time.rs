@@ -10,7 +10,7 @@
 //! The first kind that is within the tolerance is used. All arithmetic is exact in 128 bits.
 
 use crate::bound::Promise;
-use crate::codec::{self, CodecId, Target};
+use crate::codec::{self, CodecId, Context, Target};
 use crate::error::Damage;
 use crate::wire::{Bytes, push_varint, zigzag};
 use fewbits_adaptive::Effort;
@@ -157,7 +157,7 @@ fn coded_in(ticks: &[i64], grid: &Grid, scale: u64, unit: i128) -> Option<Vec<u8
         (number.abs() < 1 << 52).then_some(number as f64)
     });
     let numbers: Vec<f64> = numbers.collect::<Option<_>>()?;
-    let coded = codec::encode(&numbers, &INTEGERS, None, &[], Effort::Thorough);
+    let coded = codec::encode(&numbers, Context::alone(&INTEGERS), Effort::Thorough);
     if coded.broken > 0 || coded.bytes.len() >= 8 * ticks.len() {
         return None;
     }
@@ -192,7 +192,7 @@ pub(crate) fn decode(kind: TimeKind, bytes: &mut Bytes<'_>, rows: usize, grid: &
             let scale = i128::from(bytes.varint()?);
             let id = CodecId::from_byte(bytes.byte()?)?;
             let length = bytes.count(bytes.0.len(), "length of ticks")?;
-            let numbers = codec::decode(id, bytes.take(length)?, rows, &INTEGERS, None, &[])?;
+            let numbers = codec::decode(id, bytes.take(length)?, rows, Context::alone(&INTEGERS))?;
             let tick = |(row, number): (usize, f64)| {
                 // Whole numbers below 2^63, by saturation; the product stays below 2^127.
                 let ahead = (scale * i128::from(number as i64)).checked_add(mean * row as i128)?;

@@ -249,10 +249,7 @@ pub(crate) fn check_permutation(assignment: &[usize], size: usize) -> Result<(),
     if valid {
         Ok(())
     } else {
-        Err(Error::NotAPermutation {
-            given: assignment.to_vec(),
-            size,
-        })
+        refuse("assignment", format!("{assignment:?}"), format!("a permutation of 0..{size}"))
     }
 }
 
@@ -332,7 +329,7 @@ mod tests {
         assert!(CodedSensors::with_variances(1.0, &[0.1, 0.0]).is_err());
         let sensors = CodedSensors::with_variances(1.0, &[0.1, 0.2]).unwrap();
         for bad in [vec![0], vec![0, 0], vec![0, 2]] {
-            assert!(matches!(sensors.centre_mse(&bad), Err(Error::NotAPermutation { .. })));
+            assert!(matches!(sensors.centre_mse(&bad), Err(Error::Argument(e)) if e.name == "assignment"));
             assert!(sensors.mmse(&bad).is_err());
         }
     }

@@ -30,7 +30,6 @@ mod coded;
 mod cost;
 mod design;
 mod enumerate;
-mod error;
 mod linear;
 mod setup;
 
@@ -38,6 +37,6 @@ pub use coded::CodedSensors;
 pub use cost::{bit_error, flipped_estimate, pair_cost, pair_costs, quantization_error};
 pub use design::{BitCells, bit_cells, bit_per_sensor};
 pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, exchange};
-pub use error::Error;
+pub use fewbits_quantizer_design::Error;
 pub use linear::{CostMatrix, DualCertificate};
 pub use setup::{by_precision, variances_with_moments};

@@ -25,7 +25,8 @@ pub fn variances_with_moments(
     all_finite("direction", direction)?;
     let count = direction.len();
     if count == 0 || deviation > mean * (count as f64 - 1.0).sqrt() {
-        return Err(Error::InfeasibleVariances { mean, deviation, count });
+        let expected = format!("at most mean sqrt(count - 1), with mean {mean} over {count} sensors");
+        return refuse("deviation", deviation, expected);
     }
     if deviation == 0.0 {
         return Ok((mean >= least).then(|| vec![mean; count]));
@@ -71,7 +72,7 @@ mod tests {
     fn infeasible_moments_are_typed_errors() {
         assert!(matches!(
             variances_with_moments(0.03, 0.06, 1e-4, &[1.0, 2.0, 3.0, 4.0]),
-            Err(Error::InfeasibleVariances { .. })
+            Err(Error::Argument(e)) if e.name == "deviation"
         ));
         assert!(variances_with_moments(0.03, 0.01, 1e-4, &[1.0; 4]).is_err());
         assert!(variances_with_moments(-0.03, 0.01, 1e-4, &[1.0, 2.0]).is_err());

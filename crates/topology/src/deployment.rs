@@ -1,6 +1,6 @@
 //! Positions of sensors.
 
-use crate::Error;
+use crate::graph::no_such_node;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, finite, positive};
 use nalgebra::Vector2;
@@ -13,11 +13,11 @@ pub struct Deployment {
 }
 
 impl Deployment {
-    /// A deployment of the given positions, in metres.
+    /// The given positions.
     ///
     /// # Errors
-    /// If there is no position, or a coordinate is not finite.
-    pub fn given(positions: Vec<Vector2<f64>>) -> Result<Self, Error> {
+    /// If there is none, or a coordinate is not finite.
+    pub fn given(positions: Vec<Vector2<f64>>) -> Result<Self, ArgumentError> {
         at_least_one("positions", positions.len())?;
         for position in &positions {
             finite("positions", position.x)?;
@@ -35,17 +35,17 @@ impl Deployment {
         lower: [f64; 2],
         upper: [f64; 2],
         nodes: usize,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ArgumentError> {
         rectangle(lower, upper)?;
         at_least_one("nodes", nodes)?;
         Self::given((0..nodes).map(|_| draw(rng, lower, upper)).collect())
     }
 
-    /// A regular grid of `counts` nodes along x and y, the outermost on the border. If an axis has a single node, it is in the middle.
+    /// A regular grid with nodes on the border; `counts` nodes along x and y. A single node of an axis stands in the middle.
     ///
     /// # Errors
     /// If a count is zero or `upper` does not exceed `lower`.
-    pub fn grid(lower: [f64; 2], upper: [f64; 2], counts: [usize; 2]) -> Result<Self, Error> {
+    pub fn grid(lower: [f64; 2], upper: [f64; 2], counts: [usize; 2]) -> Result<Self, ArgumentError> {
         rectangle(lower, upper)?;
         at_least_one("counts", counts[0])?;
         at_least_one("counts", counts[1])?;
@@ -92,15 +92,15 @@ impl Deployment {
         best.1
     }
 
-    /// The same deployment with `node` moved to the position `to`.
+    /// The same deployment with one node elsewhere.
     ///
     /// # Errors
     /// If the node does not exist or the point is not finite.
-    pub fn with_moved(mut self, node: usize, to: Vector2<f64>) -> Result<Self, Error> {
+    pub fn with_moved(mut self, node: usize, to: Vector2<f64>) -> Result<Self, ArgumentError> {
         finite("to", to.x)?;
         finite("to", to.y)?;
         let nodes = self.len();
-        *self.positions.get_mut(node).ok_or(Error::NoSuchNode { node, nodes })? = to;
+        *self.positions.get_mut(node).ok_or_else(|| no_such_node(node, nodes))? = to;
         Ok(self)
     }
 }

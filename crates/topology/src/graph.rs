@@ -1,6 +1,5 @@
 //! The graph of nodes that are in range of each other.
 
-use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, refuse};
 use nalgebra::Vector2;
@@ -13,14 +12,14 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins nodes that are at most `range` apart. The nodes are sorted into the cells of a grid of that size.
+    /// Joins nodes that are at most `range` apart, by lists of the nodes in each cell of a grid of that size.
     ///
-    /// Time and memory are linear in nodes plus edges. If the field is much larger than the range times the root of the number of
-    /// nodes, the cells are larger, so that their number stays of the order of the number of nodes.
+    /// Time and memory are linear in nodes plus edges. A field that is far larger than the range times the root of the number of
+    /// nodes gets larger cells, so that their number stays of the order of the number of nodes.
     ///
     /// # Errors
     /// If a coordinate is not finite, `range` is not a positive number, or there are 2^32 nodes or more.
-    pub fn within(positions: &[Vector2<f64>], range: f64) -> Result<Self, Error> {
+    pub fn within(positions: &[Vector2<f64>], range: f64) -> Result<Self, ArgumentError> {
         positive("range", range)?;
         let count = u32::try_from(positions.len())
             .map_err(|_| ArgumentError::new("positions", positions.len(), "fewer than 2^32 nodes"))?;
@@ -63,7 +62,7 @@ impl Graph {
     ///
     /// # Errors
     /// If a node of a pair does not exist, or is joined to itself.
-    pub fn of_edges(nodes: usize, edges: impl IntoIterator<Item = (u32, u32)>) -> Result<Self, Error> {
+    pub fn of_edges(nodes: usize, edges: impl IntoIterator<Item = (u32, u32)>) -> Result<Self, ArgumentError> {
         let mut lists = vec![Vec::new(); nodes];
         for (a, b) in edges {
             if a == b {
@@ -71,7 +70,7 @@ impl Graph {
             }
             for (from, to) in [(a, b), (b, a)] {
                 let node = from as usize;
-                lists.get_mut(node).ok_or(Error::NoSuchNode { node, nodes })?.push(to);
+                lists.get_mut(node).ok_or_else(|| no_such_node(node, nodes))?.push(to);
             }
         }
         let (mut starts, mut neighbours) = (vec![0], Vec::new());
@@ -109,14 +108,18 @@ impl Graph {
 
     /// # Errors
     /// If `node` does not exist.
-    pub(crate) fn check(&self, node: usize) -> Result<(), Error> {
+    pub(crate) fn check(&self, node: usize) -> Result<(), ArgumentError> {
         let nodes = self.len();
         if node < nodes {
             Ok(())
         } else {
-            Err(Error::NoSuchNode { node, nodes })
+            Err(no_such_node(node, nodes))
         }
     }
+}
+
+pub(crate) fn no_such_node(node: usize, nodes: usize) -> ArgumentError {
+    ArgumentError::new("node", node, format!("an index below {nodes}, the number of nodes"))
 }
 
 /// Nodes sorted by the grid cell that contains them.

@@ -19,17 +19,15 @@
 //! assert_eq!(hops.distance(24), Some(8));
 //! assert_eq!(hops.route(24).map(|route| route.len()), Some(9));
 //! assert!(graph.components().is_connected());
-//! # Ok::<(), fewbits_topology::Error>(())
+//! # Ok::<(), fewbits_numerics::ArgumentError>(())
 //! ```
 //!
 //! Not here: time, energy and radio channels (`fewbits-network`).
 
 mod deployment;
-mod error;
 mod graph;
 mod search;
 
 pub use deployment::Deployment;
-pub use error::Error;
 pub use graph::Graph;
 pub use search::{Components, Hops};

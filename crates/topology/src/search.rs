@@ -1,6 +1,7 @@
 //! Distances in hops, routes, connected components.
 
-use crate::{Error, Graph};
+use crate::Graph;
+use fewbits_numerics::ArgumentError;
 
 const UNREACHED: u32 = u32::MAX;
 
@@ -83,7 +84,7 @@ impl Graph {
     ///
     /// # Errors
     /// If `root` does not exist.
-    pub fn hops_from(&self, root: usize) -> Result<Hops, Error> {
+    pub fn hops_from(&self, root: usize) -> Result<Hops, ArgumentError> {
         self.check(root)?;
         let mut hops = Hops {
             distances: vec![UNREACHED; self.len()],
@@ -154,7 +155,7 @@ impl Graph {
     ///
     /// # Errors
     /// If `root` does not exist.
-    pub fn nearest(&self, root: usize, wanted: impl Fn(usize) -> bool) -> Result<(Vec<usize>, usize), Error> {
+    pub fn nearest(&self, root: usize, wanted: impl Fn(usize) -> bool) -> Result<(Vec<usize>, usize), ArgumentError> {
         self.check(root)?;
         let mut seen = vec![false; self.len()];
         seen[root] = true;

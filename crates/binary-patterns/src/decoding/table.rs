@@ -1,6 +1,5 @@
 //! Estimates for every outcome of a bank, as a table.
 
-use crate::error::at_most;
 use crate::observation::source::Nodes;
 use crate::{Bank, Error};
 use fewbits_core::Observation;
@@ -89,7 +88,7 @@ impl LookupTable {
     /// If there are more than 24 sensors.
     pub fn expand(&self) -> Result<Vec<f64>, Error> {
         let sensors = self.bank.sensors();
-        at_most(2u128.saturating_pow(sensors as u32), 1 << MAX_TABLE_SENSORS)?;
+        Error::at_most("the table of outcomes", 2u128.saturating_pow(sensors as u32), 1u128 << MAX_TABLE_SENSORS)?;
         (0usize..1 << sensors)
             .map(|word| {
                 let bits: Vec<bool> = (0..sensors).rev().map(|at| word >> at & 1 == 1).collect();

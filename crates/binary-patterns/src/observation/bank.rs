@@ -1,6 +1,5 @@
 //! A source with its one-bit sensors, and the exact enumeration of their joint reports.
 
-use crate::error::at_most;
 use crate::observation::source::{Nodes, Threshold};
 use crate::{BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_numerics::binomial;
@@ -114,7 +113,7 @@ impl Bank {
 
     pub(crate) fn checked_outcomes(&self) -> Result<usize, Error> {
         let outcomes = self.outcomes();
-        at_most(outcomes, MAX_OUTCOMES)?;
+        Error::at_most("the table of outcomes", outcomes, MAX_OUTCOMES)?;
         Ok(outcomes as usize)
     }
 
@@ -295,6 +294,6 @@ mod tests {
             .map(|i| BinaryQuantizer::new(vec![f64::from(i)]).unwrap())
             .collect();
         let bank = Bank::homogeneous_with_deviation(source, distinct, 0.2).unwrap();
-        assert!(matches!(bank.checked_outcomes(), Err(Error::TooManyOutcomes { .. })));
+        assert!(matches!(bank.checked_outcomes(), Err(Error::TooLarge { .. })));
     }
 }

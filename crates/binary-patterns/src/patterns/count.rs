@@ -2,10 +2,12 @@
 
 use crate::Error;
 use crate::patterns::grid::bits_in_range;
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::binomial::exact as binomial;
+use fewbits_numerics::error::refuse;
 
 fn overflow(what: &'static str) -> Error {
-    Error::CountOverflow { what }
+    ArgumentError::new(what, "too large a number", "one below 2^128").into()
 }
 
 /// Number of multisets of `size` elements of `kinds` kinds: `C(kinds + size - 1, size)`.
@@ -56,11 +58,7 @@ pub fn printed_pattern_sets(bits: usize, sensors: usize) -> Result<u128, Error> 
 fn enough_sensors(bits: usize, sensors: usize) -> Result<(), Error> {
     let bits = bits_in_range(bits)?;
     if sensors < bits {
-        return Err(Error::RankDeficient {
-            sensors,
-            rank: sensors,
-            expected: bits,
-        });
+        return refuse("sensors", sensors, format!("at least {bits}, the rank of the masks"));
     }
     Ok(())
 }
@@ -211,9 +209,9 @@ mod tests {
 
     #[test]
     fn overflow_and_bad_arguments_are_errors() {
-        assert!(matches!(bijective_labelings(8), Err(Error::CountOverflow { .. })));
-        assert!(matches!(unordered_bases(16), Err(Error::CountOverflow { .. })));
-        assert!(matches!(full_rank_multisets(3, 2), Err(Error::RankDeficient { .. })));
+        assert!(matches!(bijective_labelings(8), Err(Error::Argument(e)) if e.expected == "one below 2^128"));
+        assert!(matches!(unordered_bases(16), Err(Error::Argument(e)) if e.expected == "one below 2^128"));
+        assert!(matches!(full_rank_multisets(3, 2), Err(Error::Argument(e)) if e.name == "sensors"));
         assert!(unordered_bases(0).is_err());
         assert!(unordered_bases(17).is_err());
         assert!(multisets(u128::MAX, 2).is_err());

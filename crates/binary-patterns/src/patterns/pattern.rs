@@ -32,7 +32,7 @@ impl Pattern {
     /// If all bits are equal (or there are none).
     pub fn new(mut bits: Vec<bool>) -> Result<Self, Error> {
         if bits.iter().all(|&b| b == bits[0]) {
-            return Err(Error::ConstantPattern { cells: bits.len() });
+            return refuse("bits", format!("the same in all {} cells", bits.len()), "at least one 0 and one 1");
         }
         if bits[0] {
             bits.iter_mut().for_each(|b| *b = !*b);
@@ -56,10 +56,7 @@ impl Pattern {
     /// If the number of bits is not the number of cells of the grid.
     pub fn on(&self, grid: &CellGrid) -> Result<BinaryQuantizer, Error> {
         if self.cells() != grid.cells() {
-            return Err(Error::PatternLength {
-                pattern: self.cells(),
-                grid: grid.cells(),
-            });
+            return refuse("grid", format!("of {} cells", grid.cells()), format!("{}, one a bit", self.cells()));
         }
         let thresholds = self
             .bits
@@ -146,16 +143,13 @@ impl FromStr for Pattern {
 /// (erratum `binary-3`), so the columns themselves are compared.
 ///
 /// # Errors
-/// [`Error::NotSeparating`] names the first two cells that no pattern separates; [`Error::PatternLength`] if lengths differ.
+/// Names the first two cells that no pattern separates; if lengths differ.
 pub fn check_separation(patterns: &[Pattern]) -> Result<(), Error> {
     let Some(first) = patterns.first() else {
-        return Err(Error::NotSeparating { first: 0, second: 1 });
+        return refuse("patterns", "empty", "patterns that separate all cells");
     };
     if let Some(odd) = patterns.iter().find(|p| p.cells() != first.cells()) {
-        return Err(Error::PatternLength {
-            pattern: odd.cells(),
-            grid: first.cells(),
-        });
+        return refuse("patterns", format!("of {} and {} cells", first.cells(), odd.cells()), "as many cells in each");
     }
     let mut columns: Vec<(Vec<bool>, usize)> = (0..first.cells())
         .map(|cell| (patterns.iter().map(|p| p.bits[cell]).collect(), cell))
@@ -164,10 +158,10 @@ pub fn check_separation(patterns: &[Pattern]) -> Result<(), Error> {
     columns.sort();
     match columns.windows(2).find(|w| w[0].0 == w[1].0) {
         None => Ok(()),
-        Some(w) => Err(Error::NotSeparating {
-            first: w[0].1,
-            second: w[1].1,
-        }),
+        Some(w) => {
+            let alike = format!("the same in cells {} and {}", w[0].1, w[1].1);
+            refuse("patterns", alike, "patterns that separate all cells")
+        }
     }
 }
 
@@ -182,7 +176,7 @@ mod tests {
     #[test]
     fn complements_are_one_pattern() {
         assert_eq!(pattern("1001"), pattern("0110"));
-        assert!(matches!("0000".parse::<Pattern>(), Err(Error::ConstantPattern { cells: 4 })));
+        assert!(matches!("0000".parse::<Pattern>(), Err(Error::Argument(e)) if e.value.contains("all 4 cells")));
         assert!("".parse::<Pattern>().is_err());
         assert!("01x0".parse::<Pattern>().is_err());
     }
@@ -191,7 +185,8 @@ mod tests {
     fn runs_merge_into_thresholds() {
         let grid = CellGrid::uniform(1.0, 2).unwrap();
         assert_eq!(pattern("0110").on(&grid).unwrap().breakpoints(), [-0.5, 0.5]);
-        assert_eq!(pattern("01100110").on(&grid), Err(Error::PatternLength { pattern: 8, grid: 4 }));
+        let long = pattern("01100110").on(&grid);
+        assert!(matches!(long, Err(Error::Argument(e)) if e.value == "of 4 cells" && e.expected == "8, one a bit"));
     }
 
     #[test]
@@ -206,7 +201,9 @@ mod tests {
     fn independent_patterns_need_not_separate() {
         // Independent over GF(2), yet cells 5 and 6 carry the same column.
         let patterns = [pattern("00001111"), pattern("00110000"), pattern("01000000")];
-        assert!(matches!(check_separation(&patterns), Err(Error::NotSeparating { .. })));
+        assert!(
+            matches!(check_separation(&patterns), Err(Error::Argument(e)) if e.value == "the same in cells 5 and 6")
+        );
         let natural = [pattern("00001111"), pattern("00110011"), pattern("01010101")];
         assert_eq!(check_separation(&natural), Ok(()));
         assert!(check_separation(&[]).is_err());

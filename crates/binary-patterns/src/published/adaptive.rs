@@ -3,7 +3,6 @@
 use crate::Error;
 use crate::Source;
 use crate::decoding::decoder::{moments, squared_error};
-use crate::error::at_most;
 use crate::observation::bank::IMPOSSIBLE;
 use crate::observation::source::Nodes;
 use fewbits_numerics::error::{all_finite, at_least_one, positive, refuse};
@@ -66,7 +65,7 @@ pub fn adaptive(
 ) -> Result<AdaptiveErrors, Error> {
     let noise_deviation = source.resolvable(noise_deviation)?;
     at_least_one("sensors", sensors)?;
-    at_most(2u128.saturating_pow(sensors as u32), 1 << MAX_SENSORS)?;
+    Error::at_most("the table of outcomes", 2u128.saturating_pow(sensors as u32), 1u128 << MAX_SENSORS)?;
     let mut step = 0.0;
     if let AdaptiveRule::VariableStep { step: first, factor } = rule {
         step = positive("step", first)?;

@@ -2,7 +2,6 @@
 
 use super::outcomes::{Candidates, Outcomes};
 use crate::Error;
-use crate::error::at_most;
 use crate::observation::bank::{CountTable, MAX_OUTCOMES};
 use crate::{Bank, BinaryQuantizer, CellGrid, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
@@ -236,7 +235,7 @@ impl<'a> Kernel<'a> {
             }
         }
         let outcomes = groups.iter().fold(1u128, |o, g| o.saturating_mul(g.2 as u128 + 1));
-        at_most(outcomes, MAX_OUTCOMES)?;
+        Error::at_most("the table of outcomes", outcomes, MAX_OUTCOMES)?;
         let mut others = Outcomes::new(&self.candidates.nodes.w);
         for (class, c, count) in groups {
             let table = CountTable::from_probabilities(&self.p[class][c], count);

@@ -131,7 +131,7 @@ impl<const D: usize> JointBelief<D> {
         let (h, own) = (sensor.matrix(), i + 1);
         let rows = self.rows(h, 0);
         let covariance = symmetrised(&(&rows * rows.transpose() + sensor.noise_covariance()));
-        let factor = Cholesky::new(covariance).ok_or(Error::IMPOSSIBLE)?;
+        let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
         let innovation = value - h * self.block_mean(0);
         let gains = (factor.solve(&(&rows * self.root.transpose()))).transpose();
         let noise = semidefinite_factor("noise_covariance", sensor.noise_covariance())?;
@@ -187,7 +187,7 @@ impl<const D: usize> JointBelief<D> {
         // The innovation of the sensor is a linear function of the joint state, plus noise.
         let rows = self.rows(h, 0) - self.rows(h, own);
         let covariance = symmetrised(&(&rows * rows.transpose() + sensor.noise_covariance()));
-        let factor = Cholesky::new(covariance).ok_or(Error::IMPOSSIBLE)?;
+        let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
         let mu = h * (self.block_mean(0) - self.block_mean(own));
         let after = after(&mu, &covariance)?;
         let mut gains: Gains<M> = (factor.solve(&(&rows * self.root.transpose()))).transpose();
@@ -246,13 +246,13 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
             Observation::Received(_) => continue,
         };
         info.log_likelihood +=
-            next.withhold(sensor, step, i, |mu, covariance| Ok(missing.innovation_moments(rule, mu, covariance)?))?;
+            next.withhold(sensor, step, i, |mu, covariance| missing.innovation_moments(rule, mu, covariance))?;
     }
     next.shorten();
     let mut numbers = next.mean.iter().chain(next.root.iter());
     if !(info.log_likelihood.is_finite() && numbers.all(|x| x.is_finite())) {
         let what = "the joint belief (from the models or the reports)";
-        return Err(fewbits_core::Error::unlikely_or_no_number(info.log_likelihood, what).into());
+        return Err(Error::unlikely_or_no_number(info.log_likelihood, what));
     }
     Ok((next, info))
 }

@@ -71,7 +71,7 @@ impl<const D: usize> ImputedBelief<D> {
 /// reports, a measurement that did not arrive has the distribution `N(z) (loss + (1 - loss) 1{inside})`.
 ///
 /// # Errors
-/// [`Error::ObservationCount`]; if a value is not finite; [`fewbits_core::Error::Impossible`].
+/// If there is not one observation per sensor, or a value is not finite; [`Error::Impossible`].
 pub fn step<S, R, const D: usize, const M: usize>(
     rng: &mut R,
     network: &Network<S, D, M>,

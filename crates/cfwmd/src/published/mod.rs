@@ -15,7 +15,7 @@ use nalgebra::SVector;
 /// values.
 ///
 /// # Errors
-/// [`Error::ObservationCount`]; if a value is not finite.
+/// If there is not one observation per sensor, or a value is not finite.
 pub fn fuse_received<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
     network: &Network<S, D, M>,
     predicted: &Gaussian<D>,

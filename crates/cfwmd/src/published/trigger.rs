@@ -112,13 +112,14 @@ impl Factor<1> for Bump {
         });
     }
 
-    /// Silence: a mixture of the prior (weight of the floor) and the Kalman update. A known loss: the prior minus the Kalman update.
-    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, fewbits_core::Error> {
+    /// Silence: the mixture of the prior, by the weight of the floor, and of the Kalman update. A known loss: what that update
+    /// leaves of the prior.
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         let inside = self.value.tilted(prior)?;
         let log_inside = self.log_share + inside.log_evidence;
         let log_evidence = self.mixed(log_inside);
         if log_evidence == f64::NEG_INFINITY {
-            return Err(fewbits_core::Error::Impossible);
+            return Err(Error::Impossible);
         }
         let step = inside.mean - prior.mean();
         if let Kind::Below { .. } = self.kind {
@@ -130,7 +131,7 @@ impl Factor<1> for Bump {
             let second = (removed - w * step[0] * step[0]) / left + after;
             let (mean, spread) = (prior.mean()[0] + shift[0], second - shift[0] * shift[0]);
             if !(mean.is_finite() && spread.is_finite()) {
-                return Err(fewbits_core::Error::NotANumber {
+                return Err(Error::NotANumber {
                     what: "the posterior of a known loss",
                 });
             }
@@ -147,7 +148,7 @@ impl Factor<1> for Bump {
         let mean = prior.mean() + step * weight;
         let spread = (prior.covariance() + step * step * weight) * (1.0 - weight) + inside.covariance * weight;
         if !(log_evidence.is_finite() && mean[0].is_finite() && spread[0].is_finite()) {
-            return Err(fewbits_core::Error::NotANumber {
+            return Err(Error::NotANumber {
                 what: "the posterior of a silence",
             });
         }
@@ -182,7 +183,7 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
         (): &mut (),
         measurement: &SVector<f64, 1>,
         broadcast: &SVector<f64, D>,
-    ) -> Result<Option<f64>, fewbits_core::Error> {
+    ) -> Result<Option<f64>, Error> {
         let (z, prediction) = (measurement[0], self.sensing.mean(broadcast)[0]);
         let speaks = fewbits_node::trigger::speaks(z, prediction, self.trigger.precision, rng.random());
         Ok(speaks.map_err(ArgumentError::from)?.then_some(z))
@@ -190,12 +191,7 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
 
     /// Silence: `s(m) = E exp(-(m + n - prediction)^2 Y/2) = sqrt(2 pi/Y) N(prediction; m, r + 1/Y)`. A known loss:
     /// `1 - s(m)`.
-    fn factor(
-        &self,
-        broadcast: &SVector<f64, D>,
-        observation: &Observation<f64>,
-        link: &Link,
-    ) -> Result<Bump, fewbits_core::Error> {
+    fn factor(&self, broadcast: &SVector<f64, D>, observation: &Observation<f64>, link: &Link) -> Result<Bump, Error> {
         let (prediction, r) = (self.sensing.mean(broadcast)[0], self.sensing.noise_covariance_at(broadcast)[0]);
         finite("prediction", prediction)?;
         let y = self.trigger.precision;

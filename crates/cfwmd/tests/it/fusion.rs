@@ -293,15 +293,10 @@ fn bad_steps_are_typed_errors_and_leave_the_belief() {
     let fuse =
         |observations: &[Observation<SVector<f64, 1>>]| network.fuse(&belief, &rules, belief.mean(), observations);
     let value = |z: f64| Observation::Received(Vector1::new(z));
-    assert_eq!(
-        fuse(&[Observation::Nothing]).unwrap_err(),
-        Error::ObservationCount {
-            observations: 1,
-            sensors: 2
-        }
-    );
-    assert!(matches!(fuse(&[value(1.1), value(9.0)]).unwrap_err(), Error::ProtocolViolation { sensor: 0, .. }));
-    assert!(matches!(fuse(&[value(9.0), value(f64::NAN)]).unwrap_err(), Error::Argument(_)));
+    let refused = |observations: &[_], name, value| matches!(fuse(observations), Err(Error::Argument(e)) if e.name == name && e.value.contains(value));
+    assert!(refused(&[Observation::Nothing], "observations", "1 entries"));
+    assert!(refused(&[value(1.1), value(9.0)], "report", "sensor 0"));
+    assert!(refused(&[value(9.0), value(f64::NAN)], "value", "NaN"));
     assert!(fuse(&[Observation::Nothing, Observation::Nothing]).is_ok());
     // What was sent and lost was large.
     let lost = fuse(&[Observation::Lost, Observation::Lost]).unwrap().0;
@@ -310,7 +305,7 @@ fn bad_steps_are_typed_errors_and_leave_the_belief() {
     let always = Network::new(network.sensors().to_vec(), 0.0, Link::PERFECT).unwrap();
     let rules = always.rules_under(&belief).unwrap();
     let silent = always.fuse(&belief, &rules, belief.mean(), &[value(1.0), Observation::Nothing]);
-    assert_eq!(silent.unwrap_err(), Error::IMPOSSIBLE);
+    assert_eq!(silent.unwrap_err(), Error::Impossible);
     assert!(
         always
             .fuse(&belief, &rules[..1], belief.mean(), &[value(1.0), value(2.0)])

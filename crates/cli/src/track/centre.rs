@@ -3,7 +3,7 @@
 use super::rows::Instant;
 use super::sensors::{Sends, threshold_bits};
 use crate::arguments::Model;
-use fewbits_core::{Error as CoreError, Gaussian, Link, Observation, SensorNode};
+use fewbits_core::{Gaussian, Link, Observation, SensorNode};
 use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, Slot};
 use fewbits_filters::{Error as FilterError, MomentFilter};
 use fewbits_models::ContinuousLinear;
@@ -227,8 +227,8 @@ impl<const D: usize> Estimator for Centre<D> {
                 });
                 (events.collect(), received.info.log_likelihood)
             }
-            // The reports have probability zero under the model: they are dropped.
-            Err(FilterError::Core(CoreError::Impossible)) => (vec![("impossible", None)], f64::NEG_INFINITY),
+            // Nothing that is known explains the reports: they are dropped.
+            Err(FilterError::Impossible) => (vec![("impossible", None)], f64::NEG_INFINITY),
             Err(error) => return Err(error.into()),
         };
         let belief = self.centre.estimate();

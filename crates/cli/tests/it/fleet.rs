@@ -1,20 +1,10 @@
 //! A centre and its sensors as processes.
 
+use super::start;
 use std::io::Write;
 use std::net::UdpSocket;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
-
-fn start(folder: &Path, words: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_fewbits"))
-        .args(words)
-        .current_dir(folder)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
-}
+use std::process::Output;
 
 fn key(digit: char) -> String {
     digit.to_string().repeat(64)
@@ -108,10 +98,10 @@ fn fleet_meets_at_a_broker() {
     let folder = tempfile::tempdir().unwrap();
     let settings = format!("listener {port} 127.0.0.1\nallow_anonymous true\nset_tcp_nodelay true\n");
     std::fs::write(folder.path().join("broker.conf"), settings).unwrap();
-    let mut command = Command::new("mosquitto");
+    let mut command = std::process::Command::new("mosquitto");
     let command = command.args(["-c", "broker.conf"]).current_dir(&folder);
-    let command = command.env("PATH", path).stdout(Stdio::null());
-    let Ok(mut broker) = command.stderr(Stdio::null()).spawn() else {
+    let command = command.env("PATH", path).stdout(std::process::Stdio::null());
+    let Ok(mut broker) = command.stderr(std::process::Stdio::null()).spawn() else {
         println!("skipped: mosquitto is not installed");
         return;
     };

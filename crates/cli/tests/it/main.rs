@@ -10,19 +10,24 @@ mod track;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use tempfile::TempDir;
 
-/// Runs the command in a folder.
-fn fewbits(folder: &Path, words: &[&str], input: &[u8]) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_fewbits"))
+/// Starts the command in a folder.
+fn start(folder: &Path, words: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_fewbits"))
         .args(words)
         .current_dir(folder)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .unwrap();
+        .unwrap()
+}
+
+/// Runs the command in a folder.
+fn fewbits(folder: &Path, words: &[&str], input: &[u8]) -> Output {
+    let mut child = start(folder, words);
     let mut stdin = child.stdin.take().unwrap();
     let input = input.to_vec();
     let feeder = std::thread::spawn(move || {
@@ -318,12 +323,7 @@ fn sent_stream_is_received() {
 #[test]
 fn datagrams_are_received() {
     let (_kept, folder) = folder();
-    let mut receiver = Command::new(env!("CARGO_BIN_EXE_fewbits"))
-        .args(["receive", "--udp", "127.0.0.1:0", "--timeout", "4s"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut receiver = start(&folder, &["receive", "--udp", "127.0.0.1:0", "--timeout", "4s"]);
     let mut line = String::new();
     let mut stderr = BufReader::new(receiver.stderr.take().unwrap());
     stderr.read_line(&mut line).unwrap();
@@ -360,13 +360,7 @@ fn serial_line_is_received() {
     {
         return;
     }
-    let receiver = Command::new(env!("CARGO_BIN_EXE_fewbits"))
-        .args(["receive", "--serial", "line", "--timeout", "2s"])
-        .current_dir(&folder)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let receiver = start(&folder, &["receive", "--serial", "line", "--timeout", "2s"]);
     let mut noise = std::fs::OpenOptions::new()
         .write(true)
         .open(folder.join("line"))

@@ -307,7 +307,9 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         while let Some((a, b, error_before)) = panels.pop() {
             if self.evaluations > MOST {
                 return Err(Error::NotConverged {
-                    evaluations: self.evaluations,
+                    what: "the moments of the posterior",
+                    steps: self.evaluations,
+                    unit: "evaluations of the likelihood",
                 });
             }
             let (coarse, fine) = self.panel(a, b, mode, peak);

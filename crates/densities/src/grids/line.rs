@@ -47,11 +47,11 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64], volume: f64) -> Result<f
     let sum = logs.iter().zip(&*density).map(product).sum::<f64>();
     let no_number = logs.iter().zip(&*density).any(|(l, p)| *p > 0.0 && l.is_nan());
     if no_number || peak == f64::INFINITY {
-        return Err(fewbits_core::Error::NotANumber { what: "the likelihood" }.into());
+        return Err(Error::NotANumber { what: "the likelihood" });
     }
     // If all logarithms are `-inf`, the sum is NaN.
     if !(sum > 0.0 && sum.is_finite()) {
-        return Err(fewbits_core::Error::Impossible.into());
+        return Err(Error::Impossible);
     }
     for (p, l) in density.iter_mut().zip(logs) {
         *p = product((l, p)) / sum / volume;
@@ -63,7 +63,7 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64], volume: f64) -> Result<f
 pub(crate) fn normalise(density: &mut [f64], volume: f64) -> Result<(), Error> {
     let total = density.iter().sum::<f64>() * volume;
     if !(total > 0.0 && total.is_finite()) {
-        return Err(fewbits_core::Error::Impossible.into());
+        return Err(Error::Impossible);
     }
     density.iter_mut().for_each(|p| *p /= total);
     Ok(())
@@ -151,10 +151,10 @@ impl PointMass {
         let sum: f64 = self.density.iter().zip(likelihood).map(|(p, l)| p * l).sum();
         let evidence = sum * self.grid.spacing();
         if !evidence.is_finite() {
-            return Err(fewbits_core::Error::NotANumber { what: "the likelihood" }.into());
+            return Err(Error::NotANumber { what: "the likelihood" });
         }
         if evidence <= 0.0 {
-            return Err(fewbits_core::Error::Impossible.into());
+            return Err(Error::Impossible);
         }
         for (p, l) in self.density.iter_mut().zip(likelihood) {
             *p *= l / evidence;

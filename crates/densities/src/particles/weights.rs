@@ -69,9 +69,9 @@ pub(crate) fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut 
 /// `weights` is unchanged.
 pub(crate) fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
     let what = "a log weight";
-    let largest = largest_number(logs).ok_or(fewbits_core::Error::NotANumber { what })?;
+    let largest = largest_number(logs).ok_or(Error::NotANumber { what })?;
     if !largest.is_finite() {
-        return Err(fewbits_core::Error::unlikely_or_no_number(largest, what).into());
+        return Err(Error::unlikely_or_no_number(largest, what));
     }
     let sums = exp_minus(logs, largest, weights);
     let log_sum = largest + sums.sum.ln();

@@ -1,6 +1,6 @@
 //! Grids on a line against closed forms of normals.
 
-use fewbits_core::{Density, Error as CoreError, Gaussian, Likelihood};
+use fewbits_core::{Density, Gaussian, Likelihood};
 use fewbits_densities::{Error, PointMass, UniformGrid};
 use nalgebra::{SVector, Vector1};
 use std::f64::consts::TAU;
@@ -132,11 +132,11 @@ fn on_a_line_bayes_rule_is_kalmans() {
 
 #[test]
 fn what_is_impossible_leaves_a_density_behind() {
-    let impossible = |result: Result<f64, Error>| matches!(result, Err(Error::Core(CoreError::Impossible)));
+    let impossible = |result: Result<f64, Error>| matches!(result, Err(Error::Impossible));
     let grid = UniformGrid::new(0.0, 2.0, 0.5).unwrap();
     let mut belief = PointMass::new(grid, |x| -x).unwrap();
     let before = belief.clone();
-    let no_number = |result: Result<f64, Error>| matches!(result, Err(Error::Core(CoreError::NotANumber { .. })));
+    let no_number = |result: Result<f64, Error>| matches!(result, Err(Error::NotANumber { .. }));
     assert!(impossible(belief.update_with(|_| f64::NEG_INFINITY)) && no_number(belief.update_with(|_| f64::NAN)));
     assert!(impossible(belief.reweight(&[0.0; 5])) && no_number(belief.reweight(&[f64::INFINITY; 5])));
     assert!(belief.reweight(&[1.0; 4]).is_err());

@@ -1,6 +1,5 @@
 //! Particles against sums written out by hand.
 
-use fewbits_core::Error as CoreError;
 use fewbits_densities::{Error, Particles};
 use proptest::prelude::*;
 
@@ -18,7 +17,7 @@ proptest! {
         let total: f64 = logs.iter().map(|l| l.exp()).sum();
         let belief = Particles::new([x.clone(), y.clone()], &logs);
         if total == 0.0 {
-            prop_assert!(matches!(belief, Err(Error::Core(CoreError::Impossible))), "{belief:?}");
+            prop_assert!(matches!(belief, Err(Error::Impossible)), "{belief:?}");
             return Ok(());
         }
         let mut belief = belief.unwrap();
@@ -60,9 +59,9 @@ fn a_failed_reweighing_keeps_the_belief() {
     for bad in [[f64::NEG_INFINITY; 2], [f64::NAN, 0.0], [f64::INFINITY, 0.0]] {
         let result = belief.reweigh(|_, log_weights| log_weights.copy_from_slice(&bad));
         let expected = if bad[0] == f64::NEG_INFINITY {
-            matches!(result, Err(Error::Core(CoreError::Impossible)))
+            matches!(result, Err(Error::Impossible))
         } else {
-            matches!(result, Err(Error::Core(CoreError::NotANumber { .. })))
+            matches!(result, Err(Error::NotANumber { .. }))
         };
         assert!(expected, "{bad:?}: {result:?}");
         assert_eq!(belief, before);

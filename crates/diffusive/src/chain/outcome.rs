@@ -86,7 +86,7 @@ impl Outcome {
 /// The status for an error of a belief that ends the search; `None` for other errors.
 pub(super) fn failure(error: &Error) -> Option<Status> {
     match error {
-        Error::Core(fewbits_core::Error::Impossible) => Some(Status::BeliefMiss),
+        Error::Impossible => Some(Status::BeliefMiss),
         Error::Unresolved { .. } => Some(Status::Unresolved),
         Error::Argument(_) => Some(Status::BeliefMiss),
         _ => None,

@@ -78,11 +78,19 @@ pub struct Cells<const D: usize> {
     places: OnceLock<HashMap<[i64; D], usize>>,
 }
 
+fn too_many(cells: usize) -> Error {
+    Error::Unresolved {
+        value: cells as f64,
+        unit: "cells needed",
+        expected: "at most `most_cells`",
+    }
+}
+
 impl<const D: usize> Cells<D> {
     /// Covers the box between two corners with `per_axis` cells along its longest side, and refines.
     ///
     /// # Errors
-    /// If the box is empty or `per_axis` is zero; [`fewbits_core::Error::Impossible`] if the density is zero at every centre or a value is NaN;
+    /// If the box is empty or `per_axis` is zero; [`Error::Impossible`] if the density is zero at every centre or a value is NaN;
     /// [`Error::Unresolved`] if the density needs more cells than allowed.
     pub fn cover(
         target: &impl CellTarget<D>,
@@ -114,7 +122,7 @@ impl<const D: usize> Cells<D> {
             evaluations += count;
             let (best, best_score) = (largest(&logs), largest(&scores));
             if !best_score.is_finite() || logs.iter().chain(&scores).any(|x| x.is_nan()) {
-                return Err(fewbits_core::Error::Impossible.into());
+                return Err(Error::Impossible);
             }
             if best.is_finite() {
                 weights.clear();
@@ -156,15 +164,13 @@ impl<const D: usize> Cells<D> {
             // Count before allocating: a density that is too thin is refused without using the memory.
             let kept = scores.iter().filter(|score| **score > threshold).count();
             if kept << D > options.most_cells {
-                return Err(Error::Unresolved { cells: kept << D });
+                return Err(too_many(kept << D));
             }
             let kept = (0..scores.len()).filter(|i| scores[*i] > threshold);
             centres = split(&centres, kept, 0.25 * width);
             width *= 0.5;
         }
-        Err(Error::Unresolved {
-            cells: centres[0].len(),
-        })
+        Err(too_many(centres[0].len()))
     }
 
     /// Centres of the cells: one column per coordinate.

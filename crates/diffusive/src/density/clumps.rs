@@ -58,7 +58,7 @@ impl<const D: usize> Clumps<D> {
             }
         }
         if order.is_empty() {
-            return Err(fewbits_core::Error::Impossible.into());
+            return Err(Error::Impossible);
         }
         let mut cloud = Cloud {
             columns,

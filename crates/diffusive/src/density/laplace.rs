@@ -49,7 +49,7 @@ impl<const D: usize> Peak<D> {
         let mut x = *start;
         let mut height = log_density(&x);
         if !height.is_finite() {
-            return Err(fewbits_core::Error::Impossible.into());
+            return Err(Error::Impossible);
         }
         let mut extent = *scale;
         for _ in 0..STEPS {

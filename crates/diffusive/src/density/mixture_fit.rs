@@ -77,7 +77,7 @@ impl<const D: usize> Clumps<D> {
                     let parts = fitted
                         .into_iter()
                         .map(|c| Component::new(c.weight, c.mean, c.covariance));
-                    return Ok(Mixture::new(parts.collect::<Result<_, _>>()?)?);
+                    return Mixture::new(parts.collect::<Result<_, _>>()?);
                 }
             }
         }

@@ -74,7 +74,7 @@ impl ErrorChain {
             let expected = "enough process noise for a grid of at most 40000 points";
             return Err(ArgumentError::new("process_variance", plant.process_variance(), expected).into());
         }
-        Ok(UniformGrid::symmetric(half_width, spacing)?)
+        UniformGrid::symmetric(half_width, spacing)
     }
 
     /// The chain after one prediction from a normal filtered error of variance `filtered_variance`.
@@ -240,7 +240,8 @@ impl ErrorChain {
         }
         Err(Error::NotConverged {
             what: "the error chain",
-            iterations: most_steps,
+            steps: most_steps,
+            unit: "iterations",
         })
     }
 

@@ -43,7 +43,7 @@ pub use state::CentreState;
 
 use crate::Error;
 use crate::contract::{Evolving, StateFilter};
-use fewbits_core::{Belief, BitString, Gaussian, Observation};
+use fewbits_core::{ArgumentError, Belief, BitString, Gaussian, Observation};
 use fewbits_numerics::error::{finite, non_negative, refuse};
 use rand::Rng;
 use state::{Checkpoint, MemberState};
@@ -277,7 +277,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
 
     fn seated(&self, number: u32, guess: usize) -> Result<usize, Error> {
         let seated = self.members.len();
-        let unknown = |_| Error::UnknownSensor { sensor: number, seated };
+        let expected = format!("one of the {seated} sensors that have joined");
+        let unknown = |_| ArgumentError::new("number", number, expected).into();
         self.seat(number, guess).map_err(unknown)
     }
 

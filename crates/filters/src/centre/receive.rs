@@ -125,7 +125,7 @@ impl<const D: usize> Member<D> {
     fn evidence(&self, slot: &Slot, working: f64, belief: &Gaussian<D>) -> Result<Option<Evidence>, Error> {
         match self.sensor.evidence(slot, working, belief) {
             Ok(found) => Ok(Some(found)),
-            Err(Error::Core(fewbits_core::Error::Impossible)) => Ok(None),
+            Err(Error::Impossible) => Ok(None),
             Err(error) => Err(error),
         }
     }

@@ -193,7 +193,7 @@ impl GridFilter {
         let mean = predicted.mean() + gain * (prior.lower * posterior.mean);
         let updated = Gaussian::from_trusted_parts(mean, congruence(&keep, predicted.covariance()) + moved);
         if !updated.is_finite() {
-            return Err(Error::IMPOSSIBLE);
+            return Err(Error::Impossible);
         }
         Ok((updated, info))
     }
@@ -240,7 +240,7 @@ impl GridFilter {
             .iter()
             .fold(f64::NEG_INFINITY, |peak, piece| peak.max(piece.log_evidence));
         if peak == f64::NEG_INFINITY {
-            return Err(Error::IMPOSSIBLE);
+            return Err(Error::Impossible);
         }
         // Moments of the mixture of all parts, each weighted by its evidence.
         let shares = || {
@@ -271,7 +271,9 @@ impl GridFilter {
 
 fn unresolved<const K: usize>(found: &pass::Found<K>) -> Error {
     Error::Unresolved {
-        nodes_per_deviation: found.nodes_per_deviation(),
+        value: found.nodes_per_deviation(),
+        unit: "nodes per deviation",
+        expected: "at least 1.5",
     }
 }
 

@@ -130,7 +130,7 @@ where
     let [fine, never] = [1.0, 0.0].map(|p| Observed::new(sensor, Scalar::from(Constant::new(p).unwrap())));
     let mut belief = before.clone();
     let found = filter.update(&mut rng, &mut belief, &[&fine, &never]);
-    assert!(matches!(found, Err(Error::Core(CoreError::Impossible))), "{found:?}");
+    assert!(matches!(found, Err(Error::Impossible)), "{found:?}");
     assert_eq!(belief, before);
     let info = filter.update(&mut rng, &mut belief, &[]).unwrap();
     assert!(info.log_likelihood.abs() < 1e-12);

@@ -1,7 +1,7 @@
 //! Law of every filter: what is impossible is an error of one name, and leaves the belief as it was, to the last bit.
 
 use fewbits_core::factor::{Constant, InCell, Scalar};
-use fewbits_core::{Cell, Error as CoreError, Gaussian, Likelihood, Observed};
+use fewbits_core::{Cell, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
     CloudWorkspace, Error, GaussianCloud, ParticleFilter, Particles, PointMass, PointMassFilter, RaoBlackwellised,
     Resampling, Schedule, UniformGrid, Workspace, assumed_density,
@@ -12,12 +12,12 @@ use nalgebra::{Matrix2, SVector, Vector1, Vector2};
 
 fn impossible<T: std::fmt::Debug>(result: Result<T, impl Into<Error>>) {
     let error = result.map_err(Into::into);
-    assert!(matches!(error, Err(Error::Core(CoreError::Impossible))), "{error:?}");
+    assert!(matches!(error, Err(Error::Impossible)), "{error:?}");
 }
 
 fn no_number<T: std::fmt::Debug>(result: Result<T, impl Into<Error>>) {
     let error = result.map_err(Into::into);
-    assert!(matches!(error, Err(Error::Core(CoreError::NotANumber { .. }))), "{error:?}");
+    assert!(matches!(error, Err(Error::NotANumber { .. })), "{error:?}");
 }
 
 fn direct<const D: usize>() -> LinearSensor<D, 1> {

@@ -2,9 +2,7 @@
 
 use fewbits_core::factor::{Factor, InCell, Value};
 use fewbits_core::nalgebra::{Matrix1, Vector1};
-use fewbits_core::{
-    Belief, Cell, Error as CoreError, Gaussian, GaussianDynamics, LinearDynamics, Observed, Sensing, Sign, laws,
-};
+use fewbits_core::{Belief, Cell, Gaussian, GaussianDynamics, LinearDynamics, Observed, Sensing, Sign, laws};
 use fewbits_filters::{Error, Imm, ImmBelief, ImmWorkspace, assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -153,7 +151,7 @@ fn beliefs_obey_the_laws_and_failures_change_nothing() {
     let mut after = belief.clone();
     let impossible = Observed::new(sensor, value(f64::MAX, 1e-300));
     let outcome = filter.update_in_place(&mut after, &impossible, &mut Default::default());
-    assert_eq!(outcome, Err(Error::Core(CoreError::Impossible)));
+    assert_eq!(outcome, Err(Error::Impossible));
     assert_eq!(after, belief);
     let three = ImmBelief::agreed(&modes[0], 3).unwrap();
     assert!(

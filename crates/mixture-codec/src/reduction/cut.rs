@@ -123,7 +123,7 @@ impl Cut {
     pub fn mixture<const D: usize>(&self, tree: &Tree<D>) -> Result<Mixture<D>, Error> {
         tree.check_cut(&self.nodes)?;
         let components = self.nodes.iter().map(|s| tree.nodes()[*s].component());
-        Ok(Mixture::new(components.collect::<Result<_, _>>()?)?)
+        Mixture::new(components.collect::<Result<_, _>>()?)
     }
 }
 

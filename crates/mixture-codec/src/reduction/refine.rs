@@ -51,7 +51,7 @@ pub fn refine<const D: usize>(
         let covariance = white.lower * p.covariance() * white.lower.transpose();
         Component::new(p.weight(), white.lower * p.mean() + origin, symmetrised(&covariance))
     });
-    Ok(Mixture::new(back.collect::<Result<_, _>>()?)?)
+    Mixture::new(back.collect::<Result<_, _>>()?)
 }
 
 /// Number of points that are processed together, so that their data stay in the first-level cache.
@@ -241,5 +241,5 @@ fn moments<const D: usize>(part: &Component<D>, sums: &Sums<D>) -> Result<Compon
         }
     }
     let covariance = raised(covariance, &SVector::repeat(1.0));
-    Ok(Component::new(weight, part.mean() + shift, covariance)?)
+    Component::new(weight, part.mean() + shift, covariance)
 }

@@ -1,15 +1,11 @@
 //! Kernels against high-precision values, at every width of this machine.
 
+use super::Fixture;
 use fewbits_numerics::kernels::{self, scalar};
 use fewbits_numerics::normal;
 use pulp::{Arch, NullaryFnOnce};
 use serde::Deserialize;
 use std::collections::BTreeMap;
-
-#[derive(Deserialize)]
-struct Fixture {
-    entries: Vec<Entry>,
-}
 
 #[derive(Deserialize)]
 struct Entry {
@@ -40,7 +36,7 @@ fn every_function_is_within_its_bound() {
         ("log_interval", 8.0),
         ("quantile", 8.0),
     ]);
-    let fixture: Fixture = serde_json::from_str(include_str!("../fixtures/kernels.json")).unwrap();
+    let fixture: Fixture<Entry> = serde_json::from_str(include_str!("../fixtures/kernels.json")).unwrap();
     let mut worst: BTreeMap<&str, (f64, Vec<f64>)> = BTreeMap::new();
     for entry in &fixture.entries {
         let a: Vec<f64> = entry.args.iter().map(|a| a.parse().unwrap()).collect();

@@ -5,3 +5,8 @@
 mod kernels;
 mod normal;
 mod wild;
+
+#[derive(serde::Deserialize)]
+struct Fixture<E> {
+    entries: Vec<E>,
+}

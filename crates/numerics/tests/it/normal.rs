@@ -1,15 +1,11 @@
 //! Normal-distribution numerics against high-precision values and against each other.
 
+use super::Fixture;
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::normal;
 use fewbits_numerics::normal::truncated_moments;
 use proptest::prelude::*;
 use serde::Deserialize;
-
-#[derive(Deserialize)]
-struct Fixture {
-    entries: Vec<Entry>,
-}
 
 #[derive(Deserialize)]
 struct Entry {
@@ -31,7 +27,7 @@ fn number(value: &serde_json::Value) -> f64 {
 
 #[test]
 fn every_function_meets_high_precision_values() {
-    let fixture: Fixture = serde_json::from_str(include_str!("../fixtures/normal.json")).unwrap();
+    let fixture: Fixture<Entry> = serde_json::from_str(include_str!("../fixtures/normal.json")).unwrap();
     let mut misses = Vec::new();
     for entry in &fixture.entries {
         let a: Vec<f64> = entry.args.iter().map(number).collect();

@@ -1,9 +1,9 @@
 //! Messages of particle message passing: weighted points under a common kernel.
 
 use crate::Error;
-use crate::error::refuse;
 use fewbits_core::columns::set_state;
 use fewbits_densities::{Component, Mixture};
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use nalgebra::{Matrix2, SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -179,7 +179,7 @@ impl<const D: usize> KernelMessage<D> {
     /// The message as a [`Mixture`].
     pub(crate) fn mixture(&self) -> Result<Mixture<D>, Error> {
         let components = (0..self.len()).map(|i| Component::new(self.weight(i), self.point(i), self.kernel));
-        Ok(Mixture::new(components.collect::<Result<_, _>>()?)?)
+        Mixture::new(components.collect::<Result<_, _>>()?)
     }
 }
 

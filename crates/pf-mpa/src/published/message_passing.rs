@@ -2,7 +2,6 @@
 
 use crate::Error;
 use crate::chain::draw;
-use crate::error::refuse;
 use crate::leader::lower_factor;
 use crate::linearised::Velocity;
 use crate::published::message::{DynamicsWeight, KernelMessage, KernelRule, Ring, RingWeight, kernel_of};
@@ -10,6 +9,7 @@ use crate::published::product_sampler::{Drawn, ProductSampler, ProductWorkspace}
 use crate::tracker::{GaussianTracker, Ranged, Step, StepInfo};
 use fewbits_core::Gaussian;
 use fewbits_core::columns::set_state;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use rand::{Rng, RngExt};
@@ -323,7 +323,7 @@ impl GaussianTracker for MessagePassing {
         let position: Matrix2<f64> = whole.fixed_view::<2, 2>(0, 0).into();
         let cross: Matrix2<f64> = whole.fixed_view::<2, 2>(2, 0).into();
         let own: Matrix2<f64> = whole.fixed_view::<2, 2>(2, 2).into();
-        let factor = kernel_of(&position, 1.0)?.0.cholesky().ok_or(Error::IMPOSSIBLE)?;
+        let factor = kernel_of(&position, 1.0)?.0.cholesky().ok_or(Error::Impossible)?;
         let slope = factor.solve(&cross.transpose()).transpose();
         let left = (own - slope * cross.transpose()) * lambda;
         let kernel = lower_factor(&((left + left.transpose()) * 0.5));

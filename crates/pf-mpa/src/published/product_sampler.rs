@@ -1,13 +1,13 @@
 //! Draws from the product of several messages.
 
 use crate::Error;
-use crate::error::refuse;
 use crate::product;
 use crate::published::message::KernelMessage;
 use fewbits_core::ColumnsMut;
 use fewbits_core::columns::set_state;
 use fewbits_densities::{Mixture, Particles};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels::{self, scalar, vectorised};
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -83,7 +83,7 @@ impl ProductSampler {
             labels: &mut labels,
         };
         self.draw(rng, &mut messages, &mut ProductWorkspace::default(), &mut out)?;
-        Ok(Particles::uniform(points)?)
+        Particles::uniform(points)
     }
 
     /// Fills `out` with draws from the product of `messages`, which are finished and have their kernels.
@@ -115,7 +115,7 @@ fn inverse<const D: usize>(m: &SMatrix<f64, D, D>) -> Result<SMatrix<f64, D, D>,
 
 fn whitener<const D: usize>(m: &SMatrix<f64, D, D>) -> Result<SMatrix<f64, D, D>, Error> {
     let solved = cholesky(m)?.l().solve_lower_triangular(&SMatrix::identity());
-    solved.ok_or(Error::IMPOSSIBLE)
+    solved.ok_or(Error::Impossible)
 }
 
 /// Gibbs sweeps over the labels. Because a message's kernels are equal, all precisions are the same for every choice of labels, and the
@@ -274,7 +274,7 @@ fn importance<const D: usize, R: Rng + ?Sized>(
     }
     let largest = kernels::largest(log_weights);
     if !largest.is_finite() {
-        return Err(Error::IMPOSSIBLE);
+        return Err(Error::Impossible);
     }
     let total: f64 = log_weights.iter().map(|l| (l - largest).exp()).sum();
     // Systematic resampling of the draws by these weights.

@@ -1,7 +1,7 @@
 //! The exact error of drawing a range's message over the plane from a ring of uniform bearings.
 
 use crate::Error;
-use crate::error::refuse;
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{finite, positive};
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;

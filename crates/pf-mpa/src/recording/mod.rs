@@ -18,13 +18,13 @@ pub use settings::RangeSettings;
 
 use crate::Error;
 use crate::encoder::optimal_loading;
-use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
 use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, Observed, SchemeNode, SensorNode};
 use fewbits_filters::centre::{Event, FalseAlarms, FusionCentre, Reporting, Slot};
 use fewbits_filters::{GridFilter, GridWorkspace, MomentFilter, NoiseBank};
+use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{finite, within};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2};
@@ -191,9 +191,9 @@ impl RangeTracker {
         let slot = Slot::new(anchor.number, feedback, report.into());
         let lost = match centre.receive(rng, &[slot]) {
             Ok(received) => received.events.contains(&Event::Lost),
-            // The range has probability zero under the belief, even as an outlier: the track is lost.
-            Err(fewbits_filters::Error::Core(fewbits_core::Error::Impossible)) => true,
-            Err(error) => return Err(error.into()),
+            // Nothing of the belief explains the range, not even as an outlier.
+            Err(Error::Impossible) => true,
+            Err(error) => return Err(error),
         };
         let estimate = self.centre.as_ref().map(|centre| self.estimate(centre, lost));
         if lost {
@@ -257,11 +257,8 @@ impl RangeTracker {
                     found = Some(belief);
                     break;
                 }
-                Err(
-                    fewbits_filters::Error::Core(fewbits_core::Error::Impossible)
-                    | fewbits_filters::Error::Unresolved { .. },
-                ) => {}
-                Err(error) => return Err(error.into()),
+                Err(Error::Impossible | Error::Unresolved { .. }) => {}
+                Err(error) => return Err(error),
             }
         }
         let Some(belief) = found else { return Ok(()) };

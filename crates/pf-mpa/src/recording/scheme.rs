@@ -2,7 +2,7 @@
 
 use crate::quantized::RangeReference;
 use fewbits_core::factor::Robust;
-use fewbits_core::{Link, MeasurementNoise, Memoryless, Message, Observation};
+use fewbits_core::{Error, Link, MeasurementNoise, Memoryless, Message, Observation};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix1, Vector1};
 
@@ -45,11 +45,7 @@ impl<C: Memoryless<1>, S: Fn(&C::Feedback, &C::Report) -> f64> Memoryless<1> for
         self.scheme.report_format()
     }
 
-    fn report_of(
-        &self,
-        range: &Vector1<f64>,
-        feedback: &C::Feedback,
-    ) -> Result<Option<C::Report>, fewbits_core::Error> {
+    fn report_of(&self, range: &Vector1<f64>, feedback: &C::Feedback) -> Result<Option<C::Report>, Error> {
         self.scheme.report_of(range, feedback)
     }
 
@@ -58,7 +54,7 @@ impl<C: Memoryless<1>, S: Fn(&C::Feedback, &C::Report) -> f64> Memoryless<1> for
         feedback: &C::Feedback,
         observation: &Observation<C::Report>,
         link: &Link,
-    ) -> Result<Self::Factor, fewbits_core::Error> {
+    ) -> Result<Self::Factor, Error> {
         let factor = self.scheme.meaning_of(feedback, observation, link)?;
         let (share, density) = match observation {
             Observation::Received(report) => (self.outliers, (self.stray)(feedback, report)),

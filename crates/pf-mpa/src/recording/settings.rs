@@ -87,6 +87,6 @@ impl RangeSettings {
             density[(position + 1, position + 1)] = 2.0 * rate * speed * speed;
         }
         density[(4, 4)] = self.drift;
-        Ok(ContinuousLinear::new(drift, SVector::zeros(), density)?)
+        ContinuousLinear::new(drift, SVector::zeros(), density)
     }
 }

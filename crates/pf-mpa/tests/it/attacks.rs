@@ -1,6 +1,6 @@
 //! Bad input is a typed error, extreme input an answer.
 
-use fewbits_core::{Gaussian, Observed};
+use fewbits_core::{Error, Gaussian, Observed};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_monte_carlo::Stream;
@@ -107,14 +107,14 @@ fn a_failed_step_leaves_the_belief_as_it_was() {
     let motion = WithManoeuvre::at(target, 0);
     let failed =
         ParticleFilter::default().step_in_place(&mut rng, &motion, &mut belief, &sensed, &mut Workspace::default());
-    assert!(matches!(failed, Err(fewbits_filters::Error::Core(fewbits_core::Error::Impossible))) || failed.is_ok());
+    assert!(matches!(failed, Err(Error::Impossible)) || failed.is_ok());
     if failed.is_err() {
         assert_eq!(belief, before);
     }
     // A known position has no grid.
     let known = Gaussian::known(Vector4::zeros()).unwrap();
     let grid = GridFilter::default().update(&known, [0, 1], observed.as_slice(), &mut GridWorkspace::default());
-    assert!(matches!(grid, Err(fewbits_filters::Error::Argument(_))));
+    assert!(matches!(grid, Err(Error::Argument(_))));
 }
 
 #[test]
@@ -262,6 +262,6 @@ fn a_stored_target_is_the_same() {
     assert_eq!(serde_json::from_str::<Target>(&json).unwrap(), Target::printed().unwrap());
 }
 
-fn weighted(log_weight: f64) -> Result<Particles<1>, fewbits_densities::Error> {
+fn weighted(log_weight: f64) -> Result<Particles<1>, Error> {
     Particles::new([vec![0.0, 1.0]], &[log_weight; 2])
 }

@@ -1,7 +1,7 @@
 //! The grid that adapts: consistent from blunt to sharp ranges, exact where something exact exists, an error where it cannot follow.
 
+use fewbits_core::Error;
 use fewbits_core::{Gaussian, Likelihood, Observed};
-use fewbits_filters::Error;
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_pf_mpa::{
     GridFilter, GridWorkspace, QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor, Ranged,
@@ -201,10 +201,7 @@ fn what_cannot_be_resolved_is_an_error() {
     let prior = Gaussian::new(Vector2::new(10.0, 0.0), Matrix2::identity() * 9.0).unwrap();
     let observed = [ring(10.0, 1e-9)];
     let updated = GridFilter::default().update(&prior, [0, 1], observed.as_slice(), &mut GridWorkspace::default());
-    assert!(
-        matches!(updated, Err(Error::Unresolved { nodes_per_deviation }) if nodes_per_deviation < 1.5),
-        "{updated:?}"
-    );
+    assert!(matches!(updated, Err(Error::Unresolved { value, .. }) if value < 1.5), "{updated:?}");
 }
 
 #[test]

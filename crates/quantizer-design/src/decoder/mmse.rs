@@ -1,6 +1,6 @@
 //! The posterior mean as a look-up table.
 
-use crate::error::{Error, at_most, refuse};
+use crate::error::{Error, refuse};
 use crate::law::{Reports, symbol_tables};
 use crate::moments::{Table, dot};
 use crate::observation_model::{Feature, ObservationModel};
@@ -62,7 +62,7 @@ impl MmseDecoder {
     /// # Errors
     /// [`Error::TooLarge`] if there are more. Such systems can be decoded by a filter on the likelihoods.
     pub fn new(system: &System, limit: usize) -> Result<Self, Error> {
-        at_most("decoder", system.outcomes(), limit as u64)?;
+        Error::at_most("decoder", system.outcomes(), limit as u64)?;
         let model = system.model();
         let allowed = system
             .clone()

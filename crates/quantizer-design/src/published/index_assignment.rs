@@ -7,7 +7,7 @@
 
 use crate::criterion::Criterion;
 use crate::design::{Design, joint};
-use crate::error::{Error, at_most, refuse};
+use crate::error::{Error, refuse};
 use crate::newton::Newton;
 use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
@@ -99,7 +99,7 @@ pub fn assign_words(
     let sensors = model.sensors();
     let combinations: Vec<Vec<usize>> = if words == Words::PerSensor {
         let needed = (classes.len() as u64).saturating_pow(sensors as u32);
-        at_most("list of assignments", needed, MAX_COMBINATIONS)?;
+        Error::at_most("list of assignments", needed, MAX_COMBINATIONS)?;
         (0..sensors).fold(vec![Vec::new()], |lists: Vec<Vec<usize>>, n| {
             let longer = |list: &Vec<usize>| {
                 // Sensors of equal noise may be exchanged, so their classes are kept in order.

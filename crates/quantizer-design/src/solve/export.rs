@@ -3,7 +3,7 @@
 use super::adc::Rounded;
 use super::additive::AdditiveDecoder;
 use super::solution::{SensorDesign, Solution};
-use crate::error::{Error, at_most, refuse};
+use crate::error::{Error, refuse};
 use fewbits_numerics::error::entries;
 use serde_json::json;
 
@@ -52,7 +52,7 @@ impl Solution {
             self.joint_decoder(&shape, outcomes)?
         } else {
             let needed = shape.iter().sum::<usize>() * NUMBER_BYTES;
-            at_most("decoder", needed as u64, max_bytes as u64)?;
+            Error::at_most("decoder", needed as u64, max_bytes as u64)?;
             Decoder::Additive(self.additive_decoder()?)
         };
         Ok(Export {

@@ -5,7 +5,7 @@ mod group;
 pub use group::SensorGroup;
 
 use crate::compositions::count;
-use crate::error::{Error, at_most, refuse};
+use crate::error::{Error, refuse};
 use crate::observation_model::ObservationModel;
 use fewbits_numerics::error::entries;
 use fewbits_numerics::stored;
@@ -174,11 +174,11 @@ impl System {
 
     /// An error if a table would have more outcomes than allowed.
     pub(crate) fn check_outcomes(&self) -> Result<(), Error> {
-        at_most("joint outcome table", self.outcomes(), self.outcome_limit)?;
+        Error::at_most("joint outcome table", self.outcomes(), self.outcome_limit)?;
         // Tables for fewer reports are computed as intermediate results.
         self.groups.iter().try_for_each(|group| {
             let needed = count(group.sensors.len(), group.channel.outputs() + 1);
-            at_most("table of counts", needed, self.outcome_limit)
+            Error::at_most("table of counts", needed, self.outcome_limit)
         })
     }
 

@@ -5,7 +5,7 @@ use super::{
     SPECIALS_FOLLOW, aligned, plain, shared,
 };
 use crate::bound::Bound;
-use crate::codec::{self, CodecId, JOINT_COLUMNS};
+use crate::codec::{self, CodecId, Context, JOINT_COLUMNS};
 use crate::error::Damage;
 use crate::header::Header;
 use crate::specials::{self, Specials};
@@ -179,7 +179,12 @@ impl Section<'_> {
         let others: Vec<&[f64]> = others.iter().map(Vec::as_slice).collect();
         let target = header.target(before.len(), self.own);
         let start = header.start(before.len(), self.own);
-        let values = codec::decode(self.id, self.bytes, count, &target, start.as_ref(), &others)?;
+        let context = Context {
+            target: &target,
+            start: start.as_ref(),
+            others: &others,
+        };
+        let values = codec::decode(self.id, self.bytes, count, context)?;
         Ok(specials::merged(specials, &values))
     }
 

@@ -5,7 +5,7 @@ use super::{
     APART, BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW,
     aligned, plain, shared,
 };
-use crate::codec::{self, CodecId};
+use crate::codec::{self, CodecId, Context};
 use crate::header::Header;
 use crate::related;
 use crate::specials::{self, Special, Specials};
@@ -56,7 +56,12 @@ fn encode_column(
     };
     let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
     let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-    let coded = codec::encode(&samples, &target, start.as_ref(), &values, effort);
+    let context = Context {
+        target: &target,
+        start: start.as_ref(),
+        others: &values,
+    };
+    let coded = codec::encode(&samples, context, effort);
     if !coded.uses_others {
         others.clear();
     }

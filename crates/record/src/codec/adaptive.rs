@@ -1,6 +1,6 @@
 //! Blocks of the adaptive codec (`fewbits-adaptive`), for every bound.
 
-use super::Target;
+use super::{Context, Target};
 use crate::bound::{Promise, TENS};
 use crate::error::Damage;
 use fewbits_adaptive::{BlockCodec, Config, Effort, Start};
@@ -50,37 +50,25 @@ pub(crate) fn read_start(bytes: &mut &[u8], target: &Target) -> Result<Start, Da
     start.ok_or(Damage::Content("start of blocks"))
 }
 
-/// The coded bytes, and whether other columns are needed to decode them.
-pub(super) fn encode(
-    samples: &[f64],
-    target: &Target,
-    start: Option<&Start>,
-    others: &[&[f64]],
-    effort: Effort,
-) -> Option<(Vec<u8>, bool)> {
-    let codec = codec(target)?.with_effort(effort);
-    let samples = prepared(samples, target);
-    if let Some(start) = start {
-        let block = codec.encode_from(start, &samples, others).ok()?;
+/// The bytes, and whether they are predicted from other columns.
+pub(super) fn encode(samples: &[f64], context: Context<'_>, effort: Effort) -> Option<(Vec<u8>, bool)> {
+    let codec = codec(context.target)?.with_effort(effort);
+    let samples = prepared(samples, context.target);
+    if let Some(start) = context.start {
+        let block = codec.encode_from(start, &samples, context.others).ok()?;
         return Some((block.bytes, block.joint));
     }
-    let bytes = codec.encode_with(&samples, others).ok()?;
+    let bytes = codec.encode_with(&samples, context.others).ok()?;
     // Bit 6 of a block's first byte says so.
     let joint = bytes.first().is_some_and(|head| head & 0x40 != 0);
     Some((bytes, joint))
 }
 
-pub(super) fn decode(
-    bytes: &[u8],
-    count: usize,
-    target: &Target,
-    start: Option<&Start>,
-    others: &[&[f64]],
-) -> Result<Vec<f64>, Damage> {
-    let codec = codec(target).ok_or(Damage::Content("bound"))?;
-    let values = match start {
-        Some(start) => codec.decode_from(start, bytes, count, others),
-        None => codec.decode_with(bytes, count, others),
+pub(super) fn decode(bytes: &[u8], count: usize, context: Context<'_>) -> Result<Vec<f64>, Damage> {
+    let codec = codec(context.target).ok_or(Damage::Content("bound"))?;
+    let values = match context.start {
+        Some(start) => codec.decode_from(start, bytes, count, context.others),
+        None => codec.decode_with(bytes, count, context.others),
     };
     values.map_err(|_| Damage::Content("adaptive block"))
 }

@@ -53,6 +53,27 @@ impl Target {
     }
 }
 
+/// What writer and reader of a block's column know beside its bytes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Context<'a> {
+    pub(crate) target: &'a Target,
+    /// What the header says of the column's blocks.
+    pub(crate) start: Option<&'a Start>,
+    /// The same rows of other columns, as a reader has restored them; NaN where they have no value.
+    pub(crate) others: &'a [&'a [f64]],
+}
+
+impl<'a> Context<'a> {
+    /// Of a column that is coded by itself.
+    pub(crate) fn alone(target: &'a Target) -> Self {
+        Self {
+            target,
+            start: None,
+            others: &[],
+        }
+    }
+}
+
 /// Coded values.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Coded {
@@ -71,20 +92,14 @@ const REPAIR_BYTES: usize = 10;
 
 impl Coded {
     /// Decodes what was coded and compares it with the samples; `None` if it does not decode.
-    fn verified(
-        id: CodecId,
-        bytes: Vec<u8>,
-        samples: &[f64],
-        target: &Target,
-        start: Option<&Start>,
-        others: &[&[f64]],
-    ) -> Option<Self> {
-        let restored = decode(id, &bytes, samples.len(), target, start, others).ok()?;
+    fn verified(id: CodecId, bytes: Vec<u8>, samples: &[f64], context: Context<'_>) -> Option<Self> {
+        let restored = decode(id, &bytes, samples.len(), context).ok()?;
         let pairs = samples.iter().zip(&restored);
-        let broken = pairs.filter(|(sample, value)| !target.holds(**sample, **value)).count();
+        let broken = pairs.filter(|(sample, value)| !context.target.holds(**sample, **value));
+        let broken = broken.count();
         Some(Self {
             id,
-            uses_others: !others.is_empty(),
+            uses_others: !context.others.is_empty(),
             bytes,
             restored,
             broken,
@@ -96,18 +111,10 @@ impl Coded {
     }
 }
 
-/// A short code of the samples, which are all finite. It has been decoded once, so the restored numbers are known.
-///
-/// `start`: the column's start in the header. `others`: the same rows of other columns, as a reader restores them; NaN for missing values.
-pub(crate) fn encode(
-    samples: &[f64],
-    target: &Target,
-    start: Option<&Start>,
-    others: &[&[f64]],
-    effort: Effort,
-) -> Coded {
-    let constant = plain::constant(samples, target)
-        .and_then(|bytes| Coded::verified(CodecId::Constant, bytes, samples, target, None, &[]))
+/// A small code of the samples, all finite. It was decoded once, so that what it restores is known.
+pub(crate) fn encode(samples: &[f64], context: Context<'_>, effort: Effort) -> Coded {
+    let constant = plain::constant(samples, context.target)
+        .and_then(|bytes| Coded::verified(CodecId::Constant, bytes, samples, Context::alone(context.target)))
         .filter(|coded| coded.broken == 0);
     let raw = || Coded {
         id: CodecId::Raw,
@@ -117,32 +124,25 @@ pub(crate) fn encode(
         uses_others: false,
     };
     constant.unwrap_or_else(|| {
-        adaptive::encode(samples, target, start, others, effort)
+        adaptive::encode(samples, context, effort)
             .and_then(|(bytes, joint)| {
-                let others = if joint { others } else { &[] };
-                Coded::verified(CodecId::Adaptive, bytes, samples, target, start, others)
+                let others = if joint { context.others } else { &[] };
+                Coded::verified(CodecId::Adaptive, bytes, samples, Context { others, ..context })
             })
             .filter(|coded| coded.cost() < 8 * samples.len())
             .unwrap_or_else(raw)
     })
 }
 
-/// Decodes `count` finite numbers; `others` must be those that were passed to [`encode`].
+/// The `count` numbers that the bytes stand for, all finite; `context` as it was given to [`encode`].
 ///
 /// # Errors
-/// If the bytes are not what [`encode`] writes. Any bytes give numbers or an error.
-pub(crate) fn decode(
-    id: CodecId,
-    bytes: &[u8],
-    count: usize,
-    target: &Target,
-    start: Option<&Start>,
-    others: &[&[f64]],
-) -> Result<Vec<f64>, Damage> {
+/// If they are not what [`encode`] writes. Total: any bytes give numbers or an error.
+pub(crate) fn decode(id: CodecId, bytes: &[u8], count: usize, context: Context<'_>) -> Result<Vec<f64>, Damage> {
     let values = match id {
         CodecId::Raw => plain::decode_raw(bytes, count),
         CodecId::Constant => plain::decode_constant(bytes, count),
-        CodecId::Adaptive => adaptive::decode(bytes, count, target, start, others),
+        CodecId::Adaptive => adaptive::decode(bytes, count, context),
         CodecId::Shared => Err(Damage::Content("codec")),
     }?;
     if values.iter().all(|value| value.is_finite()) {

@@ -2,7 +2,7 @@
 
 mod wild;
 
-use fewbits_topology::{Deployment, Error, Graph};
+use fewbits_topology::{Deployment, Graph};
 use nalgebra::Vector2;
 use proptest::prelude::*;
 use rand_pcg::Pcg64Mcg;
@@ -78,7 +78,7 @@ fn pieces_and_dead_ends() {
     assert_eq!(graph.nearest(0, |node| node == 2).unwrap(), (vec![2], 2));
     assert_eq!(graph.nearest(0, |node| node == 3).unwrap(), (vec![], 0));
     assert_eq!(graph.hops_from(0).unwrap().route(3), None);
-    assert_eq!(graph.hops_from(7), Err(Error::NoSuchNode { node: 7, nodes: 4 }));
+    assert!(matches!(graph.hops_from(7), Err(e) if e.name == "node" && e.value == "7"));
     assert!(graph.neighbours(17).is_empty());
 }
 

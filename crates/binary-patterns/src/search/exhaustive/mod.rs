@@ -7,9 +7,9 @@ pub use setting::{LinearSearch, MaskSet};
 
 use super::outcomes::Outcomes;
 use crate::Error;
-use crate::error::at_most;
 use crate::observation::bank::MAX_OUTCOMES;
 use crate::patterns::linear::Span;
+use fewbits_numerics::ArgumentError;
 use walk::Walk;
 
 /// Number of candidates that are evaluated again on the fine nodes.
@@ -35,10 +35,9 @@ impl LinearSearch {
             .into_iter()
             .filter(|s| s.mse <= least * (1.0 + TIE))
             .min_by(|a, b| a.masks.cmp(&b.masks))
-            .ok_or(Error::RankDeficient {
-                sensors: self.sensors,
-                rank: self.sensors.min(self.bits),
-                expected: self.bits,
+            .ok_or_else(|| {
+                let expected = format!("at least {}, the rank of the masks", self.bits);
+                ArgumentError::new("sensors", self.sensors, expected).into()
             })
     }
 
@@ -47,17 +46,17 @@ impl LinearSearch {
     /// # Errors
     /// As [`Self::best`], or if there are more than `2^26` sets.
     pub fn ranking(&self) -> Result<Vec<MaskSet>, Error> {
-        at_most(self.sets()?, MAX_RANKED)?;
+        Error::at_most("the list of sets of masks", self.sets()?, MAX_RANKED)?;
         self.run(usize::MAX)
     }
 
     fn run(&self, keep: usize) -> Result<Vec<MaskSet>, Error> {
-        at_most(self.sets()?, MAX_SETS)?;
+        Error::at_most("the list of sets of masks", self.sets()?, MAX_SETS)?;
         // Distinct masks give the largest number of outcomes.
         let distinct = self.sensors.min((1 << self.bits) - 1) as u32;
         let repeats = (self.sensors as u128 / u128::from(distinct)).saturating_add(1);
         let outcomes = repeats.saturating_add(1).saturating_pow(distinct);
-        at_most(outcomes.min(2u128.saturating_pow(self.sensors as u32)), MAX_OUTCOMES)?;
+        Error::at_most("the table of outcomes", outcomes.min(2u128.saturating_pow(self.sensors as u32)), MAX_OUTCOMES)?;
         let walk = Walk::new(self, keep)?;
         let root = Outcomes::new(&walk.candidates.nodes.w);
         let mut found = walk.branch(0, self.sensors, Span::default(), &[], root);
@@ -117,16 +116,13 @@ mod tests {
 
     #[test]
     fn too_few_sensors_for_full_rank_is_an_error() {
-        assert!(matches!(search(3, 2, 10.0).best(), Err(Error::RankDeficient { .. })));
+        assert!(matches!(search(3, 2, 10.0).best(), Err(Error::Argument(e)) if e.name == "sensors"));
         assert_eq!(search(3, 2, 10.0).any_rank().best().unwrap().masks.len(), 2);
         assert!(search(3, 2, 10.0).with_forced(&[1, 2, 3]).is_err());
         assert!(search(3, 2, 10.0).with_forced(&[8]).is_err());
         let grid = CellGrid::from_breakpoints(vec![0.0, 1.0]).unwrap();
         assert!(LinearSearch::with_deviation(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
-        assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooManyOutcomes { .. })));
-        assert!(matches!(
-            search(6, 40, 10.0).best(),
-            Err(Error::TooManyOutcomes { .. } | Error::CountOverflow { .. })
-        ));
+        assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooLarge { .. })));
+        assert!(matches!(search(6, 40, 10.0).best(), Err(Error::TooLarge { .. } | Error::Argument(_))));
     }
 }

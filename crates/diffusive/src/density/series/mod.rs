@@ -223,7 +223,7 @@ impl<const D: usize> Lpg<D> {
             second += d * d.transpose() * w;
         })?;
         if !(mass > 0.0 && mass.is_finite()) {
-            return Err(fewbits_core::Error::Impossible.into());
+            return Err(Error::Impossible);
         }
         let norm = mass.sqrt();
         for term in &mut self.terms {

@@ -181,7 +181,7 @@ pub fn series_moments<const D: usize>(
     };
     let mass = expectation(&[])?;
     if !(mass > 0.0 && mass.is_finite()) {
-        return Err(fewbits_core::Error::Impossible.into());
+        return Err(Error::Impossible);
     }
     let mut first = SVector::<f64, D>::zeros();
     let mut second = SMatrix::<f64, D, D>::zeros();

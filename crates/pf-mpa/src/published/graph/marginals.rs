@@ -2,7 +2,7 @@
 
 use super::FactorGraph;
 use crate::Error;
-use crate::error::refuse;
+use fewbits_numerics::error::refuse;
 
 impl FactorGraph {
     fn check_finite(&self) -> Result<(), Error> {
@@ -20,7 +20,7 @@ impl FactorGraph {
     /// ```
     ///
     /// # Errors
-    /// If the graph has a cycle or a variable without states; [`fewbits_core::Error::Impossible`] if all products are zero.
+    /// If the graph has a cycle or a variable without states; [`Error::Impossible`] if all products are zero.
     pub fn marginals(&self) -> Result<Vec<Vec<f64>>, Error> {
         self.check_finite()?;
         if !self.is_tree() {
@@ -97,7 +97,7 @@ fn advance(choice: &mut [usize], sizes: &[usize]) {
 fn normalised(mut message: Vec<f64>) -> Result<Vec<f64>, Error> {
     let total: f64 = message.iter().sum();
     if !(total > 0.0 && total.is_finite()) {
-        return Err(Error::IMPOSSIBLE);
+        return Err(Error::Impossible);
     }
     message.iter_mut().for_each(|m| *m /= total);
     Ok(message)
@@ -162,8 +162,8 @@ mod tests {
         graph.function("f", &[a, b], &[1.0, 0.0, 0.0, 1.0]).unwrap();
         graph.function("g", &[a], &[1.0, 0.0]).unwrap();
         graph.function("h", &[b], &[0.0, 1.0]).unwrap();
-        assert_eq!(graph.marginals(), Err(Error::IMPOSSIBLE));
-        assert_eq!(enumerated(&graph), Err(Error::IMPOSSIBLE));
+        assert_eq!(graph.marginals(), Err(Error::Impossible));
+        assert_eq!(enumerated(&graph), Err(Error::Impossible));
         graph.function("again", &[a, b], &[1.0; 4]).unwrap();
         assert!(graph.marginals().is_err());
         assert!(crate::published::graph::example().unwrap().marginals().is_err());

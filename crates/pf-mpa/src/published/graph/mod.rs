@@ -3,8 +3,8 @@
 mod marginals;
 
 use crate::Error;
-use crate::error::refuse;
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::refuse;
 use serde::{Deserialize, Serialize};
 
 /// A bipartite graph of variables and functions.
