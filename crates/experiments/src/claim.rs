@@ -105,9 +105,8 @@ impl Claims {
 
     /// What is claimed through this is made for the figure's own parameters only; skipped after `--set`.
     pub fn at_defaults(&self) -> Self {
-        let mut limited = self.clone();
-        limited.limits[0] = true;
-        limited
+        let limits = [true, self.limits[1]];
+        Self { limits, ..self.clone() }
     }
 
     /// What is claimed through this says at its end that it shows this erratum of `docs/errata.md`.
@@ -121,9 +120,8 @@ impl Claims {
     /// What is claimed through this can only be decided at the full trial count, skipped with fewer trials: what it compares is
     /// no plain average of trials.
     pub fn at_full_trials(&self) -> Self {
-        let mut limited = self.clone();
-        limited.limits[1] = true;
-        limited
+        let limits = [self.limits[0], true];
+        Self { limits, ..self.clone() }
     }
 
     fn decide(

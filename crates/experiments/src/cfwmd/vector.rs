@@ -113,7 +113,7 @@ pub(crate) static FIG6: Simulated<Linear, Step> = Simulated {
                 scheme: SAME_TRIALS,
                 ..e.run.clone()
             },
-            records: e.records.iter().take(few.trials as usize).cloned().collect(),
+            trials: e.trials.iter().take(few.trials as usize).cloned().collect(),
         };
         let same: Vec<_> = all.iter().filter(|e| e.run.scheme == "CFwMD").map(first).collect();
         all.extend(both(context, &few, &exact, &exact)?);
