@@ -1,6 +1,6 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
-use super::{ERROR, SNR, Scene, descent_from, each, mask_text, sweep, swept};
+use super::{ERROR, SNR, Scene, descent_from, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::bounds::ConditionalMean;
 use fewbits_binary_patterns::published::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
@@ -70,7 +70,7 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
         lbqp_b3: coarse.mse,
         lbqp_best: best.2,
         bits: best.0,
-        masks: mask_text(&best.1),
+        masks: joined(&best.1, " "),
         fixed: fixed_threshold(scene.source, scene.noise, p.sensors)?.mmse()?,
         luo_soft: luo.ok().map(|errors| errors.soft),
         ribeiro_relaxed: multi_threshold_bound(&scene.source, scene.noise, p.sensors)?.bound,

@@ -1,6 +1,6 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
-use super::{SNR, Scene, crossing, each, mask_text, sweep, swept};
+use super::{SNR, Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
@@ -54,7 +54,7 @@ impl Figure for GaussianSource {
             Ok(Row {
                 snr_db,
                 mse_opt: best.mse,
-                masks: mask_text(&best.masks),
+                masks: joined(&best.masks, " "),
                 mse_gray: scene.mmse(&GRAY)?,
                 mse_natural: scene.mmse(&[4, 2, 1])?,
                 dr_print: printed?,

@@ -1,6 +1,6 @@
 //! `binary-fig5-7`: optimal linear patterns against the signal-to-noise ratio, shortcuts, and Luo's scheme.
 
-use super::{ERROR, SNR, Scene, crossing, descent_from, each, mask_text, not_below, sweep};
+use super::{ERROR, SNR, Scene, crossing, descent_from, each, not_below, sweep};
 use crate::prelude::*;
 use fewbits_binary_patterns::published::{Luo, by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
@@ -71,7 +71,7 @@ fn row(bits: usize, sensors: usize, snr_db: f64) -> Result<Row, Error> {
         snr_db,
         sensors,
         mse_opt: best.mse,
-        masks: mask_text(&best.masks),
+        masks: joined(&best.masks, " "),
         mse_unconstrained: any.mse,
         mse_strategy1: search.with_forced(&gray)?.best()?.mse,
         mse_strategy13: informed(&gray)?,
@@ -89,7 +89,7 @@ fn tiling() -> Result<Vec<Tiling>, Error> {
     let row = |design, masks: &[Mask], mse| Tiling {
         design,
         mse,
-        masks: mask_text(masks),
+        masks: joined(masks, " "),
     };
     let (eights, fours) = (tiled(8)?, tiled(4)?);
     let found = descent_from(&scene, 3, 16, std::slice::from_ref(&eights), 2)?;

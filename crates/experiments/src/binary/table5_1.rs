@@ -1,6 +1,6 @@
 //! `binary-table5-1`: eight patterns of three bits at 18.2 dB.
 
-use super::{Scene, mask_text, pattern, pattern_panel};
+use super::{Scene, pattern, pattern_panel};
 use crate::prelude::*;
 use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
 use fewbits_binary_patterns::search::MaskSet;
@@ -63,7 +63,7 @@ impl Figure for Table {
             Ok::<_, Error>(search.bank(&set.masks)?.mse(Decoder::DiscreteMap(&scene.grid))?)
         })?;
         let listed = ranking.iter().zip(&other).map(|(set, mse_dmap)| Listed {
-            masks: mask_text(&set.masks),
+            masks: joined(&set.masks, " "),
             mse_mmse: set.mse,
             mse_dmap: *mse_dmap,
         });
@@ -79,7 +79,7 @@ impl Figure for Table {
             let bank = scene.bank(masks)?;
             Ok(Set {
                 set,
-                masks: mask_text(masks),
+                masks: joined(masks, " "),
                 mse_mmse: bank.mse(Decoder::Mmse)?,
                 mse_dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
                 van_trees: optimal_weight_van_trees(&bank)?,

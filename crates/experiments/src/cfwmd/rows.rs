@@ -182,11 +182,11 @@ pub struct Rows<M, X = ()> {
 }
 
 impl<M: Field, X: Field> Field for Rows<M, X> {
-    fn describe(about: Column, to: &mut Described) {
+    fn describe(_: Column, to: &mut Described) {
         Vec::<M>::describe(Column::of("main", "", "The figure's own rows."), to);
         Vec::<Summary>::describe(Column::of("summary", "", "Averages over trials and steps."), to);
         Vec::<Paired>::describe(Column::of("paired", "", "Differences of schemes on the same trials."), to);
-        X::describe(about, to);
+        X::describe(Column::of("bound", "", "Bounds of any filter that receives these messages."), to);
     }
 
     fn put(&self, to: &mut Cells) {
