@@ -218,21 +218,16 @@ impl Figure for SelfTuning {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let shown = [
-            "Q / 9",
-            "9 Q",
-            "Q learnt from Q / 9",
-            "Q learnt from 9 Q",
-            "Q learnt, r / 4",
-            "Q learnt, 4 r",
-            "Q learnt from Q / 9, inverted bits",
-            "adaptive delta modulation",
-        ];
+        // All but those that need not learn.
+        let shown = RECEIVERS.iter().filter(|(_, kind, process, ..)| match kind {
+            Kind::Fixed => *process != 1.0,
+            kind => *kind != Kind::Informed,
+        });
         let names = PLANTS.map(|plant| Scene(plant, false).name());
         let place = |r: &Row| names.iter().position(|name| *name == r.plant).unwrap_or(0) as f64;
         let y = || Axis::log("error over that of knowing Q");
         let mut still = Panel::new("a, Q, r", Axis::categories("", names.clone()), y());
-        for (i, name) in shown.iter().enumerate() {
+        for (i, (name, ..)) in shown.enumerate() {
             let marks = rows.iter().filter(|r| r.receiver == *name && names.contains(&r.plant));
             let shift = 0.09 * (i as f64 - 3.5);
             let marker = [Marker::Cross, Marker::Circle][usize::from(name.contains("learnt"))];
