@@ -48,8 +48,8 @@ const BURN: usize = 40;
 const MEASURED: usize = 60;
 
 /// Steady mean squared distance of a filter's estimate from the exact posterior mean.
-fn steady_excess<F: ScalarFilter + Clone + Sync>(
-    filter: &F,
+fn steady_excess(
+    filter: &MultibitFilter,
     context: &Context<'_>,
     stream: Stream,
     trials: u64,
@@ -114,11 +114,7 @@ impl Figure for GapToExact {
                 let settled = model.steady_state(filter.information())?;
                 let error = chain::stationary(&model, &MessageLaw::word(&filter, settled.predicted_variance)?)?;
                 let stream = context.stream(self.about().id).named(&format!("{plant} {bits}"));
-                let one = DymboFilter::new(model);
-                let excess = match bits {
-                    1 => steady_excess(&one, context, stream, p.trials)?,
-                    _ => steady_excess(&filter, context, stream, p.trials)?,
-                };
+                let excess = steady_excess(&filter, context, stream, p.trials)?;
                 steady.push(Steady {
                     plant,
                     bits,
@@ -127,7 +123,9 @@ impl Figure for GapToExact {
                     excess,
                     mmse: error.filtered_mse - excess.value,
                     kurtosis: error.kurtosis,
-                    tuned_mse: (bits == 1).then(|| tuned_gain_mse(&one)).transpose()?,
+                    tuned_mse: (bits == 1)
+                        .then(|| tuned_gain_mse(&DymboFilter::new(model)))
+                        .transpose()?,
                 });
             }
         }
