@@ -1,6 +1,7 @@
 //! Beliefs over the cells of a floor plan: which cell holds a source of unknown rate, from steady readings of sensors.
 
 use fewbits_diffusive::{RateRange, RateSums};
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal::log_interval;
 
@@ -76,6 +77,9 @@ impl Instrument {
     }
 }
 
+/// Of some sensors the responses to a unit rate in each cell, and the readings, several of each.
+pub(super) type Sensed<'a> = (&'a [Vec<f64>], &'a [Vec<f64>]);
+
 /// The belief after some sensors.
 pub(super) struct PlanBelief {
     /// Probability of each cell.
@@ -87,18 +91,16 @@ pub(super) struct PlanBelief {
 }
 
 impl PlanBelief {
-    /// The belief of a uniform prior over cells, and over rates between `rates`, after the readings of some sensors (several of
-    /// each), whose responses per unit rate are given for each cell.
+    /// The belief of a uniform prior over cells, and over rates between `rates`, after what some sensors said.
     pub fn new(
         instrument: &Instrument,
         report: Report,
         rates: [f64; 2],
-        responses: &[Vec<f64>],
-        readings: &[Vec<f64>],
-    ) -> Result<Self, fewbits_numerics::ArgumentError> {
+        sensed: Sensed<'_>,
+    ) -> Result<Self, ArgumentError> {
         let (logs, misfit) = match report {
-            Report::Value => of_values(instrument, rates, responses, readings)?,
-            Report::Word => of_words(instrument, rates, responses, readings),
+            Report::Value => of_values(instrument, rates, sensed)?,
+            Report::Word => of_words(instrument, rates, sensed),
         };
         let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut weights: Vec<f64> = logs.iter().map(|log| (log - largest).exp()).collect();
@@ -119,9 +121,8 @@ impl PlanBelief {
 fn of_values(
     instrument: &Instrument,
     [low, high]: [f64; 2],
-    responses: &[Vec<f64>],
-    readings: &[Vec<f64>],
-) -> Result<(Vec<f64>, f64), fewbits_numerics::ArgumentError> {
+    (responses, readings): Sensed<'_>,
+) -> Result<(Vec<f64>, f64), ArgumentError> {
     let (range, samples) = (RateRange::new(low, high)?, readings.concat());
     let (mut logs, mut smallest) = (Vec::new(), f64::INFINITY);
     for cell in 0..responses[0].len() {
@@ -137,12 +138,7 @@ fn of_values(
     Ok((logs, (smallest - freedom) / (2.0 * freedom).sqrt()))
 }
 
-fn of_words(
-    instrument: &Instrument,
-    [low, high]: [f64; 2],
-    responses: &[Vec<f64>],
-    readings: &[Vec<f64>],
-) -> (Vec<f64>, f64) {
+fn of_words(instrument: &Instrument, [low, high]: [f64; 2], (responses, readings): Sensed<'_>) -> (Vec<f64>, f64) {
     // One row for each sensor: all its words together.
     let row = |readings: &Vec<f64>| {
         let mut row = vec![0.0; NODES];
@@ -222,7 +218,7 @@ mod tests {
         let response = |sensor| (0..cells).map(move |cell| 1.0 / (1.0 + 0.02 * distance(sensor, cell).powi(2)));
         let responses: Vec<Vec<f64>> = (0..20).map(|sensor| response(sensor).collect()).collect();
         let readings: Vec<Vec<f64>> = responses.iter().map(|a| vec![0.9 * a[31]; 3]).collect();
-        let (logs, _) = of_words(&instrument, rates, &responses, &readings);
+        let (logs, _) = of_words(&instrument, rates, (&responses, &readings));
         let count = ((rates[1] / rates[0]).ln() / RATE_STEP).ceil() as usize;
         let brute = |cell: usize| {
             let terms = (0..count).map(|k| {
