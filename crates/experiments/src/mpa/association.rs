@@ -2,8 +2,7 @@
 
 use crate::prelude::*;
 use fewbits_filters::Resampling;
-use fewbits_numerics::kernels::log_sum_exp;
-use fewbits_numerics::normal;
+use fewbits_numerics::kernels::{self, log_sum_exp};
 use fewbits_pf_mpa::association::{
     AssociationRule, Hypotheses, PRINTED_GAIN, PairTracker, separation, sigmoid, tanh_rule,
 };
@@ -122,7 +121,8 @@ fn cloud_step<R: Rng>(
     for x in clouds.iter_mut().flatten() {
         *x += WALK.sqrt() * rng.sample::<f64, _>(StandardNormal);
     }
-    let fit = |t: f64, z: f64| normal::log_pdf_with(z, t, variance);
+    // Constants cancel.
+    let fit = |t: f64, z: f64| -0.5 * (z - t) * (z - t) / variance;
     let pairs: Vec<[f64; 2]> = clouds[0].iter().zip(&clouds[1]).map(|(a, b)| [*a, *b]).collect();
     let straight: Vec<f64> = match rule {
         CloudRule::Tanh => {
@@ -137,15 +137,18 @@ fn cloud_step<R: Rng>(
             vec![sigmoid(evidence(z) - evidence([z[1], z[0]])); pairs.len()]
         }
     };
+    let mut log_orders: Vec<f64> = straight.iter().flat_map(|p| [*p, 1.0 - p]).collect();
+    kernels::ln(&mut log_orders);
     let mut means = [0.0; 2];
     for (i, cloud) in clouds.iter_mut().enumerate() {
-        let log_weight = |(t, p): (&[f64; 2], &f64)| {
-            let own = fit(t[i], z[i]) + p.ln();
-            log_sum_exp(&[own, fit(t[i], z[1 - i]) + (1.0 - p).ln()])
-        };
-        let logs: Vec<f64> = pairs.iter().zip(&straight).map(log_weight).collect();
-        let top = log_sum_exp(&logs);
-        let weights: Vec<f64> = logs.iter().map(|l| (l - top).exp()).collect();
+        let terms = pairs.iter().zip(log_orders.chunks(2));
+        let mut terms: Vec<f64> = terms
+            .flat_map(|(t, log)| [fit(t[i], z[i]) + log[0], fit(t[i], z[1 - i]) + log[1]])
+            .collect();
+        let top = log_sum_exp(&terms);
+        terms.iter_mut().for_each(|term| *term -= top);
+        kernels::exp(&mut terms);
+        let weights: Vec<f64> = terms.chunks(2).map(|orders| orders[0] + orders[1]).collect();
         means[i] = cloud.iter().zip(&weights).map(|(x, w)| x * w).sum();
         let mut ancestors = vec![0; cloud.len()];
         Resampling::Systematic.ancestors(rng, &weights, &mut ancestors)?;
