@@ -68,6 +68,10 @@ impl<T: Into<String>> Text for T {}
 pub trait Maybe<T = f64>: Into<Option<T>> {}
 impl<T, V: Into<Option<T>>> Maybe<T> for V {}
 
+/// Values one after the other, any of which may be absent.
+pub trait Series: IntoIterator<Item: Into<Option<f64>>> {}
+impl<S: IntoIterator<Item: Into<Option<f64>>>> Series for S {}
+
 macro_rules! comparisons {
     ($($name:ident $operator:tt),*) => {$(
         #[doc = concat!("`value ", stringify!($operator), " bound`.")]
@@ -105,9 +109,8 @@ impl Claims {
 
     /// What is claimed through this is made for the figure's own parameters only; skipped after `--set`.
     pub fn at_defaults(&self) -> Self {
-        let mut limited = self.clone();
-        limited.limits[0] = true;
-        limited
+        let limits = [true, self.limits[1]];
+        Self { limits, ..self.clone() }
     }
 
     /// What is claimed through this says at its end that it shows this erratum of `docs/errata.md`.
@@ -121,9 +124,8 @@ impl Claims {
     /// What is claimed through this can only be decided at the full trial count, skipped with fewer trials: what it compares is
     /// no plain average of trials.
     pub fn at_full_trials(&self) -> Self {
-        let mut limited = self.clone();
-        limited.limits[1] = true;
-        limited
+        let limits = [self.limits[0], true];
+        Self { limits, ..self.clone() }
     }
 
     fn decide(
@@ -184,12 +186,7 @@ impl Claims {
     comparisons! { at_most <=, at_least >=, below <, above > }
 
     /// Each value is strictly smaller than the next; the value is the number of neighbours that are not. At least two values.
-    pub fn increasing<V: Into<Option<f64>>>(
-        &self,
-        id: impl Text,
-        statement: impl Text,
-        values: impl IntoIterator<Item = V>,
-    ) {
+    pub fn increasing(&self, id: impl Text, statement: impl Text, values: impl Series) {
         let values: Option<Vec<f64>> = values.into_iter().map(Into::into).collect();
         let values = values.filter(|v| v.len() > 1);
         let broken = values.map(|v| v.windows(2).filter(|pair| !increases(pair[0], pair[1])).count() as f64);
@@ -197,12 +194,7 @@ impl Claims {
     }
 
     /// Each value is strictly larger than the next.
-    pub fn decreasing<V: Into<Option<f64>>>(
-        &self,
-        id: impl Text,
-        statement: impl Text,
-        values: impl IntoIterator<Item = V>,
-    ) {
+    pub fn decreasing(&self, id: impl Text, statement: impl Text, values: impl Series) {
         self.increasing(id, statement, values.into_iter().map(|v| v.into().map(|v: f64| -v)));
     }
 
@@ -216,13 +208,8 @@ impl Claims {
         errors: f64,
     ) {
         let z = estimate.into().and_then(|e| e.z_score(expected));
-        self.decide(
-            id,
-            statement,
-            z,
-            Expected::of(format_args!("{} within {errors} standard errors", Value::Number(expected))),
-            |z| z.abs() <= errors,
-        );
+        let condition = format!("{} within {errors} standard errors", Value::Number(expected));
+        self.decide(id, statement, z, Expected::Condition(condition), |z| z.abs() <= errors);
     }
 
     /// Every row's estimate is within `errors` of its standard errors of the row's expectation; the value is the largest

@@ -93,8 +93,8 @@ macro_rules! parameters {
 macro_rules! limits {
     ($($low:literal)? $(..= $high:literal)? $(; $($length:tt)*)?) => {
         $crate::Limits {
-            low: [$(stringify!($low))?].first().copied(),
-            high: [$(stringify!($high))?].first().copied(),
+            low: [$($low as f64)?].first().copied(),
+            high: [$($high as f64)?].first().copied(),
             length: [$($crate::limits!($($length)*))?].first().map(|length: &$crate::Limits| (length.low, length.high)),
         }
     };

@@ -9,16 +9,20 @@ use std::sync::{Mutex, PoisonError};
 pub struct Kept(Mutex<HashMap<String, Box<dyn Any + Send>>>);
 
 impl Kept {
-    /// What was stored under this name, if it is of this type.
-    pub fn get<T: Clone + 'static>(&self, name: &str) -> Option<T> {
-        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.get(name)?.downcast_ref().cloned()
-    }
-
-    /// Stores a value under a name that says all that it depends on.
-    pub fn put<T: Send + 'static>(&self, name: String, value: T) {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.insert(name, Box::new(value));
+    /// What was stored under this name and is of this type, or what `make` returns. The name says all that the value depends on.
+    pub(crate) fn once<T: Clone + Send + 'static, E>(
+        &self,
+        name: String,
+        make: impl FnOnce() -> Result<T, E>,
+    ) -> Result<T, E> {
+        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = all().get(&name).and_then(|known| known.downcast_ref::<T>().cloned());
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let made = make()?;
+        all().insert(name, Box::new(made.clone()));
+        Ok(made)
     }
 }
 
@@ -29,9 +33,10 @@ mod tests {
     #[test]
     fn a_value_comes_back_under_its_name_and_type_alone() {
         let kept = Kept::default();
-        kept.put("tracks".to_owned(), vec![1.0, 2.0]);
-        assert_eq!(kept.get::<Vec<f64>>("tracks"), Some(vec![1.0, 2.0]));
-        assert_eq!(kept.get::<Vec<u8>>("tracks"), None);
-        assert_eq!(kept.get::<Vec<f64>>("other"), None);
+        let numbers = |name: &str, made: f64| kept.once(name.to_owned(), || Ok::<_, ()>(vec![made]));
+        assert_eq!(numbers("tracks", 1.0), Ok(vec![1.0]));
+        assert_eq!(numbers("tracks", 2.0), Ok(vec![1.0]));
+        assert_eq!(numbers("other", 2.0), Ok(vec![2.0]));
+        assert_eq!(kept.once("tracks".to_owned(), || Err::<Vec<u8>, _>(())), Err(()));
     }
 }

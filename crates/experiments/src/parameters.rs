@@ -185,7 +185,7 @@ mod tests {
         assert_eq!(set("patterns", "01, 10").unwrap().patterns, ["01", "10"]);
         let (_, described) = described();
         assert_eq!(described[0].default, "0.5:0.1");
-        assert_eq!(described[0].range, "1 to 9 entries; a from -1.0 to 1.0; gamma from 1e-12 to 1e12");
+        assert_eq!(described[0].range, "1 to 9 entries; a from -1 to 1; gamma from 1e-12 to 1e12");
         assert_eq!(described[1].range, "at least 1 entries; from 2 to 64");
     }
 

@@ -6,7 +6,7 @@ pub(crate) use crate::plot::{Axis, Curve, Layer, Marker, Panel, Plot, points};
 pub(crate) use crate::reference;
 pub(crate) use crate::schema::Field;
 pub(crate) use crate::sweep::{distinct, first, joined, product, select};
-pub(crate) use crate::{About, Claims, Comparison, Context, Cost, Error, Figure, Measured, Quick};
+pub(crate) use crate::{About, Claims, Context, Cost, Error, Figure, Measured, Quick};
 pub(crate) use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing};
 pub(crate) use fewbits_monte_carlo::parallel;
 pub(crate) use fewbits_monte_carlo::{Moments, Stream, Trial};

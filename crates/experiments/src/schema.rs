@@ -128,9 +128,6 @@ pub struct Cells {
 /// A field of a row (a number, a label, a [`Measured`], an `Option` of these, another row, whose columns are then this row's too)
 /// or of a figure's tables (a list of rows). [`rows!`](crate::rows!) writes it for rows.
 pub trait Field {
-    /// Columns of the field.
-    const COLUMNS: usize = 1;
-
     /// Adds the columns of a field of this name, or the table.
     fn describe(about: Column, to: &mut Described) {
         to.columns.push(about);
@@ -168,8 +165,6 @@ cells! {
 }
 
 impl Field for Measured {
-    const COLUMNS: usize = 2;
-
     fn describe(about: Column, to: &mut Described) {
         let error = Column {
             name: format!("{}_se", about.name),
@@ -187,16 +182,12 @@ impl Field for Measured {
 
 /// No columns and no table.
 impl Field for () {
-    const COLUMNS: usize = 0;
-
     fn describe(_: Column, _: &mut Described) {}
 
     fn put(&self, _: &mut Cells) {}
 }
 
 impl<T: Field> Field for Option<T> {
-    const COLUMNS: usize = T::COLUMNS;
-
     fn describe(about: Column, to: &mut Described) {
         T::describe(about, to);
     }
@@ -204,15 +195,13 @@ impl<T: Field> Field for Option<T> {
     fn put(&self, to: &mut Cells) {
         match self {
             Some(field) => field.put(to),
-            None => to.cells.extend((0..T::COLUMNS).map(|_| Value::Missing)),
+            None => to.cells.extend(columns::<T>().iter().map(|_| Value::Missing)),
         }
     }
 }
 
 /// Columns of one meaning, numbered from 1.
 impl<T: Field, const N: usize> Field for [T; N] {
-    const COLUMNS: usize = N * T::COLUMNS;
-
     fn describe(about: Column, to: &mut Described) {
         for number in 1..=N {
             let name = format!("{}{number}", about.name);
@@ -228,8 +217,6 @@ impl<T: Field, const N: usize> Field for [T; N] {
 /// The main table has no name.
 impl<T: Field> Field for Vec<T> {
     fn describe(about: Column, to: &mut Described) {
-        let mut row = Described::default();
-        T::describe(Column::of("", "", ""), &mut row);
         let name = match to.tables.as_slice() {
             [] => "main".to_owned(),
             _ => about.name.replace('_', "-"),
@@ -237,7 +224,7 @@ impl<T: Field> Field for Vec<T> {
         to.tables.push(Table {
             name,
             meaning: about.meaning,
-            columns: row.columns,
+            columns: columns::<T>(),
             rows: Vec::new(),
         });
     }
@@ -250,6 +237,13 @@ impl<T: Field> Field for Vec<T> {
         };
         to.tables.push(self.iter().map(cells).collect());
     }
+}
+
+/// The columns that `T` describes.
+fn columns<T: Field>() -> Vec<Column> {
+    let mut all = Described::default();
+    T::describe(Column::of("", "", ""), &mut all);
+    all.columns
 }
 
 /// The tables that `T` describes.

@@ -31,14 +31,10 @@ impl Context<'_> {
         name: String,
         make: impl FnOnce() -> Result<T, Error>,
     ) -> Result<T, Error> {
-        if let Some(known) = self.kept.and_then(|kept| kept.get(&name)) {
-            return Ok(known);
+        match self.kept {
+            Some(kept) => kept.once(name, make),
+            None => make(),
         }
-        let made = make()?;
-        if let Some(kept) = self.kept {
-            kept.put(name, made.clone());
-        }
-        Ok(made)
     }
 
     /// The moments of each number that a trial gives, over `count` trials on the streams of `stream`.

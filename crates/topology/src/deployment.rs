@@ -13,7 +13,7 @@ pub struct Deployment {
 }
 
 impl Deployment {
-    /// A deployment of the given positions, in metres.
+    /// The given positions.
     ///
     /// # Errors
     /// If there is no position, or a coordinate is not finite.
@@ -41,7 +41,7 @@ impl Deployment {
         Self::given((0..nodes).map(|_| draw(rng, lower, upper)).collect())
     }
 
-    /// A regular grid of `counts` nodes along x and y, the outermost on the border. If an axis has a single node, it is in the middle.
+    /// A regular grid with nodes on the border; `counts` nodes along x and y. A single node of an axis stands in the middle.
     ///
     /// # Errors
     /// If a count is zero or `upper` does not exceed `lower`.
@@ -92,7 +92,7 @@ impl Deployment {
         best.1
     }
 
-    /// The same deployment with `node` moved to the position `to`.
+    /// The same deployment with one node elsewhere.
     ///
     /// # Errors
     /// If the node does not exist or the point is not finite.

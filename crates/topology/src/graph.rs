@@ -12,10 +12,10 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins nodes that are at most `range` apart. The nodes are sorted into the cells of a grid of that size.
+    /// Joins nodes that are at most `range` apart, by lists of the nodes in each cell of a grid of that size.
     ///
-    /// Time and memory are linear in nodes plus edges. If the field is much larger than the range times the root of the number of
-    /// nodes, the cells are larger, so that their number stays of the order of the number of nodes.
+    /// Time and memory are linear in nodes plus edges. A field that is far larger than the range times the root of the number of
+    /// nodes gets larger cells, so that their number stays of the order of the number of nodes.
     ///
     /// # Errors
     /// If a coordinate is not finite, `range` is not a positive number, or there are 2^32 nodes or more.

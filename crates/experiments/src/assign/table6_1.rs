@@ -36,9 +36,7 @@ rows! {
     }
 }
 
-type Failure = fewbits_sensor_assignment::Error;
-
-fn row(assign: &'static str, sensors: &CodedSensors, assignment: &[usize]) -> Result<Row, Failure> {
+fn row(assign: &'static str, sensors: &CodedSensors, assignment: &[usize]) -> Result<Row, Error> {
     let cost = pair_costs(sensors).cost(assignment)?;
     Ok(Row {
         assign,
@@ -51,41 +49,13 @@ fn row(assign: &'static str, sensors: &CodedSensors, assignment: &[usize]) -> Re
 }
 
 /// The three assignments of the thesis.
-fn three(sensors: &CodedSensors, variances: &[f64]) -> Result<Vec<Row>, Failure> {
+fn three(sensors: &CodedSensors, variances: &[f64]) -> Result<Vec<Row>, Error> {
     let best = pair_costs(sensors).solve();
     Ok(vec![
         row("I", sensors, &(0..variances.len()).collect::<Vec<_>>())?,
         row("II", sensors, &by_precision(variances))?,
         row("optimal", sensors, &best)?,
     ])
-}
-
-fn tables(variances: &[f64]) -> Result<Rows, Failure> {
-    let sensors = CodedSensors::with_variances(1.0, variances)?;
-    let mut assignments = three(&sensors, variances)?;
-    for (name, criterion) in [
-        ("best, centre", Estimator::CellCentre),
-        ("best, posterior mean", Estimator::PosteriorMean),
-    ] {
-        assignments.push(row(name, &sensors, &all_errors(&sensors, criterion)?.best)?);
-    }
-    let squares: Vec<f64> = variances.iter().map(|v| v * v).collect();
-    let as_deviations = three(&CodedSensors::with_variances(1.0, &squares)?, variances)?;
-    let matrix = pair_costs(&sensors);
-    let proof = matrix.certificate(&matrix.solve())?;
-    let cells = (0..matrix.size()).flat_map(|bit| (0..matrix.size()).map(move |sensor| (bit, sensor)));
-    let cost = |(bit, sensor): (usize, usize)| Cost {
-        bit: bit + 1,
-        sensor: sensor + 1,
-        gamma: matrix.get(bit, sensor).unwrap_or(f64::NAN),
-        dual_bit: proof.rows[bit],
-        dual_sensor: proof.columns[sensor],
-    };
-    Ok(Rows {
-        assignments,
-        costs: cells.map(cost).collect(),
-        as_deviations,
-    })
 }
 
 fn find<'a>(rows: &'a [Row], name: &str) -> Option<&'a Row> {
@@ -99,7 +69,32 @@ impl Figure for Table {
          sigma holds variances. The posterior mean of the same bits has a fifth less error.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        Ok(tables(&p.variances)?)
+        let variances = &p.variances;
+        let sensors = CodedSensors::with_variances(1.0, variances)?;
+        let mut assignments = three(&sensors, variances)?;
+        for (name, criterion) in [
+            ("best, centre", Estimator::CellCentre),
+            ("best, posterior mean", Estimator::PosteriorMean),
+        ] {
+            assignments.push(row(name, &sensors, &all_errors(&sensors, criterion)?.best)?);
+        }
+        let squares: Vec<f64> = variances.iter().map(|v| v * v).collect();
+        let as_deviations = three(&CodedSensors::with_variances(1.0, &squares)?, variances)?;
+        let matrix = pair_costs(&sensors);
+        let proof = matrix.certificate(&matrix.solve())?;
+        let cells = (0..matrix.size()).flat_map(|bit| (0..matrix.size()).map(move |sensor| (bit, sensor)));
+        let cost = |(bit, sensor): (usize, usize)| Cost {
+            bit: bit + 1,
+            sensor: sensor + 1,
+            gamma: matrix.get(bit, sensor).unwrap_or(f64::NAN),
+            dual_bit: proof.rows[bit],
+            dual_sensor: proof.columns[sensor],
+        };
+        Ok(Rows {
+            assignments,
+            costs: cells.map(cost).collect(),
+            as_deviations,
+        })
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {

@@ -11,11 +11,6 @@ swept! { 0.0 to 30.0, step 1.0 => quick 2.0,
     bits: Vec<usize> [1..=5; 1..=4] = vec![3, 4] => "Bits, and sensors.",
 }
 
-/// The masks of fixed thresholds, of natural and of Gray patterns: as many sensors as bits.
-fn sets(bits: usize) -> Result<[Vec<Mask>; 3], Error> {
-    Ok([vec![1 << (bits - 1); bits], natural_basis(bits)?, gray_basis(bits)?])
-}
-
 /// Where equation 5.13 has the same value for two sets, near where the thesis's curves cross.
 fn meet(bits: usize, name: &str, [a, b]: [&[Mask]; 2]) -> Result<Option<f64>, Error> {
     let Some(about) = reference::value(&format!("binary-fig5-6/crossing/{name} {bits} bits")) else {
@@ -62,7 +57,8 @@ impl Figure for PrintedBounds {
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let mut rows = Rows::default();
         for &bits in &p.bits {
-            let [fixed, natural, gray] = sets(bits)?;
+            // As many sensors as bits.
+            let (fixed, natural, gray) = (vec![1 << (bits - 1); bits], natural_basis(bits)?, gray_basis(bits)?);
             rows.sets.extend(each(&sweep(p.from_db, p.to_db, p.step_db), |snr_db| {
                 let scene = Scene::uniform(bits, snr_db)?;
                 let crlb = |masks: &[Mask]| Ok::<_, Error>(printed_crlb(&scene.bank(masks)?)?);

@@ -1,6 +1,6 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
-use super::{ERROR, SNR, Scene, descent_from, each, mask_text, sweep, swept};
+use super::{ERROR, SNR, Scene, descent_from, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::bounds::ConditionalMean;
 use fewbits_binary_patterns::published::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
@@ -31,7 +31,6 @@ rows! {
     pub struct Row by "{snr_db} dB" {
         snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
         lbqp_b3: f64 ["V^2"] => "Best linear patterns of three bits, exhaustive.",
-        masks_b3: String => "Their masks.",
         lbqp_best: f64 ["V^2"] => "Best linear patterns of any number of bits, by descent beyond three.",
         bits: usize => "That number of bits.",
         masks: String => "Their masks.",
@@ -49,7 +48,7 @@ rows! {
 fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
     let scene = Scene::uniform(3, snr_db)?;
     let coarse = scene.search(p.sensors)?.best()?;
-    let mut best = (3, coarse.masks.clone(), coarse.mse);
+    let mut best = (3, coarse.masks, coarse.mse);
     for bits in 4..=p.most_bits.min(p.sensors) {
         if 2.0 / f64::from(1u32 << bits) < FINEST_CELL * scene.noise {
             break;
@@ -69,10 +68,9 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
     Ok(Row {
         snr_db,
         lbqp_b3: coarse.mse,
-        masks_b3: mask_text(&coarse.masks),
         lbqp_best: best.2,
         bits: best.0,
-        masks: mask_text(&best.1),
+        masks: joined(&best.1, " "),
         fixed: fixed_threshold(scene.source, scene.noise, p.sensors)?.mmse()?,
         luo_soft: luo.ok().map(|errors| errors.soft),
         ribeiro_relaxed: multi_threshold_bound(&scene.source, scene.noise, p.sensors)?.bound,

@@ -1,6 +1,6 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
-use super::{SNR, Scene, crossing, each, mask_text, sweep, swept};
+use super::{SNR, Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
@@ -29,7 +29,6 @@ rows! {
         dr_per_n: f64 => "The same with the noise of the average.",
         vt: f64 => "Optimal-weight van Trees bound of the best basis.",
         mse_unconstrained: f64 => "Least error over all triples of masks.",
-        masks_unconstrained: String => "The best triple.",
         mse_signs: f64 => "Error of three sign bits.",
     }
 
@@ -55,14 +54,13 @@ impl Figure for GaussianSource {
             Ok(Row {
                 snr_db,
                 mse_opt: best.mse,
-                masks: mask_text(&best.masks),
+                masks: joined(&best.masks, " "),
                 mse_gray: scene.mmse(&GRAY)?,
                 mse_natural: scene.mmse(&[4, 2, 1])?,
                 dr_print: printed?,
                 dr_per_n: network_rate_distortion(&scene.source, scene.noise, SENSORS)?,
                 vt: optimal_weight_van_trees(&scene.bank(&best.masks)?)?,
                 mse_unconstrained: any.mse,
-                masks_unconstrained: mask_text(&any.masks),
                 mse_signs: scene.mmse(&[4, 4, 4])?,
             })
         })?;

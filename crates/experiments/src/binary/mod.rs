@@ -139,11 +139,6 @@ fn descent_from(
     Ok((best, found.mse))
 }
 
-/// Masks as text, in decreasing order of their first column: `4 6 3`.
-fn mask_text(masks: &[Mask]) -> String {
-    joined(masks, " ")
-}
-
 /// The pattern of a mask.
 fn pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
     Ok(linear_pattern(mask, bits)?)

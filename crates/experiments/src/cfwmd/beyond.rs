@@ -64,14 +64,8 @@ pub(crate) static LOSSY: Simulated<Linear, Step> = Simulated {
 const TWO: &str = "2 sensors";
 
 rows! {
-    /// Bounds beside the runs.
-    #[derive(Debug, Default)]
-    pub struct Bounds {
-        bound: Vec<Bound> => "Bounds of any filter that receives these messages.",
-    }
-
-    #[derive(Debug)]
-    struct Bound {
+    /// Bounds of any filter that receives these messages.
+    pub struct Bound {
         l: f64 ["messages/step"] => "Message budget.",
         sensors: u64 => "Number of sensors.",
         bound_m: f64 ["m"] => "Time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD).",
@@ -79,7 +73,7 @@ rows! {
     }
 }
 
-fn bounds(p: &Linear) -> Result<Bounds, Error> {
+fn bounds(p: &Linear) -> Result<Vec<Bound>, Error> {
     let row = |(l, sensors)| {
         let (bound_m, bound_centre_m) = (bound(p, l, sensors, true)?, bound(p, l, sensors, false)?);
         Ok(Bound {
@@ -91,15 +85,14 @@ fn bounds(p: &Linear) -> Result<Bounds, Error> {
     };
     let own = p.messages.iter().map(|l| (*l, p.sensors));
     let cases = own.chain([(1.0, 2), (2.0, 2)]).filter(|_| p.noise_variances.len() == 1);
-    let bound = cases.map(row).collect::<Result<_, Error>>()?;
-    Ok(Bounds { bound })
+    cases.map(row).collect()
 }
 
 fn world(sensors: u64) -> String {
     format!("{sensors} sensors")
 }
 
-pub(crate) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
+pub(crate) static SCHEDULED: Simulated<Linear, Step, Vec<Bound>> = Simulated {
     further: bounds,
     about: About::of("cfwmd-scheduled", "The rate of covariance feedback without the feedback", ""),
     caption: "A schedule of innovation variances, simulated once before deployment, meets the message budget and the \
@@ -125,7 +118,7 @@ pub(crate) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
     },
     claims: |rows, claims| {
         let name = |scheme: &str| format!("{scheme}, 4 sensors");
-        let bounds = &rows.further.bound;
+        let bounds = &rows.further;
         for l in BUDGETS {
             let rate = rows.at(&name("scheduled"), l).map(|r| r.rate.value);
             let what = format!("the schedule meets the budget l = {l} without covariance feedback");
@@ -150,7 +143,7 @@ pub(crate) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
         let own = world(setting.sensors);
         let all: Vec<&Summary> = select(&rows.summary, |r| r.run.world == own).collect();
         let bounds = || {
-            let own = select(&rows.further.bound, |b| b.sensors == setting.sensors);
+            let own = select(&rows.further, |b| b.sensors == setting.sensors);
             own.take(setting.messages.len())
         };
         let error = by_budget(&all, "Position error", "time-averaged RMSE / m", |r| r.position_rmse)

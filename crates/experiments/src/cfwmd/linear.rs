@@ -54,14 +54,6 @@ pub enum Scheme {
     NoFeedback(Method),
 }
 
-impl Scheme {
-    /// Whether it exists for scalar measurements only.
-    fn needs_scalars(self) -> bool {
-        use Method::{Centred, Unconditional};
-        matches!(self, Self::Trigger(_) | Self::NoFeedback(Centred | Unconditional))
-    }
-}
-
 impl Setting for Linear {
     type Scheme = Scheme;
 
@@ -85,7 +77,9 @@ impl Setting for Linear {
         if self.noise_variances.len() == 1 {
             Line::<1>::new(self, messages, schedule)?.simulate(context, stream, self.trials, at, schemes)
         } else {
-            let schemes: Vec<_> = schemes.iter().copied().filter(|(_, s)| !s.needs_scalars()).collect();
+            use Method::{Centred, Unconditional};
+            let mut schemes = schemes.to_vec();
+            schemes.retain(|(_, s)| !matches!(s, Scheme::Trigger(_) | Scheme::NoFeedback(Centred | Unconditional)));
             Line::<2>::new(self, messages, schedule)?.simulate(context, stream, self.trials, at, &schemes)
         }
     }

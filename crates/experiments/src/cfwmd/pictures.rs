@@ -16,20 +16,42 @@ pub trait Main: Field + Sized {
 
 impl Main for Step {
     fn of(_: &str, run: &Ensemble, _: &[Ensemble], _: bool) -> Vec<Self> {
-        let steps = run.records.first().map_or(0, |r| r.position.len());
+        let steps = run.trials.first().map_or(0, Vec::len);
         let row = |k: usize| Self {
             run: run.run.clone(),
             k: k + 1,
-            position_rmse: Measured::root_mean(&run.at(k, |r| &r.position)),
-            velocity_rmse: Measured::root_mean(&run.at(k, |r| &r.velocity)),
-            messages: run.at(k, |r| &r.sent).into(),
-            trials: run.records.len(),
+            position_rmse: Measured::root_mean(&run.at(k, |m| m.position)),
+            velocity_rmse: Measured::root_mean(&run.at(k, |m| m.velocity)),
+            messages: run.at(k, |m| m.sent).into(),
         };
         (0..steps).map(row).collect()
     }
 
-    fn plot(rows: &[Self]) -> Plot {
-        by_step(rows)
+    /// Position and velocity error against time, side by side; a row of panels for each world and budget, a curve for each scheme.
+    fn plot(steps: &[Self]) -> Plot {
+        let places = distinct(steps, |r| (r.run.world.clone(), r.run.l));
+        let schemes = distinct(steps, |r| r.run.scheme);
+        let mut panels = Vec::new();
+        for (world, l) in &places {
+            for part in BOTH {
+                let (axis, title) = match part {
+                    Part::Position => ("RMSE / m", "Position"),
+                    Part::Velocity => ("RMSE / (m/s)", "Velocity"),
+                };
+                let own = |r: &&Step| (&r.run.world, r.run.l) == (world, *l);
+                let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
+                    let rows = steps.iter().filter(own).filter(|r| r.run.scheme == *scheme);
+                    let marks: Vec<_> = rows.map(|r| (r.k as f64, r.rmse(part))).collect();
+                    (!marks.is_empty()).then(|| Layer::curve(*scheme, colour_of(scheme, order), marks))
+                });
+                // One scale for all budgets, so that heights can be compared.
+                let top = steps.iter().map(|r| r.rmse(part).value).fold(0.0, f64::max);
+                let axes = (Axis::linear("time step k"), Axis::linear(axis).between(0.0, 1.05 * top));
+                let title = format!("{title}, l = {l}{}", in_world(world));
+                panels.push(Panel::new(title, axes.0, axes.1).with_all(layers.flatten()));
+            }
+        }
+        Plot::grid(2, panels)
     }
 }
 
@@ -60,33 +82,6 @@ fn colour_of(scheme: &str, otherwise: usize) -> usize {
         "scheduled" => 6,
         _ => otherwise,
     }
-}
-
-/// Position and velocity error against time, side by side; a row of panels for each world and budget, a curve for each scheme.
-pub(super) fn by_step(steps: &[Step]) -> Plot {
-    let places = distinct(steps, |r| (r.run.world.clone(), r.run.l));
-    let schemes = distinct(steps, |r| r.run.scheme);
-    let mut panels = Vec::new();
-    for (world, l) in &places {
-        for part in BOTH {
-            let (axis, title) = match part {
-                Part::Position => ("RMSE / m", "Position"),
-                Part::Velocity => ("RMSE / (m/s)", "Velocity"),
-            };
-            let own = |r: &&Step| (&r.run.world, r.run.l) == (world, *l);
-            let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
-                let rows = steps.iter().filter(own).filter(|r| r.run.scheme == *scheme);
-                let marks: Vec<_> = rows.map(|r| (r.k as f64, r.rmse(part))).collect();
-                (!marks.is_empty()).then(|| Layer::curve(*scheme, colour_of(scheme, order), marks))
-            });
-            // One scale for all budgets, so that heights can be compared.
-            let top = steps.iter().map(|r| r.rmse(part).value).fold(0.0, f64::max);
-            let axes = (Axis::linear("time step k"), Axis::linear(axis).between(0.0, 1.05 * top));
-            let title = format!("{title}, l = {l}{}", in_world(world));
-            panels.push(Panel::new(title, axes.0, axes.1).with_all(layers.flatten()));
-        }
-    }
-    Plot::grid(2, panels)
 }
 
 /// A number of the summary against the budget, a curve for each scheme.

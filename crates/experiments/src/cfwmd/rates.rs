@@ -13,7 +13,6 @@ rows! {
         covariance: Measured ["messages/step"] => "Mean number of messages, state and covariance feedback (CFwMD2).",
         printed_state: Option<f64> ["messages/step"] => "The first as printed.",
         printed_covariance: Option<f64> ["messages/step"] => "The second as printed.",
-        trials: usize => "Trials.",
     }
 }
 
@@ -32,7 +31,6 @@ impl Main for Rates {
             covariance: covariance.rate(),
             printed_state: print("state"),
             printed_covariance: print("covariance"),
-            trials: run.records.len(),
         };
         let covariance = run.run.of("CFwMD2", all).filter(|_| run.run.scheme == "CFwMD");
         covariance.map(row).into_iter().collect()

@@ -4,53 +4,53 @@ use crate::Column;
 use crate::prelude::*;
 use crate::schema::{Cells, Described};
 
-/// One trial of one scheme, one entry a step.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Record {
+/// A step of a trial of one scheme.
+#[derive(Debug, Clone)]
+pub(super) struct Moment {
     /// Squared position error (m^2).
-    pub(super) position: Vec<f64>,
+    pub(super) position: f64,
     /// Squared velocity error (m^2/s^2).
-    pub(super) velocity: Vec<f64>,
+    pub(super) velocity: f64,
     /// Messages sent.
-    pub(super) sent: Vec<f64>,
-    /// Squared position error over its variance under the belief; empty where the belief has none to offer.
-    pub(super) consistency: Vec<f64>,
+    pub(super) sent: f64,
+    /// Squared position error over its variance under the belief, where the belief has one to offer.
+    pub(super) consistency: Option<f64>,
 }
 
 /// All trials of one scheme at one message budget in one world.
 #[derive(Debug, Clone)]
 pub struct Ensemble {
     pub(super) run: Run,
-    pub(super) records: Vec<Record>,
+    pub(super) trials: Vec<Vec<Moment>>,
 }
 
-/// One number of a record for each step.
-type Of = fn(&Record) -> &[f64];
+/// One number of a step.
+type Of = fn(&Moment) -> f64;
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+fn mean(trial: &[Moment], of: Of) -> f64 {
+    trial.iter().map(of).sum::<f64>() / trial.len().max(1) as f64
 }
 
 impl Ensemble {
     /// Over all trials at a step.
     pub(super) fn at(&self, k: usize, of: Of) -> Moments {
-        self.records.iter().map(|record| of(record)[k]).collect()
+        self.trials.iter().map(|trial| of(&trial[k])).collect()
     }
 
     /// Over all trials, averaged over the steps of each.
     fn averaged(&self, of: Of) -> Moments {
-        self.records.iter().map(|record| mean(of(record))).collect()
+        self.trials.iter().map(|trial| mean(trial, of)).collect()
     }
 
     /// The same of the difference from another scheme on the same trials.
     fn less(&self, other: &Self, of: Of) -> Moments {
-        let both = self.records.iter().zip(&other.records);
-        both.map(|(a, b)| mean(of(a)) - mean(of(b))).collect()
+        let both = self.trials.iter().zip(&other.trials);
+        both.map(|(a, b)| mean(a, of) - mean(b, of)).collect()
     }
 
     /// Mean number of messages a step.
     pub(super) fn rate(&self) -> Measured {
-        self.averaged(|r| &r.sent).into()
+        self.averaged(|m| m.sent).into()
     }
 }
 
@@ -104,7 +104,6 @@ rows! {
         pub(super) position_rmse: Measured ["m"] => "Root mean squared position error.",
         pub(super) velocity_rmse: Measured ["m/s"] => "Root mean squared velocity error.",
         pub(super) messages: Measured => "Mean number of messages in this step.",
-        pub(super) trials: usize => "Trials.",
     }
 
     /// One run, averaged over its steps.
@@ -126,7 +125,6 @@ rows! {
         pub(super) l: f64 ["messages/step"] => "Message budget.",
         pub(super) position: Measured ["m^2"] => "Mean squared position error of the first minus that of the second.",
         pub(super) velocity: Measured ["m^2/s^2"] => "The same of the velocity.",
-        trials: u64 => "Trials.",
     }
 }
 
@@ -141,14 +139,14 @@ impl Step {
 
 impl Summary {
     pub(super) fn of(e: &Ensemble) -> Self {
-        let consistent = e.records.iter().all(|r| !r.consistency.is_empty());
+        let consistent = e.trials.iter().flatten().all(|m| m.consistency.is_some());
         Self {
             run: e.run.clone(),
-            position_rmse: Measured::root_mean(&e.averaged(|r| &r.position)),
-            velocity_rmse: Measured::root_mean(&e.averaged(|r| &r.velocity)),
+            position_rmse: Measured::root_mean(&e.averaged(|m| m.position)),
+            velocity_rmse: Measured::root_mean(&e.averaged(|m| m.velocity)),
             rate: e.rate(),
-            nees: consistent.then(|| e.averaged(|r| &r.consistency).into()),
-            trials: e.records.len(),
+            nees: consistent.then(|| e.averaged(|m| m.consistency.unwrap_or_default()).into()),
+            trials: e.trials.len(),
         }
     }
 }
@@ -159,15 +157,13 @@ pub(super) fn paired(ensembles: &[Ensemble], pairs: &[(&'static str, &'static st
         let firsts = select(ensembles, move |e| e.run.scheme == first);
         firsts.filter_map(move |a| {
             let b = a.run.of(second, ensembles)?;
-            let position = a.less(b, |r| &r.position);
             Some(Paired {
                 first,
                 second,
                 world: a.run.world.clone(),
                 l: a.run.l,
-                position: position.into(),
-                velocity: a.less(b, |r| &r.velocity).into(),
-                trials: position.count(),
+                position: a.less(b, |m| m.position).into(),
+                velocity: a.less(b, |m| m.velocity).into(),
             })
         })
     };
@@ -186,11 +182,11 @@ pub struct Rows<M, X = ()> {
 }
 
 impl<M: Field, X: Field> Field for Rows<M, X> {
-    fn describe(about: Column, to: &mut Described) {
+    fn describe(_: Column, to: &mut Described) {
         Vec::<M>::describe(Column::of("main", "", "The figure's own rows."), to);
         Vec::<Summary>::describe(Column::of("summary", "", "Averages over trials and steps."), to);
         Vec::<Paired>::describe(Column::of("paired", "", "Differences of schemes on the same trials."), to);
-        X::describe(about, to);
+        X::describe(Column::of("bound", "", "Bounds of any filter that receives these messages."), to);
     }
 
     fn put(&self, to: &mut Cells) {

@@ -36,11 +36,6 @@ fn both(
     Ok(all)
 }
 
-/// Names of the publication's two worlds.
-fn worlds() -> [String; 2] {
-    [world(1.0), world(STATED)]
-}
-
 pub(crate) static FIG4: Simulated<Linear, Step> = Simulated {
     about: About::of("cfwmd-fig4", "Vector measurements, state feedback", "CFwMD paper, figure 4"),
     caption: "Position and velocity measured by two sensors that share one message a step. The order of the schemes is \
@@ -56,7 +51,7 @@ pub(crate) static FIG4: Simulated<Linear, Step> = Simulated {
         Ok(all)
     },
     claims: |rows, claims| {
-        for world in &worlds() {
+        for world in &[1.0, STATED].map(world) {
             for pair in FIG4.pairs {
                 rows.beats(claims, *pair, (world, 1.0), &[Part::Position]);
             }
@@ -113,7 +108,7 @@ pub(crate) static FIG6: Simulated<Linear, Step> = Simulated {
                 scheme: SAME_TRIALS,
                 ..e.run.clone()
             },
-            records: e.records.iter().take(few.trials as usize).cloned().collect(),
+            trials: e.trials.iter().take(few.trials as usize).cloned().collect(),
         };
         let same: Vec<_> = all.iter().filter(|e| e.run.scheme == "CFwMD").map(first).collect();
         all.extend(both(context, &few, &exact, &exact)?);
@@ -122,7 +117,7 @@ pub(crate) static FIG6: Simulated<Linear, Step> = Simulated {
     },
     shown: |p, run| run.world == world(p.acceleration_variance) && run.scheme != SAME_TRIALS,
     claims: |rows, claims| {
-        for world in &worlds() {
+        for world in &[1.0, STATED].map(world) {
             rows.beats(claims, ("CFwMD", "CFoMD"), (world, 1.0), &[Part::Position]);
             let ratio = rows.ratio(&format!("exact, {world}"), &format!("{SAME_TRIALS}, {world}"), 1.0);
             let what = format!("the joint Gaussian belief is as good as the exact filter, {world} (erratum cfwmd-15)");

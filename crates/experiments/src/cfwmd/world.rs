@@ -1,6 +1,6 @@
 //! What the worlds share: truth, measurements and coins of a trial, and every scheme on every trial.
 
-use super::rows::{Ensemble, Record, Run};
+use super::rows::{Ensemble, Moment, Run};
 use crate::prelude::*;
 
 /// What all schemes of one trial share, an entry a step.
@@ -86,24 +86,26 @@ pub(super) trait World<const D: usize, const M: usize>: Sync {
         (world, messages): (&str, f64),
         schemes: &[(&'static str, Self::Scheme)],
     ) -> Result<Vec<Ensemble>, Error> {
-        let run = |scheme: Self::Scheme, draws: &Draws<D, M>, stream: Stream| -> Result<Record, Error> {
+        let run = |scheme: Self::Scheme, draws: &Draws<D, M>, stream: Stream| -> Result<Vec<Moment>, Error> {
             let mut centre = self.centre(scheme, draws, stream)?;
-            let mut record = Record::default();
-            for (k, truth) in draws.truth.iter().enumerate() {
+            let step = |(k, truth): (usize, &SVector<f64, D>)| {
                 let known = centre(k)?;
                 let squared = (truth - known.mean).map(|error| error * error);
-                record.position.push(squared.iter().step_by(2).sum());
-                record.velocity.push(squared.iter().skip(1).step_by(2).sum());
-                record.sent.push(known.sent as f64);
-                let consistency = known.variance.map(|variance| squared[0] / variance);
-                record.consistency.extend(consistency);
-            }
-            Ok(record)
+                Ok(Moment {
+                    position: squared.iter().step_by(2).sum(),
+                    velocity: squared.iter().skip(1).step_by(2).sum(),
+                    sent: known.sent as f64,
+                    consistency: known.variance.map(|variance| squared[0] / variance),
+                })
+            };
+            draws.truth.iter().enumerate().map(step).collect()
         };
-        let every = |it: Trial| -> Result<Vec<Record>, Error> {
+        let every = |it: Trial| -> Result<Vec<Vec<Moment>>, Error> {
             let draws = self.draw(it.stream);
-            let records = schemes.iter().map(|(_, scheme)| run(*scheme, &draws, it.stream));
-            records.collect()
+            schemes
+                .iter()
+                .map(|(_, scheme)| run(*scheme, &draws, it.stream))
+                .collect()
         };
         let mut trials = context.trials(stream, trials, every)?;
         let of = |(place, (scheme, _)): (usize, &(&'static str, Self::Scheme))| Ensemble {
@@ -112,7 +114,7 @@ pub(super) trait World<const D: usize, const M: usize>: Sync {
                 world: world.to_owned(),
                 l: messages,
             },
-            records: trials.iter_mut().map(|t| std::mem::take(&mut t[place])).collect(),
+            trials: trials.iter_mut().map(|t| std::mem::take(&mut t[place])).collect(),
         };
         Ok(schemes.iter().enumerate().map(of).collect())
     }

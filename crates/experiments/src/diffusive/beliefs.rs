@@ -89,66 +89,6 @@ pub static FIG6: Lobes = Lobes {
     form: Some(LPG),
 };
 
-fn fields(p: &Parameters, context: &Context<'_>, form: Option<Form>) -> Result<Fields, Error> {
-    let settings = Settings::default();
-    let mut shown = None;
-    for deployment in p.deployment..p.deployment + 100 {
-        context.check()?;
-        let outcome = Scheme::exact(p.nodes).run(&settings, context.stream(CHAINS).indexed(deployment))?;
-        let Some(posterior) = outcome.posterior else {
-            continue;
-        };
-        let apart = lobes(&posterior)?;
-        if shown.as_ref().is_none_or(|(_, _, most)| apart > *most) {
-            shown = Some((deployment, posterior, apart));
-        }
-        if apart > 4.0 {
-            break;
-        }
-    }
-    let Some((deployment, posterior, apart)) = shown else {
-        return Err(Error::Table("no search gave a belief".to_owned()));
-    };
-    let projected = form.map(|form| project(&posterior, form, &POSITION_ONLY));
-    let belief = projected.transpose()?.flatten();
-    let (lower, upper) = posterior.cells.bounds();
-    let at = |d: usize, i: usize| {
-        let (low, high) = (lower[d] - 0.05 * (upper[d] - lower[d]), upper[d] + 0.05 * (upper[d] - lower[d]));
-        low + (high - low) * (i as f64 + 0.5) / p.grid as f64
-    };
-    let density = |x: &Vector2<f64>| match &belief {
-        Some(Travelling::Position(belief)) => belief.log_density(x).exp(),
-        _ => posterior.cells.log_density(x).exp(),
-    };
-    let places = (0..p.grid).flat_map(|j| (0..p.grid).map(move |i| (i, j)));
-    let field = places.map(|(i, j)| {
-        let x = Vector2::new(at(0, i), at(1, j));
-        Point {
-            x: x.x,
-            y: x.y,
-            p: density(&x),
-            exact: posterior.cells.log_density(&x).exp(),
-        }
-    });
-    let field = field.collect();
-    let forms = [
-        ("gaussian", Form::Gaussian),
-        ("gmm-2", Form::Mixture(2)),
-        ("lpg-2x5", LPG),
-    ];
-    let divergence = |(name, form): (&'static str, Form)| -> Result<Divergence, Error> {
-        Ok(Divergence {
-            deployment,
-            form: name,
-            scalars: form.scalars(&POSITION_ONLY).unwrap_or(0),
-            kl: divergence(&posterior, form)?,
-            lobes: apart,
-        })
-    };
-    let divergences = forms.into_iter().map(divergence).collect::<Result<_, _>>()?;
-    Ok(Fields { field, divergences })
-}
-
 /// Decades of the density that are shown.
 const DECADES: f64 = 4.0;
 
@@ -173,7 +113,63 @@ impl Figure for Lobes {
     figure!(Parameters => Fields, about);
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Fields, Error> {
-        fields(p, context, self.form)
+        let settings = Settings::default();
+        let mut shown = None;
+        for deployment in p.deployment..p.deployment + 100 {
+            context.check()?;
+            let outcome = Scheme::exact(p.nodes).run(&settings, context.stream(CHAINS).indexed(deployment))?;
+            let Some(posterior) = outcome.posterior else {
+                continue;
+            };
+            let apart = lobes(&posterior)?;
+            if shown.as_ref().is_none_or(|(_, _, most)| apart > *most) {
+                shown = Some((deployment, posterior, apart));
+            }
+            if apart > 4.0 {
+                break;
+            }
+        }
+        let Some((deployment, posterior, apart)) = shown else {
+            return Err(Error::Table("no search gave a belief".to_owned()));
+        };
+        let projected = self.form.map(|form| project(&posterior, form, &POSITION_ONLY));
+        let belief = projected.transpose()?.flatten();
+        let (lower, upper) = posterior.cells.bounds();
+        let at = |d: usize, i: usize| {
+            let (low, high) = (lower[d] - 0.05 * (upper[d] - lower[d]), upper[d] + 0.05 * (upper[d] - lower[d]));
+            low + (high - low) * (i as f64 + 0.5) / p.grid as f64
+        };
+        let density = |x: &Vector2<f64>| match &belief {
+            Some(Travelling::Position(belief)) => belief.log_density(x).exp(),
+            _ => posterior.cells.log_density(x).exp(),
+        };
+        let places = (0..p.grid).flat_map(|j| (0..p.grid).map(move |i| (i, j)));
+        let field = places.map(|(i, j)| {
+            let x = Vector2::new(at(0, i), at(1, j));
+            Point {
+                x: x.x,
+                y: x.y,
+                p: density(&x),
+                exact: posterior.cells.log_density(&x).exp(),
+            }
+        });
+        let field = field.collect();
+        let forms = [
+            ("gaussian", Form::Gaussian),
+            ("gmm-2", Form::Mixture(2)),
+            ("lpg-2x5", LPG),
+        ];
+        let divergence = |(name, form): (&'static str, Form)| -> Result<Divergence, Error> {
+            Ok(Divergence {
+                deployment,
+                form: name,
+                scalars: form.scalars(&POSITION_ONLY).unwrap_or(0),
+                kl: divergence(&posterior, form)?,
+                lobes: apart,
+            })
+        };
+        let divergences = forms.into_iter().map(divergence).collect::<Result<_, _>>()?;
+        Ok(Fields { field, divergences })
     }
 
     fn claims(&self, _: &Parameters, rows: &Fields, claims: &mut Claims) {

@@ -106,16 +106,12 @@ impl<'a> Placement<'a> {
         }
         let points: Vec<[f64; 3]> = sensors.iter().map(|cell| building.centre(*cell)).collect();
         let field = SensorField::steady(&building.transport, &points)?;
-        let indoors: Vec<Vec<f64>> = (0..count)
-            .filter_map(|sensor| field.response(sensor, 0).map(<[f64]>::to_vec))
-            .collect();
+        let indoors = (0..count).filter_map(|sensor| field.response(sensor, 0).map(<[f64]>::to_vec));
+        let indoors: Vec<Vec<f64>> = indoors.collect();
         let centres: Vec<Vector3<f64>> = (0..cells).map(|cell| building.centre(cell).into()).collect();
         let free = |point: &[f64; 3]| -> Vec<f64> {
-            let at = Vector3::from(*point);
-            centres
-                .iter()
-                .map(|cell| building.free.concentration(&at, cell, 1e9))
-                .collect()
+            let concentration = |cell| building.free.concentration(&Vector3::from(*point), cell, 1e9);
+            centres.iter().map(concentration).collect()
         };
         let free = points.iter().map(free).collect();
         // The typical concentration and the thresholds: quantiles over all sensors and places of the source at rate one.
@@ -127,9 +123,8 @@ impl<'a> Placement<'a> {
         let mut noise = stream.named("noise").rng();
         let rate = rng.random_range(RATES[0]..RATES[1]);
         let mut read = |clean: f64| -> Vec<f64> {
-            (0..case.readings)
-                .map(|_| clean + instrument.noise * noise.sample::<f64, _>(StandardNormal))
-                .collect()
+            let one = |_| clean + instrument.noise * noise.sample::<f64, _>(StandardNormal);
+            (0..case.readings).map(one).collect()
         };
         let readings = indoors.iter().map(|row| read(rate * row[source])).collect();
         Ok(Self {
@@ -145,8 +140,8 @@ impl<'a> Placement<'a> {
 
     /// The belief after the first `count` sensors, in the building (0) or in free space (1).
     pub(super) fn belief(&self, model: usize, count: usize) -> Result<PlanBelief, Error> {
-        let (responses, rates) = (&self.responses[model][..count], [RATES, FREE_RATES][model]);
-        Ok(PlanBelief::new(&self.instrument, self.report, rates, responses, &self.readings[..count])?)
+        let sensed = (&self.responses[model][..count], &self.readings[..count]);
+        Ok(PlanBelief::new(&self.instrument, self.report, [RATES, FREE_RATES][model], sensed)?)
     }
 
     /// Distance of the most probable cell from the source.

@@ -43,10 +43,8 @@ impl Figure for Bytes {
     }
 
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Summary>, Error> {
-        let schemes = schemes();
-        let all = tracks(context, p, &schemes)?;
-        let each = schemes.iter().zip(&all);
-        each.map(|(scheme, tracks)| summary(scheme, p, tracks)).collect()
+        let of = |scheme: &Scheme| summary(scheme, p, &tracks(context, p, scheme)?);
+        schemes().iter().map(of).collect()
     }
 
     fn claims(&self, _: &Settings, rows: &Vec<Summary>, claims: &mut Claims) {

@@ -18,10 +18,9 @@ fn at<'a>(rows: &'a Rows, scheme: &str, range: f64, step: usize) -> Option<&'a C
 }
 
 fn references(rows: &Rows, claims: &mut Claims) {
-    let summary = || rows.summary.iter();
-    claims.keyed("reach", "share that reaches the threshold", summary(), |r| r.reach);
-    claims.keyed("nodes_median", "median nodes to the threshold", summary(), |r| r.nodes_median);
-    claims.keyed("final_err_median", "median error at the end", summary(), |r| r.final_err_median);
+    claims.keyed("reach", "share that reaches the threshold", &rows.summary, |r| r.reach);
+    claims.keyed("nodes_median", "median nodes to the threshold", &rows.summary, |r| r.nodes_median);
+    claims.keyed("final_err_median", "median error at the end", &rows.summary, |r| r.final_err_median);
 }
 
 fn calibrated(rows: &Rows, claims: &mut Claims, key: &str) {

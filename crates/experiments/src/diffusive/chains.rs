@@ -129,15 +129,13 @@ impl Figure for Chains {
     }
 
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Rows, Error> {
-        let schemes = self.schemes();
-        let all = tracks(context, p, &schemes)?;
-        let each = || schemes.iter().zip(&all);
-        Ok(Rows {
-            curves: each().flat_map(|(scheme, tracks)| curve(scheme, tracks)).collect(),
-            summary: each()
-                .map(|(scheme, tracks)| summary(scheme, p, tracks))
-                .collect::<Result<_, _>>()?,
-        })
+        let (mut curves, mut ends) = (Vec::new(), Vec::new());
+        for scheme in self.schemes() {
+            let tracks = tracks(context, p, &scheme)?;
+            curves.extend(curve(&scheme, &tracks));
+            ends.push(summary(&scheme, p, &tracks)?);
+        }
+        Ok(Rows { curves, summary: ends })
     }
 
     fn claims(&self, _: &Settings, rows: &Rows, claims: &mut Claims) {

@@ -1,6 +1,5 @@
 //! What the figures of this system share: the two examples, networks, searches, and statistics of many searches.
 
-use crate::kept::Kept;
 use crate::prelude::*;
 use fewbits_diffusive::message::Wire;
 use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Search, SearchBox, SelectionRule, SourceSensor, Status};
@@ -268,31 +267,19 @@ impl Track {
 /// The experiment of all searches: every figure sees the same deployments and noise.
 pub(super) const CHAINS: &str = "diffusive-chains";
 
-/// Every scheme on every trial: `tracks[scheme][trial]`.
-pub(super) fn tracks(context: &Context<'_>, settings: &Settings, schemes: &[Scheme]) -> Result<Vec<Vec<Track>>, Error> {
-    // All that the tracks of a scheme depend on; its name is none of it.
-    let name = |scheme: &Scheme| {
-        let unnamed = Scheme {
-            name: "",
-            place: 0,
-            ..*scheme
-        };
-        format!("{CHAINS} {} {settings:?} {unnamed:?}", context.seed)
+/// A scheme on every trial, computed once for all figures of a run.
+pub(super) fn tracks(context: &Context<'_>, settings: &Settings, scheme: &Scheme) -> Result<Vec<Track>, Error> {
+    // All that the tracks depend on; the scheme's name is none of it.
+    let unnamed = Scheme {
+        name: "",
+        place: 0,
+        ..*scheme
     };
-    let own = Kept::default();
-    let kept = context.kept.unwrap_or(&own);
-    let missing: Vec<&Scheme> = select(schemes, |s| kept.get::<Vec<Track>>(&name(s)).is_none()).collect();
-    let every = |trial: Trial| -> Result<Vec<Track>, Error> {
-        let one = |scheme: &&Scheme| Ok(Track::of(&scheme.run(settings, trial.stream)?, &scheme.example.source()));
-        missing.iter().map(one).collect()
-    };
-    if !missing.is_empty() {
-        let new = context.trials(context.stream(CHAINS), settings.trials, every)?;
-        for (i, scheme) in missing.iter().enumerate() {
-            kept.put(name(scheme), new.iter().map(|tracks| tracks[i].clone()).collect::<Vec<_>>());
-        }
-    }
-    Ok(schemes.iter().filter_map(|scheme| kept.get(&name(scheme))).collect())
+    let source = scheme.example.source();
+    let one = |trial: Trial| Ok(Track::of(&scheme.run(settings, trial.stream)?, &source));
+    context.once(format!("{CHAINS} {} {settings:?} {unnamed:?}", context.seed), || {
+        context.trials(context.stream(CHAINS), settings.trials, one)
+    })
 }
 
 /// The quantile of unsorted values; none of none.

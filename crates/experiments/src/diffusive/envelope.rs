@@ -120,17 +120,13 @@ impl Figure for Envelope {
                     truth: radius + (source - origin).dot(&Vector2::new(angle.cos(), angle.sin())),
                 });
             }
-            for j in 0..GRID {
-                for i in 0..GRID {
-                    let place = Vector2::new(i as f64 + 0.5, j as f64 + 0.5) * (100.0 / GRID as f64);
-                    let p_exceed = area.exceedance(&place, p.time, p.threshold)?;
-                    exceedance.push(Exceedance {
-                        x: place.x,
-                        y: place.y,
-                        p_exceed,
-                    });
-                }
-            }
+            let cell = |i: usize| {
+                let place = Vector2::new((i % GRID) as f64 + 0.5, (i / GRID) as f64 + 0.5) * (100.0 / GRID as f64);
+                let p_exceed = area.exceedance(&place, p.time, p.threshold)?;
+                let [x, y] = place.into();
+                Ok(Exceedance { x, y, p_exceed })
+            };
+            exceedance = (0..GRID * GRID).map(cell).collect::<Result<_, Error>>()?;
         }
         Ok(Rows {
             band,

@@ -1,6 +1,7 @@
 //! Beliefs over the cells of a floor plan: which cell holds a source of unknown rate, from steady readings of sensors.
 
 use fewbits_diffusive::{RateRange, RateSums};
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal::log_interval;
 
@@ -20,7 +21,7 @@ const NODES: usize = 4096;
 /// Distance of the rates, in their logarithm, at which the likelihood of words is averaged: below the least width that words leave.
 const RATE_STEP: f64 = 0.027;
 /// Sensors between two tests whether a cell still matters.
-const BLOCK: usize = 8;
+const BLOCK: usize = 4;
 /// A cell whose log likelihood is below that of the best by more than this has no weight.
 const NEGLIGIBLE: f64 = 60.0;
 
@@ -28,7 +29,8 @@ const NEGLIGIBLE: f64 = 60.0;
 pub(super) struct Instrument {
     pub noise: f64,
     pub thresholds: [f64; THRESHOLDS],
-    largest: f64,
+    /// Nodes of the table per unit of concentration.
+    density: f64,
     /// `ln p(word | clean concentration)` at the nodes, for each word.
     table: Vec<Vec<f64>>,
 }
@@ -49,7 +51,7 @@ impl Instrument {
         Self {
             noise,
             thresholds,
-            largest,
+            density: (NODES - 1) as f64 / largest,
             table: table.collect(),
         }
     }
@@ -61,12 +63,8 @@ impl Instrument {
     /// A row of the table, or a sum of rows, between nodes.
     #[inline(always)]
     fn look_up(&self, row: &[f64], clean: f64) -> f64 {
-        let position = (clean / self.largest).clamp(0.0, 1.0) * (NODES - 1) as f64;
-        let low = if position < (NODES - 2) as f64 {
-            position as usize
-        } else {
-            NODES - 2
-        };
+        let position = (clean * self.density).clamp(0.0, (NODES - 1) as f64);
+        let low = (position as usize).min(NODES - 2);
         row[low] + (position - low as f64) * (row[low + 1] - row[low])
     }
 
@@ -75,6 +73,9 @@ impl Instrument {
         std::array::from_fn(|word| self.look_up(&self.table[word], clean).exp())
     }
 }
+
+/// Of some sensors the responses to a unit rate in each cell, and the readings, several of each.
+pub(super) type Sensed<'a> = (&'a [Vec<f64>], &'a [Vec<f64>]);
 
 /// The belief after some sensors.
 pub(super) struct PlanBelief {
@@ -87,18 +88,16 @@ pub(super) struct PlanBelief {
 }
 
 impl PlanBelief {
-    /// The belief of a uniform prior over cells, and over rates between `rates`, after the readings of some sensors (several of
-    /// each), whose responses per unit rate are given for each cell.
+    /// The belief of a uniform prior over cells, and over rates between `rates`, after what some sensors said.
     pub fn new(
         instrument: &Instrument,
         report: Report,
         rates: [f64; 2],
-        responses: &[Vec<f64>],
-        readings: &[Vec<f64>],
-    ) -> Result<Self, fewbits_numerics::ArgumentError> {
+        sensed: Sensed<'_>,
+    ) -> Result<Self, ArgumentError> {
         let (logs, misfit) = match report {
-            Report::Value => of_values(instrument, rates, responses, readings)?,
-            Report::Word => of_words(instrument, rates, responses, readings),
+            Report::Value => of_values(instrument, rates, sensed)?,
+            Report::Word => of_words(instrument, rates, sensed),
         };
         let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut weights: Vec<f64> = logs.iter().map(|log| (log - largest).exp()).collect();
@@ -119,9 +118,8 @@ impl PlanBelief {
 fn of_values(
     instrument: &Instrument,
     [low, high]: [f64; 2],
-    responses: &[Vec<f64>],
-    readings: &[Vec<f64>],
-) -> Result<(Vec<f64>, f64), fewbits_numerics::ArgumentError> {
+    (responses, readings): Sensed<'_>,
+) -> Result<(Vec<f64>, f64), ArgumentError> {
     let (range, samples) = (RateRange::new(low, high)?, readings.concat());
     let (mut logs, mut smallest) = (Vec::new(), f64::INFINITY);
     for cell in 0..responses[0].len() {
@@ -137,12 +135,7 @@ fn of_values(
     Ok((logs, (smallest - freedom) / (2.0 * freedom).sqrt()))
 }
 
-fn of_words(
-    instrument: &Instrument,
-    [low, high]: [f64; 2],
-    responses: &[Vec<f64>],
-    readings: &[Vec<f64>],
-) -> (Vec<f64>, f64) {
+fn of_words(instrument: &Instrument, [low, high]: [f64; 2], (responses, readings): Sensed<'_>) -> (Vec<f64>, f64) {
     // One row for each sensor: all its words together.
     let row = |readings: &Vec<f64>| {
         let mut row = vec![0.0; NODES];
@@ -222,7 +215,7 @@ mod tests {
         let response = |sensor| (0..cells).map(move |cell| 1.0 / (1.0 + 0.02 * distance(sensor, cell).powi(2)));
         let responses: Vec<Vec<f64>> = (0..20).map(|sensor| response(sensor).collect()).collect();
         let readings: Vec<Vec<f64>> = responses.iter().map(|a| vec![0.9 * a[31]; 3]).collect();
-        let (logs, _) = of_words(&instrument, rates, &responses, &readings);
+        let (logs, _) = of_words(&instrument, rates, (&responses, &readings));
         let count = ((rates[1] / rates[0]).ln() / RATE_STEP).ceil() as usize;
         let brute = |cell: usize| {
             let terms = (0..count).map(|k| {

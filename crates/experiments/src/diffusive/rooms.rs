@@ -40,7 +40,6 @@ rows! {
         free_within_two_cells: Measured => "As the first, if free space is assumed.",
         /// Of the placements in which free space misses, the share in which it is said to be wrong.
         free_misses_flagged: Measured,
-        error_median: Measured ["m"] => "Median distance of the most probable cell from the source.",
     }
 
     struct Visit {
@@ -284,6 +283,5 @@ fn summary(case: String, all: &[[Judged; 2]]) -> Found {
         false_alarms: fraction(count(|[own, _]| own.alarm), all.len()),
         free_within_two_cells: fraction(count(|[_, free]| free.error <= TWO_CELLS), all.len()),
         free_misses_flagged: fraction(count(|[_, free]| free.error > TWO_CELLS && free.alarm), misses),
-        error_median: median(all.iter().map(|[own, _]| own.error)).unwrap_or_else(|| Moments::default().into()),
     }
 }

@@ -12,16 +12,6 @@ parameters! {
     }
 }
 
-impl Parameters {
-    fn precision(&self) -> Result<Matrix2<f64>, Error> {
-        let cross = self.correlation * (self.variance1 * self.variance2).sqrt();
-        let covariance = Matrix2::new(self.variance1, cross, cross, self.variance2);
-        covariance
-            .try_inverse()
-            .ok_or(Error::Table("the covariance is singular".to_owned()))
-    }
-}
-
 rows! {
     pub struct Rows {
         monomials: Vec<Monomial> => "The monomials of every polynomial.",
@@ -71,7 +61,9 @@ impl Figure for Table1 {
          them. Every polynomial but the first has mean zero under the Gaussian; the misprints do not.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        let w = p.precision()?;
+        let cross = p.correlation * (p.variance1 * p.variance2).sqrt();
+        let precision = Matrix2::new(p.variance1, cross, cross, p.variance2).try_inverse();
+        let w = precision.ok_or(Error::Table("the covariance is singular".to_owned()))?;
         let mean_of = |terms: &[([usize; 2], f64)]| -> Result<f64, Error> {
             let parts = terms
                 .iter()

@@ -24,7 +24,6 @@ rows! {
     struct Bound {
         unknown: &'static str => "What is unknown besides the position.",
         sd_x: f64 ["m"] => "Standard deviation of x at the bound.",
-        sd_rate: Option<f64> ["kg/s"] => "Standard deviation of the rate at the bound.",
     }
 
     struct Model by "{model} {nodes}" {
@@ -45,15 +44,6 @@ const NODES: [[f64; 2]; 6] = [
     [55.0, 48.0],
     [57.0, 45.0],
 ];
-
-fn models() -> Result<[(&'static str, RateModel); 3], Error> {
-    let range = RateRange::new(0.5, 1.5)?;
-    Ok([
-        ("sample-wise", RateModel::SampleWise(range)),
-        ("node-wise", RateModel::NodeWise(range)),
-        ("joint", RateModel::Joint(range)),
-    ])
-}
 
 pub struct Unknowns;
 
@@ -86,16 +76,20 @@ impl Figure for Unknowns {
             let Some(factor) = scaled.cholesky() else {
                 return Err(Error::Table("the information is singular".to_owned()));
             };
-            let variance = |i: usize| factor.inverse()[(i, i)] * scale[i] * scale[i];
+            let variance = factor.inverse()[(0, 0)] * scale[0] * scale[0];
             bounds.push(Bound {
                 unknown: name,
-                sd_x: variance(0).sqrt(),
-                sd_rate: (unknowns.len() > 2).then(|| variance(2).sqrt()),
+                sd_x: variance.sqrt(),
             });
         }
+        let range = RateRange::new(0.5, 1.5)?;
+        let kinds = [
+            ("sample-wise", RateModel::SampleWise(range)),
+            ("node-wise", RateModel::NodeWise(range)),
+            ("joint", RateModel::Joint(range)),
+        ];
         let mut rows = Vec::new();
         for count in &p.nodes {
-            let kinds = models()?;
             let all = context.trials(context.stream("diffusive-layouts"), p.trials, |trial| {
                 let mut rng = trial.stream.rng();
                 let mut draw = || -> Result<Record, Error> {

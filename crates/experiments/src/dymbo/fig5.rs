@@ -27,7 +27,6 @@ rows! {
     struct Row by "{plant} {n}" {
         plant: Plant,
         n: usize => "Step.",
-        trials: u64 => "Simulated runs.",
         kf_pred: f64 ["sigma^2"] => "Variance computed by the Kalman filter, which is exact.",
         kf_mse: Measured ["sigma^2"] => "Mean squared error of the Kalman filter.",
         dymbo_pred: f64 ["sigma^2"] => "Variance computed by the sign-bit filter.",
@@ -50,12 +49,11 @@ rows! {
     }
 }
 
-/// Truth and the three estimates at one step.
+/// Truth, the beliefs of the three filters, and the bit at one step.
 struct Step {
     truth: f64,
-    kalman: Gaussian<1>,
-    dymbo: Gaussian<1>,
-    informed: Gaussian<1>,
+    /// Of the Kalman filter, of the sign-bit filter, and of the latter with the stationary prior.
+    beliefs: [Gaussian<1>; 3],
     bit: Option<f64>,
 }
 
@@ -75,25 +73,28 @@ fn simulate(
     let message = scheme.round(sample)?;
     let mut run = vec![Step {
         truth: state[0],
-        kalman: Gaussian::scalar(sample, plant.measurement_variance())?,
-        dymbo: scheme.belief(message)?,
-        informed: scheme.belief_with_prior(message, prior)?,
+        beliefs: [
+            Gaussian::scalar(sample, plant.measurement_variance())?,
+            scheme.belief(message)?,
+            scheme.belief_with_prior(message, prior)?,
+        ],
         bit: None,
     }];
     for n in 0..p.steps {
-        let last = &run[n];
+        let [kalman, dymbo, informed] = run[n].beliefs;
         state = plant.dynamics().propagate(&mut rng, &state);
         let sample = plant.sensor().sample(&mut rng, &state)[0];
         let ask = |belief: &Gaussian<1>| Sign::of(sample, filter.threshold(belief));
-        let (bit, informed) = (ask(&last.dymbo)?, ask(&last.informed)?);
-        let step = Step {
+        let bit = ask(&dymbo)?;
+        run.push(Step {
             truth: state[0],
-            kalman: kalman::step(plant.dynamics(), plant.sensor(), &last.kalman, &Vector1::new(sample))?.0,
-            dymbo: filter.step(&last.dymbo, &Observation::Received(bit))?.0,
-            informed: filter.step(&last.informed, &Observation::Received(informed))?.0,
+            beliefs: [
+                kalman::step(plant.dynamics(), plant.sensor(), &kalman, &Vector1::new(sample))?.0,
+                filter.step(&dymbo, &Observation::Received(bit))?.0,
+                filter.step(&informed, &Observation::Received(ask(&informed)?))?.0,
+            ],
             bit: Some(bit.value()),
-        };
-        run.push(step);
+        });
     }
     Ok(run)
 }
@@ -115,8 +116,8 @@ impl Figure for Convergence {
             let sums = context.moments(stream, p.trials, |trial| {
                 let numbers = simulate(&model, &prior, p, trial.stream)?.into_iter().flat_map(|step| {
                     let squared = |belief: &Gaussian<1>| (belief.mean()[0] - step.truth).powi(2);
-                    let [kalman, dymbo, informed] = [&step.kalman, &step.dymbo, &step.informed].map(squared);
-                    [kalman, dymbo, informed, informed / step.informed.covariance()[0]]
+                    let [kalman, dymbo, informed] = step.beliefs.each_ref().map(squared);
+                    [kalman, dymbo, informed, informed / step.beliefs[2].covariance()[0]]
                 });
                 Ok(numbers.collect::<Vec<_>>())
             })?;
@@ -130,7 +131,6 @@ impl Figure for Convergence {
                 errors.push(Row {
                     plant,
                     n,
-                    trials: p.trials,
                     kf_pred,
                     kf_mse: sums[0].into(),
                     dymbo_pred: exact.filtered_variance,
@@ -151,8 +151,8 @@ impl Figure for Convergence {
                 plant,
                 n,
                 theta: step.truth,
-                kf: step.kalman.mean()[0],
-                dymbo: step.dymbo.mean()[0],
+                kf: step.beliefs[0].mean()[0],
+                dymbo: step.beliefs[1].mean()[0],
                 bit: step.bit,
             }));
         }

@@ -35,7 +35,6 @@ rows! {
         bits: usize => "Bits a sample.",
         exact_mse: f64 ["sigma^2"] => "Exact steady error of the filter.",
         riccati: f64 ["sigma^2"] => "Variance that it computes.",
-        trials: u64 => "Simulated runs.",
         excess: Measured ["sigma^2"] => "Steady distance from the exact posterior mean, squared.",
         mmse: f64 ["sigma^2"] => "Minimum error given the bits, `exact_mse - excess`.",
         kurtosis: f64 => "Kurtosis of the error; 3 if normal.",
@@ -49,8 +48,8 @@ const BURN: usize = 40;
 const MEASURED: usize = 60;
 
 /// Steady mean squared distance of a filter's estimate from the exact posterior mean.
-fn steady_excess<F: ScalarFilter + Clone + Sync>(
-    filter: &F,
+fn steady_excess(
+    filter: &MultibitFilter,
     context: &Context<'_>,
     stream: Stream,
     trials: u64,
@@ -115,21 +114,18 @@ impl Figure for GapToExact {
                 let settled = model.steady_state(filter.information())?;
                 let error = chain::stationary(&model, &MessageLaw::word(&filter, settled.predicted_variance)?)?;
                 let stream = context.stream(self.about().id).named(&format!("{plant} {bits}"));
-                let one = DymboFilter::new(model);
-                let excess = match bits {
-                    1 => steady_excess(&one, context, stream, p.trials)?,
-                    _ => steady_excess(&filter, context, stream, p.trials)?,
-                };
+                let excess = steady_excess(&filter, context, stream, p.trials)?;
                 steady.push(Steady {
                     plant,
                     bits,
                     exact_mse: error.filtered_mse,
                     riccati: settled.filtered_variance,
-                    trials: p.trials,
                     excess,
                     mmse: error.filtered_mse - excess.value,
                     kurtosis: error.kurtosis,
-                    tuned_mse: (bits == 1).then(|| tuned_gain_mse(&one)).transpose()?,
+                    tuned_mse: (bits == 1)
+                        .then(|| tuned_gain_mse(&DymboFilter::new(model)))
+                        .transpose()?,
                 });
             }
         }

@@ -24,7 +24,6 @@ rows! {
     pub struct Row by "{plant} {rule}" {
         plant: Plant,
         rule: &'static str => "Place of the threshold.",
-        trials: u64 => "Simulated runs.",
         mse: Measured ["sigma^2"] => "Mean squared error.",
         excess: Measured => "Relative excess over the prediction rule, same noise.",
         nees: Measured => "Squared error over computed variance.",
@@ -97,7 +96,6 @@ impl Figure for ThresholdPlace {
             rows.extend(RULES.iter().enumerate().map(|(i, (rule, _))| Row {
                 plant,
                 rule,
-                trials: p.trials,
                 mse: of(0, i).into_iter().collect(),
                 excess: relative(&of(0, 0), &of(0, i)),
                 nees: of(1, i).into_iter().collect(),

@@ -24,7 +24,6 @@ rows! {
         leader_x: Option<f64> ["r0"] => "Its position.",
         leader_y: Option<f64> ["r0"] => "Its position.",
         distance: Option<f64> ["r0"] => "Its distance from the target.",
-        reading: Option<f64> => "What it read.",
     }
 
     struct Sensor {
@@ -55,7 +54,6 @@ impl Figure for Fig4 {
                 leader_x: at.map(|s| s[0]),
                 leader_y: at.map(|s| s[1]),
                 distance: at.map(|s| (s - position).norm()),
-                reading: t.checked_sub(1).map(|k| world.readings[k].value),
             }
         };
         let sensors = world.sensors.iter().map(|s| (s[0], s[1])).enumerate();

@@ -1,7 +1,7 @@
 //! Figure 6(c): the actual error.
 
 use super::filters::{
-    PARTICLES, REFERENCE, STEPS, Smoothing, estimate, median, paper_cut, plain_step, prior, single, systematic, world,
+    PARTICLES, REFERENCE, STEPS, Smoothing, chosen, estimate, median, paper_cut, plain_step, prior, single, world,
 };
 use super::world::Walk;
 use crate::prelude::*;
@@ -104,7 +104,7 @@ fn trial(p: &Parameters, it: Trial) -> Result<Vec<Moment>, Error> {
         plain_step(&mut rng_a, &mut a, reading)?;
         plain_step(&mut rng_b, &mut b, reading)?;
         let mut points = a.clone();
-        points.select(&systematic(&mut pick, a.weights(), p.points))?;
+        points.select(&chosen(&mut pick, a.weights(), p.points))?;
         let mean_log = |density: &dyn Fn(Columns<'_, 2>, &mut [f64])| {
             let mut logs = vec![0.0; p.points];
             density(points.columns(), &mut logs);

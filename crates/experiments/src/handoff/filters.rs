@@ -3,7 +3,7 @@
 use super::world::{Point, Reading, START, Walk, World};
 use crate::prelude::*;
 use fewbits_core::Likelihood;
-use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles, SampleSize};
+use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles, SampleSize, systematic};
 use fewbits_handoff::{HandoffFilter, Whole, trimmed};
 use fewbits_mixture_codec::published::PaperReductions;
 use fewbits_mixture_codec::{Reduction, cut};
@@ -90,17 +90,9 @@ pub(super) fn single(estimate: &KernelEstimate<2>) -> Result<Mixture<2>, Error> 
 }
 
 /// A systematic choice of `count` among weighted particles.
-pub(super) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<u32> {
-    let offset: f64 = rng.random();
-    let (mut i, mut cumulative) = (0, weights[0]);
-    let ancestor = |k: usize| {
-        while (k as f64 + offset) / count as f64 >= cumulative && i + 1 < weights.len() {
-            i += 1;
-            cumulative += weights[i];
-        }
-        i as u32
-    };
-    (0..count).map(ancestor).collect()
+pub(super) fn chosen<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<u32> {
+    let ancestors = systematic(weights, count, rng.random());
+    ancestors.into_iter().map(|i| i as u32).collect()
 }
 
 /// A plain particle filter: systematic resampling, propagation, weights.
@@ -109,7 +101,7 @@ pub(super) fn plain_step<R: Rng + ?Sized>(
     particles: &mut Particles<2>,
     reading: &Reading,
 ) -> Result<(), Error> {
-    particles.select(&systematic(rng, particles.weights(), particles.len()))?;
+    particles.select(&chosen(rng, particles.weights(), particles.len()))?;
     Walk.propagate_columns(rng, particles.columns_mut());
     particles.reweigh(|states, logs| reading.add_log_likelihoods(states, logs))?;
     Ok(())

@@ -25,6 +25,7 @@ rows! {
 
 /// The methods by their names in the table and in the picture.
 const METHODS: [(&str, &str, Method); 14] = {
+    use Criterion::{Kl, L1, LogDeterminant, Ml};
     use Method::{Plain, Williams};
     const fn greedy(split: Split, criterion: Criterion) -> Method {
         Plain(Reduction::Greedy { split, criterion })
@@ -43,25 +44,17 @@ const METHODS: [(&str, &str, Method); 14] = {
     }
     const OPTIMAL: Reduction = Reduction::Optimal {
         split: Split::KD,
-        criterion: Criterion::Kl,
+        criterion: Kl,
     };
     [
-        ("kd ml", "KD-tree, ML", greedy(Split::KD, Criterion::Ml)),
-        ("kd l1", "KD-tree, L1", greedy(Split::KD, Criterion::L1)),
-        ("kd kl", "KD-tree, KL", greedy(Split::KD, Criterion::Kl)),
+        ("kd ml", "KD-tree, ML", greedy(Split::KD, Ml)),
+        ("kd l1", "KD-tree, L1", greedy(Split::KD, L1)),
+        ("kd kl", "KD-tree, KL", greedy(Split::KD, Kl)),
         ("kd kl optimal", "KD-tree, KL, optimal", Plain(OPTIMAL)),
-        (
-            "kd closed form",
-            "KD-tree, closed form",
-            greedy(counting(SplitAxis::Widest), Criterion::LogDeterminant),
-        ),
-        ("principal kl", "principal axes, KL", greedy(Split::PRINCIPAL, Criterion::Kl)),
-        (
-            "principal closed form",
-            "principal axes, closed form",
-            greedy(Split::PRINCIPAL, Criterion::LogDeterminant),
-        ),
-        ("alternating kl", "alternating axes, KL", greedy(counting(SplitAxis::Alternating), Criterion::Kl)),
+        ("kd closed form", "KD-tree, closed form", greedy(counting(SplitAxis::Widest), LogDeterminant)),
+        ("principal kl", "principal axes, KL", greedy(Split::PRINCIPAL, Kl)),
+        ("principal closed form", "principal axes, closed form", greedy(Split::PRINCIPAL, LogDeterminant)),
+        ("alternating kl", "alternating axes, KL", greedy(counting(SplitAxis::Alternating), Kl)),
         ("runnalls", "Runnalls", merging(MergeCost::Runnalls)),
         ("salmond", "Salmond", merging(MergeCost::Salmond)),
         ("williams from 30", "Williams from 30", Williams),

@@ -2,8 +2,7 @@
 
 use crate::prelude::*;
 use fewbits_filters::Resampling;
-use fewbits_numerics::kernels::log_sum_exp;
-use fewbits_numerics::normal;
+use fewbits_numerics::kernels::{self, log_sum_exp};
 use fewbits_pf_mpa::association::{
     AssociationRule, Hypotheses, PRINTED_GAIN, PairTracker, separation, sigmoid, tanh_rule,
 };
@@ -49,9 +48,9 @@ fn draw(stream: Stream, variance: f64, apart: f64) -> Vec<Moment> {
 /// A way to associate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Method {
-    Pair(&'static str, PairTracker),
+    Pair(PairTracker),
     Hypotheses,
-    Cloud(&'static str, CloudRule),
+    Cloud(CloudRule),
 }
 
 /// How particles, paired at random, weigh the two orders.
@@ -63,33 +62,26 @@ enum CloudRule {
     Tanh,
 }
 
-const METHODS: [Method; 8] = [
-    Method::Pair("genie", PairTracker::Genie),
-    Method::Hypotheses,
-    Method::Pair("jpda", PairTracker::Weighted(AssociationRule::Exact)),
-    Method::Cloud("pf-exact", CloudRule::Exact),
-    Method::Pair("logistic", PairTracker::Weighted(AssociationRule::Logistic)),
-    Method::Pair("tanh", PairTracker::Weighted(AssociationRule::PRINTED)),
-    Method::Cloud("pf-tanh", CloudRule::Tanh),
-    Method::Pair("gnn", PairTracker::Nearest),
+const METHODS: [(&str, Method); 8] = [
+    ("genie", Method::Pair(PairTracker::Genie)),
+    ("mht", Method::Hypotheses),
+    ("jpda", Method::Pair(PairTracker::Weighted(AssociationRule::Exact))),
+    ("pf-exact", Method::Cloud(CloudRule::Exact)),
+    ("logistic", Method::Pair(PairTracker::Weighted(AssociationRule::Logistic))),
+    ("tanh", Method::Pair(PairTracker::Weighted(AssociationRule::PRINTED))),
+    ("pf-tanh", Method::Cloud(CloudRule::Tanh)),
+    ("gnn", Method::Pair(PairTracker::Nearest)),
 ];
 
 /// Particles of each target.
 const PAIRS: usize = 300;
 
 impl Method {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Pair(name, _) | Self::Cloud(name, _) => name,
-            Self::Hypotheses => "mht",
-        }
-    }
-
-    /// Estimates and `P(r = 0)` of every step.
+    /// Estimates and `P(r = 0)` of every step; particles draw from `stream`.
     fn run(self, world: &[Moment], variance: f64, apart: f64, stream: Stream) -> Result<Vec<([f64; 2], f64)>, Error> {
         let mut targets = [Gaussian::scalar(1.0, START)?, Gaussian::scalar(1.0 + apart, START)?];
         match self {
-            Self::Pair(_, tracker) => {
+            Self::Pair(tracker) => {
                 let step = |now: &Moment| {
                     let after = tracker.step(&targets, now.measured, WALK, variance, now.straight)?;
                     targets = after.targets;
@@ -105,8 +97,8 @@ impl Method {
                 };
                 world.iter().map(step).collect()
             }
-            Self::Cloud(name, rule) => {
-                let mut rng = stream.named(name).fast_rng();
+            Self::Cloud(rule) => {
+                let mut rng = stream.fast_rng();
                 let mut clouds = targets.map(|p| {
                     let at = |_| p.mean()[0] + START.sqrt() * rng.sample::<f64, _>(StandardNormal);
                     (0..PAIRS).map(at).collect()
@@ -129,7 +121,8 @@ fn cloud_step<R: Rng>(
     for x in clouds.iter_mut().flatten() {
         *x += WALK.sqrt() * rng.sample::<f64, _>(StandardNormal);
     }
-    let fit = |t: f64, z: f64| normal::log_pdf_with(z, t, variance);
+    // Constants cancel.
+    let fit = |t: f64, z: f64| -0.5 * (z - t) * (z - t) / variance;
     let pairs: Vec<[f64; 2]> = clouds[0].iter().zip(&clouds[1]).map(|(a, b)| [*a, *b]).collect();
     let straight: Vec<f64> = match rule {
         CloudRule::Tanh => {
@@ -144,15 +137,18 @@ fn cloud_step<R: Rng>(
             vec![sigmoid(evidence(z) - evidence([z[1], z[0]])); pairs.len()]
         }
     };
+    let mut log_orders: Vec<f64> = straight.iter().flat_map(|p| [*p, 1.0 - p]).collect();
+    kernels::ln(&mut log_orders);
     let mut means = [0.0; 2];
     for (i, cloud) in clouds.iter_mut().enumerate() {
-        let log_weight = |(t, p): (&[f64; 2], &f64)| {
-            let own = fit(t[i], z[i]) + p.ln();
-            log_sum_exp(&[own, fit(t[i], z[1 - i]) + (1.0 - p).ln()])
-        };
-        let logs: Vec<f64> = pairs.iter().zip(&straight).map(log_weight).collect();
-        let top = log_sum_exp(&logs);
-        let weights: Vec<f64> = logs.iter().map(|l| (l - top).exp()).collect();
+        let terms = pairs.iter().zip(log_orders.chunks(2));
+        let mut terms: Vec<f64> = terms
+            .flat_map(|(t, log)| [fit(t[i], z[i]) + log[0], fit(t[i], z[1 - i]) + log[1]])
+            .collect();
+        let top = log_sum_exp(&terms);
+        terms.iter_mut().for_each(|term| *term -= top);
+        kernels::exp(&mut terms);
+        let weights: Vec<f64> = terms.chunks(2).map(|orders| orders[0] + orders[1]).collect();
         means[i] = cloud.iter().zip(&weights).map(|(x, w)| x * w).sum();
         let mut ancestors = vec![0; cloud.len()];
         Resampling::Systematic.ancestors(rng, &weights, &mut ancestors)?;
@@ -195,12 +191,12 @@ impl Figure for Fig37 {
         for &variance in &p.variance {
             let stream = context.stream("mpa-fig3-7");
             let world = draw(stream, variance, p.apart);
-            for method in [METHODS[2], METHODS[5]] {
-                let run = method.run(&world, variance, p.apart, stream)?;
+            for (rule, method) in [METHODS[2], METHODS[5]] {
+                let run = method.run(&world, variance, p.apart, stream.named(rule))?;
                 for (k, (now, (estimate, p0))) in world.iter().zip(run).enumerate() {
                     tracks.push(Step {
                         variance,
-                        rule: method.name(),
+                        rule,
                         k: k + 1,
                         t: now.targets,
                         za: now.measured[0],
@@ -272,8 +268,8 @@ impl Figure for Table {
                 let one = |trial: Trial| {
                     let world = draw(trial.stream, variance, apart);
                     let mut means = [[0.0; 3]; METHODS.len()];
-                    for (means, method) in means.iter_mut().zip(METHODS) {
-                        let run = method.run(&world, variance, apart, trial.stream)?;
+                    for (means, (name, method)) in means.iter_mut().zip(METHODS) {
+                        let run = method.run(&world, variance, apart, trial.stream.named(name))?;
                         for (now, (estimate, p0)) in world.iter().zip(run) {
                             let apart = |i: usize, j: usize| (estimate[i] - now.targets[j]).powi(2);
                             let (labelled, swapped) = (apart(0, 0) + apart(1, 1), apart(0, 1) + apart(1, 0));
@@ -286,11 +282,11 @@ impl Figure for Table {
                 };
                 let stream = context.stream("mpa-table3-da").named(&format!("{apart}"));
                 let sums = context.moments(stream, p.trials, one)?;
-                for (method, sum) in METHODS.into_iter().zip(sums.chunks(3)) {
+                for ((method, _), sum) in METHODS.into_iter().zip(sums.chunks(3)) {
                     rules.push(Row {
                         variance,
                         apart,
-                        method: method.name(),
+                        method,
                         labelled: sum[0].into(),
                         unlabelled: sum[1].into(),
                         association: sum[2].into(),

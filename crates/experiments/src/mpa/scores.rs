@@ -77,12 +77,6 @@ pub(super) fn agree(claims: &Claims, rows: &[Row], prefix: &str) {
     full.keyed(&format!("{prefix}lost"), "share of lost tracks", rows, |r| r.score.lost);
 }
 
-/// The references of shares that ours stay below, of three particles: where the other program loses more tracks.
-pub(super) fn loses_no_more(claims: &Claims, rows: &[Row]) {
-    let full = claims.at_full_trials();
-    full.keyed_at_most("lost-most", "share of lost tracks", rows, |r| r.score.lost);
-}
-
 /// The axis of squared position errors.
 pub(super) const MSE: &str = "mean squared error / m^2";
 

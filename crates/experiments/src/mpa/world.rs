@@ -1,12 +1,12 @@
 //! The canonical scenario, and every tracker on it.
 
 use crate::prelude::*;
-use fewbits_core::{Observed, OnAxes};
+use fewbits_core::Observed;
 use fewbits_filters::ParticleFilter;
 use fewbits_pf_mpa::published::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_pf_mpa::{
-    Encoder, GridFilter, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, QuantizedRange, RangeFactor,
-    RangeNoise, RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,
+    Encoder, GridFilter, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, QuantizedRange, RangeNoise,
+    RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,
 };
 
 /// Steps of a trajectory.
@@ -189,13 +189,6 @@ impl Method {
         self.size().map_or(family.to_owned(), |size| format!("{family}-{size}"))
     }
 
-    fn reports(&self) -> Reports {
-        match self {
-            Self::Linear(_, reports) | Self::Bootstrap(_, reports) => *reports,
-            _ => Reports::Levels,
-        }
-    }
-
     pub(super) fn run(
         &self,
         world: &World,
@@ -204,18 +197,22 @@ impl Method {
         stream: Stream,
     ) -> Result<Estimates, Error> {
         let mut rng = stream.named(&self.name()).fast_rng();
-        let all = (world, network, target, self.reports());
+        let under = |reports: Reports| (world, network, target, reports);
+        let all = under(Reports::Levels);
         match self {
-            Self::Linear(l, _) => track(l, all, &mut rng),
+            Self::Linear(l, reports) => track(l, under(*reports), &mut rng),
             Self::Grid(n) => track(&GridFilter::new(*n)?, all, &mut rng),
             Self::Guided(n) => track(&GuidedGaussian::new(*n)?, all, &mut rng),
             Self::RaoBlackwell(n) => track(&RaoBlackwellGuided::new(*n)?, all, &mut rng),
             Self::Messages(m) => track(m, all, &mut rng),
-            Self::Bootstrap(n, _) => {
+            Self::Bootstrap(n, reports) => {
                 let cloud = WithManoeuvre::cloud(&mut rng, &prior()?, *n)?;
                 let mut workspace = fewbits_filters::Workspace::default();
-                follow(all, cloud, WithManoeuvre::estimate, |k, cloud, observed| {
-                    let observed: Vec<_> = observed.iter().map(in_state).collect::<Result<_, _>>()?;
+                // A range of a state that holds the manoeuvre, too.
+                let in_state = |r: &Ranged| Ok(Observed::new(r.sensing.on_axes::<6>(POSITION)?, r.factor.clone()));
+                follow(under(*reports), cloud, WithManoeuvre::estimate, |k, cloud, observed| {
+                    let observed = observed.iter().map(in_state);
+                    let observed = observed.collect::<Result<Vec<_>, fewbits_pf_mpa::Error>>()?;
                     let motion = WithManoeuvre::at(*target, k);
                     ParticleFilter::default().step_in_place(&mut rng, &motion, cloud, &observed, &mut workspace)?;
                     Ok(())
@@ -223,11 +220,6 @@ impl Method {
             }
         }
     }
-}
-
-/// A range of a state that holds the manoeuvre, too.
-fn in_state(range: &Ranged) -> Result<Observed<OnAxes<RangeSensor, 6, 2>, RangeFactor, 1>, fewbits_pf_mpa::Error> {
-    Ok(Observed::new(range.sensing.on_axes(POSITION)?, range.factor.clone()))
 }
 
 /// One trajectory of a tracker.

@@ -34,14 +34,14 @@ rows! {
 
 pub struct Faulty;
 
-struct Point {
-    fault: &'static str,
-    level: f64,
-    echoed: bool,
-}
+/// How sensors follow, and its name in the table and in the picture.
+const TALKS: [(Feedback, &str, &str); 2] = [
+    (Feedback::Told, "told", "told"),
+    (Feedback::Echoed, "echoed", "following by echo"),
+];
 
 /// Squared error, slots to recover, disagreements of 100 slots, whether the sensor did not recover.
-fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
+fn run((fault, level): (&str, f64), feedback: Feedback, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
     let world = worlds::scalar(slots)?;
     let (truths, measurements) = world.draw(&world.sensors, stream);
     let clock = worlds::clock()?;
@@ -54,13 +54,13 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
         node: restarted,
         kind: FaultKind::Restart,
     }];
-    match point.fault {
-        "loss" => channel.loss = Loss::Fixed(point.level),
-        "flips" => channel.crossover = point.level,
-        "delay" => channel.jitter = at(point.level)?,
+    match fault {
+        "loss" => channel.loss = Loss::Fixed(level),
+        "flips" => channel.crossover = level,
+        "delay" => channel.jitter = at(level)?,
         _ => {
             // The last sensors die first, so that the restarted one is the last to go.
-            for i in 0..point.level as u32 {
+            for i in 0..level as u32 {
                 let node = SensorId(SENSORS as u32 - i);
                 let (at, kind) = (at(slots as f64 / 4.0)?, FaultKind::Death);
                 faults.push(Fault { at, node, kind });
@@ -68,16 +68,15 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
         }
     }
     // What may be lost is what the receiver knows of: the question and the report.
-    let lost = match point.fault {
-        "loss" => 1.0 - (1.0 - point.level).powi(2),
-        "flips" => 1.0 - (1.0 - point.level).powi(144 + 81),
+    let lost = match fault {
+        "loss" => 1.0 - (1.0 - level).powi(2),
+        "flips" => 1.0 - (1.0 - level).powi(144 + 81),
         "delay" => 0.5,
         _ => 0.2,
     };
     let filter = ParallelFilter::new(ScalarPlant::new(COEFFICIENT, PROCESS, 1.0)?, SENSORS, CountFusion::Exact)?;
     let filter = filter.with_link(Link::lossy(lost.min(0.99))?);
     let estimator = ParallelEstimator::new(filter, world.start)?;
-    let feedback = if point.echoed { Feedback::Echoed } else { Feedback::Told };
     let (node, centre) = (each(vec![estimator.scheme()]), over_bits(estimator));
     let own = stream.named("filter");
     let star = BitStar::new(centre, feedback, ReportLength::Fixed(1), node, measurements, clock, own);
@@ -117,32 +116,26 @@ impl Figure for Faulty {
             ("delay", p.delay.clone()),
             ("deaths", p.deaths.iter().map(|n| f64::from(*n)).collect()),
         ];
-        let mut points = Vec::new();
-        for (fault, levels) in &levels {
+        let mut rows = Vec::new();
+        for (fault, levels) in levels {
             for level in levels {
-                points.extend([false, true].map(|echoed| Point {
-                    fault,
-                    level: *level,
-                    echoed,
-                }));
+                let stream = context.stream("network-faults").named(&format!("{fault} {level}"));
+                for (talk, feedback, _) in TALKS {
+                    let one = |it: Trial| run((fault, level), talk, it.stream, p.slots);
+                    let sums = context.moments(stream, p.trials, one)?;
+                    rows.push(Row {
+                        fault,
+                        level,
+                        feedback,
+                        rmse: Measured::root_mean(&sums[0]),
+                        recovery: sums[1].into(),
+                        disagreements: sums[2].into(),
+                        unrecovered: sums[3].into(),
+                    });
+                }
             }
         }
-        let row = |point: &Point| {
-            let stream = context
-                .stream("network-faults")
-                .named(&format!("{} {}", point.fault, point.level));
-            let sums = context.moments(stream, p.trials, |it| run(point, it.stream, p.slots))?;
-            Ok(Row {
-                fault: point.fault,
-                level: point.level,
-                feedback: if point.echoed { "echoed" } else { "told" },
-                rmse: Measured::root_mean(&sums[0]),
-                recovery: sums[1].into(),
-                disagreements: sums[2].into(),
-                unrecovered: sums[3].into(),
-            })
-        };
-        points.iter().map(row).collect()
+        Ok(rows)
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
@@ -170,29 +163,23 @@ impl Figure for Faulty {
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let mut panels = Vec::new();
-        for (fault, label) in [
-            ("loss", "probability of loss"),
-            ("flips", "probability of an inverted bit"),
-            ("delay", "mean delay / slots"),
-            ("deaths", "sensors that died"),
+        for (fault, axis) in [
+            ("loss", Axis::linear("probability of loss")),
+            ("flips", Axis::log("probability of an inverted bit")),
+            ("delay", Axis::linear("mean delay / slots")),
+            ("deaths", Axis::linear("sensors that died")),
         ] {
-            let of = |feedback: &'static str| rows.iter().filter(move |r| r.fault == fault && r.feedback == feedback);
-            let axis = || match fault {
-                "flips" => Axis::log(label),
-                _ => Axis::linear(label),
+            let panel = |title: &str, label: &str, of: fn(&Row) -> Option<Measured>| {
+                let curves = TALKS.iter().enumerate().map(|(colour, (_, feedback, label))| {
+                    let own = select(rows, |r| r.fault == fault && r.feedback == *feedback);
+                    Layer::measured(*label, own, |r| (r.level, of(r))).coloured(colour)
+                });
+                Panel::new(title, axis.clone(), Axis::linear(label)).with_all(curves)
             };
-            let both = |panel: Panel, of_row: fn(&Row) -> Option<Measured>| {
-                panel
-                    .with(Layer::measured("told", of("told"), |r: &Row| (r.level, of_row(r))).coloured(0))
-                    .with(
-                        Layer::measured("following by echo", of("echoed"), |r: &Row| (r.level, of_row(r))).coloured(1),
-                    )
-            };
-            panels.push(both(Panel::new("error", axis(), Axis::linear("RMSE / noise deviation")), |r| Some(r.rmse)));
+            panels.push(panel("error", "RMSE / noise deviation", |r| Some(r.rmse)));
             // A mean over runs that were cut off is no time of recovery.
-            panels.push(both(Panel::new("recovery of a restarted sensor", axis(), Axis::linear("slots")), |r| {
-                (r.unrecovered.value == 0.0).then_some(r.recovery)
-            }));
+            let recovered = |r: &Row| (r.unrecovered.value == 0.0).then_some(r.recovery);
+            panels.push(panel("recovery of a restarted sensor", "slots", recovered));
         }
         Plot::grid(2, panels)
     }

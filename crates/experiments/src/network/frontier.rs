@@ -54,28 +54,6 @@ fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<&'static str> {
     rows.iter().map(|row| if beaten(row) { "no" } else { "yes" }).collect()
 }
 
-fn rows_of(world: &'static str, entries: &[Entry], runs: &Comparison<4>, floor: impl Fn(f64) -> f64) -> Vec<Row> {
-    let row = |(i, entry): (usize, &Entry)| {
-        let mean = |of: usize| Measured::from(runs.moments(i, of));
-        let payload = mean(1);
-        Row {
-            world,
-            scheme: entry.family,
-            setting: entry.setting.clone(),
-            feedback: entry.feedback,
-            rmse: Measured::root_mean(&runs.moments(i, 0)),
-            payload,
-            air: mean(2),
-            energy: mean(3),
-            floor: floor(payload.value),
-            best_by_payload: "",
-            best_by_air: "",
-            best_by_energy: "",
-        }
-    };
-    entries.iter().enumerate().map(row).collect()
-}
-
 impl Figure for Frontier {
     figure!(Parameters => Vec<Row>, "network-frontier", "One frontier for all schemes", "our own comparison",
         "Root mean squared error of every scheme against its payload, against all bits on air, and against the energy of \
@@ -92,7 +70,26 @@ impl Figure for Frontier {
                 Ok([bill.squared, bill.reports, bill.air, bill.joules])
             };
             let stream = context.stream("network-frontier").named(world);
-            Ok(rows_of(world, &entries, &context.compare(stream, p.trials, &entries, one)?, floor))
+            let runs = context.compare(stream, p.trials, &entries, one)?;
+            let row = |(i, entry): (usize, &Entry)| {
+                let mean = |of: usize| Measured::from(runs.moments(i, of));
+                let payload = mean(1);
+                Row {
+                    world,
+                    scheme: entry.family,
+                    setting: entry.setting.clone(),
+                    feedback: entry.feedback,
+                    rmse: Measured::root_mean(&runs.moments(i, 0)),
+                    payload,
+                    air: mean(2),
+                    energy: mean(3),
+                    floor: floor(payload.value),
+                    best_by_payload: "",
+                    best_by_air: "",
+                    best_by_energy: "",
+                }
+            };
+            Ok(entries.iter().enumerate().map(row).collect())
         };
         let mut rows = rows_of("scalar", schemes::of_scalar(&scalar)?, &|rate| floor_at(rate, least))?;
         rows.extend(rows_of("plane", schemes::of_plane(&plane)?, &|_| everything)?);
@@ -121,31 +118,23 @@ impl Figure for Frontier {
         claims.all("overhead", "air time is never below payload", rows, |r| r.air.value >= r.payload.value);
         for world in ["scalar", "plane"] {
             let fine = find(world, "all-send", "32 bit", "none");
-            let last = |bits: &str| ratio(find(world, "innovation-words", bits, "echoed"), fine, |r| r.rmse.value);
+            let words = |bits: &str, feedback: &str| find(world, "innovation-words", bits, feedback);
+            let last = |bits: &str| ratio(words(bits, "echoed"), fine, |r| r.rmse.value);
             let what = "four bits a sensor come within five per cent of everything";
             full.at_most(format!("four-bits-{world}"), what, last("m=4"), 1.05);
-            let words = ["m=1", "m=2", "m=3", "m=4"];
-            full.decreasing(format!("bits-{world}"), "more bits, less error", words.map(last));
-            let told = ratio(
-                find(world, "innovation-words", "m=1", "told"),
-                find(world, "innovation-words", "m=1", "echoed"),
-                |r| r.air.value,
-            );
+            let errors = ["m=1", "m=2", "m=3", "m=4"].map(last);
+            full.decreasing(format!("bits-{world}"), "more bits, less error", errors);
+            let told = ratio(words("m=1", "told"), words("m=1", "echoed"), |r| r.air.value);
             claims.above(format!("echo-{world}"), "an echo is cheaper on air than the question in full", told, 1.0);
-            let same = ratio(
-                find(world, "innovation-words", "m=2", "told"),
-                find(world, "innovation-words", "m=2", "echoed"),
-                |r| r.rmse.value,
-            );
+            let same = ratio(words("m=2", "told"), words("m=2", "echoed"), |r| r.rmse.value);
             claims.near(format!("same-{world}"), "and the estimates are the same", same, 1.0, 1e-12);
-            let energy = ratio(find(world, "innovation-words", "m=1", "echoed"), fine, |r| r.energy.value);
+            let energy = ratio(words("m=1", "echoed"), fine, |r| r.energy.value);
             let what = "one bit a sensor needs more than half of the radio energy of 32: frames cost, not bits";
             claims.at_least(format!("frames-{world}"), what, energy, 0.5);
         }
-        let silent =
-            ratio(find("plane", "CFwMD", "n=1", "echoed"), find("plane", "innovation-words", "m=1", "echoed"), |r| {
-                r.energy.value
-            });
+        let [censored, spoken] = [("CFwMD", "n=1"), ("innovation-words", "m=1")]
+            .map(|(scheme, setting)| find("plane", scheme, setting, "echoed"));
+        let silent = ratio(censored, spoken, |r| r.energy.value);
         let quiet =
             |r: &&Row| r.scheme == "adaptive" && ["delta=0.5", "delta=1", "delta=2"].contains(&r.setting.as_str());
         let what = "silence within +-0.5 to 2 of what both ends predict: nothing has less error for less energy";

@@ -1,13 +1,13 @@
 //! The schemes of the comparison at their settings.
 
-use super::receivers::{Followers, LookUp, SendAll, each};
+use super::receivers::{Followers, LookUp, each};
 use super::worlds::{COEFFICIENT, Entry, PROCESS, SENSORS, World, member};
 use crate::prelude::Error;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
 use fewbits_cfwmd::centre::CensoringEstimator;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Gaussian, LinearDynamics, Link, SensorNode};
+use fewbits_core::{FullValue, Gaussian, LinearDynamics, Link, SensorNode};
 use fewbits_dymbo::{
     CountFusion, InnovationWord, MultibitFilter, ParallelEstimator, ParallelFilter, Prediction, ScalarEstimator,
     ScalarFilter, ScalarPlant,
@@ -59,10 +59,15 @@ where
             }
         }
     }
-    for (setting, format) in [("few bits", world.coarse), ("32 bit", world.fine)] {
-        let (name, member) = (("all-send", setting.to_owned()), member(Feedback::Clock, format.bits()));
-        all.push(world.of_scheme(name, &world.sensors, member, SendAll::new(1.0, format)?, nothing));
-    }
+    let all_send = |setting: &str| ("all-send", setting.to_owned());
+    let (reach, bits) = world.coarse;
+    let step = 2.0 * reach / f64::from((1 << bits) - 1);
+    let edges = (1..1 << bits).map(|i| step * (f64::from(i) - 0.5) - reach).collect();
+    let coarse = QuantizingSensor::with_variance(Quantizer::new(edges)?, Labelling::natural(1 << bits)?, 1.0)?;
+    let told = |bits| member(Feedback::Clock, bits);
+    all.push(world.of_scheme(all_send("few bits"), &world.sensors, told(bits), coarse, nothing));
+    let fine = FullValue::new(1.0)?.with_format(world.fine);
+    all.push(world.of_scheme(all_send("32 bit"), &world.sensors, told(world.fine.bits()), fine, nothing));
     for delta in [0.25, 0.5, 1.0, 2.0, 4.0] {
         let followers = Followers {
             dynamics: world.dynamics.clone(),

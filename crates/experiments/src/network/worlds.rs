@@ -39,7 +39,8 @@ pub struct World<const D: usize, G> {
     pub(super) start: Gaussian<D>,
     /// What all-send and the censoring sensors send in.
     pub(super) fine: NumberFormat,
-    pub(super) coarse: NumberFormat,
+    /// Largest size of what all-send sends in few bits, and how many.
+    pub(super) coarse: (f64, u32),
     /// How far from its start the state may get, for codes of where it is.
     reach: f64,
     /// Coordinates that count.
@@ -63,7 +64,7 @@ pub fn scalar(slots: usize) -> Result<World<1, Ar1>, Error> {
         sensors: vec![LinearSensor::direct(1.0)?; SENSORS],
         start: Gaussian::scalar(0.0, variance)?,
         fine: NumberFormat::Single,
-        coarse: NumberFormat::fixed(-8.0, 8.0, 8)?,
+        coarse: (8.0, 8),
         reach: 16.0,
         counted: &[0],
         slots,
@@ -82,7 +83,7 @@ pub fn plane(slots: usize) -> Result<World<4, LinearGaussian<4, 2>>, Error> {
         sensors: (0..SENSORS).map(sensor).collect::<Result<_, _>>()?,
         start: Gaussian::new(Vector4::new(0.0, 1.0, 0.0, -1.0), Matrix4::identity() * 0.5)?,
         fine: NumberFormat::Single,
-        coarse: NumberFormat::fixed(-4096.0, 4096.0, 13)?,
+        coarse: (4096.0, 13),
         // The acceleration takes it 700 away in 300 slots, one standard deviation.
         reach: 1e4,
         counted: &[0, 2],

@@ -53,20 +53,9 @@ struct Outcome {
     violations: u64,
 }
 
-struct Point<'a> {
-    recording: &'a Recording,
-    config: Config,
-    loss: f64,
-    refresh: u64,
-    sequence_bits: u32,
-}
-
-fn one(point: &Point<'_>, trial: Trial) -> Result<Outcome, Error> {
-    let recording = point.recording;
-    let config = point.config.resilient(point.sequence_bits, Some(point.refresh))?;
+fn one(recording: &Recording, config: Config, link: &Link, stream: Stream) -> Result<Outcome, Error> {
     let delta = config.delta();
-    let link = Link::lossy(point.loss)?;
-    let mut rng = trial.stream.rng();
+    let mut rng = stream.rng();
     let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
     let n = recording.samples.len() as f64;
     let mut all = Outcome::default();
@@ -106,40 +95,28 @@ impl Figure for Loss {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-loss", context)?;
-        let mut points = Vec::new();
+        let mut rows = Vec::new();
         for recording in &recordings {
             let (config, _) = best_for(recording, p.rate, context, Replay::rate)?;
-            for loss in &p.loss {
-                for refresh in &p.refresh {
-                    points.push(Point {
-                        recording,
-                        config,
-                        loss: *loss,
-                        refresh: *refresh,
-                        sequence_bits: p.sequence_bits,
-                    });
-                }
+            for (&loss, &refresh) in product(&p.loss, &p.refresh) {
+                let (config, link) = (config.resilient(p.sequence_bits, Some(refresh))?, Link::lossy(loss)?);
+                let column = recording.name.clone();
+                let stream = context.stream("real-loss").named(&format!("{column} {loss} {refresh}"));
+                let all = context.trials(stream, p.trials, |it| one(recording, config, &link, it.stream))?;
+                rows.push(Row {
+                    column,
+                    loss,
+                    refresh,
+                    bits: all.iter().map(|o| o.bits).collect(),
+                    rmse: Measured::root_mean(&all.iter().map(|o| o.squares).collect()),
+                    beyond: all.iter().map(|o| o.beyond).collect(),
+                    unnoticed: all.iter().map(|o| o.unnoticed).collect(),
+                    longest: all.iter().map(|o| o.longest).max().unwrap_or(0) as f64 / refresh as f64,
+                    violations: all.iter().map(|o| o.violations).sum(),
+                });
             }
         }
-        let row = |point: &Point<'_>| {
-            let column = point.recording.name.clone();
-            let stream = context
-                .stream("real-loss")
-                .named(&format!("{column} {} {}", point.loss, point.refresh));
-            let all = context.trials(stream, p.trials, |trial| one(point, trial))?;
-            Ok(Row {
-                column,
-                loss: point.loss,
-                refresh: point.refresh,
-                bits: all.iter().map(|o| o.bits).collect(),
-                rmse: Measured::root_mean(&all.iter().map(|o| o.squares).collect()),
-                beyond: all.iter().map(|o| o.beyond).collect(),
-                unnoticed: all.iter().map(|o| o.unnoticed).collect(),
-                longest: all.iter().map(|o| o.longest).max().unwrap_or(0) as f64 / point.refresh as f64,
-                violations: all.iter().map(|o| o.violations).sum(),
-            })
-        };
-        points.iter().map(row).collect()
+        Ok(rows)
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {

@@ -21,15 +21,17 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
                 let half = (a[(q, q)] - a[(p, p)]) / (2.0 * entry);
                 let tangent = half.signum() / (half.abs() + half.hypot(1.0));
                 let cosine = 1.0 / tangent.hypot(1.0);
-                let mut turn = SMatrix::<f64, M, M>::identity();
-                turn[(p, p)] = cosine;
-                turn[(q, q)] = cosine;
-                turn[(p, q)] = tangent * cosine;
-                turn[(q, p)] = -tangent * cosine;
-                a = turn.transpose() * a * turn;
+                let sine = tangent * cosine;
+                let turn = |x: f64, y: f64| (cosine * x - sine * y, sine * x + cosine * y);
+                for k in 0..M {
+                    (a[(p, k)], a[(q, k)]) = turn(a[(p, k)], a[(q, k)]);
+                }
+                for k in 0..M {
+                    (a[(k, p)], a[(k, q)]) = turn(a[(k, p)], a[(k, q)]);
+                    (vectors[(k, p)], vectors[(k, q)]) = turn(vectors[(k, p)], vectors[(k, q)]);
+                }
                 a[(p, q)] = 0.0;
                 a[(q, p)] = 0.0;
-                vectors *= turn;
             }
         }
         // All entries off the diagonal were exactly zero in this sweep.

@@ -3,14 +3,12 @@
 mod followers;
 mod look_up;
 mod mixed;
-mod send_all;
 #[cfg(test)]
 mod tests;
 
 pub use followers::{Followed, Followers};
 pub use look_up::LookUp;
 pub use mixed::mixed;
-pub use send_all::SendAll;
 
 use fewbits_core::{Scheme, SchemeNode, SensorNode};
 use fewbits_protocol::{BoxError, Estimator, OverBits};
