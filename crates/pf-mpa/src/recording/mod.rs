@@ -8,7 +8,7 @@
 //! acquisition  the first range of each anchor travels in full; three anchors or more give a position by the adaptive grid
 //! tracking     each range travels as the level of its innovation, or in full; with probability `outliers` it says nothing
 //! speed        a bank of filters over speeds, weighed by evidence: also with 1 bit, since each filter predicts the other's bits
-//! lost         the centre's own test, or `silence` seconds without a range: acquisition again
+//! lost         the centre's own test, fewer than three anchors that agree, or `silence` seconds without a range: acquisition again
 //! ```
 
 mod scheme;
@@ -100,6 +100,8 @@ pub struct RangeTracker {
     collected: BTreeMap<u32, (f64, Vector2<f64>, f64)>,
     bias: (f64, f64),
     last: f64,
+    /// Anchors that contradict the others since acquisition.
+    excluded: usize,
     bits: usize,
     losses: usize,
 }
@@ -139,6 +141,7 @@ impl RangeTracker {
             collected: BTreeMap::new(),
             bias: (0.0, settings.bias * settings.bias),
             last: f64::NEG_INFINITY,
+            excluded: 0,
             bits: 0,
             losses: 0,
         })
@@ -190,7 +193,13 @@ impl RangeTracker {
         self.bits += report.as_ref().map_or(0, |bits| bits.bits());
         let slot = Slot::new(anchor.number, feedback, report.into());
         let lost = match centre.receive(rng, &[slot]) {
-            Ok(received) => received.events.contains(&Event::Lost),
+            Ok(received) => {
+                let count = |wanted: fn(&Event) -> bool| received.events.iter().filter(|event| wanted(event)).count();
+                self.excluded += count(|event| matches!(event, Event::Excluded(_)));
+                self.excluded -= count(|event| matches!(event, Event::Readmitted(_)));
+                // The ranges of two anchors have two common places.
+                received.events.contains(&Event::Lost) || self.excluded + 3 > self.anchors.len()
+            }
             // Nothing of the belief explains the range, not even as an outlier.
             Err(fewbits_filters::Error::Core(fewbits_core::Error::Impossible)) => true,
             Err(error) => return Err(error.into()),
@@ -227,6 +236,7 @@ impl RangeTracker {
             }
         }
         self.collected.clear();
+        self.excluded = 0;
     }
 
     /// The belief that the collected ranges leave, by the adaptive grid over the anchors' surroundings.
