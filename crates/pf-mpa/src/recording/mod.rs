@@ -8,7 +8,8 @@
 //! acquisition  the first range of each anchor is sent in full; three anchors or more give a position by the adaptive grid
 //! tracking     each range is sent as the level of its innovation, or in full; with probability `outliers` it is unrelated to the state
 //! speed        a bank of filters over speeds, weighted by evidence; works with 1 bit too
-//! lost         by the centre's own test, or after `silence` seconds without a range: acquisition starts again
+//! lost         by the centre's own test, if fewer than three anchors agree, or after `silence` seconds without a range: acquisition starts
+//!              again
 //! ```
 
 mod scheme;
@@ -177,6 +178,7 @@ impl RangeTracker {
             self.forget();
         }
         self.last = time;
+        let anchors = self.anchors.len() as u32;
         let (Some(centre), Some(anchor)) = (self.centre.as_mut(), self.anchors.get_mut(anchor)) else {
             self.bits += FULL_BITS;
             self.collected.insert(number, (time, place, range));
@@ -190,7 +192,11 @@ impl RangeTracker {
         self.bits += report.as_ref().map_or(0, |bits| bits.bits());
         let slot = Slot::new(anchor.number, feedback, report.into());
         let lost = match centre.receive(rng, &[slot]) {
-            Ok(received) => received.events.contains(&Event::Lost),
+            Ok(received) => {
+                let used = (0..anchors).filter(|number| centre.is_excluded(*number) == Ok(false));
+                // The ranges of two anchors have two common places.
+                received.events.contains(&Event::Lost) || used.count() < 3
+            }
             // The range has probability zero under the belief, even as an outlier: the track is lost.
             Err(Error::Impossible) => true,
             Err(error) => return Err(error),
