@@ -20,7 +20,7 @@ const NODES: usize = 4096;
 /// Distance of the rates, in their logarithm, at which the likelihood of words is averaged: below the least width that words leave.
 const RATE_STEP: f64 = 0.027;
 /// Sensors between two tests whether a cell still matters.
-const BLOCK: usize = 8;
+const BLOCK: usize = 4;
 /// A cell whose log likelihood is below that of the best by more than this has no weight.
 const NEGLIGIBLE: f64 = 60.0;
 
@@ -28,7 +28,8 @@ const NEGLIGIBLE: f64 = 60.0;
 pub(super) struct Instrument {
     pub noise: f64,
     pub thresholds: [f64; THRESHOLDS],
-    largest: f64,
+    /// Nodes of the table per unit of concentration.
+    density: f64,
     /// `ln p(word | clean concentration)` at the nodes, for each word.
     table: Vec<Vec<f64>>,
 }
@@ -49,7 +50,7 @@ impl Instrument {
         Self {
             noise,
             thresholds,
-            largest,
+            density: (NODES - 1) as f64 / largest,
             table: table.collect(),
         }
     }
@@ -61,12 +62,8 @@ impl Instrument {
     /// A row of the table, or a sum of rows, between nodes.
     #[inline(always)]
     fn look_up(&self, row: &[f64], clean: f64) -> f64 {
-        let position = (clean / self.largest).clamp(0.0, 1.0) * (NODES - 1) as f64;
-        let low = if position < (NODES - 2) as f64 {
-            position as usize
-        } else {
-            NODES - 2
-        };
+        let position = (clean * self.density).clamp(0.0, (NODES - 1) as f64);
+        let low = (position as usize).min(NODES - 2);
         row[low] + (position - low as f64) * (row[low + 1] - row[low])
     }
 
