@@ -28,8 +28,7 @@ pub struct SensorSettings {
     pub feedback: Feedback,
     /// What the check of a frame covers.
     pub check: Check,
-    /// When slots begin. Required for [`Feedback::Clock`]. Other sensors with a schedule refuse frames of another slot than the present
-    /// one.
+    /// When slots begin. Required for [`Feedback::Clock`]; other sensors with a schedule refuse frames of other slots.
     pub schedule: Option<Schedule>,
     /// For sensors that report by the clock: nanoseconds from the beginning of a slot to the measurement. The clock may be ahead by at most
     /// this. Different offsets keep sensors from sending at once.
@@ -103,8 +102,7 @@ pub enum Task<'a> {
 pub struct Reaction<'a> {
     /// What to do next.
     pub task: Task<'a>,
-    /// A timer to set: time in nanoseconds, and what to pass to [`Sensor::on_timer`]. Several may run at once. They may fire late but not
-    /// early.
+    /// A timer to set: time in nanoseconds, and what to pass to [`Sensor::on_timer`]. Several may run at once, and fire late but not early.
     pub timer: Option<(u64, SensorTimer)>,
     /// A note to record.
     pub note: Option<Note>,

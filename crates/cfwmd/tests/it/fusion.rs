@@ -296,7 +296,11 @@ fn bad_steps_are_typed_errors_and_leave_the_belief() {
     let refused = |observations: &[_], name, value| matches!(fuse(observations), Err(Error::Argument(e)) if e.name == name && e.value.contains(value));
     assert!(refused(&[Observation::Nothing], "observations", "1 entries"));
     assert!(refused(&[value(1.1), value(9.0)], "report", "sensor 0"));
-    assert!(refused(&[value(9.0), value(f64::NAN)], "value", "NaN"));
+    assert!(
+        refused(&[value(9.0), value(f64::NAN)], "report", "NaN"),
+        "{:?}",
+        fuse(&[value(9.0), value(f64::NAN)])
+    );
     assert!(fuse(&[Observation::Nothing, Observation::Nothing]).is_ok());
     // What was sent and lost was large.
     let lost = fuse(&[Observation::Lost, Observation::Lost]).unwrap().0;

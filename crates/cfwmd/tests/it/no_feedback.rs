@@ -250,7 +250,7 @@ fn bad_steps_are_typed_errors() {
     let far = Observation::Received(Vector1::new(9.0));
     let nan = Observation::Received(Vector1::new(f64::NAN));
     let cases = [
-        (&network, vec![Observation::Nothing], "1 observations"),
+        (&network, vec![Observation::Nothing], "`observations` is 1 entries"),
         (&network, vec![nan, Observation::Nothing], "report"),
         (&always, vec![far, Observation::Nothing], "impossible"),
     ];
