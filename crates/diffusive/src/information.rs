@@ -236,7 +236,7 @@ fn no_diffusivity() -> ArgumentError {
 /// is a finite difference with a step of 1e-5 of the shortest age.
 ///
 /// # Errors
-/// If the model has no concentrations at a node, or [`Error::NoDiffusivity`].
+/// If the model has no concentrations at a node, or no diffusivity that could change although it is an unknown.
 pub fn fisher_information(
     unknowns: &[Unknown],
     sensor: &SourceSensor,

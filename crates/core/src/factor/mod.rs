@@ -39,7 +39,7 @@ use nalgebra::{SMatrix, SVector};
 ///
 /// Laws ([`crate::laws::factor`]):
 /// 1. `log_likelihood` is finite or `-inf` for every finite `m`. If `m` is NaN, the result is NaN or at most the smallest value at any
-/// number, so that a NaN never raises a weight;
+///    number, so that a NaN never raises a weight;
 /// 2. `add_log_likelihoods` adds what `log_likelihood` returns, up to rounding. If lengths differ, all of `log_weights` becomes NaN
 ///    ([`crate::columns::lengths_agree`]);
 /// 3. `tilted` agrees with quadrature of `log_likelihood` against the prior.

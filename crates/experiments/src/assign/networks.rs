@@ -45,6 +45,7 @@ rows! {
         /// What is varied: standard deviation (`assign-fig6-3`) or mean (`assign-fig6-4`) of the noise variances.
         at: f64 ["V^2"],
         decoder: &'static str => "Decoder.",
+        trials: u64 => "Networks averaged.",
         alg: Measured ["V^2"] => "Squared error of the linear assignment.",
         min: Measured ["V^2"] => "Least over all assignments.",
         ii: Measured ["V^2"] => "Most precise sensor to the coarsest bit.",
@@ -181,6 +182,7 @@ impl Figure for Networks {
                 rows.push(Row {
                     at: (self.varied)(moment),
                     decoder,
+                    trials,
                     alg: sums[0].into(),
                     min: sums[1].into(),
                     ii: sums[2].into(),

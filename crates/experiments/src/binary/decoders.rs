@@ -34,9 +34,10 @@ rows! {
 
     struct Tightness by "{snr_db} dB" {
         snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
+        van_trees: f64 ["V^2"] => "Optimal-weight bound, uniform source.",
         mmse: f64 ["V^2"] => "Exact error.",
         crlb: f64 ["V^2"] => "Equation 5.13.",
-        ratio: f64 => "Optimal-weight bound over error, uniform source.",
+        ratio: f64 => "Bound over error.",
     }
 }
 
@@ -64,12 +65,13 @@ fn row(source: &'static str, snr_db: f64) -> Result<Row, Error> {
 
 fn tightness(snr_db: f64) -> Result<Tightness, Error> {
     let bank = Scene::uniform(3, snr_db)?.bank(&[4, 6, 3])?;
-    let mmse = bank.mmse()?;
+    let (van_trees, mmse) = (optimal_weight_van_trees(&bank)?, bank.mmse()?);
     Ok(Tightness {
         snr_db,
+        van_trees,
         mmse,
         crlb: printed_crlb(&bank)?,
-        ratio: optimal_weight_van_trees(&bank)? / mmse,
+        ratio: van_trees / mmse,
     })
 }
 

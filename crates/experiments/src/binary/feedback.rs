@@ -31,6 +31,7 @@ rows! {
     pub struct Row by "{snr_db} dB" {
         snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
         lbqp_b3: f64 ["V^2"] => "Best linear patterns of three bits, exhaustive.",
+        masks_b3: String => "Their masks.",
         lbqp_best: f64 ["V^2"] => "Best linear patterns of any number of bits, by descent beyond three.",
         bits: usize => "That number of bits.",
         masks: String => "Their masks.",
@@ -48,7 +49,7 @@ rows! {
 fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
     let scene = Scene::uniform(3, snr_db)?;
     let coarse = scene.search(p.sensors)?.best()?;
-    let mut best = (3, coarse.masks, coarse.mse);
+    let mut best = (3, coarse.masks.clone(), coarse.mse);
     for bits in 4..=p.most_bits.min(p.sensors) {
         if 2.0 / f64::from(1u32 << bits) < FINEST_CELL * scene.noise {
             break;
@@ -68,6 +69,7 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
     Ok(Row {
         snr_db,
         lbqp_b3: coarse.mse,
+        masks_b3: joined(&coarse.masks, " "),
         lbqp_best: best.2,
         bits: best.0,
         masks: joined(&best.1, " "),

@@ -29,6 +29,7 @@ rows! {
         dr_per_n: f64 => "The same with the noise of the average.",
         vt: f64 => "Optimal-weight van Trees bound of the best basis.",
         mse_unconstrained: f64 => "Least error over all triples of masks.",
+        masks_unconstrained: String => "The best triple.",
         mse_signs: f64 => "Error of three sign bits.",
     }
 
@@ -61,6 +62,7 @@ impl Figure for GaussianSource {
                 dr_per_n: network_rate_distortion(&scene.source, scene.noise, SENSORS)?,
                 vt: optimal_weight_van_trees(&scene.bank(&best.masks)?)?,
                 mse_unconstrained: any.mse,
+                masks_unconstrained: joined(&any.masks, " "),
                 mse_signs: scene.mmse(&[4, 4, 4])?,
             })
         })?;

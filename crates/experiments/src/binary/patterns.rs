@@ -109,6 +109,7 @@ rows! {
     /// A bit of a pattern.
     pub struct Bit {
         pattern: String => "Name.",
+        mask: Mask => "Which natural patterns are XORed, the first the most significant digit.",
         l: usize => "Cell, from 1.",
         bit: u32 => "Bit sent from the cell.",
     }
@@ -122,20 +123,27 @@ pub struct Patterns {
     about: About,
     what: &'static str,
     printed: &'static [&'static str],
-    /// The patterns of so many bits.
-    masks: fn(usize) -> Result<Vec<Named>, Error>,
-    /// What is claimed besides, for so many bits.
-    claims: fn(usize, &Claims),
+    /// Masks beyond the Gray basis; without them the figure has no such parameter.
+    extra: Option<&'static [Mask]>,
+    masks: fn(&PatternParameters) -> Result<Vec<Named>, Error>,
+    /// What is claimed besides.
+    claims: fn(&PatternParameters, &Claims),
 }
 
 parameters! {
     pub struct PatternParameters {
         bits: usize [1..=8] = 4 => "Bits of the cell index.",
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        extra: Option<Vec<Mask>> [1..=255; 1..=20] = None => "Masks beyond the Gray basis, below 2^bits.",
     }
+    check |p| fit("extra", p.extra(), p.bits);
 }
 
-/// Masks beyond the Gray basis.
-const FURTHER: [Mask; 3] = [14, 5, 11];
+impl PatternParameters {
+    fn extra(&self) -> &[Mask] {
+        self.extra.as_deref().unwrap_or_default()
+    }
+}
 
 /// Numbers patterns after their kind.
 fn numbered(kind: &str, masks: Vec<Mask>) -> Vec<Named> {
@@ -154,7 +162,8 @@ pub static NATURAL: Patterns = Patterns {
         "0011001100110011",
         "0101010101010101",
     ],
-    masks: |bits| Ok(numbered("N", natural_basis(bits)?)),
+    extra: None,
+    masks: |p| Ok(numbered("N", natural_basis(p.bits)?)),
     claims: |_, _| {},
 };
 
@@ -170,9 +179,10 @@ pub static GRAY: Patterns = Patterns {
         "0011110000111100",
         "0110011001100110",
     ],
-    masks: |bits| Ok(numbered("G", gray_basis(bits)?)),
-    claims: |bits, claims| {
-        let matrix = gray_basis(bits).and_then(|basis| generator_matrix(&basis, bits));
+    extra: None,
+    masks: |p| Ok(numbered("G", gray_basis(p.bits)?)),
+    claims: |p, claims| {
+        let matrix = gray_basis(p.bits).and_then(|basis| generator_matrix(&basis, p.bits));
         let matrix = matrix.unwrap_or_default();
         claims.all("adjacent", "neighbouring cells differ in exactly one bit", matrix.windows(2), |w| {
             w[0].iter().zip(&w[1]).filter(|(a, b)| a != b).count() == 1
@@ -187,10 +197,11 @@ pub static EXTRA: Patterns = Patterns {
     ),
     what: "the patterns are columns 5 to 7 of matrix (5.6)",
     printed: &["0011110011000011", "0101101001011010", "0110011010011001"],
-    masks: |_| Ok(FURTHER.map(|mask| (format!("mask {mask}"), mask)).into()),
-    claims: |bits, claims| {
-        let masks = gray_basis(bits).unwrap_or_default().into_iter().chain(FURTHER);
-        let all: Option<Vec<Pattern>> = masks.map(|mask| pattern(mask, bits).ok()).collect();
+    extra: Some(&[14, 5, 11]),
+    masks: |p| Ok(p.extra().iter().map(|&mask| (format!("mask {mask}"), mask)).collect()),
+    claims: |p, claims| {
+        let masks = gray_basis(p.bits).unwrap_or_default().into_iter().chain(p.extra().iter().copied());
+        let all: Option<Vec<Pattern>> = masks.map(|mask| pattern(mask, p.bits).ok()).collect();
         let what = "with the Gray basis they separate all cells";
         claims.all("separating", what, all, |patterns| check_separation(&patterns).is_ok());
         // Independent over GF(2), yet two cells carry the same column: footnote 2 of the thesis holds for linear patterns only.
@@ -204,12 +215,20 @@ pub static EXTRA: Patterns = Patterns {
 impl Figure for Patterns {
     figure!(PatternParameters => Vec<Bit>, about);
 
+    fn defaults(&self) -> PatternParameters {
+        PatternParameters {
+            extra: self.extra.map(<[Mask]>::to_vec),
+            ..PatternParameters::default()
+        }
+    }
+
     fn run(&self, p: &PatternParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
         let mut table = Vec::new();
-        for (name, mask) in (self.masks)(p.bits)? {
+        for (name, mask) in (self.masks)(p)? {
             for (l, bit) in pattern(mask, p.bits)?.bits().iter().enumerate() {
                 table.push(Bit {
                     pattern: name.clone(),
+                    mask,
                     l: l + 1,
                     bit: u32::from(*bit),
                 });
@@ -225,7 +244,7 @@ impl Figure for Patterns {
         claims
             .at_defaults()
             .all("bits", self.what, rows.iter().zip(printed.chars()), same);
-        (self.claims)(p.bits, claims);
+        (self.claims)(p, claims);
     }
 
     fn plot(&self, _: &PatternParameters, table: &Vec<Bit>) -> Plot {

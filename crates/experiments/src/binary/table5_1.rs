@@ -2,7 +2,7 @@
 
 use super::{Scene, pattern, pattern_panel};
 use crate::prelude::*;
-use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
+use fewbits_binary_patterns::bounds::{optimal_weight_van_trees, printed_crlb};
 use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};
 
@@ -29,6 +29,8 @@ rows! {
         masks: String => "Its masks.",
         mse_mmse: f64 ["V^2"] => "Exact error of the posterior mean.",
         mse_dmap: f64 ["V^2"] => "Exact error of the discrete maximum a posteriori decoder.",
+        mse_exact_dmap: f64 ["V^2"] => "The same with exact cell probabilities.",
+        crlb: f64 ["V^2"] => "Equation 5.13.",
         van_trees: f64 ["V^2"] => "Optimal-weight van Trees bound.",
         /// Place among all sets under the posterior mean, from 0; none for a set that is not of full rank.
         rank: Option<usize>,
@@ -82,6 +84,8 @@ impl Figure for Table {
                 masks: joined(masks, " "),
                 mse_mmse: bank.mse(Decoder::Mmse)?,
                 mse_dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
+                mse_exact_dmap: bank.mse(Decoder::ExactDivisionMap(&scene.grid))?,
+                crlb: printed_crlb(&bank)?,
                 van_trees: optimal_weight_van_trees(&bank)?,
                 rank: place(&ranking, masks),
                 rank_dmap: place(&by_map, masks),

@@ -38,6 +38,7 @@ rows! {
         patterns: String => "Its patterns.",
         linear: usize => "Patterns that are XORs of natural ones.",
         mse_mmse: f64 => "Exact error of the posterior mean; the variance of the source is 0.1.",
+        mse_dmap: f64 => "Exact error of the discrete maximum a posteriori decoder.",
         rank: Option<usize> => "Place among the labelings of eight cells, from 0.",
     }
 
@@ -99,7 +100,8 @@ impl Figure for Table {
         let all = parallel::try_map(&labelings()?, |l| Ok::<_, Error>(scene.pattern_bank(l)?.mmse()?))?;
         let linear = |masks: &[u32]| masks.iter().map(|&m| pattern(m, 3)).collect::<Result<Vec<_>, _>>();
         let set = |(set, patterns): (_, Vec<Pattern>)| {
-            let mse_mmse = scene.pattern_bank(&patterns)?.mmse()?;
+            let bank = scene.pattern_bank(&patterns)?;
+            let mse_mmse = bank.mmse()?;
             // Mirror images tie up to rounding.
             let better = || all.iter().filter(|e| **e < mse_mmse * (1.0 - 1e-9)).count();
             Ok(Set {
@@ -107,6 +109,7 @@ impl Figure for Table {
                 patterns: joined(&patterns, " "),
                 linear: patterns.iter().filter(|p| mask_of(p).is_some()).count(),
                 mse_mmse,
+                mse_dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
                 rank: check_separation(&patterns).is_ok().then(better),
             })
         };

@@ -88,8 +88,8 @@ fn seated(rng: &mut dyn Rng, [a, q, r]: [f64; 3], flips: f64, prior: &Gaussian<1
     Ok(centre)
 }
 
-/// Mean squared errors over the second half, and over the windows after its beginning.
-fn one_run(scene: &Scene, receiver: &Receiver, p: &Parameters, stream: Stream) -> Result<[f64; 6], Error> {
+/// Mean squared errors over the second half, over the windows after its beginning, and `ln` of the learnt factor.
+fn one_run(scene: &Scene, receiver: &Receiver, p: &Parameters, stream: Stream) -> Result<[f64; 7], Error> {
     let mut world = stream.named("world").fast_rng();
     let (mut rng, mut air) = (stream.named("filter").fast_rng(), stream.named("air").fast_rng());
     let Scene([a, q, r], jumps) = *scene;
@@ -109,7 +109,7 @@ fn one_run(scene: &Scene, receiver: &Receiver, p: &Parameters, stream: Stream) -
     let mut node = SchemeNode::new(SignBit::new(r)?);
     let (mut estimate, mut step, mut last) = (0.0, r.sqrt(), 0.0);
     let half = WINDOWS[4];
-    let (mut sums, mut window) = ([0.0; 6], 0);
+    let (mut sums, mut window) = ([0.0; 7], 0);
     for k in 0..2 * half {
         if k == half && jumps && kind == Kind::Informed {
             centre = seated(&mut rng, [a, FACTOR * q, r], flips, &centre.estimate())?;
@@ -139,6 +139,7 @@ fn one_run(scene: &Scene, receiver: &Receiver, p: &Parameters, stream: Stream) -
             sums[1 + window] += square / (WINDOWS[window] - start) as f64;
         }
     }
+    sums[6] = (centre.noise_scale() * process).ln();
     Ok(sums)
 }
 
@@ -147,9 +148,13 @@ rows! {
         /// Coefficient, process variance, measurement variance; "jump" if the process variance becomes nine times as large at step 1000.
         plant: String,
         receiver: &'static str => "What is known of the process variance, and what receives.",
-        to: u64 => "End of the window, counted from step 1000.",
+        from: u64 => "First step of the window, counted from step 1000.",
+        to: u64 => "End of the window.",
+        trials: u64 => "Simulated runs.",
+        error: Measured => "Root mean squared error.",
         /// Error in parts of that of the receiver that knows the process variance, over the same link.
         ratio: Measured,
+        learnt: f64 => "Process variance at the end in parts of that before the jump, geometric mean.",
     }
 }
 
@@ -172,15 +177,19 @@ impl Figure for SelfTuning {
                 let windows = if scene.1 { 1..6 } else { 0..1 };
                 let knows = if *inverted { 8 } else { 0 };
                 for of in windows {
-                    let known = found.moments(knows, of).mean();
+                    let (own, known) = (found.moments(i, of), found.moments(knows, of).mean());
                     // Runs are paired: the error of the ratio is that of the difference.
                     let spread = found.difference(i, knows, of).standard_error();
-                    let ratio = (found.moments(i, of).mean() / known).sqrt();
+                    let ratio = (own.mean() / known).sqrt();
                     rows.push(Row {
                         plant: scene.name(),
                         receiver,
+                        from: if of < 2 { 0 } else { WINDOWS[of - 2] },
                         to: WINDOWS[of.wrapping_sub(1).min(4)],
+                        trials: p.trials,
+                        error: Measured::root_mean(&own),
                         ratio: Measured::new(ratio, spread / (2.0 * known * ratio)),
+                        learnt: found.moments(i, 6).mean().exp(),
                     });
                 }
             }

@@ -9,8 +9,16 @@ use std::f64::consts::LN_2;
 parameters! {
     pub struct Parameters {
         steps: usize [1..=1000] = 15 => "Steps of each stage.",
-        crossovers: Vec<f64> [0.0..=0.06; 1..=8] = vec![0.0] => "Crossover probabilities of the words' bits, natural words, increasing.",
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        crossovers: Option<Vec<f64>> [0.0..=0.06; 1..=8] = None => "Crossover probabilities of the words' bits, natural words, increasing.",
         noise_sd: f64 [1e-2..=1e2] = 1.0 => "Noise standard deviation of both sensors, in prior standard deviations.",
+    }
+}
+
+impl Parameters {
+    /// Those of a clean channel, unless there are others.
+    fn crossovers(&self) -> &[f64] {
+        self.crossovers.as_deref().unwrap_or(&[0.0])
     }
 }
 
@@ -61,10 +69,13 @@ fn step(crossover: f64, [iteration, stage, iter_in_stage]: [usize; 3], both: &Sy
 /// A column as a figure draws it, and its name there.
 type Column = (fn(&Step) -> f64, &'static str);
 
+/// Label and points of a curve.
+type Curve = (String, Vec<(f64, f64)>);
+
 /// One of Figures 4.2 to 4.5: its columns, and what it claims of them.
 pub struct Iterations {
     about: About,
-    crossovers: &'static [f64],
+    crossovers: Option<&'static [f64]>,
     axis: &'static str,
     columns: &'static [Column],
     /// Claims that hold everywhere, and those about the publication's setting.
@@ -74,12 +85,12 @@ pub struct Iterations {
 const INFORMATION: &str = "mutual information / bits";
 const ERROR: &str = "mean squared error / prior variances";
 /// The channels of Figures 4.4 and 4.5.
-const CHANNELS: [f64; 4] = [0.0, 0.001, 0.01, 0.05];
+const CHANNELS: Option<&[f64]> = Some(&[0.0, 0.001, 0.01, 0.05]);
 
 pub static FIGURE42: Iterations = Iterations {
     about: About::of("mi-fig4-2", "Information over iterations, clean channel", "thesis, Figure 4.2")
         .showing("Mutual information rises in two steps, one per sensor, to a plateau each."),
-    crossovers: &[0.0],
+    crossovers: None,
     axis: INFORMATION,
     columns: &[(|r| r.mi_x_z1_bits, "sensor 1"), (|r| r.mi_x_z1z2_bits, "both sensors")],
     judge: |p, rows, claims, here| {
@@ -97,7 +108,7 @@ pub static FIGURE42: Iterations = Iterations {
 pub static FIGURE43: Iterations = Iterations {
     about: About::of("mi-fig4-3", "Squared error over iterations, clean channel", "thesis, Figure 4.3")
         .showing("The squared error falls while the information rises, though it is not what is optimised."),
-    crossovers: &[0.0],
+    crossovers: None,
     axis: ERROR,
     columns: &[(|r| r.mse, "both sensors")],
     judge: |p, rows, claims, here| {
@@ -110,7 +121,7 @@ pub static FIGURE44: Iterations = Iterations {
     about: About::of("mi-fig4-4", "Information over iterations, noisy channels", "thesis, Figure 4.4")
         .showing("Joint information at four crossovers, natural words. It rises for the better channels; at 0.05 the first stage \
                   lowers it, and the greedy result is below its start."),
-    crossovers: &CHANNELS,
+    crossovers: CHANNELS,
     axis: INFORMATION,
     columns: &[(|r| r.mi_x_z1z2_bits, "")],
     judge: |p, rows, claims, here| {
@@ -129,7 +140,7 @@ pub static FIGURE44: Iterations = Iterations {
 pub static FIGURE45: Iterations = Iterations {
     about: About::of("mi-fig4-5", "Squared error over iterations, noisy channels", "thesis, Figure 4.5")
         .showing("Squared error at four crossovers, natural words. It falls at every step, on every channel."),
-    crossovers: &CHANNELS,
+    crossovers: CHANNELS,
     axis: ERROR,
     columns: &[(|r| r.mse, "")],
     judge: |_, rows, _, here| {
@@ -142,7 +153,7 @@ pub static FIGURE45: Iterations = Iterations {
 impl Rows {
     /// The chain's steps on a clean channel, where there is no other.
     fn clean(&self, p: &Parameters) -> impl Iterator<Item = &Step> {
-        let clean = p.crossovers == [0.0];
+        let clean = p.crossovers() == [0.0];
         select(&self.chain, move |_| clean)
     }
 }
@@ -181,7 +192,7 @@ impl Figure for Iterations {
 
     fn defaults(&self) -> Parameters {
         Parameters {
-            crossovers: self.crossovers.to_vec(),
+            crossovers: self.crossovers.map(<[f64]>::to_vec),
             ..Parameters::default()
         }
     }
@@ -189,7 +200,7 @@ impl Figure for Iterations {
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let steps = p.steps;
         let mut rows = Rows::default();
-        for &crossover in &p.crossovers {
+        for &crossover in p.crossovers() {
             context.check()?;
             let start = lloyd_system(&scene(&[p.noise_sd; 2], 0.0)?, 4, |_| 1.0)?;
             let start = over_bsc(&start, &[0, 1, 2, 3], crossover)?;
@@ -219,30 +230,33 @@ impl Figure for Iterations {
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let several = p.crossovers.len() > 1;
-        // The curves from the `first` on, in the order of channels and columns.
-        let panel = |title: String, first: usize| {
-            let all = product(&p.crossovers, self.columns).into_iter().enumerate().skip(first);
-            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-            let curves = all.flat_map(|(i, (crossover, (column, name)))| {
+        let (several, edge) = (p.crossovers().len() > 1, p.steps as f64);
+        // Label, points and place in the palette of each curve.
+        let all = p.crossovers().iter().flat_map(|crossover| {
+            self.columns.iter().map(move |(column, name)| {
                 let own = select(&rows.chain, |r| r.crossover == *crossover);
-                let curve = points(own, |r| (r.iteration as f64, column(r)));
-                (low, high) = curve.iter().fold((low, high), |(l, h), p| (l.min(p.1), h.max(p.1)));
                 let label = if several {
-                    &format!("crossover {crossover}")
+                    format!("crossover {crossover}")
                 } else {
-                    *name
+                    (*name).to_owned()
                 };
-                Layer::marked_line(label, i, curve)
-            });
-            let panel = Panel::linear(title, "iteration", self.axis).with_all(curves);
-            let edge = p.steps as f64;
-            panel.with(Layer::dashed("stage 2 begins", vec![(edge, low), (edge, high)]).coloured(6))
+                (label, points(own, |r| (r.iteration as f64, column(r))))
+            })
+        });
+        let all: Vec<_> = all.enumerate().collect();
+        let panel = |title: String, drawn: &[(usize, Curve)]| {
+            let heights = drawn.iter().flat_map(|(_, (_, curve))| curve).map(|p| p.1);
+            let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
+            let divider = Layer::dashed("stage 2 begins", vec![(edge, low), (edge, high)]).coloured(6);
+            let curve = |(i, (label, curve)): &(usize, Curve)| Layer::marked_line(label, *i, curve.clone());
+            Panel::linear(title, "iteration", self.axis)
+                .with_all(drawn.iter().flat_map(curve))
+                .with(divider)
         };
-        let mut panels = vec![panel(self.about.title.to_owned(), 0)];
-        if let (Some(worst), true) = (p.crossovers.last(), several) {
+        let mut panels = vec![panel(self.about.title.to_owned(), &all)];
+        if let (Some(worst), true) = (p.crossovers().last(), several) {
             // On the common scale the worst channel's curve looks flat.
-            panels.push(panel(format!("Crossover {worst} alone"), p.crossovers.len() * self.columns.len() - 1));
+            panels.push(panel(format!("Crossover {worst} alone"), &all[all.len() - 1..]));
         }
         Plot::grid(2, panels)
     }

@@ -3,6 +3,7 @@
 use super::common::MI;
 use crate::prelude::*;
 use fewbits_numerics::normal;
+use fewbits_quantizer_design::decoder::NeymanPearson;
 use fewbits_quantizer_design::published::{self, Separation};
 use fewbits_quantizer_design::{
     Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior, Quantizer, System, design,
@@ -14,6 +15,7 @@ parameters! {
     pub struct Parameters {
         signals: Vec<f64> [0.1..=16.0; 1..=20] = vec![2.0, 4.0] => "The signals to detect, in noise standard deviations.",
         sensors: usize [2..=9] = 5 => "Number of sensors; the greedy chain enumerates `4^sensors` outcomes.",
+        false_alarm: f64 [1e-9..=0.999] = 0.01 => "False-alarm probability of the randomised test.",
     }
 }
 
@@ -29,12 +31,15 @@ rows! {
         signal: f64 ["noise sd"] => "The value to tell from 0.",
         method: &'static str => "What the quantizer maximises (pe: minimises the error itself).",
         t: f64 ["noise sd"] => "Offset of the outer breakpoints (of the first sensor).",
+        offsets: String ["noise sd"] => "Offsets of all sensors, where they differ.",
         pe: f64 => "Bayes error at equal priors.",
         printed_pe: Option<f64> => "The publication's value.",
         mi_nats: f64 ["nat"] => "Mutual information.",
         equivocation_nats: f64 ["nat"] => "ln 2 minus it, without cancellation.",
+        matusita: Option<f64> => "Matusita distance of one sensor's symbol.",
         j_divergence: Option<f64> => "J-divergence of one sensor's symbol.",
         bhattacharyya: Option<f64> => "Bhattacharyya coefficient of one sensor's symbol.",
+        detection: f64 => "Detection probability of the randomised Neyman-Pearson test.",
     }
 
     struct Point {
@@ -65,25 +70,28 @@ fn about(signal: f64, t: f64) -> Result<Quantizer, Error> {
 fn row(p: &Parameters, signal: f64, method: &'static str, system: &System) -> Result<Design, Error> {
     let printed = reference::value(&format!("mi-table4-4/printed/{signal} {method}"));
     let quantizers = system.quantizers();
-    let symbol = match &quantizers[..] {
-        [common] => Some(JointTable::new(&System::identical(scene(signal, 1)?, common.clone())?)?),
-        _ => None,
+    let offset = |q: &Quantizer| q.breakpoints()[2] - 0.5 * signal;
+    let symbol = if quantizers.len() == 1 {
+        let law = JointTable::new(&System::identical(scene(signal, 1)?, quantizers[0].clone())?)?;
+        Some((0..4).map(|t| (law.likelihood(t)[0], law.likelihood(t)[1])).unzip())
+    } else {
+        None
     };
-    let separation = |of: Separation| {
-        let law = symbol.as_ref()?;
-        let [p0, p1] = [0, 1].map(|given| (0..4).map(|t| law.likelihood(t)[given]).collect::<Vec<f64>>());
-        Some(of.of(&p0, &p1))
-    };
+    let separation = |of: Separation| symbol.as_ref().map(|(p0, p1): &(Vec<f64>, Vec<f64>)| of.of(p0, p1));
+    let differ = if quantizers.len() > 1 { &quantizers[..] } else { &[] };
     Ok(Design {
         signal,
         method,
-        t: quantizers[0].breakpoints()[2] - 0.5 * signal,
+        t: offset(&quantizers[0]),
+        offsets: joined(differ.iter().map(|q| format!("{:.8}", offset(q))), " "),
         pe: system.value(PE)?,
         printed_pe: printed.filter(|_| p.sensors == 5),
         mi_nats: system.value(MI)?,
         equivocation_nats: JointTable::new(system)?.equivocation()?,
+        matusita: separation(Separation::Matusita),
         j_divergence: separation(Separation::JDivergence),
         bhattacharyya: separation(Separation::Bhattacharyya).map(|distance| (-distance).exp()),
+        detection: NeymanPearson::new(system, p.false_alarm)?.detection_probability(),
     })
 }
 

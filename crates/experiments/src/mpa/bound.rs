@@ -19,7 +19,10 @@ rows! {
         unquantized: Measured => "Bound for the ranges themselves.",
         grid: Measured => "Grid of 25 nodes an axis.",
         message_passing: Measured => "Gaussian message passing.",
-        grid_median: f64 => "Median of the grid.",
+        unquantized_filter: Measured => "Extended Kalman filter of the ranges.",
+        grid_median: f64 => "Medians of the three.",
+        message_passing_median: f64 => "Median.",
+        unquantized_filter_median: f64 => "Median.",
     }
 }
 
@@ -44,10 +47,10 @@ impl Figure for Bounds {
         for snr_db in SNRS {
             for levels in LEVELS {
                 let network = Point::published(snr_db, levels, SPEED)?.network()?;
-                let one = |trial: Trial| -> Result<([f64; 2], Sums), Error> {
+                let one = |trial: Trial| -> Result<([f64; 3], Sums), Error> {
                     let world = World::draw(trial.stream, &target, Field::Free)?;
                     let run = |method: Method| method.run(&world, &network, &target, trial.stream);
-                    let runs = [run(Method::Grid(25))?, run(Method::GMPA)?];
+                    let runs = [run(Method::Grid(25))?, run(Method::GMPA)?, run(Method::EKF_U)?];
                     let mut previous = prior()?;
                     let mut sums = Vec::with_capacity(STEPS);
                     for (k, x) in world.track.iter().enumerate() {
@@ -79,7 +82,7 @@ impl Figure for Bounds {
                     Ok(Measured::new(without(which, None)?, spread.standard_error() * (GROUPS - 1) as f64))
                 };
                 let score = |m: usize| Score::of(all.iter().map(|(errors, _)| errors[m]).collect());
-                let [grid, message_passing] = [0, 1].map(score);
+                let [grid, message_passing, filter] = [0, 1, 2].map(score);
                 bounds.push(Row {
                     snr_db,
                     levels,
@@ -87,7 +90,10 @@ impl Figure for Bounds {
                     unquantized: bound(1)?,
                     grid: grid.mse,
                     message_passing: message_passing.mse,
+                    unquantized_filter: filter.mse,
                     grid_median: grid.median.value,
+                    message_passing_median: message_passing.median.value,
+                    unquantized_filter_median: filter.median.value,
                 });
             }
         }

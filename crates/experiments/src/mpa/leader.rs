@@ -22,6 +22,7 @@ rows! {
         none: Measured => "With none.",
         several: Measured => "With several.",
         nearest: Measured => "Share of steps in which the true nearest sensor leads.",
+        mse: Measured => "Mean squared position error of the leader's estimate.",
         spread: Measured => "Variance of the sensors' estimates about their mean, both axes.",
     }
 }
@@ -48,7 +49,7 @@ impl Figure for Leaders {
                 let mut streams: Vec<_> = (0..sensors.len()).map(|i| own(i).fast_rng()).collect();
                 let mut shared: Gaussian<4> = super::world::prior()?;
                 // Steps of one trajectory depend on each other: a trajectory is one trial.
-                let mut means = [Moments::default(); 5];
+                let mut means = [Moments::default(); 6];
                 for k in 0..STEPS {
                     let ranges = world.ranges(&network, k);
                     let observed = network.observe(&target, k, &shared, &ranges, Reports::Levels)?;
@@ -64,8 +65,9 @@ impl Figure for Leaders {
                     shared = LeaderMessage::new(&copies[election.leader], &NumberFormat::Single)?.belief();
                     let is = |yes: bool| f64::from(u8::from(yes));
                     let count = election.claimants.len();
+                    let error = (places[election.leader] - truth).norm_squared();
                     let leads = election.leader == nearest(&sensors, &truth);
-                    let all = [is(count == 1), is(count == 0), is(count > 1), is(leads), spread];
+                    let all = [is(count == 1), is(count == 0), is(count > 1), is(leads), error, spread];
                     means.iter_mut().zip(all).for_each(|(m, x)| m.add(x));
                 }
                 Ok(means.map(|m| m.mean()))
@@ -78,7 +80,8 @@ impl Figure for Leaders {
                 none: sums[1].into(),
                 several: sums[2].into(),
                 nearest: sums[3].into(),
-                spread: sums[4].into(),
+                mse: sums[4].into(),
+                spread: sums[5].into(),
             })
         };
         SETTINGS.into_iter().map(row).collect()

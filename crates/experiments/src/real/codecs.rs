@@ -18,7 +18,12 @@ parameters! {
 }
 
 rows! {
-    pub struct Row {
+    pub struct Rows {
+        signals: Vec<Row> => "Every signal at every bound.",
+        references: Vec<Reference> => "Means over 73 recorded series, measured elsewhere.",
+    }
+
+    struct Row {
         column: String => "Signal.",
         percent: f64 => "Largest error in percent of the range.",
         adaptive: f64 ["bit"] => "Block of the adaptive codec, without container.",
@@ -26,6 +31,12 @@ rows! {
         pco: f64 ["bit"] => "pco 1 on the indices of a lattice of twice the bound, its delta order found by itself.",
         /// zstd, level 19, on those indices as 32-bit numbers; without the feature `zstd` of this crate not run.
         zstd: Option<f64> ["bit"],
+    }
+
+    struct Reference {
+        percent: f64 => "Largest error in percent of the range.",
+        codec: &'static str => "Program.",
+        bits: f64 ["bit"] => "Mean bits per sample.",
     }
 }
 
@@ -72,35 +83,52 @@ fn zstd_bytes(_: &[i64]) -> Option<usize> {
 }
 
 impl Figure for Codecs {
-    figure!(Parameters => Vec<Row>, "real-codecs", "Bits against the bound, beside other codecs", "our own comparison",
+    figure!(Parameters => Rows, "real-codecs", "Bits against the bound, beside other codecs", "our own comparison",
         "Bits per sample against the guaranteed largest error, on signals with the traits of recordings, or on the columns of a \
          file: a block of the adaptive codec, pco on lattice indices, and with the feature `zstd` zstd on them. Dashed: means of \
          programs that are no crates over recorded series, from the page of recordings.");
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
-        each(&p.source.load("real-codecs", context)?, &p.percent, measured)
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let recordings = p.source.load("real-codecs", context)?;
+        let references = REFERENCES.iter().flat_map(|(codec, bits)| {
+            bits.iter().map(move |(percent, bits)| Reference {
+                percent: *percent,
+                codec,
+                bits: *bits,
+            })
+        });
+        Ok(Rows {
+            signals: each(&recordings, &p.percent, measured)?,
+            references: references.collect(),
+        })
     }
 
-    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
-        let worst = largest(rows.iter().map(|row| row.worst));
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let worst = largest(rows.signals.iter().map(|row| row.worst));
         // The quotient of the error is rounded; the bound itself is checked exactly by the tests of the codec.
         claims.at_most("bounded", "no error exceeds the bound", worst, 1.0 + 1e-9);
-        let ratio = geometric_mean(rows.iter().map(|row| row.adaptive / row.pco));
+        let ratio = geometric_mean(rows.signals.iter().map(|row| row.adaptive / row.pco));
         claims.at_most("pco", "fewer bits than pco on lattice indices, in the geometric mean", ratio, 1.0);
     }
 
-    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let columns = distinct(rows, |row| row.column.clone());
-        let curves: [Curve<'_, Row, Option<f64>>; 3] = [
-            ("adaptive", |row| Some(row.adaptive)),
-            ("pco", |row| Some(row.pco)),
-            ("zstd", |row| row.zstd),
-        ];
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let columns = distinct(&rows.signals, |row| row.column.clone());
         let panel = |column: &String| {
-            let references = REFERENCES.iter().enumerate();
-            Panel::loglog(column, "largest error, percent of the range", "bits per sample")
-                .with_lines(select(rows, |row| row.column == *column), |row| row.percent, &curves)
-                .with_all(references.map(|(i, (codec, bits))| Layer::dashed(*codec, bits.to_vec()).coloured(3 + i)))
+            let chosen = || rows.signals.iter().filter(|row| row.column == *column);
+            let zstd = chosen().filter_map(|row| Some((row.percent, row.zstd?)));
+            let zstd: Vec<(f64, f64)> = zstd.collect();
+            let mut layers = vec![
+                Layer::line("adaptive", points(chosen(), |row| (row.percent, row.adaptive))).coloured(0),
+                Layer::line("pco", points(chosen(), |row| (row.percent, row.pco))).coloured(1),
+            ];
+            if !zstd.is_empty() {
+                layers.push(Layer::line("zstd", zstd).coloured(2));
+            }
+            layers.extend(REFERENCES.iter().enumerate().map(|(i, (codec, _))| {
+                let curve = rows.references.iter().filter(|row| row.codec == *codec);
+                Layer::dashed(*codec, points(curve, |row| (row.percent, row.bits))).coloured(3 + i)
+            }));
+            Panel::loglog(column, "largest error, percent of the range", "bits per sample").with_all(layers)
         };
         Plot::grid(3, columns.iter().map(panel).collect())
     }

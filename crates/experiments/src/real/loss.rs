@@ -53,9 +53,20 @@ struct Outcome {
     violations: u64,
 }
 
-fn one(recording: &Recording, config: Config, link: &Link, stream: Stream) -> Result<Outcome, Error> {
+struct Point<'a> {
+    recording: &'a Recording,
+    config: Config,
+    loss: f64,
+    refresh: u64,
+    sequence_bits: u32,
+}
+
+fn one(point: &Point<'_>, trial: Trial) -> Result<Outcome, Error> {
+    let recording = point.recording;
+    let config = point.config.resilient(point.sequence_bits, Some(point.refresh))?;
     let delta = config.delta();
-    let mut rng = stream.rng();
+    let link = Link::lossy(point.loss)?;
+    let mut rng = trial.stream.rng();
     let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
     let n = recording.samples.len() as f64;
     let mut all = Outcome::default();
@@ -95,28 +106,40 @@ impl Figure for Loss {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-loss", context)?;
-        let mut rows = Vec::new();
+        let mut points = Vec::new();
         for recording in &recordings {
             let (config, _) = best_for(recording, p.rate, context, Replay::rate)?;
-            for (&loss, &refresh) in product(&p.loss, &p.refresh) {
-                let (config, link) = (config.resilient(p.sequence_bits, Some(refresh))?, Link::lossy(loss)?);
-                let column = recording.name.clone();
-                let stream = context.stream("real-loss").named(&format!("{column} {loss} {refresh}"));
-                let all = context.trials(stream, p.trials, |it| one(recording, config, &link, it.stream))?;
-                rows.push(Row {
-                    column,
-                    loss,
-                    refresh,
-                    bits: all.iter().map(|o| o.bits).collect(),
-                    rmse: Measured::root_mean(&all.iter().map(|o| o.squares).collect()),
-                    beyond: all.iter().map(|o| o.beyond).collect(),
-                    unnoticed: all.iter().map(|o| o.unnoticed).collect(),
-                    longest: all.iter().map(|o| o.longest).max().unwrap_or(0) as f64 / refresh as f64,
-                    violations: all.iter().map(|o| o.violations).sum(),
-                });
+            for loss in &p.loss {
+                for refresh in &p.refresh {
+                    points.push(Point {
+                        recording,
+                        config,
+                        loss: *loss,
+                        refresh: *refresh,
+                        sequence_bits: p.sequence_bits,
+                    });
+                }
             }
         }
-        Ok(rows)
+        let row = |point: &Point<'_>| {
+            let column = point.recording.name.clone();
+            let stream = context
+                .stream("real-loss")
+                .named(&format!("{column} {} {}", point.loss, point.refresh));
+            let all = context.trials(stream, p.trials, |trial| one(point, trial))?;
+            Ok(Row {
+                column,
+                loss: point.loss,
+                refresh: point.refresh,
+                bits: all.iter().map(|o| o.bits).collect(),
+                rmse: Measured::root_mean(&all.iter().map(|o| o.squares).collect()),
+                beyond: all.iter().map(|o| o.beyond).collect(),
+                unnoticed: all.iter().map(|o| o.unnoticed).collect(),
+                longest: all.iter().map(|o| o.longest).max().unwrap_or(0) as f64 / point.refresh as f64,
+                violations: all.iter().map(|o| o.violations).sum(),
+            })
+        };
+        points.iter().map(row).collect()
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
