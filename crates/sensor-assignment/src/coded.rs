@@ -131,7 +131,7 @@ impl CodedSensors {
             .zip(&self.quantizers)
             .map(|(&n, quantizer)| PatternSensor::with_deviation(quantizer.clone(), self.noise_deviations[n]))
             .collect::<Result<_, _>>()?;
-        Ok(Bank::new(self.source, sensors)?)
+        Bank::new(self.source, sensors)
     }
 
     /// Exact mean squared error of the posterior mean. Takes `2^N` outcomes per node.

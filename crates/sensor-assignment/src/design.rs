@@ -47,9 +47,9 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
 /// As [`bit_cells`].
 pub fn bit_per_sensor(model: ObservationModel, link: Link) -> Result<Request<'static>, Error> {
     let cells = bit_cells(&model)?;
-    Ok(Request::estimation(model, BitBudget::Each(1), link)
+    Request::estimation(model, BitBudget::Each(1), link)
         .with_cells(AllowedCells::Any)
-        .with_start(cells)?)
+        .with_start(cells)
 }
 
 #[cfg(test)]

@@ -104,7 +104,7 @@ impl CellGrid {
     /// # Errors
     /// If the measurement is NaN.
     pub fn locate(&self, measurement: f64) -> Result<usize, Error> {
-        Ok(cell_of(&self.breakpoints, measurement)?)
+        cell_of(&self.breakpoints, measurement)
     }
 
     /// Limits of cell `l`, restricted to the support of the source; `None` if the two do not overlap.

@@ -148,7 +148,7 @@ impl TryFrom<&BinaryQuantizer> for Quantizer {
     /// The same cells, with the bit as level.
     fn try_from(binary: &BinaryQuantizer) -> Result<Self, Error> {
         let labels = (0..=binary.breakpoints.len()).map(|cell| cell % 2).collect();
-        Ok(Self::with_labels(binary.breakpoints.clone(), labels)?)
+        Self::with_labels(binary.breakpoints.clone(), labels)
     }
 }
 

@@ -63,7 +63,7 @@ pub(super) fn halved(system: &System, group: usize, direction: &DVector<f64>, le
         match (moved(share), moved(against)) {
             (Ok(one), Ok(other)) => return apart.with_quantizer(group, one)?.with_quantizer(group + 1, other),
             // Two breakpoints have met: a shorter step keeps their order.
-            (Err(error), _) | (_, Err(error)) if share < 1e-9 => return Err(error.into()),
+            (Err(error), _) | (_, Err(error)) if share < 1e-9 => return Err(error),
             _ => share *= 0.5,
         }
     }

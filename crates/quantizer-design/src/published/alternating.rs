@@ -172,7 +172,7 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
             probability: 0.0,
         });
     }
-    Ok(Quantizer::with_labels(breakpoints, labels)?)
+    Quantizer::with_labels(breakpoints, labels)
 }
 
 /// The functions `D_z(y)`: sums over the nodes of gain times density of the sample. Far out, the density is available as a logarithm only.
