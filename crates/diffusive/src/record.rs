@@ -210,7 +210,9 @@ impl Record {
                 if !along.tilted {
                     return [a.max(0.0) * inverse * inverse, b * inverse];
                 }
-                let lag = 0.5 * (along.wind.dot(offset) / along.diffusivity - along.drift * offset.norm());
+                let wind = along.wind;
+                let speed = wind.x.hypot(wind.y);
+                let lag = (wind.x * offset.x + wind.y * offset.y - speed * offset.norm()) / (2.0 * along.diffusivity);
                 let scale = lag.exp() * inverse;
                 [a.max(0.0) * scale * scale, b * scale]
             }

@@ -9,7 +9,7 @@ use crate::density::Cells;
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
 use fewbits_numerics::error::refuse;
-use fewbits_numerics::kernels::{scalar, vectorised};
+use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{Vector2, Vector3};
 
@@ -243,10 +243,9 @@ impl Slice {
                 continue;
             }
             let polynomials = sums_of_polynomials(&u, &term.coefficients[..=self.degree], self.absolute);
-            let exponentials = exponents.map(scalar::exp);
             for lane in 0..LANES {
                 if exponents[lane] >= -FAINT {
-                    sums[lane] += polynomials[lane] * exponentials[lane];
+                    sums[lane] += polynomials[lane] * exponents[lane].exp();
                 }
             }
         }
