@@ -137,6 +137,19 @@ pub(crate) fn evenly(models: usize, switching: f64) -> Result<Vec<f64>, Argument
     Ok((0..models * models).map(entry).collect())
 }
 
+/// A matrix of transition probabilities, row by row.
+pub(crate) fn by_rows(models: usize, transition: &[Vec<f64>]) -> Result<Vec<f64>, ArgumentError> {
+    if transition.len() != models || transition.iter().any(|row| row.len() != models) {
+        let rows: Vec<usize> = transition.iter().map(Vec::len).collect();
+        let expected = format!("{0} rows of {0}", models);
+        return Err(ArgumentError::new("transition", format!("rows of {rows:?}"), expected));
+    }
+    for row in transition {
+        probabilities("transition", row)?;
+    }
+    Ok(transition.concat())
+}
+
 impl<G> Imm<G> {
     /// The filter with transition probabilities `transition[i][j] = p(next model j | model i)`.
     ///
@@ -144,17 +157,9 @@ impl<G> Imm<G> {
     /// If there is no model, the matrix is not square of their number, or a row does not sum to one.
     pub fn new(models: Vec<G>, transition: &[Vec<f64>]) -> Result<Self, ArgumentError> {
         at_least_one("models", models.len())?;
-        if transition.len() != models.len() || transition.iter().any(|row| row.len() != models.len()) {
-            let rows: Vec<usize> = transition.iter().map(Vec::len).collect();
-            let expected = format!("{0} rows of {0}", models.len());
-            return Err(ArgumentError::new("transition", format!("rows of {rows:?}"), expected));
-        }
-        for row in transition {
-            probabilities("transition", row)?;
-        }
         Ok(Self {
+            transition: by_rows(models.len(), transition)?,
             models,
-            transition: transition.concat(),
         })
     }
 
@@ -211,7 +216,7 @@ impl<G> Imm<G> {
         workspace: &mut ImmWorkspace<D>,
     ) -> Result<f64, Error> {
         self.check(belief)?;
-        weigh(belief, workspace, |mode| {
+        weigh(belief, workspace, |_, mode| {
             let (next, info) = assumed_density::update_through(mode, observed)?;
             Ok((next, info.log_likelihood))
         })
@@ -251,12 +256,12 @@ pub(crate) fn mix<const D: usize>(
 pub(crate) fn weigh<const D: usize>(
     belief: &mut ImmBelief<D>,
     workspace: &mut ImmWorkspace<D>,
-    mut update: impl FnMut(&Gaussian<D>) -> Result<(Gaussian<D>, f64), Error>,
+    mut update: impl FnMut(usize, &Gaussian<D>) -> Result<(Gaussian<D>, f64), Error>,
 ) -> Result<f64, Error> {
     workspace.modes.clear();
     workspace.probabilities.clear();
-    for (mode, p) in belief.modes.iter().zip(&belief.probabilities) {
-        let (next, log_evidence) = match update(mode) {
+    for (j, (mode, p)) in belief.modes.iter().zip(&belief.probabilities).enumerate() {
+        let (next, log_evidence) = match update(j, mode) {
             Ok(updated) => updated,
             // A mode under which the observation is impossible gets probability zero. It is an error only if all modes do.
             Err(Error::Impossible) => (*mode, f64::NEG_INFINITY),

@@ -1,7 +1,7 @@
 //! Filters that differ in the scale of the process noise or in the model, weighted by evidence.
 
 use crate::contract::{Info, Move, StateFilter, StateLikelihood};
-use crate::imm::{ImmWorkspace, evenly, mix, weigh};
+use crate::imm::{ImmWorkspace, by_rows, evenly, mix, weigh};
 use crate::{Error, ImmBelief};
 use fewbits_core::Gaussian;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
@@ -33,7 +33,7 @@ use rand::Rng;
 /// ```
 #[derive(Debug, Clone)]
 pub struct NoiseBank<const D: usize, F> {
-    filter: F,
+    filters: Vec<F>,
     scales: Vec<f64>,
     transition: Vec<f64>,
     workspace: ImmWorkspace<D>,
@@ -44,22 +44,50 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> NoiseBank<D, F> {
     ///
     /// # Errors
     /// If there is no scale, one is not above 0, or `switching` is outside `[0, 1]`.
-    pub fn new(filter: F, scales: Vec<f64>, switching: f64) -> Result<Self, Error> {
+    pub fn new(filter: F, scales: Vec<f64>, switching: f64) -> Result<Self, Error>
+    where
+        F: Clone,
+    {
+        let transition = evenly(scales.len(), switching)?;
+        Self::checked(vec![filter; scales.len()], scales, transition)
+    }
+
+    /// A bank of these filters, each with its scale of the process-noise covariance: they may differ in more than the scale. In each
+    /// step they change by the probabilities `transition[i][j] = p(next j | i)`.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), or if the matrix is not square of their number, or a row does not sum to one.
+    pub fn of(filters: Vec<(F, f64)>, transition: &[Vec<f64>]) -> Result<Self, Error> {
+        let transition = by_rows(filters.len(), transition)?;
+        let (filters, scales) = filters.into_iter().unzip();
+        Self::checked(filters, scales, transition)
+    }
+
+    fn checked(filters: Vec<F>, scales: Vec<f64>, transition: Vec<f64>) -> Result<Self, Error> {
         at_least_one("scales", scales.len())?;
         for scale in &scales {
             positive("scales", *scale)?;
         }
         Ok(Self {
-            filter,
-            transition: evenly(scales.len(), switching)?,
+            filters,
+            transition,
             scales,
             workspace: ImmWorkspace::default(),
         })
     }
 
+    /// The filters, in the order of the belief's modes.
+    pub fn filters(&self) -> &[F] {
+        &self.filters
+    }
+
     /// Scales of the process noise, in the order of the belief's modes.
     pub fn scales(&self) -> &[f64] {
         &self.scales
+    }
+
+    fn starts(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Vec<Gaussian<D>>, Error> {
+        self.filters.iter_mut().map(|filter| filter.start(rng, prior)).collect()
     }
 
     /// The estimated scale: the geometric mean of the scales, weighted by the modes' probabilities.
@@ -73,17 +101,17 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
     type Belief = ImmBelief<D>;
 
     fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<ImmBelief<D>, Error> {
-        Ok(ImmBelief::agreed(&self.filter.start(rng, prior)?, self.scales.len())?)
+        let even = vec![1.0 / self.filters.len() as f64; self.filters.len()];
+        Ok(ImmBelief::new(even, self.starts(rng, prior)?)?)
     }
 
     fn restart(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>, lost: &ImmBelief<D>) -> Result<ImmBelief<D>, Error> {
-        let start = self.filter.start(rng, prior)?;
-        Ok(ImmBelief::new(lost.probabilities().to_vec(), vec![start; lost.modes().len()])?)
+        Ok(ImmBelief::new(lost.probabilities().to_vec(), self.starts(rng, prior)?)?)
     }
 
     fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut ImmBelief<D>) -> Result<(), Error> {
         let Self {
-            filter,
+            filters,
             scales,
             transition,
             workspace,
@@ -95,7 +123,7 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         mix(belief, transition, workspace, |j, mixed| {
             let mut moved = *mixed;
             let own = modes.get(j).map_or(motion.motion, |mode| &**mode);
-            filter.predict(rng, Move::new(own, motion.noise_scale * scales[j]), &mut moved)?;
+            filters[j].predict(rng, Move::new(own, motion.noise_scale * scales[j]), &mut moved)?;
             Ok(moved)
         })
     }
@@ -106,10 +134,10 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         belief: &mut ImmBelief<D>,
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error> {
-        let Self { filter, workspace, .. } = self;
-        let log_likelihood = weigh(belief, workspace, |mode| {
+        let Self { filters, workspace, .. } = self;
+        let log_likelihood = weigh(belief, workspace, |j, mode| {
             let mut next = *mode;
-            let info = filter.update(rng, &mut next, observed)?;
+            let info = filters[j].update(rng, &mut next, observed)?;
             Ok((next, info.log_likelihood))
         })?;
         Ok(Info::new(log_likelihood))

@@ -111,6 +111,8 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
         "y_low",
         "y_high",
         "bias",
+        "scale",
+        "noise",
         "speed",
         "ranges",
         "events",
@@ -158,12 +160,9 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
         }
         summary.rows += 1;
         summary.ranges += ranges;
-        let place = found.as_ref().map(|found| {
-            let deviations = [found.covariance[(0, 0)].sqrt(), found.covariance[(1, 1)].sqrt()];
-            (found.position, deviations, found.bias, found.speed)
-        });
-        let cells: [Option<f64>; 8] = match place {
-            Some((p, d, bias, speed)) => {
+        let cells: [Option<f64>; 10] = match &found {
+            Some(found) => {
+                let (p, d) = (found.position, [0, 1].map(|i| found.covariance[(i, i)].sqrt()));
                 path.push((p, d));
                 let band = |i: usize, sign: f64| Some(p[i] + sign * BAND * d[i]);
                 [
@@ -173,14 +172,16 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
                     band(0, 1.0),
                     band(1, -1.0),
                     band(1, 1.0),
-                    Some(bias),
-                    Some(speed),
+                    Some(found.bias),
+                    Some(found.scale),
+                    Some(found.noise),
+                    Some(found.speed),
                 ]
             }
             None => {
                 summary.searching += 1;
                 events = "searching";
-                [None; 8]
+                [None; 10]
             }
         };
         let first = first_cell(&instants, instant.time);

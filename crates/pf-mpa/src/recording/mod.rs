@@ -1,17 +1,18 @@
 //! Tracking from single ranges at arbitrary times and from arbitrary anchors, as in recordings and from real radios.
 //!
-//! Real ranges have a common bias and outliers, anchors stop sending, and speed and first position are unknown. [`RangeTracker`]
-//! estimates all of these on a [`FusionCentre`]:
+//! Real ranges have a common bias, an error of scale and outliers, anchors stop sending, and speed, noise and first position are unknown.
+//! [`RangeTracker`] estimates all of these on a [`FusionCentre`]:
 //!
 //! ```text
-//! state        [x, vx, y, vy, bias]; a velocity is forgotten within `persistence`, the bias changes slowly
+//! state        [x, vx, y, vy, bias, scale, offset]; a velocity is forgotten within `persistence`, the bias changes slowly, the scale never
 //! acquisition  the first range of each anchor is sent in full; three anchors or more give a position by the adaptive grid
 //! tracking     each range is sent as the level of its innovation, or in full; with probability `outliers` it is unrelated to the state
-//! speed        a bank of filters over speeds, weighted by evidence; works with 1 bit too
+//! speed, noise a bank of filters, weighted by evidence; works with 1 bit too
 //! lost         by the centre's own test, if fewer than three anchors agree, or after `silence` seconds without a range: acquisition starts
 //!              again
 //! ```
 
+mod own_error;
 mod scheme;
 mod settings;
 
@@ -24,23 +25,28 @@ use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
 use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, Observed, SchemeNode, SensorNode};
 use fewbits_filters::centre::{Event, FalseAlarms, FusionCentre, Reporting, Slot};
-use fewbits_filters::{GridFilter, GridWorkspace, MomentFilter, NoiseBank};
+use fewbits_filters::{GridFilter, GridWorkspace, NoiseBank};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{finite, within};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2};
+use own_error::OwnError;
 use rand::Rng;
 use scheme::{Tolerant, stray_level};
 use std::collections::BTreeMap;
 
-/// Indices of x, y and bias in the state.
-const AXES: [usize; 3] = [0, 2, 4];
-/// Probability per range that the speed changes: once in a few minutes.
-const SWITCHING: f64 = 0.003;
+/// Indices of bias and scale in the state.
+const BIAS: usize = 4;
+const SCALE: usize = 5;
+/// Index of the sum of the bias and the error of the next range.
+const OFFSET: usize = 6;
 /// Probability of a false alarm of the test for a lost track, per range. With one bit a lost track shows only slowly, so the rate is
-/// higher. With more bits it is low, because errors of successive real ranges are correlated for seconds.
+/// higher: in a recording of 1000 ranges, most losses are then false alarms.
 const ONE_BIT_ALARMS: f64 = 3e-3;
-const ALARMS: f64 = 1e-6;
+const ALARMS: f64 = 1e-5;
+/// Added to the variances of bias and scale when the track is lost, as a share of those before the first range: for the bias one square
+/// metre by default.
+const LOST_SHARE: f64 = 0.04;
 /// Bits of a range that is sent in full.
 const FULL_BITS: usize = 32;
 
@@ -63,8 +69,12 @@ pub struct RangeEstimate {
     pub covariance: Matrix2<f64>,
     /// Common bias of the ranges, in metres.
     pub bias: f64,
-    /// Estimated standard deviation of the velocity along an axis: [`RangeSettings::speed`] times the root of the bank's noise scale,
-    /// which is the geometric mean over the bank's filters, weighted by their probabilities.
+    /// Error of scale: ranges are `1 + scale` times the distance, plus the bias.
+    pub scale: f64,
+    /// Estimated standard deviation of a range's error, in metres: the geometric mean over the bank's filters, weighted by their
+    /// probabilities.
+    pub noise: f64,
+    /// Estimated standard deviation of the velocity along an axis, in metres per second, averaged in the same way.
     pub speed: f64,
     /// Whether this range showed that the track was lost. Acquisition then starts again.
     pub lost: bool,
@@ -79,7 +89,7 @@ impl RangeEstimate {
     }
 }
 
-type Filter = NoiseBank<5, MomentFilter>;
+type Filter = NoiseBank<7, OwnError>;
 
 /// An anchor: its number at the centre, its sensor model, and its own half of the scheme.
 struct Anchor {
@@ -94,12 +104,13 @@ pub struct RangeTracker {
     travel: Travel,
     settings: RangeSettings,
     noise: RangeNoise,
-    centre: Option<FusionCentre<5, Filter>>,
+    centre: Option<FusionCentre<7, Filter>>,
     /// Time, in seconds, that the centre counts as zero.
     origin: f64,
     /// The latest range in full of each anchor since acquisition began: time, place of the anchor, range.
     collected: BTreeMap<u32, (f64, Vector2<f64>, f64)>,
-    bias: (f64, f64),
+    /// Mean and variance of bias and error of scale before acquisition.
+    calibration: [(f64, f64); 2],
     last: f64,
     bits: usize,
     losses: usize,
@@ -116,7 +127,7 @@ impl RangeTracker {
         settings: RangeSettings,
     ) -> Result<Self, Error> {
         settings.check()?;
-        let noise = RangeNoise::constant(settings.noise)?;
+        let noise = RangeNoise::constant(0.5 * settings.least_noise())?;
         let mut seated = BTreeMap::new();
         for (name, place) in anchors {
             let sensor = RangeSensor::new(place, noise)?;
@@ -138,7 +149,7 @@ impl RangeTracker {
             centre: None,
             origin: 0.0,
             collected: BTreeMap::new(),
-            bias: (0.0, settings.bias * settings.bias),
+            calibration: settings.calibration().map(|deviation| (0.0, deviation * deviation)),
             last: f64::NEG_INFINITY,
             bits: 0,
             losses: 0,
@@ -209,27 +220,42 @@ impl RangeTracker {
         Ok(estimate)
     }
 
-    fn estimate(&self, centre: &FusionCentre<5, Filter>, lost: bool) -> RangeEstimate {
+    fn estimate(&self, centre: &FusionCentre<7, Filter>, lost: bool) -> RangeEstimate {
         let belief = centre.estimate();
         let (m, p) = (belief.mean(), belief.covariance());
-        let scale = centre.filter().scale(centre.belief());
+        let (filters, weights) = (centre.filter().filters(), centre.belief().probabilities());
+        let least = self.noise.at_sensor();
+        let log_noise = |filter: &OwnError| 0.5 * (filter.variance + least * least).ln();
+        let noise = filters
+            .iter()
+            .zip(weights)
+            .map(|(filter, p)| p * log_noise(filter))
+            .sum::<f64>();
         RangeEstimate {
             position: Vector2::new(m[0], m[2]),
             covariance: Matrix2::new(p[(0, 0)], p[(0, 2)], p[(2, 0)], p[(2, 2)]),
-            bias: m[4],
-            speed: self.settings.speed * scale.sqrt(),
+            bias: m[BIAS],
+            scale: m[SCALE],
+            noise: noise.exp(),
+            speed: self.settings.speed * centre.filter().scale(centre.belief()).sqrt(),
             lost,
         }
     }
 
-    /// Starts acquisition again. The estimate of the bias is kept.
+    /// Starts acquisition again. The estimates of bias and scale are kept, with a larger variance.
     fn forget(&mut self) {
         if let Some(centre) = self.centre.take() {
             let belief = centre.estimate();
-            // The bias of a lost track is uncertain: raise its variance by one square metre.
-            let variance = belief.covariance()[(4, 4)] + 1.0;
-            if variance.is_finite() && belief.mean()[4].abs() < 3.0 * self.settings.bias {
-                self.bias = (belief.mean()[4], variance.min(self.settings.bias * self.settings.bias));
+            for ((axis, known), deviation) in [BIAS, SCALE]
+                .into_iter()
+                .zip(&mut self.calibration)
+                .zip(self.settings.calibration())
+            {
+                let (mean, prior) = (belief.mean()[axis], deviation * deviation);
+                let variance = belief.covariance()[(axis, axis)] + LOST_SHARE * prior;
+                if variance.is_finite() && mean.abs() < 3.0 * deviation {
+                    *known = (mean, variance.min(prior));
+                }
             }
         }
         self.collected.clear();
@@ -242,10 +268,11 @@ impl RangeTracker {
         let middle = places().sum::<Vector2<f64>>() / count;
         let spread = places().map(|p| (p - middle).norm_squared()).sum::<f64>() / count;
         let speed = self.settings.speed;
-        let (mut mean, mut variances) = (SVector::<f64, 5>::zeros(), SVector::<f64, 5>::repeat(speed * speed));
-        (mean[0], mean[2], mean[4]) = (middle[0], middle[1], self.bias.0);
+        let (mut mean, mut variances) = (SVector::<f64, 7>::zeros(), SVector::<f64, 7>::repeat(speed * speed));
+        let [bias, scale] = self.calibration;
+        (mean[0], mean[2], mean[BIAS], mean[SCALE]) = (middle[0], middle[1], bias.0, scale.0);
         // Prior: the target is somewhere among the anchors or a little outside.
-        (variances[0], variances[2], variances[4]) = (spread, spread, self.bias.1);
+        (variances[0], variances[2], variances[BIAS], variances[SCALE]) = (spread, spread, bias.1, scale.1);
         let prior = Gaussian::from_trusted_parts(mean, SMatrix::from_diagonal(&variances));
         // If no place fits the ranges within their noise, or the posterior is a thin ridge, try larger noise; then wait for more ranges.
         let (mut found, mut workspace) = (None, GridWorkspace::default());
@@ -258,7 +285,7 @@ impl RangeTracker {
                 Ok(Observed::new(BiasedRangeSensor(RangeSensor::new(*place, noise)?), factor))
             });
             let ranges: Vec<Observed<BiasedRangeSensor, RangeFactor, 1>> = ranges.collect::<Result<_, Error>>()?;
-            match GridFilter::default().update(&prior, AXES, ranges.as_slice(), &mut workspace) {
+            match GridFilter::default().update(&prior, [0, 2, BIAS, SCALE], ranges.as_slice(), &mut workspace) {
                 Ok((belief, _)) => {
                     found = Some(belief);
                     break;
@@ -273,8 +300,16 @@ impl RangeTracker {
         Ok(())
     }
 
-    fn centre_from(&self, rng: &mut dyn Rng, belief: &Gaussian<5>) -> Result<FusionCentre<5, Filter>, Error> {
-        let bank = NoiseBank::new(MomentFilter, self.settings.scales(), SWITCHING)?;
+    fn centre_from(&self, rng: &mut dyn Rng, belief: &Gaussian<7>) -> Result<FusionCentre<7, Filter>, Error> {
+        // What a filter's noise has more than the schemes'.
+        let least = self.noise.at_sensor();
+        let (bank, transition) = self.settings.bank();
+        let filter = |(speed, noise): (f64, f64)| {
+            let deviation = noise * self.settings.noise;
+            let variance = deviation * deviation - least * least;
+            (OwnError { variance }, speed * speed)
+        };
+        let bank = NoiseBank::of(bank.into_iter().map(filter).collect(), &transition)?;
         let sensor = FalseAlarms::default().sensor;
         let centre = match self.travel {
             Travel::Bits(1) => ONE_BIT_ALARMS,
@@ -283,7 +318,7 @@ impl RangeTracker {
         let mut centre = FusionCentre::new(rng, self.settings.world()?, bank, belief)?
             .with_false_alarms(FalseAlarms { sensor, centre })?;
         for anchor in self.anchors.values() {
-            let sensing = BiasedRangeSensor(anchor.sensor).on_axes::<5>(AXES)?;
+            let sensing = BiasedRangeSensor(anchor.sensor).on_axes::<7>([0, 2, OFFSET, SCALE])?;
             let RangeSettings { outliers, stray, .. } = self.settings;
             match self.travel {
                 Travel::Full => {
@@ -292,7 +327,7 @@ impl RangeTracker {
                         outliers,
                         stray: move |(): &(), _: &f64| 1.0 / stray,
                     };
-                    let remote = Reporting::new(sensing, scheme, Link::PERFECT, |_: &Gaussian<5>, _: &Gaussian<1>| ());
+                    let remote = Reporting::new(sensing, scheme, Link::PERFECT, |_: &Gaussian<7>, _: &Gaussian<1>| ());
                     centre.join(anchor.number, remote.sending_values())?;
                 }
                 Travel::Bits(bits) => {
@@ -302,7 +337,7 @@ impl RangeTracker {
                         outliers,
                         stray: move |r: &RangeReference, level: &Symbol| stray_level(levels, stray, r, level),
                     };
-                    let ask = move |_: &Gaussian<5>, expected: &Gaussian<1>| RangeReference::about(expected, loading);
+                    let ask = move |_: &Gaussian<7>, expected: &Gaussian<1>| RangeReference::about(expected, loading);
                     centre.join(anchor.number, Reporting::new(sensing, scheme, Link::PERFECT, ask))?;
                 }
             }
