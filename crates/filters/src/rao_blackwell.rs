@@ -302,6 +302,7 @@ fn choose<R: Rng + ?Sized>(
     let mut chosen = 0;
     if pieces.len() > 1 {
         // A piece of share zero is never chosen, even if rounding leaves a rest of the uniform draw at the end.
+        // Evaluated again and not stored: a particle then needs no memory for its pieces, and the search stops at the chosen one.
         let mut left = rng.random::<f64>();
         for (i, term) in log_shares(pieces, predicted, deviation).enumerate() {
             let share = (term - total).exp();
