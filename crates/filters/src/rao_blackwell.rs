@@ -3,7 +3,7 @@
 use crate::contract::{Info, LinearScalar, Move, StateFilter, StateLikelihood};
 use crate::particle::{ParticleFilter, Workspace, weigh};
 use crate::{Error, kalman};
-use fewbits_core::columns::{count, set_state};
+use fewbits_core::columns::{change_each, count, set_state, state_at};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Cell, FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observed};
 use fewbits_densities::GaussianCloud;
@@ -85,11 +85,7 @@ impl RaoBlackwellised {
         }
         self.filter
             .resample(rng, belief.means_mut(), &mut workspace.particles)?;
-        let mut columns = belief.means_mut().columns_mut();
-        for i in 0..count(&columns) {
-            let moved = mean(&SVector::from_fn(|d, _| columns[d][i]));
-            set_state(&mut columns, i, &moved);
-        }
+        change_each(belief.means_mut().columns_mut(), |state| mean(&state));
         belief.set_shared_covariance(*shared.covariance());
         Ok(())
     }
@@ -181,7 +177,7 @@ impl RaoBlackwellised {
         let width = belief.means().auxiliary_width();
         let (mut columns, side) = belief.means_mut().parts_mut();
         for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
-            let mean = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
+            let mean = state_at(&columns, i);
             let predicted = matrix * mean;
             // The measurement is drawn given the report and then used as if it had been received. The weight is multiplied by the
             // probability of the report.

@@ -87,7 +87,7 @@ impl<const K: usize> Found<K> {
     /// Whether the moments are those of the posterior: resolved and inside the grid.
     pub fn is_done(&self, region: &Region<K>, reach: f64) -> bool {
         let widest = self.covariance.diagonal().max().sqrt();
-        let covered = match region.is_prediction() {
+        let covered = match region.is_prediction {
             true if widest >= BLUNT => 1.0,
             true => COVERED_BY_PREDICTION,
             false => COVERED,
