@@ -10,8 +10,8 @@ pub type ColumnsMut<'a, const D: usize> = [&'a mut [f64]; D];
 
 /// State `i` of the columns.
 #[inline]
-pub fn state_at<const D: usize>(columns: &Columns<'_, D>, i: usize) -> SVector<f64, D> {
-    SVector::from_fn(|d, _| columns[d][i])
+pub fn state_at<const D: usize>(columns: &[impl AsRef<[f64]>; D], i: usize) -> SVector<f64, D> {
+    SVector::from_fn(|d, _| columns[d].as_ref()[i])
 }
 
 /// Writes `state` as state `i`.
@@ -53,7 +53,7 @@ pub fn change_each<const D: usize>(
 ) {
     if columns_agree(&mut columns) {
         for i in 0..count(&columns) {
-            let changed = change(SVector::from_fn(|d, _| columns[d][i]));
+            let changed = change(state_at(&columns, i));
             set_state(&mut columns, i, &changed);
         }
     }

@@ -266,9 +266,7 @@ impl<const D: usize> FactoredGaussian<D> {
     pub fn log_pdf(&self, x: &SVector<f64, D>) -> f64 {
         self.log_peak - 0.5 * self.squared_distance(x)
     }
-}
 
-impl<const D: usize> FactoredGaussian<D> {
     /// Adds `ln N(x; mean, covariance)` of every state to `logs`. Solves with the Cholesky factor for blocks of columns.
     pub(crate) fn add_log_pdfs(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
         const BLOCK: usize = 64;

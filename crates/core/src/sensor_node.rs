@@ -56,17 +56,6 @@ impl<C: Scheme<M>, const M: usize> SchemeNode<C, M> {
         let memory = scheme.start();
         Self { scheme, memory }
     }
-
-    /// What the sensor remembers.
-    pub fn memory(&self) -> &C::State {
-        &self.memory
-    }
-
-    /// The same sensor with a memory that was stored earlier.
-    #[must_use]
-    pub fn with_memory(self, memory: C::State) -> Self {
-        Self { memory, ..self }
-    }
 }
 
 impl<C: Deterministic<M>, const M: usize> SchemeNode<C, M> {

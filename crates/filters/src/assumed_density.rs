@@ -1,6 +1,7 @@
 //! The assumed-density filter: a Gaussian belief, updated by any factor.
 
 use crate::Error;
+use fewbits_core::factor::Tilted;
 use fewbits_core::{Factor, Gaussian, GaussianDynamics, Observed, Sensing};
 use fewbits_numerics::linalg::{congruence, congruence_of, solve_semidefinite, times_transposed};
 use nalgebra::{SMatrix, SVector};
@@ -19,9 +20,18 @@ pub struct UpdateInfo<const D: usize, const M: usize> {
 
 /// Time update, linearised at the mean `m`: mean `f(m)`, covariance `F P F' + Q` with `F` the Jacobian at `m`.
 pub fn predict<const D: usize>(dynamics: &impl GaussianDynamics<D>, belief: &Gaussian<D>) -> Gaussian<D> {
+    predict_scaled(dynamics, belief, 1.0)
+}
+
+/// [`predict`] with `noise_scale Q` in place of `Q`.
+pub(crate) fn predict_scaled<const D: usize>(
+    dynamics: &impl GaussianDynamics<D>,
+    belief: &Gaussian<D>,
+    noise_scale: f64,
+) -> Gaussian<D> {
     let jacobian = dynamics.jacobian(belief.mean());
-    let covariance = congruence(&jacobian, belief.covariance()) + dynamics.noise_covariance_at(belief.mean());
-    Gaussian::from_trusted_parts(dynamics.mean(belief.mean()), covariance)
+    let noise = dynamics.noise_covariance_at(belief.mean()) * noise_scale;
+    Gaussian::from_trusted_parts(dynamics.mean(belief.mean()), congruence(&jacobian, belief.covariance()) + noise)
 }
 
 /// Measurement update for a linear sensor. The factor gives the posterior of `m = H x`; the posterior of `x` follows by linear regression
@@ -84,10 +94,7 @@ pub fn evidence_through<const D: usize, const M: usize>(
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
 ) -> Result<(f64, SVector<f64, M>), Error> {
     let (predicted, jacobian) = (observed.sensing.mean(belief.mean()), observed.sensing.jacobian(belief.mean()));
-    let cross = times_transposed(belief.covariance(), &jacobian);
-    let prior = measured(predicted, &jacobian, &cross)?;
-    let tilted = observed.factor.tilted(&prior)?;
-    let correction = tilted.mean - prior.mean();
+    let Tilt { correction, tilted, .. } = tilt(belief, predicted, &jacobian, &observed.factor)?;
     if !(tilted.log_evidence.is_finite() && correction.iter().all(|x| x.is_finite())) {
         let what = "the evidence (from the belief, the sensing model or the factor)";
         return Err(Error::unlikely_or_no_number(tilted.log_evidence, what));
@@ -95,19 +102,37 @@ pub fn evidence_through<const D: usize, const M: usize>(
     Ok((tilted.log_evidence, correction))
 }
 
-/// The distribution of the noise-free measurement, from `P H'`.
-#[inline]
-fn measured<const D: usize, const M: usize>(
+/// The posterior of the noise-free measurement `y`, and what leads from it to that of the state.
+struct Tilt<const D: usize, const M: usize> {
+    /// `P H'`.
+    cross: SMatrix<f64, D, M>,
+    prior: Gaussian<M>,
+    tilted: Tilted<M>,
+    /// Posterior minus prior mean.
+    correction: SVector<f64, M>,
+}
+
+/// The factor depends only on `y = H x`, so its posterior moments are computed for `y`.
+#[inline(always)]
+fn tilt<const D: usize, const M: usize>(
+    belief: &Gaussian<D>,
     predicted: SVector<f64, M>,
     matrix: &SMatrix<f64, M, D>,
-    cross: &SMatrix<f64, D, M>,
-) -> Result<Gaussian<M>, Error> {
-    let prior = Gaussian::from_symmetric_parts(predicted, congruence_of(matrix, cross));
+    factor: &impl Factor<M>,
+) -> Result<Tilt<D, M>, Error> {
+    let cross = times_transposed(belief.covariance(), matrix);
+    let prior = Gaussian::from_symmetric_parts(predicted, congruence_of(matrix, &cross));
     if !prior.is_finite() {
         let what = "the predicted measurement (from the belief or the sensing model)";
         return Err(Error::NotANumber { what });
     }
-    Ok(prior)
+    let tilted = factor.tilted(&prior)?;
+    Ok(Tilt {
+        cross,
+        prior,
+        correction: tilted.mean - prior.mean(),
+        tilted,
+    })
 }
 
 #[inline(always)]
@@ -117,12 +142,14 @@ fn update_at<const D: usize, const M: usize>(
     matrix: &SMatrix<f64, M, D>,
     factor: &impl Factor<M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
-    // The factor depends only on `y = H x`, so its posterior moments are computed for `y`.
-    let cross = times_transposed(belief.covariance(), matrix);
-    let prior = measured(predicted, matrix, &cross)?;
-    let tilted = factor.tilted(&prior)?;
-    // Given `y`, the state is `x = mean + gain (y - predicted)` plus a residual that is independent of `y`.
-    let correction = tilted.mean - prior.mean();
+    let Tilt {
+        cross,
+        prior,
+        tilted,
+        correction,
+    } = tilt(belief, predicted, matrix, factor)?;
+    // Given `y`, the state is `x = mean + gain (y - predicted)` plus a residual that is independent of `y`. The observation leaves the
+    // residual's covariance as it is. Both terms are positive semidefinite, so their sum is so under rounding too.
     let gain = solve_semidefinite(prior.covariance(), &cross.transpose())?.transpose();
     let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
     let covariance = congruence(&keep, belief.covariance()) + congruence(&gain, &tilted.covariance);

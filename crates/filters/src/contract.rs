@@ -6,7 +6,6 @@
 use crate::{Error, assumed_density};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Belief, ColumnsMut, Evolution, Factor, Gaussian, GaussianDynamics, Likelihood, Observed, Sensing};
-use fewbits_numerics::linalg::congruence;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
@@ -35,25 +34,20 @@ impl<const D: usize, G: GaussianDynamics<D>> Motion<D> for G {
     }
 
     fn predict(&self, belief: &Gaussian<D>, noise_scale: f64) -> Gaussian<D> {
-        let jacobian = self.jacobian(belief.mean());
-        let noise = self.noise_covariance_at(belief.mean()) * noise_scale;
-        let mean = fewbits_core::Dynamics::mean(self, belief.mean());
-        Gaussian::from_trusted_parts(mean, congruence(&jacobian, belief.covariance()) + noise)
+        assumed_density::predict_scaled(self, belief, noise_scale)
     }
 
-    fn move_columns(&self, rng: &mut dyn Rng, noise_scale: f64, mut states: ColumnsMut<'_, D>) {
+    fn move_columns(&self, rng: &mut dyn Rng, noise_scale: f64, states: ColumnsMut<'_, D>) {
         if noise_scale == 1.0 {
             self.propagate_columns(rng, states);
             return;
         }
         // The deviation of the draw from the mean is multiplied by the root of `noise_scale`.
         let stretch = noise_scale.sqrt();
-        for i in 0..fewbits_core::columns::count(&states) {
-            let state = SVector::<f64, D>::from_fn(|d, _| states[d][i]);
+        fewbits_core::columns::change_each(states, |state| {
             let mean = fewbits_core::Dynamics::mean(self, &state);
-            let moved = mean + (self.propagate(rng, &state) - mean) * stretch;
-            fewbits_core::columns::set_state(&mut states, i, &moved);
-        }
+            mean + (self.propagate(rng, &state) - mean) * stretch
+        });
     }
 }
 
@@ -75,6 +69,11 @@ impl<'a, const D: usize> Move<'a, D> {
     /// Time update of a Gaussian.
     pub fn predict(&self, belief: &Gaussian<D>) -> Gaussian<D> {
         self.motion.predict(belief, self.noise_scale)
+    }
+
+    /// Replaces every state by an independent draw of its next state.
+    pub fn move_columns(&self, rng: &mut dyn Rng, states: ColumnsMut<'_, D>) {
+        self.motion.move_columns(rng, self.noise_scale, states);
     }
 }
 
@@ -196,6 +195,18 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
 /// Largest `h(x) - h'(x) x`, relative to `h(x)` and the noise deviation, that is treated as rounding of a linear sensor.
 const OFFSET: f64 = 1e-9;
 
+/// Conditions a Gaussian on observations, one after the other: the posterior, and `ln p(all observations)` by the chain rule.
+pub(crate) fn condition_all<const D: usize>(
+    belief: &Gaussian<D>,
+    observed: &[&dyn StateLikelihood<D>],
+) -> Result<(Gaussian<D>, f64), Error> {
+    let (mut next, mut log_likelihood) = (*belief, 0.0);
+    for one in observed {
+        log_likelihood += one.condition(&mut next)?.log_likelihood;
+    }
+    Ok((next, log_likelihood))
+}
+
 /// Results of an update other than the new belief.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
@@ -299,10 +310,7 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
         belief: &mut Gaussian<D>,
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error> {
-        let (mut next, mut log_likelihood) = (*belief, 0.0);
-        for one in observed {
-            log_likelihood += one.condition(&mut next)?.log_likelihood;
-        }
+        let (next, log_likelihood) = condition_all(belief, observed)?;
         *belief = next;
         Ok(Info::new(log_likelihood))
     }

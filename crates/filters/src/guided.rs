@@ -1,7 +1,7 @@
 //! A particle filter whose proposal depends on the observations.
 
 use crate::Error;
-use crate::contract::{Info, Move, StateFilter, StateLikelihood};
+use crate::contract::{Info, Move, StateFilter, StateLikelihood, condition_all};
 use crate::particle::{BootstrapFilter, ParticleFilter, weigh};
 use fewbits_core::columns::{set_state, state_at};
 use fewbits_core::{Gaussian, Likelihood};
@@ -54,10 +54,7 @@ fn propose<const D: usize>(
     moved: &Gaussian<D>,
     observed: &[&dyn StateLikelihood<D>],
 ) -> Option<(SVector<f64, D>, f64)> {
-    let posterior = observed
-        .iter()
-        .try_fold(*moved, |mut belief, one| one.condition(&mut belief).map(|_| belief))
-        .ok()?;
+    let (posterior, _) = condition_all(moved, observed).ok()?;
     // u = back (x' - f) on the range of Q; elsewhere u stays standard normal.
     let lower = semidefinite_factor("noise_covariance", moved.covariance()).ok()?;
     let back = solve_semidefinite(moved.covariance(), &lower).ok()?.transpose();
@@ -92,9 +89,7 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
         let known = |i| Gaussian::from_trusted_parts(state_at(&columns, i), SMatrix::zeros());
         self.moves.clear();
         self.moves.extend((0..belief.len()).map(|i| motion.predict(&known(i))));
-        motion
-            .motion
-            .move_columns(rng, motion.noise_scale, belief.columns_mut());
+        motion.move_columns(rng, belief.columns_mut());
         Ok(())
     }
 
@@ -111,7 +106,7 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
         if self.moves.len() == belief.len() && !observed.is_empty() {
             let mut columns = next.columns_mut();
             for (i, (moved, ratio)) in self.moves.iter().zip(&mut ratios).enumerate() {
-                let own = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
+                let own = state_at(&columns, i);
                 if let Some((state, log_ratio)) = propose(rng, &own, moved, observed) {
                     set_state(&mut columns, i, &state);
                     *ratio = log_ratio;

@@ -57,28 +57,27 @@ impl ParticleFilter {
         belief: &mut Particles<D>,
         workspace: &mut Workspace<D>,
     ) -> Result<bool, Error> {
-        if !self.schedule.is_due(belief.effective_sample_size(), belief.len()) {
-            return Ok(false);
+        let is_due = self.draw_ancestors(rng, belief, &mut workspace.ancestors);
+        if is_due {
+            belief.select(&workspace.ancestors)?;
         }
-        self.resample_to(rng, belief, belief.len(), workspace)?;
-        Ok(true)
+        Ok(is_due)
     }
 
-    /// Resamples to `count` particles, whatever the schedule.
-    ///
-    /// # Errors
-    /// If `count` is zero.
-    pub fn resample_to<const D: usize, R: Rng + ?Sized>(
+    /// Draws an ancestor of each particle if the schedule says so. Returns whether it did.
+    fn draw_ancestors<const D: usize, R: Rng + ?Sized>(
         &self,
         rng: &mut R,
-        belief: &mut Particles<D>,
-        count: usize,
-        workspace: &mut Workspace<D>,
-    ) -> Result<(), Error> {
-        workspace.ancestors.resize(count, 0);
-        self.resampling
-            .ancestors_of_normalised(rng, belief.weights(), &mut workspace.ancestors);
-        belief.select(&workspace.ancestors)
+        belief: &Particles<D>,
+        ancestors: &mut Vec<u32>,
+    ) -> bool {
+        let is_due = self.schedule.is_due(belief.effective_sample_size(), belief.len());
+        if is_due {
+            ancestors.resize(belief.len(), 0);
+            self.resampling
+                .ancestors_of_normalised(rng, belief.weights(), ancestors);
+        }
+        is_due
     }
 
     /// Resamples if the schedule says so, then draws the next state of every particle.
@@ -124,10 +123,7 @@ impl ParticleFilter {
         // Everything happens in a second buffer, so that the belief is unchanged if a later part fails.
         let Workspace { ancestors, next } = workspace;
         let next = next.get_or_insert_with(|| belief.clone());
-        if self.schedule.is_due(belief.effective_sample_size(), belief.len()) {
-            ancestors.resize(belief.len(), 0);
-            self.resampling
-                .ancestors_of_normalised(rng, belief.weights(), ancestors);
+        if self.draw_ancestors(rng, belief, ancestors) {
             next.select_from(belief, ancestors)?;
         } else {
             next.clone_from(belief);
@@ -196,9 +192,7 @@ impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
 
     fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Particles<D>) -> Result<(), Error> {
         self.resample(rng, belief)?;
-        motion
-            .motion
-            .move_columns(rng, motion.noise_scale, belief.columns_mut());
+        motion.move_columns(rng, belief.columns_mut());
         Ok(())
     }
 

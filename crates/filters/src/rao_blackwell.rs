@@ -3,12 +3,12 @@
 use crate::contract::{Info, LinearScalar, Move, StateFilter, StateLikelihood};
 use crate::particle::{ParticleFilter, Workspace, weigh};
 use crate::{Error, kalman};
-use fewbits_core::columns::{count, set_state};
+use fewbits_core::columns::{change_each, count, set_state, state_at};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Cell, FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observed};
 use fewbits_densities::GaussianCloud;
 use fewbits_numerics::error::{at_least_one, refuse};
-use fewbits_numerics::normal;
+use fewbits_numerics::{LogSum, normal};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -65,6 +65,19 @@ impl RaoBlackwellised {
         // All particles share one covariance, since the Riccati recursion does not depend on the data.
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
         let shared = kalman::predict(dynamics, &shared);
+        self.advance(rng, |mean| dynamics.transition() * mean, &shared, belief, workspace)
+    }
+
+    /// Resamples if the schedule says so, moves every mean by `mean`, and sets the covariance to that of `shared`.
+    fn advance<const D: usize, R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        mean: impl Fn(&SVector<f64, D>) -> SVector<f64, D>,
+        shared: &Gaussian<D>,
+        belief: &mut GaussianCloud<D>,
+        workspace: &mut CloudWorkspace<D>,
+    ) -> Result<(), Error> {
+        // Checked before resampling, so that a failed prediction leaves the belief as it was.
         if !shared.is_finite() {
             return Err(Error::NotANumber {
                 what: "the predicted covariance",
@@ -72,11 +85,7 @@ impl RaoBlackwellised {
         }
         self.filter
             .resample(rng, belief.means_mut(), &mut workspace.particles)?;
-        let mut columns = belief.means_mut().columns_mut();
-        for i in 0..count(&columns) {
-            let mean = dynamics.transition() * SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
-            set_state(&mut columns, i, &mean);
-        }
+        change_each(belief.means_mut().columns_mut(), |state| mean(&state));
         belief.set_shared_covariance(*shared.covariance());
         Ok(())
     }
@@ -168,7 +177,7 @@ impl RaoBlackwellised {
         let width = belief.means().auxiliary_width();
         let (mut columns, side) = belief.means_mut().parts_mut();
         for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
-            let mean = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
+            let mean = state_at(&columns, i);
             let predicted = matrix * mean;
             // The measurement is drawn given the report and then used as if it had been received. The weight is multiplied by the
             // probability of the report.
@@ -214,15 +223,8 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
     fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut GaussianCloud<D>) -> Result<(), Error> {
         let shared = Gaussian::from_trusted_parts(belief.means().mean(), *belief.shared_covariance());
         let moved = motion.predict(&shared);
-        let particles = &mut self.workspace.particles;
-        self.filter.filter.resample(rng, belief.means_mut(), particles)?;
-        let mut columns = belief.means_mut().columns_mut();
-        for i in 0..count(&columns) {
-            let mean = motion.motion.mean(&SVector::<f64, D>::from_fn(|d, _| columns[d][i]));
-            set_state(&mut columns, i, &mean);
-        }
-        belief.set_shared_covariance(*moved.covariance());
-        Ok(())
+        let mean = |state: &SVector<f64, D>| motion.motion.mean(state);
+        self.filter.advance(rng, mean, &moved, belief, &mut self.workspace)
     }
 
     fn update(
@@ -263,7 +265,7 @@ impl Imputation {
         match self {
             Self::Value(value) => (*value, normal::log_pdf((value - predicted) / deviation) - deviation.ln()),
             Self::Pieces(pieces) => {
-                let total = log_sum(log_shares(pieces, predicted, deviation));
+                let total = log_shares(pieces, predicted, deviation).collect::<LogSum>().value();
                 if total == f64::NEG_INFINITY {
                     return (predicted, total);
                 }
@@ -278,20 +280,10 @@ impl Imputation {
 
 /// `ln(share P(z in piece))` of each piece.
 #[inline]
-fn log_shares(pieces: &[(Cell, f64)], predicted: f64, deviation: f64) -> impl Iterator<Item = f64> + Clone + '_ {
+fn log_shares(pieces: &[(Cell, f64)], predicted: f64, deviation: f64) -> impl Iterator<Item = f64> + '_ {
     pieces
         .iter()
         .map(move |(cell, share)| cell.log_probability(predicted, deviation) + share.ln())
-}
-
-/// `ln sum exp`.
-#[inline]
-fn log_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
-    let largest = terms.clone().fold(f64::NEG_INFINITY, f64::max);
-    if largest == f64::NEG_INFINITY {
-        return largest;
-    }
-    largest + terms.map(|t| (t - largest).exp()).sum::<f64>().ln()
 }
 
 /// The ends of a piece drawn with probability proportional to its share. No random number is used if there is only one.
@@ -306,6 +298,7 @@ fn choose<R: Rng + ?Sized>(
     let mut chosen = 0;
     if pieces.len() > 1 {
         // A piece of share zero is never chosen, even if rounding leaves a rest of the uniform draw at the end.
+        // Evaluated again and not stored: a particle then needs no memory for its pieces, and the search stops at the chosen one.
         let mut left = rng.random::<f64>();
         for (i, term) in log_shares(pieces, predicted, deviation).enumerate() {
             let share = (term - total).exp();

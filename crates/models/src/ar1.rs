@@ -99,6 +99,7 @@ impl Dynamics<1> for Ar1 {
         const BLOCK: usize = 128;
         let (mut normals, mut draws) = (StandardNormals::new(rng), [0.0; BLOCK]);
         let (coefficient, deviation) = (self.coefficient(), self.noise_variance().sqrt());
+        // Draws first, so that the loop over the states has neither calls nor branches.
         for states in states.chunks_mut(BLOCK) {
             normals.fill(&mut draws[..states.len()]);
             vectorised(

@@ -250,17 +250,15 @@ impl<const D: usize> Dynamics<D> for AffineGaussian<D> {
         Gaussian::from_symmetric_parts(self.mean(state), self.noise_covariance).sample(rng)
     }
 
-    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: fewbits_core::ColumnsMut<'_, D>) {
+    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: fewbits_core::ColumnsMut<'_, D>) {
         // A covariance that rounding has made indefinite is replaced by its diagonal.
         let factor = semidefinite_factor("noise_covariance", &self.noise_covariance)
             .unwrap_or_else(|_| SMatrix::from_diagonal(&self.noise_covariance.diagonal().map(|v| v.max(0.0).sqrt())));
-        for i in 0..fewbits_core::columns::count(&states) {
-            let state = SVector::<f64, D>::from_fn(|d, _| states[d][i]);
+        fewbits_core::columns::change_each(states, |state| {
             let normals =
                 SVector::<f64, D>::from_fn(|_, _| rand_distr::Distribution::sample(&rand_distr::StandardNormal, rng));
-            let moved = self.mean(&state) + factor * normals;
-            fewbits_core::columns::set_state(&mut states, i, &moved);
-        }
+            self.mean(&state) + factor * normals
+        });
     }
 }
 

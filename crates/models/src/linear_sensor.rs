@@ -120,6 +120,7 @@ impl<const D: usize, const M: usize> Sensing<D, M> for LinearSensor<D, M> {
         for (k, means) in means.into_iter().enumerate() {
             means.fill(0.0);
             for (entry, column) in self.matrix.row(k).iter().zip(states) {
+                // Most entries of a measurement matrix are zero.
                 if *entry != 0.0 {
                     for (mean, x) in means.iter_mut().zip(*column) {
                         *mean += entry * x;

@@ -18,6 +18,7 @@ pub fn canonical(quantizers: &[Quantizer], interchangeable: &[usize]) -> Vec<Qua
             .cmp(&(b.cells(), b.labels()))
             .then_with(|| compare(a.breakpoints(), b.breakpoints(), 1e-6 * scale))
     };
+    // Selection by exchanges: only sensors of one class may change places, and they need not be neighbours.
     let sorted = |mut all: Vec<Quantizer>| {
         for i in 0..all.len() {
             for j in i + 1..all.len() {
@@ -31,6 +32,7 @@ pub fn canonical(quantizers: &[Quantizer], interchangeable: &[usize]) -> Vec<Qua
     };
     let plain = sorted(quantizers.iter().map(Quantizer::renumbered).collect());
     let mirror = sorted(quantizers.iter().map(|q| q.mirrored().renumbered()).collect());
+    // The first sensor in which the design and its mirror image differ decides.
     let first = plain.iter().zip(&mirror).map(|(p, m)| order(p, m)).find(|o| o.is_ne());
     if first == Some(Ordering::Less) { mirror } else { plain }
 }

@@ -117,6 +117,7 @@ impl Channel {
         let eps = fewbits_numerics::error::within("crossover", crossover, 0.0, 1.0)?;
         let bits = labelling.bits();
         Self::from_fn(labelling.levels(), labelling.symbols(), |t, z| {
+            // Every symbol has a word, so the second arm is never taken.
             let distance = match (labelling.word(t), labelling.word(z)) {
                 (Some(a), Some(b)) => (a ^ b).count_ones(),
                 _ => bits,
@@ -162,6 +163,7 @@ impl Channel {
     /// If `levels < 2` or `snr` is not a positive number.
     pub fn pulse_amplitude(levels: usize, snr: f64) -> Result<Self, Error> {
         fewbits_numerics::error::positive("snr", snr)?;
+        // Amplitudes -(L-1), .., L-1 in steps of 2 have mean square (L^2 - 1) / 3 in units of half their distance.
         let half = (3.0 * snr / (levels as f64 * levels as f64 - 1.0)).sqrt();
         Self::from_fn(levels, levels, |t, z| {
             let offset = 2.0 * (t as f64 - z as f64);

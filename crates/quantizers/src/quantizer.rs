@@ -35,11 +35,6 @@ stored! { Quantizer as Stored |quantizer| {
     labels: Vec<usize> = quantizer.labels,
 } => Quantizer::with_labels(breakpoints, labels), Error }
 
-/// Whether the numbers are finite and strictly increasing.
-pub(crate) fn increasing(b: &[f64]) -> bool {
-    b.iter().all(|x| x.is_finite()) && b.windows(2).all(|w| w[0] < w[1])
-}
-
 /// Checks that breakpoints are finite and strictly increasing.
 ///
 /// # Errors
@@ -88,6 +83,7 @@ impl Quantizer {
         if let Some(label) = labels.iter().find(|label| **label >= labels.len()) {
             return refuse("labels", label, format!("numbers below {}, the number of cells", labels.len()));
         }
+        // Labels below the number of cells: the search for an unused one then ends after as many steps.
         let levels = labels.iter().max().map_or(0, |m| m + 1);
         if levels < 2 {
             return refuse("labels", "a single level", "at least two levels");
@@ -190,6 +186,7 @@ impl Quantizer {
     pub fn factor_of(&self, noise_variance: f64, given_level: impl Fn(usize) -> f64) -> Result<Scalar, Error> {
         positive("noise_variance", noise_variance)?;
         let given_cell: Vec<f64> = self.labels.iter().map(|l| given_level(*l)).collect();
+        // A partition refuses an observation that no cell can cause.
         if given_cell.iter().all(|p| *p == 0.0) {
             return Ok(Constant::new(0.0)?.into());
         }

@@ -112,7 +112,9 @@ impl Memoryless<1> for QuantizingSensor {
         let Some(received) = word(symbol.0) else {
             return refuse("symbol", symbol.0, format!("a number below {}", self.labelling.symbols()));
         };
+        // p(word received | level) = arrival c^d (1 - c)^(bits - d), `d` the bits in which the words differ.
         let given_level = |level: usize| {
+            // A level below `levels` always has a word.
             let sent = word(level).unwrap_or(received);
             arrival * link.word_probability(sent, received, self.labelling.bits())
         };

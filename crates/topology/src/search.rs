@@ -86,11 +86,7 @@ impl Graph {
     /// If `root` does not exist.
     pub fn hops_from(&self, root: usize) -> Result<Hops, ArgumentError> {
         self.check(root)?;
-        let mut hops = Hops {
-            distances: vec![UNREACHED; self.len()],
-            parents: vec![UNREACHED; self.len()],
-            order: Vec::new(),
-        };
+        let mut hops = self.unreached();
         self.flood(root, &mut hops);
         // Choose parents by index, so that they do not depend on the order of the search.
         for at in 0..hops.order.len() {
@@ -107,6 +103,15 @@ impl Graph {
         Ok(hops)
     }
 
+    fn unreached(&self) -> Hops {
+        Hops {
+            distances: vec![UNREACHED; self.len()],
+            parents: vec![UNREACHED; self.len()],
+            order: Vec::new(),
+        }
+    }
+
+    /// Breadth-first search of the nodes that were not reached before; `order` is its queue.
     fn flood(&self, root: usize, hops: &mut Hops) {
         hops.distances[root] = 0;
         hops.order.push(root as u32);
@@ -125,27 +130,18 @@ impl Graph {
 
     /// The connected components.
     pub fn components(&self) -> Components {
-        let mut labels = vec![UNREACHED; self.len()];
-        let mut sizes = Vec::new();
-        let mut queue = Vec::new();
+        let (mut labels, mut sizes) = (vec![0; self.len()], Vec::new());
+        let mut hops = self.unreached();
         for root in 0..self.len() {
-            if labels[root] != UNREACHED {
-                continue;
+            if hops.distances[root] == UNREACHED {
+                let before = hops.order.len();
+                self.flood(root, &mut hops);
+                let members = &hops.order[before..];
+                members
+                    .iter()
+                    .for_each(|node| labels[*node as usize] = sizes.len() as u32);
+                sizes.push(members.len());
             }
-            let label = sizes.len() as u32;
-            labels[root] = label;
-            queue.push(root);
-            let mut size = 0;
-            while let Some(node) = queue.pop() {
-                size += 1;
-                for &other in self.neighbours(node) {
-                    if labels[other as usize] == UNREACHED {
-                        labels[other as usize] = label;
-                        queue.push(other as usize);
-                    }
-                }
-            }
-            sizes.push(size);
         }
         Components { labels, sizes }
     }
@@ -170,6 +166,7 @@ impl Graph {
                 }
             }
             hops += 1;
+            // In increasing order, so that the result does not depend on the order of the search.
             next.sort_unstable();
             let found: Vec<usize> = next.iter().copied().filter(|node| wanted(*node)).collect();
             if !found.is_empty() {

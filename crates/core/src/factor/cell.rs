@@ -166,7 +166,8 @@ impl Factor<1> for InCell {
             return;
         }
         let (lower, upper) = (self.cell.lower(), self.cell.upper());
-        let (scale, floor, share, log_share) = (1.0 / self.deviation, self.floor, self.share, self.log_share);
+        let (scale, floor, share) = (1.0 / self.deviation, self.floor, self.share);
+        let constant = if floor > 0.0 { 0.0 } else { self.log_share };
         // A half-line has one finite edge; its probability rises with `m` (`m` above the edge) or falls.
         let cut = if upper == f64::INFINITY {
             Some((lower, scale))
@@ -197,17 +198,13 @@ impl Factor<1> for InCell {
                     (false, true) => kernels::log_interval_wide(buffer, upper_edges),
                 }
             }
+            // With a floor the buffer holds probabilities, otherwise logarithms, which do not underflow far from the cell.
             if floor > 0.0 {
                 buffer.iter_mut().for_each(|p| *p = floor + share * *p);
                 kernels::ln(buffer);
-                log_weights
-                    .iter_mut()
-                    .zip(buffer)
-                    .for_each(|(log_weight, log)| *log_weight += *log);
-            } else {
-                let pairs = log_weights.iter_mut().zip(buffer);
-                pairs.for_each(|(log_weight, log)| *log_weight += log_share + *log);
             }
+            let pairs = log_weights.iter_mut().zip(buffer);
+            pairs.for_each(|(log_weight, log)| *log_weight += constant + *log);
         }
     }
 
@@ -222,6 +219,7 @@ impl Factor<1> for InCell {
         // If the probability of the cell underflows, the observation is attributed to the floor (a bit flip or a loss).
         let out_of_reach = (self.floor > 0.0).then_some((f64::NEG_INFINITY, 0.0, 1.0));
         let (log_inside, inside_mean, inside_variance) = standard.or(out_of_reach).ok_or(Error::Impossible)?;
+        // Given `y = m + n`, the mean of `m` is `mean + gain (y - mean)` and its variance `gain r`, whatever `y` is.
         let gain = v / total;
         let shift = gain * s * inside_mean;
         let inside = gain * (self.variance + v * inside_variance);
@@ -230,10 +228,12 @@ impl Factor<1> for InCell {
         }
         let by_cell = self.share * log_inside.exp();
         let evidence = self.floor + by_cell;
+        // Posterior probability that the cell caused the observation; the floor leaves the prior unchanged.
         let blame = by_cell / evidence;
         if blame == 0.0 {
             return Tilted::scalar(evidence.ln(), mean, v);
         }
+        // The last term is the variance between the means of the two cases.
         let variance = (1.0 - blame) * v + blame * inside + blame * (1.0 - blame) * shift * shift;
         Tilted::scalar(evidence.ln(), mean + blame * shift, variance)
     }

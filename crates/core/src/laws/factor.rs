@@ -12,14 +12,7 @@ use nalgebra::SVector;
 /// # Errors
 /// If the law fails at a measurement; the violation names the first one.
 pub fn is_a_number<const M: usize>(factor: &impl Factor<M>, measurements: &[SVector<f64, M>]) -> Result<(), Violation> {
-    let mut least = f64::INFINITY;
-    for m in measurements {
-        let value = factor.log_likelihood(m);
-        if value.is_nan() || value == f64::INFINITY {
-            return Err(Violation::new("a log likelihood is a number", format!("{value} at {m:?}"), "finite or -inf"));
-        }
-        least = least.min(value);
-    }
+    let least = super::least_of_numbers(measurements, |m| factor.log_likelihood(m))?;
     for (m, k) in measurements.iter().flat_map(|m| (0..M).map(move |k| (m, k))) {
         let mut broken = *m;
         broken[k] = f64::NAN;

@@ -13,14 +13,7 @@ pub fn sweep_is_scalar<const D: usize>(
     likelihood: &impl Likelihood<D>,
     states: &[SVector<f64, D>],
 ) -> Result<(), Violation> {
-    let mut least = f64::INFINITY;
-    for x in states {
-        let alone = likelihood.log_likelihood(x);
-        if alone.is_nan() || alone == f64::INFINITY {
-            return Err(Violation::new("a log likelihood is a number", format!("{alone} at {x:?}"), "finite or -inf"));
-        }
-        least = least.min(alone);
-    }
+    let least = super::least_of_numbers(states, |x| likelihood.log_likelihood(x))?;
     let broken = SVector::<f64, D>::repeat(f64::NAN);
     super::never_raises(likelihood.log_likelihood(&broken), least, "NaN")?;
     let all: Vec<SVector<f64, D>> = states.iter().copied().chain([broken]).collect();

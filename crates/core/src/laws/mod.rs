@@ -64,6 +64,22 @@ fn agree(
     }
 }
 
+/// A log likelihood is finite or `-inf` at every point. Returns the smallest.
+fn least_of_numbers<const D: usize>(
+    points: &[SVector<f64, D>],
+    log_likelihood: impl Fn(&SVector<f64, D>) -> f64,
+) -> Result<f64, Violation> {
+    let mut least = f64::INFINITY;
+    for x in points {
+        let value = log_likelihood(x);
+        if value.is_nan() || value == f64::INFINITY {
+            return Err(Violation::new("a log likelihood is a number", format!("{value} at {x:?}"), "finite or -inf"));
+        }
+        least = least.min(value);
+    }
+    Ok(least)
+}
+
 /// A likelihood at an input of NaN must not exceed the smallest one at numbers.
 fn never_raises(value: f64, least: f64, at: impl std::fmt::Display) -> Result<(), Violation> {
     if value.is_nan() || value <= least {

@@ -49,6 +49,7 @@ pub fn total_probability_with<const M: usize, S: Scheme<M>>(
     let nothing = failed(TOTAL, scheme.factor(feedback, &Observation::Nothing, link))?;
     let lost = failed(TOTAL, scheme.factor(feedback, &Observation::Lost, link))?;
     for m in measurements {
+        // A link that knows of no losses never delivers `Lost`. It then has no place in the sum, and its factor is checked by itself.
         let (nothing, lost) = (nothing.log_likelihood(m).exp(), lost.log_likelihood(m).exp());
         let total = received(m) + nothing;
         if link.erasure() == 0.0 && (total - 1.0).abs() <= tolerance {
@@ -151,8 +152,8 @@ where
 
 /// The law of [`Deterministic`]: two sensors with differently seeded random sources send the same report, and neither source is drawn from.
 ///
+/// # Errors
 /// If encoding fails, or at the first measurement at which the law fails.
-/// If encoding fails, or the measurement at which the law fails.
 pub fn deterministic<const M: usize, S: Deterministic<M>, R: Rng + Clone + PartialEq>(
     scheme: &S,
     feedback: &S::Feedback,

@@ -196,6 +196,7 @@ impl Belief<1> for PointMass {
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, [states]: ColumnsMut<'_, 1>) {
         let cumulative = Categorical::new(&self.density);
         let (mean, variance, h) = (self.mean(), self.variance(), self.grid.spacing());
+        // A draw within its spacing has the variance of the nodes plus that of the offset.
         let shrink = (variance / (variance + TRIANGULAR_VARIANCE * h * h)).sqrt();
         for x in states {
             let drawn = self.grid.node(cumulative.draw(rng)) + h * triangular(rng);

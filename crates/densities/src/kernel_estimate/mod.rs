@@ -9,7 +9,7 @@ pub use sums::add_cross_sums;
 use crate::Error;
 use crate::mixture::{Component, Mixture};
 use crate::particles::{Particles, systematic};
-use fewbits_core::columns::change_each;
+use fewbits_core::columns::{change_each, state_at};
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::factored::Factored;
@@ -134,6 +134,7 @@ impl<const D: usize> KernelEstimate<D> {
         vectorised(
             #[inline(always)]
             || {
+                // Two points at a time: each centre is loaded once for both.
                 let point = |p: usize| -> [f64; D] { std::array::from_fn(|d| points[d][p]) };
                 let last = out.len().saturating_sub(1);
                 let (pairs, odd) = out.as_chunks_mut::<2>();
@@ -189,10 +190,9 @@ impl<const D: usize> KernelEstimate<D> {
     /// # Errors
     /// If the kernel is not positive definite, which cannot happen for an estimate that was constructed.
     pub fn to_mixture(&self) -> Result<Mixture<D>, Error> {
-        let components = (0..self.len()).filter(|i| self.particles.weights()[*i] > 0.0).map(|i| {
-            let centre = SVector::from_fn(|d, _| self.particles.columns()[d][i]);
-            Component::new(self.particles.weights()[i], centre, self.kernel)
-        });
+        let components = (0..self.len())
+            .filter(|i| self.particles.weights()[*i] > 0.0)
+            .map(|i| Component::new(self.particles.weights()[i], state_at(&self.particles.columns(), i), self.kernel));
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
 
@@ -207,7 +207,7 @@ impl<const D: usize> KernelEstimate<D> {
         Particles::from_draws(count, || {
             let i = chosen.next().unwrap_or(0);
             let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
-            SVector::from_fn(|d, _| columns[d][i]) + self.factor.lower * z
+            state_at(&columns, i) + self.factor.lower * z
         })
     }
 }

@@ -83,6 +83,7 @@ pub(super) fn log_far_sum<const D: usize>(white: &[&[f64]; D], weights: &[f64], 
     if nearest == f64::INFINITY {
         return f64::NEG_INFINITY;
     }
+    // The nearest centre then adds its whole weight, so the sum does not underflow.
     let [sum] = kernel_sums(white, weights, &[*z], nearest);
     sum.ln() - nearest / std::f64::consts::LOG2_E
 }
@@ -178,6 +179,7 @@ fn cross_block<const D: usize, const P: usize>(
             }
             kernels[j] = power_of_half(square * HALF_LOG2_E);
         }
+        // Kernels first, sums second: each loop over the block runs in vector registers.
         for j in 0..BLOCK {
             sums[j] += own[p] * kernels[j];
         }

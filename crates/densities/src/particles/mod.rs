@@ -8,6 +8,7 @@ pub use gaussian_cloud::GaussianCloud;
 pub use weights::{Categorical, systematic};
 
 use crate::Error;
+use fewbits_core::columns::state_at;
 use fewbits_core::{Belief, Columns, ColumnsMut};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, entries, probabilities, refuse};
@@ -174,7 +175,7 @@ impl<const D: usize> Particles<D> {
 
     /// Particle `i`, or `None` past the end.
     pub fn point(&self, i: usize) -> Option<SVector<f64, D>> {
-        (i < self.len()).then(|| SVector::from_fn(|d, _| self.columns[d][i]))
+        (i < self.len()).then(|| state_at(&self.columns, i))
     }
 
     /// Effective sample size `1 / sum w_i^2`, between 1 and the number of particles.
@@ -192,6 +193,7 @@ impl<const D: usize> Particles<D> {
         self.scratch.clear();
         self.scratch.extend_from_slice(&self.log_weights);
         change(self.columns.each_ref().map(Vec::as_slice), &mut self.scratch);
+        // The copy becomes the belief's only after it was normalised, so that a failure changes nothing.
         let (log_sum, effective_sample_size) = normalise(&mut self.scratch, &mut self.weights)?;
         std::mem::swap(&mut self.log_weights, &mut self.scratch);
         self.effective_sample_size = effective_sample_size;
@@ -331,6 +333,7 @@ impl<const D: usize> Belief<D> for Particles<D> {
 
 impl<const D: usize> From<Particles<D>> for StoredParticles {
     fn from(belief: Particles<D>) -> Self {
+        // Logarithms of equal weights follow from the weights.
         let equal = belief.log_weights.windows(2).all(|pair| pair[0] == pair[1]);
         let stored = |w: &f64| w.is_finite().then_some(*w);
         Self {

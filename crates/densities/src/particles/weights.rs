@@ -34,6 +34,7 @@ impl Categorical {
 
     /// Draws an index of positive weight.
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
+        // Rounding may put the point at the total, beyond the last index of positive weight.
         let point = rng.random::<f64>() * self.sums.last().copied().unwrap_or(0.0);
         self.sums.partition_point(|sum| *sum <= point).min(self.last)
     }
@@ -73,6 +74,7 @@ pub(crate) fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f
     if !largest.is_finite() {
         return Err(Error::unlikely_or_no_number(largest, what));
     }
+    // Relative to the largest, so that no exponential overflows and the sum is at least one.
     let sums = exp_minus(logs, largest, weights);
     let log_sum = largest + sums.sum.ln();
     let scale = 1.0 / sums.sum;

@@ -18,9 +18,13 @@ const UNDERFLOW: f64 = -690.0;
 const MIN_EFFECTIVE_NODES: f64 = 3.0;
 /// The grid must cover this many deviations of the posterior to each side of its mean.
 const COVERED: f64 = 3.0;
-/// The same for the first grid, if it is wide compared with the posterior: a narrower grid costs as much and covers less.
+/// The same for the first grid, if it is wide compared with the posterior: one more grid, narrowed to the posterior, costs as much as the
+/// first. If the first grid holds 4.8 deviations, a Gaussian has less than 1e-6 of its weight beyond each end (1e-3 beyond
+/// [`COVERED`]), and a further grid over a default reach of 4 would cover less.
 const COVERED_BY_PREDICTION: f64 = 4.8;
-/// If the posterior's deviation is at least this multiple of the predicted one, the ends of the first grid are those of the prediction.
+/// If the posterior's deviation is at least this multiple of the predicted one, the ends of the first grid are those of the prediction. A
+/// Gaussian likelihood then has at least .58 of the predicted deviation. A narrower grid would gain little, so the first one need hold
+/// only one deviation of the posterior to each side of its mean.
 const BLUNT: f64 = 0.5;
 /// A grid is no longer narrowed if all principal axes of the weights are longer than this, in its own deviations.
 const STALLED: f64 = 0.7;
@@ -83,7 +87,7 @@ impl<const K: usize> Found<K> {
     /// Whether the moments are those of the posterior: resolved and inside the grid.
     pub fn is_done(&self, region: &Region<K>, reach: f64) -> bool {
         let widest = self.covariance.diagonal().max().sqrt();
-        let covered = match region.is_prediction() {
+        let covered = match region.is_prediction {
             true if widest >= BLUNT => 1.0,
             true => COVERED_BY_PREDICTION,
             false => COVERED,
@@ -181,7 +185,8 @@ impl GridFilter {
         let log_total = sums.sum.ln();
         let (fewest, mut exponent) = (MIN_EFFECTIVE_NODES.powi(K as i32), 1.0);
         if effective(sums) < fewest {
-            // The effective number of nodes decreases with the exponent. At the lowest exponent all nodes have nearly equal weight.
+            // The effective number of nodes decreases with the exponent. At the lowest, e^-27.6 = 1e-12, all nodes have nearly equal
+            // weight. A number within 20 % of the aim is enough, since the moments only place the next grid.
             let (mut low, mut high) = (-27.6, 0.0);
             for _ in 0..BISECTIONS {
                 let middle: f64 = 0.5 * (low + high);
@@ -206,6 +211,7 @@ impl GridFilter {
         let (mut first, mut second) = (SVector::<f64, K>::zeros(), SMatrix::<f64, K, K>::zeros());
         index = [0; K];
         for w in weights.iter() {
+            // The largest weight is one, so what is skipped is below 2e-12 of the sum even with `MAX_NODES` nodes.
             if *w > 1e-18 {
                 let t = node(&index);
                 let weighted = t * *w;

@@ -31,7 +31,7 @@ pub(super) struct Region<const K: usize> {
     /// How often the grid was evaluated again although it no longer narrowed.
     retries: u32,
     /// Whether the grid is still the one over the prediction.
-    is_prediction: bool,
+    pub is_prediction: bool,
 }
 
 /// One side of a split: `normal' u >= offset`. The posterior is negligible near the plane.
@@ -80,11 +80,6 @@ impl<const K: usize> Region<K> {
     /// `ln` of the volume in `u` of a unit cube of grid coordinates.
     pub fn log_volume(&self) -> f64 {
         self.deviations.iter().map(|d| d.ln()).sum()
-    }
-
-    /// Whether the grid is still the one over the prediction.
-    pub fn is_prediction(&self) -> bool {
-        self.is_prediction
     }
 
     /// Whether another split is possible.

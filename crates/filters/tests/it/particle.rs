@@ -4,7 +4,7 @@ use fewbits_core::factor::{Constant, InCell, Scalar, Value};
 use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
     BootstrapFilter, GuidedFilter, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule,
-    StateFilter, StateLikelihood, UniformGrid, Workspace, kalman,
+    StateFilter, StateLikelihood, UniformGrid, kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -237,24 +237,6 @@ fn censored_silence_and_loss_run_through_the_filter() {
                 .into()
         }
     });
-}
-
-#[test]
-fn the_number_of_particles_can_change() {
-    let mut rng = Stream::new(2).fast_rng();
-    let mut belief = Particles::new([vec![0.0, 10.0]], &[0.0, 3.0_f64.ln()]).unwrap();
-    let filter = ParticleFilter::default();
-    filter
-        .resample_to(&mut rng, &mut belief, 400, &mut Workspace::default())
-        .unwrap();
-    assert_eq!(belief.len(), 400);
-    assert!((belief.mean()[0] - 7.5).abs() < 0.05);
-    assert!(
-        filter
-            .resample_to(&mut rng, &mut belief, 0, &mut Workspace::default())
-            .is_err()
-    );
-    assert_eq!(belief.len(), 400);
 }
 
 /// A sharp value seen through the square root of a distance: weights of the proposal that has seen it are far more even.

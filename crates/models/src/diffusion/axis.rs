@@ -93,6 +93,7 @@ impl Axis {
         let k = self.diffusivity;
         let distance = field - source;
         match self.bounds {
+            // Equation 7 with its Gaussian completed to a square: the mass moves with the wind.
             Bounds::Open => {
                 let spread = 4.0 * k * age;
                 let moved = distance - self.wind * age;
@@ -104,6 +105,7 @@ impl Axis {
                     Flux::Total => 0.5 * v,
                     Flux::Diffusive => -0.5 * v,
                 };
+                // ln of the factor by which the wind changes c*.
                 let shift = v * distance / (2.0 * k) - v * v * age / (4.0 * k);
                 half_space::green(field, source, age, k, wall.loss() + change, shift)
             }

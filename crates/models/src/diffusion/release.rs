@@ -1,6 +1,6 @@
 //! Releases whose rate changes with time.
 
-use super::integrate::integrate;
+use super::integrate::over_ages;
 use crate::Error;
 use fewbits_numerics::error::{all_finite, positive, refuse};
 
@@ -64,6 +64,7 @@ impl Release {
     /// Concentration (kg/m^3) at `time` (s). `per_unit_rate(age)` is the concentration per unit rate of a source that has released for
     /// `age` seconds.
     pub fn concentration(&self, time: f64, per_unit_rate: impl Fn(f64) -> f64) -> f64 {
+        // Superposition: a rate between two instants is one that began at the first less one that began at the second.
         let since = |edge: f64| if time > edge { per_unit_rate(time - edge) } else { 0.0 };
         let boxes = self.rates.iter().zip(self.edges.windows(2));
         boxes
@@ -90,14 +91,6 @@ impl Release {
         if time <= start {
             return Ok(0.0);
         }
-        let (first, last) = ((time - start).sqrt().recip(), (4.0 * diffusivity * 745.0).sqrt() / distance);
-        if first >= last {
-            return Ok(0.0);
-        }
-        let integrand = |u: f64| {
-            let age = (u * u).recip();
-            2.0 * rate(time - age) * impulse(age) * age / u
-        };
-        Ok(integrate(&integrand, first, last, 1e-13))
+        Ok(over_ages(diffusivity, distance, time - start, |age| rate(time - age) * impulse(age)))
     }
 }

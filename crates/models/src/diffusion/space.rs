@@ -1,7 +1,7 @@
 //! Diffusion in three dimensions.
 
 use super::axis::Axis;
-use super::integrate::integrate;
+use super::integrate::over_ages;
 use crate::Error;
 use fewbits_numerics::error::refuse;
 use nalgebra::Vector3;
@@ -73,20 +73,5 @@ pub fn step_response(
     } else {
         *field
     };
-    let distance = distance.max(closest);
-    // For larger u, exp(-distance^2 u^2 / 4 kappa) underflows to zero.
-    let last = (4.0 * response.diffusivity() * 745.0).sqrt() / distance;
-    let first = age.sqrt().recip();
-    if first >= last {
-        return 0.0;
-    }
-    integrate(
-        &|u: f64| {
-            let since = (u * u).recip();
-            2.0 * response.green(&field, source, since) * since / u
-        },
-        first,
-        last,
-        1e-13,
-    )
+    over_ages(response.diffusivity(), distance.max(closest), age, |since| response.green(&field, source, since))
 }

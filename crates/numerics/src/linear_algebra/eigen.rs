@@ -43,7 +43,8 @@ pub fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f6
 }
 
 /// Raises the eigenvalues of `covariance` to at least one, in coordinates scaled so that the variances `least` are one. Returns
-/// `covariance` unchanged if all are at least one already, or if an entry of `least` is not positive.
+/// `covariance` unchanged if all are at least one already, or if an entry of `least` is not positive: a coordinate without a least
+/// variance has no unit to scale by, as a coordinate without spread whose floor is a fraction of its spread.
 pub fn raised<const D: usize>(covariance: SMatrix<f64, D, D>, least: &SVector<f64, D>) -> SMatrix<f64, D, D> {
     if least.iter().any(|v| *v <= 0.0) {
         return covariance;
@@ -54,6 +55,7 @@ pub fn raised<const D: usize>(covariance: SMatrix<f64, D, D>, least: &SVector<f6
     if values.iter().all(|v| *v >= 1.0) {
         return covariance;
     }
+    // The mean of both triangles is exactly symmetric; the product of three matrices is so only up to rounding.
     let lifted = vectors * SMatrix::from_diagonal(&values.map(|v| v.max(1.0))) * vectors.transpose();
     SMatrix::from_fn(|i, j| 0.5 * (lifted[(i, j)] + lifted[(j, i)]) * scale[i] * scale[j])
 }

@@ -87,6 +87,7 @@ pub trait Density {
             let middle = low + (i as f64 + 0.5) * width;
             cumulative[i + 1] = cumulative[i] + self.pdf(middle).max(0.0).cbrt();
         }
+        // Invert the cumulative sum at the fractions l / levels, linearly between its nodes.
         let total = cumulative[START_GRID];
         (1..levels)
             .map(|l| {

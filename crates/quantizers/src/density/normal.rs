@@ -86,6 +86,7 @@ impl Density for Normal {
         let s = self.deviation;
         let (a, b, point) = (a / s, b / s, point / s);
         if let Some((middle, half)) = narrow(a, b) {
+            // phi(middle + t) = phi(middle) exp(-t (middle + t / 2)).
             let density = |t: f64| (-t * (middle + 0.5 * t)).exp() * (middle + t - point) * (middle + t - point);
             return s * s * normal::pdf(middle) * gauss_legendre::<NODES>().sum(-half, half, density);
         }

@@ -49,6 +49,7 @@ impl<F: Fn(f64) -> f64> SmoothDensity<F> {
         if a >= b {
             return 0.0;
         }
+        // Panels no longer than those of the whole interval, which resolve the function.
         let panels = ((b - a) / self.panel).ceil() as usize;
         let f = |x: f64| weight(x) * (self.density)(self.centre + x);
         self.scale * gauss_legendre::<20>().composite(a, b, panels, f)

@@ -62,6 +62,7 @@ pub fn design(density: &impl Density, levels: usize) -> Result<LloydMax, Error> 
         };
         return newton::solve(density, start);
     }
+    // Without a unique optimum the start decides which one is found; two starts are compared.
     let found = newton::solve(density, density.companding(levels));
     let Some(start) = partition::best_on_grid(density, levels) else {
         return found;
@@ -100,6 +101,7 @@ pub fn gaussian(levels: usize) -> Result<LloydMax, Error> {
 pub fn design_from(density: &impl Density, breakpoints: &[f64]) -> Result<LloydMax, Error> {
     checked_levels(breakpoints.len().saturating_add(1))?;
     check_increasing(breakpoints)?;
+    // Breakpoints far from zero may coincide once the centre is subtracted, hence the second check.
     let centre = density.centre();
     let start: Vec<f64> = breakpoints.iter().map(|b| b - centre).collect();
     check_increasing(&start)?;

@@ -3,7 +3,7 @@
 use super::table::LloydMax;
 use crate::density::{CellMoments, Density, edges};
 use crate::error::Error;
-use crate::quantizer::{check_increasing, increasing};
+use crate::quantizer::check_increasing;
 use fewbits_numerics::error::all_finite;
 use fewbits_numerics::tridiagonal;
 
@@ -31,12 +31,13 @@ pub(super) fn solve(density: &impl Density, mut b: Vec<f64>) -> Result<LloydMax,
     let (mut change, mut before) = (f64::INFINITY, solver.residual());
     for _ in 0..MAX_ITERATIONS {
         solver.newton_step(density, &b);
+        // Halve the step until the breakpoints keep their order and the residual falls. A residual at rounding need not fall.
         let mut share = 1.0;
         let after = loop {
             for ((t, b), s) in trial.iter_mut().zip(&b).zip(&solver.step) {
                 *t = b - share * s;
             }
-            if increasing(&trial) {
+            if check_increasing(&trial).is_ok() {
                 solver.enter(density, &trial);
                 let after = solver.residual();
                 if after <= before || after <= negligible {
@@ -59,10 +60,11 @@ pub(super) fn solve(density: &impl Density, mut b: Vec<f64>) -> Result<LloydMax,
         change = b.iter().zip(&trial).fold(0.0, |m, (p, q)| f64::max(m, (p - q).abs()));
         std::mem::swap(&mut b, &mut trial);
         before = after;
-        if !increasing(&b) {
+        if check_increasing(&b).is_err() {
             // The density is NaN somewhere.
             break;
         }
+        // Only a full step converges quadratically, so only then does its length bound the error that is left.
         let narrowest = b.windows(2).map(|w| w[1] - w[0]).fold(0.5 * (high - low), f64::min);
         let quadratic = share == 1.0 && change <= LAST_STEP * narrowest;
         let at_rounding = change <= ROUNDING_STEP * narrowest && change >= 0.5 * last;
@@ -122,6 +124,7 @@ impl Solver {
         let masses = self.cells.iter().map(|c| c.mass).enumerate();
         let (cell, probability) = masses.min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((0, 0.0));
         let (below, diagonal, above) = self.jacobian(density, b);
+        // Pivots of Gaussian elimination without exchanges of rows. A pivot at zero is raised, so that the division exists.
         let mut pivot = diagonal[0];
         let mut is_saddle = pivot < -FLAT_PIVOT;
         for i in 1..diagonal.len() {
@@ -157,6 +160,7 @@ impl Solver {
             if cell.mass > 0.0 {
                 0.5 * densities[edge] * distance / cell.mass
             } else {
+                // The centroid of an empty cell is its middle, which follows an edge half as far.
                 0.25
             }
         };
@@ -174,6 +178,7 @@ fn finish(density: &impl Density, b: &[f64], cells: &[CellMoments]) -> Result<Ll
     let centre = density.centre();
     let (mut centroids, mut error) = (Vec::with_capacity(cells.len()), 0.0);
     for (i, cell) in cells.iter().enumerate() {
+        // Outer cells have one finite edge only.
         let (lower, upper) = edges(b, i);
         let centroid = if upper.is_finite() {
             upper - cell.to_upper

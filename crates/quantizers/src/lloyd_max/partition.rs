@@ -40,6 +40,7 @@ pub(super) fn best_on_grid(density: &impl Density, levels: usize) -> Option<Vec<
     }
     let cost = |a: usize, b: usize| {
         let [m, x, xx] = [0, 1, 2].map(|i| sums[b][i] - sums[a][i]);
+        // Rounding may leave a negative sum for a cell that is nearly a point.
         if m > 0.0 { (xx - x * (x / m)).max(0.0) } else { 0.0 }
     };
     let mut best: Vec<f64> = (0..=GRID).map(|b| cost(0, b)).collect();
@@ -51,11 +52,13 @@ pub(super) fn best_on_grid(density: &impl Density, levels: usize) -> Option<Vec<
             next: vec![f64::INFINITY; GRID + 1],
             from: vec![0; GRID + 1],
         };
+        // `level + 1` cells need as many grid cells; the cells before the last need `level` of them.
         layer.fill((level + 1, GRID), (level, GRID - 1));
         let Layer { next, from, .. } = layer;
         best = next;
         came_from.push(from);
     }
+    // Follow the best last edge of each layer back from the end of the grid.
     let mut at = GRID;
     let mut edges: Vec<f64> = Vec::with_capacity(levels - 1);
     for from in came_from.iter().rev() {
