@@ -48,7 +48,7 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::vectorised;
 use grid::{Bytes, DECIMALS, Grid, PHASES, unzigzag};
 use head::{CIRCLE, Coding, Head, LINE, SAMPLES, invalid, write_head};
-use indices::{from_pco_bytes, raw_samples, read_counts, read_models, smallest_pco, with_counts, with_models};
+use indices::{from_pco_bytes, raw_samples, read_block, smallest_pco, write_block};
 pub use rows::JOINT_COLUMNS;
 use rows::Others;
 pub use start::{Start, StartedBlock};
@@ -142,15 +142,11 @@ impl BlockCodec {
         };
         if let Some(grid) = self.grid(samples).map(|grid| grid.fitted(samples)) {
             let (indices, exceptions) = self.indices(&grid, samples);
-            if self.effort == Effort::Thorough {
-                keep(with_models(&grid, &indices, &exceptions, None)?, &mut best);
-                if !others.is_empty() {
-                    let others = Others::new(others);
-                    keep(with_models(&grid, &indices, &exceptions, Some(&others))?, &mut best);
-                }
-            }
-            if self.effort == Effort::Fast {
-                keep(with_counts(&grid, &indices, &exceptions)?, &mut best);
+            let thorough = self.effort == Effort::Thorough;
+            keep(write_block(thorough, &grid, &indices, &exceptions, None)?, &mut best);
+            if thorough && !others.is_empty() {
+                let others = Others::new(others);
+                keep(write_block(true, &grid, &indices, &exceptions, Some(&others))?, &mut best);
             }
             // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
             if best.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8) {
@@ -206,9 +202,9 @@ impl BlockCodec {
                     return Err(invalid("block", "joint", "the other columns that it was written with").into());
                 }
                 let others = head.joint.then(|| Others::new(others));
-                read_models(rest, rows, &grid, others.as_ref())?
+                read_block(rest, true, &grid, rows, others.as_ref())?
             }
-            Coding::Counts => read_counts(rest, rows)?,
+            Coding::Counts => read_block(rest, false, &grid, rows, None)?,
             _ => from_pco_bytes::<i64>(rest, rows)?,
         };
         let mut samples = grid.values(&indices);

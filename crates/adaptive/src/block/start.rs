@@ -12,11 +12,11 @@
 //! blocks), phase (byte, as in blocks), usual index (zigzag varint), `k` (byte).
 
 use super::coder::{Coder, Reader, Writer};
-use super::counts::{Counts, gamma};
+use super::counts::gamma;
 use super::grid::{Bytes, DECIMALS, Grid, push_varint, unzigzag, zigzag};
 use super::head::{CIRCLE, LINE, invalid};
-use super::model::Model;
-use super::rows::{LARGEST, Others, code_all};
+use super::indices::code_rest;
+use super::rows::{LARGEST, Others};
 use super::{Accuracy, BlockCodec, Effort, check_rows};
 use crate::Error;
 use fewbits_core::CodecError;
@@ -227,12 +227,7 @@ impl BlockCodec {
     ) -> Result<Vec<i64>, CodecError> {
         let by_models = coder.bit(BY_MODELS, self.effort == Effort::Thorough);
         let first = start.first_index(coder, wanted.and_then(|wanted| wanted.first().copied()))?;
-        if by_models {
-            let model = Model::new(rows, first, start.grid.cells(), others.is_some());
-            return code_all(coder, model, wanted, rows, others);
-        }
-        let second = coder.raw(u64::from(wanted.is_some_and(Counts::prefers_second)), 1) == 1;
-        code_all(coder, Counts::new(first, second), wanted, rows, None)
+        code_rest(coder, by_models, &start.grid, first, wanted, rows, others)
     }
 
     fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, CodecError> {
