@@ -189,11 +189,7 @@ impl Receiver {
         let believed = if self.config.is_resilient() {
             let model = reader.read(MODEL_BITS)? as usize;
             if model > MODELS {
-                return Err(CodecError::Invalid {
-                    what: "model",
-                    value: model.to_string(),
-                    expected: "one of the bank, or none",
-                });
+                return Err(CodecError::invalid("model", model, "one of the bank, or none"));
             }
             Some(model)
         } else {

@@ -329,10 +329,6 @@ impl Bytes<'_> {
                 return Ok(value);
             }
         }
-        Err(CodecError::Invalid {
-            what: "number",
-            value: "more than 64 bits".into(),
-            expected: "at most 64 bits",
-        })
+        Err(CodecError::invalid("number", "more than 64 bits", "at most 64 bits"))
     }
 }

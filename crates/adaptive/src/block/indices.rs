@@ -3,7 +3,7 @@
 use super::coder::{Coder, Reader, Writer};
 use super::counts::Counts;
 use super::grid::{Grid, unzigzag, zigzag};
-use super::head::{Coding, invalid, write_head};
+use super::head::{Coding, write_head};
 use super::model::Model;
 use super::rows::{LARGEST, Others, code_all};
 use fewbits_core::CodecError;
@@ -15,7 +15,7 @@ use pco::{ChunkConfig, DeltaSpec};
 const FIRST_LENGTH: u32 = 6;
 
 fn from_pco(error: impl std::fmt::Display) -> CodecError {
-    invalid("pco block", error, "what a writer of as many rows wrote")
+    CodecError::invalid("pco block", error, "what a writer of as many rows wrote")
 }
 
 /// Codes the first index of a block that has no [`Start`](super::Start).
@@ -24,7 +24,7 @@ fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>) -> Result<i64, Codec
     let length = coder.raw(u64::from(u64::BITS - z.leading_zeros()), FIRST_LENGTH) as u32;
     let first = unzigzag(coder.raw(z, length));
     if first.unsigned_abs() > LARGEST as u64 {
-        return Err(invalid("first index", first, "at most 2^46 in size"));
+        return Err(CodecError::invalid("first index", first, "at most 2^46 in size"));
     }
     Ok(first)
 }
@@ -98,7 +98,7 @@ pub(super) fn smallest_pco<T: Number>(numbers: &[T]) -> Result<Vec<u8>, CodecErr
 pub(super) fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, CodecError> {
     let (samples, rest) = bytes.as_chunks::<8>();
     if samples.len() != rows || !rest.is_empty() {
-        return Err(invalid("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
+        return Err(CodecError::invalid("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
     }
     Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }

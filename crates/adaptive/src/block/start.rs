@@ -14,7 +14,7 @@
 use super::coder::{Coder, Reader, Writer};
 use super::counts::gamma;
 use super::grid::{Bytes, DECIMALS, Grid, push_varint, unzigzag, zigzag};
-use super::head::{CIRCLE, LINE, invalid};
+use super::head::{CIRCLE, LINE};
 use super::indices::code_rest;
 use super::rows::{LARGEST, Others};
 use super::{Accuracy, BlockCodec, Effort, check_rows};
@@ -87,7 +87,7 @@ impl Start {
         let offset = high.checked_mul(1 << k).map(|high| unzigzag(high | low));
         match offset.and_then(|offset| offset.checked_add(self.usual)) {
             Some(index) if index.unsigned_abs() <= LARGEST as u64 => Ok(index),
-            _ => Err(invalid("first index", "too large", "at most 2^46 in size")),
+            _ => Err(CodecError::invalid("first index", "too large", "at most 2^46 in size")),
         }
     }
 }
@@ -136,7 +136,7 @@ impl BlockCodec {
             (0..DECIMALS, _) => self.decimal_grid(kind & !STEPPED, kind & STEPPED != 0, &mut reader)?,
             (LINE, Accuracy::Within(config)) if kind == LINE => Grid::line(config.delta(), 0.0),
             (CIRCLE, Accuracy::Within(config)) if kind == CIRCLE => self.circle(&config)?,
-            _ => return Err(invalid("grid", kind, "one of the agreed accuracy").into()),
+            _ => return Err(CodecError::invalid("grid", kind, "one of the agreed accuracy").into()),
         };
         if head & MOVED != 0 {
             grid = super::read_phase(grid, &mut reader)?;
@@ -144,7 +144,7 @@ impl BlockCodec {
         let usual = unzigzag(reader.varint()?);
         let [k] = reader.array()?;
         if usual.unsigned_abs() > LARGEST as u64 || k > MOST_BITS {
-            return Err(invalid("usual index", usual, "at most 2^46 in size").into());
+            return Err(CodecError::invalid("usual index", usual, "at most 2^46 in size").into());
         }
         *bytes = reader.0;
         Ok(Start { grid, usual, k })
@@ -176,7 +176,7 @@ impl BlockCodec {
             });
         }
         let shortest = found.into_iter().min_by_key(|block| block.bytes.len());
-        shortest.ok_or_else(|| invalid("block", "none", "a coding that holds the samples").into())
+        shortest.ok_or_else(|| CodecError::invalid("block", "none", "a coding that holds the samples").into())
     }
 
     /// The samples as indices on the start's grid, for [`code_shared`](Self::code_shared). `None` if a block of its own may be shorter: a
