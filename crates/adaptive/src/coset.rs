@@ -266,11 +266,7 @@ impl CosetReceiver {
         let counter = reader.read(self.config.counter_bits)? as u32;
         let refresh = reader.read(1)? == 1;
         let width = reader.remaining();
-        let invalid = |value: String, expected| CodecError::Invalid {
-            what: "packet",
-            value,
-            expected,
-        };
+        let invalid = |value: String, expected| CodecError::invalid("packet", value, expected);
         if !(1..=u64::BITS).contains(&width) {
             return Err(invalid(format!("{width} bits of an index"), "1 to 64 bits"));
         }

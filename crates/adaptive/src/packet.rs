@@ -10,40 +10,13 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Packet(pub(crate) fewbits_node::Packet);
 
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "Packet", deny_unknown_fields)]
-struct Stored {
-    word: u128,
-    bits: u32,
-}
-
-impl From<Packet> for Stored {
-    fn from(Packet(packet): Packet) -> Self {
-        Self {
-            word: packet.word(),
-            bits: packet.bits(),
-        }
-    }
-}
-
-impl TryFrom<Stored> for Packet {
-    type Error = ArgumentError;
-
-    fn try_from(Stored { word, bits }: Stored) -> Result<Self, ArgumentError> {
-        let packet = fewbits_node::Packet::from_word(word, bits);
-        packet
-            .map(Self)
-            .ok_or_else(|| ArgumentError::new("bits", bits, "at most 128, as many as the word has"))
-    }
-}
-
-fn invalid(what: &'static str, value: impl std::fmt::Display, expected: &'static str) -> CodecError {
-    CodecError::Invalid {
-        what,
-        value: value.to_string(),
-        expected,
-    }
-}
+fewbits_numerics::stored! { #[serde(rename = "Packet")] Packet as Stored |packet| {
+    word: u128 = packet.0.word(),
+    bits: u32 = packet.0.bits(),
+} => {
+    let packet = fewbits_node::Packet::from_word(word, bits).map(Packet);
+    packet.ok_or_else(|| ArgumentError::new("bits", bits, "at most 128, as many as the word has"))
+}, ArgumentError }
 
 impl Packet {
     /// Length in bits.
@@ -73,7 +46,7 @@ impl Message for Packet {
 
     fn decode((): &(), reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
         if reader.remaining() > 128 {
-            return Err(invalid("packet", format!("{} bits long", reader.remaining()), "at most 128 bits"));
+            return Err(CodecError::invalid("packet", format!("{} bits long", reader.remaining()), "at most 128 bits"));
         }
         let mut packet = fewbits_node::Packet::default();
         while reader.remaining() > 0 {
@@ -133,14 +106,14 @@ pub(crate) fn read_number(reader: &mut PacketReader) -> Result<f64, CodecError> 
         return if value.is_finite() {
             Ok(value)
         } else {
-            Err(invalid("sample", value, "a finite number"))
+            Err(CodecError::invalid("sample", value, "a finite number"))
         };
     }
     let negative = reader.read(1)? == 1;
     let decimals = reader.read(4)? as usize;
     let length = reader.read(6)? as u32;
     if length > 52 {
-        return Err(invalid("length of the digits", length, "at most 52 bits"));
+        return Err(CodecError::invalid("length of the digits", length, "at most 52 bits"));
     }
     let size = reader.read(length)? as f64 / TENS.get(decimals).copied().unwrap_or(1.0);
     Ok(if negative { -size } else { size })

@@ -37,48 +37,20 @@ pub struct Receiver {
     synchronised: bool,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "Receiver", deny_unknown_fields)]
-struct Stored {
-    config: Config,
-    replica: Option<Replica>,
-    slot: Option<u64>,
-    sequence: u32,
-    synchronised: bool,
-}
-
-impl From<Receiver> for Stored {
-    fn from(receiver: Receiver) -> Self {
-        Self {
-            config: receiver.config,
-            replica: receiver.replica,
-            slot: receiver.slot,
-            sequence: receiver.sequence,
-            synchronised: receiver.synchronised,
-        }
+fewbits_numerics::stored! { #[serde(rename = "Receiver")] Receiver as Stored |receiver| {
+    config: Config = receiver.config,
+    replica: Option<Replica> = receiver.replica,
+    slot: Option<u64> = receiver.slot,
+    sequence: u32 = receiver.sequence,
+    synchronised: bool = receiver.synchronised,
+} => {
+    if replica.as_ref().is_some_and(|replica| !replica.is_valid(&config.0)) {
+        return Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"));
     }
-}
-
-impl TryFrom<Stored> for Receiver {
-    type Error = ArgumentError;
-
-    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
-        let replica = stored.replica;
-        if replica
-            .as_ref()
-            .is_some_and(|replica| !replica.is_valid(&stored.config.0))
-        {
-            return Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"));
-        }
-        Ok(Self {
-            config: stored.config,
-            synchronised: stored.synchronised && replica.is_some(),
-            replica,
-            slot: stored.slot,
-            sequence: stored.sequence & ((1 << stored.config.sequence_bits()) - 1),
-        })
-    }
-}
+    let synchronised = synchronised && replica.is_some();
+    let sequence = sequence & ((1 << config.sequence_bits()) - 1);
+    Ok(Receiver { config, replica, slot, sequence, synchronised })
+}, ArgumentError }
 
 impl Receiver {
     /// A receiver that runs from the sensor's first slot on.
@@ -217,11 +189,7 @@ impl Receiver {
         let believed = if self.config.is_resilient() {
             let model = reader.read(MODEL_BITS)? as usize;
             if model > MODELS {
-                return Err(CodecError::Invalid {
-                    what: "model",
-                    value: model.to_string(),
-                    expected: "one of the bank, or none",
-                });
+                return Err(CodecError::invalid("model", model, "one of the bank, or none"));
             }
             Some(model)
         } else {

@@ -2,7 +2,7 @@
 
 use crate::packet::{PacketReader, read_number};
 use fewbits_core::CodecError;
-use fewbits_node::adaptive::{Config, Content, Law, PRECISION, Place, Replica, Slot};
+use fewbits_node::adaptive::{Config, Content, Law, PRECISION, Replica, Slot};
 
 fn unzigzag(z: u64) -> i64 {
     (z >> 1) as i64 ^ -((z & 1) as i64)
@@ -24,11 +24,7 @@ pub(crate) fn content(symbol: u32, rest: &mut PacketReader) -> Result<Content, C
     let length = rest.read(Content::LENGTH)? as u32;
     let k = unzigzag(rest.read(length)?);
     if Law::residual_of(Law::symbol(k)).is_some() || k == 0 || k.unsigned_abs() >= 1 << 50 {
-        return Err(CodecError::Invalid {
-            what: "residual",
-            value: k.to_string(),
-            expected: "one that needs the escape",
-        });
+        return Err(CodecError::invalid("residual", k, "one that needs the escape"));
     }
     Ok(Content::Far(k))
 }
@@ -42,31 +38,20 @@ pub(crate) fn apply(
     outside: f32,
 ) -> Result<(), CodecError> {
     let applied = content.apply(config, replica, slot, outside);
-    applied.map_err(|error| CodecError::Invalid {
-        what: error.name,
-        value: error.value.to_string(),
-        expected: error.expected,
-    })
+    applied.map_err(|error| CodecError::invalid(error.name, error.value, error.expected))
 }
 
 /// Reads what `fewbits_node::adaptive::push` wrote, up to the packet's end.
 pub(crate) fn read(law: &Law<'_>, reader: &mut PacketReader) -> Result<Content, CodecError> {
     let (symbol, place) = law.find(reader.peek(PRECISION) as u32);
-    let (expected, bits) = word(&place, Law::residual_of(symbol).is_some());
+    // The symbol of a near residual ends the packet, so its word may be shorter.
+    let last = Law::residual_of(symbol).is_some();
+    let (expected, bits) = if last { place.last_word() } else { place.word() };
     let word = reader.read(bits)?;
     if word != u64::from(expected) {
-        return Err(CodecError::Invalid {
-            what: "code word",
-            value: word.to_string(),
-            expected: "the shortest of its symbol",
-        });
+        return Err(CodecError::invalid("code word", word, "the shortest of its symbol"));
     }
     let content = content(symbol, reader)?;
     reader.finish()?;
     Ok(content)
-}
-
-/// The word of a symbol; `last` says whether it ends the packet.
-fn word(place: &Place, last: bool) -> (u32, u32) {
-    if last { place.last_word() } else { place.word() }
 }

@@ -41,37 +41,16 @@ pub struct Sensor {
     encoder: Encoder,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "Sensor", deny_unknown_fields)]
-struct Stored {
-    config: Config,
-    replica: Option<Replica>,
-    slot: u64,
-    sequence: u32,
-    refresh_requested: bool,
-}
-
-impl From<Sensor> for Stored {
-    fn from(Sensor { config, encoder }: Sensor) -> Self {
-        Self {
-            config,
-            replica: encoder.replica().cloned(),
-            slot: encoder.slot(),
-            sequence: encoder.sequence(),
-            refresh_requested: encoder.refresh_requested(),
-        }
-    }
-}
-
-impl TryFrom<Stored> for Sensor {
-    type Error = ArgumentError;
-
-    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
-        let (config, requested) = (stored.config, stored.refresh_requested);
-        let encoder = Encoder::restored(config.0, stored.replica, stored.slot, stored.sequence, requested)?;
-        Ok(Self { config, encoder })
-    }
-}
+fewbits_numerics::stored! { #[serde(rename = "Sensor")] Sensor as Stored |sensor| {
+    config: Config = sensor.config,
+    replica: Option<Replica> = sensor.encoder.replica().cloned(),
+    slot: u64 = sensor.encoder.slot(),
+    sequence: u32 = sensor.encoder.sequence(),
+    refresh_requested: bool = sensor.encoder.refresh_requested(),
+} => {
+    let encoder = Encoder::restored(config.0, replica, slot, sequence, refresh_requested)?;
+    Ok(Sensor { config, encoder })
+}, ArgumentError }
 
 impl Sensor {
     /// A sensor before its first sample.

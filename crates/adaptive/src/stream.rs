@@ -210,11 +210,7 @@ pub struct StreamReader<'a> {
 }
 
 fn damaged(value: impl std::fmt::Display) -> CodecError {
-    CodecError::Invalid {
-        what: "stream",
-        value: value.to_string(),
-        expected: "what a writer of the same configuration wrote",
-    }
+    CodecError::invalid("stream", value, "what a writer of the same configuration wrote")
 }
 
 impl<'a> StreamReader<'a> {

@@ -53,29 +53,20 @@ impl Missing {
                 return Ok(outside);
             }
         };
-        let Some(inside) = under.moments(mu) else {
-            return if loss > 0.0 {
-                Ok(EllipsoidMoments {
-                    log_mass: loss.ln(),
-                    mean: *mu,
-                    covariance: *covariance,
-                })
-            } else {
-                Err(Error::Impossible)
-            };
-        };
+        let inside = under.moments(mu);
+        // Over a link without loss the logarithm of the mass is kept, which may be below that of the smallest number.
         if loss == 0.0 {
-            return Ok(inside);
+            return inside.ok_or(Error::Impossible);
         }
-        let share = (1.0 - loss) * inside.log_mass.exp();
+        let share = inside.map_or(0.0, |inside| (1.0 - loss) * inside.log_mass.exp());
         let total = loss + share;
-        let weight = share / total;
-        let step = inside.mean - mu;
-        Ok(EllipsoidMoments {
+        // A lost report leaves the innovation as it was before.
+        let lost = EllipsoidMoments {
             log_mass: total.ln(),
-            mean: mu + step * weight,
-            covariance: (covariance + step * step.transpose() * weight) * (1.0 - weight) + inside.covariance * weight,
-        })
+            mean: *mu,
+            covariance: *covariance,
+        };
+        Ok(inside.map_or(lost, |inside| lost.mixed(&inside, share / total)))
     }
 }
 
@@ -240,6 +231,7 @@ impl<const M: usize> Censored<M> {
     pub fn values(values: &[SVector<f64, M>], noise: &SMatrix<f64, M, M>, arrival: f64) -> Result<Self, ArgumentError> {
         let count = at_least_one("values", values.len())? as f64;
         let mean = values.iter().sum::<SVector<f64, M>>() / count;
+        // The factor of the mean has the right shape. Its constant follows from both forms at one point, `m = mean`.
         let mut all = Self::value(&mean, &(noise / count), 1.0)?;
         let single = Value::new(mean, *noise)?;
         let separate: f64 = values.iter().map(|z| single.log_likelihood(z)).sum();

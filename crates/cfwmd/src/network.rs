@@ -213,8 +213,8 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         broadcast: &SVector<f64, D>,
         observations: &[Observation<SVector<f64, M>>],
     ) -> Result<(Gaussian<D>, FusionInfo), Error> {
-        self.count(rules.len(), observations.len())?;
-        self.fuse_observed(predicted, rules, broadcast, |i| Some(observations[i]))
+        let asked: Vec<_> = observations.iter().copied().map(Some).collect();
+        self.fuse_asked(predicted, rules, broadcast, &asked)
     }
 
     /// As [`fuse`](Self::fuse). `None` stands for a sensor without observation: it was not asked, or its report cannot be used. Neither
@@ -230,18 +230,6 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         observations: &[Option<Observation<SVector<f64, M>>>],
     ) -> Result<(Gaussian<D>, FusionInfo), Error> {
         self.count(rules.len(), observations.len())?;
-        self.fuse_observed(predicted, rules, broadcast, |i| observations[i])
-    }
-
-    /// `observed(i)` is what was observed of sensor `i`.
-    #[inline]
-    fn fuse_observed(
-        &self,
-        predicted: &Gaussian<D>,
-        rules: &[CensoringRule<M>],
-        broadcast: &SVector<f64, D>,
-        observed: impl Fn(usize) -> Option<Observation<SVector<f64, M>>>,
-    ) -> Result<(Gaussian<D>, FusionInfo), Error> {
         let (mut belief, mut info, mut plain) = (*predicted, FusionInfo::default(), 0_usize);
         let update = |belief: &mut Gaussian<D>, i: usize, factor: &Censored<M>| -> Result<f64, Error> {
             let (next, step) = assumed_density::update(belief, self.sensors[i].matrix(), factor)?;
@@ -249,7 +237,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
             Ok(step.log_likelihood)
         };
         for (i, sensor) in self.sensors.iter().enumerate() {
-            let Some(Observation::Received(value)) = observed(i) else {
+            let Some(Observation::Received(value)) = observations[i] else {
                 continue;
             };
             info.received += 1;
@@ -269,7 +257,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
             info.log_likelihood += plain as f64 * self.link.of_received()?.ln();
         }
         for i in 0..self.sensors.len() {
-            if let Some(missing) = self.missing_together(rules, &observed, i) {
+            if let Some(missing) = self.missing_together(rules, |j| observations[j], i) {
                 let factor = self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?;
                 info.log_likelihood += update(&mut belief, i, &factor)?;
             }

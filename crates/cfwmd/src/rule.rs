@@ -95,6 +95,7 @@ impl<const M: usize> CensoringRule<M> {
     /// If the rule would not have sent it; the error names `sensor`.
     pub fn check(&self, sensor: usize, innovation: &SVector<f64, M>, rounding: &SVector<f64, M>) -> Result<(), Error> {
         let statistic = self.statistic(innovation);
+        // By the triangle inequality, rounding moves the root of the statistic by at most the sum over the components.
         let slack: f64 = (0..M)
             .filter(|j| rounding[*j] > 0.0)
             .map(|j| {

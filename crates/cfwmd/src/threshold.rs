@@ -86,6 +86,7 @@ fn chi_square_upper_tail(x: f64, dimension: usize) -> (f64, f64) {
 
 /// The root of `ln P(chi^2 > x) - ln rate` in `x`.
 fn chi_square_upper_quantile(rate: f64, dimension: usize) -> f64 {
+    // The logarithm of the tail is concave in `x`, so Newton's method on it converges from any start inside the bracket.
     let mut high = dimension as f64;
     while chi_square_upper_tail(high, dimension).0 > rate {
         high *= 2.0;

@@ -63,6 +63,17 @@ pub enum CodecError {
     },
 }
 
+impl CodecError {
+    /// [`CodecError::Invalid`] with a value of any type.
+    pub fn invalid(what: &'static str, value: impl ToString, expected: &'static str) -> Self {
+        Self::Invalid {
+            what,
+            value: value.to_string(),
+            expected,
+        }
+    }
+}
+
 /// A finished sequence of bits. Up to 16 bytes need no heap memory. Serialised as its bytes and the number of bits.
 #[derive(Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "(Vec<u8>, usize)", into = "(Vec<u8>, usize)")]

@@ -160,11 +160,7 @@ impl NumberFormat {
 }
 
 fn invalid(value: f64, expected: &'static str) -> CodecError {
-    CodecError::Invalid {
-        what: "number",
-        value: value.to_string(),
-        expected,
-    }
+    CodecError::invalid("number", value, expected)
 }
 
 impl Message for f64 {
@@ -213,11 +209,8 @@ impl<const D: usize> Message for Gaussian<D> {
                 covariance[(j, i)] = covariance[(i, j)];
             }
         }
-        Self::new(mean, covariance).map_err(|error| CodecError::Invalid {
-            what: "covariance",
-            value: error.value,
-            expected: "a positive semidefinite matrix",
-        })
+        Self::new(mean, covariance)
+            .map_err(|error| CodecError::invalid("covariance", error.value, "a positive semidefinite matrix"))
     }
 }
 

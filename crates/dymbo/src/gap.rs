@@ -17,12 +17,7 @@ const REACH: f64 = 8.5;
 /// # Errors
 /// If the plant is unstable, or its process noise too small for a grid.
 pub fn exact_filter(plant: &ScalarPlant, steps: usize) -> Result<PointMassFilter, Error> {
-    let mut variance = plant.steady_state(FRAC_2_PI)?.filtered_variance;
-    let mut widest = variance;
-    for _ in 0..steps {
-        variance = plant.dynamics().predict_variance(variance);
-        widest = widest.max(variance);
-    }
+    let widest = plant.widest_variance(plant.steady_state(FRAC_2_PI)?.filtered_variance, steps);
     let spacing = SPACING * plant.process_variance().min(plant.measurement_variance()).sqrt();
     PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(REACH * widest.sqrt(), spacing)?)
 }

@@ -62,11 +62,8 @@ impl Message for CellIndex {
 
     fn decode(bits: &u32, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
         let index = reader.read(*bits)?;
-        u16::try_from(index).map(Self).map_err(|_| CodecError::Invalid {
-            what: "cell index",
-            value: index.to_string(),
-            expected: "at most 65535",
-        })
+        let word = u16::try_from(index).map(Self);
+        word.map_err(|_| CodecError::invalid("cell index", index, "at most 65535"))
     }
 }
 

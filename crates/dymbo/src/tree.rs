@@ -50,11 +50,7 @@ pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) ->
     let start = scalar(0.0, plant.measurement_variance() + tau * tau / 12.0);
 
     // The grid must hold the state for all bits: rare strings have their posterior in the far tail of the prior.
-    let (mut variance, mut widest) = (start.covariance()[0], start.covariance()[0]);
-    for _ in 0..depth {
-        variance = plant.dynamics().predict_variance(variance);
-        widest = widest.max(variance);
-    }
+    let widest = plant.widest_variance(start.covariance()[0], depth);
     let half_width = 0.5 * tau + REACH * widest.sqrt();
     let finest = plant.process_variance().sqrt().min(sigma);
     let grid = UniformGrid::symmetric(half_width, SPACING * positive("process_variance", finest)?)?;

@@ -105,23 +105,15 @@ impl<const D: usize> Tree<D> {
             nodes: Vec::with_capacity(2 * order.len()),
             order,
         };
-        let mut keys = vec![0.0; weights.len()];
-        let whole = 0..tree.order.len();
-        tree.build(estimate, split, whole, 0, &mut keys);
+        tree.build(estimate, split);
         Ok(tree)
     }
 
-    /// Adds the node of `range` and all nodes below it; returns its index. The depth is `O(log n)` with count medians but can be `n`
-    /// with extreme weights, so an explicit stack is used instead of recursion.
-    fn build(
-        &mut self,
-        estimate: &KernelEstimate<D>,
-        split: Split,
-        whole: Range<usize>,
-        depth: usize,
-        keys: &mut [f64],
-    ) {
-        let mut pending = vec![(whole, depth, None::<(usize, usize)>)];
+    /// Adds the root and all nodes below it. The depth is `O(log n)` with count medians but can be `n` with extreme weights, so an
+    /// explicit stack is used instead of recursion.
+    fn build(&mut self, estimate: &KernelEstimate<D>, split: Split) {
+        let mut keys = vec![0.0; estimate.particles().weights().len()];
+        let mut pending = vec![(0..self.order.len(), 0, None::<(usize, usize)>)];
         while let Some((range, depth, parent)) = pending.pop() {
             let index = self.nodes.len();
             if let Some((parent, side)) = parent
@@ -138,7 +130,7 @@ impl<const D: usize> Tree<D> {
             };
             if range.len() > 1 {
                 node.children = Some([0, 0]);
-                let middle = self.part(estimate, split, range.clone(), depth, keys);
+                let middle = self.part(estimate, split, range.clone(), depth, &mut keys);
                 pending.push((middle..range.end, depth + 1, Some((index, 1))));
                 pending.push((range.start..middle, depth + 1, Some((index, 0))));
             }

@@ -187,11 +187,8 @@ impl<'a> Reader<'a> {
         if self.bytes.len() == settled + count && tail == &end.to_be_bytes()[..count] {
             return Ok(());
         }
-        Err(CodecError::Invalid {
-            what: "block",
-            value: format!("{} bytes", self.bytes.len()),
-            expected: "the bytes that a writer of as many rows ends with",
-        })
+        let expected = "the bytes that a writer of as many rows ends with";
+        Err(CodecError::invalid("block", format!("{} bytes", self.bytes.len()), expected))
     }
 }
 

@@ -62,25 +62,23 @@ impl Grid {
         })?;
         let ten = TENS[usize::from(decimals)];
         let width = Self::width(delta, ten)?;
+        let plain = Self::Decimal {
+            decimals,
+            width,
+            phase: 0,
+        };
         if width > 1 {
-            return Some(Self::Decimal {
-                decimals,
-                width,
-                phase: 0,
-            });
+            return Some(plain);
         }
         let mut all = samples.iter().filter_map(|x| digits(*x, ten));
         let origin = all.next()?;
         // If all samples are multiples of a larger unit (for example an ADC step in millivolts), count in that unit.
         let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
-        if unit <= 1 {
-            return Some(Self::Decimal {
-                decimals,
-                width,
-                phase: 0,
-            });
-        }
-        Some(Self::Stepped { decimals, unit, origin })
+        Some(if unit <= 1 {
+            plain
+        } else {
+            Self::Stepped { decimals, unit, origin }
+        })
     }
 
     /// Number of neighbouring multiples of `1 / ten` within `delta` of their middle; `None` if it is too large.
@@ -331,10 +329,6 @@ impl Bytes<'_> {
                 return Ok(value);
             }
         }
-        Err(CodecError::Invalid {
-            what: "number",
-            value: "more than 64 bits".into(),
-            expected: "at most 64 bits",
-        })
+        Err(CodecError::invalid("number", "more than 64 bits", "at most 64 bits"))
     }
 }

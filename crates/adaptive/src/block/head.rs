@@ -1,7 +1,6 @@
 //! The head of a block, before the indices.
 
 use super::grid::{Grid, push_varint};
-use fewbits_core::CodecError;
 
 /// Code of the line in the head; smaller codes are numbers of decimals.
 pub(super) const LINE: u8 = 13;
@@ -23,14 +22,6 @@ pub(super) struct Head {
     pub(super) coding: Coding,
     pub(super) joint: bool,
     pub(super) exceptions: Vec<(usize, f64)>,
-}
-
-pub(super) fn invalid(what: &'static str, value: impl ToString, expected: &'static str) -> CodecError {
-    CodecError::Invalid {
-        what,
-        value: value.to_string(),
-        expected,
-    }
 }
 
 pub(super) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &[(usize, f64)], bytes: &mut Vec<u8>) {

@@ -3,7 +3,7 @@
 use super::coder::{Coder, Reader, Writer};
 use super::counts::Counts;
 use super::grid::{Grid, unzigzag, zigzag};
-use super::head::{Coding, invalid, write_head};
+use super::head::{Coding, write_head};
 use super::model::Model;
 use super::rows::{LARGEST, Others, code_all};
 use fewbits_core::CodecError;
@@ -15,71 +15,67 @@ use pco::{ChunkConfig, DeltaSpec};
 const FIRST_LENGTH: u32 = 6;
 
 fn from_pco(error: impl std::fmt::Display) -> CodecError {
-    invalid("pco block", error, "what a writer of as many rows wrote")
+    CodecError::invalid("pco block", error, "what a writer of as many rows wrote")
 }
 
-fn write_first(writer: &mut Writer, indices: &[i64]) -> i64 {
-    let first = indices.first().copied().unwrap_or(0);
-    let length = u64::BITS - zigzag(first).leading_zeros();
-    writer.raw(u64::from(length), FIRST_LENGTH);
-    writer.raw(zigzag(first), length);
-    first
-}
-
-fn read_first(reader: &mut Reader<'_>) -> Result<i64, CodecError> {
-    let length = reader.raw(0, FIRST_LENGTH) as u32;
-    let first = unzigzag(reader.raw(0, length));
+/// Codes the first index of a block that has no [`Start`](super::Start).
+fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>) -> Result<i64, CodecError> {
+    let z = wanted.map_or(0, zigzag);
+    let length = coder.raw(u64::from(u64::BITS - z.leading_zeros()), FIRST_LENGTH) as u32;
+    let first = unzigzag(coder.raw(z, length));
     if first.unsigned_abs() > LARGEST as u64 {
-        return Err(invalid("first index", first, "at most 2^46 in size"));
+        return Err(CodecError::invalid("first index", first, "at most 2^46 in size"));
     }
     Ok(first)
 }
 
-pub(super) fn with_models(
+/// Codes the indices after the first one by models, or by counts with one bit in front. Counts do not use `others`.
+pub(super) fn code_rest<C: Coder>(
+    coder: &mut C,
+    by_models: bool,
+    grid: &Grid,
+    first: i64,
+    wanted: Option<&[i64]>,
+    rows: usize,
+    others: Option<&Others<'_>>,
+) -> Result<Vec<i64>, CodecError> {
+    if by_models {
+        let model = Model::new(rows, first, grid.cells(), others.is_some());
+        return code_all(coder, model, wanted, rows, others);
+    }
+    // The reader does not know the indices in advance: whether differences of differences are smaller is told.
+    let second = coder.raw(u64::from(wanted.is_some_and(Counts::prefers_second)), 1) == 1;
+    code_all(coder, Counts::new(first, second), wanted, rows, None)
+}
+
+/// A block whose indices are coded by models or by counts.
+pub(super) fn write_block(
+    by_models: bool,
     grid: &Grid,
     indices: &[i64],
     exceptions: &[(usize, f64)],
     others: Option<&Others<'_>>,
 ) -> Result<Vec<u8>, CodecError> {
     let mut bytes = Vec::with_capacity(64 + indices.len() / 2);
-    write_head(grid, Coding::Models, others.is_some(), exceptions, &mut bytes);
+    let coding = if by_models { Coding::Models } else { Coding::Counts };
+    write_head(grid, coding, others.is_some(), exceptions, &mut bytes);
     let mut writer = Writer::new(bytes);
-    let first = write_first(&mut writer, indices);
-    let model = Model::new(indices.len(), first, grid.cells(), others.is_some());
-    code_all(&mut writer, model, Some(indices), indices.len(), others)?;
+    let first = code_first(&mut writer, Some(indices.first().copied().unwrap_or(0)))?;
+    code_rest(&mut writer, by_models, grid, first, Some(indices), indices.len(), others)?;
     Ok(writer.finish())
 }
 
-pub(super) fn read_models(
+/// The indices of a block of [`write_block`], without its head.
+pub(super) fn read_block(
     bytes: &[u8],
-    rows: usize,
+    by_models: bool,
     grid: &Grid,
+    rows: usize,
     others: Option<&Others<'_>>,
 ) -> Result<Vec<i64>, CodecError> {
     let mut reader = Reader::new(bytes);
-    let first = read_first(&mut reader)?;
-    let model = Model::new(rows, first, grid.cells(), others.is_some());
-    let indices = code_all(&mut reader, model, None, rows, others)?;
-    reader.finish()?;
-    Ok(indices)
-}
-
-pub(super) fn with_counts(grid: &Grid, indices: &[i64], exceptions: &[(usize, f64)]) -> Result<Vec<u8>, CodecError> {
-    let mut bytes = Vec::with_capacity(64 + indices.len() / 2);
-    write_head(grid, Coding::Counts, false, exceptions, &mut bytes);
-    let mut writer = Writer::new(bytes);
-    let first = write_first(&mut writer, indices);
-    let second = Counts::prefers_second(indices);
-    writer.raw(u64::from(second), 1);
-    code_all(&mut writer, Counts::new(first, second), Some(indices), indices.len(), None)?;
-    Ok(writer.finish())
-}
-
-pub(super) fn read_counts(bytes: &[u8], rows: usize) -> Result<Vec<i64>, CodecError> {
-    let mut reader = Reader::new(bytes);
-    let first = read_first(&mut reader)?;
-    let counts = Counts::new(first, reader.raw(0, 1) == 1);
-    let indices = code_all(&mut reader, counts, None, rows, None)?;
+    let first = code_first(&mut reader, None)?;
+    let indices = code_rest(&mut reader, by_models, grid, first, None, rows, others)?;
     reader.finish()?;
     Ok(indices)
 }
@@ -102,7 +98,7 @@ pub(super) fn smallest_pco<T: Number>(numbers: &[T]) -> Result<Vec<u8>, CodecErr
 pub(super) fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, CodecError> {
     let (samples, rest) = bytes.as_chunks::<8>();
     if samples.len() != rows || !rest.is_empty() {
-        return Err(invalid("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
+        return Err(CodecError::invalid("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
     }
     Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }

@@ -47,8 +47,8 @@ use fewbits_core::CodecError;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::vectorised;
 use grid::{Bytes, DECIMALS, Grid, PHASES, unzigzag};
-use head::{CIRCLE, Coding, Head, LINE, SAMPLES, invalid, write_head};
-use indices::{from_pco_bytes, raw_samples, read_counts, read_models, smallest_pco, with_counts, with_models};
+use head::{CIRCLE, Coding, Head, LINE, SAMPLES, write_head};
+use indices::{from_pco_bytes, raw_samples, read_block, smallest_pco, write_block};
 pub use rows::JOINT_COLUMNS;
 use rows::Others;
 pub use start::{Start, StartedBlock};
@@ -142,15 +142,11 @@ impl BlockCodec {
         };
         if let Some(grid) = self.grid(samples).map(|grid| grid.fitted(samples)) {
             let (indices, exceptions) = self.indices(&grid, samples);
-            if self.effort == Effort::Thorough {
-                keep(with_models(&grid, &indices, &exceptions, None)?, &mut best);
-                if !others.is_empty() {
-                    let others = Others::new(others);
-                    keep(with_models(&grid, &indices, &exceptions, Some(&others))?, &mut best);
-                }
-            }
-            if self.effort == Effort::Fast {
-                keep(with_counts(&grid, &indices, &exceptions)?, &mut best);
+            let thorough = self.effort == Effort::Thorough;
+            keep(write_block(thorough, &grid, &indices, &exceptions, None)?, &mut best);
+            if thorough && !others.is_empty() {
+                let others = Others::new(others);
+                keep(write_block(true, &grid, &indices, &exceptions, Some(&others))?, &mut best);
             }
             // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
             if best.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8) {
@@ -203,12 +199,14 @@ impl BlockCodec {
         let indices = match head.coding {
             Coding::Models => {
                 if head.joint && others.is_empty() {
-                    return Err(invalid("block", "joint", "the other columns that it was written with").into());
+                    return Err(
+                        CodecError::invalid("block", "joint", "the other columns that it was written with").into()
+                    );
                 }
                 let others = head.joint.then(|| Others::new(others));
-                read_models(rest, rows, &grid, others.as_ref())?
+                read_block(rest, true, &grid, rows, others.as_ref())?
             }
-            Coding::Counts => read_counts(rest, rows)?,
+            Coding::Counts => read_block(rest, false, &grid, rows, None)?,
             _ => from_pco_bytes::<i64>(rest, rows)?,
         };
         let mut samples = grid.values(&indices);
@@ -290,13 +288,14 @@ impl BlockCodec {
                 decimals,
                 unit: match i64::try_from(bytes.varint()?) {
                     Ok(unit @ 1..) => unit,
-                    _ => return Err(invalid("unit", "too large", "1 to 2^63")),
+                    _ => return Err(CodecError::invalid("unit", "too large", "1 to 2^63")),
                 },
                 origin: unzigzag(bytes.varint()?),
             });
         }
         let width = Grid::width(self.delta(), fewbits_node::adaptive::TENS[usize::from(decimals)]);
-        let width = width.ok_or_else(|| invalid("decimals", decimals, "a grid not finer than the samples"))?;
+        let width =
+            width.ok_or_else(|| CodecError::invalid("decimals", decimals, "a grid not finer than the samples"))?;
         Ok(Grid::Decimal {
             decimals,
             width,
@@ -307,7 +306,7 @@ impl BlockCodec {
     fn circle(&self, config: &Config) -> Result<Grid, CodecError> {
         match config.period() {
             Some(period) => Ok(Grid::circle(config, period)),
-            None => Err(invalid("grid", "circle", "the grid of a line")),
+            None => Err(CodecError::invalid("grid", "circle", "the grid of a line")),
         }
     }
 
@@ -319,11 +318,11 @@ impl BlockCodec {
             (1, _) => Coding::Pco,
             (2, SAMPLES) => Coding::Raw,
             (3, 0..SAMPLES) => Coding::Counts,
-            _ => return Err(invalid("head", head, "a grid and a coding that belong together")),
+            _ => return Err(CodecError::invalid("head", head, "a grid and a coding that belong together")),
         };
         let [second] = if head & 128 == 0 { [0] } else { bytes.array()? };
         if second > 15 || (head & 128 != 0 && second == 0) || (kind == SAMPLES && head & 192 != 0) {
-            return Err(invalid(
+            return Err(CodecError::invalid(
                 "second byte",
                 second,
                 "exceptions, steps, an anchor or a phase, and a grid that has them",
@@ -339,12 +338,12 @@ impl BlockCodec {
                     f64::from_le_bytes(bytes.array()?)
                 };
                 if !anchor.is_finite() {
-                    return Err(invalid("anchor", anchor, "a finite number"));
+                    return Err(CodecError::invalid("anchor", anchor, "a finite number"));
                 }
                 Some(Grid::line(config.delta(), anchor))
             }
             (CIRCLE, Accuracy::Within(config)) => Some(self.circle(&config)?),
-            _ => return Err(invalid("grid", kind, "one of the agreed accuracy")),
+            _ => return Err(CodecError::invalid("grid", kind, "one of the agreed accuracy")),
         };
         let grid = match grid {
             Some(grid) if second & 8 != 0 => Some(read_phase(grid, bytes)?),
@@ -357,7 +356,7 @@ impl BlockCodec {
             for i in 0..count {
                 row = row.saturating_add(bytes.varint()?).saturating_add(u64::from(i > 0));
                 if row >= rows as u64 {
-                    return Err(invalid("exception", row, "a row of the block"));
+                    return Err(CodecError::invalid("exception", row, "a row of the block"));
                 }
                 exceptions.push((row as usize, f64::from_le_bytes(bytes.array()?)));
             }
@@ -376,7 +375,7 @@ fn read_phase(grid: Grid, bytes: &mut Bytes<'_>) -> Result<Grid, CodecError> {
     let [phase] = bytes.array()?;
     match grid {
         Grid::Decimal { .. } | Grid::Line { .. } if (1..PHASES).contains(&phase) => Ok(grid.with_phase(phase)),
-        _ => Err(invalid("phase", phase, "1 to 15, of a grid of cells on a line")),
+        _ => Err(CodecError::invalid("phase", phase, "1 to 15, of a grid of cells on a line")),
     }
 }
 

@@ -89,9 +89,5 @@ pub(super) fn code_all<C: Coder, S: State>(
 }
 
 pub(super) fn damaged(value: i64) -> CodecError {
-    CodecError::Invalid {
-        what: "index",
-        value: value.to_string(),
-        expected: "at most 2^46 in size",
-    }
+    CodecError::invalid("index", value, "at most 2^46 in size")
 }

@@ -12,11 +12,11 @@
 //! blocks), phase (byte, as in blocks), usual index (zigzag varint), `k` (byte).
 
 use super::coder::{Coder, Reader, Writer};
-use super::counts::{Counts, gamma};
+use super::counts::gamma;
 use super::grid::{Bytes, DECIMALS, Grid, push_varint, unzigzag, zigzag};
-use super::head::{CIRCLE, LINE, invalid};
-use super::model::Model;
-use super::rows::{LARGEST, Others, code_all};
+use super::head::{CIRCLE, LINE};
+use super::indices::code_rest;
+use super::rows::{LARGEST, Others};
 use super::{Accuracy, BlockCodec, Effort, check_rows};
 use crate::Error;
 use fewbits_core::CodecError;
@@ -87,7 +87,7 @@ impl Start {
         let offset = high.checked_mul(1 << k).map(|high| unzigzag(high | low));
         match offset.and_then(|offset| offset.checked_add(self.usual)) {
             Some(index) if index.unsigned_abs() <= LARGEST as u64 => Ok(index),
-            _ => Err(invalid("first index", "too large", "at most 2^46 in size")),
+            _ => Err(CodecError::invalid("first index", "too large", "at most 2^46 in size")),
         }
     }
 }
@@ -136,7 +136,7 @@ impl BlockCodec {
             (0..DECIMALS, _) => self.decimal_grid(kind & !STEPPED, kind & STEPPED != 0, &mut reader)?,
             (LINE, Accuracy::Within(config)) if kind == LINE => Grid::line(config.delta(), 0.0),
             (CIRCLE, Accuracy::Within(config)) if kind == CIRCLE => self.circle(&config)?,
-            _ => return Err(invalid("grid", kind, "one of the agreed accuracy").into()),
+            _ => return Err(CodecError::invalid("grid", kind, "one of the agreed accuracy").into()),
         };
         if head & MOVED != 0 {
             grid = super::read_phase(grid, &mut reader)?;
@@ -144,7 +144,7 @@ impl BlockCodec {
         let usual = unzigzag(reader.varint()?);
         let [k] = reader.array()?;
         if usual.unsigned_abs() > LARGEST as u64 || k > MOST_BITS {
-            return Err(invalid("usual index", usual, "at most 2^46 in size").into());
+            return Err(CodecError::invalid("usual index", usual, "at most 2^46 in size").into());
         }
         *bytes = reader.0;
         Ok(Start { grid, usual, k })
@@ -176,7 +176,7 @@ impl BlockCodec {
             });
         }
         let shortest = found.into_iter().min_by_key(|block| block.bytes.len());
-        shortest.ok_or_else(|| invalid("block", "none", "a coding that holds the samples").into())
+        shortest.ok_or_else(|| CodecError::invalid("block", "none", "a coding that holds the samples").into())
     }
 
     /// The samples as indices on the start's grid, for [`code_shared`](Self::code_shared). `None` if a block of its own may be shorter: a
@@ -227,12 +227,7 @@ impl BlockCodec {
     ) -> Result<Vec<i64>, CodecError> {
         let by_models = coder.bit(BY_MODELS, self.effort == Effort::Thorough);
         let first = start.first_index(coder, wanted.and_then(|wanted| wanted.first().copied()))?;
-        if by_models {
-            let model = Model::new(rows, first, start.grid.cells(), others.is_some());
-            return code_all(coder, model, wanted, rows, others);
-        }
-        let second = coder.raw(u64::from(wanted.is_some_and(Counts::prefers_second)), 1) == 1;
-        code_all(coder, Counts::new(first, second), wanted, rows, None)
+        code_rest(coder, by_models, &start.grid, first, wanted, rows, others)
     }
 
     fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, CodecError> {

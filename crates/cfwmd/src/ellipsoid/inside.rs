@@ -1,6 +1,6 @@
 //! Probability, mean and covariance of a Gaussian inside or outside an ellipsoid.
 
-use super::quadrature::{Moments, Side, log_mass, moments};
+use super::quadrature::{EllipsoidMoments, Side, log_mass, moments};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::error::all_finite;
@@ -29,17 +29,6 @@ pub struct GaussianInEllipsoid<const M: usize> {
     threshold: f64,
 }
 
-/// Probability, mean and covariance of a Gaussian restricted to an ellipsoid or to its outside.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EllipsoidMoments<const M: usize> {
-    /// Logarithm of the probability of the region.
-    pub log_mass: f64,
-    /// Mean given the region.
-    pub mean: SVector<f64, M>,
-    /// Covariance given the region.
-    pub covariance: SMatrix<f64, M, M>,
-}
-
 impl<const M: usize> GaussianInEllipsoid<M> {
     /// The region `nu' S^-1 nu < threshold` with `S = L L'`, `L = lower`, and a Gaussian of covariance `V`.
     pub(super) fn new(
@@ -58,6 +47,7 @@ impl<const M: usize> GaussianInEllipsoid<M> {
         if !sound {
             return Err(refuse());
         }
+        // The component of largest variance comes first: the quadrature runs over its angle, where the integrand is widest.
         let mut order: [usize; M] = std::array::from_fn(|i| i);
         order.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
         let basis = SMatrix::<f64, M, M>::from_fn(|i, j| vectors[(i, order[j])]);
@@ -83,8 +73,7 @@ impl<const M: usize> GaussianInEllipsoid<M> {
 
     /// Mass, mean and covariance of `nu ~ N(mu, V)` inside; `None` if the mass is zero or `mu` is not finite.
     pub fn moments(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
-        let b = self.finite(mu)?;
-        self.back(moments(Side::Inside, self.variances.as_slice(), &b, 0, self.threshold))
+        self.moments_on(Side::Inside, mu)
     }
 
     /// `ln P(nu outside)`, accurate for tiny probabilities too.
@@ -102,17 +91,13 @@ impl<const M: usize> GaussianInEllipsoid<M> {
 
     /// Mass, mean and covariance of `nu ~ N(mu, V)` outside; `None` if the mass is zero or `mu` is not finite.
     pub fn moments_outside(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
-        let b = self.finite(mu)?;
-        self.back(moments(Side::Outside, self.variances.as_slice(), &b, 0, self.threshold))
+        self.moments_on(Side::Outside, mu)
     }
 
-    /// `mu` in whitened coordinates; `None` if it is not finite.
-    fn finite(&self, mu: &SVector<f64, M>) -> Option<SVector<f64, M>> {
-        Some(self.forward * mu).filter(|b| b.iter().all(|x| x.is_finite()))
-    }
-
-    /// Transforms moments from whitened coordinates to those of the innovation.
-    fn back(&self, white: Moments<M>) -> Option<EllipsoidMoments<M>> {
+    fn moments_on(&self, side: Side, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
+        let b = Some(self.forward * mu).filter(|b| b.iter().all(|x| x.is_finite()))?;
+        let white = moments(side, self.variances.as_slice(), &b, 0, self.threshold);
+        // From whitened coordinates back to those of the innovation.
         white.log_mass.is_finite().then(|| EllipsoidMoments {
             log_mass: white.log_mass,
             mean: self.backward * white.mean,

@@ -4,7 +4,8 @@ mod inside;
 mod integrate;
 mod quadrature;
 
-pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
+pub use inside::GaussianInEllipsoid;
+pub use quadrature::EllipsoidMoments;
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::non_negative;

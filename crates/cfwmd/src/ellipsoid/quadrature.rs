@@ -12,7 +12,8 @@ use nalgebra::{SMatrix, SVector};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::OnceLock;
 
-/// A component whose variance is below this share of the ball's squared radius is taken as known.
+/// A component whose variance is below this share of the ball's squared radius is taken as known. Its deviation is then below 1e-8 of
+/// the radius, less than the stated error of the probability.
 const KNOWN: f64 = 1e-16;
 
 /// Whether the mass inside or outside the ball is meant.
@@ -127,14 +128,27 @@ fn tame_plane(variances: [f64; 2], means: [f64; 2], eta: f64) -> f64 {
     kernels::log_sum_exp(&logs) + (radius / deviations[0]).ln() - normal::LN_SQRT_2PI
 }
 
-/// Mass, mean and covariance over the coordinates from `first` on; entries before `first` are zero.
-pub(super) struct Moments<const M: usize> {
-    pub(super) log_mass: f64,
-    pub(super) mean: SVector<f64, M>,
-    pub(super) covariance: SMatrix<f64, M, M>,
+/// Probability, mean and covariance of a Gaussian restricted to an ellipsoid or to its outside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EllipsoidMoments<const M: usize> {
+    /// Logarithm of the probability of the region.
+    pub log_mass: f64,
+    /// Mean given the region.
+    pub mean: SVector<f64, M>,
+    /// Covariance given the region.
+    pub covariance: SMatrix<f64, M, M>,
 }
 
-impl<const M: usize> Moments<M> {
+impl<const M: usize> EllipsoidMoments<M> {
+    /// Mean and covariance of the mixture `(1 - share) self + share part`; the mass is that of `self`. The sums are taken about the means:
+    /// raw moments would cancel where the means are large beside the spread.
+    pub(crate) fn mixed(mut self, part: &Self, share: f64) -> Self {
+        let step = part.mean - self.mean;
+        self.mean += step * share;
+        self.covariance = (self.covariance + step * step.transpose() * share) * (1.0 - share) + part.covariance * share;
+        self
+    }
+
     fn with_mass(log_mass: f64) -> Self {
         Self {
             log_mass,
@@ -162,21 +176,23 @@ impl<const M: usize> Moments<M> {
     }
 }
 
-/// As [`log_mass`], with mean and covariance. `variances` are those of the coordinates from `first` on, `means` those of all.
+/// As [`log_mass`], with mean and covariance over the coordinates from `first` on; entries before `first` are zero. `variances` are those
+/// of the coordinates from `first` on, `means` those of all.
 pub(super) fn moments<const M: usize>(
     side: Side,
     variances: &[f64],
     means: &SVector<f64, M>,
     first: usize,
     eta: f64,
-) -> Moments<M> {
+) -> EllipsoidMoments<M> {
     let tail = &means.as_slice()[first..first + variances.len()];
     if eta <= 0.0 && side == Side::Outside {
-        return Moments::free(variances, tail, first);
+        return EllipsoidMoments::free(variances, tail, first);
     }
     let (Some((w, inner)), Some(b)) = (variances.split_first().filter(|_| eta > 0.0), tail.first()) else {
-        return Moments::with_mass(side.of_point(eta > 0.0));
+        return EllipsoidMoments::with_mass(side.of_point(eta > 0.0));
     };
+    // As in `log_mass`: a coordinate of negligible variance is known.
     if let (Some((last_w, rest)), Some(last_b)) = (variances.split_last(), tail.last())
         && *last_w <= KNOWN * eta
     {
@@ -192,22 +208,19 @@ pub(super) fn moments<const M: usize>(
         // The two tails of the leading component; the others are unrestricted.
         (Side::Outside, _) => &[(f64::NEG_INFINITY, low), (high, f64::INFINITY)],
     };
-    let (mut sum, mut total) = (LogSum::default(), Moments::with_mass(0.0));
-    let mut add = |part: Moments<M>, log_weight: f64| {
+    let (mut sum, mut total) = (LogSum::default(), EllipsoidMoments::with_mass(0.0));
+    let mut add = |part: EllipsoidMoments<M>, log_weight: f64| {
         let share = sum.add_with_share(part.log_mass + log_weight);
+        // A part without mass has no moments: its mean may be anything.
         if share > 0.0 {
-            // Moments of the mixture of the sum so far and the part, about their means: raw moments would cancel.
-            let step = part.mean - total.mean;
-            total.mean += step * share;
-            total.covariance =
-                (total.covariance + step * step.transpose() * share) * (1.0 - share) + part.covariance * share;
+            total = total.mixed(&part, share);
         }
     };
     for cut in cuts
         .iter()
         .filter_map(|(from, to)| normal::truncated_moments(*from, *to).ok())
     {
-        add(Moments::free(inner, &tail[1..], first + 1).with_cut(first, *w, *b, &cut), 0.0);
+        add(EllipsoidMoments::free(inner, &tail[1..], first + 1).with_cut(first, *w, *b, &cut), 0.0);
     }
     if !inner.is_empty() {
         let leading = leading(*w, *b, eta);
@@ -217,7 +230,7 @@ pub(super) fn moments<const M: usize>(
         };
         side.integrate(variances, tail, eta, integrand, |theta, weight| {
             let (q, left, log_density) = leading(theta);
-            let mut slice: Moments<M> = moments(side, inner, means, first + 1, left);
+            let mut slice: EllipsoidMoments<M> = moments(side, inner, means, first + 1, left);
             slice.mean[first] = q;
             slice.log_mass += log_density;
             add(slice, weight.ln());

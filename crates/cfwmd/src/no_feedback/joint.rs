@@ -135,6 +135,7 @@ impl<const D: usize> JointBelief<D> {
         let innovation = value - h * self.block_mean(0);
         let gains = (factor.solve(&(&rows * self.root.transpose()))).transpose();
         let noise = semidefinite_factor("noise_covariance", sensor.noise_covariance())?;
+        // Joseph form on the root: `C = (L - G H L)(L - G H L)' + G R G'`.
         self.shift(&gains, &innovation);
         self.detach(&gains, &rows);
         self.append(&[columns(&gains * noise)]);
@@ -154,6 +155,7 @@ impl<const D: usize> JointBelief<D> {
             // Rounding may give p = 1. The report is then improbable, not impossible.
             log_likelihood += (1.0 - p).max(f64::EPSILON).ln();
             if let Some(inside) = inside.filter(|_| p < IMPLAUSIBLE) {
+                // Moments outside: the whole is the mixture of inside (weight p) and outside.
                 let outside = (mu - inside.mean * p) / (1.0 - p);
                 let apart = inside.mean - outside;
                 let left = (spread - inside.covariance * p) / (1.0 - p) - apart * apart.transpose() * p;

@@ -7,7 +7,7 @@ use crate::rule::{CensoringRule, OwnRecursion};
 use fewbits_core::{FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observation};
 use fewbits_densities::GaussianCloud;
 use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule};
-use fewbits_numerics::normal;
+use fewbits_numerics::{LogSum, normal};
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -169,16 +169,13 @@ fn impute<const M: usize, R: Rng + ?Sized>(
     let inside = region.statistic(&(z - own)) < region.threshold();
     let log_density = innovation.log_pdf(&(z - central));
     let log_target = log_density + if inside { 0.0 } else { loss.ln() };
-    // Proposal: `share N(z) + (1 - share) U(z)`, `U` uniform in the ellipsoid.
-    let (normal_part, uniform_part) = (share.ln() + log_density, (1.0 - share).ln() - region.log_volume());
-    let log_proposal = match (inside, share > 0.0) {
-        (true, false) => uniform_part,
-        (false, _) => normal_part,
-        (true, true) => {
-            let largest = normal_part.max(uniform_part);
-            largest + ((normal_part - largest).exp() + (uniform_part - largest).exp()).ln()
-        }
+    // Proposal: `share N(z) + (1 - share) U(z)`, `U` uniform in the ellipsoid and zero outside.
+    let uniform_part = if inside {
+        (1.0 - share).ln() - region.log_volume()
+    } else {
+        f64::NEG_INFINITY
     };
+    let log_proposal = LogSum::from_iter([share.ln() + log_density, uniform_part]).value();
     (
         z,
         if log_target == f64::NEG_INFINITY {
@@ -203,8 +200,7 @@ fn impute_sent<const M: usize, R: Rng + ?Sized>(
         let (interval, deviation) = (rule.interval(own[0]), innovation.lower()[(0, 0)]);
         let (low, high) = ((interval.0 - central[0]) / deviation, (interval.1 - central[0]) / deviation);
         let tails = [normal::log_cdf(low), normal::log_cdf(-high)];
-        let largest = tails[0].max(tails[1]);
-        let total = largest + tails.iter().map(|tail| (tail - largest).exp()).sum::<f64>().ln();
+        let total = LogSum::from_iter(tails).value();
         let (from, to) = if rng.random::<f64>() < (tails[0] - total).exp() {
             (f64::NEG_INFINITY, low)
         } else {

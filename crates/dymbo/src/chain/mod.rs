@@ -36,6 +36,7 @@ use fewbits_filters::UniformGrid;
 use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::normal::{self, INV_SQRT_2PI};
 use std::f64::consts::FRAC_2_PI;
+use std::ops::Range;
 
 /// Grid spacing divided by the smaller of the two noise deviations.
 const SPACING: f64 = 0.4;
@@ -81,7 +82,7 @@ impl ErrorChain {
     ///
     /// # Errors
     /// If the process noise is zero or so small that the grid would need more than 40000 points.
-    pub fn from_normal(plant: &ScalarPlant, filtered_variance: f64) -> Result<Self, Error> {
+    fn from_normal(plant: &ScalarPlant, filtered_variance: f64) -> Result<Self, Error> {
         let variance = plant.dynamics().predict_variance(filtered_variance);
         let grid = Self::grid(plant, WIDTH * variance.max(plant.process_variance()).sqrt())?;
         let density = grid
@@ -121,17 +122,18 @@ impl ErrorChain {
         Ok(chain)
     }
 
-    /// Adds `mass` spread by the process noise around `centre`.
-    fn add_kernel(&mut self, centre: f64, mass: f64) {
+    /// Adds `mass` spread by the process noise around `centre`, and returns the nodes that it reaches.
+    fn add_kernel(&mut self, centre: f64, mass: f64) -> Range<usize> {
         let deviation = self.plant.process_variance().sqrt();
         let scale = mass * INV_SQRT_2PI / deviation;
         let reached = self
             .grid
             .indices_within(centre - REACH * deviation, centre + REACH * deviation);
-        for i in reached {
+        for i in reached.clone() {
             let z = (self.grid.node(i) - centre) / deviation;
             self.density[i] += scale * (-0.5 * z * z).exp();
         }
+        reached
     }
 
     /// `E e^2` before the message.
@@ -141,7 +143,7 @@ impl ErrorChain {
     }
 
     /// `E (e - d)^power` after the message.
-    pub fn filtered_moment(&self, law: &MessageLaw, power: i32) -> f64 {
+    fn filtered_moment(&self, law: &MessageLaw, power: i32) -> f64 {
         let sum: f64 = self
             .grid
             .nodes()
@@ -183,19 +185,14 @@ impl ErrorChain {
             ..*self
         };
         let unit = self.grid.spacing();
-        let deviation = self.plant.process_variance().sqrt();
-        let a = self.plant.coefficient();
         self.grid
             .nodes()
             .map(|e| {
                 let (mut first, mut end) = (self.grid.points(), 0);
                 // The error after a message of this correction, moved by the plant: a normal kernel about `a (e - correction)`.
                 for (probability, correction) in law.messages(e) {
-                    let centre = a * (e - correction);
-                    column.add_kernel(centre, unit * probability);
-                    let reached = self
-                        .grid
-                        .indices_within(centre - REACH * deviation, centre + REACH * deviation);
+                    let centre = self.plant.coefficient() * (e - correction);
+                    let reached = column.add_kernel(centre, unit * probability);
                     if !reached.is_empty() {
                         (first, end) = (first.min(reached.start), end.max(reached.end));
                     }

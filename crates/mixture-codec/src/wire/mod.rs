@@ -137,11 +137,8 @@ impl<const D: usize> Message for CodedMixture<D> {
         while expected.remaining() > 0 {
             let width = expected.remaining().min(64) as u32;
             if expected.read(width)? != reader.read(width)? {
-                return Err(CodecError::Invalid {
-                    what: "code word",
-                    value: "another than the encoder's".into(),
-                    expected: "the shortest code of its symbols",
-                });
+                let expected = "the shortest code of its symbols";
+                return Err(CodecError::invalid("code word", "another than the encoder's", expected));
             }
         }
         Ok(message)

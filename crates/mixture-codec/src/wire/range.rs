@@ -37,12 +37,8 @@ impl Law {
     }
 }
 
-fn out_of_range(what: &'static str, value: impl std::fmt::Display) -> CodecError {
-    CodecError::Invalid {
-        what,
-        value: value.to_string(),
-        expected: "a number within the range of the format",
-    }
+pub(super) fn out_of_range(what: &'static str, value: impl std::fmt::Display) -> CodecError {
+    CodecError::invalid(what, value, "a number within the range of the format")
 }
 
 /// The operations that writer and reader share: code symbols by tables.

@@ -12,7 +12,8 @@ pub(super) const TOTAL: u32 = 1 << PRECISION;
 
 /// Frequency of the escape symbol; it takes about 11 bits.
 const ESCAPE: u32 = 32;
-/// A logistic table ends at this many scales from its centre; values beyond use the escape symbol.
+/// A logistic table ends at this many scales from its centre; values beyond use the escape symbol. At the largest scale, 64, the table
+/// has about 1300 symbols, whose frequencies of at least one take 2 % of the total.
 const REACH: f64 = 10.0;
 /// Weight of the wide density in the mixture, and its scale relative to the narrow one.
 const WIDE_SHARE: f64 = 0.01;
@@ -55,6 +56,7 @@ impl Table {
     /// machine gets the same bits.
     fn cumulative(&self, index: u32) -> u32 {
         match *self {
+            // At most 2^12 times 2^16: the product does not overflow.
             Self::Uniform { count } => index * TOTAL / count,
             Self::Logistic {
                 centre,
@@ -63,20 +65,22 @@ impl Table {
                 scale,
             } => {
                 let symbols = 2 * half + 1;
-                if index == 0 {
-                    0
-                } else if index >= symbols {
-                    if index == symbols { TOTAL - ESCAPE } else { TOTAL }
-                } else {
-                    let edge = (centre - i64::from(half) + i64::from(index)) as f64 - 0.5;
-                    let z = (edge - location) / scale;
-                    // `e^-z` is the eighth power of the exponential that the wide density needs.
-                    let wide = libm::exp(-z / WIDE);
-                    let fourth = (wide * wide) * (wide * wide);
-                    let share = (1.0 - WIDE_SHARE) / (1.0 + fourth * fourth) + WIDE_SHARE / (1.0 + wide);
-                    // Frequency one for every symbol; the rest is distributed by the density.
-                    index + (f64::from(TOTAL - ESCAPE - symbols) * share) as u32
+                // The end symbols also take the mass beyond the table, and the escape symbol follows them.
+                if index == 0 || index >= symbols {
+                    return match index {
+                        0 => 0,
+                        _ if index == symbols => TOTAL - ESCAPE,
+                        _ => TOTAL,
+                    };
                 }
+                let edge = (centre - i64::from(half) + i64::from(index)) as f64 - 0.5;
+                let z = (edge - location) / scale;
+                // `e^-z` is the eighth power of the exponential that the wide density needs.
+                let wide = libm::exp(-z / WIDE);
+                let fourth = (wide * wide) * (wide * wide);
+                let share = (1.0 - WIDE_SHARE) / (1.0 + fourth * fourth) + WIDE_SHARE / (1.0 + wide);
+                // Frequency one for every symbol; the rest is distributed by the density.
+                index + (f64::from(TOTAL - ESCAPE - symbols) * share) as u32
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The order and the distributions of a message's numbers, used by quantiser and decoder alike.
 
 use super::format::WireFormat;
-use super::range::{Coder, LARGEST, Law, Reader};
+use super::range::{Coder, LARGEST, Law, Reader, out_of_range};
 use fewbits_core::CodecError;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::factored::Factored;
@@ -27,7 +27,7 @@ impl Source for Quantiser {
             Law::Logistic { .. } => rounded.abs() < LARGEST,
         };
         if !fits {
-            return Err(invalid("parameter in steps", rounded));
+            return Err(out_of_range("parameter in steps", rounded));
         }
         self.symbols.push((*law, rounded as i64));
         Ok(rounded as i64)
@@ -45,14 +45,6 @@ impl Source for Decoder {
         let n = self.reader.integer(law, None)?;
         self.symbols.push((*law, n));
         Ok(n)
-    }
-}
-
-fn invalid(what: &'static str, value: impl std::fmt::Display) -> CodecError {
-    CodecError::Invalid {
-        what,
-        value: value.to_string(),
-        expected: "a number within the range of the format",
     }
 }
 
@@ -79,7 +71,7 @@ pub(super) fn walk<const D: usize>(
     order.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
     let k = symbols.next(&Law::Uniform { count: 64 }, target.map(|_| order.len() as f64))?;
     if k == 0 {
-        return Err(invalid("number of components", "0, reserved for later formats"));
+        return Err(out_of_range("number of components", "0, reserved for later formats"));
     }
     let k = k as usize;
     let choices = format.resolutions.len() as u64;
@@ -88,13 +80,13 @@ pub(super) fn walk<const D: usize>(
         .resolutions
         .get(choice as usize)
         .copied()
-        .ok_or_else(|| invalid("resolution", choice))?;
+        .ok_or_else(|| out_of_range("resolution", choice))?;
 
     let overall = match target {
         None => None,
         Some((mixture, _)) => {
-            let factor =
-                Factored::new("covariance", &mixture.covariance()).map_err(|_| invalid("covariance", "singular"))?;
+            let factor = Factored::new("covariance", &mixture.covariance())
+                .map_err(|_| out_of_range("covariance", "singular"))?;
             Some((mixture.mean(), factor))
         }
     };
@@ -104,7 +96,7 @@ pub(super) fn walk<const D: usize>(
         let step = if k == 1 { r } else { 0.5 * r } * lower[(i, i)];
         let count = (2.0 * format.half_width / step).ceil() + 1.0;
         if count.is_nan() || count > 1e15 {
-            return Err(invalid("positions in the field", count));
+            return Err(out_of_range("positions in the field", count));
         }
         let start = format.centre[i] - format.half_width;
         let wanted = overall.as_ref().map(|(m, _)| (m[i] - start) / step);
@@ -125,7 +117,8 @@ pub(super) fn walk<const D: usize>(
             Some(c) => {
                 let covariance = white.whitener * c.covariance() * white.whitener.transpose();
                 let symmetric = (covariance + covariance.transpose()) * 0.5;
-                let factor = Factored::new("covariance", &symmetric).map_err(|_| invalid("covariance", "singular"))?;
+                let factor =
+                    Factored::new("covariance", &symmetric).map_err(|_| out_of_range("covariance", "singular"))?;
                 Some((white.whitener * (c.mean() - mean), factor.lower))
             }
         };
@@ -210,7 +203,7 @@ fn cholesky<const D: usize>(
         let target = wanted.map(|l| ((l[(i, i)] / scales.unit).ln() - scales.log_start) / scales.log_step);
         let log = scales.log_start + scales.log_step * symbols.next(&scales.log_law, target)? as f64;
         if log.abs() > scales.log_range {
-            return Err(invalid("logarithm of a standard deviation", log));
+            return Err(out_of_range("logarithm of a standard deviation", log));
         }
         lower[(i, i)] = scales.unit * exp(log);
     }
@@ -253,7 +246,7 @@ fn weights<const D: usize>(
         });
         let g = step * symbols.next(&law, target)? as f64;
         if g.abs() > LOGIT + step {
-            return Err(invalid("logit of a weight", g));
+            return Err(out_of_range("logit of a weight", g));
         }
         let odds = exp(g);
         weights.push(left * ((low + odds) / (1.0 + odds)));
@@ -278,9 +271,9 @@ fn component<const D: usize>(
     mean: SVector<f64, D>,
     lower: SMatrix<f64, D, D>,
 ) -> Result<Component<D>, CodecError> {
-    Component::new(weight, mean, lower * lower.transpose()).map_err(|error| invalid("component", error))
+    Component::new(weight, mean, lower * lower.transpose()).map_err(|error| out_of_range("component", error))
 }
 
 fn mixture<const D: usize>(components: Vec<Component<D>>) -> Result<Mixture<D>, CodecError> {
-    Mixture::new(components).map_err(|error| invalid("mixture", error))
+    Mixture::new(components).map_err(|error| out_of_range("mixture", error))
 }
