@@ -137,7 +137,7 @@ pub(crate) fn run(options: &BenchOptions) -> Result<Ending, Error> {
     let (bytes, encode, decode) = packed(&finite)?;
     lines.push(line("pco", "lossless, no gaps, no time", bytes, samples, encode, decode));
     #[cfg(feature = "zstd")]
-    lines.push(zstandard(&finite, samples).map_err(Error::file("zstd", "compress"))?);
+    lines.push(zstandard(&finite, samples).map_err(Error::io("zstd", "compress"))?);
     if options.json {
         output::json(&lines)?;
         return Ok(Ending::Good);

@@ -148,10 +148,7 @@ fn with<const D: usize, T: Transport>(
     world: impl Evolving<D> + 'static,
 ) -> Result<Ending, Error> {
     let file = &options.configuration;
-    let refused = |reason: String| Error::Configuration {
-        file: file.display().to_string(),
-        reason,
-    };
+    let refused = configured::<String>(file);
     let expected = || refused(format!("prior: expected {D} means and {D} deviations, one per coordinate of the model"));
     let mean: [f64; D] = given.prior.mean.clone().try_into().map_err(|_| expected())?;
     let deviation: [f64; D] = given.prior.deviation.clone().try_into().map_err(|_| expected())?;
@@ -240,7 +237,7 @@ fn serve<R: Receiver, T: Transport>(
     coordinates: usize,
 ) -> Result<Ending, Error> {
     let mut sink = std::io::stdout().lock();
-    let failed = Error::file("standard output", "write");
+    let failed = Error::io("standard output", "write");
     let mut head = "slot,reports".to_owned();
     for i in 0..coordinates {
         let _ = write!(head, ",mean{i},deviation{i}");

@@ -10,7 +10,7 @@ pub(crate) const NANOSECONDS: u8 = 9;
 /// Description of an invalid time: what is wrong, and what the user can do.
 pub(crate) type Problem = (&'static str, &'static str);
 
-const NO_TIME: Problem = (
+pub(crate) const NO_TIME: Problem = (
     "is not a time",
     "write seconds, or UTC as 2026-01-31T12:00:00.5Z, or name another column with --time-column",
 );
@@ -142,11 +142,8 @@ pub(crate) fn tolerance(text: &str) -> Result<u64, Error> {
         return Ok(0);
     }
     let size = text.strip_prefix('±').or(text.strip_prefix("+-")).unwrap_or(text);
-    let duration = humantime::parse_duration(size).map_err(|_| Error::Option {
-        option: "--time",
-        value: text.to_owned(),
-        expected: "`exact`, or how far times may be off, as `±10ms`",
-    })?;
+    let duration = humantime::parse_duration(size)
+        .map_err(|_| Error::option("--time", text, "`exact`, or how far times may be off, as `±10ms`"))?;
     Ok(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX).min(1 << 52))
 }
 

@@ -42,7 +42,7 @@ pub(crate) fn receive(
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::Csv, names)?;
     let mut sensor = Slots::new(config);
     let mut understood = false;
-    while let Some(bytes) = frames.next().map_err(Error::file(name, "read"))? {
+    while let Some(bytes) = frames.next().map_err(Error::io(name, "read"))? {
         match sensor.frame(&bytes) {
             Ok(rows) => {
                 understood = true;

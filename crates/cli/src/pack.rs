@@ -62,13 +62,10 @@ pub(crate) fn run(options: &PackOptions) -> Result<Ending, Error> {
             let mut table = Table::open(&options.table)?;
             let columns = recorder.schema().columns();
             if !columns.iter().map(fewbits_record::Column::name).eq(table.names.iter()) {
-                return Err(Error::Mismatch {
-                    file: table.file().to_owned(),
-                    problem: format!(
-                        "columns {}: {file} has other columns, choose and order them with --columns",
-                        table.names.join(", ")
-                    ),
-                });
+                let names = table.names.join(", ");
+                let problem =
+                    format!("columns {names}: {file} has other columns, choose and order them with --columns");
+                return Err(Error::content(table.file(), problem));
             }
             let (columns, before) = (columns.len(), recorder.bytes());
             let rows = fill(&mut table, &mut recorder, &file)?;

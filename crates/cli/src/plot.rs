@@ -174,7 +174,7 @@ impl Picture {
         let drawn = self.draw(&mut svg);
         drawn.map_err(Error::refused("the picture cannot be drawn"))?;
         // Width and height are those of the window, not of the drawing.
-        std::fs::write(path, svg).map_err(Error::file(&path.display().to_string(), "create"))
+        std::fs::write(path, svg).map_err(Error::io(&path.display().to_string(), "create"))
     }
 
     fn draw(&self, svg: &mut String) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {

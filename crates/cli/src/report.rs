@@ -32,20 +32,14 @@ pub(crate) enum Report {
 /// Reads a TOML file.
 pub(crate) fn configuration<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(Error::file(&name, "read"))?;
-    toml::from_str(&text).map_err(|error| Error::Configuration {
-        file: name,
-        reason: error.to_string(),
-    })
+    let text = std::fs::read_to_string(path).map_err(Error::io(&name, "read"))?;
+    toml::from_str(&text).map_err(configured(path))
 }
 
 /// An error of a value in a configuration file.
 pub(crate) fn configured<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Error + use<E> {
     let file = path.display().to_string();
-    move |error| Error::Configuration {
-        file: file.clone(),
-        reason: error.to_string(),
-    }
+    move |error| Error::content(&file, error)
 }
 
 /// What a sensor of one coordinate of the state measures.

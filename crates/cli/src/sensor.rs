@@ -150,7 +150,7 @@ impl Program for Samples {
     fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
         let (number, line) = match self.lines.try_recv() {
             Ok((number, Ok(line))) => (number, line),
-            Ok((_, Err(source))) => return self.refuse(Error::file("standard input", "read")(source)),
+            Ok((_, Err(source))) => return self.refuse(Error::io("standard input", "read")(source)),
             Err(TryRecvError::Empty) => return ControlFlow::Continue(None),
             Err(TryRecvError::Disconnected) => return ControlFlow::Break(()),
         };
@@ -160,9 +160,8 @@ impl Program for Samples {
             // The first line may be a name.
             Err(_) if cell.is_empty() || number == 1 => return ControlFlow::Continue(None),
             _ => {
-                let reason = format!("line {number}: `{cell}` is no finite number");
-                let file = "standard input".to_owned();
-                return self.refuse(Error::Configuration { file, reason });
+                let problem = format!("line {number}: `{cell}` is no finite number");
+                return self.refuse(Error::content("standard input", problem));
             }
         };
         let mut rng = self.stream.indexed(u64::from(slot.number())).rng();

@@ -48,10 +48,8 @@ fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
     };
     let names = Table::open(&options(Vec::new()))?.names;
     let [name, x, y] = names.as_slice() else {
-        return Err(Error::Mismatch {
-            file: file.to_owned(),
-            problem: format!("columns {}: three are expected, name, x and y", names.join(", ")),
-        });
+        let problem = format!("columns {}: three are expected, name, x and y", names.join(", "));
+        return Err(Error::content(file, problem));
     };
     let mut table = Table::open(&options(vec![x.clone(), y.clone()]))?.with_labels(name)?;
     let mut anchors: Vec<Anchor> = Vec::new();
@@ -65,10 +63,7 @@ fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
             }
             _ => format!("anchor `{label}` has no place: write x and y"),
         };
-        return Err(Error::Mismatch {
-            file: file.to_owned(),
-            problem: format!("row {row}: {problem}"),
-        });
+        return Err(Error::content(file, format_args!("row {row}: {problem}")));
     }
     Ok(anchors)
 }
@@ -191,10 +186,7 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
     summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
     if summary.rows == 0 {
-        return Err(Error::Empty {
-            file: instants.file().to_owned(),
-            what: "rows",
-        });
+        return Err(Error::empty(instants.file(), "rows"));
     }
     if let Some(file) = &options.plot {
         picture(&anchors, path.points(), &summary).save(file)?;
@@ -211,12 +203,8 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
 }
 
 fn unknown(table: &str, name: &str, anchors: &str) -> Error {
-    Error::Mismatch {
-        file: table.to_owned(),
-        problem: format!(
-            "`{name}` is no anchor of {anchors}: add it there, choose columns with --columns, or name the column of anchors with --by"
-        ),
-    }
+    let mend = "add it there, choose columns with --columns, or name the column of anchors with --by";
+    Error::content(table, format_args!("`{name}` is no anchor of {anchors}: {mend}"))
 }
 
 /// Corners of a drawn ellipse's cross, and how many there are along a path.

@@ -111,10 +111,7 @@ impl Settings {
         };
         let first: Vec<Instant> = instants.peek(rows)?.iter().cloned().collect();
         if first.is_empty() {
-            return Err(Error::Empty {
-                file: instants.file().to_owned(),
-                what: "rows",
-            });
+            return Err(Error::empty(instants.file(), "rows"));
         }
         let sensors = instants.names.len();
         let gaps = (0..sensors).map(|sensor| {
