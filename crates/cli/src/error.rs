@@ -2,6 +2,9 @@
 
 use std::io;
 
+/// Why a model, a sensor, a report or a row was refused.
+pub(crate) type Failure = Box<dyn std::error::Error + Send + Sync>;
+
 /// Errors of the command.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -42,7 +45,7 @@ pub(crate) enum Error {
     Parquet {
         file: String,
         #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
+        source: Failure,
     },
     /// A Parquet file was given, but this program was built without Parquet.
     #[cfg(not(feature = "parquet"))]
@@ -84,14 +87,14 @@ pub(crate) enum Error {
         file: String,
         row: u64,
         #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
+        source: Failure,
     },
     /// The options do not give a valid model, sensor or design.
     #[error("{what}")]
     Refused {
         what: &'static str,
         #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
+        source: Failure,
     },
     /// Binary data would be written to a terminal.
     #[error("standard output is a terminal: name a file with --output, or redirect")]

@@ -110,9 +110,9 @@ fn size_of(file: &mut std::fs::File) -> Result<u64, fewbits_record::Error> {
 }
 
 /// A sink that counts the bytes written.
-pub(crate) struct Counted<W> {
-    pub(crate) sink: W,
-    pub(crate) bytes: u64,
+struct Counted<W> {
+    sink: W,
+    bytes: u64,
 }
 
 impl<W: Write> Write for Counted<W> {

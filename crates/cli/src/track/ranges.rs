@@ -2,13 +2,14 @@
 
 use super::report::{BAND, first_cell, first_name, summarise};
 use super::rows::Instants;
-use super::sensors::Sends;
+use super::sensors;
 use crate::Ending;
 use crate::arguments::{TableOptions, TrackOptions};
 use crate::error::Error;
 use crate::input::Table;
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
+use crate::report::Report;
 use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
 use fewbits_record::TimeBase;
 use nalgebra::Vector2;
@@ -71,10 +72,10 @@ fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
 /// Runs the task.
 pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) -> Result<Ending, Error> {
     let anchors = read_anchors(file, options.table.delimiter)?;
-    let travel = match Sends::parse(&options.send)? {
-        Sends::Value => Travel::Full,
-        Sends::Bit => Travel::Bits(1),
-        Sends::Word(bits) => Travel::Bits(bits),
+    let travel = match sensors::parse(&options.send)? {
+        Report::Value | Report::Censored { .. } => Travel::Full,
+        Report::Sign => Travel::Bits(1),
+        Report::Word { bits } => Travel::Bits(bits),
     };
     if options.reports {
         return Err(Error::option("--reports", "--model ranges", "measured ranges, which this command quantizes"));

@@ -2,11 +2,12 @@
 
 use super::centre::{Seat, Use, World, centre};
 use super::rows::{Instant, Instants};
-use super::sensors::Sends;
+use super::sensors;
 use crate::arguments::{Model, TrackOptions};
 use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::numbers::{above_zero, mean_and_deviation, number};
+use crate::report::Report;
 
 /// Number of rows that are examined before the first estimate.
 const FIRST_ROWS: usize = 200;
@@ -30,7 +31,7 @@ pub(super) struct Settings {
     pub(super) world: World,
     noises: PerColumn<Option<f64>>,
     pub(super) noise: f64,
-    sends: PerColumn<Sends>,
+    sends: PerColumn<Report>,
     thresholds: PerColumn<Option<f64>>,
     /// Per sensor, as far as the first rows go.
     losses: Vec<f64>,
@@ -89,7 +90,7 @@ impl Settings {
         let noises = PerColumn::parse(&options.noise, None, |text| above_zero("--noise", text, NOISE).map(Some))?;
         let thresholds =
             PerColumn::parse(&options.threshold, None, |text| number("--threshold", text, THRESHOLD).map(Some))?;
-        let sends = PerColumn::parse(&options.send, Sends::Value, Sends::parse)?;
+        let sends = PerColumn::parse(&options.send, Report::Value, sensors::parse)?;
         if options.by.is_none() {
             noises.check(&instants.names, instants.file())?;
             thresholds.check(&instants.names, instants.file())?;
@@ -144,7 +145,7 @@ impl Settings {
         settings.world.within = asked_change.map_or(settings.world.interval, |change| change.1);
         let can_look = |option: &'static str, asked: bool| {
             let is_bits =
-                options.reports && (0..sensors).any(|n| settings.sends.of(&instants.names[n]) != &Sends::Value);
+                options.reports && (0..sensors).any(|n| settings.sends.of(&instants.names[n]) != &Report::Value);
             if is_bits && !asked {
                 Err(Error::Needed {
                     option,
@@ -267,7 +268,7 @@ impl Settings {
         let mut centre = centre(&self.world, Use::Comparison).ok()?;
         for sensor in 0..sensors {
             centre
-                .join(self.seat_with(sensor, Sends::Value, self.noise, None))
+                .join(self.seat_with(sensor, Report::Value, self.noise, None))
                 .ok()?;
         }
         let steps = first
@@ -276,7 +277,7 @@ impl Settings {
         steps.sum()
     }
 
-    fn seat_with(&self, sensor: usize, sends: Sends, noise: f64, threshold: Option<f64>) -> Seat {
+    fn seat_with(&self, sensor: usize, sends: Report, noise: f64, threshold: Option<f64>) -> Seat {
         Seat {
             sends,
             noise,
@@ -294,6 +295,6 @@ impl Settings {
 
     /// Whether any sensor sends quantized reports.
     pub(super) fn has_bits(&self, names: &[String]) -> bool {
-        names.iter().any(|name| *self.sends.of(name) != Sends::Value)
+        names.iter().any(|name| *self.sends.of(name) != Report::Value)
     }
 }
