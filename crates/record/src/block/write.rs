@@ -10,7 +10,7 @@ use crate::header::Header;
 use crate::related;
 use crate::specials::{self, Special, Specials};
 use crate::time::{self, TimeKind};
-use crate::wire::{Bytes, checksum, push_varint};
+use crate::wire::{Bytes, checked, push_varint};
 use fewbits_adaptive::Effort;
 
 struct CodedColumn {
@@ -201,15 +201,5 @@ fn encode_as(
         let indices: Vec<Option<Vec<i64>>> = coded.into_iter().map(|column| column.indices).collect();
         body.extend(shared::encode(header, columns, &specials, &indices, &restored, effort));
     }
-    (framed(header, body), restored, shares)
-}
-
-/// A block as it is written: length, content, checksum.
-fn framed(header: &Header, body: Vec<u8>) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(body.len() + 9);
-    push_varint(&mut bytes, body.len() as u64);
-    bytes.extend(body);
-    let check = checksum(&[&header.check.to_le_bytes(), &bytes]);
-    bytes.extend(check.to_le_bytes());
-    bytes
+    (checked(header.check, &[], &body), restored, shares)
 }
