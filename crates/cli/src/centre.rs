@@ -145,6 +145,7 @@ fn with<const D: usize, T: Transport>(
     let stream = Stream::new(given.seed);
     let mut centre =
         FusionCentre::new(&mut stream.named("prior").rng(), world, MomentFilter, &prior).map_err(configured(file))?;
+    // The order in which the receiver counts sensors.
     let mut sensors: Vec<&Sensor> = given.sensors.iter().collect();
     sensors.sort_by_key(|sensor| sensor.number);
     let mut peers = Vec::new();
@@ -222,6 +223,7 @@ fn serve<R: Receiver, T: Transport>(
         None => None,
     };
     let mut remaining = options.slots;
+    // What is called at each step can only say whether to go on: its error is kept until the station has ended.
     let mut outcome = Ok(());
     run_station(&mut transport, station, |_station, outputs| {
         for output in outputs {

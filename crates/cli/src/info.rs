@@ -56,6 +56,7 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
     for block in playback.blocks() {
         let block = match block {
             Ok(block) => block,
+            // The blocks after damaged bytes can be read.
             Err(fewbits_record::Error::Block { .. }) => {
                 damaged += 1;
                 continue;

@@ -242,6 +242,7 @@ impl Table {
         };
         let nanoseconds = clock::tolerance(options.time.as_deref().unwrap_or("exact"))?;
         let decimals = match (format, survey) {
+            // Exact times: a tick is as fine as the finest time of the table.
             (TimeFormat::Seconds, Some(survey)) if nanoseconds == 0 => survey.decimals,
             // Times in milliseconds or microseconds since 1970 are too large for nanoseconds.
             (TimeFormat::Seconds, _) if first.parse::<f64>().is_ok_and(|first| first.abs() > 4e9) => 0,

@@ -92,6 +92,7 @@ fn way(options: &SendOptions) -> Result<Way, Error> {
             begun: false,
         });
     };
+    // A socket can only send to addresses of its own family.
     let local = if address.starts_with('[') {
         "[::]:0"
     } else {
@@ -148,6 +149,7 @@ pub(crate) fn send(options: &SendOptions) -> Result<Ending, Error> {
         let before = writer.waiting();
         let frames = writer.push(tick, &row.1).map_err(&failed)?;
         way.send(&writer, &frames)?;
+        // Behind a frame only the last rows are left, and their time is counted from here.
         if before == 0 || !frames.is_empty() {
             oldest = (writer.waiting() > 0).then(Instant::now);
         }

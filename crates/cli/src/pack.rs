@@ -67,6 +67,7 @@ pub(crate) fn run(options: &PackOptions) -> Result<Ending, Error> {
                     format!("columns {names}: {file} has other columns, choose and order them with --columns");
                 return Err(Error::content(table.file(), problem));
             }
+            // The old index was removed and counts as written anew.
             let (columns, before) = (columns.len(), recorder.bytes());
             let rows = fill(&mut table, &mut recorder, &file)?;
             let bytes = recorder

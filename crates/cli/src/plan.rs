@@ -76,6 +76,7 @@ fn plan_column(name: &str, cells: &[Option<f64>], rows_per_block: usize) -> Resu
     let ends = finite.iter().copied().fold(None, widened);
     let range = ends.map_or(0.0, |(low, high)| high - low);
     let mut bounds = Vec::new();
+    // A bound must be positive, and its double finite.
     if range > 0.0 && (2.0 * range).is_finite() {
         for percent in PERCENTS {
             let delta = 0.01 * percent * range;

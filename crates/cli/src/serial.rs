@@ -107,6 +107,7 @@ impl Frames {
                     _ => continue,
                 }
             }
+            // Without a zero byte for so long, the line carries noise: memory is bounded.
             if self.collected.len() > MAX_FRAME {
                 self.collected.clear();
             }

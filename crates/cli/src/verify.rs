@@ -77,6 +77,7 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
                     && a.is_finite()
                     && b.is_finite()
                 {
+                    // On a circle the error is the distance along the shorter arc.
                     let turns = column
                         .period()
                         .map_or(0.0, |period| period * ((a - b) / period).round());

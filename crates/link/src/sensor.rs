@@ -174,6 +174,7 @@ impl SensorLink {
 
     fn envelope(&mut self, frame: &[u8]) -> Result<Request, Error> {
         if self.counter == self.reserved {
+            // Stored before the first of them is used: a restarted sensor goes on behind all that were reserved.
             self.reserved += RESERVED;
             if let Some(store) = &self.store {
                 store.save(&self.reserved)?;

@@ -48,6 +48,7 @@ fn receive<T: Transport>(
     until: u64,
     mut take: impl FnMut(T::Address, &[u8]) -> Result<(), Error>,
 ) -> Result<(), Error> {
+    // Zero would not wait at all, and the loop of the caller would spin until the timer is due.
     let mut wait = Duration::from_nanos(until.saturating_sub(now())).clamp(Duration::from_micros(50), MAX_WAIT);
     for _ in 0..BATCH {
         let Some((from, bytes)) = transport.receive(wait)? else {
@@ -57,6 +58,7 @@ fn receive<T: Transport>(
         if now() >= until {
             break;
         }
+        // Only what has come already: timers are due before later datagrams.
         wait = Duration::ZERO;
     }
     Ok(())
@@ -84,6 +86,7 @@ pub fn run_station<R: Receiver, T: Transport>(
             return Ok(());
         }
         outputs.clear();
+        // What datagrams cause is sent in the next round, and watched then.
         let until = station.next_timer().unwrap_or(u64::MAX);
         receive(transport, until, |from, bytes| station.on_datagram(from, bytes, &mut outputs))?;
     }

@@ -164,6 +164,7 @@ impl Bearer {
         let (after, belief) = (slot.after(), lead.message);
         if next == self.address {
             self.stay(now, after, Some(belief), errands);
+        // After the last slot nobody leads, so nothing is handed over.
         } else if slot.nearest_count(self.schedule.count(now)) < self.last {
             let sum = digest(after, Payload::from(&belief));
             self.pass(next, (after, sum), belief, errands);

@@ -53,6 +53,7 @@ impl FrameWriter {
     /// If `max_bytes` is below [`MIN_FRAME_BYTES`], or the header needs more than 256 pieces.
     pub fn new(schema: Schema, max_bytes: usize) -> Result<Self, Error> {
         let columns = schema.columns.len();
+        // Origin and step of rows take at most 18 bytes more than those of no rows.
         let header = Header::new(schema.clone(), &[], vec![0.0; columns]).to_bytes().len() + 32 + MAX_START * columns;
         let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);
         if max_bytes < least {
@@ -225,6 +226,7 @@ impl FrameReader {
             return self.piece(frame).map_err(damaged);
         }
         let Some(header) = &self.header else {
+            // The oldest is dropped: the memory is bounded, also if the header never comes.
             if self.waiting.len() == MAX_WAITING {
                 self.waiting.pop_front();
             }
@@ -253,6 +255,7 @@ impl FrameReader {
             return Ok(Vec::new());
         }
         let count = usize::from(last) + 1;
+        // Pieces of another header replace those before: its sender has started anew.
         let known = self
             .pieces
             .take()

@@ -199,6 +199,7 @@ impl<W: Write> Recorder<W> {
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Error> {
         if let Err(error) = self.writer.write_all(bytes) {
+            // The file may now end within a block, and nothing may follow that.
             self.broken = true;
             return Err(Error::io("write")(error));
         }
@@ -228,6 +229,7 @@ impl<W: Write> Recorder<W> {
         let Waiting { ticks, columns, ranges } = &self.rows;
         let own = ranges.own_bounds(header);
         let (bytes, restored) = block::encode(header, ticks, columns, &own, self.effort);
+        // The index has the ends of what a reader gets, which may lie outside those of the samples.
         let entry = Entry::of(bytes.len() as u64, ticks, &restored);
         self.write(&bytes)?;
         self.entries.push(entry);

@@ -98,6 +98,8 @@ pub(super) enum Use {
 pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, Failure> {
     let (c, t) = (world.change * world.change, world.within);
     Ok(match world.model {
+        // From known values at time 0, the level after `t` has the variance `q t`, `q t^3 / 3` or `q t^5 / 20` if the level, the slope or
+        // the curvature is a random walk of density `q`. Here it is `c`.
         Model::Velocity => {
             let model = ContinuousLinear::nearly_constant_velocity(3.0 * c / t.powi(3))?;
             Box::new(Centre::<2>::new(model, world, purpose)?)
@@ -209,6 +211,7 @@ impl<const D: usize> Estimator for Centre<D> {
     }
 
     fn step(&mut self, instant: &Instant) -> Result<Step, Failure> {
+        // First the forecast: sensors compare with it, so the feedback of all slots is made before any report is used.
         self.centre.advance(&mut self.rng, instant.seconds)?;
         let slots = instant.reports.iter().map(|(sensor, cell)| self.slot(*sensor, *cell));
         let slots: Vec<Slot> = slots.collect::<Result<_, _>>()?;

@@ -148,6 +148,7 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
             if estimate.as_ref().is_some_and(|estimate| estimate.lost) {
                 events = "lost";
             }
+            // The last estimate of an instant has used all of its ranges.
             found = estimate.or(found);
             summary.anchors[anchor].ranges += 1;
             ranges += 1;

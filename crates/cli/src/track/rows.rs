@@ -151,6 +151,7 @@ impl Instants {
             }
         }
         let first = *self.first.get_or_insert(tick);
+        // The difference is taken in whole ticks: as nanoseconds since 1970, doubles are 256 apart.
         let seconds = (i128::from(tick) - i128::from(first)) as f64 * self.tick;
         let time = clock::shown(tick, self.base);
         if seconds < self.last {

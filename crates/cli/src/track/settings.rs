@@ -192,10 +192,13 @@ impl Settings {
             .iter()
             .flat_map(|values| values.windows(2).map(|pair| (pair[1] - pair[0]).abs()))
             .collect();
+        // At a constant level the difference of two values has `sqrt(2)` times the deviation of the noise. Jumps of the level hardly move the
+        // median.
         let typical = median(differences.clone()) / (NORMAL_MEDIAN * std::f64::consts::SQRT_2);
         let mean_size = differences.iter().sum::<f64>() / (differences.len() as f64).max(1.0);
         let steps = fewbits_adaptive::own_steps(&flat);
         let floor = ROUNDING * steps.into_iter().reduce(f64::min).unwrap_or(0.0);
+        // The median is 0 if most values repeat the one before.
         let scale = [typical, mean_size, spread].into_iter().find(|size| *size > 0.0);
         let Some(scale) = scale.map(|scale| scale.max(floor)) else {
             return Err(Error::Needed {
@@ -239,6 +242,7 @@ impl Settings {
             self.noise = noise;
             self.log_likelihood(first, sensors).unwrap_or(f64::NEG_INFINITY)
         };
+        // Search along one axis at a time, in logarithms relative to the first guess, with smaller and smaller steps.
         let (mut best, mut place) = (likelihood([0.0, 0.0]), [0.0, 0.0]);
         let free = [fit_change, fit_noise];
         for step in STEPS {

@@ -160,6 +160,7 @@ fn encode_as(
     let told = !shares && specials.iter().flatten().any(Option::is_some);
     match (kind, Bytes(&time).varint()) {
         (TimeKind::Grid, Ok(block)) if all_plain && whole && !told => {
+            // The usual block: bit 0 is 0, bit 1 says whether columns are apart, the rest is the number on the grid.
             push_varint(&mut body, 4 * block + 2 * u64::from(apart))
         }
         _ => {
@@ -168,6 +169,7 @@ fn encode_as(
                 | flag(!all_plain, DESCRIPTORS_FOLLOW)
                 | flag(told, SPECIALS_FOLLOW)
                 | flag(apart, APART);
+            // Bit 0 is 1. Then come two bits of the kind of times, and the flags that say what follows.
             push_varint(&mut body, 2 * (kind as u64 | flags) + 1);
             if !whole {
                 push_varint(&mut body, ticks.len() as u64);
