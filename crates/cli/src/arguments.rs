@@ -285,7 +285,8 @@ pub(crate) struct TrackOptions {
     #[arg(long, value_name = "NAME")]
     pub(crate) by: Option<String>,
     /// Standard deviation of the measurement noise in the unit of the column, as `0.3` or `column=0.3,*=0.5`. Default: estimated from the
-    /// first 200 rows, or with `--model ranges` that of the tracker.
+    /// first 200 rows. With `--model ranges` the largest that the tracker considers (default 1.8): it estimates the deviation from a quarter
+    /// of that on.
     #[arg(long, default_value = "", value_name = "DEVIATION")]
     pub(crate) noise: String,
     /// Standard deviation of the level from its forecast after a time, as `0.5/1h`. Default: estimated from the first 200 rows. The
