@@ -104,7 +104,7 @@ impl SensorLink {
         Ok(())
     }
 
-    /// A datagram has arrived.
+    /// A datagram has arrived. Carry out its requests before the next datagram: a sample counts for the last question.
     ///
     /// # Errors
     /// If the store cannot be written.
