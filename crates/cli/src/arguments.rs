@@ -14,7 +14,7 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand)]
 pub(crate) enum Task {
-    /// Show what a table would cost at several bounds, which steps its columns have, and how its time runs.
+    /// Show the bits per sample of a table at several error bounds, the quantization steps of its columns, and the bits of its times.
     Plan(PlanOptions),
     /// Pack a table (CSV) into a recording.
     Pack(PackOptions),
@@ -22,9 +22,9 @@ pub(crate) enum Task {
     Unpack(UnpackOptions),
     /// Write some rows or columns of a recording as CSV.
     Cat(CatOptions),
-    /// Say what a recording holds.
+    /// Describe a recording: rows, columns, bounds, times and damage.
     Info(InfoOptions),
-    /// Check that a recording keeps its promises to the table it was made of. Exit code 1 if not.
+    /// Check every row of a recording against the table it was made of and the error bounds. Exit code 1 if a bound is violated.
     Verify(VerifyOptions),
     /// Compare sizes and speeds on a table: this format, pco and (with feature `zstd`) zstd, in the same run.
     Bench(BenchOptions),
@@ -44,33 +44,33 @@ pub(crate) enum Task {
     Generate(GenerateOptions),
 }
 
-/// How a table is read.
+/// Reading of a table.
 #[derive(Args, Clone)]
 pub(crate) struct TableOptions {
     /// CSV file with a line of names first; `-` for standard input.
     pub(crate) file: String,
-    /// Rows have times: `exact`, or how far restored times may be off, as `±10ms`. Without it rows are numbered.
+    /// Largest error of restored times: `exact` or as `±10ms`. Default: rows are numbered.
     #[arg(long, value_name = "exact|±10ms", allow_hyphen_values = true)]
     pub(crate) time: Option<String>,
-    /// The column of times: seconds, or UTC as 2026-01-31T12:00:00.5Z. Without it the first column, if there is `--time`.
+    /// Column of times: seconds, or UTC as 2026-01-31T12:00:00.5Z. Default: the first column if `--time` is given.
     #[arg(long, value_name = "NAME")]
     pub(crate) time_column: Option<String>,
-    /// Only these columns.
+    /// Columns of values, separated by commas. Default: all.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     pub(crate) columns: Vec<String>,
-    /// What separates cells.
+    /// Character between cells.
     #[arg(long, default_value_t = ',', value_name = "CHARACTER")]
     pub(crate) delimiter: char,
 }
 
-/// What columns promise.
+/// Error bounds of the columns.
 #[derive(Args, Clone)]
 pub(crate) struct BoundOptions {
     /// Bounds as `column=bound,...`, `*` for all others: `±0.1`, `1%` of the range, `decimals:3`, `lossless`; a circle as `±2@360`.
     /// Columns without a bound are lossless.
     #[arg(long, value_name = "BOUNDS", allow_hyphen_values = true, default_value = "")]
     pub(crate) bound: String,
-    /// Rows of a block: what is lost if one is damaged.
+    /// Number of rows per block. A damaged block loses its rows only.
     #[arg(long, default_value_t = fewbits_record::ROWS_PER_BLOCK, value_name = "ROWS")]
     pub(crate) rows_per_block: usize,
 }
@@ -79,10 +79,10 @@ pub(crate) struct BoundOptions {
 pub(crate) struct PlanOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
-    /// Rows of a block.
+    /// Number of rows per block.
     #[arg(long, default_value_t = fewbits_record::ROWS_PER_BLOCK, value_name = "ROWS")]
     pub(crate) rows_per_block: usize,
-    /// As JSON.
+    /// Print JSON instead of text.
     #[arg(long)]
     pub(crate) json: bool,
     /// Draw bits against bounds into this SVG file.
@@ -96,16 +96,16 @@ pub(crate) struct PackOptions {
     pub(crate) table: TableOptions,
     #[command(flatten)]
     pub(crate) bounds: BoundOptions,
-    /// The recording. Without it standard output.
+    /// File of the recording. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-    /// Some ten times as fast, at 1.03 to 1.09 times the bits (without other columns: more where they help).
+    /// Encode about ten times as fast, with 1.03 to 1.09 times the bits. Columns are then not predicted from each other.
     #[arg(long)]
     pub(crate) fast: bool,
-    /// Go on with the recording in `--output`, with its columns and bounds.
+    /// Continue the recording in `--output`, with its columns and bounds.
     #[arg(long, requires = "output", conflicts_with_all = ["bound", "rows_per_block"])]
     pub(crate) append: bool,
-    /// Print what was done as JSON on standard error.
+    /// Print the summary as JSON on standard error.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -114,7 +114,7 @@ pub(crate) struct PackOptions {
 pub(crate) struct UnpackOptions {
     /// Recording; `-` for standard input.
     pub(crate) file: String,
-    /// The table. Without it standard output.
+    /// File of the table. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
@@ -123,19 +123,19 @@ pub(crate) struct UnpackOptions {
 pub(crate) struct CatOptions {
     /// Recording; `-` for standard input.
     pub(crate) file: String,
-    /// First time, or row number.
+    /// First time or row number. Default: that of the first row.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) from: Option<String>,
-    /// Last time, or row number.
+    /// Last time or row number. Default: that of the last row.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) to: Option<String>,
-    /// Only these columns, in this order.
+    /// Columns to write, in this order. Default: all.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     pub(crate) columns: Vec<String>,
     /// One JSON object per row instead of CSV.
     #[arg(long)]
     pub(crate) json: bool,
-    /// The table. Without it standard output.
+    /// File of the table. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
@@ -144,7 +144,7 @@ pub(crate) struct CatOptions {
 pub(crate) struct InfoOptions {
     /// Recording.
     pub(crate) file: PathBuf,
-    /// As JSON.
+    /// Print JSON instead of text.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -155,7 +155,7 @@ pub(crate) struct VerifyOptions {
     pub(crate) table: TableOptions,
     /// The recording that was made of the table.
     pub(crate) packed: PathBuf,
-    /// As JSON.
+    /// Print JSON instead of text.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -166,7 +166,7 @@ pub(crate) struct BenchOptions {
     pub(crate) table: TableOptions,
     #[command(flatten)]
     pub(crate) bounds: BoundOptions,
-    /// As JSON.
+    /// Print JSON instead of text.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -175,10 +175,10 @@ pub(crate) struct BenchOptions {
 pub(crate) struct CentreOptions {
     /// Configuration (TOML): model, prior, sensors and their keys.
     pub(crate) configuration: PathBuf,
-    /// End after so many slots.
+    /// Stop after this number of slots. Default: run until stopped.
     #[arg(long)]
     pub(crate) slots: Option<u64>,
-    /// Show a page at this address, as 0.0.0.0:8080.
+    /// Serve a live page over HTTP at this address, as 0.0.0.0:8080. Default: none.
     #[cfg(feature = "live")]
     #[arg(long, value_name = "HOST:PORT")]
     pub(crate) live: Option<std::net::SocketAddr>,
@@ -196,25 +196,25 @@ pub(crate) struct SendOptions {
     pub(crate) table: TableOptions,
     #[command(flatten)]
     pub(crate) bounds: BoundOptions,
-    /// Longest frame in bytes.
+    /// Largest length of a frame in bytes.
     #[arg(long, default_value_t = 1200, value_name = "BYTES")]
     pub(crate) max_bytes: usize,
-    /// No row waits longer than this for its frame, as `60s`.
+    /// Longest time that a row waits for its frame, as `60s`. Default: until the frame is full.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     pub(crate) deadline: Option<std::time::Duration>,
     /// Send UDP datagrams to this address instead of writing a stream.
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "output")]
     pub(crate) udp: Option<String>,
-    /// Send over a serial line: its device.
+    /// Send over the serial line of this device.
     #[arg(long, value_name = "DEVICE", conflicts_with_all = ["output", "udp"])]
     pub(crate) serial: Option<String>,
     /// Bits per second of the serial line.
     #[arg(long, default_value_t = 115200, value_name = "BAUD")]
     pub(crate) baud: u32,
-    /// With UDP or a serial line: the header goes before every so many frames.
+    /// With UDP or a serial line: number of frames after which the header is repeated.
     #[arg(long, default_value_t = 32, value_name = "FRAMES", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) header_every: u64,
-    /// Where the stream goes. Without it standard output.
+    /// File of the stream. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
@@ -227,7 +227,7 @@ pub(crate) struct ReceiveOptions {
     /// Listen for UDP datagrams at this address instead.
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub(crate) udp: Option<String>,
-    /// Listen at a serial line instead: its device.
+    /// Listen at the serial line of this device instead.
     #[arg(long, value_name = "DEVICE", conflicts_with_all = ["udp", "file"])]
     pub(crate) serial: Option<String>,
     /// Bits per second of the serial line.
@@ -237,29 +237,29 @@ pub(crate) struct ReceiveOptions {
     /// are slots and values. From a loss that is noticed to the next refresh there are gaps.
     #[arg(long, value_name = "BOUND", conflicts_with = "udp", allow_hyphen_values = true)]
     pub(crate) sensor: Option<String>,
-    /// With `--sensor`: bits of the number in each of its packets.
+    /// With `--sensor`: bits of the sequence number in each packet.
     #[arg(long, default_value_t = 4, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) sequence_bits: u32,
-    /// With UDP or a serial line: end when nothing came for so long.
+    /// With UDP or a serial line: stop after this time without a frame, as `10s`. Default: wait without limit.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     pub(crate) timeout: Option<std::time::Duration>,
-    /// The table. Without it standard output.
+    /// File of the table. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
 
-/// How the world moves.
+/// Dynamics model of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Model {
-    /// A level that wanders.
+    /// Level: random walk.
     Walk,
-    /// A level with a slope that wanders.
+    /// Level and slope: the slope is a random walk (nearly constant velocity).
     Velocity,
-    /// A level with slope and curvature that wanders.
+    /// Level, slope and curvature: the curvature is a random walk (nearly constant acceleration).
     Acceleration,
-    /// A level that returns to the mean of `--prior` (Ornstein-Uhlenbeck).
+    /// Level: Ornstein-Uhlenbeck process that returns to the mean of `--prior`.
     Returning,
-    /// A place in the plane, from its distances to anchors at known places.
+    /// Position in the plane, from ranges to anchors at known positions.
     Ranges,
 }
 
@@ -267,44 +267,49 @@ pub(crate) enum Model {
 pub(crate) struct TrackOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
-    /// How what is measured moves.
+    /// Dynamics model of the state.
     #[arg(long, value_enum, default_value = "walk")]
     pub(crate) model: Model,
-    /// What sensors send: `value`, `bit`, `word:2` to `word:4`; or as `column=word:3,*=bit`.
+    /// Report of each sensor: `value` (the measurement), `bit` (its sign relative to the prediction), `word:2` to `word:4` (the
+    /// innovation, quantized in 2 to 4 bits); per column as `column=word:3,*=bit`.
     #[arg(long, default_value = "value", value_name = "WHAT")]
     pub(crate) send: String,
-    /// Cells are reports as they were sent (`value`, 0 or 1, number of a cell), not measurements that this command is to quantize.
+    /// The table contains reports (a value, 0 or 1, or the number of a quantizer cell). Without it, it contains measurements, which this
+    /// command quantizes.
     #[arg(long)]
     pub(crate) reports: bool,
-    /// Bits compare with these thresholds, as `column=2.5,*=3`, instead of with the prediction.
+    /// Fixed thresholds of bits in the unit of the column, as `column=2.5,*=3`. Default: the prediction.
     #[arg(long, default_value = "", value_name = "THRESHOLDS", allow_hyphen_values = true)]
     pub(crate) threshold: String,
-    /// One report per row: the column that names the sensor (or anchor). The column of values is the other one, or that of `--columns`.
+    /// Each row is one report: the column with the name of its sensor or anchor. Values are in the other column, or that of `--columns`.
     #[arg(long, value_name = "NAME")]
     pub(crate) by: Option<String>,
-    /// Standard deviation of a measurement's noise, as `0.3` or `column=0.3,*=0.5`. Without it found from the first rows.
+    /// Standard deviation of the measurement noise in the unit of the column, as `0.3` or `column=0.3,*=0.5`. Default: estimated from the
+    /// first 200 rows. With `--model ranges` the largest that the tracker considers (default 1.8): it estimates the deviation from a quarter
+    /// of that on.
     #[arg(long, default_value = "", value_name = "DEVIATION")]
     pub(crate) noise: String,
-    /// How far the level strays from its forecast (standard deviation) in some time, as `0.5/1h`. Without it found from the first rows,
-    /// and always corrected on the way.
+    /// Standard deviation of the level from its forecast after a time, as `0.5/1h`. Default: estimated from the first 200 rows. The
+    /// process noise is adapted during the run in either case.
     #[arg(long, value_name = "SIZE/TIME")]
     pub(crate) change: Option<String>,
-    /// What is known before the first row, as `20±5`. Without it found from the first rows.
+    /// Mean and standard deviation of the level before the first row, as `20±5`. Default: estimated from the first 200 rows.
     #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
     pub(crate) prior: Option<String>,
-    /// Subtract each sensor's mean difference from the others in this many first rows.
+    /// Subtract from each sensor its mean difference from the median of all sensors over this many first rows. Default: no correction.
     #[arg(long, value_name = "ROWS")]
     pub(crate) align: Option<usize>,
-    /// With `--model ranges`: a CSV of anchors: name, x, y.
+    /// With `--model ranges`: CSV file of the anchors with columns name, x, y.
     #[arg(long, value_name = "FILE", required_if_eq("model", "ranges"))]
     pub(crate) anchors: Option<String>,
-    /// With `--model ranges`: standard deviation of the velocity along an axis, to a factor of four.
+    /// With `--model ranges`: standard deviation of the velocity along an axis, in units of length per second; a factor of four off is
+    /// enough.
     #[arg(long, default_value_t = 1.0, value_name = "SPEED")]
     pub(crate) speed: f64,
-    /// With `--model ranges`: seconds that a velocity lasts.
+    /// With `--model ranges`: correlation time of the velocity in seconds.
     #[arg(long, default_value_t = 6.0, value_name = "SECONDS")]
     pub(crate) persistence: f64,
-    /// With `--model ranges`: share of ranges that have nothing to do with the distance.
+    /// With `--model ranges`: probability that a range is an outlier, independent of the distance.
     #[arg(long, default_value_t = 0.02, value_name = "SHARE")]
     pub(crate) outliers: f64,
     /// Draw the estimates into this SVG file.
@@ -313,12 +318,12 @@ pub(crate) struct TrackOptions {
     /// One JSON object per row instead of CSV, and the summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// The estimates. Without it standard output.
+    /// File of the estimates. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
 
-/// What is generated.
+/// Kind of the output.
 #[derive(Clone, Copy, ValueEnum)]
 pub(crate) enum Generated {
     Bash,

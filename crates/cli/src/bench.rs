@@ -6,7 +6,8 @@
 use crate::arguments::BenchOptions;
 use crate::error::Error;
 use crate::input::Cells;
-use crate::pack::{Counted, schema};
+use crate::numbers::widened;
+use crate::pack::schema;
 use crate::{Ending, output};
 use fewbits_record::{Bound, Effort, Playback, Recorder, Schema};
 use pco::ChunkConfig;
@@ -49,18 +50,14 @@ fn ours(
 ) -> Result<Line, fewbits_record::Error> {
     let samples = columns.len() * ticks.len();
     let start = Instant::now();
-    let sink = Counted {
-        sink: Vec::new(),
-        bytes: 0,
-    };
-    let mut recorder = Recorder::new(sink, schema).with_effort(effort);
+    let mut recorder = Recorder::new(Vec::new(), schema).with_effort(effort);
     let mut row = Vec::with_capacity(columns.len());
     for (i, tick) in ticks.iter().enumerate() {
         row.clear();
         row.extend(columns.iter().map(|column| column[i]));
         recorder.push(*tick, &row)?;
     }
-    let bytes = recorder.finish()?.sink;
+    let bytes = recorder.finish()?;
     let encode = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let mut rows = 0;
@@ -97,12 +94,10 @@ fn packed<T: pco::data_types::Number>(columns: &[Vec<T>]) -> Result<(usize, f64,
 /// Indices on a lattice of `2 delta` for lossy columns; `None` if a column has another kind of bound.
 fn indices(schema: &Schema, finite: &[Vec<f64>]) -> Option<Vec<Vec<i64>>> {
     let column = |(column, samples): (&fewbits_record::Column, &Vec<f64>)| {
-        let ends = samples
-            .iter()
-            .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+        let (low, high) = samples.iter().copied().fold(None, widened).unwrap_or_default();
         let step = match column.bound() {
             Bound::Absolute(delta) => 2.0 * delta,
-            Bound::ShareOfRange(share) => 2.0 * share * column.period().unwrap_or(ends.1 - ends.0),
+            Bound::ShareOfRange(share) => 2.0 * share * column.period().unwrap_or(high - low),
             Bound::Decimals(places) => 10_f64.powi(-i32::from(places)),
             _ => return None,
         };
@@ -137,7 +132,7 @@ pub(crate) fn run(options: &BenchOptions) -> Result<Ending, Error> {
     let (bytes, encode, decode) = packed(&finite)?;
     lines.push(line("pco", "lossless, no gaps, no time", bytes, samples, encode, decode));
     #[cfg(feature = "zstd")]
-    lines.push(zstandard(&finite, samples).map_err(Error::file("zstd", "compress"))?);
+    lines.push(zstandard(&finite, samples).map_err(Error::io("zstd", "compress"))?);
     if options.json {
         output::json(&lines)?;
         return Ok(Ending::Good);

@@ -48,11 +48,7 @@ impl<T> PerColumn<T> {
     pub(crate) fn check(&self, names: &[String], file: &str) -> Result<(), Error> {
         match self.named.iter().find(|(name, _)| !names.contains(name)) {
             None => Ok(()),
-            Some((name, _)) => Err(Error::NoColumn {
-                file: file.to_owned(),
-                column: name.clone(),
-                existing: names.join(", "),
-            }),
+            Some((name, _)) => Err(Error::no_column(file, name, names)),
         }
     }
 }
@@ -63,11 +59,7 @@ const LOSSLESS: Spec = Spec {
 };
 
 fn refused(value: &str) -> Error {
-    Error::Option {
-        option: "--bound",
-        value: value.to_owned(),
-        expected: EXPECTED,
-    }
+    Error::option("--bound", value, EXPECTED)
 }
 
 /// Parses one bound, possibly on a circle.

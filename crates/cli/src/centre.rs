@@ -2,15 +2,15 @@
 
 use crate::Ending;
 use crate::arguments::CentreOptions;
-use crate::error::Error;
+use crate::error::{Error, Failure};
 use crate::place::Place;
-use crate::report::{Report, censored, configuration, configured, coordinate};
-use fewbits_core::{FullValue, Gaussian, Link, OnAxes};
+use crate::report::{Report, configuration, configured};
+use fewbits_core::{Gaussian, Link};
 use fewbits_filters::MomentFilter;
-use fewbits_filters::centre::{FusionCentre, Reporting};
+use fewbits_filters::centre::FusionCentre;
 use fewbits_filters::contract::Evolving;
 use fewbits_link::{FusionReceiver, Key, Output, Peer, Station, Step, Store, Transport, Udp, run_station};
-use fewbits_models::{ContinuousLinear, LinearSensor};
+use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, ReportLength, Schedule};
 use nalgebra::{SMatrix, SVector};
@@ -112,32 +112,19 @@ fn over<T: Transport>(
     given: &Configuration,
     open: impl FnOnce() -> Result<T, Error>,
 ) -> Result<Ending, Error> {
-    let file = &options.configuration;
-    match &given.model {
-        Model::RandomWalk { density } => {
-            with(options, given, open, ContinuousLinear::random_walk(*density).map_err(configured(file))?)
-        }
+    match given.model {
+        Model::RandomWalk { density } => with(options, given, open, ContinuousLinear::random_walk(density)),
         Model::OrnsteinUhlenbeck {
             mean,
             time_constant,
             variance,
-        } => {
-            let world =
-                ContinuousLinear::ornstein_uhlenbeck(*mean, *time_constant, *variance).map_err(configured(file))?;
-            with(options, given, open, world)
+        } => with(options, given, open, ContinuousLinear::ornstein_uhlenbeck(mean, time_constant, variance)),
+        Model::ConstantVelocity { density } => {
+            with(options, given, open, ContinuousLinear::nearly_constant_velocity(density))
         }
-        Model::ConstantVelocity { density } => with(
-            options,
-            given,
-            open,
-            ContinuousLinear::nearly_constant_velocity(*density).map_err(configured(file))?,
-        ),
-        Model::ConstantVelocity2d { density } => with(
-            options,
-            given,
-            open,
-            ContinuousLinear::nearly_constant_velocity_2d(*density).map_err(configured(file))?,
-        ),
+        Model::ConstantVelocity2d { density } => {
+            with(options, given, open, ContinuousLinear::nearly_constant_velocity_2d(density))
+        }
     }
 }
 
@@ -145,13 +132,11 @@ fn with<const D: usize, T: Transport>(
     options: &CentreOptions,
     given: &Configuration,
     open: impl FnOnce() -> Result<T, Error>,
-    world: impl Evolving<D> + 'static,
+    world: Result<impl Evolving<D> + 'static, fewbits_models::Error>,
 ) -> Result<Ending, Error> {
     let file = &options.configuration;
-    let refused = |reason: String| Error::Configuration {
-        file: file.display().to_string(),
-        reason,
-    };
+    let world = world.map_err(configured(file))?;
+    let refused = configured::<String>(file);
     let expected = || refused(format!("prior: expected {D} means and {D} deviations, one per coordinate of the model"));
     let mean: [f64; D] = given.prior.mean.clone().try_into().map_err(|_| expected())?;
     let deviation: [f64; D] = given.prior.deviation.clone().try_into().map_err(|_| expected())?;
@@ -160,6 +145,7 @@ fn with<const D: usize, T: Transport>(
     let stream = Stream::new(given.seed);
     let mut centre =
         FusionCentre::new(&mut stream.named("prior").rng(), world, MomentFilter, &prior).map_err(configured(file))?;
+    // The order in which the receiver counts sensors.
     let mut sensors: Vec<&Sensor> = given.sensors.iter().collect();
     sensors.sort_by_key(|sensor| sensor.number);
     let mut peers = Vec::new();
@@ -201,35 +187,10 @@ fn with<const D: usize, T: Transport>(
     serve(options, given, open()?, &mut station, D)
 }
 
-fn join<const D: usize>(
-    centre: &mut FusionCentre<D, MomentFilter>,
-    sensor: &Sensor,
-) -> Result<(), Box<dyn std::error::Error>> {
+fn join<const D: usize>(centre: &mut FusionCentre<D, MomentFilter>, sensor: &Sensor) -> Result<(), Failure> {
     let (variance, link) = (sensor.deviation * sensor.deviation, Link::lossy(sensor.loss)?);
-    let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(variance)?, [sensor.reads])?;
-    match sensor.report {
-        Report::Sign => {
-            let ask = |_: &Gaussian<D>, m: &Gaussian<1>| m.mean()[0];
-            centre.join(sensor.number, Reporting::new(sensing, fewbits_dymbo::SignBit::new(variance)?, link, ask))?;
-        }
-        Report::Word { bits } => {
-            let ask = |_: &Gaussian<D>, m: &Gaussian<1>| fewbits_dymbo::Prediction {
-                mean: m.mean()[0],
-                deviation: m.covariance()[0].sqrt(),
-            };
-            let scheme = fewbits_dymbo::InnovationWord::new(variance, bits)?;
-            centre.join(sensor.number, Reporting::new(sensing, scheme, link, ask))?;
-        }
-        Report::Value => {
-            centre.join(sensor.number, Reporting::values(sensing, FullValue::new(variance)?, link))?;
-        }
-        Report::Censored { threshold } => {
-            let ask = |state: &Gaussian<D>, _: &Gaussian<1>| *state;
-            let scheme = censored::<D>(sensor.reads, variance, threshold)?;
-            centre.join(sensor.number, Reporting::new(coordinate::<D>(sensor.reads, variance)?, scheme, link, ask))?;
-        }
-    }
-    Ok(())
+    let remote = sensor.report.remote(sensor.reads, variance, link)?;
+    Ok(centre.join_boxed(sensor.number, remote)?)
 }
 
 fn serve<R: Receiver, T: Transport>(
@@ -240,7 +201,7 @@ fn serve<R: Receiver, T: Transport>(
     coordinates: usize,
 ) -> Result<Ending, Error> {
     let mut sink = std::io::stdout().lock();
-    let failed = Error::file("standard output", "write");
+    let failed = Error::io("standard output", "write");
     let mut head = "slot,reports".to_owned();
     for i in 0..coordinates {
         let _ = write!(head, ",mean{i},deviation{i}");
@@ -262,6 +223,7 @@ fn serve<R: Receiver, T: Transport>(
         None => None,
     };
     let mut remaining = options.slots;
+    // What is called at each step can only say whether to go on: its error is kept until the station has ended.
     let mut outcome = Ok(());
     run_station(&mut transport, station, |_station, outputs| {
         for output in outputs {

@@ -10,7 +10,7 @@ pub(crate) const NANOSECONDS: u8 = 9;
 /// Description of an invalid time: what is wrong, and what the user can do.
 pub(crate) type Problem = (&'static str, &'static str);
 
-const NO_TIME: Problem = (
+pub(crate) const NO_TIME: Problem = (
     "is not a time",
     "write seconds, or UTC as 2026-01-31T12:00:00.5Z, or name another column with --time-column",
 );
@@ -68,6 +68,7 @@ pub(crate) fn decimals_of(text: &str) -> Option<u8> {
 }
 
 fn utc(text: &str) -> Result<i64, Problem> {
+    // A date alone is its midnight.
     let with_time = if text.len() == 10 {
         format!("{text} 00:00:00")
     } else {
@@ -107,6 +108,7 @@ pub(crate) fn tick(text: &str, time: TimeBase) -> Result<i64, Problem> {
         return Err(TOO_FINE);
     }
     let kept = &number.decimals[..number.decimals.len().min(places)];
+    // The digits with zeros behind them are the number of ticks. This is exact, unlike a product of doubles.
     let all: i128 = format!("0{}{kept:0<places$}", number.whole)
         .parse()
         .map_err(|_| TOO_LARGE)?;
@@ -142,11 +144,9 @@ pub(crate) fn tolerance(text: &str) -> Result<u64, Error> {
         return Ok(0);
     }
     let size = text.strip_prefix('±').or(text.strip_prefix("+-")).unwrap_or(text);
-    let duration = humantime::parse_duration(size).map_err(|_| Error::Option {
-        option: "--time",
-        value: text.to_owned(),
-        expected: "`exact`, or how far times may be off, as `±10ms`",
-    })?;
+    let duration = humantime::parse_duration(size)
+        .map_err(|_| Error::option("--time", text, "`exact`, or how far times may be off, as `±10ms`"))?;
+    // The largest tolerance of a recording is 2^52 ticks.
     Ok(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX).min(1 << 52))
 }
 

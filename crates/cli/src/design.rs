@@ -35,20 +35,16 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
         delimiter: options.delimiter,
     })?;
     if table.names.len() != 1 {
-        return Err(Error::Mismatch {
-            file: table.file().to_owned(),
-            problem: format!("columns {}: name the one of the sample with --column", table.names.join(", ")),
-        });
+        let names = table.names.join(", ");
+        let problem = format!("columns {names}: name the one of the sample with --column");
+        return Err(Error::content(table.file(), problem));
     }
     let mut values = Vec::new();
     while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
         values.extend(cells.into_iter().flatten().filter(|value| value.is_finite()));
     }
     if values.is_empty() {
-        return Err(Error::Empty {
-            file: table.file().to_owned(),
-            what: "numbers in the column of the sample",
-        });
+        return Err(Error::empty(table.file(), "numbers in the column of the sample"));
     }
     let prior = Prior::sample(&values).map_err(Error::refused("the sample cannot be a prior"))?;
     if let Some(fit) = prior.sample_fit() {

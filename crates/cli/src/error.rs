@@ -2,14 +2,17 @@
 
 use std::io;
 
+/// Why a model, a sensor, a report or a row was refused.
+pub(crate) type Failure = Box<dyn std::error::Error + Send + Sync>;
+
 /// Errors of the command.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum Error {
-    /// A file could not be opened, read or written.
-    #[error("{file}: cannot {action}")]
-    File {
-        file: String,
+    /// A file, a device or a socket could not be used.
+    #[error("{place}: cannot {action}")]
+    Io {
+        place: String,
         action: &'static str,
         #[source]
         source: io::Error,
@@ -42,20 +45,12 @@ pub(crate) enum Error {
     Parquet {
         file: String,
         #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
+        source: Failure,
     },
     /// A Parquet file was given, but this program was built without Parquet.
     #[cfg(not(feature = "parquet"))]
     #[error("{file}: this program was built without Parquet: build it with `--features parquet`, or use CSV")]
     NoParquet { file: String },
-    /// A row of a table could not be parsed.
-    #[error("{file}: row {row}: {problem}: {mend}")]
-    Line {
-        file: String,
-        row: u64,
-        problem: String,
-        mend: &'static str,
-    },
     /// A table has no columns or no rows.
     #[error("{file}: no {what}: the first line names the columns, rows follow")]
     Empty { file: String, what: &'static str },
@@ -92,32 +87,21 @@ pub(crate) enum Error {
         file: String,
         row: u64,
         #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
+        source: Failure,
     },
     /// The options do not give a valid model, sensor or design.
     #[error("{what}")]
     Refused {
         what: &'static str,
         #[source]
-        source: Box<dyn std::error::Error + Send + Sync>,
+        source: Failure,
     },
     /// Binary data would be written to a terminal.
     #[error("standard output is a terminal: name a file with --output, or redirect")]
     Terminal,
-    /// The two files of a comparison do not have the same rows.
+    /// A table, recording or configuration was read, but its content is not what the task needs.
     #[error("{file}: {problem}")]
-    Mismatch { file: String, problem: String },
-    /// A socket could not be used.
-    #[error("{address}: cannot {action}")]
-    Socket {
-        address: String,
-        action: &'static str,
-        #[source]
-        source: io::Error,
-    },
-    /// A configuration file, or a file that it names, has an invalid value.
-    #[error("{file}: {reason}")]
-    Configuration { file: String, reason: String },
+    Content { file: String, problem: String },
     /// A centre or a sensor cannot continue.
     #[error(transparent)]
     Link(#[from] fewbits_link::Error),
@@ -127,12 +111,34 @@ pub(crate) enum Error {
 }
 
 impl Error {
-    pub(crate) fn file(file: &str, action: &'static str) -> impl Fn(io::Error) -> Self + use<> {
-        let file = file.to_owned();
-        move |source| Self::File {
-            file: file.clone(),
+    pub(crate) fn io(place: &str, action: &'static str) -> impl Fn(io::Error) -> Self + use<> {
+        let place = place.to_owned();
+        move |source| Self::Io {
+            place: place.clone(),
             action,
             source,
+        }
+    }
+
+    pub(crate) fn content(file: &str, problem: impl std::fmt::Display) -> Self {
+        Self::Content {
+            file: file.to_owned(),
+            problem: problem.to_string(),
+        }
+    }
+
+    pub(crate) fn empty(file: &str, what: &'static str) -> Self {
+        Self::Empty {
+            file: file.to_owned(),
+            what,
+        }
+    }
+
+    pub(crate) fn no_column(file: &str, column: &str, existing: &[String]) -> Self {
+        Self::NoColumn {
+            file: file.to_owned(),
+            column: column.to_owned(),
+            existing: existing.join(", "),
         }
     }
 
@@ -163,24 +169,21 @@ impl Error {
         let file = file.to_owned();
         move |source| {
             let row = source.position().map_or(0, csv::Position::record);
-            let (problem, mend) = match source.kind() {
-                csv::ErrorKind::UnequalLengths { expected_len, len, .. } => (
-                    format!("{len} cells instead of {expected_len}"),
-                    "mend the row, or name what separates cells with --delimiter",
+            match source.kind() {
+                csv::ErrorKind::UnequalLengths { expected_len, len, .. } => Self::content(
+                    &file,
+                    format_args!(
+                        "row {row}: {len} cells instead of {expected_len}: mend the row, or name what separates cells with \
+                         --delimiter"
+                    ),
                 ),
-                csv::ErrorKind::Utf8 { .. } => ("not text in UTF-8".to_owned(), "save the table as UTF-8"),
-                _ => {
-                    return Self::Table {
-                        file: file.clone(),
-                        source,
-                    };
+                csv::ErrorKind::Utf8 { .. } => {
+                    Self::content(&file, format_args!("row {row}: not text in UTF-8: save the table as UTF-8"))
                 }
-            };
-            Self::Line {
-                file: file.clone(),
-                row,
-                problem,
-                mend,
+                _ => Self::Table {
+                    file: file.clone(),
+                    source,
+                },
             }
         }
     }
@@ -188,7 +191,7 @@ impl Error {
     /// Whether the error is that the reader of the output has closed the pipe.
     pub(crate) fn is_closed_pipe(&self) -> bool {
         let kind = match self {
-            Self::File { source, .. } => source.kind(),
+            Self::Io { source, .. } => source.kind(),
             Self::Json(error) => error.io_error_kind().unwrap_or(io::ErrorKind::Other),
             Self::Recording {
                 source: fewbits_record::Error::Io { source, .. },

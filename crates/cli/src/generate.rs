@@ -18,12 +18,12 @@ pub(crate) fn run(options: &GenerateOptions) -> Result<Ending, Error> {
         Generated::Man => {
             if let Some(folder) = &options.folder {
                 let name = folder.display().to_string();
-                clap_mangen::generate_to(command, folder).map_err(Error::file(&name, "write"))?;
+                clap_mangen::generate_to(command, folder).map_err(Error::io(&name, "write"))?;
                 return Ok(Ending::Good);
             }
             let page = clap_mangen::Man::new(command);
             page.render(&mut std::io::stdout())
-                .map_err(Error::file("standard output", "write"))?;
+                .map_err(Error::io("standard output", "write"))?;
             return Ok(Ending::Good);
         }
     };

@@ -2,7 +2,7 @@
 
 use crate::arguments::InfoOptions;
 use crate::error::Error;
-use crate::numbers::exact;
+use crate::numbers::{exact, widened};
 use crate::{Ending, bounds, clock, output};
 use fewbits_record::{Playback, TimeBase};
 use serde::Serialize;
@@ -52,10 +52,11 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
         })
         .collect();
     let (mut rows, mut blocks, mut damaged) = (0, 0, 0);
-    let mut span: Option<(i64, i64)> = None;
+    let mut span = None;
     for block in playback.blocks() {
         let block = match block {
             Ok(block) => block,
+            // The blocks after damaged bytes can be read.
             Err(fewbits_record::Error::Block { .. }) => {
                 damaged += 1;
                 continue;
@@ -64,10 +65,7 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
         };
         rows += block.rows() as u64;
         blocks += 1;
-        for tick in &block.ticks {
-            let (from, to) = span.unwrap_or((*tick, *tick));
-            span = Some((from.min(*tick), to.max(*tick)));
-        }
+        span = block.ticks.iter().copied().fold(span, widened);
         for (info, cells) in columns.iter_mut().zip(&block.columns) {
             info.gaps += cells.iter().filter(|cell| cell.is_none()).count() as u64;
             for value in cells.iter().flatten().filter(|value| value.is_finite()) {

@@ -3,6 +3,7 @@
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
+use crate::numbers::widened;
 use fewbits_record::{TimeBase, TimeFormat};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
@@ -49,8 +50,8 @@ impl Source {
         let source: Box<dyn Read + Send> = if options.file == "-" {
             Box::new(std::io::stdin())
         } else {
-            let mut opened = File::open(file).map_err(Error::file(file, "open"))?;
-            if is_parquet(&mut opened).map_err(Error::file(file, "read"))? {
+            let mut opened = File::open(file).map_err(Error::io(file, "open"))?;
+            if is_parquet(&mut opened).map_err(Error::io(file, "read"))? {
                 #[cfg(feature = "parquet")]
                 {
                     let mut rows = crate::parquet::Rows::open(opened, file)?;
@@ -63,11 +64,9 @@ impl Source {
             let bar = progress(opened.metadata().ok().map(|data| data.len()));
             Box::new(bar.wrap_read(opened))
         };
-        let delimiter = u8::try_from(options.delimiter).map_err(|_| Error::Option {
-            option: "--delimiter",
-            value: options.delimiter.to_string(),
-            expected: "one character of ASCII",
-        })?;
+        let delimiter = options.delimiter;
+        let delimiter = u8::try_from(delimiter)
+            .map_err(|_| Error::option("--delimiter", &delimiter.to_string(), "one character of ASCII"))?;
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(delimiter)
             .trim(csv::Trim::All)
@@ -127,6 +126,12 @@ pub(crate) fn progress(bytes: Option<u64>) -> ProgressBar {
     }
 }
 
+/// Index of a column.
+fn position(names: &[String], name: &str, file: &str) -> Result<usize, Error> {
+    let found = names.iter().position(|known| known == name);
+    found.ok_or_else(|| Error::no_column(file, name, names))
+}
+
 impl Table {
     /// Opens the table and reads the names.
     pub(crate) fn open(options: &TableOptions) -> Result<Self, Error> {
@@ -135,20 +140,10 @@ impl Table {
             name => name,
         };
         let (source, names) = Source::open(options, file)?;
-        let file = file.to_owned();
         if names.is_empty() {
-            return Err(Error::Empty { file, what: "columns" });
+            return Err(Error::empty(file, "columns"));
         }
-        let position = |name: &String| {
-            names
-                .iter()
-                .position(|known| known == name)
-                .ok_or_else(|| Error::NoColumn {
-                    file: file.clone(),
-                    column: name.clone(),
-                    existing: names.join(", "),
-                })
-        };
+        let position = |name: &String| position(&names, name, file);
         let time_column = match (&options.time_column, &options.time) {
             (Some(name), _) => Some(position(name)?),
             (None, Some(_)) => Some(0),
@@ -162,7 +157,7 @@ impl Table {
         Ok(Self {
             names: columns.iter().map(|i| names[*i].clone()).collect(),
             all_names: names,
-            file,
+            file: file.to_owned(),
             source,
             record: csv::StringRecord::new(),
             time_column,
@@ -194,13 +189,7 @@ impl Table {
 
     /// Reads a column as names instead of numbers: [`Table::label`].
     pub(crate) fn with_labels(mut self, name: &str) -> Result<Self, Error> {
-        let Some(column) = self.all_names.iter().position(|known| known == name) else {
-            return Err(Error::NoColumn {
-                file: self.file,
-                column: name.to_owned(),
-                existing: self.all_names.join(", "),
-            });
-        };
+        let column = position(&self.all_names, name, &self.file)?;
         self.label_column = Some(column);
         self.without(column);
         Ok(self)
@@ -244,24 +233,16 @@ impl Table {
             return Ok(TimeBase::Numbered);
         };
         if !self.read_record()? {
-            return Err(Error::Empty {
-                file: self.file.clone(),
-                what: "rows",
-            });
+            return Err(Error::empty(&self.file, "rows"));
         }
         self.peeked = true;
         let first = self.record.get(column).unwrap_or_default();
         let Some(format) = clock::format_of(first) else {
-            return Err(self.cell_error(
-                column,
-                (
-                    "is not a time",
-                    "write seconds, or UTC as 2026-01-31T12:00:00.5Z, or name another column with --time-column",
-                ),
-            ));
+            return Err(self.cell_error(column, clock::NO_TIME));
         };
         let nanoseconds = clock::tolerance(options.time.as_deref().unwrap_or("exact"))?;
         let decimals = match (format, survey) {
+            // Exact times: a tick is as fine as the finest time of the table.
             (TimeFormat::Seconds, Some(survey)) if nanoseconds == 0 => survey.decimals,
             // Times in milliseconds or microseconds since 1970 are too large for nanoseconds.
             (TimeFormat::Seconds, _) if first.parse::<f64>().is_ok_and(|first| first.abs() > 4e9) => 0,
@@ -303,16 +284,12 @@ impl Table {
             && let Some((tick, cells)) = self.next(time)?
         {
             ticks.push(tick.unwrap_or(ticks.len() as i64));
-            columns
-                .iter_mut()
-                .zip(cells)
-                .for_each(|(column, cell): (&mut Vec<_>, _)| column.push(cell));
+            for (column, cell) in columns.iter_mut().zip(cells) {
+                column.push(cell);
+            }
         }
         if ticks.is_empty() {
-            return Err(Error::Empty {
-                file: self.file().to_owned(),
-                what: "rows",
-            });
+            return Err(Error::empty(&self.file, "rows"));
         }
         Ok((ticks, columns))
     }
@@ -333,14 +310,15 @@ impl Table {
             return Err(self.cell_error(column, ("is not a number", mend)));
         };
         let size = text.trim_start_matches(['-', '+']);
-        if size.len() > 15 && size.bytes().all(|byte| byte.is_ascii_digit()) {
-            let is_double = size.parse::<u64>().is_ok_and(|whole| whole <= MAX_WHOLE);
-            if !is_double {
-                return Err(self.cell_error(
-                    column,
-                    ("is a whole number of more than 53 bits", "split the column, or leave it out with --columns"),
-                ));
-            }
+        // Whole numbers of at most 15 digits are below 2^53, so they are exact doubles.
+        if size.len() > 15
+            && size.bytes().all(|byte| byte.is_ascii_digit())
+            && !size.parse::<u64>().is_ok_and(|whole| whole <= MAX_WHOLE)
+        {
+            return Err(self.cell_error(
+                column,
+                ("is a whole number of more than 53 bits", "split the column, or leave it out with --columns"),
+            ));
         }
         Ok(Some(value))
     }
@@ -355,8 +333,7 @@ impl Table {
         while table.read_record()? {
             for (i, column) in table.columns.iter().enumerate() {
                 if let Some(value) = table.cell(*column)?.filter(|value| value.is_finite()) {
-                    let (low, high) = survey.ends[i].unwrap_or((value, value));
-                    survey.ends[i] = Some((low.min(value), high.max(value)));
+                    survey.ends[i] = widened(survey.ends[i], value);
                 }
             }
             if let Some(column) = table.time_column {

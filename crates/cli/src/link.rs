@@ -43,7 +43,7 @@ impl Way {
         for frame in frames {
             match self {
                 Self::Stream { sink, name, begun } => {
-                    let failed = Error::file(name, "write");
+                    let failed = Error::io(name, "write");
                     if !std::mem::replace(begun, true) {
                         sink.write_all(&writer.header().unwrap_or_default()).map_err(&failed)?;
                     }
@@ -64,21 +64,12 @@ impl Way {
                         .iter()
                         .try_for_each(|piece| post(piece))
                         .and_then(|()| post(frame));
-                    outcome.map_err(link_error(address, "send"))?;
+                    outcome.map_err(Error::io(address, "send"))?;
                     *sent += 1;
                 }
             }
         }
         Ok(())
-    }
-}
-
-fn link_error(address: &str, action: &'static str) -> impl Fn(std::io::Error) -> Error + use<> {
-    let address = address.to_owned();
-    move |source| Error::Socket {
-        address: address.clone(),
-        action,
-        source,
     }
 }
 
@@ -101,13 +92,14 @@ fn way(options: &SendOptions) -> Result<Way, Error> {
             begun: false,
         });
     };
+    // A socket can only send to addresses of its own family.
     let local = if address.starts_with('[') {
         "[::]:0"
     } else {
         "0.0.0.0:0"
     };
     let socket = UdpSocket::bind(local).and_then(|socket| socket.connect(address).map(|()| socket));
-    let socket = socket.map_err(link_error(address, "connect"))?;
+    let socket = socket.map_err(Error::io(address, "connect"))?;
     Ok(frames(
         address,
         Box::new(move |frame: &[u8]| match socket.send(frame) {
@@ -157,6 +149,7 @@ pub(crate) fn send(options: &SendOptions) -> Result<Ending, Error> {
         let before = writer.waiting();
         let frames = writer.push(tick, &row.1).map_err(&failed)?;
         way.send(&writer, &frames)?;
+        // Behind a frame only the last rows are left, and their time is counted from here.
         if before == 0 || !frames.is_empty() {
             oldest = (writer.waiting() > 0).then(Instant::now);
         }
@@ -207,7 +200,7 @@ pub(crate) fn receive(options: &ReceiveOptions) -> Result<Ending, Error> {
 fn open(file: &str) -> Result<(Box<dyn Read + Send>, &str), Error> {
     Ok(match file {
         "-" => (Box::new(std::io::stdin()), "standard input"),
-        file => (Box::new(File::open(file).map_err(Error::file(file, "open"))?), file),
+        file => (Box::new(File::open(file).map_err(Error::io(file, "open"))?), file),
     })
 }
 
@@ -228,10 +221,10 @@ fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
 }
 
 fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, Error> {
-    let socket = UdpSocket::bind(address).map_err(link_error(address, "listen"))?;
+    let socket = UdpSocket::bind(address).map_err(Error::io(address, "listen"))?;
     socket
         .set_read_timeout(options.timeout)
-        .map_err(link_error(address, "set the timeout"))?;
+        .map_err(Error::io(address, "set the timeout"))?;
     if let Ok(local) = socket.local_addr() {
         eprintln!("listening at {local}");
     }
@@ -250,7 +243,7 @@ fn receive_frames(
     mut next: impl FnMut() -> std::io::Result<Option<Vec<u8>>>,
 ) -> Result<Ending, Error> {
     let (mut reader, mut writer) = (FrameReader::new(), None::<(Writer, Vec<usize>)>);
-    while let Some(frame) = next().map_err(link_error(address, "receive"))? {
+    while let Some(frame) = next().map_err(Error::io(address, "receive"))? {
         let blocks = match reader.handle(&frame) {
             Ok(blocks) => blocks,
             Err(error) => {

@@ -42,7 +42,7 @@ pub(crate) fn receive(
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::Csv, names)?;
     let mut sensor = Slots::new(config);
     let mut understood = false;
-    while let Some(bytes) = frames.next().map_err(Error::file(name, "read"))? {
+    while let Some(bytes) = frames.next().map_err(Error::io(name, "read"))? {
         match sensor.frame(&bytes) {
             Ok(rows) => {
                 understood = true;
@@ -130,9 +130,11 @@ impl Slots {
     fn report(&mut self, frame: &Frame<'_>, rows: &mut [Row]) -> Result<Option<f64>, String> {
         let bits = BitString::from(frame.payload);
         let packet = Packet::from_bits(&(), &bits).map_err(|error| error.to_string())?;
+        // A packet begins with its counter, of at most 16 bits, highest bit first.
         let two = |i| u32::from(bits.bytes().get(i).copied().unwrap_or(0));
         let sequence = (two(0) << 8 | two(1)) >> (16 - self.config.sequence_bits());
         if self.sequence.is_some_and(|expected| expected != sequence) {
+            // Any of the slots without a frame may be that of the lost packet.
             rows.iter_mut().for_each(|(_, value)| *value = None);
         }
         self.sequence = Some((sequence + 1) & ((1 << self.config.sequence_bits()) - 1));

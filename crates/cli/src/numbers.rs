@@ -30,6 +30,12 @@ pub(crate) fn mean_and_deviation(option: &'static str, text: &str) -> Result<(f6
     Ok((number(option, mean, EXPECTED)?, above_zero(option, deviation, EXPECTED)?))
 }
 
+/// Lower and upper end of numbers, with one more included.
+pub(crate) fn widened<T: PartialOrd + Copy>(ends: Option<(T, T)>, number: T) -> Option<(T, T)> {
+    let (low, high) = ends.unwrap_or((number, number));
+    Some((if number < low { number } else { low }, if number > high { number } else { high }))
+}
+
 /// A number with all its digits, with an exponent instead of many zeros.
 pub(crate) fn exact(number: f64) -> String {
     if number == 0.0 || (1e-7..1e16).contains(&number.abs()) {

@@ -15,7 +15,7 @@ pub(crate) fn open(path: Option<&Path>) -> Result<(Box<dyn Write>, String), Erro
     match path {
         Some(path) => {
             let name = path.display().to_string();
-            let file = File::create(path).map_err(Error::file(&name, "create"))?;
+            let file = File::create(path).map_err(Error::io(&name, "create"))?;
             Ok((Box::new(file), name))
         }
         None => Ok((Box::new(std::io::stdout()), STANDARD_OUTPUT.to_owned())),
@@ -33,14 +33,14 @@ pub(crate) fn open_binary(path: Option<&Path>) -> Result<(Box<dyn Write>, String
 /// Writes a whole text.
 pub(crate) fn text(path: Option<&Path>, text: &str) -> Result<(), Error> {
     let (mut sink, name) = open(path)?;
-    sink.write_all(text.as_bytes()).map_err(Error::file(&name, "write"))
+    sink.write_all(text.as_bytes()).map_err(Error::io(&name, "write"))
 }
 
 /// Writes one JSON value and a line end to standard output.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
     let mut out = std::io::stdout().lock();
     serde_json::to_writer_pretty(&mut out, value)?;
-    writeln!(out).map_err(Error::file(STANDARD_OUTPUT, "write"))
+    writeln!(out).map_err(Error::io(STANDARD_OUTPUT, "write"))
 }
 
 /// A cell of a row.
@@ -129,7 +129,7 @@ impl Sheet {
                 let cells = cells.into_iter().map(|cell| cell.json());
                 let object: serde_json::Map<_, _> = self.names.iter().cloned().zip(cells).collect();
                 serde_json::to_writer(&mut *sink, &object)?;
-                writeln!(sink).map_err(Error::file(&self.file, "write"))
+                writeln!(sink).map_err(Error::io(&self.file, "write"))
             }
         }
     }
@@ -139,7 +139,7 @@ impl Sheet {
             Rows::Csv(rows) => rows.flush(),
             Rows::Json(sink) => sink.flush(),
         }
-        .map_err(Error::file(&self.file, "write"))
+        .map_err(Error::io(&self.file, "write"))
     }
 }
 

@@ -62,14 +62,12 @@ pub(crate) fn run(options: &PackOptions) -> Result<Ending, Error> {
             let mut table = Table::open(&options.table)?;
             let columns = recorder.schema().columns();
             if !columns.iter().map(fewbits_record::Column::name).eq(table.names.iter()) {
-                return Err(Error::Mismatch {
-                    file: table.file().to_owned(),
-                    problem: format!(
-                        "columns {}: {file} has other columns, choose and order them with --columns",
-                        table.names.join(", ")
-                    ),
-                });
+                let names = table.names.join(", ");
+                let problem =
+                    format!("columns {names}: {file} has other columns, choose and order them with --columns");
+                return Err(Error::content(table.file(), problem));
             }
+            // The old index was removed and counts as written anew.
             let (columns, before) = (columns.len(), recorder.bytes());
             let rows = fill(&mut table, &mut recorder, &file)?;
             let bytes = recorder
@@ -113,9 +111,9 @@ fn size_of(file: &mut std::fs::File) -> Result<u64, fewbits_record::Error> {
 }
 
 /// A sink that counts the bytes written.
-pub(crate) struct Counted<W> {
-    pub(crate) sink: W,
-    pub(crate) bytes: u64,
+struct Counted<W> {
+    sink: W,
+    bytes: u64,
 }
 
 impl<W: Write> Write for Counted<W> {

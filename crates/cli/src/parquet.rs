@@ -127,7 +127,7 @@ impl Sink {
     /// Rows of these columns.
     pub(crate) fn create(path: &Path, schema: &Schema, names: &[String]) -> Result<Self, Error> {
         let file = path.display().to_string();
-        let target = File::create(path).map_err(Error::file(&file, "create"))?;
+        let target = File::create(path).map_err(Error::io(&file, "create"))?;
         let kept = names
             .iter()
             .map(|name| schema.position(name).map(|i| schema.columns()[i].clone()));

@@ -3,7 +3,7 @@
 use crate::arguments::PlanOptions;
 use crate::error::Error;
 use crate::input::Table;
-use crate::pack::Counted;
+use crate::numbers::widened;
 use crate::plot::{Layer, Picture};
 use crate::{Ending, output};
 use fewbits_record::{Bound, Column, Recorder, Schema, TimeBase};
@@ -45,24 +45,20 @@ struct TimePlan {
     tolerances: Vec<(u64, f64)>,
 }
 
-/// Length in bytes of a recording of one column.
-fn size(
+/// Bits per row of a recording of one column.
+fn bits_per_row(
     column: Column,
     time: TimeBase,
     rows_per_block: usize,
     ticks: &[i64],
     cells: &[Option<f64>],
-) -> Result<u64, fewbits_record::Error> {
+) -> Result<f64, fewbits_record::Error> {
     let schema = Schema::new(vec![column], time)?.with_rows_per_block(rows_per_block)?;
-    let sink = Counted {
-        sink: std::io::sink(),
-        bytes: 0,
-    };
-    let mut recorder = Recorder::new(sink, schema);
+    let mut recorder = Recorder::new(Vec::new(), schema);
     for (tick, cell) in ticks.iter().zip(cells) {
         recorder.push(*tick, &[*cell])?;
     }
-    Ok(recorder.finish()?.bytes)
+    Ok(8.0 * recorder.finish()?.len() as f64 / cells.len() as f64)
 }
 
 fn plan_column(name: &str, cells: &[Option<f64>], rows_per_block: usize) -> Result<ColumnPlan, fewbits_record::Error> {
@@ -74,15 +70,13 @@ fn plan_column(name: &str, cells: &[Option<f64>], rows_per_block: usize) -> Resu
         .filter(|value| value.is_finite())
         .collect();
     let bits = |bound: Bound| {
-        let bytes = size(Column::new(name, bound)?, TimeBase::Numbered, rows_per_block, &rows, cells)?;
-        Ok::<f64, fewbits_record::Error>(8.0 * bytes as f64 / cells.len() as f64)
+        let column = Column::new(name, bound)?;
+        bits_per_row(column, TimeBase::Numbered, rows_per_block, &rows, cells)
     };
-    let ends = finite.iter().fold(None, |ends: Option<(f64, f64)>, value| {
-        let (low, high) = ends.unwrap_or((*value, *value));
-        Some((low.min(*value), high.max(*value)))
-    });
+    let ends = finite.iter().copied().fold(None, widened);
     let range = ends.map_or(0.0, |(low, high)| high - low);
     let mut bounds = Vec::new();
+    // A bound must be positive, and its double finite.
     if range > 0.0 && (2.0 * range).is_finite() {
         for percent in PERCENTS {
             let delta = 0.01 * percent * range;
@@ -115,8 +109,8 @@ fn plan_time(ticks: &[i64], time: TimeBase, rows_per_block: usize) -> Result<Opt
             tolerance: nanoseconds / ten,
             format,
         };
-        let bytes = size(Column::new("", Bound::Lossless)?, time, rows_per_block, ticks, &cells)?;
-        Ok::<f64, fewbits_record::Error>(8.0 * bytes as f64 / ticks.len() as f64)
+        let column = Column::new("", Bound::Lossless)?;
+        bits_per_row(column, time, rows_per_block, ticks, &cells)
     };
     let mut tolerances = Vec::new();
     for nanoseconds in [1_000_000, 10_000_000, 100_000_000, 1_000_000_000] {

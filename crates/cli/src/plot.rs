@@ -1,6 +1,7 @@
 //! Pictures of a few lines, bands, dots and boxes, as SVG.
 
 use crate::error::Error;
+use crate::numbers::widened;
 use plotters::backend::SVGBackend;
 use plotters::chart::ChartBuilder;
 use plotters::drawing::{DrawingAreaErrorKind, IntoDrawingArea};
@@ -96,6 +97,7 @@ impl<T> Thinned<T> {
         }
         self.seen += 1;
         if self.kept.len() == MAX_POINTS {
+            // Every second point goes, and from now on only every second one comes: the kept ones stay evenly spaced.
             let mut number = 0;
             self.kept.retain(|_| {
                 number += 1;
@@ -139,10 +141,8 @@ impl Picture {
     fn ends(&self) -> [(f64, f64); 2] {
         let points: Vec<Point> = self.layers.iter().flat_map(Layer::points).collect();
         let ends = |numbers: &mut dyn Iterator<Item = f64>| {
-            let (low, high) = numbers
-                .filter(|number| number.is_finite())
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-            if low > high { (0.0, 1.0) } else { (low, high) }
+            let ends = numbers.filter(|number| number.is_finite()).fold(None, widened);
+            ends.unwrap_or((0.0, 1.0))
         };
         let mut both = [
             ends(&mut points.iter().map(|point| point.0)),
@@ -150,6 +150,7 @@ impl Picture {
         ];
         if self.is_map {
             let wide = f64::from(SIZE.0) / f64::from(SIZE.1);
+            // The axis that is too short for one scale is extended at both ends.
             let height = (both[1].1 - both[1].0).max((both[0].1 - both[0].0) / wide);
             for (axis, length) in both.iter_mut().zip([wide * height, height]) {
                 let middle = 0.5 * axis.0 + 0.5 * axis.1;
@@ -174,7 +175,7 @@ impl Picture {
         let drawn = self.draw(&mut svg);
         drawn.map_err(Error::refused("the picture cannot be drawn"))?;
         // Width and height are those of the window, not of the drawing.
-        std::fs::write(path, svg).map_err(Error::file(&path.display().to_string(), "create"))
+        std::fs::write(path, svg).map_err(Error::io(&path.display().to_string(), "create"))
     }
 
     fn draw(&self, svg: &mut String) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {

@@ -1,8 +1,10 @@
-//! Kinds of reports of a sensor, and reading of configuration files.
+//! Kinds of reports with their two halves, at sensor and centre, and reading of configuration files.
 
-use crate::error::Error;
+use crate::error::{Error, Failure};
 use fewbits_cfwmd::scheme::CovarianceFeedback;
-use fewbits_core::NumberFormat;
+use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, OnAxes, SchemeNode, SensorNode};
+use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
+use fewbits_filters::centre::{RemoteSensor, Reporting};
 use fewbits_models::LinearSensor;
 use nalgebra::SVector;
 use serde::Deserialize;
@@ -10,7 +12,7 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// Kind of a sensor's reports. The files of sensor and centre must state the same.
-#[derive(Deserialize, Clone, Copy)]
+#[derive(Debug, Deserialize, Clone, Copy, PartialEq)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub(crate) enum Report {
     /// One bit: whether the sample is at or above the prediction.
@@ -18,7 +20,7 @@ pub(crate) enum Report {
     /// The cell of the innovation, in 2 to 4 bits.
     Word {
         /// Bits of a report.
-        bits: usize,
+        bits: u32,
     },
     /// Every sample, in double precision.
     Value,
@@ -29,30 +31,50 @@ pub(crate) enum Report {
     },
 }
 
-/// Reads a TOML file.
-pub(crate) fn configuration<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(Error::file(&name, "read"))?;
-    toml::from_str(&text).map_err(|error| Error::Configuration {
-        file: name,
-        reason: error.to_string(),
-    })
-}
+impl Report {
+    /// The centre's half of a sensor that reads coordinate `reads` of the state, with the variance of its noise.
+    pub(crate) fn remote<const D: usize>(
+        self,
+        reads: usize,
+        variance: f64,
+        link: Link,
+    ) -> Result<Box<dyn RemoteSensor<D>>, Failure> {
+        let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(variance)?, [reads])?;
+        Ok(match self {
+            Self::Sign => {
+                let ask = |_: &Gaussian<D>, m: &Gaussian<1>| m.mean()[0];
+                Box::new(Reporting::new(sensing, SignBit::new(variance)?, link, ask))
+            }
+            Self::Word { bits } => {
+                let ask = |_: &Gaussian<D>, m: &Gaussian<1>| Prediction {
+                    mean: m.mean()[0],
+                    deviation: m.covariance()[0].sqrt(),
+                };
+                let scheme = InnovationWord::new(variance, bits as usize)?;
+                Box::new(Reporting::new(sensing, scheme, link, ask))
+            }
+            Self::Value => Box::new(Reporting::values(sensing, FullValue::new(variance)?, link)),
+            Self::Censored { threshold } => {
+                let ask = |state: &Gaussian<D>, _: &Gaussian<1>| *state;
+                let scheme = censored::<D>(reads, variance, threshold)?;
+                Box::new(Reporting::new(coordinate::<D>(reads, variance)?, scheme, link, ask))
+            }
+        })
+    }
 
-/// An error of a value in a configuration file.
-pub(crate) fn configured<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Error + use<E> {
-    let file = path.display().to_string();
-    move |error| Error::Configuration {
-        file: file.clone(),
-        reason: error.to_string(),
+    /// The sensor's half. Only that of censored reports uses `D` and `reads`, because it is told the covariance of the state.
+    pub(crate) fn node<const D: usize>(self, reads: usize, variance: f64) -> Result<Box<dyn SensorNode<1>>, Failure> {
+        Ok(match self {
+            Self::Sign => Box::new(SchemeNode::new(SignBit::new(variance)?)),
+            Self::Word { bits } => Box::new(SchemeNode::new(InnovationWord::new(variance, bits as usize)?)),
+            Self::Value => Box::new(SchemeNode::new(FullValue::new(variance)?)),
+            Self::Censored { threshold } => Box::new(SchemeNode::new(censored::<D>(reads, variance, threshold)?)),
+        })
     }
 }
 
 /// What a sensor of one coordinate of the state measures.
-pub(crate) fn coordinate<const D: usize>(
-    reads: usize,
-    variance: f64,
-) -> Result<LinearSensor<D, 1>, Box<dyn std::error::Error>> {
+fn coordinate<const D: usize>(reads: usize, variance: f64) -> Result<LinearSensor<D, 1>, Failure> {
     if reads >= D {
         return Err(format!("reads is {reads}: expected below {D}, the coordinates of the model").into());
     }
@@ -61,11 +83,24 @@ pub(crate) fn coordinate<const D: usize>(
 }
 
 /// The scheme of a censored report.
-pub(crate) fn censored<const D: usize>(
+fn censored<const D: usize>(
     reads: usize,
     variance: f64,
     threshold: f64,
-) -> Result<CovarianceFeedback<LinearSensor<D, 1>, D, 1>, Box<dyn std::error::Error>> {
+) -> Result<CovarianceFeedback<LinearSensor<D, 1>, D, 1>, Failure> {
     let sensing = coordinate::<D>(reads, variance)?;
     Ok(CovarianceFeedback::new(sensing, threshold, NumberFormat::Double)?)
+}
+
+/// Reads a TOML file.
+pub(crate) fn configuration<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(Error::io(&name, "read"))?;
+    toml::from_str(&text).map_err(configured(path))
+}
+
+/// An error of a value in a configuration file.
+pub(crate) fn configured<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Error + use<E> {
+    let file = path.display().to_string();
+    move |error| Error::content(&file, error)
 }

@@ -4,8 +4,8 @@ use crate::Ending;
 use crate::arguments::SensorOptions;
 use crate::error::Error;
 use crate::place::Place;
-use crate::report::{Report, censored, configuration, configured};
-use fewbits_core::{BitString, FullValue, SchemeNode, SensorNode};
+use crate::report::{Report, configuration, configured};
+use fewbits_core::{BitString, SensorNode};
 use fewbits_link::{Key, Program, SensorLink, Store, Udp, run_sensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{Feedback, Note, SensorSettings, Slot};
@@ -92,30 +92,16 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
 type Node = Box<dyn SensorNode<1>>;
 
 fn node(file: &Path, given: &Configuration) -> Result<Node, Error> {
-    let variance = given.deviation * given.deviation;
-    match given.report {
-        Report::Sign => {
-            let scheme = fewbits_dymbo::SignBit::new(variance).map_err(configured(file))?;
-            Ok(Box::new(SchemeNode::new(scheme)))
+    let (report, reads, variance) = (given.report, given.reads, given.deviation * given.deviation);
+    let node = match (report, given.coordinates) {
+        (Report::Censored { .. }, 2) => report.node::<2>(reads, variance),
+        (Report::Censored { .. }, 4) => report.node::<4>(reads, variance),
+        (Report::Censored { .. }, other) if other != 1 => {
+            Err(format!("coordinates is {other}: expected 1, 2 or 4").into())
         }
-        Report::Word { bits } => {
-            let scheme = fewbits_dymbo::InnovationWord::new(variance, bits).map_err(configured(file))?;
-            Ok(Box::new(SchemeNode::new(scheme)))
-        }
-        Report::Value => Ok(Box::new(SchemeNode::new(FullValue::new(variance).map_err(configured(file))?))),
-        Report::Censored { threshold } => match given.coordinates {
-            1 => Ok(Box::new(SchemeNode::new(
-                censored::<1>(given.reads, variance, threshold).map_err(configured(file))?,
-            ))),
-            2 => Ok(Box::new(SchemeNode::new(
-                censored::<2>(given.reads, variance, threshold).map_err(configured(file))?,
-            ))),
-            4 => Ok(Box::new(SchemeNode::new(
-                censored::<4>(given.reads, variance, threshold).map_err(configured(file))?,
-            ))),
-            other => Err(configured(file)(format!("coordinates is {other}: expected 1, 2 or 4"))),
-        },
-    }
+        _ => report.node::<1>(reads, variance),
+    };
+    node.map_err(configured(file))
 }
 
 /// Reads samples, one per line, in a thread, so that a slot never waits for one.
@@ -150,7 +136,7 @@ impl Program for Samples {
     fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
         let (number, line) = match self.lines.try_recv() {
             Ok((number, Ok(line))) => (number, line),
-            Ok((_, Err(source))) => return self.refuse(Error::file("standard input", "read")(source)),
+            Ok((_, Err(source))) => return self.refuse(Error::io("standard input", "read")(source)),
             Err(TryRecvError::Empty) => return ControlFlow::Continue(None),
             Err(TryRecvError::Disconnected) => return ControlFlow::Break(()),
         };
@@ -160,9 +146,8 @@ impl Program for Samples {
             // The first line may be a name.
             Err(_) if cell.is_empty() || number == 1 => return ControlFlow::Continue(None),
             _ => {
-                let reason = format!("line {number}: `{cell}` is no finite number");
-                let file = "standard input".to_owned();
-                return self.refuse(Error::Configuration { file, reason });
+                let problem = format!("line {number}: `{cell}` is no finite number");
+                return self.refuse(Error::content("standard input", problem));
             }
         };
         let mut rng = self.stream.indexed(u64::from(slot.number())).rng();

@@ -16,7 +16,7 @@ const CHUNKS: usize = 64;
 const PAUSE: Duration = Duration::from_millis(20);
 
 fn refused(device: &str, action: &'static str) -> impl Fn(std::io::Error) -> Error + use<> {
-    Error::file(device, action)
+    Error::io(device, action)
 }
 
 /// Opens the device; a terminal is set to raw bytes at `baud`. Reads of a terminal wait a tenth of a second.
@@ -107,6 +107,7 @@ impl Frames {
                     _ => continue,
                 }
             }
+            // Without a zero byte for so long, the line carries noise: memory is bounded.
             if self.collected.len() > MAX_FRAME {
                 self.collected.clear();
             }

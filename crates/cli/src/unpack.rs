@@ -30,14 +30,11 @@ struct Selection {
 
 fn end(text: Option<&String>, option: &'static str, time: TimeBase, otherwise: i64) -> Result<i64, Error> {
     let Some(text) = text else { return Ok(otherwise) };
-    clock::tick(text, time).map_err(|_| Error::Option {
-        option,
-        value: text.clone(),
-        expected: match time {
-            TimeBase::Numbered => "a row number, since this recording has no times",
-            _ => "a time as the recording writes it",
-        },
-    })
+    let expected = match time {
+        TimeBase::Numbered => "a row number, since this recording has no times",
+        _ => "a time as the recording writes it",
+    };
+    clock::tick(text, time).map_err(|_| Error::option(option, text, expected))
 }
 
 fn selection(options: &CatOptions, schema: &Schema) -> Result<Selection, Error> {

@@ -64,10 +64,8 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
         let block = block.map_err(Error::recording(&file))?;
         for (row, tick) in block.ticks.iter().enumerate() {
             let Some((original, cells)) = table.next(time)? else {
-                return Err(Error::Mismatch {
-                    file,
-                    problem: format!("has more rows than {}, which has {}", table.file(), verdict.rows),
-                });
+                let problem = format!("has more rows than {}, which has {}", table.file(), verdict.rows);
+                return Err(Error::content(&file, problem));
             };
             verdict.rows += 1;
             if original.is_some_and(|original| original.abs_diff(*tick) > tolerance) {
@@ -79,6 +77,7 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
                     && a.is_finite()
                     && b.is_finite()
                 {
+                    // On a circle the error is the distance along the shorter arc.
                     let turns = column
                         .period()
                         .map_or(0.0, |period| period * ((a - b) / period).round());

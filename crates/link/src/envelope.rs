@@ -143,6 +143,7 @@ impl ReplayWindow {
     pub fn take(&mut self, counter: u64) -> Result<(), Refusal> {
         if counter > self.highest {
             let ahead = counter - self.highest;
+            // From a distance of 64 on, all counters that were accepted before are too old.
             self.taken = if ahead < 64 { self.taken << ahead } else { 0 } | 1;
             self.highest = counter;
             return Ok(());

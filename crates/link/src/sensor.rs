@@ -104,7 +104,7 @@ impl SensorLink {
         Ok(())
     }
 
-    /// A datagram has arrived.
+    /// A datagram has arrived. Carry out its requests before the next datagram: a sample counts for the last question.
     ///
     /// # Errors
     /// If the store cannot be written.
@@ -174,6 +174,7 @@ impl SensorLink {
 
     fn envelope(&mut self, frame: &[u8]) -> Result<Request, Error> {
         if self.counter == self.reserved {
+            // Stored before the first of them is used: a restarted sensor goes on behind all that were reserved.
             self.reserved += RESERVED;
             if let Some(store) = &self.store {
                 store.save(&self.reserved)?;

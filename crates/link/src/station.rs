@@ -270,6 +270,7 @@ impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
     pub fn on_datagram(&mut self, from: A, bytes: &[u8], outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
         let opened = sensor_of(bytes).ok_or(Refusal::TooShort).and_then(|number| {
             let place = *self.places.get(&number).ok_or(Refusal::Unknown)?;
+            // First the code, then the counter: a forged envelope must not use up a counter.
             let (counter, frame) = self.peers[place].key.open(Direction::ToCentre, bytes)?;
             self.windows[place].take(counter)?;
             Ok((place, frame))

@@ -12,7 +12,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Longest datagram in bytes.
 pub(crate) const MAX_DATAGRAM: usize = 65_535;
-/// Largest number of datagrams that are processed before timers are checked again: many datagrams do not delay a slot.
+/// Largest number of datagrams that a station processes before timers are checked again: many datagrams do not delay a slot.
 const BATCH: usize = 256;
 /// Longest wait: the caller is asked ten times a second whether to continue.
 const MAX_WAIT: Duration = Duration::from_millis(100);
@@ -42,14 +42,16 @@ pub fn now() -> u64 {
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Waits for datagrams until the time `until`, and passes those that have come to `take`.
+/// Waits for datagrams until the time `until`, and passes those that have come, at most `most`, to `take`.
 fn receive<T: Transport>(
     transport: &mut T,
     until: u64,
+    most: usize,
     mut take: impl FnMut(T::Address, &[u8]) -> Result<(), Error>,
 ) -> Result<(), Error> {
+    // Zero would not wait at all, and the loop of the caller would spin until the timer is due.
     let mut wait = Duration::from_nanos(until.saturating_sub(now())).clamp(Duration::from_micros(50), MAX_WAIT);
-    for _ in 0..BATCH {
+    for _ in 0..most {
         let Some((from, bytes)) = transport.receive(wait)? else {
             break;
         };
@@ -57,6 +59,7 @@ fn receive<T: Transport>(
         if now() >= until {
             break;
         }
+        // Only what has come already: timers are due before later datagrams.
         wait = Duration::ZERO;
     }
     Ok(())
@@ -84,8 +87,9 @@ pub fn run_station<R: Receiver, T: Transport>(
             return Ok(());
         }
         outputs.clear();
+        // What datagrams cause is sent in the next round, and watched then.
         let until = station.next_timer().unwrap_or(u64::MAX);
-        receive(transport, until, |from, bytes| station.on_datagram(from, bytes, &mut outputs))?;
+        receive(transport, until, BATCH, |from, bytes| station.on_datagram(from, bytes, &mut outputs))?;
     }
 }
 
@@ -138,7 +142,9 @@ pub fn run_sensor<T: Transport>(
             }
         }
         let until = link.next_timer().unwrap_or(u64::MAX).min(hello_at);
-        receive(transport, until, |from, bytes| match from == *centre {
+        // One datagram at a time: a second question that waits would replace the slot of the sample that the first one asks for, and the
+        // report would be sent as that of the wrong slot.
+        receive(transport, until, 1, |from, bytes| match from == *centre {
             true => link.on_datagram(now(), bytes, &mut requests),
             false => Ok(()),
         })?;

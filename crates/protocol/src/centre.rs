@@ -203,6 +203,7 @@ impl Centre {
             at: next,
             timer: CentreTimer::SlotBegins,
         });
+        // The clock was set back, or the slot is the one in which the program was stopped: no slot begins twice.
         if count <= self.slot {
             return;
         }
@@ -250,6 +251,7 @@ impl Centre {
         // Followers are sent what was observed in the slot before, or the whole state.
         let follows = |member: &Member| member.feedback == Feedback::Echoed;
         if let Some(state) = state.filter(|_| members.iter().any(follows)) {
+            // A follower compares with its copy at the end of the slot before, so the digest is of the state before the prediction.
             let sum = digest(slot.before(), Payload::from(state));
             for (sum_of_member, _) in self.digests.iter_mut().zip(members).filter(|(_, m)| follows(m)) {
                 *sum_of_member = sum;
@@ -273,6 +275,7 @@ impl Centre {
             let to = Recipient::All;
             actions.push(Action::Send { to, frame });
         }
+        // Only now: the echo above is made of the observations of the slot before.
         self.observed.fill(Observation::Nothing);
         self.unusable.fill(false);
         self.echoed = None;

@@ -184,6 +184,7 @@ impl<'a> Frame<'a> {
         if SUM.checksum(&bytes[..covered]).to_be_bytes() != bytes[end..] {
             return Err(DecodeError::Check);
         }
+        // The payload ends `padding` bits before its last byte does.
         let bits = (8 * content.len()).checked_sub(padding).ok_or(DecodeError::Padding)?;
         Ok(Self {
             kind,

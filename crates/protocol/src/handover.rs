@@ -164,6 +164,7 @@ impl Bearer {
         let (after, belief) = (slot.after(), lead.message);
         if next == self.address {
             self.stay(now, after, Some(belief), errands);
+        // After the last slot nobody leads, so nothing is handed over.
         } else if slot.nearest_count(self.schedule.count(now)) < self.last {
             let sum = digest(after, Payload::from(&belief));
             self.pass(next, (after, sum), belief, errands);
@@ -234,6 +235,11 @@ impl Bearer {
 
     /// Accepts a belief that another node has sent or was meant to lead with. If this node leads already, the belief that contains more
     /// slots is kept; in a tie, its own.
+    ///
+    /// A repeated frame does not reach this function: [`on_decoded`](Self::on_decoded) compares it with the last accepted handover, which a
+    /// loss of memory does not clear, and notes the same one as a duplicate, another one of its slot as a disagreement and one of an
+    /// earlier slot as late. This holds for frames that are less than half the range of slot numbers old. Nor does a second report
+    /// that a handover was given up reach it, because the first one removes the handover from `pending`.
     fn take_over(&mut self, now: u64, with: u32, slot: Slot, belief: BitString, errands: &mut Vec<Errand>) {
         if let Some(leads) = self.leads() {
             let note = Note::Disagreement { slot };

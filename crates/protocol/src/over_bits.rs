@@ -127,6 +127,7 @@ impl<E: Estimator> Receiver for OverBits<E> {
         } else {
             self.slot.saturating_add(1)
         };
+        // A model predicts one slot, so the slots that were skipped are predicted too. The belief changes only if all succeed.
         for slot in first..=slot {
             predicted = Some(
                 self.estimator

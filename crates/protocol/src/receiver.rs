@@ -114,6 +114,7 @@ pub fn predict_and_ask<R: Receiver + ?Sized>(
     slot: u64,
 ) -> Result<(Vec<BitString>, Option<BitString>), BoxError> {
     let follows = members.iter().any(|member| member.feedback == Feedback::Echoed);
+    // Before the prediction: followers have the state at the end of the slot before.
     let state = follows.then(|| receiver.state()).transpose()?;
     receiver.predict(slot)?;
     let feedback = (0..members.len()).map(|sensor| receiver.feedback(sensor));

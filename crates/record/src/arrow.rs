@@ -192,6 +192,7 @@ pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Er
     let scaled = |tick: &i64| match shift {
         0 => Some(*tick),
         1.. => tick.checked_mul(scale?),
+        // A coarser unit must divide the tick: no time is rounded.
         _ => Some(*tick)
             .filter(|tick| scale.is_some_and(|scale| tick % scale == 0))
             .zip(scale)

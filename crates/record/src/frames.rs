@@ -13,9 +13,9 @@
 use crate::block::{self, Block, Cells};
 use crate::error::{Damage, Error};
 use crate::header::{Header, MAX_START};
-use crate::ranges::Ranges;
 use crate::schema::Schema;
-use crate::wire::{Bytes, CHECK_BYTES, checksum};
+use crate::waiting::Waiting;
+use crate::wire::{Bytes, read_checked};
 use fewbits_adaptive::Effort;
 use fewbits_numerics::ArgumentError;
 use std::collections::VecDeque;
@@ -39,9 +39,8 @@ pub struct FrameWriter {
     schema: Schema,
     header: Option<Header>,
     max_bytes: usize,
-    ticks: Vec<i64>,
-    columns: Vec<Cells>,
-    ranges: Ranges,
+    /// Rows that are not in a frame yet.
+    rows: Waiting,
     /// Number of rows at which it is next tried whether they fill a frame.
     next_trial: usize,
     has_sent: bool,
@@ -54,6 +53,7 @@ impl FrameWriter {
     /// If `max_bytes` is below [`MIN_FRAME_BYTES`], or the header needs more than 256 pieces.
     pub fn new(schema: Schema, max_bytes: usize) -> Result<Self, Error> {
         let columns = schema.columns.len();
+        // Origin and step of rows take at most 18 bytes more than those of no rows.
         let header = Header::new(schema.clone(), &[], vec![0.0; columns]).to_bytes().len() + 32 + MAX_START * columns;
         let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);
         if max_bytes < least {
@@ -62,9 +62,7 @@ impl FrameWriter {
         Ok(Self {
             header: None,
             max_bytes,
-            ticks: Vec::new(),
-            columns: vec![Vec::new(); schema.columns.len()],
-            ranges: Ranges::new(schema.columns.len()),
+            rows: Waiting::new(columns),
             next_trial: 1,
             has_sent: false,
             schema,
@@ -73,7 +71,7 @@ impl FrameWriter {
 
     /// Number of rows that are not in a frame yet.
     pub fn waiting(&self) -> usize {
-        self.ticks.len()
+        self.rows.ticks.len()
     }
 
     /// The header as at the beginning of a recording, for links without losses; `None` before the first frame.
@@ -108,32 +106,8 @@ impl FrameWriter {
     /// # Errors
     /// If the number of cells is not that of the columns, or the row does not fit into a frame by itself.
     pub fn push(&mut self, tick: i64, row: &[Option<f64>]) -> Result<Vec<Vec<u8>>, Error> {
-        if row.len() != self.columns.len() {
-            let expected = format!("{} cells, one per column", self.columns.len());
-            return Err(ArgumentError::new("row", format!("{} cells", row.len()), expected).into());
-        }
-        self.ticks.push(tick);
-        self.ranges.add(row);
-        self.columns
-            .iter_mut()
-            .zip(row)
-            .for_each(|(cells, cell)| cells.push(*cell));
-        let mut frames = Vec::new();
-        while self.ticks.len() >= self.next_trial.min(self.schema.rows_per_block) && !self.ticks.is_empty() {
-            let rows = self.ticks.len().min(self.schema.rows_per_block);
-            let bytes = self.encode(rows)?;
-            if bytes.len() > self.max_bytes {
-                frames.push(self.largest(rows, bytes.len())?);
-            } else if rows == self.schema.rows_per_block {
-                frames.push(bytes);
-                self.forget(rows);
-            } else {
-                let guess = rows as f64 * FILLED * self.max_bytes as f64 / bytes.len() as f64;
-                self.next_trial = (guess as usize).max(rows + 1);
-                break;
-            }
-        }
-        Ok(frames)
+        self.rows.push(tick, row)?;
+        self.frames(false)
     }
 
     /// Frames of all waiting rows, even if they are not full.
@@ -141,15 +115,25 @@ impl FrameWriter {
     /// # Errors
     /// If a row does not fit into a frame by itself.
     pub fn flush(&mut self) -> Result<Vec<Vec<u8>>, Error> {
-        let mut frames = Vec::new();
-        while !self.ticks.is_empty() {
-            let rows = self.ticks.len().min(self.schema.rows_per_block);
+        self.frames(true)
+    }
+
+    /// The frames that are full, or frames of all rows. Encoding takes the most time, so a frame that is not full is tried again only
+    /// when it probably is.
+    fn frames(&mut self, all: bool) -> Result<Vec<Vec<u8>>, Error> {
+        let (limit, mut frames) = (self.schema.rows_per_block, Vec::new());
+        while self.waiting() > 0 && (all || self.waiting() >= self.next_trial.min(limit)) {
+            let rows = self.waiting().min(limit);
             let bytes = self.encode(rows)?;
             if bytes.len() > self.max_bytes {
                 frames.push(self.largest(rows, bytes.len())?);
-            } else {
+            } else if all || rows == limit {
                 frames.push(bytes);
                 self.forget(rows);
+            } else {
+                let guess = rows as f64 * FILLED * self.max_bytes as f64 / bytes.len() as f64;
+                self.next_trial = (guess as usize).max(rows + 1);
+                break;
             }
         }
         Ok(frames)
@@ -188,24 +172,22 @@ impl FrameWriter {
 
     fn forget(&mut self, rows: usize) {
         self.has_sent = true;
-        self.ticks.drain(..rows);
-        self.columns.iter_mut().for_each(|cells| drop(cells.drain(..rows)));
+        self.rows.remove(rows);
         self.next_trial = rows.max(1);
     }
 
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
         // The first frame: the header's starts follow from all waiting rows.
         if !self.has_sent {
-            let bounds = self.ranges.bounds(&self.schema);
-            let header = Header::new(self.schema.clone(), &self.ticks, bounds);
-            self.header = Some(header.with_starts(&self.columns));
+            self.header = Some(self.rows.header(&self.schema).with_starts(&self.rows.columns));
         }
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let own = self.ranges.own_bounds(header);
-        let cells: Vec<Cells> = self.columns.iter().map(|cells| cells[..rows].to_vec()).collect();
-        Ok(block::encode(header, &self.ticks[..rows], &cells, &own, Effort::Thorough).0)
+        let Waiting { ticks, columns, ranges } = &self.rows;
+        let own = ranges.own_bounds(header);
+        let cells: Vec<Cells> = columns.iter().map(|cells| cells[..rows].to_vec()).collect();
+        Ok(block::encode(header, &ticks[..rows], &cells, &own, Effort::Thorough).0)
     }
 }
 
@@ -244,6 +226,7 @@ impl FrameReader {
             return self.piece(frame).map_err(damaged);
         }
         let Some(header) = &self.header else {
+            // The oldest is dropped: the memory is bounded, also if the header never comes.
             if self.waiting.len() == MAX_WAITING {
                 self.waiting.pop_front();
             }
@@ -254,18 +237,15 @@ impl FrameReader {
     }
 
     fn piece(&mut self, frame: &[u8]) -> Result<Vec<Block>, Damage> {
-        let mut reader = Bytes(&frame[1..]);
-        if reader.byte()? != PIECE {
+        if frame.get(1) != Some(&PIECE) {
             return Err(Damage::NoBlock);
         }
-        let length = reader.count(frame.len(), "length")?;
-        let mut content = Bytes(reader.take(length)?);
-        let end = frame.len() - reader.0.len();
-        let sum = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
-        reader.finish()?;
-        if sum != checksum(&[&[0; 4], &frame[..end]]) {
-            return Err(Damage::Checksum);
+        // The receiver of a piece has no header yet, so the checksum covers zeros in place of the header's.
+        let (content, whole) = read_checked(0, frame, 2, 0..=frame.len())?;
+        if whole != frame.len() {
+            return Err(Damage::Content("length"));
         }
+        let mut content = Bytes(content);
         let check = u32::from_le_bytes(content.array()?);
         let [last, number] = content.array()?;
         if number > last {
@@ -275,6 +255,7 @@ impl FrameReader {
             return Ok(Vec::new());
         }
         let count = usize::from(last) + 1;
+        // Pieces of another header replace those before: its sender has started anew.
         let known = self
             .pieces
             .take()

@@ -220,6 +220,7 @@ const DOUBLE: u8 = 0xff;
 fn push_number(body: &mut Vec<u8>, number: f64) {
     let digits = (0_u8..).zip(TENS).find_map(|(decimals, ten)| {
         let digits = (number * ten).round();
+        // Such digits take at most 6 bytes, the double itself 8.
         (digits < 2f64.powi(42) && digits / ten == number).then_some((decimals, digits as u64))
     });
     match digits {

@@ -8,7 +8,7 @@ use crate::block::Cells;
 use crate::error::Damage;
 use crate::header::Header;
 use crate::ranges::{self, Ends};
-use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint, unzigzag, zigzag};
+use crate::wire::{Bytes, checked, push_varint, read_checked, unzigzag, zigzag};
 
 /// Number of blocks per segment.
 pub(crate) const BLOCKS_PER_SEGMENT: usize = 1024;
@@ -97,14 +97,9 @@ impl Segment {
     }
 }
 
-/// A special record: mark, kind, content, checksum.
+/// A special record: mark, kind, length, content, checksum.
 pub(crate) fn special(check: u32, kind: u8, content: &[u8]) -> Vec<u8> {
-    let mut bytes = vec![0, kind];
-    push_varint(&mut bytes, content.len() as u64);
-    bytes.extend_from_slice(content);
-    let sum = checksum(&[&check.to_le_bytes(), &bytes]);
-    bytes.extend(sum.to_le_bytes());
-    bytes
+    checked(check, &[0, kind], content)
 }
 
 /// The longest content of a special record of a recording.
@@ -118,25 +113,13 @@ fn max_content(kind: u8, columns: usize) -> usize {
 
 /// Kind, content and whole length of the special record at the front, which begins with 0.
 pub(crate) fn read_special<'a>(header: &Header, bytes: &'a [u8]) -> Result<(u8, &'a [u8], usize), Damage> {
-    let mut reader = Bytes(bytes);
-    if reader.byte()? != 0 {
+    let [mark, kind] = Bytes(bytes).array()?;
+    if mark != 0 {
         return Err(Damage::NoBlock);
     }
-    let kind = reader.byte()?;
-    let length = reader.varint().map_err(|damage| match damage {
-        Damage::CutOff => damage,
-        _ => Damage::NoBlock,
-    })?;
-    if length > max_content(kind, header.schema.columns.len()) as u64 {
-        return Err(Damage::NoBlock);
-    }
-    let content = reader.take(length as usize)?;
-    let end = bytes.len() - reader.0.len();
-    let sum = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
-    if sum != checksum(&[&header.check.to_le_bytes(), &bytes[..end]]) {
-        return Err(Damage::Checksum);
-    }
-    Ok((kind, content, end + CHECK_BYTES))
+    let limit = max_content(kind, header.schema.columns.len());
+    let (content, whole) = read_checked(header.check, bytes, 2, 0..=limit)?;
+    Ok((kind, content, whole))
 }
 
 /// The largest `f32` that does not exceed `value`.
@@ -267,6 +250,7 @@ pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>
     let mut length = 0_u64;
     for _ in 0..count {
         let head = reader.varint()?;
+        // Any lengths can stand here: `playback::entries` compares their sum with the footer.
         length = length.wrapping_add(unzigzag(head >> 1) as u64);
         let mut entry = Entry::damaged(length, columns);
         let shape = if head & 1 == 1 {

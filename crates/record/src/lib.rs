@@ -66,6 +66,7 @@ mod scan;
 mod schema;
 mod specials;
 mod time;
+mod waiting;
 mod wire;
 
 pub use block::{Block, Cells};

@@ -212,6 +212,7 @@ pub(crate) fn segments(reader: &mut (impl Read + Seek), header: &Header) -> Resu
         }
         _ => return Ok(None),
     };
+    // The segments must fill the file up to the footer: offsets of blocks are sums of lengths.
     let ends = |segments: &Vec<Segment>| segments.last().map_or(first, Segment::end) == expected;
     Ok(found.ok().filter(ends))
 }
@@ -263,6 +264,7 @@ impl<R: Read + Seek> Blocks<'_, R> {
             damage,
         };
         let header = &self.playback.header;
+        // The length before a block and the checksum after it take at most 14 bytes. Nothing longer is read, whatever the index says.
         let limit = block::max_bytes(header) as u64 + 16;
         if entry.length > limit || entry.rows == 0 {
             return Err(damaged(Damage::NoBlock));
@@ -282,6 +284,7 @@ impl<R: Read + Seek> Blocks<'_, R> {
             self.scan = None;
             return Some(Err(Error::io("read")(error)));
         }
+        // Each block has a new scanner, because a scanner borrows the reader. The stretch then begins after that block.
         let header = &self.playback.header;
         let mut scanner: Scanner<Take<&mut R>> = Scanner::new(reader.take(end - start), start);
         loop {
@@ -322,6 +325,7 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
                 }
             }
             if let Some((offset, entry)) = self.entries.pop_front() {
+                // An entry without rows stands for damaged bytes, whose times are unknown: they are reported for every range.
                 if entry.rows > 0 && !self.overlaps(entry.ticks) {
                     continue;
                 }

@@ -1,14 +1,13 @@
 //! Writing of recordings.
 
-use crate::block::{self, Cells};
+use crate::block;
 use crate::error::Error;
 use crate::header::Header;
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
-use crate::ranges::Ranges;
 use crate::resume;
-use crate::schema::{Schema, TimeBase};
+use crate::schema::Schema;
+use crate::waiting::Waiting;
 use fewbits_adaptive::Effort;
-use fewbits_numerics::ArgumentError;
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -30,9 +29,8 @@ pub struct Recorder<W> {
     writer: W,
     schema: Schema,
     header: Option<Header>,
-    ticks: Vec<i64>,
-    columns: Vec<Cells>,
-    ranges: Ranges,
+    /// The rows of the block that is not full yet.
+    rows: Waiting,
     next_tick: i64,
     /// Number of bytes written.
     offset: u64,
@@ -69,22 +67,17 @@ impl Recorder<File> {
     /// If the file cannot be opened, read or truncated, or its header is incomplete or damaged.
     pub fn resume(path: impl AsRef<Path>) -> Result<Self, Error> {
         let (file, resumed) = resume::open(path.as_ref())?;
-        let mut recorder = Self::new(file, resumed.header.schema.clone());
-        recorder.header = Some(resumed.header);
-        recorder.next_tick = resumed.next_tick;
-        recorder.offset = resumed.offset;
-        recorder.segment_start = resumed.segments.last().map_or_else(
-            || {
-                recorder
-                    .header
-                    .as_ref()
-                    .map_or(0, |header| header.to_bytes().len() as u64)
-            },
-            Segment::end,
-        );
-        recorder.segments = resumed.segments;
-        recorder.entries = resumed.entries;
-        Ok(recorder)
+        let schema = resumed.header.schema.clone();
+        let first = resumed.header.to_bytes().len() as u64;
+        Ok(Self {
+            header: Some(resumed.header),
+            next_tick: resumed.next_tick,
+            offset: resumed.offset,
+            segment_start: resumed.segments.last().map_or(first, Segment::end),
+            segments: resumed.segments,
+            entries: resumed.entries,
+            ..Self::new(file, schema)
+        })
     }
 
     /// Writes the rows so far as a block, even if it is not full, and waits until the storage device has them.
@@ -100,14 +93,11 @@ impl Recorder<File> {
 impl<W: Write> Recorder<W> {
     /// A recording into any sink. Each block is written by one call, so no buffer is needed.
     pub fn new(writer: W, schema: Schema) -> Self {
-        let columns = schema.columns.len();
         Self {
             writer,
+            rows: Waiting::new(schema.columns.len()),
             schema,
             header: None,
-            ticks: Vec::new(),
-            columns: vec![Vec::new(); columns],
-            ranges: Ranges::new(columns),
             next_tick: 0,
             offset: 0,
             segment_start: 0,
@@ -147,17 +137,9 @@ impl<W: Write> Recorder<W> {
         if self.broken {
             return Err(Error::Broken);
         }
-        if row.len() != self.columns.len() {
-            let expected = format!("{} cells, one per column", self.columns.len());
-            return Err(ArgumentError::new("row", format!("{} cells", row.len()), expected).into());
-        }
-        self.ticks.push(tick);
-        self.ranges.add(row);
-        for (cells, cell) in self.columns.iter_mut().zip(row) {
-            cells.push(*cell);
-        }
+        self.rows.push(tick, row)?;
         self.next_tick = tick.wrapping_add(1);
-        if self.ticks.len() == self.schema.rows_per_block {
+        if self.rows.ticks.len() == self.schema.rows_per_block {
             self.write_block(Starts::Learned)?;
         }
         Ok(())
@@ -179,7 +161,7 @@ impl<W: Write> Recorder<W> {
         if self.broken {
             return Err(Error::Broken);
         }
-        if !self.ticks.is_empty() {
+        if !self.rows.ticks.is_empty() {
             self.write_block(Starts::Learned)?;
         }
         self.writer.flush().map_err(Error::io("write"))
@@ -194,7 +176,7 @@ impl<W: Write> Recorder<W> {
             return Err(Error::Broken);
         }
         // A single block contains itself what several would share.
-        if !self.ticks.is_empty() {
+        if !self.rows.ticks.is_empty() {
             self.write_block(Starts::None)?;
         }
         self.write_header(Starts::None)?;
@@ -217,6 +199,7 @@ impl<W: Write> Recorder<W> {
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Error> {
         if let Err(error) = self.writer.write_all(bytes) {
+            // The file may now end within a block, and nothing may follow that.
             self.broken = true;
             return Err(Error::io("write")(error));
         }
@@ -228,10 +211,9 @@ impl<W: Write> Recorder<W> {
         if self.header.is_some() {
             return Ok(());
         }
-        let bounds = self.ranges.bounds(&self.schema);
-        let mut header = Header::new(self.schema.clone(), &self.ticks, bounds);
+        let mut header = self.rows.header(&self.schema);
         if starts == Starts::Learned {
-            header = header.with_starts(&self.columns);
+            header = header.with_starts(&self.rows.columns);
         }
         self.write(&header.to_bytes())?;
         self.segment_start = self.offset;
@@ -244,12 +226,14 @@ impl<W: Write> Recorder<W> {
         let Some(header) = &self.header else {
             return Err(Error::Broken);
         };
-        let own = self.ranges.own_bounds(header);
-        let (bytes, restored) = block::encode(header, &self.ticks, &self.columns, &own, self.effort);
+        let Waiting { ticks, columns, ranges } = &self.rows;
+        let own = ranges.own_bounds(header);
+        let (bytes, restored) = block::encode(header, ticks, columns, &own, self.effort);
+        // The index has the ends of what a reader gets, which may lie outside those of the samples.
+        let entry = Entry::of(bytes.len() as u64, ticks, &restored);
         self.write(&bytes)?;
-        self.entries.push(Entry::of(bytes.len() as u64, &self.ticks, &restored));
-        self.ticks.clear();
-        self.columns.iter_mut().for_each(Vec::clear);
+        self.entries.push(entry);
+        self.rows.remove(self.rows.ticks.len());
         if self.entries.len() == BLOCKS_PER_SEGMENT {
             self.write_segment(index::SEGMENT)?;
         }
@@ -271,10 +255,5 @@ impl<W: Write> Recorder<W> {
         self.segments.push(segment);
         self.entries.clear();
         Ok(())
-    }
-
-    /// Whether rows are numbered.
-    pub fn is_numbered(&self) -> bool {
-        self.schema.time == TimeBase::Numbered
     }
 }

@@ -22,6 +22,7 @@ pub(crate) fn open(path: &Path) -> Result<(File, Resumed), Error> {
         Some(resumed) => resumed,
         None => from_blocks(&mut file, header)?,
     };
+    // If the program stops after this line, the file is a recording that was not finished, which can be read and resumed.
     file.set_len(resumed.offset).map_err(Error::io("truncate"))?;
     file.seek(SeekFrom::Start(resumed.offset)).map_err(Error::io("read"))?;
     Ok((file, resumed))
@@ -50,7 +51,7 @@ fn from_index(file: &mut File, header: &Header) -> Result<Option<Resumed>, Error
         let Some(found) = playback::entries(file, header, &last)? else {
             return Ok(None);
         };
-        // The last segment is not full: continue it.
+        // The last segment is not full: it is overwritten, and its entries go into the next one.
         if found.len() < BLOCKS_PER_SEGMENT {
             offset = last.start + last.blocks;
             entries = found;
@@ -81,6 +82,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
             Err(Error::Block { .. }) => continue,
             Err(error) => return Err(error),
         };
+        // Skipped bytes stay in the file, so they need an entry: offsets of blocks are sums of lengths.
         if found.offset > offset {
             entries.push(Entry::damaged(found.offset - offset, columns));
         }

@@ -145,6 +145,7 @@ impl<R: Read> Scanner<R> {
                 Ok((kind, length)) => {
                     let found = self.found(kind, length);
                     let Some(damage) = first else { return Ok(Some(found)) };
+                    // The damage is reported first, and the record after it by the next call.
                     self.pending = Some(found);
                     return Err(Error::Block {
                         offset: start,
@@ -162,6 +163,7 @@ impl<R: Read> Scanner<R> {
                     });
                 }
                 Err(damage) => {
+                    // Try the next byte. Bytes that are no record pass for one with probability 2^-32, by the checksum.
                     first.get_or_insert(damage);
                     self.position += 1;
                 }

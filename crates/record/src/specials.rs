@@ -102,6 +102,7 @@ impl Count {
         // Counts stay below 2^28, those of 2^24 cells of a block.
         let one = (u64::from(self.yes) << 16) / u64::from(self.yes + self.no);
         let bit = coder.bit((one as u32).clamp(1, 65_535), wanted);
+        // A decision counts 2, so that a count of 1 before the first one is a half.
         *(if bit { &mut self.yes } else { &mut self.no }) += 2;
         bit
     }
@@ -157,10 +158,12 @@ pub(crate) fn code<C: Coder>(
             };
             last = special;
             all[*column].push(Some(special));
+            // Damaged bytes may be too few: stop here instead of inventing the remaining rows.
             if coder.overran() {
                 return Err(Damage::Content("special cells"));
             }
         }
+        // A row in which all of several columns are special is probably part of an outage, which goes on in the next row.
         all_above = found > 1 && found == present.len();
     }
     Ok(all)

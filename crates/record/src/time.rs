@@ -81,6 +81,7 @@ impl Grid {
         if size == 0 {
             return None;
         }
+        // The nearest one, because the first tick may be off the grid by the tolerance.
         let block = (first + size.abs() / 2 * size.signum()).div_euclid(size);
         let block = u64::try_from(block).ok().filter(|b| i128::from(*b) < MAX_BLOCK)?;
         let fits = |(row, tick): (usize, &i64)| {
@@ -93,6 +94,7 @@ impl Grid {
 
 fn even_tick(start: i64, span: i64, row: usize, rows: usize) -> Option<i64> {
     let steps = (rows as i128 - 1).max(1);
+    // The quotient rounded to the nearest, halves up, in whole numbers.
     let ahead = (2 * i128::from(span) * row as i128 + steps).div_euclid(2 * steps);
     i64::try_from(i128::from(start) + ahead).ok()
 }
@@ -149,11 +151,13 @@ fn coded(ticks: &[i64], grid: &Grid) -> Option<Vec<u8>> {
 fn coded_in(ticks: &[i64], grid: &Grid, scale: u64, unit: i128) -> Option<Vec<u8>> {
     let (start, last) = (*ticks.first()?, *ticks.last()?);
     let steps = ticks.len() as i128 - 1;
+    // A multiple of `unit`: then the rests of exact ticks are multiples of their divisor too.
     let mean = (i128::from(last) - i128::from(start)) / (steps.max(1) * unit) * unit;
     let numbers = ticks.iter().enumerate().map(|(row, tick)| {
         let rest = i128::from(*tick) - i128::from(start) - mean * row as i128;
         let scale = i128::from(scale);
         let number = (2 * rest + scale).div_euclid(2 * scale);
+        // Such numbers, and the differences of two, are exact doubles.
         (number.abs() < 1 << 52).then_some(number as f64)
     });
     let numbers: Vec<f64> = numbers.collect::<Option<_>>()?;

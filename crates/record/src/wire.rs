@@ -2,6 +2,7 @@
 
 use crate::error::Damage;
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use std::ops::RangeInclusive;
 
 /// The checksum of headers, blocks and index: CRC-32 as in zip and PNG.
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
@@ -16,6 +17,45 @@ pub(crate) fn checksum(parts: &[&[u8]]) -> u32 {
         digest.update(part);
     }
     digest.finalize()
+}
+
+/// A record as it is written: head, length of the content, content, and the checksum of `check` and all of it.
+pub(crate) fn checked(check: u32, head: &[u8], content: &[u8]) -> Vec<u8> {
+    let mut bytes = head.to_vec();
+    push_varint(&mut bytes, content.len() as u64);
+    bytes.extend_from_slice(content);
+    let sum = checksum(&[&check.to_le_bytes(), &bytes]);
+    bytes.extend(sum.to_le_bytes());
+    bytes
+}
+
+/// Reads what [`checked`] wrote with a head of this length: the content, and the length of the whole record.
+///
+/// # Errors
+/// [`Damage::CutOff`] if the slice ends before the record, [`Damage::NoBlock`] if its length is not one of `lengths`, and
+/// [`Damage::Checksum`]. The length is verified first, so that damaged bytes never let a reader wait for a record without end.
+pub(crate) fn read_checked(
+    check: u32,
+    bytes: &[u8],
+    head: usize,
+    lengths: RangeInclusive<usize>,
+) -> Result<(&[u8], usize), Damage> {
+    let mut reader = Bytes(bytes);
+    reader.take(head)?;
+    let length = reader.count(*lengths.end(), "length").map_err(|damage| match damage {
+        Damage::CutOff => damage,
+        _ => Damage::NoBlock,
+    })?;
+    if !lengths.contains(&length) {
+        return Err(Damage::NoBlock);
+    }
+    let content = reader.take(length)?;
+    let end = bytes.len() - reader.0.len();
+    let sum = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
+    if sum != checksum(&[&check.to_le_bytes(), &bytes[..end]]) {
+        return Err(Damage::Checksum);
+    }
+    Ok((content, end + CHECK_BYTES))
 }
 
 /// Appends an integer in groups of seven bits, lowest first; every byte but the last has its top bit set.

@@ -1,8 +1,10 @@
 //! The fusion centre for sensors that all measure the same level.
 
 use super::rows::Instant;
-use super::sensors::{Sends, threshold_bits};
+use super::sensors;
 use crate::arguments::Model;
+use crate::error::Failure;
+use crate::report::Report;
 use fewbits_core::{Gaussian, Link, Observation, SensorNode};
 use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, Slot};
 use fewbits_filters::{Error as FilterError, MomentFilter};
@@ -10,9 +12,6 @@ use fewbits_models::ContinuousLinear;
 use nalgebra::{SMatrix, SVector, Vector1};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-
-/// Why a row was refused, or no centre could be made.
-pub(super) type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// Probability per row that a sensor fails.
 const FAILURE: f64 = 1e-4;
@@ -46,7 +45,7 @@ pub(super) struct World {
 /// Model of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Seat {
-    pub(super) sends: Sends,
+    pub(super) sends: Report,
     /// Standard deviation of its measurement noise.
     pub(super) noise: f64,
     pub(super) threshold: Option<f64>,
@@ -99,6 +98,8 @@ pub(super) enum Use {
 pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, Failure> {
     let (c, t) = (world.change * world.change, world.within);
     Ok(match world.model {
+        // From known values at time 0, the level after `t` has the variance `q t`, `q t^3 / 3` or `q t^5 / 20` if the level, the slope or
+        // the curvature is a random walk of density `q`. Here it is `c`.
         Model::Velocity => {
             let model = ContinuousLinear::nearly_constant_velocity(3.0 * c / t.powi(3))?;
             Box::new(Centre::<2>::new(model, world, purpose)?)
@@ -169,14 +170,14 @@ impl<const D: usize> Centre<D> {
         let number = sensor as u32;
         let member = &mut self.members[sensor];
         let feedback = match member.seat.threshold {
-            Some(threshold) => threshold_bits(threshold - member.seat.offset)?,
+            Some(threshold) => sensors::double(threshold - member.seat.offset)?,
             None => self.centre.feedback(number)?,
         };
         // A measurement that is not finite counts as missing.
         let report = match cell.filter(|cell| cell.is_finite()) {
             None => None,
-            Some(cell) if self.purpose == Use::Reports && member.seat.sends != Sends::Value => {
-                Some(member.seat.sends.bits(cell)?)
+            Some(cell) if self.purpose == Use::Reports && member.seat.sends != Report::Value => {
+                Some(sensors::bits(member.seat.sends, cell)?)
             }
             Some(cell) => {
                 let measurement = Vector1::new(cell - member.seat.offset);
@@ -190,15 +191,16 @@ impl<const D: usize> Centre<D> {
 impl<const D: usize> Estimator for Centre<D> {
     fn join(&mut self, seat: Seat) -> Result<(), Failure> {
         let sends = if self.purpose == Use::Comparison {
-            Sends::Value
+            Report::Value
         } else {
             seat.sends
         };
         let seat = Seat { sends, ..seat };
-        let remote = sends.remote::<D>(seat.noise, Link::lossy(seat.loss)?)?;
+        let variance = seat.noise * seat.noise;
+        let remote = sends.remote::<D>(0, variance, Link::lossy(seat.loss)?)?;
         self.centre.join_boxed(self.members.len() as u32, remote)?;
         self.members.push(Member {
-            node: sends.node(seat.noise)?,
+            node: sends.node::<D>(0, variance)?,
             seat,
         });
         Ok(())
@@ -209,6 +211,7 @@ impl<const D: usize> Estimator for Centre<D> {
     }
 
     fn step(&mut self, instant: &Instant) -> Result<Step, Failure> {
+        // First the forecast: sensors compare with it, so the feedback of all slots is made before any report is used.
         self.centre.advance(&mut self.rng, instant.seconds)?;
         let slots = instant.reports.iter().map(|(sensor, cell)| self.slot(*sensor, *cell));
         let slots: Vec<Slot> = slots.collect::<Result<_, _>>()?;

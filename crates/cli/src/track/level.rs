@@ -1,12 +1,12 @@
 //! Tracking of a level that sensors measure: estimates with bands, row by row.
 
-use super::centre::{Estimator, Failure, Step, Use, centre};
+use super::centre::{Estimator, Step, Use, centre};
 use super::report::{BAND, first_cell, first_name, summarise};
 use super::rows::{Instant, Instants};
 use super::settings::Settings;
 use crate::Ending;
 use crate::arguments::{Model, TrackOptions};
-use crate::error::Error;
+use crate::error::{Error, Failure};
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
 use serde::Serialize;

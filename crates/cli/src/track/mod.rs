@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `rows` | the table as instants |
-//! | `sensors` | what a sensor sends, at both ends |
+//! | `sensors` | reports as options and tables have them |
 //! | `centre` | the centre of a level |
 //! | `settings` | what options and first rows say |
 //! | `report` | first cell of a row, summary |

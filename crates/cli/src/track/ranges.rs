@@ -2,13 +2,14 @@
 
 use super::report::{BAND, first_cell, first_name, summarise};
 use super::rows::Instants;
-use super::sensors::Sends;
+use super::sensors;
 use crate::Ending;
 use crate::arguments::{TableOptions, TrackOptions};
 use crate::error::Error;
 use crate::input::Table;
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
+use crate::report::Report;
 use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
 use fewbits_record::TimeBase;
 use nalgebra::Vector2;
@@ -48,10 +49,8 @@ fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
     };
     let names = Table::open(&options(Vec::new()))?.names;
     let [name, x, y] = names.as_slice() else {
-        return Err(Error::Mismatch {
-            file: file.to_owned(),
-            problem: format!("columns {}: three are expected, name, x and y", names.join(", ")),
-        });
+        let problem = format!("columns {}: three are expected, name, x and y", names.join(", "));
+        return Err(Error::content(file, problem));
     };
     let mut table = Table::open(&options(vec![x.clone(), y.clone()]))?.with_labels(name)?;
     let mut anchors: Vec<Anchor> = Vec::new();
@@ -65,10 +64,7 @@ fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
             }
             _ => format!("anchor `{label}` has no place: write x and y"),
         };
-        return Err(Error::Mismatch {
-            file: file.to_owned(),
-            problem: format!("row {row}: {problem}"),
-        });
+        return Err(Error::content(file, format_args!("row {row}: {problem}")));
     }
     Ok(anchors)
 }
@@ -76,10 +72,10 @@ fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
 /// Runs the task.
 pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) -> Result<Ending, Error> {
     let anchors = read_anchors(file, options.table.delimiter)?;
-    let travel = match Sends::parse(&options.send)? {
-        Sends::Value => Travel::Full,
-        Sends::Bit => Travel::Bits(1),
-        Sends::Word(bits) => Travel::Bits(bits),
+    let travel = match sensors::parse(&options.send)? {
+        Report::Value | Report::Censored { .. } => Travel::Full,
+        Report::Sign => Travel::Bits(1),
+        Report::Word { bits } => Travel::Bits(bits),
     };
     if options.reports {
         return Err(Error::option("--reports", "--model ranges", "measured ranges, which this command quantizes"));
@@ -154,6 +150,7 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
             if estimate.as_ref().is_some_and(|estimate| estimate.lost) {
                 events = "lost";
             }
+            // The last estimate of an instant has used all of its ranges.
             found = estimate.or(found);
             summary.anchors[anchor].ranges += 1;
             ranges += 1;
@@ -192,10 +189,7 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
     summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
     if summary.rows == 0 {
-        return Err(Error::Empty {
-            file: instants.file().to_owned(),
-            what: "rows",
-        });
+        return Err(Error::empty(instants.file(), "rows"));
     }
     if let Some(file) = &options.plot {
         picture(&anchors, path.points(), &summary).save(file)?;
@@ -212,12 +206,8 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
 }
 
 fn unknown(table: &str, name: &str, anchors: &str) -> Error {
-    Error::Mismatch {
-        file: table.to_owned(),
-        problem: format!(
-            "`{name}` is no anchor of {anchors}: add it there, choose columns with --columns, or name the column of anchors with --by"
-        ),
-    }
+    let mend = "add it there, choose columns with --columns, or name the column of anchors with --by";
+    Error::content(table, format_args!("`{name}` is no anchor of {anchors}: {mend}"))
 }
 
 /// Corners of a drawn ellipse's cross, and how many there are along a path.

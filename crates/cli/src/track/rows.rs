@@ -56,20 +56,13 @@ impl Instants {
         if let Some(name) = &options.by {
             table = table.with_labels(name)?;
             if table.names.len() != 1 {
-                return Err(Error::Mismatch {
-                    file: table.file().to_owned(),
-                    problem: format!(
-                        "columns {}: one column of values is expected beside time and --by, name it with --columns",
-                        table.names.join(", ")
-                    ),
-                });
+                let names = table.names.join(", ");
+                let expected = "one column of values is expected beside time and --by, name it with --columns";
+                return Err(Error::content(table.file(), format_args!("columns {names}: {expected}")));
             }
         }
         if table.names.is_empty() {
-            return Err(Error::Empty {
-                file: table.file().to_owned(),
-                what: "columns of values",
-            });
+            return Err(Error::empty(table.file(), "columns of values"));
         }
         let base = table.time_base(&table_options, None)?;
         let tick = match base {
@@ -158,27 +151,22 @@ impl Instants {
             }
         }
         let first = *self.first.get_or_insert(tick);
+        // The difference is taken in whole ticks: as nanoseconds since 1970, doubles are 256 apart.
         let seconds = (i128::from(tick) - i128::from(first)) as f64 * self.tick;
         let time = clock::shown(tick, self.base);
         if seconds < self.last {
-            return Err(Error::Mismatch {
-                file: self.file().to_owned(),
-                problem: format!(
-                    "row {}: time {time} is before that of the row above: sort the rows by time",
-                    self.table.row()
-                ),
-            });
+            let row = self.table.row();
+            let problem = format!("row {row}: time {time} is before that of the row above: sort the rows by time");
+            return Err(Error::content(self.file(), problem));
         }
         self.last = seconds;
         let reports = if self.is_long {
             let label = self.table.label();
-            let sensor = match self.names.iter().position(|name| name == label) {
-                Some(sensor) => sensor,
-                None => {
-                    self.names.push(label.to_owned());
-                    self.names.len() - 1
-                }
-            };
+            let known = self.names.iter().position(|name| name == label);
+            let sensor = known.unwrap_or_else(|| {
+                self.names.push(label.to_owned());
+                self.names.len() - 1
+            });
             vec![(sensor, cells[0])]
         } else {
             cells.into_iter().enumerate().collect()

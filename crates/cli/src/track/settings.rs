@@ -2,11 +2,12 @@
 
 use super::centre::{Seat, Use, World, centre};
 use super::rows::{Instant, Instants};
-use super::sensors::Sends;
+use super::sensors;
 use crate::arguments::{Model, TrackOptions};
 use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::numbers::{above_zero, mean_and_deviation, number};
+use crate::report::Report;
 
 /// Number of rows that are examined before the first estimate.
 const FIRST_ROWS: usize = 200;
@@ -30,7 +31,7 @@ pub(super) struct Settings {
     pub(super) world: World,
     noises: PerColumn<Option<f64>>,
     pub(super) noise: f64,
-    sends: PerColumn<Sends>,
+    sends: PerColumn<Report>,
     thresholds: PerColumn<Option<f64>>,
     /// Per sensor, as far as the first rows go.
     losses: Vec<f64>,
@@ -89,7 +90,7 @@ impl Settings {
         let noises = PerColumn::parse(&options.noise, None, |text| above_zero("--noise", text, NOISE).map(Some))?;
         let thresholds =
             PerColumn::parse(&options.threshold, None, |text| number("--threshold", text, THRESHOLD).map(Some))?;
-        let sends = PerColumn::parse(&options.send, Sends::Value, Sends::parse)?;
+        let sends = PerColumn::parse(&options.send, Report::Value, sensors::parse)?;
         if options.by.is_none() {
             noises.check(&instants.names, instants.file())?;
             thresholds.check(&instants.names, instants.file())?;
@@ -111,10 +112,7 @@ impl Settings {
         };
         let first: Vec<Instant> = instants.peek(rows)?.iter().cloned().collect();
         if first.is_empty() {
-            return Err(Error::Empty {
-                file: instants.file().to_owned(),
-                what: "rows",
-            });
+            return Err(Error::empty(instants.file(), "rows"));
         }
         let sensors = instants.names.len();
         let gaps = (0..sensors).map(|sensor| {
@@ -147,7 +145,7 @@ impl Settings {
         settings.world.within = asked_change.map_or(settings.world.interval, |change| change.1);
         let can_look = |option: &'static str, asked: bool| {
             let is_bits =
-                options.reports && (0..sensors).any(|n| settings.sends.of(&instants.names[n]) != &Sends::Value);
+                options.reports && (0..sensors).any(|n| settings.sends.of(&instants.names[n]) != &Report::Value);
             if is_bits && !asked {
                 Err(Error::Needed {
                     option,
@@ -194,10 +192,13 @@ impl Settings {
             .iter()
             .flat_map(|values| values.windows(2).map(|pair| (pair[1] - pair[0]).abs()))
             .collect();
+        // At a constant level the difference of two values has `sqrt(2)` times the deviation of the noise. Jumps of the level hardly move the
+        // median.
         let typical = median(differences.clone()) / (NORMAL_MEDIAN * std::f64::consts::SQRT_2);
         let mean_size = differences.iter().sum::<f64>() / (differences.len() as f64).max(1.0);
         let steps = fewbits_adaptive::own_steps(&flat);
         let floor = ROUNDING * steps.into_iter().reduce(f64::min).unwrap_or(0.0);
+        // The median is 0 if most values repeat the one before.
         let scale = [typical, mean_size, spread].into_iter().find(|size| *size > 0.0);
         let Some(scale) = scale.map(|scale| scale.max(floor)) else {
             return Err(Error::Needed {
@@ -241,6 +242,7 @@ impl Settings {
             self.noise = noise;
             self.log_likelihood(first, sensors).unwrap_or(f64::NEG_INFINITY)
         };
+        // Search along one axis at a time, in logarithms relative to the first guess, with smaller and smaller steps.
         let (mut best, mut place) = (likelihood([0.0, 0.0]), [0.0, 0.0]);
         let free = [fit_change, fit_noise];
         for step in STEPS {
@@ -270,7 +272,7 @@ impl Settings {
         let mut centre = centre(&self.world, Use::Comparison).ok()?;
         for sensor in 0..sensors {
             centre
-                .join(self.seat_with(sensor, Sends::Value, self.noise, None))
+                .join(self.seat_with(sensor, Report::Value, self.noise, None))
                 .ok()?;
         }
         let steps = first
@@ -279,7 +281,7 @@ impl Settings {
         steps.sum()
     }
 
-    fn seat_with(&self, sensor: usize, sends: Sends, noise: f64, threshold: Option<f64>) -> Seat {
+    fn seat_with(&self, sensor: usize, sends: Report, noise: f64, threshold: Option<f64>) -> Seat {
         Seat {
             sends,
             noise,
@@ -297,6 +299,6 @@ impl Settings {
 
     /// Whether any sensor sends quantized reports.
     pub(super) fn has_bits(&self, names: &[String]) -> bool {
-        names.iter().any(|name| *self.sends.of(name) != Sends::Value)
+        names.iter().any(|name| *self.sends.of(name) != Report::Value)
     }
 }

@@ -96,6 +96,7 @@ impl SimulatorCore {
     /// Draws the copies that arrive at every node that could receive the attempt.
     fn draw(&mut self, attempt: &Attempt<'_>, pool: &mut BufferPool) -> Vec<Reception> {
         let (from, size) = (attempt.from, attempt.size);
+        // This number names the random streams of the attempt, so it is read before `charge` counts the frame.
         let sent = u64::from(self.state.ledger.accounts[from.index()].frames);
         let mut receptions = std::mem::take(&mut pool.receptions);
         let hearers = match attempt.to {
@@ -181,6 +182,7 @@ impl SimulatorCore {
             receiving = radio.turn() + radio.receive(radio.acknowledgement);
             awake += radio.answer_time();
         }
+        // A repetition carries no new payload.
         let payload = Bits(if attempt.before == 0 { attempt.size.payload } else { 0 });
         let accounts = &mut self.state.ledger.accounts;
         let sender = &mut accounts[from.index()];
@@ -237,6 +239,7 @@ impl SimulatorCore {
             }
             for copy in &reception.copies {
                 let at = on_air.after(copy.delay);
+                // A receiver acknowledges only what it can read.
                 let mut answer = attempt.answer.filter(|_| self.is_intact(attempt.frames, copy));
                 for bits in frames_of(attempt.frames, copy) {
                     let from = attempt.from;

@@ -121,6 +121,7 @@ impl Queue {
     pub(crate) fn push(&mut self, time: Instant, node: SensorId, kind: EventKind) {
         let mut event = Event::new(time, self.sequence, node, kind);
         self.sequence += 1;
+        // Either `front` precedes all events of the heap, or there is none.
         let first = self.front.or_else(|| self.heap.peek().map(|event| event.0));
         if first.is_none_or(|first| event < first) {
             match self.front.replace(event) {
@@ -157,6 +158,7 @@ impl Queue {
 
     /// Destroys bits on their way. Returns whether there were any.
     pub(crate) fn destroy(&mut self, place: u32) -> bool {
+        // The place stays taken: the event of the arrival still refers to it, and `take` frees it.
         self.arrivals
             .get_mut(place as usize)
             .is_some_and(|arrival| arrival.take().is_some())

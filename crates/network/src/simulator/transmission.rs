@@ -91,6 +91,7 @@ impl SimulatorCore {
     fn dispatch(&mut self, from: SensorId, to: Option<SensorId>, frames: &[BitString], tickets: &[Ticket]) {
         self.drain(from);
         let acknowledged = self.is_acknowledged(to);
+        // A sender in an outage loses the frame, unless it repeats frames: then it tries again after the outage.
         if !self.is_alive(from) || (!acknowledged && !self.listens(from)) {
             self.state.ledger.faults.lost += 1;
             return;

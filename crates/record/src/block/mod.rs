@@ -10,7 +10,7 @@ mod write;
 use crate::codec::CodecId;
 use crate::error::Damage;
 use crate::header::Header;
-use crate::wire::{Bytes, CHECK_BYTES, checksum};
+use crate::wire::read_checked;
 pub(crate) use read::decode;
 pub(crate) use write::encode;
 
@@ -72,21 +72,5 @@ pub(crate) fn max_bytes(header: &Header) -> usize {
 /// # Errors
 /// [`Damage::CutOff`] if the slice ends before the block does; others if no block begins here.
 pub(crate) fn length(header: &Header, bytes: &[u8]) -> Result<usize, Damage> {
-    let mut reader = Bytes(bytes);
-    let length = reader.varint().map_err(|damage| match damage {
-        Damage::CutOff => damage,
-        _ => Damage::NoBlock,
-    })?;
-    let limit = max_bytes(header) as u64;
-    if length == 0 || length > limit {
-        return Err(Damage::NoBlock);
-    }
-    let body = reader.take(length as usize)?;
-    let end = bytes.len() - reader.0.len();
-    debug_assert_eq!(body.len() as u64, length);
-    let check = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
-    if check != checksum(&[&header.check.to_le_bytes(), &bytes[..end]]) {
-        return Err(Damage::Checksum);
-    }
-    Ok(end + CHECK_BYTES)
+    Ok(read_checked(header.check, bytes, 0, 1..=max_bytes(header))?.1)
 }

@@ -31,6 +31,7 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
     if flags > 63 {
         return Err(Damage::Content("flags"));
     }
+    // Without stored descriptors, columns have those of `plain`; apart, none is shared.
     if flags & APART != 0 {
         descriptors.fill(CodecId::Adaptive as u8);
     }

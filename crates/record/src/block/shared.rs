@@ -99,6 +99,7 @@ pub(super) fn encode(
             let _ = codec.code_shared(&mut writer, &start, Some(wanted), wanted.len(), &values);
             writer
         };
+        // The code goes on from the shorter of two versions. A reader is told which, so the choice may be any.
         let alone = written(&[]);
         let related = match effort {
             Effort::Thorough => related::columns(&cells[column], &restored[..column]),

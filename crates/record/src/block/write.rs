@@ -10,7 +10,7 @@ use crate::header::Header;
 use crate::related;
 use crate::specials::{self, Special, Specials};
 use crate::time::{self, TimeKind};
-use crate::wire::{Bytes, checksum, push_varint};
+use crate::wire::{Bytes, checked, push_varint};
 use fewbits_adaptive::Effort;
 
 struct CodedColumn {
@@ -160,6 +160,7 @@ fn encode_as(
     let told = !shares && specials.iter().flatten().any(Option::is_some);
     match (kind, Bytes(&time).varint()) {
         (TimeKind::Grid, Ok(block)) if all_plain && whole && !told => {
+            // The usual block: bit 0 is 0, bit 1 says whether columns are apart, the rest is the number on the grid.
             push_varint(&mut body, 4 * block + 2 * u64::from(apart))
         }
         _ => {
@@ -168,6 +169,7 @@ fn encode_as(
                 | flag(!all_plain, DESCRIPTORS_FOLLOW)
                 | flag(told, SPECIALS_FOLLOW)
                 | flag(apart, APART);
+            // Bit 0 is 1. Then come two bits of the kind of times, and the flags that say what follows.
             push_varint(&mut body, 2 * (kind as u64 | flags) + 1);
             if !whole {
                 push_varint(&mut body, ticks.len() as u64);
@@ -201,15 +203,5 @@ fn encode_as(
         let indices: Vec<Option<Vec<i64>>> = coded.into_iter().map(|column| column.indices).collect();
         body.extend(shared::encode(header, columns, &specials, &indices, &restored, effort));
     }
-    (framed(header, body), restored, shares)
-}
-
-/// A block as it is written: length, content, checksum.
-fn framed(header: &Header, body: Vec<u8>) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(body.len() + 9);
-    push_varint(&mut bytes, body.len() as u64);
-    bytes.extend(body);
-    let check = checksum(&[&header.check.to_le_bytes(), &bytes]);
-    bytes.extend(check.to_le_bytes());
-    bytes
+    (checked(header.check, &[], &body), restored, shares)
 }
