@@ -149,6 +149,7 @@ impl SensorField {
                 .rfind(|without| joined[*without]);
             let place = moved().try_fold(at, |at, axis| grid.next(at, axis, upwards[axis]));
             if corner > 0 {
+                // A corner that lacks one of the moves has a smaller number, so the cell that represents it is known by now.
                 let free = near.and(place).and_then(|place| self.domain.number(grid.index(place)));
                 joined[corner] = free.is_some();
                 corners[corner].0 = free.unwrap_or(corners[near.unwrap_or(corner & (corner - 1))].0);
