@@ -11,7 +11,6 @@ use nalgebra::{DMatrix, DVector};
 impl Problem<'_> {
     /// The signed criterion with gradient and Hessian.
     pub(super) fn second_order(&self, b: &[f64]) -> Derivatives {
-        let parts = self.split(b);
         let total = b.len();
         let features = self.scored.features();
         let width = features.len();
@@ -19,10 +18,9 @@ impl Problem<'_> {
         let mut gradient = DVector::zeros(total);
         let mut hessian = DMatrix::zeros(total, total);
 
-        let mut offsets = Vec::with_capacity(parts.len());
-        let mut slots = Vec::with_capacity(parts.len());
+        let (mut offsets, mut slots) = (Vec::new(), Vec::new());
         let mut offset = 0;
-        for (a, b) in self.active.iter().zip(&parts) {
+        for (a, b) in self.groups_at(b) {
             let symbols = a.symbols(b);
             let (densities, slopes) = a.densities(b);
             value += self.entropy_share(a, &symbols);
