@@ -143,7 +143,8 @@ impl SensorField {
         for corner in 0..1_usize << axes {
             let beyond = |axis: usize| corner >> axis & 1 == 1;
             let moved = || (0..axes).filter(|axis| beyond(*axis));
-            // Prefer a corner with its own value: along a wall the field is then that of the near side.
+            // Prefer a corner with its own value: along a wall the field is then that of the near side. Any such corner serves; the one
+            // without the last move is at the height of the point's own cell.
             let near = moved()
                 .map(|axis| corner ^ (1 << axis))
                 .rfind(|without| joined[*without]);
