@@ -2,8 +2,9 @@
 
 use crate::Error;
 use crate::observation::source::{Kind, Source};
-use fewbits_numerics::error::refuse;
-use fewbits_quantizers::quantizer::{cell_of, check_increasing};
+use crate::patterns::quantizer::check_breakpoints;
+use fewbits_numerics::error::{positive, refuse};
+use fewbits_quantizers::quantizer::cell_of;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of bits of a cell index.
@@ -42,7 +43,7 @@ impl CellGrid {
     /// # Errors
     /// If `half_width` is not positive and finite or `bits` not in `1..=16`.
     pub fn uniform(half_width: f64, bits: usize) -> Result<Self, Error> {
-        let half_width = fewbits_numerics::error::positive("half_width", half_width)?;
+        let half_width = positive("half_width", half_width)?;
         let cells = 1usize << bits_in_range(bits)?;
         // Symmetric by construction, so that the middle edge is exactly zero.
         let breakpoints = (1..cells)
@@ -56,10 +57,7 @@ impl CellGrid {
     /// # Errors
     /// If the edges are empty, not finite or not strictly increasing.
     pub fn from_breakpoints(breakpoints: Vec<f64>) -> Result<Self, Error> {
-        if breakpoints.is_empty() {
-            return refuse("breakpoints", "empty", "at least one breakpoint");
-        }
-        check_increasing(&breakpoints)?;
+        check_breakpoints(&breakpoints)?;
         Ok(Self { breakpoints })
     }
 
@@ -68,7 +66,7 @@ impl CellGrid {
     /// # Errors
     /// If `deviation` is not positive and finite or `bits` not in `1..=8`.
     pub fn lloyd_max(deviation: f64, bits: usize) -> Result<Self, Error> {
-        let deviation = fewbits_numerics::error::positive("deviation", deviation)?;
+        let deviation = positive("deviation", deviation)?;
         let table = fewbits_quantizers::lloyd_max::gaussian_table(bits_in_range(bits)?)?;
         Self::from_breakpoints(table.breakpoints().iter().map(|t| t * deviation).collect())
     }
@@ -78,7 +76,7 @@ impl CellGrid {
     /// # Errors
     /// If `deviation` is not positive and finite.
     pub fn printed_gaussian(deviation: f64) -> Result<Self, Error> {
-        let deviation = fewbits_numerics::error::positive("deviation", deviation)?;
+        let deviation = positive("deviation", deviation)?;
         Self::from_breakpoints(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * deviation).collect())
     }
 
@@ -125,6 +123,7 @@ impl CellGrid {
         (0..self.cells())
             .filter_map(|cell| self.support(cell, source))
             .map(|(low, high)| {
+                // A uniform density is a polynomial, so one panel is exact.
                 let width = match source.kind() {
                     Kind::Uniform { .. } => high - low,
                     Kind::Gaussian { deviation } => deviation,

@@ -29,10 +29,7 @@ impl BinaryQuantizer {
     /// # Errors
     /// If there is no breakpoint, one is not finite, or they do not increase strictly.
     pub fn new(breakpoints: Vec<f64>) -> Result<Self, Error> {
-        if breakpoints.is_empty() {
-            return refuse("breakpoints", "empty", "at least one breakpoint");
-        }
-        check_increasing(&breakpoints)?;
+        check_breakpoints(&breakpoints)?;
         Ok(Self { breakpoints })
     }
 
@@ -126,6 +123,14 @@ impl BinaryQuantizer {
         }
         visit(bit, low, f64::INFINITY);
     }
+}
+
+/// An error unless there is a breakpoint, and all are finite and increase strictly.
+pub(crate) fn check_breakpoints(breakpoints: &[f64]) -> Result<(), Error> {
+    if breakpoints.is_empty() {
+        return refuse("breakpoints", "empty", "at least one breakpoint");
+    }
+    Ok(check_increasing(breakpoints)?)
 }
 
 impl TryFrom<Vec<f64>> for BinaryQuantizer {
