@@ -2,9 +2,8 @@
 
 use crate::Error;
 use crate::observation::source::{Kind, Source};
-use crate::patterns::quantizer::check_breakpoints;
 use fewbits_numerics::error::{positive, refuse};
-use fewbits_quantizers::quantizer::cell_of;
+use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of bits of a cell index.
@@ -57,7 +56,10 @@ impl CellGrid {
     /// # Errors
     /// If the edges are empty, not finite or not strictly increasing.
     pub fn from_breakpoints(breakpoints: Vec<f64>) -> Result<Self, Error> {
-        check_breakpoints(&breakpoints)?;
+        if breakpoints.is_empty() {
+            return refuse("breakpoints", "empty", "at least one breakpoint");
+        }
+        check_increasing(&breakpoints)?;
         Ok(Self { breakpoints })
     }
 
