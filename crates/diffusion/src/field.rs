@@ -143,12 +143,14 @@ impl SensorField {
         for corner in 0..1_usize << axes {
             let beyond = |axis: usize| corner >> axis & 1 == 1;
             let moved = || (0..axes).filter(|axis| beyond(*axis));
-            // Prefer a corner with its own value: along a wall the field is then that of the near side.
+            // Prefer a corner with its own value: along a wall the field is then that of the near side. Any such corner serves; the one
+            // without the last move is at the height of the point's own cell.
             let near = moved()
                 .map(|axis| corner ^ (1 << axis))
                 .rfind(|without| joined[*without]);
             let place = moved().try_fold(at, |at, axis| grid.next(at, axis, upwards[axis]));
             if corner > 0 {
+                // A corner that lacks one of the moves has a smaller number, so the cell that represents it is known by now.
                 let free = near.and(place).and_then(|place| self.domain.number(grid.index(place)));
                 joined[corner] = free.is_some();
                 corners[corner].0 = free.unwrap_or(corners[near.unwrap_or(corner & (corner - 1))].0);

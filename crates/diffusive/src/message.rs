@@ -3,7 +3,7 @@
 use crate::belief::SentBelief;
 use crate::density::Lpg;
 use crate::fit::Fit;
-use crate::project::{Travelling, lpg_scalars};
+use crate::project::{Travelling, gaussian_scalars, lpg_scalars};
 use crate::{Error, Record};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_densities::{Component, Mixture};
@@ -51,7 +51,7 @@ impl Wire {
     ///
     /// # Errors
     /// If the bits are outside 1 to 32 or the step is not positive.
-    pub fn sample_format(&self, noise: f64) -> Result<NumberFormat, Error> {
+    pub(crate) fn sample_format(&self, noise: f64) -> Result<NumberFormat, Error> {
         match self.samples {
             None => Ok(NumberFormat::Double),
             Some(code) => {
@@ -67,7 +67,7 @@ impl Wire {
     /// The record as the receiver decodes it: samples rounded, and `step^2 / 12` added to the noise variance for the rounding.
     ///
     /// # Errors
-    /// As [`Wire::sample_format`].
+    /// If the bits of a sample are outside 1 to 32, its step is not positive, or a sample is not finite.
     pub fn quantised(&self, record: Record) -> Result<Record, Error> {
         let Some(code) = self.samples else { return Ok(record) };
         let format = self.sample_format(record.noise())?;
@@ -225,10 +225,10 @@ impl Message for Packet {
         let components = reader.read(COUNT_BITS)? as usize;
         let degree = Some(reader.read(COUNT_BITS)? as usize).filter(|d| *d != 31);
         let with_rate = reader.read_bit()?;
-        let count = match (degree, with_rate) {
-            (Some(degree), _) => components * lpg_scalars(degree, with_rate),
-            (None, true) => (components * 10).saturating_sub(1),
-            (None, false) => (components * 6).saturating_sub(1),
+        let count = match degree {
+            Some(degree) => components * lpg_scalars(degree, with_rate),
+            // The first weight is not sent: they sum to one.
+            None => (components * (1 + gaussian_scalars(with_rate))).saturating_sub(1),
         };
         let numbers = (0..count)
             .map(|_| format.wire.numbers.read(reader))
@@ -250,11 +250,6 @@ fn invalid(error: Error) -> CodecError {
         value: error.to_string(),
         expected: "a valid sample code",
     }
-}
-
-/// The numbers of one Gaussian of `D` coordinates: its mean and the lower triangle of its Cholesky factor.
-const fn gaussian_scalars(dimension: usize) -> usize {
-    dimension + dimension * (dimension + 1) / 2
 }
 
 /// Number of components, degree and numbers of a belief.
@@ -279,7 +274,7 @@ fn belief_of<const D: usize>(packed: &PackedBelief) -> Result<SentBelief<D>, Err
     // A mixture sends all weights but the first; a series has none.
     let weights = degree.map_or(count.saturating_sub(1), |_| 0).min(numbers.len());
     let (weights, rest) = numbers.split_at(weights);
-    let size = gaussian_scalars(D);
+    let size = gaussian_scalars(D == 3);
     let (gaussians, coefficients) = rest.split_at(size.saturating_mul(count).min(rest.len()));
     let first = (1.0 - weights.iter().sum::<f64>()).max(0.0);
     let weights = std::iter::once(first)
@@ -308,7 +303,7 @@ fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {
 }
 
 fn read_gaussian<const D: usize>(weight: f64, numbers: &[f64]) -> Result<Component<D>, Error> {
-    entries("numbers", numbers.len(), gaussian_scalars(D))?;
+    entries("numbers", numbers.len(), gaussian_scalars(D == 3))?;
     let (mean, mut rest) = numbers.split_at(D);
     let mut lower = SMatrix::<f64, D, D>::zeros();
     for i in 0..D {

@@ -62,22 +62,24 @@ impl Form {
         let carried = matches!(rate, RateModel::Joint(_));
         match *self {
             Self::Raw => None,
-            Self::Gaussian | Self::Laplace => Some(if carried { 9 } else { 5 }),
-            Self::Mixture(n) => Some(n * if carried { 10 } else { 6 } - 1),
+            Self::Gaussian | Self::Laplace => Some(gaussian_scalars(carried)),
+            Self::Mixture(n) => Some(n * (1 + gaussian_scalars(carried)) - 1),
             Self::Lpg { components, degree } => Some(components * lpg_scalars(degree, carried) - 1),
             Self::Particles(n) => Some(2 * n),
         }
     }
 }
 
-/// Numbers of one polynomial Gaussian over the position, or over position and rate.
+/// Numbers of one Gaussian over the position, or over position and rate: its mean and the lower triangle of its Cholesky factor.
+pub(crate) fn gaussian_scalars(with_rate: bool) -> usize {
+    if with_rate { 3 + 6 } else { 2 + 3 }
+}
+
+/// Numbers of one polynomial Gaussian over the position, or over position and rate: those of the Gaussian and the coefficients.
 pub(crate) fn lpg_scalars(degree: usize, with_rate: bool) -> usize {
     let plane = (degree + 1) * (degree + 2) / 2;
-    if with_rate {
-        9 + plane * (degree + 3) / 3
-    } else {
-        5 + plane
-    }
+    let coefficients = if with_rate { plane * (degree + 3) / 3 } else { plane };
+    gaussian_scalars(with_rate) + coefficients
 }
 
 /// A belief in a message.

@@ -225,10 +225,14 @@ fn moved(
 }
 
 fn in_order(b: &[f64], blocks: &[usize]) -> bool {
-    let mut rest = b;
-    blocks.iter().all(|n| {
-        let (head, tail) = rest.split_at(*n);
-        rest = tail;
-        head.iter().all(|x| x.is_finite()) && head.windows(2).all(|w| w[0] < w[1])
+    split(b, blocks).all(|part| part.iter().all(|x| x.is_finite()) && part.windows(2).all(|w| w[0] < w[1]))
+}
+
+/// The parts of `b` with these lengths.
+pub(crate) fn split<'b>(mut b: &'b [f64], lengths: &[usize]) -> impl Iterator<Item = &'b [f64]> {
+    lengths.iter().map(move |n| {
+        let (part, rest) = b.split_at(*n);
+        b = rest;
+        part
     })
 }

@@ -183,6 +183,7 @@ fn weighted_mean(mesh: &Mesh, points: &[f64], rates: &[f64], clamped: bool, dens
     let mut ratio = vec![0.0; n + 1];
     let mut value = vec![0.0; n + 1];
     let (first, last) = if clamped { (1, n - 1) } else { (0, n) };
+    // Row `i` reads `-left q_(i-1) + (left + right + mass r) q_i - right q_(i+1) = mass`; forward elimination.
     for i in first..=last {
         let left = if i > 0 { flux[i - 1] } else { 0.0 };
         let right = if i < n { flux[i] } else { 0.0 };
@@ -195,6 +196,7 @@ fn weighted_mean(mesh: &Mesh, points: &[f64], rates: &[f64], clamped: bool, dens
         ratio[i] = right / pivot;
         value[i] = (mass[i] + left * above_value) / pivot;
     }
+    // Back substitution, with the mean of `q` on the way.
     let (mut q, mut mean) = (0.0, 0.0);
     for i in (first..=last).rev() {
         q = value[i] + ratio[i] * q;

@@ -47,9 +47,11 @@ pub(crate) fn estimates(bank: &Bank, outcomes: usize) -> Vec<f64> {
                 .take_while(|&i| score[i] >= enough)
                 .last()
                 .unwrap_or(first);
+            // Four neighbours are as high only on a plateau: about a smooth peak at most two are.
             if last > first + 2 {
                 return 0.5 * (points[first] + points[last]);
             }
+            // Between the points on either side the log posterior is unimodal, so the golden-section search finds its peak.
             let posterior = |x: f64| {
                 bank.groups().iter().zip(&counts).fold(prior(x), |sum, (g, &ones)| {
                     let [l0, l1] = g.sensor.log_probabilities(x);

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::observation::source::{Kind, Source};
-use fewbits_numerics::error::refuse;
+use fewbits_numerics::error::{positive, refuse};
 use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +42,7 @@ impl CellGrid {
     /// # Errors
     /// If `half_width` is not positive and finite or `bits` not in `1..=16`.
     pub fn uniform(half_width: f64, bits: usize) -> Result<Self, Error> {
-        let half_width = fewbits_numerics::error::positive("half_width", half_width)?;
+        let half_width = positive("half_width", half_width)?;
         let cells = 1usize << bits_in_range(bits)?;
         // Symmetric by construction, so that the middle edge is exactly zero.
         let breakpoints = (1..cells)
@@ -68,7 +68,7 @@ impl CellGrid {
     /// # Errors
     /// If `deviation` is not positive and finite or `bits` not in `1..=8`.
     pub fn lloyd_max(deviation: f64, bits: usize) -> Result<Self, Error> {
-        let deviation = fewbits_numerics::error::positive("deviation", deviation)?;
+        let deviation = positive("deviation", deviation)?;
         let table = fewbits_quantizers::lloyd_max::gaussian_table(bits_in_range(bits)?)?;
         Self::from_breakpoints(table.breakpoints().iter().map(|t| t * deviation).collect())
     }
@@ -78,7 +78,7 @@ impl CellGrid {
     /// # Errors
     /// If `deviation` is not positive and finite.
     pub fn printed_gaussian(deviation: f64) -> Result<Self, Error> {
-        let deviation = fewbits_numerics::error::positive("deviation", deviation)?;
+        let deviation = positive("deviation", deviation)?;
         Self::from_breakpoints(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * deviation).collect())
     }
 
@@ -125,6 +125,7 @@ impl CellGrid {
         (0..self.cells())
             .filter_map(|cell| self.support(cell, source))
             .map(|(low, high)| {
+                // A uniform density is a polynomial, so one panel is exact.
                 let width = match source.kind() {
                     Kind::Uniform { .. } => high - low,
                     Kind::Gaussian { deviation } => deviation,

@@ -82,9 +82,7 @@ impl Pattern {
             })
             .collect())
     }
-}
 
-impl Pattern {
     /// The pattern over `grid` of this quantizer; `None` unless all its breakpoints are edges of the grid (to `1e-9` of its extent).
     pub fn of(quantizer: &BinaryQuantizer, grid: &CellGrid) -> Option<Self> {
         let edges = grid.breakpoints();

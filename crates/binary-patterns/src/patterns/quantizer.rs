@@ -1,12 +1,10 @@
 //! One-bit quantizers: breakpoints at which the bit changes.
 
-use crate::Error;
+use crate::{CellGrid, Error};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use fewbits_numerics::normal::{interval, log_interval, pdf};
 use fewbits_quantizers::Quantizer;
-use fewbits_quantizers::quantizer::check_increasing;
 use serde::{Deserialize, Serialize};
 
 /// Beyond this many standard deviations the tail probability underflows.
@@ -18,9 +16,10 @@ const VANISHED: f64 = 39.0;
 ///
 /// [`Pattern`]: crate::Pattern
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+#[serde(transparent)]
 pub struct BinaryQuantizer {
-    breakpoints: Vec<f64>,
+    /// The cells between the breakpoints; the bit is 0 in every second one.
+    cells: CellGrid,
 }
 
 impl BinaryQuantizer {
@@ -29,16 +28,13 @@ impl BinaryQuantizer {
     /// # Errors
     /// If there is no breakpoint, one is not finite, or they do not increase strictly.
     pub fn new(breakpoints: Vec<f64>) -> Result<Self, Error> {
-        if breakpoints.is_empty() {
-            return refuse("breakpoints", "empty", "at least one breakpoint");
-        }
-        check_increasing(&breakpoints)?;
-        Ok(Self { breakpoints })
+        let cells = CellGrid::from_breakpoints(breakpoints)?;
+        Ok(Self { cells })
     }
 
     /// The breakpoints, increasing.
     pub fn breakpoints(&self) -> &[f64] {
-        &self.breakpoints
+        self.cells.breakpoints()
     }
 
     /// The bit of a measurement: the parity of the number of breakpoints at or below it.
@@ -48,7 +44,7 @@ impl BinaryQuantizer {
     /// # Errors
     /// If the measurement is NaN.
     pub fn encode(&self, measurement: f64) -> Result<bool, Error> {
-        Ok(fewbits_node::pattern_bit(&self.breakpoints, measurement).map_err(ArgumentError::from)?)
+        Ok(fewbits_node::pattern_bit(self.breakpoints(), measurement).map_err(ArgumentError::from)?)
     }
 
     /// `[P(0|x), P(1|x)]` for the measurement `Y = x + N(0, noise_deviation^2)`.
@@ -68,7 +64,7 @@ impl BinaryQuantizer {
     pub fn probabilities_at(&self, points: &[f64], noise_deviation: f64) -> Vec<[f64; 2]> {
         let mut mass = vec![[0.0; 2]; points.len()];
         let (mut edges, mut inside) = (vec![f64::NEG_INFINITY; points.len()], vec![0.0; points.len()]);
-        for (cell, t) in self.breakpoints.iter().copied().chain([f64::INFINITY]).enumerate() {
+        for (cell, t) in self.breakpoints().iter().copied().chain([f64::INFINITY]).enumerate() {
             inside.copy_from_slice(&edges);
             edges
                 .iter_mut()
@@ -99,7 +95,7 @@ impl BinaryQuantizer {
     pub fn slope(&self, x: f64, noise_deviation: f64) -> f64 {
         let mut sign = 1.0;
         let mut slope = 0.0;
-        for &t in &self.breakpoints {
+        for &t in self.breakpoints() {
             slope += sign * pdf((t - x) / noise_deviation);
             sign = -sign;
         }
@@ -118,7 +114,7 @@ impl BinaryQuantizer {
     fn for_cells(&self, x: f64, noise_deviation: f64, mut visit: impl FnMut(usize, f64, f64)) {
         let mut low = f64::NEG_INFINITY;
         let mut bit = 0;
-        for &t in &self.breakpoints {
+        for &t in self.breakpoints() {
             let high = (t - x) / noise_deviation;
             visit(bit, low, high);
             bit ^= 1;
@@ -128,27 +124,13 @@ impl BinaryQuantizer {
     }
 }
 
-impl TryFrom<Vec<f64>> for BinaryQuantizer {
-    type Error = Error;
-
-    fn try_from(breakpoints: Vec<f64>) -> Result<Self, Error> {
-        Self::new(breakpoints)
-    }
-}
-
-impl From<BinaryQuantizer> for Vec<f64> {
-    fn from(quantizer: BinaryQuantizer) -> Self {
-        quantizer.breakpoints
-    }
-}
-
 impl TryFrom<&BinaryQuantizer> for Quantizer {
     type Error = Error;
 
     /// The same cells, with the bit as level.
     fn try_from(binary: &BinaryQuantizer) -> Result<Self, Error> {
-        let labels = (0..=binary.breakpoints.len()).map(|cell| cell % 2).collect();
-        Self::with_labels(binary.breakpoints.clone(), labels)
+        let labels = (0..=binary.breakpoints().len()).map(|cell| cell % 2).collect();
+        Self::with_labels(binary.breakpoints().to_vec(), labels)
     }
 }
 

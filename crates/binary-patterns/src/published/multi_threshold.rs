@@ -100,6 +100,7 @@ fn optimum(
         rho.iter_mut().for_each(|r| *r *= total / sum);
         state = Objective::of(&rows, &rho, &nodes);
     }
+    // A gap that is NaN (all information underflows) also fails.
     let gap = state.gap(total);
     if gap.is_nan() || gap >= GAP {
         return Err(Error::NotConverged {

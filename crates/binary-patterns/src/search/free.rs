@@ -1,6 +1,6 @@
 //! Optimal thresholds without a grid, by descent along the exact gradient.
 
-use super::lbfgs::{Stop, minimise};
+use super::lbfgs::minimise;
 use super::outcomes::SEARCH_PANEL;
 use crate::Error;
 use crate::decoding::decoder::moments;
@@ -16,10 +16,10 @@ use rand::RngExt;
 
 /// Largest number of sensors: the outcome tree of distinct sensors has `2^N` leaves.
 const MAX_SENSORS: usize = 16;
-const STOP: Stop = Stop {
-    iterations: 400,
-    decrease: 1e-11,
-};
+/// Largest number of iterations of a run.
+const MAX_ITERATIONS: usize = 400;
+/// A run ends below this relative decrease of the error; the nodes of a search give errors to about `1e-10`.
+const DECREASE: f64 = 1e-11;
 
 /// The result of [`free_breakpoints`].
 #[derive(Debug, Clone, PartialEq)]
@@ -108,18 +108,11 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
         let from: Vec<Vec<f64>> = sensors
             .iter()
             .map(|sensor| {
-                let mut moved: Vec<f64> = sensor
-                    .quantizer()
-                    .breakpoints()
-                    .iter()
-                    .map(|t| {
-                        if start == 0 {
-                            *t
-                        } else {
-                            t + jitter * (2.0 * rng.random::<f64>() - 1.0)
-                        }
-                    })
-                    .collect();
+                let mut moved = sensor.quantizer().breakpoints().to_vec();
+                if start > 0 {
+                    let mut offset = || jitter * (2.0 * rng.random::<f64>() - 1.0);
+                    moved.iter_mut().for_each(|t| *t += offset());
+                }
                 moved.sort_by(f64::total_cmp);
                 // Gaps must be positive, since their logarithms are the variables.
                 for j in 1..moved.len() {
@@ -128,7 +121,7 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
                 moved
             })
             .collect();
-        let (variables, _) = minimise(|v, g| tree.value(v, g), encode(&from), STOP);
+        let variables = minimise(|v, g| tree.value(v, g), encode(&from), MAX_ITERATIONS, DECREASE);
         let found = decode(&variables, &tree.lengths)
             .into_iter()
             .zip(sensors)
@@ -191,10 +184,8 @@ struct OutcomeTree {
 
 impl OutcomeTree {
     fn new(source: &Source, sensors: &[PatternSensor]) -> Self {
-        let finest = sensors
-            .iter()
-            .map(PatternSensor::noise_deviation)
-            .fold(f64::INFINITY, f64::min);
+        let noise: Vec<f64> = sensors.iter().map(PatternSensor::noise_deviation).collect();
+        let finest = noise.iter().copied().fold(f64::INFINITY, f64::min);
         let nodes = source.nodes(SEARCH_PANEL * finest, gauss_legendre::<8>());
         let row = || vec![0.0; nodes.len()];
         let pairs = || sensors.iter().map(|_| [row(), row()]).collect();
@@ -202,7 +193,7 @@ impl OutcomeTree {
         let mut weight: Vec<Vec<f64>> = rows();
         weight[0].copy_from_slice(&nodes.w);
         Self {
-            noise: sensors.iter().map(PatternSensor::noise_deviation).collect(),
+            noise,
             lengths: sensors.iter().map(|s| s.quantizer().breakpoints().len()).collect(),
             variance: source.variance(),
             p: pairs(),
@@ -284,6 +275,7 @@ impl OutcomeTree {
             return first * estimate;
         }
         let mut explained = 0.0;
+        self.value[depth].fill(0.0);
         for bit in 0..2 {
             let (above, below) = self.weight.split_at_mut(depth + 1);
             for ((child, w), p) in below[0].iter_mut().zip(&above[depth]).zip(&self.p[depth][bit]) {
@@ -291,9 +283,6 @@ impl OutcomeTree {
             }
             explained += self.walk(depth + 1);
             let (own, child) = self.value.split_at_mut(depth + 1);
-            if bit == 0 {
-                own[depth].fill(0.0);
-            }
             let p = &self.p[depth][bit];
             let slope = &mut self.slope[depth][bit];
             // Reverse mode: derivatives are carried from the leaves upwards, and those with respect to the bit probabilities are added up.

@@ -2,32 +2,32 @@
 
 use std::collections::VecDeque;
 
+/// Number of steps from which the Hessian is estimated.
 const MEMORY: usize = 12;
 /// Constants of the Wolfe conditions: sufficient decrease, and curvature.
 const DECREASE: f64 = 1e-4;
 const CURVATURE: f64 = 0.9;
+/// Bisections of a step; 40 leave `1e-12` of it.
 const LINE_STEPS: usize = 40;
+/// Consecutive iterations with too small a decrease that end the search: one alone may be due to a poor direction.
+const MAX_STALLED: usize = 3;
 
-/// Stopping rule.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Stop {
-    pub iterations: usize,
-    /// The iteration stops below this relative decrease of the value.
-    pub decrease: f64,
-}
-
-/// Minimises `f`, which returns the value and writes the gradient. Returns the last point and its value, which is never above that at
-/// the start.
+/// Minimises `f`, which returns the value and writes the gradient. Returns the last point, whose value is never above that at the
+/// start. The search ends after `iterations`, or if the value no longer decreases by the share `decrease`.
 ///
 /// Two-loop recursion with a bisecting weak-Wolfe line search, which keeps the curvature `s.y` positive.
-pub(crate) fn minimise(mut f: impl FnMut(&[f64], &mut [f64]) -> f64, start: Vec<f64>, stop: Stop) -> (Vec<f64>, f64) {
-    let n = start.len();
+pub(crate) fn minimise(
+    mut f: impl FnMut(&[f64], &mut [f64]) -> f64,
+    start: Vec<f64>,
+    iterations: usize,
+    decrease: f64,
+) -> Vec<f64> {
     let mut x = start;
-    let mut gradient = vec![0.0; n];
+    let mut gradient = vec![0.0; x.len()];
     let mut value = f(&x, &mut gradient);
     let mut pairs: VecDeque<(Vec<f64>, Vec<f64>, f64)> = VecDeque::new();
     let mut stalled = 0;
-    for _ in 0..stop.iterations {
+    for _ in 0..iterations {
         let direction = descent_direction(&gradient, &pairs);
         let slope = dot(&gradient, &direction);
         if slope >= 0.0 || slope.is_nan() {
@@ -45,24 +45,21 @@ pub(crate) fn minimise(mut f: impl FnMut(&[f64], &mut [f64]) -> f64, start: Vec<
         let s: Vec<f64> = trial.iter().zip(&x).map(|(a, b)| a - b).collect();
         let y: Vec<f64> = trial_gradient.iter().zip(&gradient).map(|(a, b)| a - b).collect();
         let curvature = dot(&s, &y);
+        // A pair whose curvature is only rounding would make the estimated Hessian indefinite.
         if curvature > 1e-14 * dot(&s, &s).sqrt() * dot(&y, &y).sqrt() {
             pairs.push_back((s, y, 1.0 / curvature));
             if pairs.len() > MEMORY {
                 pairs.pop_front();
             }
         }
-        stalled = if value - at <= stop.decrease * value.abs() {
-            stalled + 1
-        } else {
-            0
-        };
-        (x, value) = (trial, at);
-        gradient = trial_gradient;
-        if stalled >= 3 {
+        let is_stalled = value - at <= decrease * value.abs();
+        stalled = if is_stalled { stalled + 1 } else { 0 };
+        (x, value, gradient) = (trial, at, trial_gradient);
+        if stalled >= MAX_STALLED {
             break;
         }
     }
-    (x, value)
+    x
 }
 
 /// A point along `direction` with sufficient decrease and, if possible, a flatter slope: returns point, gradient, value.
@@ -91,6 +88,7 @@ fn line_search(
         } else {
             high = step;
         }
+        // Too long: bisect. Long enough, but the slope is still steep: longer, until a step is too long.
         step = if high.is_finite() {
             0.5 * (low + high)
         } else {
@@ -100,6 +98,7 @@ fn line_search(
     best
 }
 
+/// Minus the gradient times the inverse Hessian that the pairs `(s, y, 1 / s.y)` of the last steps imply.
 fn descent_direction(gradient: &[f64], pairs: &VecDeque<(Vec<f64>, Vec<f64>, f64)>) -> Vec<f64> {
     let mut q: Vec<f64> = gradient.iter().map(|g| -g).collect();
     let mut shares = Vec::with_capacity(pairs.len());
@@ -108,6 +107,7 @@ fn descent_direction(gradient: &[f64], pairs: &VecDeque<(Vec<f64>, Vec<f64>, f64
         q.iter_mut().zip(y).for_each(|(q, y)| *q -= share * y);
         shares.push(share);
     }
+    // The first estimate of the inverse Hessian is the identity, in the scale of the last step.
     if let Some((s, y, _)) = pairs.back() {
         let scale = dot(s, y) / dot(y, y);
         q.iter_mut().for_each(|q| *q *= scale);
@@ -135,11 +135,8 @@ mod tests {
             g[1] = 200.0 * b;
             a * a + 100.0 * b * b
         };
-        let stop = Stop {
-            iterations: 200,
-            decrease: 1e-30,
-        };
-        let (x, value) = minimise(rosenbrock, vec![-1.2, 1.0], stop);
+        let x = minimise(rosenbrock, vec![-1.2, 1.0], 200, 1e-30);
+        let value = rosenbrock(&x, &mut [0.0; 2]);
         assert!(value < 1e-18 && (x[0] - 1.0).abs() < 1e-8 && (x[1] - 1.0).abs() < 1e-8, "{x:?} {value}");
     }
 }

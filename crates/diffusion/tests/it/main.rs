@@ -16,6 +16,7 @@ mod field;
 mod fixtures;
 mod laws;
 mod refusals;
+mod round;
 mod slab;
 mod sphere;
 mod two_media;

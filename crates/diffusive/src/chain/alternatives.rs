@@ -32,9 +32,7 @@ impl Alternative {
             posterior: None,
         }
     }
-}
 
-impl Alternative {
     pub(super) fn log_posterior(&self) -> f64 {
         self.log_weight + self.log_evidence
     }

@@ -156,16 +156,14 @@ impl Search {
                 });
             }
             if let Some(status) = self.update(&mut alternatives, received.as_ref().map(|(belief, _)| belief))? {
-                outcome.status = status;
                 outcome.records = alternatives.swap_remove(most_probable(&alternatives)).records;
-                return Ok(outcome);
+                return Ok(outcome.ended(status));
             }
             let best = most_probable(&alternatives);
             outcome.models = alternatives.iter().map(|a| a.probability).collect();
             outcome.records.clone_from(&alternatives[best].records);
             let Some(updated) = alternatives[best].posterior.clone() else {
-                outcome.status = Status::Unresolved;
-                return Ok(outcome);
+                return Ok(outcome.ended(Status::Unresolved));
             };
             let fit = mixed_fit(&alternatives, updated.fit.samples);
             let fit = received.as_ref().map_or(fit, |(_, before)| before.plus(&fit));
@@ -179,10 +177,7 @@ impl Search {
                     Some(self.peak(belief, &updated, last, before)?)
                 }
                 Ok(None) => None,
-                Err(error) => {
-                    outcome.status = failure(&error).ok_or(error)?;
-                    return Ok(outcome);
-                }
+                Err(error) => return Ok(outcome.ended(failure(&error).ok_or(error)?)),
             };
             let packet = match &projected {
                 Some(belief) => Packet::belief_of(belief, &fit, &self.wire)?,
@@ -197,9 +192,8 @@ impl Search {
             received = match Packet::from_bits(&contract, &message)?.belief() {
                 Ok(decoded) => decoded,
                 Err(_) => {
-                    outcome.status = Status::Undecodable;
                     outcome.posterior = Some(updated);
-                    return Ok(outcome);
+                    return Ok(outcome.ended(Status::Undecodable));
                 }
             };
             let estimate = received
@@ -223,32 +217,31 @@ impl Search {
             bits = message.bits();
 
             // Stop, or choose the next node.
-            let ending = |status| self.ending(status, &updated, &fit);
-            if determinant < self.threshold {
-                outcome.status = ending(Status::Converged);
+            let (candidates, distance) = graph.nearest(node, |other| !visited[other])?;
+            let reason = if determinant < self.threshold {
+                Some(Status::Converged)
             } else if outcome.steps.len() >= self.most_nodes {
-                outcome.status = ending(Status::NodeLimit);
+                Some(Status::NodeLimit)
+            } else if candidates.is_empty() {
+                Some(Status::Exhausted)
             } else {
-                let (candidates, distance) = graph.nearest(node, |other| !visited[other])?;
-                if candidates.is_empty() {
-                    outcome.status = ending(Status::Exhausted);
-                } else {
-                    let rule = if self.stalled(&outcome.steps) {
-                        SelectionRule::MutualInformation
-                    } else {
-                        self.rule
-                    };
-                    let selector = Selector::new(rule, &updated, &estimate, &self.rate)?;
-                    let places: Vec<_> = candidates.iter().map(|c| (*c, deployment.positions()[*c])).collect();
-                    let next = selector
-                        .best(&alternatives[best].sensor, &places)
-                        .unwrap_or(candidates[0]);
-                    (node, hops) = (next, distance);
-                    continue;
-                }
+                None
+            };
+            if let Some(reason) = reason {
+                let status = self.ending(reason, &updated, &fit);
+                outcome.posterior = Some(updated);
+                return Ok(outcome.ended(status));
             }
-            outcome.posterior = Some(updated);
-            return Ok(outcome);
+            let rule = if self.stalled(&outcome.steps) {
+                SelectionRule::MutualInformation
+            } else {
+                self.rule
+            };
+            let selector = Selector::new(rule, &updated, &estimate, &self.rate)?;
+            let places: Vec<_> = candidates.iter().map(|c| (*c, deployment.positions()[*c])).collect();
+            let next = selector.best(&alternatives[best].sensor, &places);
+            // There is a candidate, so the selector returns one.
+            (node, hops) = (next.unwrap_or(candidates[0]), distance);
         }
     }
 
@@ -320,6 +313,7 @@ impl Search {
             return false;
         };
         let now = steps.last().map_or(0.0, |step| step.log10_determinant);
+        // A factor of two is 0.3 in decimal logarithms.
         now > steps[past].log10_determinant - 0.3
     }
 }

@@ -77,6 +77,11 @@ impl Outcome {
         self.steps.last().map(|step| step.fit)
     }
 
+    /// The outcome of a search that ends for this reason.
+    pub(super) fn ended(self, status: Status) -> Self {
+        Self { status, ..self }
+    }
+
     /// Total bits of all messages.
     pub fn bits(&self) -> usize {
         self.steps.iter().map(|step| step.bits).sum()
@@ -86,9 +91,8 @@ impl Outcome {
 /// The status for an error of a belief that ends the search; `None` for other errors.
 pub(super) fn failure(error: &Error) -> Option<Status> {
     match error {
-        Error::Impossible => Some(Status::BeliefMiss),
+        Error::Impossible | Error::Argument(_) => Some(Status::BeliefMiss),
         Error::Unresolved { .. } => Some(Status::Unresolved),
-        Error::Argument(_) => Some(Status::BeliefMiss),
         _ => None,
     }
 }

@@ -45,6 +45,7 @@ impl Search {
         if largest == f64::NEG_INFINITY {
             return Ok(Some(end.unwrap_or(Status::Misfit)));
         }
+        // Bayes' rule over the models, relative to the most probable one.
         let mut total = 0.0;
         for alternative in alternatives.iter_mut() {
             let log = alternative.log_posterior() - largest;

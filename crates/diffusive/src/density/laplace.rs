@@ -10,6 +10,9 @@ use nalgebra::{SMatrix, SVector};
 const STEP: f64 = 0.05;
 /// Limit on the Newton steps.
 const STEPS: usize = 100;
+/// Tilt of the differences of `Lambda`, in inverse standard deviations: their truncation error is of the order of its square, and
+/// rounding errors of the heights are divided by its square.
+const TILT: f64 = 0.1;
 /// The search ends if the quadratic model predicts a rise below this, in nats.
 const SETTLED: f64 = 1e-13;
 
@@ -130,7 +133,7 @@ pub fn cumulant_laplace<const D: usize>(
     let Some(factor) = centre.covariance.cholesky() else {
         return no_peak("the curvature is singular");
     };
-    // In coordinates y with x = mode + L y the posterior is near a standard normal, so one size STEP of the tilt fits all axes.
+    // In coordinates y with x = mode + L y the posterior is near a standard normal, so one tilt fits all axes.
     let lower = factor.l();
     let whitened = |y: &SVector<f64, D>| log_density(&(centre.mode + lower * y));
     let ones = SVector::<f64, D>::repeat(1.0);
@@ -139,18 +142,17 @@ pub fn cumulant_laplace<const D: usize>(
         let peak = Peak::climb(&tilted, s, &ones)?;
         Ok(peak.height - peak.half_log_curvature)
     };
-    let tilt = 0.1;
     let unit = |i: usize, by: f64| SVector::<f64, D>::from_fn(|d, _| if d == i { by } else { 0.0 });
     let middle = lambda(&SVector::zeros())?;
     let mut mean = SVector::<f64, D>::zeros();
     let mut covariance = SMatrix::<f64, D, D>::zeros();
     for i in 0..D {
-        let (up, down) = (lambda(&unit(i, tilt))?, lambda(&unit(i, -tilt))?);
-        mean[i] = (up - down) / (2.0 * tilt);
-        covariance[(i, i)] = (up - 2.0 * middle + down) / (tilt * tilt);
+        let (up, down) = (lambda(&unit(i, TILT))?, lambda(&unit(i, -TILT))?);
+        mean[i] = (up - down) / (2.0 * TILT);
+        covariance[(i, i)] = (up - 2.0 * middle + down) / (TILT * TILT);
         for j in 0..i {
-            let at = |a: f64, b: f64| lambda(&(unit(i, a * tilt) + unit(j, b * tilt)));
-            let mixed = (at(1.0, 1.0)? - at(1.0, -1.0)? - at(-1.0, 1.0)? + at(-1.0, -1.0)?) / (4.0 * tilt * tilt);
+            let at = |a: f64, b: f64| lambda(&(unit(i, a * TILT) + unit(j, b * TILT)));
+            let mixed = (at(1.0, 1.0)? - at(1.0, -1.0)? - at(-1.0, 1.0)? + at(-1.0, -1.0)?) / (4.0 * TILT * TILT);
             covariance[(i, j)] = mixed;
             covariance[(j, i)] = mixed;
         }

@@ -1,8 +1,7 @@
 //! Models of the medium that are not air: everything along the general path.
 
-use super::{field, joint, searched, sensor};
+use super::{joint, posterior_of, searched, sensor};
 use fewbits_core::{Belief, Gaussian, Likelihood};
-use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
     Form, ModelGrid, Posterior, Prior, RateModel, RateRange, SourceLikelihood, SourceSensor, Status,
 };
@@ -81,7 +80,7 @@ fn likelihood(sensor: &SourceSensor, windy: bool, nodes: usize, rate: RateModel)
 
 fn posterior(likelihood: &SourceLikelihood) -> Posterior {
     let prior = Prior::Exact(Gaussian::new(Vector2::from(NODES[0]), Matrix2::identity() * 2500.0).unwrap());
-    Posterior::new(&prior, likelihood, &field(1.0), None, &CellOptions::default()).unwrap()
+    posterior_of(&prior, likelihood).unwrap()
 }
 
 #[test]

@@ -1,15 +1,14 @@
 //! Arguments that make no sense, and data that do not fit.
 
-use super::{RULES, field, joint, sensor};
+use super::{RULES, field, joint, posterior_of, sensor};
 use fewbits_core::Gaussian;
 use fewbits_densities::Component;
 use fewbits_diffusive::density::laplace::Peak;
 use fewbits_diffusive::density::polynomials::{hermite, multi_indices};
-use fewbits_diffusive::density::{CellOptions, Cells, Clumps, Lpg, MixtureFit};
+use fewbits_diffusive::density::{Clumps, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
-    Form, Posterior, Prior, RateModel, RateRange, RateSums, Record, Search, SearchBox, SourceLikelihood, SourceSensor,
-    Status,
+    Form, Prior, RateModel, RateRange, RateSums, Record, Search, SearchBox, SourceLikelihood, SourceSensor, Status,
 };
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_topology::{Deployment, Graph};
@@ -189,13 +188,7 @@ fn clean_record(node: &Vector2<f64>) -> Record {
 fn two_densities_that_exclude_each_other() {
     let record = clean_record(&Vector2::new(50.0, 54.0));
     let far = Gaussian::new(Vector2::new(1e6, 1e6), Matrix2::identity() * 1e-6).unwrap();
-    let result = Posterior::new(
-        &Prior::Exact(far),
-        &SourceLikelihood::new(vec![record], joint()).unwrap(),
-        &field(1.0),
-        None,
-        &CellOptions::default(),
-    );
+    let result = posterior_of(&Prior::Exact(far), &SourceLikelihood::new(vec![record], joint()).unwrap());
     // The prior decides among what is left; whatever comes out is finite or an error.
     if let Ok(posterior) = result {
         assert!(posterior.gaussian().mean().iter().all(|x| x.is_finite()));
@@ -216,15 +209,8 @@ fn polynomial_gaussians_refuse_bad_parts() {
     let node = Vector2::new(50.0, 54.0);
     let record = clean_record(&node);
     let prior = Prior::Exact(Gaussian::new(node, Matrix2::identity() * 2500.0).unwrap());
-    let cells: Cells<2> = Posterior::new(
-        &prior,
-        &SourceLikelihood::new(vec![record], RateModel::Known(1.0)).unwrap(),
-        &field(1.0),
-        None,
-        &CellOptions::default(),
-    )
-    .unwrap()
-    .cells;
+    let likelihood = SourceLikelihood::new(vec![record], RateModel::Known(1.0)).unwrap();
+    let cells = posterior_of(&prior, &likelihood).unwrap().cells;
     let fit = Clumps::new(&cells.columns(), &[&[], &[]], cells.weights(), 100)
         .unwrap()
         .fit(&MixtureFit::new(1).unwrap())

@@ -1,10 +1,9 @@
 //! Envelopes and Fisher information over the sensors' own ground and heights.
 
-use super::field;
+use super::posterior_of;
 use fewbits_core::Gaussian;
-use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information};
-use fewbits_diffusive::{Envelope, Posterior, Prior, RateModel, SourceLikelihood, SourceSensor};
+use fewbits_diffusive::{Envelope, Prior, RateModel, SourceLikelihood, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -39,7 +38,7 @@ fn sharp(sensor: &SourceSensor, rate: RateModel) -> Envelope {
     });
     let likelihood = SourceLikelihood::new(records.collect(), rate).unwrap();
     let prior = Prior::Exact(Gaussian::new(source, Matrix2::identity() * 100.0).unwrap());
-    let posterior = Posterior::new(&prior, &likelihood, &field(1.0), None, &CellOptions::default()).unwrap();
+    let posterior = posterior_of(&prior, &likelihood).unwrap();
     Envelope::new(&posterior, &likelihood).unwrap()
 }
 

@@ -1,6 +1,6 @@
 //! The laws of the library's words, on every implementation here.
 
-use super::{field, joint, sensor};
+use super::{field, joint, posterior_of, sensor};
 use fewbits_core::laws::likelihood::sweep_is_scalar;
 use fewbits_core::{Belief, Density, Gaussian, Likelihood, laws};
 use fewbits_diffusive::density::{CellOptions, Lpg};
@@ -42,14 +42,7 @@ fn models() -> [RateModel; 4] {
 
 fn posterior(rate: RateModel, nodes: usize) -> Posterior {
     let prior = Gaussian::new(Vector2::from(NODES[0]), Matrix2::identity() * 2500.0).unwrap();
-    Posterior::new(
-        &Prior::Exact(prior),
-        &likelihood(rate, 1.0, false, nodes),
-        &field(1.0),
-        None,
-        &CellOptions::default(),
-    )
-    .unwrap()
+    posterior_of(&Prior::Exact(prior), &likelihood(rate, 1.0, false, nodes)).unwrap()
 }
 
 #[test]
@@ -256,9 +249,7 @@ fn polynomial_gaussians_over_position_and_rate() {
         .record(&node, &sensor.sample(&mut rng, &node, &Vector2::new(62.0, 50.0), 1.0).unwrap())
         .unwrap();
     let next = SourceLikelihood::new(vec![record], joint()).unwrap();
-    let updated =
-        Posterior::new(&Prior::WithRate(belief.clone(), range), &next, &field(1.0), None, &CellOptions::default())
-            .unwrap();
+    let updated = posterior_of(&Prior::WithRate(belief.clone(), range), &next).unwrap();
     let density = |at: &Vector2<f64>, power: i32| {
         Rule::gauss_legendre(20).composite(range.low(), range.high(), 200, |rate| {
             let prior = lpg.log_density(&Vector3::new(at.x, at.y, rate));

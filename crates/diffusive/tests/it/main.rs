@@ -27,8 +27,10 @@ mod slices;
 mod unknown_models;
 mod wild;
 
+use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
-    Error, Form, ModelGrid, Outcome, RateModel, RateRange, Search, SearchBox, SelectionRule, SourceSensor,
+    Error, Form, ModelGrid, Outcome, Posterior, Prior, RateModel, RateRange, Search, SearchBox, SelectionRule,
+    SourceLikelihood, SourceSensor,
 };
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
@@ -75,6 +77,11 @@ fn field(unit: f64) -> SearchBox {
         lower: [-20.0 * unit; 2],
         upper: [120.0 * unit; 2],
     }
+}
+
+/// The posterior over the field from a prior and records.
+fn posterior_of(prior: &Prior, likelihood: &SourceLikelihood) -> Result<Posterior, Error> {
+    Posterior::new(prior, likelihood, &field(1.0), None, &CellOptions::default())
 }
 
 /// A search for a source at (62, 50) among `nodes` nodes of a range of `reach`, and how far its estimate is off; NaN without estimate.

@@ -1,9 +1,8 @@
 //! What travels, as bits.
 
-use super::{field, joint, sensor};
+use super::{joint, posterior_of, sensor};
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
 use fewbits_core::{BitString, Gaussian, Message, NumberFormat};
-use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::message::{Contract, Packet, SampleCode, Wire};
 use fewbits_diffusive::{Fit, Form, Posterior, Prior, RateModel, SourceLikelihood, project};
 use nalgebra::{Matrix2, Vector2};
@@ -32,7 +31,7 @@ fn posterior(rate: RateModel) -> (Posterior, SourceLikelihood) {
     };
     let likelihood = SourceLikelihood::new(vec![record([50.0, 54.0]), record([58.0, 60.0])], rate).unwrap();
     let prior = Prior::Exact(Gaussian::new(Vector2::new(50.0, 54.0), Matrix2::identity() * 2500.0).unwrap());
-    (Posterior::new(&prior, &likelihood, &field(1.0), None, &CellOptions::default()).unwrap(), likelihood)
+    (posterior_of(&prior, &likelihood).unwrap(), likelihood)
 }
 
 #[test]

@@ -110,20 +110,8 @@ pub(crate) fn joint_until(
     Ok(design)
 }
 
-/// As [`joint`], over the breakpoints of the groups `active`; all others are fixed.
-///
-/// # Errors
-/// As [`joint`]; also if `active` is empty or names a group that is not there.
-pub fn optimise_groups(
-    system: &System,
-    active: &[usize],
-    criterion: Criterion,
-    newton: &Newton,
-) -> Result<Design, Error> {
-    Ok(optimise_until(system, active, criterion, newton, Deadline::NEVER)?.0)
-}
-
-/// A design, and the group whose sensors gain most to second order by opposite moves.
+/// The design of the breakpoints of the groups `active`, with all others fixed, and the group whose sensors gain most to second order
+/// by opposite moves.
 fn optimise_until(
     system: &System,
     active: &[usize],
@@ -131,12 +119,6 @@ fn optimise_until(
     newton: &Newton,
     deadline: Deadline,
 ) -> Result<(Design, Option<(usize, Opposed)>), Error> {
-    if active.is_empty() {
-        return refuse("active", "empty", "at least one group");
-    }
-    for g in active {
-        system.group(*g)?;
-    }
     let problem = Problem::new(system, criterion, active)?;
     let scale = breakpoint_scale(system, active);
     let found = climb(&problem, &problem.start(), scale, newton, deadline)?;
@@ -226,7 +208,7 @@ pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &N
         }
         let model = system.model().subset(&sensors)?;
         let partial = System::distinct(model, quantizers, channels)?.with_outcome_limit(system.outcome_limit());
-        stages.push(optimise_groups(&partial, &[n], criterion, newton)?);
+        stages.push(optimise_until(&partial, &[n], criterion, newton, Deadline::NEVER)?.0);
     }
     Ok(stages)
 }

@@ -22,7 +22,7 @@ use crate::derivatives::Derivatives;
 use crate::error::Error;
 use crate::law::{Active, Slots, negative_entropy, sums};
 use crate::moments::{Table, dot, moments};
-use crate::newton::Objective;
+use crate::newton::{Objective, split};
 use crate::system::System;
 
 /// A criterion (signed so that larger is better) as a function of the breakpoints of the active groups.
@@ -43,9 +43,8 @@ impl Objective for Problem<'_> {
     fn value(&self, b: &[f64]) -> f64 {
         let mut value = self.constant;
         let reports: Vec<Table> = self
-            .active
-            .iter()
-            .zip(self.split(b))
+            .groups_at(b)
+            .into_iter()
             .map(|(a, b)| {
                 let (reports, symbols) = a.reports(b);
                 value += self.entropy_share(a, &symbols);
@@ -76,35 +75,30 @@ impl<'a> Problem<'a> {
         system.check_outcomes()?;
         let model = system.model();
         let scored = Scored::new(criterion, model)?;
-        let mut fixed = Vec::new();
-        let mut log_multiplicity = vec![0.0];
-        let mut constant = scored.constant(model);
-        let mut chosen = Vec::new();
+        let mut problem = Self {
+            constant: scored.constant(model),
+            system,
+            scored,
+            active: Vec::new(),
+            fixed: Vec::new(),
+            log_multiplicity: vec![0.0],
+        };
         for index in 0..system.groups().len() {
             let entry = Active::new(system, index)?;
             if active.contains(&index) {
-                chosen.push(entry);
+                problem.active.push(entry);
                 continue;
             }
-            let (reports, symbols) = entry.reports(entry.breakpoints());
-            if scored.has_separable_entropy() {
-                constant += entry.group.sensors().len() as f64 * negative_entropy(&symbols, &model.mass.weights);
-            }
             // Groups that stay fixed enter through the probabilities of their reports.
-            fixed.push(reports);
-            log_multiplicity = sums(&log_multiplicity, &entry.compositions.log_multiplicity);
+            let (reports, symbols) = entry.reports(entry.breakpoints());
+            problem.constant += problem.entropy_share(&entry, &symbols);
+            problem.fixed.push(reports);
+            problem.log_multiplicity = sums(&problem.log_multiplicity, &entry.compositions.log_multiplicity);
         }
-        for entry in &chosen {
-            log_multiplicity = sums(&log_multiplicity, &entry.compositions.log_multiplicity);
+        for entry in &problem.active {
+            problem.log_multiplicity = sums(&problem.log_multiplicity, &entry.compositions.log_multiplicity);
         }
-        Ok(Self {
-            system,
-            scored,
-            active: chosen,
-            fixed,
-            log_multiplicity,
-            constant,
-        })
+        Ok(problem)
     }
 
     /// The breakpoints of the active groups in the system.
@@ -114,34 +108,25 @@ impl<'a> Problem<'a> {
 
     /// The system with the active groups' breakpoints replaced.
     pub(crate) fn system_at(&self, b: &[f64]) -> Result<System, Error> {
-        self.active
-            .iter()
-            .zip(self.split(b))
-            .try_fold(self.system.clone(), |system, (a, b)| {
-                system.with_quantizer(a.index, a.group.quantizer().with_breakpoints(b.to_vec())?)
-            })
+        let groups = self.groups_at(b).into_iter();
+        groups.fold(Ok(self.system.clone()), |system, (a, b)| {
+            system?.with_quantizer(a.index, a.group.quantizer().with_breakpoints(b.to_vec())?)
+        })
     }
 
     /// The least probable cell of the active groups: `(group, cell, probability)`.
     pub(crate) fn rarest_cell(&self, b: &[f64]) -> Option<(usize, usize, f64)> {
         let mass = &self.system.model().mass.weights;
-        let cells = self.active.iter().zip(self.split(b)).flat_map(|(a, b)| {
+        let cells = self.groups_at(b).into_iter().flat_map(|(a, b)| {
             let cells = a.cells(b).into_iter().enumerate();
             cells.map(move |(cell, p)| (a.index, cell, dot(&p, mass)))
         });
         cells.min_by(|x, y| x.2.total_cmp(&y.2))
     }
 
-    fn split<'b>(&self, b: &'b [f64]) -> Vec<&'b [f64]> {
-        let mut rest = b;
-        self.active
-            .iter()
-            .map(|a| {
-                let (head, tail) = rest.split_at(a.parameters());
-                rest = tail;
-                head
-            })
-            .collect()
+    /// Each active group with its breakpoints.
+    fn groups_at<'b>(&self, b: &'b [f64]) -> Vec<(&Active<'a>, &'b [f64])> {
+        self.active.iter().zip(split(b, &self.blocks())).collect()
     }
 
     fn fixed_outcomes(&self) -> usize {

@@ -11,7 +11,6 @@ use nalgebra::{DMatrix, DVector};
 impl Problem<'_> {
     /// The signed criterion with gradient and Hessian.
     pub(super) fn second_order(&self, b: &[f64]) -> Derivatives {
-        let parts = self.split(b);
         let total = b.len();
         let features = self.scored.features();
         let width = features.len();
@@ -19,22 +18,18 @@ impl Problem<'_> {
         let mut gradient = DVector::zeros(total);
         let mut hessian = DMatrix::zeros(total, total);
 
-        let mut offsets = Vec::with_capacity(parts.len());
-        let mut slots = Vec::with_capacity(parts.len());
+        let (mut offsets, mut slots) = (Vec::new(), Vec::new());
         let mut offset = 0;
-        for (a, b) in self.active.iter().zip(&parts) {
+        for (a, b) in self.groups_at(b) {
             let symbols = a.symbols(b);
             let (densities, slopes) = a.densities(b);
             value += self.entropy_share(a, &symbols);
             if self.scored.has_separable_entropy() {
                 let terms = self.entropy_derivatives(a, &symbols, &densities, &slopes);
-                let n = b.len();
-                for i in 0..n {
-                    gradient[offset + i] += terms.gradient[i];
-                    for j in 0..n {
-                        hessian[(offset + i, offset + j)] += terms.hessian[(i, j)];
-                    }
-                }
+                let mut own = gradient.rows_mut(offset, b.len());
+                own += terms.gradient;
+                let mut own = hessian.view_mut((offset, offset), (b.len(), b.len()));
+                own += terms.hessian;
             }
             slots.push(a.slots(&symbols, &densities, &slopes));
             offsets.push(offset);
@@ -71,6 +66,8 @@ impl Problem<'_> {
             let mut pair = 0;
             for i in 0..n {
                 let row = offsets[g] + i;
+                // The gradient and the term with `phi_i'` are sums over one report fewer, the terms with `phi_i phi_j` over two fewer
+                // (formulas at the head of `problem`).
                 let reduced = reduce(&worth, axis, &a.compositions, 0, &a.exchange[i]);
                 let moved = slice(&first, axis, n, below, i);
                 gradient[row] += dot(&reduced, &moved);
@@ -81,7 +78,7 @@ impl Problem<'_> {
                     for j in i..n {
                         let both = reduce(&reduced, axis, &a.compositions, 1, &a.exchange[j]);
                         let term = dot(&both, &slice(&second, axis, pairs, twice, pair));
-                        add_symmetric(&mut hessian, row, offsets[g] + j, term);
+                        hessian[(row, offsets[g] + j)] += term;
                         pair += 1;
                     }
                 }
@@ -112,7 +109,7 @@ impl Problem<'_> {
                             below,
                             i,
                         );
-                        add_symmetric(&mut hessian, row, offsets[h] + j, dot(&both, &of_ij));
+                        hessian[(row, offsets[h] + j)] += dot(&both, &of_ij);
                     }
                 }
                 changes.push(scatter(&moved, axis, &a.compositions, &a.exchange[i]));
@@ -127,9 +124,11 @@ impl Problem<'_> {
                 self.scored.curvature(m, d, out);
             }
             for q in p..total {
-                add_symmetric(&mut hessian, p, q, dot(&bent, &changes[q]));
+                hessian[(p, q)] += dot(&bent, &changes[q]);
             }
         }
+        // All terms above went to the upper triangle.
+        hessian.fill_lower_triangle_with_upper_triangle();
         Derivatives {
             value,
             gradient,
@@ -137,7 +136,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Derivatives of `N sum_node mass sum_t P_t ln P_t`.
+    /// Derivatives of `N sum_node mass sum_t P_t ln P_t`; of the Hessian only the upper triangle.
     fn entropy_derivatives(
         &self,
         a: &Active<'_>,
@@ -178,7 +177,7 @@ impl Problem<'_> {
                         }
                     }
                 }
-                add_symmetric(&mut hessian, i, j, sensors * term);
+                hessian[(i, j)] += sensors * term;
             }
         }
         Derivatives {
@@ -186,12 +185,5 @@ impl Problem<'_> {
             gradient,
             hessian,
         }
-    }
-}
-
-fn add_symmetric(matrix: &mut DMatrix<f64>, i: usize, j: usize, term: f64) {
-    matrix[(i, j)] += term;
-    if i != j {
-        matrix[(j, i)] += term;
     }
 }

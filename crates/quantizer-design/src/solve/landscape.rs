@@ -31,6 +31,19 @@ impl WordLaw {
     fn probability(&self, output: usize, word: usize) -> f64 {
         self.transition[output * self.words + word]
     }
+
+    /// Moments of the outcome "symbol `output` received", from the moments of each word, if word `w` is sent as `renamed[w]`.
+    fn mix(&self, output: usize, words: &[f64], renamed: &[usize], outcome: &mut [f64]) {
+        outcome.fill(0.0);
+        for (moments, word) in words.chunks_exact(outcome.len()).zip(renamed) {
+            add_scaled(outcome, self.probability(output, *word), moments);
+        }
+    }
+
+    /// Every word is sent as itself.
+    fn unchanged(&self) -> Vec<usize> {
+        (0..self.words).collect()
+    }
 }
 
 /// One observation model, on coarse nodes.
@@ -255,8 +268,8 @@ impl Landscape {
     /// The signed criterion, without constants and without the other sensors' part of the conditional entropy.
     pub(super) fn value(&self, block: &Block, grid: &Grid, words: &[usize]) -> f64 {
         let levels = self.levels(block, words);
-        let identity: Vec<usize> = (0..self.laws[block.sensor].words).collect();
-        self.value_of_levels(block, grid, &levels, words, &identity)
+        let unchanged = self.laws[block.sensor].unchanged();
+        self.value_of_levels(block, grid, &levels, words, &unchanged)
     }
 
     /// Moments of each word: `[other][word][feature]`.
@@ -283,16 +296,12 @@ impl Landscape {
         renamed: &[usize],
     ) -> f64 {
         let law = &self.laws[block.sensor];
-        let (width, count) = (self.width(), law.words);
-        let mut outcome = vec![0.0; width];
+        let mut outcome = vec![0.0; self.width()];
         let mut value = 0.0;
         // For every outcome of the other sensors, the link mixes the words to symbols, and each symbol has its value.
-        for other in levels.chunks_exact(count * width) {
+        for other in levels.chunks_exact(law.words * self.width()) {
             for t in 0..law.outputs {
-                outcome.fill(0.0);
-                for (w, level) in other.chunks_exact(width).enumerate() {
-                    add_scaled(&mut outcome, law.probability(t, renamed[w]), level);
-                }
+                law.mix(t, other, renamed, &mut outcome);
                 value += self.scored.value(&outcome, 0.0);
             }
         }
@@ -336,18 +345,15 @@ impl Landscape {
         let (width, count, outputs) = (self.width(), law.words, law.outputs);
         let levels = self.levels(block, words);
         let mut per_symbol = vec![0.0; block.cells * outputs];
+        let unchanged = law.unchanged();
         let (mut outcome, mut slopes) = (vec![0.0; width], vec![0.0; outputs * width]);
-        for other in 0..block.others {
-            let own = &levels[other * count * width..(other + 1) * count * width];
+        let cells = block.moments.chunks_exact(block.cells * width);
+        for (own, cells) in levels.chunks_exact(count * width).zip(cells) {
             for (t, slope) in slopes.chunks_exact_mut(width).enumerate() {
-                outcome.fill(0.0);
-                for (w, level) in own.chunks_exact(width).enumerate() {
-                    add_scaled(&mut outcome, law.probability(t, w), level);
-                }
+                law.mix(t, own, &unchanged, &mut outcome);
                 // For a fixed decoder the criterion is linear in the outcome, and its slope gives the gain of a cell for each symbol.
                 self.scored.slope(&outcome, 0.0, slope);
             }
-            let cells = &block.moments[other * block.cells * width..(other + 1) * block.cells * width];
             for (cell, out) in cells.chunks_exact(width).zip(per_symbol.chunks_exact_mut(outputs)) {
                 for (slope, out) in slopes.chunks_exact(width).zip(out) {
                     *out += slope.iter().zip(cell).map(|(s, m)| s * m).sum::<f64>();

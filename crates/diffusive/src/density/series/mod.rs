@@ -39,6 +39,14 @@ pub struct Lpg<const D: usize> {
     covariance: SMatrix<f64, D, D>,
 }
 
+/// Terms of the square root this many nats below another do not change a sum of doubles (`exp(-60)` is 9e-27).
+const FAINT: f64 = 60.0;
+/// Factor of the deviations of the rejection sampler's proposal: the polynomials widen the Gaussians.
+const WIDER: f64 = 1.6;
+/// Number of trial points for the sampler's bound, and the most draws of one sample.
+const TRIALS: usize = 1000;
+const MAX_DRAWS: usize = 100_000;
+
 #[derive(Debug, Clone, PartialEq)]
 struct Term<const D: usize> {
     gaussian: Component<D>,
@@ -125,7 +133,7 @@ impl<const D: usize> Lpg<D> {
             let near = (length - reach).max(0.0);
             let peak = term.half_log_peak - 0.25 * near * near;
             let log = term.half_log_peak - 0.25 * length * length;
-            if peak < highest - 60.0 {
+            if peak < highest - FAINT {
                 continue;
             }
             hermite_products(&self.indices, self.degree, &u, scratch);
@@ -134,6 +142,7 @@ impl<const D: usize> Lpg<D> {
                 .zip(&term.coefficients)
                 .map(|(polynomial, c)| polynomial * c);
             let (value, size): (f64, f64) = (parts.clone().sum(), parts.map(f64::abs).sum());
+            // In a large cell the polynomials may all be near zero at its centre. The sum of the coefficients' sizes is used instead.
             let size: f64 = if reach > 0.5 {
                 size.max(term.coefficients.iter().map(|c| c.abs()).sum())
             } else {
@@ -141,6 +150,7 @@ impl<const D: usize> Lpg<D> {
             };
             bound.add(peak + size.ln());
             highest = bound.value();
+            // The sum is kept relative to its largest Gaussian, so that it cannot underflow.
             if log > largest {
                 sum *= (largest - log).exp();
                 largest = log;
@@ -169,21 +179,21 @@ impl<const D: usize> Lpg<D> {
                 let (a, b) = (&self.terms[l], &self.terms[m]);
                 let (wa, wb) = (&a.gaussian.factor().whitener, &b.gaussian.factor().whitener);
                 let precision = (wa.tr_mul(wa) + wb.tr_mul(wb)) * 0.5;
+                let singular = || refuse("covariance", "singular", "a positive definite matrix");
                 let Some(factor) = precision.cholesky() else {
-                    return refuse("covariance", "singular", "a positive definite matrix");
+                    return singular();
                 };
                 let pull = wa.tr_mul(wa) * a.gaussian.mean() + wb.tr_mul(wb) * b.gaussian.mean();
                 let mean = factor.solve(&(pull * 0.5));
-                let covariance = factor.inverse();
-                let Some(root) = covariance.cholesky() else {
-                    return refuse("covariance", "singular", "a positive definite matrix");
+                let Some(root) = factor.inverse().cholesky() else {
+                    return singular();
                 };
                 let (ua, ub) = (a.whitened(&mean), b.whitened(&mean));
                 let half_log_det: f64 = root.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
                 // sqrt(phi_l phi_m) = exp(overlap) N(x; mean, covariance)
                 let overlap = a.half_log_peak + b.half_log_peak + half_log_det + D as f64 * LN_SQRT_2PI
                     - 0.25 * (ua.norm_squared() + ub.norm_squared());
-                if overlap < -60.0 {
+                if overlap < -FAINT {
                     continue;
                 }
                 let lower = root.l();
@@ -270,14 +280,14 @@ impl<const D: usize> Belief<D> for Lpg<D> {
             parts.collect::<LogSum>().value()
         };
         let mut bound = f64::NEG_INFINITY;
-        for _ in 0..1000 {
+        for _ in 0..TRIALS {
             let x = widened(rng);
             bound = bound.max(self.log_density_and_bound(&x, 0.0, &mut values).0 - log_proposal(&x));
         }
         bound += 3.0_f64.ln();
         change_each(states, |_| {
             let mut x = widened(rng);
-            for _ in 0..100_000 {
+            for _ in 0..MAX_DRAWS {
                 let ratio = self.log_density_and_bound(&x, 0.0, &mut values).0 - log_proposal(&x) - bound;
                 if rng.random::<f64>().ln() < ratio {
                     break;
@@ -289,8 +299,6 @@ impl<const D: usize> Belief<D> for Lpg<D> {
     }
 }
 
-/// Factor of the deviations of the rejection sampler's proposal.
-const WIDER: f64 = 1.6;
 impl<const D: usize> Density<D> for Lpg<D> {
     fn log_density(&self, state: &SVector<f64, D>) -> f64 {
         self.log_density_and_bound(state, 0.0, &mut Vec::new()).0
