@@ -36,18 +36,8 @@ pub fn run(options: &Options) -> Result<bool, Error> {
     let metadata = MetadataCommand::new().no_deps().exec()?;
     let is_library = |package: &&Package| package.manifest_path.as_str().contains("/crates/");
     let libraries: Vec<&Package> = metadata.packages.iter().filter(is_library).collect();
-    let unknown = |name: &&String| libraries.iter().all(|p| p.name.as_str() != name.as_str());
-    if let Some(name) = options.crates.iter().find(unknown) {
-        let valid = libraries
-            .iter()
-            .map(|package| package.name.as_str())
-            .collect::<Vec<_>>()
-            .join(", ");
-        return Err(Error::UnknownCrate {
-            name: name.clone(),
-            valid,
-        });
-    }
+    let names: Vec<&str> = libraries.iter().map(|package| package.name.as_str()).collect();
+    Error::check_crates(&options.crates, &names)?;
     let root = metadata.workspace_root.as_std_path();
     let target = metadata.target_directory.as_std_path().join("alone");
     let mut good = true;

@@ -29,14 +29,7 @@ struct Measured {
 /// If a crate is unknown or cargo cannot be run.
 pub fn run(options: &Options) -> Result<bool, Error> {
     let known = crates_with_benches()?;
-    for name in &options.crates {
-        if !known.contains(name) {
-            return Err(Error::UnknownCrate {
-                name: name.clone(),
-                valid: known.join(", "),
-            });
-        }
-    }
+    Error::check_crates(&options.crates, &known.iter().map(String::as_str).collect::<Vec<_>>())?;
     let chosen = if options.crates.is_empty() {
         &known
     } else {

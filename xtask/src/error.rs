@@ -105,6 +105,17 @@ pub enum Error {
 }
 
 impl Error {
+    /// Refuses the first name that is not among the valid ones.
+    pub(crate) fn check_crates(names: &[String], valid: &[&str]) -> Result<(), Self> {
+        match names.iter().find(|name| !valid.contains(&name.as_str())) {
+            None => Ok(()),
+            Some(name) => Err(Self::UnknownCrate {
+                name: name.clone(),
+                valid: valid.join(", "),
+            }),
+        }
+    }
+
     pub(crate) fn reading(path: &Path) -> impl Fn(std::io::Error) -> Self {
         move |source| Self::Read {
             path: path.to_owned(),

@@ -75,7 +75,7 @@ pub enum SensorTimer {
 pub enum Task<'a> {
     /// Nothing.
     Wait,
-    /// Measure, encode the report with this feedback, and call [`Sensor::on_sample`].
+    /// Before the next event: measure, encode the report with this feedback, and call [`Sensor::on_sample`].
     Sample {
         /// The slot.
         slot: Slot,

@@ -199,16 +199,19 @@ impl Run<'_> {
     }
 
     /// Writes gallery and summary as they stand.
-    fn write(&self, note: &str) -> Result<Vec<Record>, Error> {
+    fn write(&self, note: &str) -> Result<(), Error> {
         let finished = self.finished();
         let records: Vec<Record> = finished.records.values().cloned().collect();
-        let summary = Summary {
+        self.summary(note)
+            .write(&records, &finished.all, self.started.elapsed())
+    }
+
+    fn summary<'a>(&'a self, note: &'a str) -> Summary<'a> {
+        Summary {
             out: self.out,
             json: self.options.json,
             note,
-        };
-        summary.write(&records, &finished.all, self.started.elapsed())?;
-        Ok(records)
+        }
     }
 
     /// Writes the gallery for the last time and prints the summary.
@@ -220,13 +223,8 @@ impl Run<'_> {
             String::new()
         };
         let written = self.write(&note);
-        let summary = Summary {
-            out: self.out,
-            json: self.options.json,
-            note: &note,
-        };
         let records: Vec<Record> = self.finished().records.values().cloned().collect();
-        let ending = summary.print(&records, self.started.elapsed());
+        let ending = self.summary(&note).print(&records, self.started.elapsed());
         written?;
         Ok(if missing > 0 { Ending::Interrupted } else { ending })
     }
