@@ -81,7 +81,7 @@ impl Figure for Encoders {
             let of = |method: &str| find(&t.encoders, &format!("adaptive {point}"), method).map(|r| r.score.mse);
             // The error of the extended filter has a heavy tail at 50 dB: 8 % standard error in 200 tracks.
             let ratio = of("grid-15").zip(of("EKF-U")).map(|(a, b)| {
-                let relative = |m: Measured| m.standard_error.unwrap_or(0.0) / m.value;
+                let relative = |m: Measured| m.error() / m.value;
                 a.value / b.value * (1.0 - 2.0 * relative(a).hypot(relative(b)))
             });
             let what = "with the adaptive encoder four bits are as good as the unquantized extended Kalman filter \

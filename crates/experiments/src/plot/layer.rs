@@ -179,7 +179,7 @@ impl Layer {
         let place = |row| {
             let (x, y) = point(row);
             let y: Measured = y.into()?;
-            Some(((x, y.value), y.standard_error.unwrap_or(0.0)))
+            Some(((x, y.value), y.error()))
         };
         let (points, errors) = rows.into_iter().filter_map(place).unzip();
         Self::points(label, points).with_errors(errors)
