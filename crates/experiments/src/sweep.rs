@@ -115,6 +115,14 @@ mod tests {
     }
 
     #[test]
+    fn schemes_share_the_noise_of_a_trial() {
+        let context = Context::new(1);
+        let both = |it: Trial| Ok([1.0, 2.0].map(|scale| scale * it.stream.rng().random::<f64>()));
+        let all = context.trials(context.stream("demo"), 100, both).unwrap();
+        assert!(all.len() == 100 && all.iter().all(|[one, two]| *two == 2.0 * one));
+    }
+
+    #[test]
     fn progress_is_told_and_cancelling_ends_it() {
         let (seen, stop) = (AtomicU64::new(0), AtomicBool::new(false));
         let told = |trials: u64| {

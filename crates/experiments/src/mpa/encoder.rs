@@ -99,10 +99,9 @@ impl Figure for Encoders {
                 Layer::measured(*name, of, |r| ((r.levels as f64).log2(), r.score.mse)).coloured(i)
             });
             let reference = first(&t.encoders, |r| r.snr_db == snr && r.method == "EKF-U");
-            let level = reference.map_or(Vec::new(), |r| vec![(1.0, r.score.mse.value), (4.0, r.score.mse.value)]);
             Panel::semilog(format!("{snr} dB"), "bits", super::scores::MSE)
                 .with_all(marks)
-                .with(Layer::dashed("EKF-U", level))
+                .with(Layer::level("EKF-U", [1.0, 4.0], reference.map(|r| r.score.mse.value)))
         };
         Plot::grid(3, [50.0, 40.0, 30.0].map(panel).to_vec())
     }
