@@ -48,11 +48,8 @@ pub(crate) static FIG4: Simulated<Linear, Step> = Simulated {
         let mut all = both(context, setting, &FOUR, &FOUR)?;
         let cloud = [("CFwMD particles", Scheme::Particles(setting.cloud(), Weighing::OwnFilter))];
         let own = world(setting.acceleration_variance);
-        all.extend(
-            setting
-                .of_trials(150)
-                .run(context, (&own, setting.messages[0]), &cloud)?,
-        );
+        let few = setting.of_trials(150);
+        all.extend(few.run(context, (&own, few.messages[0]), &cloud)?);
         Ok(all)
     },
     claims: |rows, claims| {
