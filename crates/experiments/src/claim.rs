@@ -89,6 +89,8 @@ pub struct Claims {
     figure: &'static str,
     made: Rc<RefCell<Vec<Claim>>>,
     erratum: Option<&'static str>,
+    /// Whether a value may be below its reference by any amount.
+    one_sided: bool,
     /// Whether what is claimed holds at the figure's own parameters only, and needs the full trial count.
     limits: [bool; 2],
     /// Whether the run has these parameters, and that count.
@@ -102,6 +104,7 @@ impl Claims {
             figure,
             made: Rc::default(),
             erratum: None,
+            one_sided: false,
             limits: [false; 2],
             run: [defaults, full_effort],
         }
@@ -117,6 +120,15 @@ impl Claims {
     pub(crate) fn showing(&self, erratum: &'static str) -> Self {
         Self {
             erratum: Some(erratum),
+            ..self.clone()
+        }
+    }
+
+    /// Less is better in what is claimed through this, and the other program is not known to be the best: no row is above its
+    /// reference by more than the tolerance and four combined standard errors.
+    pub fn no_more(&self) -> Self {
+        Self {
+            one_sided: true,
             ..self.clone()
         }
     }
@@ -248,35 +260,7 @@ impl Claims {
         rows: impl IntoIterator<Item = R>,
         key_and_value: impl Fn(R) -> (String, V),
     ) {
-        let rows = rows.into_iter().map(key_and_value).collect();
-        self.against_references(quantity, statement, rows, false);
-    }
-
-    /// As [`Claims::references`], of rows that name their own keys.
-    pub fn keyed<'r, R: Keyed + 'r, V: Cell>(
-        &self,
-        quantity: &str,
-        statement: &str,
-        rows: impl IntoIterator<Item = &'r R>,
-        value: impl Fn(&R) -> V,
-    ) {
-        self.references(quantity, statement, rows, |row| (row.key(), value(row)));
-    }
-
-    /// The same where less is better and the other program is not known to be the best: no row is above its reference by more
-    /// than the tolerance and four combined standard errors.
-    pub fn keyed_at_most<'r, R: Keyed + 'r, V: Cell>(
-        &self,
-        quantity: &str,
-        statement: &str,
-        rows: impl IntoIterator<Item = &'r R>,
-        value: impl Fn(&R) -> V,
-    ) {
-        let rows = rows.into_iter().map(|row| (row.key(), value(row))).collect();
-        self.against_references(quantity, statement, rows, true);
-    }
-
-    fn against_references<V: Cell>(&self, quantity: &str, statement: &str, rows: Vec<(String, V)>, one_sided: bool) {
+        let rows: Vec<_> = rows.into_iter().map(key_and_value).collect();
         let known = match reference::group(self.figure, quantity) {
             Ok(known) if !known.is_empty() => known,
             Ok(_) => {
@@ -298,13 +282,24 @@ impl Claims {
             let id = format!("{quantity}/{key}").replace(' ', "-");
             let statement = format!("{statement}, {key}");
             let number = found.map(|found| found.value);
-            if one_sided {
+            if self.one_sided {
                 let statement = format!("{statement}: no more than the reference {}", known.value);
                 here.at_most(id, statement, number, known.value + tolerance);
             } else {
                 here.near(id, statement, number, known.value, tolerance);
             }
         }
+    }
+
+    /// As [`Claims::references`], of rows that name their own keys.
+    pub fn keyed<'r, R: Keyed + 'r, V: Cell>(
+        &self,
+        quantity: &str,
+        statement: &str,
+        rows: impl IntoIterator<Item = &'r R>,
+        value: impl Fn(&R) -> V,
+    ) {
+        self.references(quantity, statement, rows, |row| (row.key(), value(row)));
     }
 
     /// All that were made.

@@ -47,7 +47,6 @@ pub use figure::{About, AnyFigure, Context, Figure, Outcome};
 pub use kept::Kept;
 pub use measured::Measured;
 pub use schema::{Column, Table, Value};
-pub use sweep::Comparison;
 
 /// Every figure and table, in the order of the publications.
 pub fn all() -> Vec<&'static dyn AnyFigure> {

@@ -26,6 +26,11 @@ impl Measured {
         Self::new(root.value, (moments.count() > 1).then_some(root.standard_error))
     }
 
+    /// The standard error; 0 without one.
+    pub fn error(self) -> f64 {
+        self.standard_error.unwrap_or(0.0)
+    }
+
     /// The same in another unit, or against a reference without error.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {

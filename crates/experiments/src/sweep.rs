@@ -59,22 +59,6 @@ impl Context<'_> {
         };
         Ok(self.monte_carlo(stream, count).fold(Vec::new, add, merge)?)
     }
-
-    /// Runs every scheme on every trial and keeps each trial's `K` numbers, for paired comparisons.
-    ///
-    /// # Errors
-    /// If a trial fails or the run is cancelled.
-    pub fn compare<S: Sync, const K: usize>(
-        &self,
-        stream: Stream,
-        count: u64,
-        schemes: &[S],
-        trial: impl Fn(&S, Trial) -> Result<[f64; K], Error> + Sync,
-    ) -> Result<Comparison<K>, Error> {
-        let every = |it: Trial| schemes.iter().map(|scheme| trial(scheme, it)).collect();
-        let trials = self.trials(stream, count, every)?;
-        Ok(Comparison { trials })
-    }
 }
 
 /// The words of these with `by` between them.
@@ -109,25 +93,6 @@ pub fn distinct<R, K: PartialEq>(rows: &[R], key: impl Fn(&R) -> K) -> Vec<K> {
     seen
 }
 
-/// All trials of all schemes at one point: `K` numbers each.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Comparison<const K: usize> {
-    trials: Vec<Vec<[f64; K]>>,
-}
-
-impl<const K: usize> Comparison<K> {
-    /// Number `of` of a scheme (both by their place in the lists).
-    pub fn moments(&self, scheme: usize, of: usize) -> Moments {
-        self.trials.iter().map(|schemes| schemes[scheme][of]).collect()
-    }
-
-    /// Number `of` of the first scheme minus that of the second, trial by trial.
-    pub fn difference(&self, first: usize, second: usize, of: usize) -> Moments {
-        let less = |schemes: &Vec<[f64; K]>| schemes[first][of] - schemes[second][of];
-        self.trials.iter().map(less).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,12 +117,9 @@ mod tests {
     #[test]
     fn schemes_share_the_noise_of_a_trial() {
         let context = Context::new(1);
-        let one = |scheme: &f64, it: Trial| Ok([scheme * it.stream.rng().random::<f64>()]);
-        let all = context
-            .compare(context.stream("demo"), 100, &[1.0, 2.0, 1.0], one)
-            .unwrap();
-        assert_eq!(all.difference(0, 2, 0).variance(), 0.0);
-        assert_eq!(all.difference(1, 0, 0), all.moments(0, 0));
+        let both = |it: Trial| Ok([1.0, 2.0].map(|scale| scale * it.stream.rng().random::<f64>()));
+        let all = context.trials(context.stream("demo"), 100, both).unwrap();
+        assert!(all.len() == 100 && all.iter().all(|[one, two]| *two == 2.0 * one));
     }
 
     #[test]

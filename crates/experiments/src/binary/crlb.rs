@@ -7,9 +7,9 @@ use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 
 pub struct PrintedBounds;
 
-swept! { 0.0 to 30.0, step 1.0 => quick 2.0,
+swept! { 0.0 to 30.0, step 1.0 => quick 2.0, {
     bits: Vec<usize> [1..=5; 1..=4] = vec![3, 4] => "Bits, and sensors.",
-}
+} }
 
 /// Where equation 5.13 has the same value for two sets, near where the thesis's curves cross.
 fn meet(bits: usize, name: &str, [a, b]: [&[Mask]; 2]) -> Result<Option<f64>, Error> {

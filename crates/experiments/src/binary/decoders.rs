@@ -9,7 +9,7 @@ use fewbits_binary_patterns::{Decoder, gray_basis};
 
 pub struct Decoders;
 
-swept! { -10.0 to 40.0, step 1.0 => quick 5.0, }
+swept! { -10.0 to 40.0, step 1.0 => quick 5.0, {} }
 
 rows! {
     pub struct Rows {

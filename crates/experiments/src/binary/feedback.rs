@@ -8,12 +8,12 @@ use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Feedback;
 
-swept! { 0.0 to 40.0 => quick 30.0, step 2.5 => quick 10.0,
+swept! { 0.0 to 40.0 => quick 30.0, step 2.5 => quick 10.0, {
     sensors: usize [3..=14] = 10 => "Number of sensors.",
     most_bits: usize [3..=8] = 7 => quick 5 => "Most bits of the cell index that are tried.",
     vs_step: f64 [1e-6..=10.0] = 0.5 => "First step of AQ-VS in units of V. The thesis gives no rule.",
     vs_factor: f64 [1.0..=10.0] = 1.5 => "Factor of AQ-VS.",
-}
+} }
 
 /// Finer cells than this share of the noise are not tried: they never win.
 const FINEST_CELL: f64 = 0.5;

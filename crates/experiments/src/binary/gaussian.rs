@@ -7,7 +7,7 @@ use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_va
 
 pub struct GaussianSource;
 
-swept! { -10.0 to 30.0, step 1.0 => quick 5.0, }
+swept! { -10.0 to 30.0, step 1.0 => quick 5.0, {} }
 
 const SENSORS: usize = 3;
 const GRAY: [Mask; 3] = [3, 4, 6];

@@ -70,9 +70,10 @@ impl Scene {
     }
 }
 
-/// Parameters of a sweep over signal-to-noise ratios, in steps of 1 dB by default, behind the figure's own.
+/// Parameters of a sweep over signal-to-noise ratios behind the figure's own, and what else is refused.
 macro_rules! swept {
-    ($from:literal to $to:literal $(=> quick $last:literal)?, step $step:literal => quick $quick:literal, $($own:tt)*) => {
+    ($from:literal to $to:literal $(=> quick $last:literal)?, step $step:literal => quick $quick:literal,
+        { $($own:tt)* } $(check $check:expr)?) => {
         parameters! {
             pub struct Parameters {
                 $($own)*
@@ -80,16 +81,16 @@ macro_rules! swept {
                 to_db: f64 [-60.0..=60.0] = $to $(=> quick $last)? => "Last signal-to-noise ratio, dB.",
                 step_db: f64 [0.01..=60.0] = $step => quick $quick => "Step, dB.",
             }
-            check |p| super::not_below(p.from_db, p.to_db);
+            check |p| {
+                accept("to_db", p.to_db >= p.from_db, || format!("lower than from_db, {}", p.from_db))?;
+                $(let own: fn(&Parameters) -> Result<(), Refusal> = $check;
+                own(p)?;)?
+                Ok(())
+            };
         }
     };
 }
 use swept;
-
-/// Refuses the end of a sweep below its beginning.
-fn not_below(from: f64, to: f64) -> Result<(), Refusal> {
-    accept("to_db", to >= from, || format!("lower than from_db, {from}"))
-}
 
 /// `from, from + step, ..., to`.
 fn sweep(from: f64, to: f64, step: f64) -> Vec<f64> {

@@ -1,26 +1,19 @@
 //! `binary-fig5-7`: optimal linear patterns against the signal-to-noise ratio, shortcuts, and Luo's scheme.
 
-use super::{ERROR, SNR, Scene, crossing, descent_from, each, not_below, sweep};
+use super::{ERROR, SNR, Scene, crossing, descent_from, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::published::{Luo, by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Optimum;
 
-parameters! {
-    pub struct Parameters {
-        bits: usize [2..=4] = 3 => "Bits of the cell index.",
-        sensors: Vec<usize> [2..=10; 1..=6] = vec![3, 5, 8] => "Numbers of sensors, each at least the number of bits.",
-        from_db: f64 [-60.0..=60.0] = 0.0 => "First signal-to-noise ratio, dB.",
-        to_db: f64 [-60.0..=60.0] = 30.0 => "Last signal-to-noise ratio, dB.",
-        step_db: f64 [0.01..=60.0] = 1.0 => quick 5.0 => "Step, dB.",
-    }
-    check |p| {
-        not_below(p.from_db, p.to_db)?;
-        let bits = p.bits;
-        accept_each("sensors", &p.sensors, |n| (*n < bits).then(|| format!("fewer sensors than the {bits} bits")))
-    };
-}
+swept! { 0.0 to 30.0, step 1.0 => quick 5.0, {
+    bits: usize [2..=4] = 3 => "Bits of the cell index.",
+    sensors: Vec<usize> [2..=10; 1..=6] = vec![3, 5, 8] => "Numbers of sensors, each at least the number of bits.",
+} check |p| {
+    let bits = p.bits;
+    accept_each("sensors", &p.sensors, |n| (*n < bits).then(|| format!("fewer sensors than the {bits} bits")))
+} }
 
 rows! {
     pub struct Rows {

@@ -305,11 +305,10 @@ impl Figure for Response {
     }
 
     fn plot(&self, _: &ResponseParameters, rows: &Vec<Answer>) -> Plot {
-        let x = || Axis::linear("source x / V");
-        let probability = Panel::new("Probability of a 1", x(), Axis::linear("P(1 | x)"))
+        let probability = Panel::linear("Probability of a 1", "source x / V", "P(1 | x)")
             .with(Layer::dashed("without noise", points(rows, |r| (r.x, f64::from(r.bit)))).coloured(7))
             .with(Layer::line("with noise", points(rows, |r| (r.x, r.p1))).coloured(0));
-        let information = Panel::new("Information in the bit", x(), Axis::linear("Fisher information / V⁻²"))
+        let information = Panel::linear("Information in the bit", "source x / V", "Fisher information / V⁻²")
             .with(Layer::line("", points(rows, |r| (r.x, r.information))).coloured(1))
             .without_legend();
         Plot::grid(2, vec![probability, information])

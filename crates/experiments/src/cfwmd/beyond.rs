@@ -112,7 +112,7 @@ pub(crate) static SCHEDULED: Simulated<Linear, Step, Vec<Bound>> = Simulated {
                 sensors: 2,
                 ..setting.clone()
             };
-            all.extend(two.run(context, TWO, 1.0, &schemes)?);
+            all.extend(two.run(context, (TWO, 1.0), &schemes)?);
         }
         Ok(all)
     },

@@ -119,7 +119,7 @@ pub(crate) static FIG9: Simulated<Field, Summary> = Simulated {
     },
     simulate: |setting, context| {
         let mut all = setting.at_budgets(context, "", &FOUR[1..])?;
-        all.extend(setting.run(context, "", 9.0, &FOUR[..1])?);
+        all.extend(setting.run(context, ("", 9.0), &FOUR[..1])?);
         Ok(all)
     },
     claims: |rows, claims| {
@@ -170,7 +170,7 @@ pub(crate) static FIG10: Simulated<Field, Step> = Simulated {
             particles: (setting.particles / 5).max(2),
             ..setting.clone()
         };
-        all.extend(many.run(context, MANY, setting.messages[0], &FUSED)?);
+        all.extend(many.run(context, (MANY, setting.messages[0]), &FUSED)?);
         Ok(all)
     },
     shown: |_, run| run.world.is_empty(),

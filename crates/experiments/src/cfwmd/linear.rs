@@ -2,7 +2,7 @@
 
 use super::rows::Ensemble;
 use super::setting::{Linear, Setting};
-use super::world::{Centre, Draws, Known, World};
+use super::world::{At, Centre, Draws, Known, Named, World};
 use crate::prelude::*;
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
@@ -62,25 +62,18 @@ impl Setting for Linear {
     }
 
     /// On common random numbers. Schemes for scalar measurements are left out where position and velocity are measured.
-    fn run(
-        &self,
-        context: &Context<'_>,
-        world: &str,
-        messages: f64,
-        schemes: &[(&'static str, Scheme)],
-    ) -> Result<Vec<Ensemble>, Error> {
+    fn run(&self, context: &Context<'_>, at: At<'_>, schemes: &[Named<Scheme>]) -> Result<Vec<Ensemble>, Error> {
         // One stream for all figures and budgets: schemes differ by what they do, not by their luck.
         let stream = context.stream("cfwmd-linear");
         let scheduled = schemes.iter().any(|(_, s)| *s == Scheme::Gaussian(Weighing::Scheduled));
         let schedule = scheduled.then(|| context.stream("cfwmd-schedule"));
-        let at = (world, messages);
         if self.noise_variances.len() == 1 {
-            Line::<1>::new(self, messages, schedule)?.simulate(context, stream, self.trials, at, schemes)
+            Line::<1>::new(self, at.1, schedule)?.simulate(context, stream, self.trials, at, schemes)
         } else {
             use Method::{Centred, Unconditional};
             let mut schemes = schemes.to_vec();
             schemes.retain(|(_, s)| !matches!(s, Scheme::Trigger(_) | Scheme::NoFeedback(Centred | Unconditional)));
-            Line::<2>::new(self, messages, schedule)?.simulate(context, stream, self.trials, at, &schemes)
+            Line::<2>::new(self, at.1, schedule)?.simulate(context, stream, self.trials, at, &schemes)
         }
     }
 }

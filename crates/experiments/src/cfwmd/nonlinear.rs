@@ -2,7 +2,7 @@
 
 use super::rows::Ensemble;
 use super::setting::{Field, Setting};
-use super::world::{Centre, Draws, Known, World};
+use super::world::{At, Centre, Draws, Known, Named, World};
 use crate::prelude::*;
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
@@ -137,14 +137,8 @@ impl Setting for Field {
         &self.messages
     }
 
-    fn run(
-        &self,
-        context: &Context<'_>,
-        world: &str,
-        messages: f64,
-        schemes: &[(&'static str, Scheme)],
-    ) -> Result<Vec<Ensemble>, Error> {
+    fn run(&self, context: &Context<'_>, at: At<'_>, schemes: &[Named<Scheme>]) -> Result<Vec<Ensemble>, Error> {
         let stream = context.stream("cfwmd-nonlinear");
-        Plane::new(self, messages)?.simulate(context, stream, self.trials, (world, messages), schemes)
+        Plane::new(self, at.1)?.simulate(context, stream, self.trials, at, schemes)
     }
 }

@@ -86,11 +86,10 @@ fn colour_of(scheme: &str, otherwise: usize) -> usize {
 
 /// A number of the summary against the budget, a curve for each scheme.
 pub(super) fn by_budget(rows: &[&Summary], title: &str, label: &str, of: impl Fn(&Summary) -> Measured) -> Panel {
-    let axes = (Axis::linear("message budget l / (messages/step)"), Axis::linear(label));
     let schemes = distinct(rows, |r| r.run.scheme);
     let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
         let own = rows.iter().filter(|r| r.run.scheme == *scheme);
         Layer::curve(*scheme, colour_of(scheme, order), own.map(|r| (r.run.l, of(r))).collect())
     });
-    Panel::new(title, axes.0, axes.1).with_all(layers)
+    Panel::linear(title, "message budget l / (messages/step)", label).with_all(layers)
 }

@@ -50,8 +50,7 @@ impl Main for Rates {
                 let own = rows.iter().filter(|r| r.setting == *world);
                 Layer::curve(world.as_str(), colour, own.map(|r| (r.l, ours(r) - r.l)).collect())
             });
-            let axis = Axis::linear("message budget l / (messages/step)");
-            Panel::new(title, axis, Axis::linear("rate minus budget / (messages/step)"))
+            Panel::linear(title, "message budget l / (messages/step)", "rate minus budget / (messages/step)")
                 .with(Layer::dashed("printed", points(first, |r| (r.l, printed(r).map(|p| p - r.l)))).coloured(7))
                 .with_all(layers)
         };

@@ -270,7 +270,7 @@ impl<X> Rows<Step, X> {
             let order = schemes.join(" < ");
             let what = format!("at every step {order} in {part:?} error, but for two standard errors {world}");
             claims.all(id, what, neighbours, |(a, b)| {
-                let error = a.standard_error.unwrap_or(0.0).hypot(b.standard_error.unwrap_or(0.0));
+                let error = a.error().hypot(b.error());
                 a.value <= b.value + 2.0 * error
             });
         }

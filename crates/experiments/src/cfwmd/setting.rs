@@ -1,6 +1,7 @@
 //! Parameters of the simulated figures.
 
 use super::rows::Ensemble;
+use super::world::{At, Named};
 use crate::Argument;
 use crate::prelude::*;
 use serde::{Serialize, de::DeserializeOwned};
@@ -17,13 +18,7 @@ pub trait Setting: Clone + Default + Serialize + DeserializeOwned + Argument + Q
     ///
     /// # Errors
     /// If a filter fails or the run is cancelled.
-    fn run(
-        &self,
-        context: &Context<'_>,
-        world: &str,
-        messages: f64,
-        schemes: &[(&'static str, Self::Scheme)],
-    ) -> Result<Vec<Ensemble>, Error>;
+    fn run(&self, context: &Context<'_>, at: At<'_>, schemes: &[Named<Self::Scheme>]) -> Result<Vec<Ensemble>, Error>;
 
     /// Runs schemes at all budgets.
     ///
@@ -33,10 +28,10 @@ pub trait Setting: Clone + Default + Serialize + DeserializeOwned + Argument + Q
         &self,
         context: &Context<'_>,
         world: &str,
-        schemes: &[(&'static str, Self::Scheme)],
+        schemes: &[Named<Self::Scheme>],
     ) -> Result<Vec<Ensemble>, Error> {
         let budgets = self.messages().iter();
-        let runs = budgets.map(|l| self.run(context, world, *l, schemes));
+        let runs = budgets.map(|l| self.run(context, (world, *l), schemes));
         Ok(runs.collect::<Result<Vec<_>, _>>()?.concat())
     }
 }

@@ -8,6 +8,7 @@ use super::rates::{Rates, as_printed};
 use super::rows::{Ensemble, Part, Run, Step};
 use super::scalar::{CENSORED, FOUR};
 use super::setting::{Linear, Setting};
+use super::world::Named;
 use crate::prelude::*;
 use fewbits_cfwmd::rule::Weighing;
 
@@ -22,8 +23,8 @@ fn world(variance: f64) -> String {
 fn both(
     context: &Context<'_>,
     setting: &Linear,
-    schemes: &[(&'static str, Scheme)],
-    again: &[(&'static str, Scheme)],
+    schemes: &[Named<Scheme>],
+    again: &[Named<Scheme>],
 ) -> Result<Vec<Ensemble>, Error> {
     let mut all = setting.at_budgets(context, &world(setting.acceleration_variance), schemes)?;
     if setting.acceleration_variance != STATED {
@@ -47,7 +48,8 @@ pub(crate) static FIG4: Simulated<Linear, Step> = Simulated {
         let mut all = both(context, setting, &FOUR, &FOUR)?;
         let cloud = [("CFwMD particles", Scheme::Particles(setting.cloud(), Weighing::OwnFilter))];
         let own = world(setting.acceleration_variance);
-        all.extend(setting.of_trials(150).run(context, &own, setting.messages[0], &cloud)?);
+        let few = setting.of_trials(150);
+        all.extend(few.run(context, (&own, few.messages[0]), &cloud)?);
         Ok(all)
     },
     claims: |rows, claims| {

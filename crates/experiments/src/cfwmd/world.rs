@@ -62,6 +62,12 @@ impl<const D: usize> Known<D> {
 /// A fusion centre as it goes from step to step, called with their numbers.
 pub(super) type Centre<'a, const D: usize> = Box<dyn FnMut(usize) -> Result<Known<D>, Error> + 'a>;
 
+/// A scheme under its name in the tables.
+pub(super) type Named<S> = (&'static str, S);
+
+/// What a figure calls the setting of its runs, and their message budget.
+pub(super) type At<'a> = (&'a str, f64);
+
 /// A world whose states alternate positions and velocities.
 pub(super) trait World<const D: usize, const M: usize>: Sync {
     /// What is sent, and what is made of it.
@@ -83,8 +89,8 @@ pub(super) trait World<const D: usize, const M: usize>: Sync {
         context: &Context<'_>,
         stream: Stream,
         trials: u64,
-        (world, messages): (&str, f64),
-        schemes: &[(&'static str, Self::Scheme)],
+        (world, messages): At<'_>,
+        schemes: &[Named<Self::Scheme>],
     ) -> Result<Vec<Ensemble>, Error> {
         let run = |scheme: Self::Scheme, draws: &Draws<D, M>, stream: Stream| -> Result<Vec<Moment>, Error> {
             let mut centre = self.centre(scheme, draws, stream)?;
@@ -108,7 +114,7 @@ pub(super) trait World<const D: usize, const M: usize>: Sync {
                 .collect()
         };
         let mut trials = context.trials(stream, trials, every)?;
-        let of = |(place, (scheme, _)): (usize, &(&'static str, Self::Scheme))| Ensemble {
+        let of = |(place, (scheme, _)): (usize, &Named<Self::Scheme>)| Ensemble {
             run: Run {
                 scheme,
                 world: world.to_owned(),

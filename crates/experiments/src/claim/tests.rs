@@ -95,7 +95,9 @@ fn references_are_found_by_key_and_fail_where_the_row_is_absent_or_off() {
     }
     let one_sided = |value: f64| {
         let claims = Claims::about("mi-table4-3", true, true);
-        claims.keyed_at_most("mse", "squared error", &[Named(value)], |row| Some(row.0));
+        claims
+            .no_more()
+            .keyed("mse", "squared error", &[Named(value)], |row| Some(row.0));
         let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
         claims.made().into_iter().find_map(of).unwrap()
     };

@@ -83,7 +83,7 @@ pub(super) fn fig7(rows: &Rows, claims: &mut Claims) {
     let value = |scheme| determinant(scheme).map(|m| m.value);
     let lpg = "lpg-2x5 known rate";
     let what = "after five nodes polynomial Gaussians are sharper than the other program's (log10 det -3.8), by more than four standard errors (erratum diffusive-13)";
-    let most = determinant(lpg).map(|m| m.value + 4.0 * m.standard_error.unwrap_or(0.0));
+    let most = determinant(lpg).map(|m| m.value + 4.0 * m.error());
     paper.below("det5/lpg", what, most, -3.8);
     let what = "and no sharper than the exact belief with the rate known";
     paper.at_least("det5/honest", what, minus(value(lpg), value("exact known rate")), 0.0);

@@ -164,10 +164,9 @@ impl Figure for Chains {
         };
         let threshold = schemes[0].example.threshold.log10();
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;
-        let limit = || Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7);
+        let limit = || Layer::level("threshold", [1.0, last], threshold).coloured(7);
         let determinants = |title: &str, chosen: &dyn Fn(&Scheme) -> bool| {
-            let axis = Axis::linear("lg det of the covariance / m^4");
-            let panel = Panel::new(title, Axis::linear("nodes"), axis).with(limit());
+            let panel = Panel::linear(title, "nodes", "lg det of the covariance / m^4").with(limit());
             let line = |scheme: &Scheme| {
                 let line = points(of(scheme), |c| (c.step as f64, c.log10det_med.map_or(f64::NAN, |m| m.value)));
                 curve(scheme, line)

@@ -171,7 +171,7 @@ impl Figure for Convergence {
         here.all("consistent", what, rows, |r| steady(r.dymbo_exact / r.dymbo_pred));
         let what = "normalised error of the prior-aware start within 4.5 standard errors of the same interval";
         here.all("informed-consistent", what, rows, |r| {
-            let slack = 4.5 * r.informed_nees.standard_error.unwrap_or(0.0);
+            let slack = 4.5 * r.informed_nees.error();
             (0.9995 - slack..=1.0030 + slack).contains(&r.informed_nees.value)
         });
         for curve in rows.chunks(p.steps + 1) {
@@ -222,9 +222,8 @@ impl Figure for Convergence {
         for curve in rows.errors.chunks(p.steps + 1) {
             let line = |of: fn(&Row) -> f64| points(curve, |r| (r.n as f64, of(r)));
             let marks = |label: &str, of: fn(&Row) -> Measured| Layer::measured(label, curve, |r| (r.n as f64, of(r)));
-            let (x, y) = (Axis::linear("step n"), Axis::log("mean squared error / sigma^2"));
             panels.push(
-                Panel::new(curve[0].plant.title(), x, y)
+                Panel::semilog(curve[0].plant.title(), "step n", "mean squared error / sigma^2")
                     .with(Layer::line("Kalman, exact", line(|r| r.kf_pred)).coloured(0))
                     .with(marks("Kalman, simulated", |r| r.kf_mse).coloured(0))
                     .with(Layer::line("sign bit, exact", line(|r| r.dymbo_exact)).coloured(1))

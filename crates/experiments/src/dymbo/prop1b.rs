@@ -83,8 +83,8 @@ impl Figure for PosteriorShape {
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let law = |sigma: f64| (sigma, 0.02 / p.sigma_theta * (p.sigma_theta / sigma).powi(3));
-        let x = Axis::log("measurement noise deviation sigma");
-        let distance = Panel::new("Distance from normal", x, Axis::log("largest density difference"))
+        let x = "measurement noise deviation sigma";
+        let distance = Panel::loglog("Distance from normal", x, "largest density difference")
             .with(Layer::dashed("0.02 / sigma^3", p.sigma.iter().map(|s| law(*s)).collect()).coloured(1))
             .with(Layer::points("exact", points(&rows.distances, |r| (r.sigma, r.distance))).coloured(0));
         let curve = |of: fn(&Density) -> f64| points(&rows.densities, |r| (r.theta, of(r)));

@@ -172,14 +172,17 @@ impl Figure for SelfTuning {
         let mut rows = Vec::new();
         for scene in &scenes {
             let stream = context.stream(self.about().id).named(&scene.name());
-            let found = context.compare(stream, p.trials, &RECEIVERS, |of, it| one_run(scene, of, p, it.stream))?;
+            let every = |it: Trial| RECEIVERS.iter().map(|of| one_run(scene, of, p, it.stream)).collect();
+            let runs: Vec<Vec<[f64; 7]>> = context.trials(stream, p.trials, every)?;
+            let moments = |receiver: usize, of: usize| runs.iter().map(|run| run[receiver][of]).collect::<Moments>();
             for (i, (receiver, .., inverted)) in RECEIVERS.iter().enumerate() {
                 let windows = if scene.1 { 1..6 } else { 0..1 };
                 let knows = if *inverted { 8 } else { 0 };
                 for of in windows {
-                    let (own, known) = (found.moments(i, of), found.moments(knows, of).mean());
+                    let (own, known) = (moments(i, of), moments(knows, of).mean());
                     // Runs are paired: the error of the ratio is that of the difference.
-                    let spread = found.difference(i, knows, of).standard_error();
+                    let differences = runs.iter().map(|run| run[i][of] - run[knows][of]);
+                    let spread = differences.collect::<Moments>().standard_error();
                     let ratio = (own.mean() / known).sqrt();
                     rows.push(Row {
                         plant: scene.name(),
@@ -189,7 +192,7 @@ impl Figure for SelfTuning {
                         trials: p.trials,
                         error: Measured::root_mean(&own),
                         ratio: Measured::new(ratio, spread / (2.0 * known * ratio)),
-                        learnt: found.moments(i, 6).mean().exp(),
+                        learnt: moments(i, 6).mean().exp(),
                     });
                 }
             }
@@ -203,9 +206,7 @@ impl Figure for SelfTuning {
             rows.iter()
                 .find(|r| r.plant == plant && r.receiver == receiver && r.to == to)
         };
-        let less = |r: Option<&Row>, bound: f64| {
-            r.map(|r| r.ratio.value - 4.0 * r.ratio.standard_error.unwrap_or(0.0) - bound)
-        };
+        let less = |r: Option<&Row>, bound: f64| r.map(|r| r.ratio.value - 4.0 * r.ratio.error() - bound);
         for (plant, learnt) in PLANTS.iter().zip(LEARNT) {
             let plant = Scene(*plant, false).name();
             for from in ["Q / 9", "9 Q"] {

@@ -86,7 +86,7 @@ impl Figure for Fig2 {
                 .with(Layer::line("from the first density", points(of(), |r| (r.t.into(), r.kl_total))))
                 .with(Layer::dashed("to the first density", points(of(), |r| (r.t.into(), r.kl_total_reverse))))
                 .with(Layer::points("sum of the steps", points(of(), |r| (r.t.into(), r.sum_of_steps))))
-                .with(Layer::dashed("0.1 nat", vec![(1.0, 0.1), (f64::from(p.steps), 0.1)]))
+                .with(Layer::level("0.1 nat", [1.0, p.steps.into()], 0.1))
         };
         Plot::grid(2, p.ratio.iter().map(panel).collect())
     }

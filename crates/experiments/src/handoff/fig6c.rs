@@ -195,9 +195,7 @@ impl Figure for Fig6c {
         let pair = |pair: &'static str| rows.difference.iter().filter(move |d| d.pair == pair);
         paper.all("ml-behind", "ML is behind KL at every time", pair("ml-kl"), |d| d.kl.value > 0.0);
         let what = "KL and L1 are the same within 0.015 nat and three standard errors";
-        here.all("kl-l1", what, pair("kl-l1"), |d| {
-            d.kl.value.abs() < 0.015 + 3.0 * d.kl.standard_error.unwrap_or(0.0)
-        });
+        here.all("kl-l1", what, pair("kl-l1"), |d| d.kl.value.abs() < 0.015 + 3.0 * d.kl.error());
         let worst = (1..=STEPS).filter_map(|t| {
             let gauss = rows.at(t, "gauss")?.value;
             let better = |(method, ..): &(&str, _, _)| rows.at(t, method).is_some_and(|v| v.value < gauss);

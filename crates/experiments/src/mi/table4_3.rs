@@ -161,10 +161,8 @@ impl Figure for Table43 {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let flat = |name: &str| {
-            let level = first(&rows.bounds, |b| b.bound == name).map(|b| vec![(0.8, b.mse), (2.0, b.mse)]);
-            level.unwrap_or_default()
-        };
+        let bound =
+            |label, name| Layer::level(label, [0.8, 2.0], first(&rows.bounds, |b| b.bound == name).map(|b| b.mse));
         let marks = |value: fn(&Design) -> Option<f64>| {
             let identical = rows.designs.iter().filter_map(|d| Some((d.t?, value(d))));
             points(identical, |point| point)
@@ -174,8 +172,8 @@ impl Figure for Table43 {
             .with(Layer::line("identical quantizers", points(&rows.curve, |p| (p.t, p.values.mse))))
             .with(Layer::points("designs", marks(|d| Some(d.values.mse))))
             .with(Layer::points("printed", marks(|d| d.printed_mse)).marked(Marker::Cross))
-            .with(Layer::dashed("bound for any codes", flat("ceo")))
-            .with(Layer::dashed("unquantized", flat("unquantized")));
+            .with(bound("bound for any codes", "ceo"))
+            .with(bound("unquantized", "unquantized"));
         let chain = points(select(&rows.chain, |s| s.criterion == "mi"), |s| (s.stage as f64, s.t));
         let stages = Panel::linear("Greedy chain for information", "sensor, in order of design", t)
             .with_all(Layer::marked_line("", 0, chain))

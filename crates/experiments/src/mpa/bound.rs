@@ -107,7 +107,7 @@ impl Figure for Bounds {
         full.keyed("unquantized", what, t, |r| r.unquantized);
         full.keyed("grid-median", "median of the grid", t, |r| r.grid_median);
         claims.all("floor", "no tracker of levels is below its bound", t, |r| {
-            let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.standard_error.unwrap_or(0.0);
+            let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.error();
             above(r.grid) && above(r.message_passing)
         });
         claims.all("order", "levels never tell more than ranges", t, |r| r.quantized.value > r.unquantized.value);

@@ -81,7 +81,7 @@ impl Figure for Encoders {
             let of = |method: &str| find(&t.encoders, &format!("adaptive {point}"), method).map(|r| r.score.mse);
             // The error of the extended filter has a heavy tail at 50 dB: 8 % standard error in 200 tracks.
             let ratio = of("grid-15").zip(of("EKF-U")).map(|(a, b)| {
-                let relative = |m: Measured| m.standard_error.unwrap_or(0.0) / m.value;
+                let relative = |m: Measured| m.error() / m.value;
                 a.value / b.value * (1.0 - 2.0 * relative(a).hypot(relative(b)))
             });
             let what = "with the adaptive encoder four bits are as good as the unquantized extended Kalman filter \
@@ -99,10 +99,9 @@ impl Figure for Encoders {
                 Layer::measured(*name, of, |r| ((r.levels as f64).log2(), r.score.mse)).coloured(i)
             });
             let reference = first(&t.encoders, |r| r.snr_db == snr && r.method == "EKF-U");
-            let level = reference.map_or(Vec::new(), |r| vec![(1.0, r.score.mse.value), (4.0, r.score.mse.value)]);
             Panel::semilog(format!("{snr} dB"), "bits", super::scores::MSE)
                 .with_all(marks)
-                .with(Layer::dashed("EKF-U", level))
+                .with(Layer::level("EKF-U", [1.0, 4.0], reference.map(|r| r.score.mse.value)))
         };
         Plot::grid(3, [50.0, 40.0, 30.0].map(panel).to_vec())
     }

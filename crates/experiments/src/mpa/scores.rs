@@ -96,7 +96,7 @@ pub(super) fn ladder<'a>(title: &str, rows: impl IntoIterator<Item = &'a Row>) -
     let y = Axis::ladder(rows.iter().map(|r| r.method.as_str()));
     let lying = |label: &str, of: fn(&Row) -> Measured| {
         let marks = rows.iter().enumerate().map(|(i, r)| (of(r).value, -(i as f64)));
-        let errors = rows.iter().map(|r| of(r).standard_error.unwrap_or(0.0));
+        let errors = rows.iter().map(|r| of(r).error());
         Layer::points(label, marks.collect())
             .with_errors(errors.collect())
             .lying()

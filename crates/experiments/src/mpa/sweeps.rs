@@ -165,7 +165,8 @@ impl Figure for Fig34 {
         let full = claims.at_full_trials();
         agree(claims, t, "");
         // Of three particles the other program loses more tracks.
-        full.keyed_at_most("lost-most", "share of lost tracks", t, |r| r.score.lost);
+        full.no_more()
+            .keyed("lost-most", "share of lost tracks", t, |r| r.score.lost);
         let value = |method: String| mse(t, "40dB-L4", &method);
         let improved = [10, 20, 40, 100].map(|n| value(format!("improved-{n}")));
         full.decreasing("improved", "improved message passing gains from particles up to 100", improved);
@@ -188,16 +189,13 @@ impl Figure for Fig34 {
             "rao-blackwell",
         ];
         let size = |r: &Row| r.size.unwrap_or(1) as f64;
-        let level = |method: &str| {
-            let value = mse(t, "40dB-L4", method);
-            value.map(|v| vec![(3.0, v), (500.0, v)]).unwrap_or_default()
-        };
+        let level = |label, method| Layer::level(label, [3.0, 500.0], mse(t, "40dB-L4", method));
         let particles = Axis::log("particles").named(SIZES.map(|n| (n as f64, n.to_string())));
         Plot::of(
             Panel::new("40 dB, four levels", particles, Axis::log(MSE))
                 .with_all(families(t.iter(), &shown, size))
-                .with(Layer::dashed("grid of 15", level("grid-15")))
-                .with(Layer::dashed("EKF-U", level("EKF-U"))),
+                .with(level("grid of 15", "grid-15"))
+                .with(level("EKF-U", "EKF-U")),
         )
     }
 }
@@ -294,7 +292,8 @@ impl Figure for Low {
         let full = claims.at_full_trials();
         agree(claims, t, "");
         // Of three particles the other program loses more tracks.
-        full.keyed_at_most("lost-most", "share of lost tracks", t, |r| r.score.lost);
+        full.no_more()
+            .keyed("lost-most", "share of lost tracks", t, |r| r.score.lost);
         let gmpa = |snr: u32, levels: usize| mse(t, &format!("{snr}dB-L{levels}"), "GMPA");
         full.decreasing("30dB", "at 30 dB more levels help (erratum mpa-15)", [4, 8, 16, 64].map(|l| gmpa(30, l)));
         let saturated = [16, 64].map(|l| Some(gmpa(20, l)? / gmpa(20, 8)?));

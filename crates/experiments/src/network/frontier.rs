@@ -1,7 +1,7 @@
 //! Error against bits, transmitted bits and joules: every scheme on the same worlds.
 
 use super::schemes;
-use super::worlds::{self, COEFFICIENT, Entry};
+use super::worlds::{self, Bill, COEFFICIENT, Entry};
 use crate::prelude::*;
 
 parameters! {
@@ -65,24 +65,21 @@ impl Figure for Frontier {
         let (scalar, plane) = (worlds::scalar(p.slots)?, worlds::plane(p.slots)?);
         let (least, everything) = (scalar.everything()?, plane.everything()?[1].sqrt());
         let rows_of = |world, entries: Vec<Entry>, floor: &dyn Fn(f64) -> f64| -> Result<Vec<Row>, Error> {
-            let one = |entry: &Entry, it: Trial| {
-                let bill = entry.run(it.stream)?;
-                Ok([bill.squared, bill.reports, bill.air, bill.joules])
-            };
             let stream = context.stream("network-frontier").named(world);
-            let runs = context.compare(stream, p.trials, &entries, one)?;
+            let all = |it: Trial| entries.iter().map(|entry| entry.run(it.stream)).collect();
+            let runs: Vec<Vec<Bill>> = context.trials(stream, p.trials, all)?;
             let row = |(i, entry): (usize, &Entry)| {
-                let mean = |of: usize| Measured::from(runs.moments(i, of));
-                let payload = mean(1);
+                let moments = |of: fn(&Bill) -> f64| runs.iter().map(|bills| of(&bills[i])).collect::<Moments>();
+                let payload = Measured::from(moments(|bill| bill.reports));
                 Row {
                     world,
                     scheme: entry.family,
                     setting: entry.setting.clone(),
                     feedback: entry.feedback,
-                    rmse: Measured::root_mean(&runs.moments(i, 0)),
+                    rmse: Measured::root_mean(&moments(|bill| bill.squared)),
                     payload,
-                    air: mean(2),
-                    energy: mean(3),
+                    air: moments(|bill| bill.air).into(),
+                    energy: moments(|bill| bill.joules).into(),
                     floor: floor(payload.value),
                     best_by_payload: "",
                     best_by_air: "",
@@ -110,7 +107,7 @@ impl Figure for Frontier {
             first(rows, |r| (r.world, r.scheme, r.setting.as_str(), r.feedback) == (world, scheme, setting, feedback))
         };
         let ratio = |a: Option<&Row>, b: Option<&Row>, of: fn(&Row) -> f64| a.zip(b).map(|(a, b)| of(a) / of(b));
-        let slack = |r: &&Row| r.floor - 4.0 * r.rmse.standard_error.unwrap_or(0.0);
+        let slack = |r: &&Row| r.floor - 4.0 * r.rmse.error();
         let loud = || select(rows, |r| !["CFwMD", "CFwMD2", "adaptive"].contains(&r.scheme));
         claims.all("floor", "no scheme that pays for every symbol beats the floor", loud(), |r| {
             r.rmse.value >= slack(&r)

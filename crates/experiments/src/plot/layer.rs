@@ -157,6 +157,12 @@ impl Layer {
         Self::stroked(label, points, Stroke::Dashed)
     }
 
+    /// A dashed horizontal line over this stretch of the horizontal axis; nothing without a level.
+    pub fn level(label: impl Into<String>, [from, to]: [f64; 2], level: impl Into<Option<f64>>) -> Self {
+        let level = level.into();
+        Self::dashed(label, level.into_iter().flat_map(|y| [(from, y), (to, y)]).collect())
+    }
+
     /// Markers: measurements.
     pub fn points(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self::new(
@@ -179,7 +185,7 @@ impl Layer {
         let place = |row| {
             let (x, y) = point(row);
             let y: Measured = y.into()?;
-            Some(((x, y.value), y.standard_error.unwrap_or(0.0)))
+            Some(((x, y.value), y.error()))
         };
         let (points, errors) = rows.into_iter().filter_map(place).unzip();
         Self::points(label, points).with_errors(errors)

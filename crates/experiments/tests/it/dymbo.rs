@@ -1,16 +1,16 @@
 //! Sign bits over bad links, and about vectors.
 
-use super::{assert_agrees, exact};
+use super::{assert_agrees, assert_agrees_if_known, exact, trials};
 use fewbits_core::factor::InCell;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
 use fewbits_dymbo::gap::{SmoothedGap, Twin, exact_filter};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, SignFilter, chain, steady,
 };
-use fewbits_experiments::{Measured, reference};
+use fewbits_experiments::Measured;
 use fewbits_filters::{CloudWorkspace, GaussianCloud, RaoBlackwellised, scalar_fixed_lag_variance, steady_state};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
-use fewbits_monte_carlo::{MonteCarlo, Stream, Trial};
+use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
 use rand::RngExt;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -54,9 +54,7 @@ fn lost_bits_cost_what_the_bound_says() {
         .flat_map(|gamma| [0.0, 0.1, 0.3, 0.5, 0.7].map(|loss| (gamma, loss)))
     {
         let plant = plant(gamma);
-        let stream = Stream::new(1).named(&format!("{gamma} {loss}"));
-        let run = |it: Trial| Ok::<_, fewbits_dymbo::Error>(lossy_run(&plant, loss, it.stream));
-        let runs = MonteCarlo::new(stream, 300).run(run).unwrap();
+        let runs = trials(&format!("{gamma} {loss}"), 300, |it| Ok(lossy_run(&plant, loss, it.stream)));
         let [mean, mse] = [0, 1].map(|of| runs.iter().map(|run| run[of]).collect::<Measured>());
         let [noise, mse_noise] = [mean, mse].map(|m| 4.5 * m.standard_error.unwrap());
         let bound = steady::erasure_bound(&plant, &Link::lossy(loss).unwrap())
@@ -95,22 +93,17 @@ fn knowing_that_bits_are_inverted_pays_where_many_are() {
         let cost = naive_mse / mse - 1.0;
         assert!(crossover != 0.01 || cost.abs() <= 1e-4, "gamma {gamma}: {cost}");
         for (quantity, value) in [("aware", mse), ("naive", naive_mse), ("cost", cost)] {
-            let key = format!("dymbo-bsc/{quantity}/0.9 {gamma} {crossover}");
-            if reference::find(&key).is_some() {
-                assert_agrees(&key, exact(value));
-            }
+            assert_agrees_if_known(&format!("dymbo-bsc/{quantity}/0.9 {gamma} {crossover}"), exact(value));
         }
         if gamma == 0.5 {
             under = under.max(mse / plant.steady_state(aware.information()).unwrap().filtered_variance - 1.0);
         }
         if crossover >= 0.1 {
             let exact = exact_filter(&plant, 100).unwrap();
-            let run = |it: Trial| {
+            let runs = trials(&format!("{gamma} {crossover}"), 200, |it| {
                 let mut rng = it.stream.fast_rng();
-                Twin::new(&mut rng, aware, &exact)?.steady_excess(&mut rng, 40, 60)
-            };
-            let stream = Stream::new(1).named(&format!("{gamma} {crossover}"));
-            let runs = MonteCarlo::new(stream, 200).run(run).unwrap();
+                Ok(Twin::new(&mut rng, aware, &exact)?.steady_excess(&mut rng, 40, 60)?)
+            });
             let excess = runs.into_iter().collect::<Measured>().value;
             assert!(excess <= 1.2e-4 * mse, "gamma {gamma}, crossover {crossover}: {excess}");
         }
@@ -144,10 +137,7 @@ fn escapes(plant: &ScalarPlant, stream: Stream) -> bool {
 #[test]
 fn one_bit_cannot_hold_an_unstable_plant() {
     let wild = ScalarPlant::new_unstable(1.2, 0.5, 1.0).unwrap();
-    let run = |it: Trial| Ok::<_, fewbits_dymbo::Error>(f64::from(escapes(&wild, it.stream)));
-    let runs = MonteCarlo::new(Stream::new(1).named("unstable"), 20_000)
-        .run(run)
-        .unwrap();
+    let runs = trials("unstable", 20_000, |it| Ok(f64::from(escapes(&wild, it.stream))));
     assert_agrees("dymbo-threshold/escaped/1.2 0.5", runs.into_iter().collect::<Measured>());
     let steady = wild.steady_state(DymboFilter::new(wild).information()).unwrap();
     assert_agrees("dymbo-threshold/riccati/1.2 0.5", exact(steady.filtered_variance));
@@ -175,10 +165,7 @@ fn two_sensors_in_turn_are_worth_one_unquantized() {
             ("table", table_mse),
             ("kalman", kalman),
         ] {
-            let key = format!("dymbo-sensors/{quantity}/0.9 {gamma} {sensors}");
-            if reference::find(&key).is_some() {
-                assert_agrees(&key, exact(value));
-            }
+            assert_agrees_if_known(&format!("dymbo-sensors/{quantity}/0.9 {gamma} {sensors}"), exact(value));
         }
         assert!(sequential <= parallel * (1.0 + 1e-9) && table <= parallel * (1.0 + 1e-9), "{gamma}, {sensors}");
         if gamma == 0.5 && sensors == 10 {
@@ -208,14 +195,13 @@ fn a_lag_of_four_beats_the_unquantized_filter_of_a_slow_plant() {
     ] {
         let filter = DymboFilter::new(plant);
         let density = exact_filter(&plant, 40 + 10 * 4 + 20).unwrap();
-        let run = |it: Trial| {
+        let name = format!("{} {}", plant.coefficient(), plant.process_variance());
+        let runs = trials(&name, 150, |it| {
             let mut rng = it.stream.fast_rng();
             let mut twin = Twin::new(&mut rng, filter, &density)?;
             (0..40).try_for_each(|_| twin.step(&mut rng))?;
-            twin.smoothed(&mut rng, &lags, 10, 4)
-        };
-        let name = format!("{} {}", plant.coefficient(), plant.process_variance());
-        let runs = MonteCarlo::new(Stream::new(1).named(&name), 150).run(run).unwrap();
+            Ok(twin.smoothed(&mut rng, &lags, 10, 4)?)
+        });
         let steady = |c: f64| plant.steady_state(c).unwrap();
         let rows = lags.map(|lag| {
             let of = |number: fn(&SmoothedGap) -> f64| -> Measured {
@@ -226,10 +212,7 @@ fn a_lag_of_four_beats_the_unquantized_filter_of_a_slow_plant() {
             let (rts, exact_mse) = (of(|gap| gap.exact_variance + gap.excess), of(|gap| gap.exact_variance));
             let predicted = scalar_fixed_lag_variance(plant.coefficient(), &steady(filter.information()), lag);
             for (quantity, value) in [("rts", rts), ("exact", exact_mse), ("predicted", exact(predicted))] {
-                let key = format!("dymbo-smoother/{quantity}/{name} {lag}");
-                if reference::find(&key).is_some() {
-                    assert_agrees(&key, value);
-                }
+                assert_agrees_if_known(&format!("dymbo-smoother/{quantity}/{name} {lag}"), value);
             }
             (rts, exact_mse, of(|gap| gap.excess))
         });
@@ -239,7 +222,7 @@ fn a_lag_of_four_beats_the_unquantized_filter_of_a_slow_plant() {
                 assert!((saved(5) - 0.28).abs() <= 0.01);
                 for (_, exact_mse, excess) in rows {
                     // Within 0.14 % of the exact smoother at every lag.
-                    let noise = 4.5 * excess.standard_error.unwrap_or(0.0);
+                    let noise = 4.5 * excess.error();
                     assert!(excess.value - noise <= 1.45e-3 * exact_mse.value);
                 }
             }
@@ -335,8 +318,7 @@ fn assert_arrangement<const M: usize>(name: &str, at_once: bool) -> f64 {
         .filtered_covariance
         .trace();
     let start = Gaussian::new(Vector2::zeros(), steady).unwrap();
-    let run = |it: Trial| Ok::<_, fewbits_dymbo::Error>(vector_run(&filter, at_once, start, it.stream));
-    let runs = MonteCarlo::new(Stream::new(1).named(name), 40).run(run).unwrap();
+    let runs = trials(name, 40, |it| Ok(vector_run(&filter, at_once, start, it.stream)));
     let [mmse, excess, nees] = [0, 1, 2].map(|of| runs.iter().map(|run| run[of]).collect::<Measured>());
     for (quantity, value) in [
         ("trace", exact(steady.trace())),

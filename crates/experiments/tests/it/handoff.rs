@@ -1,6 +1,6 @@
 //! Filters that hand their belief on, against the exact belief on a lattice: smoothing costs more than reduction.
 
-use super::assert_agrees;
+use super::{assert_agrees_if_known, trials};
 use fewbits_core::Likelihood;
 use fewbits_densities::Bandwidth;
 use fewbits_experiments::handoff::filters::{PARTICLES, prior, world};
@@ -8,7 +8,7 @@ use fewbits_experiments::handoff::world::{DISTURBANCE, Reading, START, Walk};
 use fewbits_experiments::{Error, Measured};
 use fewbits_handoff::{Components, HandoffFilter, Reducer, Whole};
 use fewbits_mixture_codec::{Criterion, Reduction};
-use fewbits_monte_carlo::{MonteCarlo, Stream, Trial};
+use fewbits_monte_carlo::Stream;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 
@@ -166,17 +166,11 @@ fn errors(setups: &[Setup], law: &[([i64; 2], f64)], stream: Stream) -> Result<V
 #[test]
 fn smoothing_costs_more_than_reduction() {
     let (setups, law) = (setups(), step_law());
-    let trial = |it: Trial| errors(&setups, &law, it.stream);
-    let runs = MonteCarlo::new(Stream::new(1).named("handoff-bandwidth"), 40)
-        .run(trial)
-        .unwrap();
+    let runs = trials("handoff-bandwidth", 40, |it| errors(&setups, &law, it.stream));
     let mean = |i: usize| runs.iter().map(|run| run[i]).collect::<Measured>();
     let of = |name: &str| mean(setups.iter().position(|setup| setup.0 == name).unwrap()).value;
     for (i, (name, ..)) in setups.iter().enumerate() {
-        let key = format!("handoff-bandwidth/kl/{name}");
-        if fewbits_experiments::reference::find(&key).is_some() {
-            assert_agrees(&key, mean(i));
-        }
+        assert_agrees_if_known(&format!("handoff-bandwidth/kl/{name}"), mean(i));
     }
     // Shrinking, or half the bandwidth, removes a fifth of the error or more at no bits, but not where the estimate itself is
     // handed on.
