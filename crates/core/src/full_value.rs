@@ -61,6 +61,7 @@ impl Factor<1> for SentValue {
         let Some(value) = self.value else {
             return Tilted::unchanged(prior, self.log_probability);
         };
+        // The probability of arrival multiplies the evidence and does not depend on `m`.
         let own = value.tilted(prior)?;
         Ok(Tilted {
             log_evidence: own.log_evidence + self.log_probability,
@@ -91,6 +92,7 @@ impl Memoryless<1> for FullValue {
     fn meaning_of(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {
         let (value, probability) = match observation {
             Observation::Received(value) => {
+                // A value with inverted bits has no useful likelihood.
                 within("crossover", link.crossover(), 0.0, 0.0)?;
                 finite("report", *value)?;
                 (Some(Value::scalar(*value, self.noise_variance)?), link.of_received()?)

@@ -152,6 +152,7 @@ impl<const D: usize> Gaussian<D> {
             .zip(own.l().diagonal().iter())
             .map(|(r, o)| (r / o).ln())
             .sum();
+        // (ln(det R / det P) + tr(R^-1 P) + d' R^-1 d - D) / 2; the diagonals of the factors gave half the first term.
         let trace = reference.solve(&self.covariance).trace();
         let shift = other.mean - self.mean;
         error::finite("divergence", log_ratio + 0.5 * (trace + shift.dot(&reference.solve(&shift)) - D as f64))

@@ -71,6 +71,7 @@ impl Levels {
 
     /// The level with an index.
     fn level(&self, index: u64) -> f64 {
+        // A weighted mean of the ends meets both exactly.
         let share = index as f64 / self.top();
         self.lower * (1.0 - share) + self.upper * share
     }

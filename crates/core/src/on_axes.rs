@@ -57,6 +57,7 @@ impl<S: Sensing<K, M>, const D: usize, const K: usize, const M: usize> Sensing<D
         let own = self.sensing.jacobian(&self.read(state));
         let mut jacobian = SMatrix::<f64, M, D>::zeros();
         for (k, axis) in self.axes.iter().enumerate() {
+            // dm / dx_axis; the model does not depend on any other coordinate.
             jacobian.set_column(*axis, &own.column(k));
         }
         jacobian

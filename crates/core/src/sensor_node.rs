@@ -97,6 +97,7 @@ impl<C: Scheme<M>, const M: usize> SensorNode<M> for SchemeNode<C, M> {
     ) -> Result<Option<BitString>, Error> {
         let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), feedback)
             .map_err(|error| ArgumentError::new("feedback", error, "the bits of a feedback of this scheme"))?;
+        // `encode` changes the memory only if it succeeds; what follows fails only for a scheme that breaks its format.
         let report = self.scheme.encode(rng, &mut self.memory, measurement, &feedback)?;
         let bits = report.map(|report| report.to_bits(&self.scheme.report_format()));
         Ok(bits

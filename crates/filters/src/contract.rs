@@ -181,6 +181,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
         let jacobian = self.sensing.jacobian(state);
         let matrix = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
         let (mean, noise) = (self.sensing.mean(state)[0], self.sensing.noise_covariance_at(state)[(0, 0)]);
+        // An imputed measurement updates the state by `z - h x`, so the sensor must have no offset.
         let offset = (mean - (matrix * state)[0]).abs();
         let is_sensor = noise > 0.0 && noise.is_finite() && matrix.iter().all(|x| x.is_finite());
         (is_sensor && offset <= OFFSET * (mean.abs() + noise.sqrt())).then_some(LinearScalar {

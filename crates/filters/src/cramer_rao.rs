@@ -26,6 +26,7 @@ pub fn covariance_step<const D: usize>(
     let root = semidefinite_factor("information", information)?;
     let transition = dynamics.transition();
     let predicted = transition * bound * transition.transpose() + dynamics.noise_covariance();
+    // The Kalman update of a measurement with H = L' and unit noise.
     let cross = predicted * root;
     let inner = SMatrix::<f64, D, D>::identity() + root.transpose() * cross;
     let factor = Cholesky::new(inner).ok_or(Error::SingularInnovation)?;

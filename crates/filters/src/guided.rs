@@ -69,7 +69,8 @@ fn propose<const D: usize>(
     };
     let offset = drawn - shift;
     let log_root: f64 = spread.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
-    // ratio = ln N(u; shift, spread) / N(u; 0, I); `mixed` adds the fraction drawn from the dynamics.
+    // ratio = ln N(u; shift, spread) / N(u; 0, I); `mixed` adds the fraction drawn from the dynamics. The larger of the two terms is
+    // taken out of the sum, so that no exponential overflows.
     let ratio = 0.5 * (drawn.norm_squared() - offset.dot(&spread.solve(&offset))) - log_root;
     let mixed = ratio.max(0.0) + ((1.0 - DEFENCE) * ratio.min(0.0).exp() + DEFENCE * (-ratio.max(0.0)).exp()).ln();
     mixed.is_finite().then(|| (moved.mean() + lower * drawn, -mixed))

@@ -69,12 +69,14 @@ pub(crate) fn update_by<const D: usize, const M: usize>(
     let roots = lower.diagonal();
     let gain = over(&cross, &lower);
     let innovation = measurement - matrix * belief.mean();
+    // The Joseph form costs two congruences, so it is taken only where the difference may cancel.
     let covariance = if is_mild(roots.as_slice(), noise) {
         less_product(belief.covariance(), &gain, &cross)
     } else {
         let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
         congruence(&keep, belief.covariance()) + congruence(&gain, noise)
     };
+    // innovation' S^-1 innovation, and with it and det S the density N(innovation; 0, S).
     let squared = innovation.dot(&over(&innovation.transpose(), &lower).transpose());
     // No entry of the posterior exceeds this sum (Cauchy and Schwarz), and zero times a number is zero. The range check of the root, which
     // its logarithm needs in any case, therefore tests all entries at once.
@@ -110,6 +112,7 @@ fn log_product(factors: &[f64], numbers: f64, measurement: &[f64]) -> Result<f64
 /// `a (l l')^-1` for a lower triangular `l`, with one division per column of `l`.
 #[inline(always)]
 fn over<const D: usize, const M: usize>(a: &SMatrix<f64, D, M>, l: &SMatrix<f64, M, M>) -> SMatrix<f64, D, M> {
+    // The result `x` solves `x l = y` with `y l' = a`: first `y` from the first column on, then `x` from the last.
     let mut out = *a;
     let reciprocals = SVector::<f64, M>::from_fn(|k, _| 1.0 / l[(k, k)]);
     for k in 0..M {

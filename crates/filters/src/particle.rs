@@ -144,6 +144,7 @@ pub(crate) fn weigh<const D: usize>(
     belief: &mut Particles<D>,
     change: impl FnOnce(Columns<'_, D>, &mut [f64]),
 ) -> Result<Info, Error> {
+    // Without an early exit the test runs in vector registers.
     let finite = |column: &&[f64]| column.iter().fold(true, |finite, x| finite & x.is_finite());
     if !belief.columns().iter().all(finite) {
         return Err(Error::NotANumber { what: "a particle" });

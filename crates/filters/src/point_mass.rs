@@ -78,6 +78,8 @@ impl PointMassFilter {
 
     /// Rows of `h N(x; f(y), Q(y))`, from the pair `(f, sqrt Q)` of each node.
     fn from_kernel(grid: UniformGrid, moved: &[(f64, f64)]) -> Self {
+        // The kernel is stored by rows (next state), but a motion says which rows a column (present state) reaches. First the range of
+        // columns of each row, then its entries.
         let mut reach = vec![(grid.points(), 0); grid.points()];
         for (j, (mean, deviation)) in moved.iter().enumerate() {
             for i in grid.indices_within(mean - REACH * deviation, mean + REACH * deviation) {
@@ -223,6 +225,7 @@ impl PointMassFilter {
             for ((w, m), l) in weighted.iter_mut().zip(&message).zip(likelihood) {
                 *w = m * l;
             }
+            // p(later observations | x) = sum_x' N(x'; a x, q) p(observed | x') p(those after it | x'): the transposed kernel.
             message.fill(0.0);
             for (i, w) in weighted.iter().enumerate() {
                 let (column, row) = self.row(i);

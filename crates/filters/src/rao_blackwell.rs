@@ -139,6 +139,7 @@ impl RaoBlackwellised {
                 },
             )?;
         }
+        // ln w += sum of ln p(observed | m) over the observations; normalise.
         let info = weigh(next.means_mut(), |_, logs| {
             logs.iter_mut()
                 .zip(&*log_weights)

@@ -28,6 +28,7 @@ pub fn smooth_step<const D: usize>(
     let transition = dynamics.transition();
     let predicted = kalman::predict(dynamics, filtered);
     let gain = solve_semidefinite(predicted.covariance(), &(transition * filtered.covariance()))?.transpose();
+    // A sum of positive semidefinite terms, equal to M + C (next P - P+) C', in which nothing cancels.
     let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
     let future = smoothed_next.covariance() + dynamics.noise_covariance();
     Ok(Gaussian::from_trusted_parts(

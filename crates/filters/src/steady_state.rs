@@ -132,6 +132,7 @@ where
         before = [low, high];
     }
     let p = settled.ok_or(Error::NoSteadyState)?;
+    // One measurement update of the limit gives the filtered covariance.
     let cross = p * matrix.transpose();
     let innovation = Cholesky::new(matrix * cross + sensing.noise_covariance()).ok_or(Error::SingularInnovation)?;
     Ok(SteadyState {

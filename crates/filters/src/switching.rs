@@ -47,10 +47,12 @@ impl<const D: usize> Motion<D> for SwitchingMotion<D> {
             .iter()
             .map(|motion| motion.predict(belief, noise_scale))
             .collect();
+        // Nothing here says which model holds, so all have equal weights. A `NoiseBank` uses the single `modes` instead.
         moments(moved.iter().map(|one| (1.0 / moved.len() as f64, one)))
     }
 
     fn move_columns(&self, rng: &mut dyn Rng, noise_scale: f64, mut states: ColumnsMut<'_, D>) {
+        // Each state draws its own model, so the states move one by one.
         for i in 0..fewbits_core::columns::count(&states) {
             let motion = &self.0[rng.random_range(0..self.0.len())];
             motion.move_columns(rng, noise_scale, states.each_mut().map(|column| &mut column[i..=i]));

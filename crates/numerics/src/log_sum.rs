@@ -33,6 +33,7 @@ impl LogSum {
     #[inline]
     pub fn add_with_share(&mut self, term: f64) -> f64 {
         if term > self.largest {
+            // The sum so far is now relative to the new largest term.
             self.scaled = self.scaled * (self.largest - term).exp() + 1.0;
             self.largest = term;
             1.0 / self.scaled

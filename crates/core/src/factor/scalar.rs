@@ -113,6 +113,7 @@ impl Scalar {
                 factor.given_cell().to_vec(),
             ),
         };
+        // Cells that cannot have caused the observation are left out.
         let ends = edges.windows(2).map(|pair| Cell::new(pair[0], pair[1]));
         ends.zip(shares)
             .filter_map(|(cell, p)| Some((cell.ok()?, p)))

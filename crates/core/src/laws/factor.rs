@@ -60,6 +60,7 @@ pub fn tilted_is_quadrature(
     let logs: Vec<f64> = nodes().map(log).collect();
     let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = logs.iter().map(|l| (l - peak).exp()).collect();
+    // Moments about the prior's mean, so that they keep their digits if it is far from zero.
     let total: f64 = weights.iter().sum();
     let first = nodes().zip(&weights).map(|(t, w)| t * w).sum::<f64>() / total;
     let second = nodes()

@@ -101,6 +101,7 @@ fn sweep<const D: usize>(
     let mut sums = vec![0.25; points.len()];
     add(columns.each_ref().map(Vec::as_slice), &mut sums);
     for (x, sum) in points.iter().zip(&sums) {
+        // A sweep may give a state with a NaN either a NaN or no weight.
         let no_number = x.iter().any(|x| x.is_nan()) && (sum.is_nan() || *sum == f64::NEG_INFINITY);
         if !no_number {
             agree("a sweep is the scalar", format!("{x:?}"), *sum, 0.25 + alone(x), 1e-12, 1.0)?;
@@ -129,6 +130,7 @@ fn average_is(
     let (mut count, mut mean, mut squares) = (0.0, 0.0, 0.0);
     for x in draws {
         count += 1.0;
+        // Welford's recursion of mean and sum of squares.
         let delta = x - mean;
         mean += delta / count;
         squares += delta * (x - mean);

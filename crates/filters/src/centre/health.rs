@@ -37,6 +37,7 @@ impl Residual {
     /// correction is zero. `None` if only one outcome is possible.
     pub fn of_bit(share: f64, correction: f64) -> Option<Self> {
         let other = (1.0 - share).max(f64::MIN_POSITIVE);
+        // A variable of mean zero with two values and probabilities `share` and `other` has deviation one if this is its size at `share`.
         let size = (other / share).sqrt();
         // Bits of equal probability have no surprise.
         let surprise = if (share - other).abs() > EQUAL {
@@ -73,6 +74,7 @@ impl Residual {
 
     /// Residual of a value, from `ln` of its density, the variance of the innovation, and the sign of the correction.
     pub fn of_value(log_density: f64, variance: f64, correction: f64) -> Option<Self> {
+        // -2 ln N(innovation; 0, S) = innovation^2 / S + ln(2 pi S); rounding may leave a negative rest.
         let nis = (-2.0 * log_density - (std::f64::consts::TAU * variance).ln()).max(0.0);
         let residual = nis.sqrt().copysign(correction);
         let surprise = (nis - 1.0) * std::f64::consts::FRAC_1_SQRT_2;
@@ -129,6 +131,7 @@ pub(super) enum Alarm {
 fn limit(rate: f64) -> f64 {
     let steps = 2.0 / rate;
     let run = |b: f64| ((2.0 * DRIFT * b).exp_m1() - 2.0 * DRIFT * b) / (2.0 * DRIFT * DRIFT);
+    // Each of two sides may raise half of the alarms. The run length grows with `b`; exp(2 k 400) is far above every rate allowed.
     let (mut low, mut high) = (0.0, 400.0);
     for _ in 0..60 {
         let middle: f64 = 0.5 * (low + high);
@@ -203,6 +206,7 @@ impl Monitor {
                 Some(Direction::Down) if i != 1 => Alarm::Overstatement,
                 Some(_) => Alarm::Contradiction,
             };
+            // A contradiction is the graver conclusion and is kept.
             if alarm != Some(Alarm::Contradiction) {
                 alarm = Some(meaning);
             }

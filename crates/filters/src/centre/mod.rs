@@ -183,6 +183,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// # Errors
     /// As [`join`](Self::join).
     pub fn join_boxed(&mut self, number: u32, sensor: Box<dyn RemoteSensor<D>>) -> Result<(), Error> {
+        // The feedback is computed here, so that a sensor whose models state different noise is refused now and not at its first report.
         let silent = Slot::new(number, sensor.feedback(&self.estimate())?, Observation::Nothing);
         let nothing = sensor.likelihood(&silent, 1.0);
         let member = Member {
@@ -292,6 +293,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             return refuse("time", time, format!("{} or later; see `late`", self.now));
         }
         if seconds > 0.0 {
+            // On a copy, so that a failure leaves the centre as it was.
             let mut belief = self.belief.clone();
             self.moved(rng, &mut belief, seconds)?;
             self.belief = belief;

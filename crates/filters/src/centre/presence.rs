@@ -121,6 +121,7 @@ impl Outage {
         let new = (1.0 - self.0) * (1.0 - survives);
         let total = self.0 + new;
         for sensor in sensors {
+            // A common failure of this interval finds the sensor as it was alone, and destroys it with probability `TAKEN`.
             if total > 0.0 {
                 sensor.struck = (self.0 * survives * sensor.struck + new * (1.0 - TAKEN) * sensor.alone) / total;
             }
@@ -135,6 +136,7 @@ impl Outage {
         // The log odds are limited so that the probability differs from 0 and 1.
         let odds = ((self.0 / (1.0 - self.0)).ln() + log_ratio).clamp(-700.0, 700.0).exp();
         self.0 = odds / (1.0 + odds);
+        // A certain common failure becomes part of each sensor's own probability, and the next one can be found.
         let settled = self.0 > SETTLED;
         for sensor in sensors {
             sensor.working = (1.0 - self.0) * sensor.alone + self.0 * sensor.struck;

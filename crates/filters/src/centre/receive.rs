@@ -111,6 +111,7 @@ struct Posterior<const D: usize> {
 impl<const D: usize> Posterior<D> {
     /// Updates with a silence or a loss.
     fn missing(&mut self, missing: &dyn StateLikelihood<D>, given: &Gaussian<D>) -> Result<(), Error> {
+        // A constant likelihood changes no moments.
         if let Some(log) = missing.as_constant().filter(|log| log.is_finite()) {
             self.log_likelihood += log;
             return Ok(());
@@ -140,6 +141,7 @@ impl<const D: usize> Member<D> {
         if slot.observation == Observation::Lost {
             return Ok(Watched::Nothing);
         }
+        // `likelihood` holds for a sensor that works with the present probability. Unless that is one, it is formed again.
         let found = match likelihood.as_constant() {
             Some(log) if self.state.presence.working == 1.0 => log.exp(),
             _ => self
@@ -160,6 +162,7 @@ impl<const D: usize> Member<D> {
         let place = |found: Evidence| (found.log_likelihood, found.correction);
         let working = self.state.presence.working;
         if let Some(variance) = self.sensor.value_variance(predicted) {
+            // The likelihood includes the probability that the value arrives; only the value itself is tested.
             let log_density = received.log_likelihood - (self.arrival * working).ln();
             return Ok(Residual::of_value(log_density, variance, received.correction));
         }
@@ -169,6 +172,7 @@ impl<const D: usize> Member<D> {
         let mut words = Vec::with_capacity(1 << bits.bits());
         let (mut at, mut alternative) = (0, slot.clone());
         for word in 0..1_u8 << bits.bits() {
+            // A bit string begins at the highest bit of its first byte.
             let other = BitString::from_bytes(vec![word << (8 - bits.bits())], bits.bits())?;
             if other == *bits {
                 at = words.len();

@@ -111,6 +111,7 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
         let mean = self.sensing.mean(predicted.mean());
         let (sensed, supposed) =
             (self.sensing.noise_covariance_at(predicted.mean()), self.scheme.noise_covariance_at(&mean));
+        // Compared relative to the deviations of both coordinates: the result does not depend on the units.
         let scale = sensed.diagonal().map(f64::sqrt);
         let off =
             |i: usize, j: usize| (sensed[(i, j)] - supposed[(i, j)]).abs() > NOISE_TOLERANCE * scale[i] * scale[j];
@@ -189,6 +190,7 @@ fn supposed(link: &Link, working: f64) -> Result<Link, Error> {
         return Ok(*link);
     }
     let loss = 1.0 - (1.0 - link.loss()) * working;
+    // Rounding of the products may leave a sum above one.
     let erasure = (link.erasure() * working).min(1.0 - loss);
     Ok(Link::new(loss, link.crossover())?.with_erasure(erasure)?)
 }

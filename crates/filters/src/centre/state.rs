@@ -161,6 +161,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
         finite("now", state.now)?;
         positive("noise_scale", state.noise_scale)?;
+        // Everything is checked before anything is replaced.
         if !state.members.keys().copied().eq(self.sensors()) {
             let expected = format!("the sensors {:?}", self.sensors().collect::<Vec<_>>());
             return refuse("state", format!("of the sensors {:?}", state.members.keys().collect::<Vec<_>>()), expected);

@@ -89,6 +89,7 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
         if observed.is_empty() {
             return Ok(Info::default());
         }
+        // The grid covers `axes` only. The other coordinates are held at the mean, so no likelihood may depend on them.
         let others = (0..D).filter(|d| !self.axes.contains(d));
         for axis in others {
             if observed.iter().any(|one| one.reads(belief.mean(), axis)) {

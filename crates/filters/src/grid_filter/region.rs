@@ -108,6 +108,7 @@ impl<const K: usize> Region<K> {
         let slack = if found.is_tempered() { 0.25 } else { 1.0 / 48.0 };
         let spread = found.covariance + SMatrix::identity() * (slack * found.step * found.step);
         let (centre, covariance) = self.moments(&found.mean, &spread);
+        // The axes of the next grid are those of the posterior, so that few nodes fall where it is negligible.
         let (values, axes) = symmetric_eigen(covariance);
         let retries = self.retries + u32::from(!found.is_tempered());
         let wider = (1.0 / (found.step * NODES_PER_DEVIATION)).clamp(1.0, WIDER);
@@ -139,6 +140,7 @@ impl<const K: usize> Region<K> {
             let mut side = self.clone();
             side.cuts[side.depth] = Cut { normal, offset };
             side.depth += 1;
+            // Each side is a new posterior, which may narrow again.
             side.retries = 0;
             side
         })

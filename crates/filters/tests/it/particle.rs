@@ -3,8 +3,8 @@
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
 use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
-    BootstrapFilter, GuidedFilter, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule,
-    StateFilter, StateLikelihood, UniformGrid, kalman,
+    BootstrapFilter, GuidedFilter, ParticleFilter, Particles, Resampling, Schedule, StateFilter, StateLikelihood,
+    kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -169,15 +169,7 @@ fn against_the_grid(observed_at: impl Fn(usize) -> Scalar) {
     let likelihoods: Vec<_> = (0..8)
         .map(|k| Observed::new(LinearSensor::direct(NOISE).unwrap(), observed_at(k)))
         .collect();
-    let grid = UniformGrid::new(-12.0, 12.0, 0.02).unwrap();
-    let referee = PointMassFilter::new(&dynamics, grid).unwrap();
-    let mut exact = PointMass::normal(grid, 0.0, 3.0).unwrap();
-    let mut evidence = 0.0;
-    for likelihood in &likelihoods {
-        let (next, increment) = referee.step(&exact, likelihood).unwrap();
-        exact = next;
-        evidence += increment;
-    }
+    let (exact, evidence) = crate::on_a_grid(&dynamics, [0.0, 3.0], &likelihoods);
     let filter = ParticleFilter::default();
     for kind in Kind::ALL {
         let mut moments = <(Moments, Moments, Moments)>::default();

@@ -2,10 +2,7 @@
 
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Link, Observed, Sign};
-use fewbits_filters::{
-    CloudWorkspace, GaussianCloud, ParticleFilter, PointMass, PointMassFilter, RaoBlackwellised, Resampling, Schedule,
-    UniformGrid, kalman,
-};
+use fewbits_filters::{CloudWorkspace, GaussianCloud, ParticleFilter, RaoBlackwellised, Resampling, Schedule, kalman};
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{SVector, Vector2};
@@ -52,15 +49,7 @@ fn bits_cells_silence_and_loss_agree_with_the_grid() {
         silence(0.1),
     ]
     .map(|factor| Observed::new(sensor, factor));
-    let grid = UniformGrid::new(-12.0, 12.0, 0.02).unwrap();
-    let referee = PointMassFilter::new(&dynamics, grid).unwrap();
-    let mut exact = PointMass::normal(grid, 0.5, 2.0).unwrap();
-    let mut evidence = 0.0;
-    for observed in &sequence {
-        let (next, increment) = referee.step(&exact, observed).unwrap();
-        exact = next;
-        evidence += increment;
-    }
+    let (exact, evidence) = crate::on_a_grid(&dynamics, [0.5, 2.0], &sequence);
     let (mut mean, mut variance, mut ratio) = <(Moments, Moments, Moments)>::default();
     let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5)));
     for repeat in 0..60 {

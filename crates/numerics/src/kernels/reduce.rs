@@ -23,6 +23,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
             let count = a.len().min(b.len());
             let (a, b) = (a[..count].chunks_exact(LANES), b[..count].chunks_exact(LANES));
             let mut lane = [0.0; LANES];
+            // The rest that fills no group of lanes begins the sums; it has fewer elements than there are lanes.
             for (j, (x, y)) in a.remainder().iter().zip(b.remainder()).enumerate() {
                 lane[j] = x * y;
             }

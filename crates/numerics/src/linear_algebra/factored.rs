@@ -43,6 +43,7 @@ impl<const D: usize> Factored<D> {
     }
 
     fn scaled(covariance: &SMatrix<f64, D, D>, scale: &SVector<f64, D>) -> Option<Self> {
+        // The Cholesky factor of the correlation matrix, column by column; its rows are then multiplied by the deviations.
         let mut lower = SMatrix::<f64, D, D>::zeros();
         for j in 0..D {
             let mut pivot = 1.0;
@@ -76,6 +77,7 @@ impl<const D: usize> Factored<D> {
     pub fn from_lower(lower: SMatrix<f64, D, D>) -> Self {
         let mut whitener = SMatrix::<f64, D, D>::zeros();
         let mut half_log_det = 0.0;
+        // L W = I by forward substitution, column by column.
         for j in 0..D {
             half_log_det += lower[(j, j)].ln();
             whitener[(j, j)] = 1.0 / lower[(j, j)];
@@ -119,6 +121,7 @@ impl<const D: usize> Factored<D> {
             let z = &mut buffer[..out.len()];
             out.fill(offset);
             for i in 0..D {
+                // Coordinate i of W (x - mean) of all points of the block; half its square is subtracted.
                 z.fill(0.0);
                 for j in 0..=i {
                     let (w, m) = (self.whitener[(i, j)], mean[j]);
