@@ -271,6 +271,7 @@ impl CosetReceiver {
             return Err(invalid(format!("{width} bits of an index"), "1 to 64 bits"));
         }
         let bits = reader.read(width)?;
+        // Number of packets missing between the last decoded one and this one, modulo the range of the counter.
         let missing = counter.wrapping_sub(self.counter) & self.config.largest_counter();
         let index = if refresh {
             Some(signed(bits, width))

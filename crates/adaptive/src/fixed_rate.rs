@@ -190,6 +190,7 @@ impl FixedRate {
                 .map(|(p, mode)| p * normal::cdf((edge - mode.mean()[0]) / deviation(mode)))
                 .sum()
         };
+        // Beyond nine deviations of every model that counts, the distribution is flat to rounding.
         let ends = modes().filter(|(p, _)| **p > 1e-9).map(|(_, mode)| {
             let reach = 9.0 * deviation(mode);
             (mode.mean()[0] - reach, mode.mean()[0] + reach)
@@ -204,6 +205,7 @@ impl FixedRate {
                 } else {
                     f64::from(i) / f64::from(count)
                 };
+                // 50 halvings reach the rounding of the range.
                 let (mut low, mut high) = (low, high);
                 for _ in 0..50 {
                     let middle = 0.5 * (low + high);

@@ -1,12 +1,9 @@
 //! Decoding of reports: the receiver's half of `fewbits_node::adaptive::Content`.
 
+use crate::block::unzigzag;
 use crate::packet::{PacketReader, read_number};
 use fewbits_core::CodecError;
 use fewbits_node::adaptive::{Config, Content, Law, PRECISION, Replica, Slot};
-
-fn unzigzag(z: u64) -> i64 {
-    (z >> 1) as i64 ^ -((z & 1) as i64)
-}
 
 /// `-log2` of the probability of a symbol with this frequency.
 pub(crate) fn information(frequency: u32) -> f64 {

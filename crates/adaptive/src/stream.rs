@@ -43,6 +43,7 @@ impl Flags {
     fn place(&self, silent: bool) -> Place {
         let [reported, quiet] = self.counts[self.context];
         let split = (u64::from(TOTAL) * u64::from(reported) / u64::from(reported + quiet)) as u32;
+        // Neither event may have frequency zero.
         let split = split.clamp(1, TOTAL - 1);
         if silent {
             Place {
@@ -58,6 +59,7 @@ impl Flags {
         let counts = &mut self.counts[self.context];
         counts[usize::from(silent)] += 1;
         if counts.iter().sum::<u32>() > 1 << 16 {
+            // Halved, rounded up: old slots count less, and no count becomes zero.
             counts.iter_mut().for_each(|c| *c = c.div_ceil(2));
         }
         self.context = (2 * self.context + usize::from(silent)) & 3;

@@ -21,7 +21,7 @@ pub struct Replay {
 
 impl Replay {
     /// Root mean square error.
-    pub fn rms_error(&self) -> f64 {
+    fn rms_error(&self) -> f64 {
         let worst = self.worst_error();
         if worst == 0.0 {
             return 0.0;
@@ -97,6 +97,7 @@ pub fn best_within<E: From<Error>>(
     }
     let with = |delta: f64| config.with_delta(delta).map_err(|error| E::from(error.into()));
     for _ in 0..BISECTIONS {
+        // The geometric mean; roots first, so that no product overflows.
         let middle = low.sqrt() * high.sqrt();
         if price(&replay(with(middle)?, samples)?)? <= most {
             high = middle;
@@ -179,6 +180,7 @@ fn refined(samples: &[f64], seed: f64) -> Option<f64> {
             let k = (y / step).round();
             (n, k1, k2, y1, ky) = (n + 1.0, k1 + k, k2 + k * k, y1 + y, ky + k * y);
         }
+        // The slope of the regression line of the samples on their multiples.
         let spread = n * k2 - k1 * k1;
         if spread > 0.0 {
             step = (n * ky - k1 * y1) / spread;

@@ -62,6 +62,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
         let (plant, scheme, link) = (self.filter.plant(), self.filter.scheme(), self.filter.link());
         self.state = plant.dynamics().propagate(rng, &self.state);
         let sample = plant.sensor().sample(rng, &self.state);
+        // Both receive the same observation; the threshold follows from the filter's belief alone.
         let predicted = self.filter.predict(&self.belief);
         let feedback = self.filter.feedback(&predicted);
         let report = scheme.encode(rng, &mut (), &sample, &feedback)?;

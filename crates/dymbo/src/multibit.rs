@@ -84,6 +84,7 @@ fn levels(scheme: &InnovationWord, link: &Link) -> Vec<(f64, f64)> {
     if link.crossover() == 0.0 {
         return sent().map(|(y, p)| (y, *p)).collect();
     }
+    // Bayes' rule over the words `i` that may have been sent: `p(j) = sum_i p_i p(j | i)` and `y_j = sum_i p_i p(j | i) y_i / p(j)`.
     let received = |j: u64| {
         let (mass, first) = sent().zip(0..).fold((0.0, 0.0), |(mass, first), ((y, p), i)| {
             let joint = p * link.word_probability(i, j, scheme.bits());

@@ -101,6 +101,7 @@ impl ParallelFilter {
         let (r, count) = (self.plant.measurement_variance(), count as f64);
         let (rho, clean) = (p / (p + r), 1.0 - 2.0 * self.link.crossover());
         let scale = SQRT_2_OVER_PI * clean;
+        // `D`, the variance of the sum of the bits per bit; then `P - G c K` with the covariance `c` of a bit with the state.
         let inflation = 1.0 + (count - 1.0) * FRAC_2_PI * clean * clean * rho.asin();
         let left = p * (1.0 - FRAC_2_PI * clean * clean * rho * count / inflation);
         (scale * innovation_gain(p, r) / inflation, left)
@@ -116,6 +117,7 @@ impl ParallelFilter {
             }
             CountFusion::Exact => {
                 let moments = count_moments(k, p, self.plant.measurement_variance(), &self.link);
+                // The mean of the posterior variance is `P` less the variance of the posterior mean.
                 let removed: f64 = moments.iter().map(|(mass, mean)| mass * mean * mean).sum();
                 (moments.into_iter().map(|(_, mean)| mean).collect(), (p - removed).max(0.0))
             }
@@ -235,6 +237,7 @@ fn count_moments(k: usize, p: f64, r: f64, link: &Link) -> Vec<(f64, f64)> {
                 mass += density;
                 first += density * e;
             }
+            // A count without mass cannot be received: its correction is not used.
             (mass, if mass > 0.0 { first / mass } else { 0.0 })
         })
         .collect()

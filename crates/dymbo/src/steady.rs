@@ -65,6 +65,7 @@ pub(crate) fn crossing(
     if function(low)? > level || function(high)? < level {
         return Ok(None);
     }
+    // The solver takes plain numbers: an error is kept aside and ends the search as NaN.
     let mut failure = None;
     let offset = |x: f64| match function(x) {
         Ok(y) => y - level,

@@ -209,6 +209,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         let information = sign_bit::information(&self.link);
         let received = |i: usize| observations[i].received().is_some();
         let deviations = spread.diagonal().map(f64::sqrt);
+        // A crossover `e` multiplies the mean of a bit by `1 - 2 e`: once in its covariance with the state, twice in that of two bits.
         let with_state = SMatrix::<f64, D, M>::from_fn(|d, i| {
             if received(i) {
                 crosses[i][d] * (information.sqrt() / deviations[i])

@@ -146,6 +146,7 @@ impl<R> HandoffFilter<R> {
 pub fn trimmed<const D: usize>(particles: &Particles<D>, trim: f64) -> Result<Particles<D>, Error> {
     non_negative("trim", trim)?;
     let weights = particles.weights();
+    // If all weights are below `trim / N`, only those equal to the largest are kept.
     let largest = weights.iter().fold(0.0_f64, |m, w| m.max(*w));
     let least = (trim / particles.len() as f64).min(largest);
     let kept: Vec<usize> = (0..weights.len())

@@ -53,6 +53,7 @@ pub fn bounds(steps: &[Divergence], by: Amplification) -> Bounds {
         kl_corrected.add(exponent + (-(-2.0 * exponent).exp_m1() * step.l1).ln());
         l1_printed.add(exponent + (2.0 * step.l1).ln());
         l1_tight.add(exponent + (if last { step.l1 } else { 2.0 * step.l1 }).ln());
+        // The amplification of a hand-over sums the errors of those before it, so it is updated last.
         ml += step.ml;
         dr += step.dr;
         exponent = 2.0

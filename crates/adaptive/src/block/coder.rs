@@ -59,6 +59,7 @@ impl Interval {
 
     #[inline(always)]
     fn split(&mut self, part: u64, bit: bool) {
+        // Equal ends are shifted out at once, so the width is above `part`: both parts hold a number.
         if bit {
             self.width = part;
         } else {
@@ -83,6 +84,7 @@ impl Interval {
     fn end(self) -> (u64, usize) {
         (0..8)
             .map(|count| {
+                // `low` rounded up to `count` bytes. A sum beyond the range wraps to 0, which the search refuses.
                 let kept = if count == 0 { 0 } else { u64::MAX << (64 - 8 * count) };
                 (self.low.wrapping_add(!kept) & kept, count)
             })
@@ -182,6 +184,7 @@ impl<'a> Reader<'a> {
     /// If the bytes are not those that a writer of the same decisions would have written.
     pub fn finish(&self) -> Result<(), CodecError> {
         let (end, count) = self.interval.end();
+        // The bytes that were shifted out of the interval are settled; the end follows them.
         let settled = self.taken - AHEAD;
         let tail = self.bytes.get(settled..).unwrap_or_default();
         if self.bytes.len() == settled + count && tail == &end.to_be_bytes()[..count] {

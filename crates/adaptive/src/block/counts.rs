@@ -93,6 +93,12 @@ impl Counts {
         }
     }
 
+    /// The index from which the next difference is counted.
+    #[inline(always)]
+    fn expected(&self) -> i64 {
+        self.last + if self.second { self.slope } else { 0 }
+    }
+
     /// Whether differences of differences are smaller than differences.
     pub(super) fn prefers_second(indices: &[i64]) -> bool {
         let bits = |d: i64| u64::from(64 - d.unsigned_abs().leading_zeros());
@@ -119,7 +125,7 @@ impl State for Counts {
         wanted: Option<i64>,
         _: [f64; JOINT_COLUMNS],
     ) -> Result<i64, CodecError> {
-        let expected = self.last + if self.second { self.slope } else { 0 };
+        let expected = self.expected();
         // From mean size 4 on the lowest bits of differences are noise.
         let k = 64 - (self.size / 64).leading_zeros();
         let context = ((self.told >> k).clamp(-STEPS, STEPS) + STEPS) as usize % CONTEXTS;
@@ -152,16 +158,15 @@ impl State for Counts {
             (2 * i64::from(up) - 1) * size as i64
         };
         let low = coder.raw((d - (cell << k)) as u64, k);
-        let d = (difference << k) + low as i64;
-        let index = expected + d;
-        if index.abs() > LARGEST {
-            return Err(damaged(index));
-        }
-        self.size = self.size - self.size / 16 + d.unsigned_abs();
-        self.told = d;
+        Ok(expected + (difference << k) + low as i64)
+    }
+
+    #[inline(always)]
+    fn learn(&mut self, index: i64) {
+        self.told = index - self.expected();
+        self.size = self.size - self.size / 16 + self.told.unsigned_abs();
         self.slope = index - self.last;
         self.last = index;
-        Ok(index)
     }
 }
 
@@ -172,6 +177,7 @@ pub(super) fn gamma<C: Coder>(coder: &mut C, value: u64) -> Result<u64, CodecErr
     let mut bits = 0;
     while coder.bit(1 << 15, bits < wanted) {
         bits += 1;
+        // Differences of differences, the largest numbers, are at most 2^48 in size.
         if bits > 48 {
             return Err(damaged(i64::MAX));
         }

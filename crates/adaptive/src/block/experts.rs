@@ -130,6 +130,7 @@ impl<const N: usize> LeastSquares<N> {
     /// Updates with the actual `step` that followed the regressors.
     #[inline(always)]
     pub(super) fn update(&mut self, step: f64) {
+        // `P x`, from the rows of the symmetric `P`.
         let mut gain = [0.0; N];
         for (row, regressor) in self.covariance.iter().zip(&self.regressors) {
             for i in 0..N {
@@ -137,7 +138,7 @@ impl<const N: usize> LeastSquares<N> {
             }
         }
         let error = step - product(&self.coefficients, &self.regressors);
-        // Recursive least squares with forgetting.
+        // Recursive least squares with forgetting: the gain is `P x / (memory + x' P x)`.
         let inverse = 1.0 / (MEMORY + product(&gain, &self.regressors));
         let (mut largest, mut least) = (0.0_f64, f64::INFINITY);
         for i in 0..N {
@@ -241,6 +242,7 @@ impl Frequencies {
         };
         let low = (centre - cells / 2).rem_euclid(cells);
         let length = (edge - (centre - cells / 2)).clamp(0, cells);
+        // The stretch from `low` may pass the end of the window and go on at its start.
         let (first, end) = (self.prefix(low), low + length);
         if end <= cells {
             self.prefix(end) - first

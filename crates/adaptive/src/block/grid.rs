@@ -124,6 +124,7 @@ impl Grid {
             Self::Line { anchor, step, .. } => (phases / step, phases * (0.5 - anchor / step)),
             _ => return self,
         };
+        // Under phase `p` a sample is in cell `(place - p) / 16`, rounded down: for each phase, how often the cell changes.
         let crossings = vectorised_narrow(
             #[inline(always)]
             || {
@@ -288,7 +289,7 @@ pub(super) fn zigzag(k: i64) -> u64 {
     ((k << 1) ^ (k >> 63)) as u64
 }
 
-pub(super) fn unzigzag(z: u64) -> i64 {
+pub(crate) fn unzigzag(z: u64) -> i64 {
     (z >> 1) as i64 ^ -((z & 1) as i64)
 }
 

@@ -144,6 +144,7 @@ impl Mixer {
             let odds = log2(self.yes[i] / self.no[i]);
             inputs[i] = greater(lesser(odds, FARTHEST_INPUT), -FARTHEST_INPUT);
         }
+        // Few occurrences say little: the log odds of a rarely seen context are reduced.
         for c in 0..CONTEXTS {
             inputs[c] *= self.seen[c] / (self.seen[c] + HALF_CONFIDENCE);
         }
@@ -178,9 +179,11 @@ impl Mixer {
         for c in 0..CONTEXTS {
             let seen = self.seen[c];
             let one = if seen == 0.0 { mixed } else { self.yes[c] };
+            // The mean of the outcomes, in which the first estimate counts as half an outcome.
             let moved = (one + (target - one) / (seen + 1.5)) * UNITS;
             let moved = greater(lesser(moved, UNITS - LEAST_UNITS), LEAST_UNITS);
             let times = lesser(seen + 1.0, MOST_SEEN);
+            // Probability, occurrences and hash bits in one word.
             slots[c] = (moved + WHOLE).to_bits() << 16 | ((times + WHOLE).to_bits() & 255) << 8 | self.checks[c];
         }
         for c in 0..CONTEXTS {

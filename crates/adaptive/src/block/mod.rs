@@ -46,7 +46,8 @@ use crate::{Config, Error};
 use fewbits_core::CodecError;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::vectorised;
-use grid::{Bytes, DECIMALS, Grid, PHASES, unzigzag};
+pub(crate) use grid::unzigzag;
+use grid::{Bytes, DECIMALS, Grid, PHASES};
 use head::{CIRCLE, Coding, Head, LINE, SAMPLES, write_head};
 use indices::{from_pco_bytes, raw_samples, read_block, smallest_pco, write_block};
 pub use rows::JOINT_COLUMNS;
@@ -143,6 +144,7 @@ impl BlockCodec {
         if let Some(grid) = self.grid(samples).map(|grid| grid.fitted(samples)) {
             let (indices, exceptions) = self.indices(&grid, samples);
             let thorough = self.effort == Effort::Thorough;
+            // Other columns may mislead the models: the shorter of both blocks is kept.
             keep(write_block(thorough, &grid, &indices, &exceptions, None)?, &mut best);
             if thorough && !others.is_empty() {
                 let others = Others::new(others);

@@ -47,12 +47,23 @@ impl State for Model {
         others: [f64; JOINT_COLUMNS],
     ) -> Result<i64, CodecError> {
         let grid = self.expect(others);
-        let index = self.decide(coder, grid, wanted)?;
-        if index.abs() > LARGEST {
-            return Err(damaged(index));
+        self.decide(coder, grid, wanted)
+    }
+
+    #[inline(always)]
+    fn learn(&mut self, index: i64) {
+        let step = index - self.last;
+        self.tracks.update(step as f32, self.seen as f32);
+        self.squares.update(step as f64);
+        if let Some(squares) = &mut self.joint {
+            squares.update(step as f64);
         }
-        self.learn(index);
-        Ok(index)
+        self.frequencies.add(index, step != 0);
+        self.past.rotate_right(1);
+        self.past[0] = step;
+        self.last = index;
+        self.seen += 1.0;
+        self.slow += (index as f64 - self.slow) * (1.0 / self.seen).max(SLOW);
     }
 }
 
@@ -159,7 +170,9 @@ impl Model {
         let steps = step(d0) | step(d1) << 6;
         let sizes = size(d0) << 6 | size(d1) << 4 | size(d2) << 2 | size(d3);
         let last = point(self.last).wrapping_mul(0x2545_F491);
+        // The last two steps with the offset; the centre; the last index with the offset; rough sizes of four steps.
         let contexts = [steps | here << 12, point(centre), last ^ here, sizes | k << 8];
+        // A product with an odd number mixes the highest bits best; the rotation brings them down to where the table is indexed.
         for (context, word) in self.mixer.contexts.iter_mut().zip(contexts) {
             *context = word.wrapping_mul(0x9E37_79B1).rotate_left(13);
         }
@@ -287,21 +300,5 @@ impl Model {
         let left = grid.k.saturating_sub(MODELLED);
         let value = wanted.map_or(0, |j| (j - index) as u64);
         index + coder.raw(value, left) as i64
-    }
-
-    #[inline(always)]
-    fn learn(&mut self, index: i64) {
-        let step = index - self.last;
-        self.tracks.update(step as f32, self.seen as f32);
-        self.squares.update(step as f64);
-        if let Some(squares) = &mut self.joint {
-            squares.update(step as f64);
-        }
-        self.frequencies.add(index, step != 0);
-        self.past.rotate_right(1);
-        self.past[0] = step;
-        self.last = index;
-        self.seen += 1.0;
-        self.slow += (index as f64 - self.slow) * (1.0 / self.seen).max(SLOW);
     }
 }

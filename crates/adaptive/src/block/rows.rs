@@ -56,6 +56,9 @@ pub(super) trait State {
         wanted: Option<i64>,
         others: [f64; JOINT_COLUMNS],
     ) -> Result<i64, CodecError>;
+
+    /// Updates the state with the index that was coded, of at most [`LARGEST`] in size.
+    fn learn(&mut self, index: i64);
 }
 
 /// Codes the indices after the first one: `wanted` at the writer, `None` at the reader, which stops if the bytes end too early. Returns all
@@ -77,7 +80,13 @@ pub(super) fn code_all<C: Coder, S: State>(
             indices.push(state.last());
             for row in 1..rows {
                 let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-                indices.push(state.code(&mut own, wanted.map(|wanted| wanted[row]), steps)?);
+                let index = state.code(&mut own, wanted.map(|wanted| wanted[row]), steps)?;
+                // Larger ones, which only damaged bytes contain, could overflow the sums of the state.
+                if index.abs() > LARGEST {
+                    return Err(damaged(index));
+                }
+                state.learn(index);
+                indices.push(index);
                 if own.overran() {
                     break;
                 }

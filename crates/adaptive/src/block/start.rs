@@ -82,6 +82,7 @@ impl Start {
     fn first_index<C: Coder>(&self, coder: &mut C, wanted: Option<i64>) -> Result<i64, CodecError> {
         let k = u32::from(self.k);
         let z = wanted.map_or(0, |index| zigzag(index - self.usual));
+        // The gamma code begins at one.
         let high = gamma(coder, (z >> k) + 1)? - 1;
         let low = coder.raw(z & ((1 << k) - 1), k);
         let offset = high.checked_mul(1 << k).map(|high| unzigzag(high | low));
@@ -105,6 +106,7 @@ impl BlockCodec {
         }
         .fitted(samples);
         let (mut indices, _) = self.indices(&grid, samples);
+        // The median has the smallest mean distance from the indices.
         indices.sort_unstable();
         let usual = indices[indices.len() / 2];
         let sizes: u128 = indices.iter().map(|index| u128::from(zigzag(index - usual))).sum();
@@ -116,6 +118,7 @@ impl BlockCodec {
                 usual: 0,
                 k: cells.ilog2() as u8,
             },
+            // The mean distance is below `2^k`, so the high bits are mostly zero.
             None => Start {
                 grid,
                 usual,

@@ -110,6 +110,19 @@ impl<const D: usize> JointBelief<D> {
         matrix * self.root.fixed_rows::<D>(block * D)
     }
 
+    /// A measurement that is a linear function of the joint state, with root `rows`, plus the sensor's noise: its covariance, the factor of
+    /// it, and the regression of the joint state on the measurement.
+    fn regression<const M: usize>(
+        &self,
+        sensor: &impl LinearSensing<D, M>,
+        rows: &Rows<M>,
+    ) -> Result<(SMatrix<f64, M, M>, Cholesky<f64, Const<M>>, Gains<M>), Error> {
+        let covariance = symmetrised(&(rows * rows.transpose() + sensor.noise_covariance()));
+        let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
+        let gains = factor.solve(&(rows * self.root.transpose())).transpose();
+        Ok((covariance, factor, gains))
+    }
+
     /// Removes from the joint state the part that its regression on a variable explains: `L <- L - G rows`. `rows` are the root of the
     /// variable, `G` the regression coefficients.
     fn detach<const M: usize>(&mut self, gains: &Gains<M>, rows: &Rows<M>) {
@@ -130,10 +143,8 @@ impl<const D: usize> JointBelief<D> {
     ) -> Result<f64, Error> {
         let (h, own) = (sensor.matrix(), i + 1);
         let rows = self.rows(h, 0);
-        let covariance = symmetrised(&(&rows * rows.transpose() + sensor.noise_covariance()));
-        let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
+        let (covariance, factor, gains) = self.regression(sensor, &rows)?;
         let innovation = value - h * self.block_mean(0);
-        let gains = (factor.solve(&(&rows * self.root.transpose()))).transpose();
         let noise = semidefinite_factor("noise_covariance", sensor.noise_covariance())?;
         // Joseph form on the root: `C = (L - G H L)(L - G H L)' + G R G'`.
         self.shift(&gains, &innovation);
@@ -188,11 +199,9 @@ impl<const D: usize> JointBelief<D> {
         let (h, own) = (sensor.matrix(), i + 1);
         // The innovation of the sensor is a linear function of the joint state, plus noise.
         let rows = self.rows(h, 0) - self.rows(h, own);
-        let covariance = symmetrised(&(&rows * rows.transpose() + sensor.noise_covariance()));
-        let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
+        let (covariance, _, mut gains) = self.regression(sensor, &rows)?;
         let mu = h * (self.block_mean(0) - self.block_mean(own));
         let after = after(&mu, &covariance)?;
-        let mut gains: Gains<M> = (factor.solve(&(&rows * self.root.transpose()))).transpose();
         let noise = semidefinite_factor("noise_covariance", sensor.noise_covariance())?;
         self.shift(&gains, &(after.mean - mu));
         self.detach(&gains, &rows);

@@ -159,6 +159,7 @@ fn impute<const M: usize, R: Rng + ?Sized>(
     }
     let region = rule.region();
     // Threshold 0: every measurement is sent, so a missing report was lost on the link.
+    // A lost measurement may be anywhere, a withheld one is inside.
     let share = if region.threshold() == 0.0 { 1.0 } else { loss };
     let anywhere = share > 0.0 && rng.random::<f64>() < share;
     let z = if anywhere {
@@ -201,6 +202,7 @@ fn impute_sent<const M: usize, R: Rng + ?Sized>(
         let (low, high) = ((interval.0 - central[0]) / deviation, (interval.1 - central[0]) / deviation);
         let tails = [normal::log_cdf(low), normal::log_cdf(-high)];
         let total = LogSum::from_iter(tails).value();
+        // A tail in proportion to its probability, then the normal distribution truncated to it.
         let (from, to) = if rng.random::<f64>() < (tails[0] - total).exp() {
             (f64::NEG_INFINITY, low)
         } else {

@@ -76,6 +76,7 @@ impl MessageLaw {
         let (above, below) = (factor(Sign::Above)?, factor(Sign::Below)?);
         let mut law = Self::empty();
         law.corrections = filter.table(predicted_variance).0;
+        // All strings with `up` bits of `+1` have the same likelihood: one entry stands for `sensors` choose `up` of them.
         for (up, log_choose) in log_row(sensors).into_iter().enumerate() {
             let bits = (0..sensors).map(|i| if i < up { above.clone() } else { below.clone() });
             law.factors.push((log_choose, bits.collect()));

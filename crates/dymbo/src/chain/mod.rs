@@ -59,13 +59,14 @@ const MOST_KERNELS: f64 = 2e7;
 
 /// The density of the prediction error `e` on a uniform grid about zero.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ErrorChain {
+struct ErrorChain {
     plant: ScalarPlant,
     grid: UniformGrid,
     density: Vec<f64>,
 }
 
 impl ErrorChain {
+    /// The grid for this half width; refused if the process noise is zero or so small that it would need more than 40000 points.
     fn grid(plant: &ScalarPlant, half_width: f64) -> Result<UniformGrid, Error> {
         let finest = positive("process_variance", plant.process_variance())?
             .min(plant.measurement_variance())
@@ -79,9 +80,6 @@ impl ErrorChain {
     }
 
     /// The chain after one prediction from a normal filtered error of variance `filtered_variance`.
-    ///
-    /// # Errors
-    /// If the process noise is zero or so small that the grid would need more than 40000 points.
     fn from_normal(plant: &ScalarPlant, filtered_variance: f64) -> Result<Self, Error> {
         let variance = plant.dynamics().predict_variance(filtered_variance);
         let grid = Self::grid(plant, WIDTH * variance.max(plant.process_variance()).sqrt())?;
@@ -98,10 +96,7 @@ impl ErrorChain {
 
     /// The chain at `n = 1` after a first message of resolution `resolution` (`tau`, state units) and no prior. The error of the
     /// rounded sample has density `[Phi((e + tau/2)/sigma) - Phi((e - tau/2)/sigma)]/tau`.
-    ///
-    /// # Errors
-    /// If `resolution` is not positive, or the process noise is zero or too small for the grid.
-    pub fn from_first_message(plant: &ScalarPlant, resolution: f64) -> Result<Self, Error> {
+    fn from_first_message(plant: &ScalarPlant, resolution: f64) -> Result<Self, Error> {
         let tau = positive("resolution", resolution)?;
         let sigma = plant.measurement_variance().sqrt();
         let start_width = 0.5 * tau + 9.0 * sigma;
@@ -115,6 +110,7 @@ impl ErrorChain {
             density: vec![0.0; grid.points()],
         };
         let from = Self::grid(plant, start_width)?;
+        // Each part of the first error is moved by the plant and spread by the process noise.
         for e in from.nodes() {
             let mass = from.spacing() * normal::interval((e - 0.5 * tau) / sigma, (e + 0.5 * tau) / sigma) / tau;
             chain.add_kernel(plant.coefficient() * e, mass);
@@ -137,7 +133,7 @@ impl ErrorChain {
     }
 
     /// `E e^2` before the message.
-    pub fn predicted_mse(&self) -> f64 {
+    fn predicted_mse(&self) -> f64 {
         let sum: f64 = self.grid.nodes().zip(&self.density).map(|(e, p)| e * e * p).sum();
         sum * self.grid.spacing()
     }
@@ -159,12 +155,12 @@ impl ErrorChain {
     }
 
     /// Mean squared error after the message.
-    pub fn filtered_mse(&self, law: &MessageLaw) -> f64 {
+    fn filtered_mse(&self, law: &MessageLaw) -> f64 {
         self.filtered_moment(law, 2)
     }
 
     /// Sends a message and predicts: the density of the next prediction error.
-    pub fn advance(&mut self, law: &MessageLaw) {
+    fn advance(&mut self, law: &MessageLaw) {
         let mut next = Self {
             density: vec![0.0; self.density.len()],
             ..*self
@@ -198,6 +194,7 @@ impl ErrorChain {
                     }
                 }
                 let first = first.min(end);
+                // The column is zero elsewhere, so clearing this stretch prepares it for the next node.
                 let weights = column.density[first..end].to_vec();
                 column.density[first..end].fill(0.0);
                 (first, weights)

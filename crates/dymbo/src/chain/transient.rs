@@ -22,7 +22,7 @@ pub struct TransientStep {
 /// filter starts from `initial_variance`; `sigma^2 + tau^2/12` is the correct one.
 ///
 /// # Errors
-/// As [`ErrorChain::from_first_message`]; if `initial_variance` is negative.
+/// If `resolution` is not positive, `initial_variance` is negative, or the process noise is zero or too small for a grid.
 pub fn first_message_transient(
     plant: &ScalarPlant,
     resolution: f64,

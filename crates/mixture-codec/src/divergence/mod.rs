@@ -162,6 +162,7 @@ pub fn kl_centred_normals(a: f64, b: f64) -> Result<f64, Error> {
     if x.abs() < 1e-3 {
         return Ok(0.5 * x * x * (0.5 - x * (1.0 / 3.0 - x * (0.25 - x * (0.2 - x / 6.0)))));
     }
+    // Near -1 the sum `1 + x` has lost the digits of `a/b`, and beyond 1e10 `x` may overflow: the logarithms are as exact there.
     if !(-0.5..1e10).contains(&x) {
         return Ok(0.5 * x - (a.ln() - b.ln()));
     }

@@ -83,6 +83,7 @@ impl NodeErrors {
         entries("plug_in", plug_in.len(), tree.nodes().len())?;
         let nodes = tree.nodes().iter().zip(plug_in);
         let (values, combine) = match criterion {
+            // The ML of a mixture is at most the largest of its parts, whatever their weights. KL and L1 add up with them.
             Criterion::Ml => (nodes.map(|(_, e)| e.ml_plugin).collect(), Combine::Max),
             Criterion::Kl => (nodes.map(|(n, e)| n.weight * e.kl_plugin.max(0.0)).collect(), Combine::Sum),
             Criterion::L1 => (nodes.map(|(n, e)| n.weight * e.l1_plugin).collect(), Combine::Sum),
@@ -182,6 +183,7 @@ pub fn greedy_within<const D: usize>(
         if total.is_nan() || total > limit {
             return Ok(best);
         }
+        // The children take the place of their parent, so the cut stays in order from left to right.
         cut.splice(worst..=worst, [left, right]);
         let bound = errors.bound(&cut);
         if bound < best.bound {

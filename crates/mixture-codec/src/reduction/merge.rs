@@ -191,6 +191,7 @@ fn williams<const D: usize>(original: Vec<Part<D>>, components: usize) -> (Vec<P
             for j in i + 1..n {
                 let (wi, wj) = (parts[i].weight, parts[j].weight);
                 let joined = parts[i].joined(&parts[j]);
+                // The terms of the pair are taken out of the sums, then those of the joined component are added.
                 let without = reduced - 2.0 * (wi * rows[i] + wj * rows[j])
                     + wi * wi * within[i][i]
                     + wj * wj * within[j][j]

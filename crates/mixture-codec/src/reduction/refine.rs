@@ -184,6 +184,7 @@ fn exponents<const D: usize>(
     gaps: &mut [[f64; BLOCK]; D],
     out: &mut [f64; BLOCK],
 ) {
+    // With this factor `z' z` is the exponent of the Gaussian as a power of one half.
     let scale = (0.5 * std::f64::consts::LOG2_E).sqrt();
     let whitener = part.factor().whitener * scale;
     for d in 0..D {

@@ -140,6 +140,7 @@ impl Writer {
         for word in bulk {
             writer.write(u64::from(word), 32)?;
         }
+        // The coder holds back words that a carry may still change: with a carry the first rises by one and the others become zero.
         if let EncoderSituation::Inverted(count, first) = situation {
             let (first, rest) = if point >= WHOLE {
                 (first.wrapping_add(1), 0)

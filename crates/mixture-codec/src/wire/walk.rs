@@ -127,6 +127,8 @@ pub(super) fn walk<const D: usize>(
         for d in 0..D {
             let step = 1.4 * r * l[(d, d)];
             let (mut location, mut scale) = (0.0, 0.55);
+            // The whitened means have the weighted sum zero, so those before predict the last one. Its spread is that of their
+            // quantisation errors.
             if i == k - 1 {
                 let w = weights[i];
                 let spread = (0.35 * l[(d, d)] + 0.05).max((noise[d] / (w * w)).sqrt() + 0.5 * r / w / 12.0_f64.sqrt());
@@ -236,6 +238,7 @@ fn weights<const D: usize>(
     };
     let (mut weights, mut left) = (Vec::with_capacity(k), 1.0);
     for i in 0..k - 1 {
+        // Weights decrease, so this one has at least the share `1/(k - i)` of the rest. 2 % less keep the logit of equal weights finite.
         let low = 0.98 / (k - i) as f64;
         let target = order.get(i).map(|c| {
             // The remaining weight is summed from the smallest on, so that rounding cannot lose it.
