@@ -136,6 +136,7 @@ impl Predictions {
         let densities: Vec<f64> = densities.collect();
         let mut total = 0.0;
         for (own, weight) in points.iter().zip(&self.weights).filter(|(_, w)| **w > 0.0) {
+            // Components so far away have no density within the reach of the rule.
             let near = points.iter().zip(&self.weights).map(|(p, w)| (p - own, *w));
             let near = near.filter(|(p, w)| *w > 0.0 && p.norm() < 3.0 * REACH);
             // Ratio of the mixture's density to that of its component at every node: a sum of products of functions of each axis.

@@ -44,6 +44,7 @@ impl Posterior {
             (Prior::WithRate(belief, _), _) => (belief.bounds(), NARROW),
         };
         let around = around.within(search);
+        // A region of more than half the box needs as many cells as the whole box.
         let wide = around.upper[0] - around.lower[0] > 0.5 * (search.upper[0] - search.lower[0]);
         let per_axis = if wide { WIDE } else { per_axis };
         let target = Target::new(prior, likelihood)?;

@@ -217,6 +217,7 @@ impl RateSums {
         if a * range.high * range.high < SILENT {
             return (self.log_given_rate(range.middle()), None);
         }
+        // Completing the square in the rate: a normal of mean B / A and variance 1 / A, cut off at the ends of the range.
         let root = a.sqrt();
         let best = b / a;
         let log =

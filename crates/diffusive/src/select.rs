@@ -147,6 +147,7 @@ impl Selector {
             let Some(prior) = covariance.cholesky() else {
                 return f64::NEG_INFINITY;
             };
+            // The information about the position that is left when the rate is unknown: the Schur complement.
             let total = prior.inverse() + information;
             let cross = Vector2::new(total[(0, 2)], total[(1, 2)]);
             let position = total.fixed_view::<2, 2>(0, 0) - cross * cross.transpose() / total[(2, 2)];
@@ -166,6 +167,7 @@ impl Selector {
             let a = self.predicted(sensor, receptor, &place(clump));
             let residual = &predicted - &a * clump.mean[2];
             let along = a.dot(&residual);
+            // The uncertain rate correlates the samples of a clump: a matrix of rank one is added to the noise.
             let spread = 1.0 + clump.covariance[(2, 2)] * a.norm_squared();
             let squared = residual.norm_squared() - clump.covariance[(2, 2)] * along * along / spread;
             logs.push(clump.weight.ln() - 0.5 * squared - 0.5 * spread.ln());

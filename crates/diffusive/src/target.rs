@@ -175,6 +175,7 @@ impl<'a> Target<'a> {
             if log < best - FAINT || !log.is_finite() {
                 continue;
             }
+            // Sums are relative to the largest term so far, so that they do not underflow.
             if log > best {
                 let shrink = (best - log).exp();
                 total *= shrink;
@@ -203,6 +204,7 @@ impl<'a> Target<'a> {
 #[inline]
 fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3]) -> (f64, f64, f64) {
     let (m, v) = (given.mean + given.gain.dot(d), given.variance);
+    // A Kalman update of the rate by all samples together: they have information A about it.
     let spread = 1.0 + v * a;
     let residual = b - a * m;
     let variance = v / spread;

@@ -129,6 +129,7 @@ impl<'a> Active<'a> {
         let nodes = self.means.len();
         let mut levels = self.compositions.probabilities(symbols, nodes).into_iter();
         let reports = [(); 3].map(|()| Table::new(levels.next().unwrap_or_default(), nodes));
+        // Products of two densities move the reports of two sensors, so a single sensor has none.
         let mut pairs = Vec::new();
         if self.compositions.total >= 2 {
             for (i, p) in densities.iter().enumerate() {

@@ -77,6 +77,7 @@ pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
     let (mut points, mut weights) = (Vec::new(), Vec::new());
     // The code is symmetric except for its first bit, and so is the cost.
     for cell in cells / 2..cells {
+        // Without another wrong bit, all samples of a cell whose bit is inverted have the same estimate.
         let landing = flipped_centre(cell, bit, cells, v);
         let low = v * (2.0 * cell as f64 - cells as f64) / cells as f64;
         let middle = low + 0.5 * width;

@@ -208,6 +208,7 @@ fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
             // The nodes cover one side, with the weight of both.
             row *= 0.5 * w;
         }
+        // Probabilities of all joint outcomes and, below, their first moments: a row for each of the first half, a column for the second.
         let mass = &first.rows * &weighted;
         for (mut row, x) in weighted.row_iter_mut().zip(&nodes.x) {
             row *= *x;
@@ -240,6 +241,7 @@ pub(super) fn for_permutations(n: usize, mut visit: impl FnMut(&[usize])) {
     let mut p: Vec<usize> = (0..n).collect();
     loop {
         visit(&p);
+        // The next permutation: the last ascent is raised by the least larger number after it, and the rest becomes increasing.
         let Some(i) = (1..n).rev().find(|&i| p[i - 1] < p[i]) else {
             return;
         };

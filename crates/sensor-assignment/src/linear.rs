@@ -117,6 +117,7 @@ impl CostMatrix {
                         (least, next) = (slack[j], j);
                     }
                 }
+                // Reduced costs of matched entries stay zero, since their row and column change by opposite amounts.
                 for j in 0..=n {
                     if reached[j] {
                         u[row_of[j]] += least;
@@ -130,6 +131,7 @@ impl CostMatrix {
                     break;
                 }
             }
+            // The column is free: move every match on the path by one column.
             while column != 0 {
                 row_of[column] = row_of[before[column]];
                 column = before[column];

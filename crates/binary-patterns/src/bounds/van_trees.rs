@@ -73,7 +73,7 @@ fn extrapolated(mut on_grid: impl FnMut(usize) -> Option<f64>) -> Result<f64, Er
     for level in 0..LEVELS {
         let Some(mut value) = on_grid(level) else { break };
         let last = row.last().copied();
-        // One row of the Romberg table, in place.
+        // One row of the Romberg table, in place: each entry removes the next even power of the width from the error.
         let mut power = 1.0;
         for entry in &mut row {
             power *= 4.0;

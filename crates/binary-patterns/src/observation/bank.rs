@@ -216,6 +216,7 @@ const LOG_COUNT: usize = 60;
 
 impl CountTable {
     pub fn from_probabilities(p: &[[f64; 2]], count: usize) -> Self {
+        // Row `k`: the probability that `k` of the sensors report 1.
         let log_choose = binomial::log_row(count);
         let rows = (0..=count)
             .map(|k| {

@@ -227,6 +227,7 @@ impl Nodes {
         let widest = source.widest_panel();
         let mut x = from;
         while x < to {
+            // The widest panel that no threshold forbids.
             let mut step = widest.min(to - x);
             for &Threshold {
                 position: threshold,

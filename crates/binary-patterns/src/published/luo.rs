@@ -91,6 +91,7 @@ impl Luo {
         for (&x, &w) in nodes.x.iter().zip(&nodes.w) {
             // (mean, variance) of both estimates given x.
             let (mut by_mean, mut by_vote) = ((0.0, 0.0), (0.0, 0.0));
+            // Digit `b` weighs `V / 2^b`, and the bits of different digits are independent given `x`.
             let mut weight = self.half_width;
             for (quantizer, &count) in self.quantizers.iter().zip(&self.allocation) {
                 weight *= 0.5;

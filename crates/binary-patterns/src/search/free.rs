@@ -240,6 +240,7 @@ impl OutcomeTree {
     fn threshold_slopes(&self, n: usize, thresholds: &[f64]) -> Vec<f64> {
         let s = self.noise[n];
         let [zero, one] = &self.slope[n];
+        // The bit alternates between cells, so neighbouring thresholds move probability in opposite directions.
         let mut sign = 1.0;
         thresholds
             .iter()

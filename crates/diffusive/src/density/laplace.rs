@@ -237,6 +237,7 @@ fn ascent<const D: usize>(
     let largest = values.amax().max(f64::MIN_POSITIVE);
     let definite = values.iter().all(|v| *v > 1e-9 * largest);
     let curvatures = values.map(|v| v.abs().max(1e-9 * largest));
+    // The size of each curvature is used, so that the step also ascends where the density curves upwards.
     let mut step = vectors * vectors.tr_mul(&g).component_div(&curvatures);
     let length = step.norm();
     if length > 4.0 {

@@ -232,16 +232,13 @@ pub fn multi_start(
         let Ok(candidate) = joint(&start, criterion, newton) else {
             continue;
         };
-        let better = match &best {
-            Ok(design) => {
-                // A maximum is preferred to a saddle, even if the saddle has the better value.
-                let saddle = (design.is_saddle(), candidate.is_saddle());
-                criterion.sense() * (candidate.value - design.value) > 0.0 && saddle != (false, true)
-                    || saddle == (true, false)
-            }
-            Err(_) => true,
+        // A maximum is preferred to a saddle, even if the saddle has the better value.
+        let is_better = |design: &Design| match (design.is_saddle(), candidate.is_saddle()) {
+            (true, false) => true,
+            (false, true) => false,
+            _ => criterion.sense() * (candidate.value - design.value) > 0.0,
         };
-        if better {
+        if best.as_ref().ok().is_none_or(is_better) {
             best = Ok(candidate);
         }
     }

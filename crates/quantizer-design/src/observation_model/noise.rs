@@ -141,6 +141,7 @@ impl Noise {
 
     /// `1' Sigma^-1 1`: the inverse of the smallest variance of a weighted mean of the samples.
     pub fn precision_of_mean(&self) -> f64 {
+        // Sherman and Morrison's formula for a diagonal matrix plus one factor.
         let pairs = || self.loadings.iter().zip(&self.residuals);
         let own: f64 = self.residuals.iter().map(|d| 1.0 / (d * d)).sum();
         let (cross, shared) = pairs().fold((0.0, 1.0), |(c, s), (a, d)| (c + a / (d * d), s + (a / d) * (a / d)));
@@ -187,6 +188,7 @@ fn shared_factor(matrix: &DMatrix<f64>, tolerance: f64) -> Vec<f64> {
     let mut loadings = vec![0.0; n];
     match third {
         Some(r) => {
+            // With one factor each entry is a product of two loadings, so three entries give the square of one.
             let square = matrix[(p, q)] * matrix[(p, r)] / matrix[(q, r)];
             let pivot = square.max(0.0).sqrt();
             if pivot > 0.0 {

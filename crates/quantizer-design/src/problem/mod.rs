@@ -108,9 +108,9 @@ impl<'a> Problem<'a> {
 
     /// The system with the active groups' breakpoints replaced.
     pub(crate) fn system_at(&self, b: &[f64]) -> Result<System, Error> {
-        let groups = self.groups_at(b).into_iter();
-        groups.fold(Ok(self.system.clone()), |system, (a, b)| {
-            system?.with_quantizer(a.index, a.group.quantizer().with_breakpoints(b.to_vec())?)
+        let mut groups = self.groups_at(b).into_iter();
+        groups.try_fold(self.system.clone(), |system, (a, b)| {
+            system.with_quantizer(a.index, a.group.quantizer().with_breakpoints(b.to_vec())?)
         })
     }
 

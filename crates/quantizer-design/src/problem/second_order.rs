@@ -88,7 +88,7 @@ impl Problem<'_> {
                     let plain = self.axis(h, width);
                     let shrunk = Axis {
                         outer: plain.outer / a.compositions.len() * below,
-                        inner: plain.inner,
+                        ..plain
                     };
                     let expanded = Axis {
                         outer: shrunk.outer * n,
@@ -98,17 +98,11 @@ impl Problem<'_> {
                     for j in 0..other.parameters() {
                         let both = reduce(&reduced, shrunk, &other.compositions, 0, &other.exchange[j]);
                         let of_j = slice(crossed, expanded, other.parameters(), below_h, j);
-                        let inner = axis.inner / other.compositions.len() * below_h;
-                        let of_ij = slice(
-                            &of_j,
-                            Axis {
-                                outer: axis.outer,
-                                inner,
-                            },
-                            n,
-                            below,
-                            i,
-                        );
+                        let beside = Axis {
+                            inner: axis.inner / other.compositions.len() * below_h,
+                            ..axis
+                        };
+                        let of_ij = slice(&of_j, beside, n, below, i);
                         hessian[(row, offsets[h] + j)] += dot(&both, &of_ij);
                     }
                 }

@@ -51,6 +51,7 @@ pub fn best_contiguous(
     let edges = candidates.len() + 2;
     let worth = |a: usize, b: usize| cells[a * edges + b];
 
+    // `best[b]`: the largest sum over cells that end at edge `b`, for the present number of cells.
     let mut best: Vec<f64> = (0..edges)
         .map(|b| if b == 0 { f64::NEG_INFINITY } else { worth(0, b) })
         .collect();
@@ -59,6 +60,7 @@ pub fn best_contiguous(
         let mut next = vec![f64::NEG_INFINITY; edges];
         let mut from = vec![0; edges];
         for b in level + 1..edges {
+            // `level` cells end at edge `level` at the earliest.
             for a in level..b {
                 let value = best[a] + worth(a, b);
                 if value > next[b] {
@@ -69,6 +71,7 @@ pub fn best_contiguous(
         best = next;
         came_from.push(from);
     }
+    // Trace back from the last edge, which is infinite.
     let mut breakpoints = Vec::with_capacity(levels - 1);
     let mut at = edges - 1;
     for from in came_from.iter().rev() {

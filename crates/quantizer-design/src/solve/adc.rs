@@ -59,6 +59,7 @@ impl Adc {
     /// The code whose lower edge is nearest to a breakpoint.
     fn nearest(&self, breakpoint: f64) -> u32 {
         let largest = (1u32 << self.bits) - 1;
+        // Code 0 has no lower edge: every sample reaches it.
         (((breakpoint - self.low) / self.step()).round() as u32).clamp(1, largest)
     }
 }

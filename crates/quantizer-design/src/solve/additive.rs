@@ -76,6 +76,7 @@ impl Solution {
                 }
             }
         }
+        // The matrix is singular (indicators of a sensor's symbols sum to one); the least solution of the normal equations is taken.
         let svd = gram.svd(true, true);
         let cut = RANK_TOLERANCE * svd.singular_values.max();
         let stalled = Error::NotConverged {

@@ -371,6 +371,7 @@ impl Landscape {
                 }
             }
         }
+        // The gain of a word is the mean gain of the symbols into which the link turns it.
         let mut worth = vec![0.0; block.cells * count];
         for (out, per_symbol) in worth.chunks_exact_mut(count).zip(per_symbol.chunks_exact(outputs)) {
             for (w, out) in out.iter_mut().enumerate() {

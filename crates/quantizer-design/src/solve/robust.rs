@@ -188,6 +188,7 @@ pub fn minimax(
         let errors = errors_of(&systems, &mixed)?;
         let worst_case = worst(&errors);
         let average: f64 = errors.iter().zip(&weights).map(|(e, w)| e * w).sum();
+        // No design has a smaller worst case than the least mean error over any mixture of the models.
         bound = bound.max(average);
         if best.as_ref().is_none_or(|b| worst_case < b.worst_case) {
             best = Some(Minimax {

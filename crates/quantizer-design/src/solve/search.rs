@@ -354,6 +354,7 @@ impl Sensor<'_> {
 /// Dynamic programme over the cells of a grid: intervals with words in the given order; words may be left out.
 fn in_order(worth: &[f64], count: usize, order: &[usize]) -> (f64, Words) {
     let cells = worth.len() / count;
+    // `best[j]`: the most that the cells so far can gain if the last one has the `j`-th word of the order.
     let mut best = vec![0.0; order.len()];
     let mut from = Vec::with_capacity(cells);
     for row in worth.chunks_exact(count) {
@@ -371,6 +372,7 @@ fn in_order(worth: &[f64], count: usize, order: &[usize]) -> (f64, Words) {
     }
     let mut at = (0..order.len()).fold(0, |a, j| if best[j] > best[a] { j } else { a });
     let value = best[at];
+    // Trace back from the best word of the last cell.
     let mut words = vec![0; cells];
     for c in (0..cells).rev() {
         words[c] = order[at];
