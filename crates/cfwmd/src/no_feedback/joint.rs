@@ -35,6 +35,8 @@ const NEGLIGIBLE: f64 = 1e-12;
 type Rows<const M: usize> = OMatrix<f64, Const<M>, Dyn>;
 /// Regression coefficients of the joint state on a measurement.
 type Gains<const M: usize> = OMatrix<f64, Dyn, Const<M>>;
+/// Covariance of a measurement, the factor of it, and the regression of the joint state on the measurement.
+type Regression<const M: usize> = (SMatrix<f64, M, M>, Cholesky<f64, Const<M>>, Gains<M>);
 
 impl<const D: usize> JointBelief<D> {
     /// The belief before the first step: every sensor's estimate is the mean of `start`.
@@ -110,13 +112,12 @@ impl<const D: usize> JointBelief<D> {
         matrix * self.root.fixed_rows::<D>(block * D)
     }
 
-    /// A measurement that is a linear function of the joint state, with root `rows`, plus the sensor's noise: its covariance, the factor of
-    /// it, and the regression of the joint state on the measurement.
+    /// A measurement that is a linear function of the joint state, with root `rows`, plus the sensor's noise.
     fn regression<const M: usize>(
         &self,
         sensor: &impl LinearSensing<D, M>,
         rows: &Rows<M>,
-    ) -> Result<(SMatrix<f64, M, M>, Cholesky<f64, Const<M>>, Gains<M>), Error> {
+    ) -> Result<Regression<M>, Error> {
         let covariance = symmetrised(&(rows * rows.transpose() + sensor.noise_covariance()));
         let factor = Cholesky::new(covariance).ok_or(Error::Impossible)?;
         let gains = factor.solve(&(rows * self.root.transpose())).transpose();
