@@ -33,13 +33,9 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2};
 use own_error::OwnError;
 use rand::Rng;
 use scheme::{Tolerant, stray_level};
+use settings::{BIAS, OFFSET, SCALE};
 use std::collections::BTreeMap;
 
-/// Indices of bias and scale in the state.
-const BIAS: usize = 4;
-const SCALE: usize = 5;
-/// Index of the sum of the bias and the error of the next range.
-const OFFSET: usize = 6;
 /// Probability of a false alarm of the test for a lost track, per range. With one bit a lost track shows only slowly, so the rate is
 /// higher: in a recording of 1000 ranges, most losses are then false alarms.
 const ONE_BIT_ALARMS: f64 = 3e-3;

@@ -2,7 +2,7 @@
 //!
 //! All filters of a bank receive the same likelihood, with the same noise. The rest of a filter's noise is a coordinate of its state.
 
-use super::{BIAS, OFFSET};
+use super::settings::{BIAS, OFFSET};
 use fewbits_core::Gaussian;
 use fewbits_filters::contract::{Info, Move, StateFilter, StateLikelihood};
 use fewbits_filters::{Error, MomentFilter};

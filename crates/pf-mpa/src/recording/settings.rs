@@ -5,6 +5,11 @@ use fewbits_models::ContinuousLinear;
 use fewbits_numerics::error::{positive, within};
 use nalgebra::{SMatrix, SVector};
 
+/// Indices of bias and scale in the state.
+pub(super) const BIAS: usize = 4;
+pub(super) const SCALE: usize = 5;
+/// Index of the sum of the bias and the error of the next range.
+pub(super) const OFFSET: usize = 6;
 /// Probability per range that the speed changes: once in a few minutes. The noise is a property of the radio and changes less often.
 const SPEED_CHANGES: f64 = 0.003;
 const NOISE_CHANGES: f64 = 0.1 * SPEED_CHANGES;
@@ -117,7 +122,7 @@ impl RangeSettings {
             drift[(position + 1, position + 1)] = -rate;
             density[(position + 1, position + 1)] = 2.0 * rate * speed * speed;
         }
-        density[(4, 4)] = self.drift;
+        density[(BIAS, BIAS)] = self.drift;
         ContinuousLinear::new(drift, SVector::zeros(), density)
     }
 }
