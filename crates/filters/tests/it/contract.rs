@@ -5,7 +5,7 @@ use fewbits_core::{
     Belief, Dynamics, Error as CoreError, Evolution, Gaussian, Link, Memoryless, NumberFormat, Observation, Observed,
     Scheme, Sensing, Sign, laws,
 };
-use fewbits_filters::contract::Evolving;
+use fewbits_filters::contract::{Evolving, Move};
 use fewbits_filters::{
     BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, ParticleFilter,
     PointMasses, RaoBlackwellised, StateFilter, StateLikelihood, Switching, UniformGrid, assumed_density,
@@ -146,6 +146,40 @@ fn what_is_impossible_leaves_every_belief_as_it_was() {
     refused(GuidedFilter::new(filter, 50).unwrap());
     refused(CloudFilter::new(RaoBlackwellised::new(filter), 50).unwrap());
     refused(NoiseBank::new(MomentFilter, vec![1.0, 2.0], 0.1).unwrap());
+}
+
+#[test]
+fn a_bank_of_equal_filters_is_that_of_one_and_odd_matrices_are_refused() {
+    let scales = [0.5, 2.0];
+    let filters = || scales.map(|scale| (MomentFilter, scale)).to_vec();
+    // An even switch of probability .1 between two: .05 to the other.
+    let mut own = NoiseBank::<1, MomentFilter>::of(filters(), &[vec![0.95, 0.05], vec![0.05, 0.95]]).unwrap();
+    let mut same = NoiseBank::<1, _>::new(MomentFilter, scales.to_vec(), 0.1).unwrap();
+    let (mut rng, prior) = (Stream::new(3).rng(), Gaussian::scalar(0.0, 1.0).unwrap());
+    let (sensor, world) =
+        (LinearSensor::direct(0.1).unwrap(), ContinuousLinear::ornstein_uhlenbeck(0.0, 2.0, 1.0).unwrap());
+    let mut beliefs = [
+        own.start(&mut rng, &prior).unwrap(),
+        same.start(&mut rng, &prior).unwrap(),
+    ];
+    for z in [0.4, -1.1, 3.0] {
+        let observed = Observed::new(sensor, Value::new(Vector1::new(z), nalgebra::Matrix1::new(0.1)).unwrap());
+        let motion = Evolution::over(&world, 0.7).unwrap();
+        for (bank, belief) in [&mut own, &mut same].into_iter().zip(&mut beliefs) {
+            bank.predict(&mut rng, Move::new(&motion, 1.0), belief).unwrap();
+            bank.update(&mut rng, belief, &[&observed]).unwrap();
+        }
+    }
+    let [a, b] = beliefs.map(|belief| belief.probabilities()[1]);
+    assert!((a - b).abs() < 1e-12 && (a - 0.5).abs() > 0.01, "{a} {b}");
+    for transition in [
+        vec![vec![1.0]],
+        vec![vec![0.5, 0.6], vec![0.5, 0.5]],
+        vec![vec![1.0, 0.0], vec![1.0]],
+    ] {
+        assert!(NoiseBank::<1, MomentFilter>::of(filters(), &transition).is_err(), "{transition:?}");
+    }
+    assert!(NoiseBank::<1, MomentFilter>::of(Vec::new(), &[]).is_err());
 }
 
 /// A quick and a slow world: the bank of both is the interacting-multiple-model filter, here without switching a bank of two Kalman

@@ -333,17 +333,26 @@ fn bad_settings_and_ranges_are_refused() {
         |anchors: &[(String, Vector2<f64>)], travel, settings| RangeTracker::new(anchors.to_vec(), travel, settings);
     assert!(new(&recording.anchors[..2], Travel::Full, settings).is_err());
     assert!(new(&recording.anchors, Travel::Bits(0), settings).is_err());
-    assert!(
-        new(
-            &recording.anchors,
-            Travel::Full,
-            RangeSettings {
-                speed: f64::NAN,
-                ..settings
-            }
-        )
-        .is_err()
-    );
+    for bad in [
+        RangeSettings {
+            speed: f64::NAN,
+            ..settings
+        },
+        RangeSettings {
+            noise_factor: 0.5,
+            ..settings
+        },
+        RangeSettings {
+            noise: 1e-200,
+            ..settings
+        },
+        RangeSettings {
+            scale: -0.1,
+            ..settings
+        },
+    ] {
+        assert!(new(&recording.anchors, Travel::Full, bad).is_err(), "{bad:?}");
+    }
     let mut tracker = new(&recording.anchors, Travel::Bits(2), settings).unwrap();
     let mut rng = Stream::new(1).rng();
     assert!(tracker.push(&mut rng, 1.0, "nobody", 3.0).is_err());
