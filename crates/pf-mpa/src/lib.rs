@@ -21,7 +21,6 @@
 //! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
 //! | particles and draws | [`ParticleFilter`](fewbits_filters::ParticleFilter) on [`WithManoeuvre`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
 //! | bounds | [`CramerRao`], [`level_information`] |
-//! | two targets, measurements in unknown order | [`association`] |
 //! | which sensor leads, what it hands over, in bits | [`leader`] |
 //!
 //! ```
@@ -52,7 +51,6 @@ pub mod engine {
     pub use crate::leader::lower_factor;
 }
 
-pub mod association;
 mod bound;
 mod chain;
 mod encoder;

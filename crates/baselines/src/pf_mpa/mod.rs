@@ -6,8 +6,10 @@
 //! | Algorithm 6 | [`MessagePassing`] |
 //! | its messages, their kernels and weights | [`Ring`], [`RingWeight`], [`DynamicsWeight`], [`KernelRule`], [`RingBias`] |
 //! | draws from products of messages; convergence of Gibbs sweeps over their labels | [`ProductSampler`]; [`LabelChain`] |
+//! | two targets, measurements in unknown order | [`association`] |
 //! | factor graphs, sum-product over finite alphabets | [`graph`] |
 
+pub mod association;
 pub mod graph;
 mod labels;
 mod message;

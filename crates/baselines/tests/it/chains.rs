@@ -1,7 +1,7 @@
 //! The bounds on chains of lossy hand-overs of discrete beliefs, where everything is exact.
 
 use fewbits_baselines::handoff::{Amplification, bounds};
-use fewbits_mixture_codec::divergence::discrete;
+use fewbits_baselines::mixture_codec::divergence::discrete;
 use fewbits_monte_carlo::Stream;
 use rand::{Rng, RngExt};
 

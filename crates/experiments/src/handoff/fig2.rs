@@ -1,7 +1,7 @@
 //! Figure 2: small losses add up to more than their sum.
 
 use crate::prelude::*;
-use fewbits_mixture_codec::divergence::kl_centred_normals;
+use fewbits_baselines::mixture_codec::divergence::kl_centred_normals;
 
 parameters! {
     pub struct Parameters {

@@ -1,9 +1,9 @@
 //! Sign bits over bad links, and about vectors.
 
 use super::{assert_agrees, assert_agrees_if_known, exact, trials};
+use fewbits_baselines::dymbo::gap::{SmoothedGap, Twin, exact_filter};
 use fewbits_core::factor::InCell;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
-use fewbits_dymbo::gap::{SmoothedGap, Twin, exact_filter};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, SignFilter, chain, steady,
 };

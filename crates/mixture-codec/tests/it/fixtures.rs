@@ -1,9 +1,9 @@
 //! Deterministic reference values.
 
 use crate::common::d1;
+use fewbits_baselines::mixture_codec::divergence::{self, discrete, kl_centred_normals};
 use fewbits_densities::{Component, KernelEstimate, Mixture, Particles};
 use fewbits_mixture_codec::cut::{greedy, optimal};
-use fewbits_mixture_codec::divergence::{self, discrete, kl_centred_normals};
 use fewbits_mixture_codec::merge::{MergeCost, merge};
 use fewbits_mixture_codec::plug_in::{node_errors, plug_in};
 use fewbits_mixture_codec::quadrature::{QuadratureGrid, integrated};

@@ -1,13 +1,14 @@
 //! Relations between the error measures, on random laws.
 
 use crate::common::random_mixture;
-use fewbits_core::Gaussian;
-use fewbits_mixture_codec::divergence::{
-    discrete, kl_chain_corrected, kl_chain_printed, kl_from_dr, kl_from_dr_hoeffding, kl_from_ml, l1_from_dr,
-    log_largest_ratio,
+use fewbits_baselines::mixture_codec::divergence::{
+    discrete, kl_centred_normals, kl_chain_corrected, kl_chain_printed, kl_from_dr, kl_from_dr_hoeffding, kl_from_ml,
+    l1_from_dr, log_largest_ratio,
 };
+use fewbits_core::Gaussian;
 use fewbits_mixture_codec::quadrature::integrated;
 use fewbits_monte_carlo::Stream;
+use fewbits_numerics::wild;
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
@@ -121,5 +122,27 @@ fn relations_hold_between_random_mixtures() {
         let single = fewbits_densities::Mixture::single(&whole).unwrap();
         let kl = integrated(&p, &single).unwrap().kl;
         assert!(kl <= bound.fold(0.0, f64::max) + 1e-9);
+    }
+}
+
+proptest! {
+    #[test]
+    fn divergences_are_numbers_or_refused(x in prop::array::uniform4(any::<u64>().prop_map(wild::number)), p in prop::array::uniform3(0..5_u32), q in prop::array::uniform3(0..5_u32)) {
+        let law = |counts: [u32; 3]| counts.map(|n| f64::from(n) / f64::from(counts.iter().sum::<u32>()));
+        let (p, q) = (law(p), law(q));
+        for laws in [[p, q], [q, p], [[x[0], x[1], x[2]], q]] {
+            if let Ok(found) = discrete(&laws[0], &laws[1]) {
+                prop_assert!(found.kl >= 0.0 && (0.0..=2.0 + 1e-9).contains(&found.l1) && !found.ml.is_nan() && !found.dr.is_nan(), "{:?}: {:?}", laws, found);
+            }
+        }
+        if let Ok(kl) = kl_centred_normals(x[0], x[1]) {
+            prop_assert!(kl >= 0.0, "{:?}: {}", x, kl);
+        }
+        for (name, value) in [("kl_from_dr", kl_from_dr(x[0])), ("kl_from_ml", kl_from_ml(x[0].abs())), ("l1_from_dr", l1_from_dr(x[0]))] {
+            prop_assert!(value.is_nan() == x[0].is_nan(), "{} {}: {}", name, x[0], value);
+        }
+        if let (Ok(p), Ok(q)) = (Gaussian::scalar(x[0], x[1]), Gaussian::scalar(x[2], x[3])) && let Ok(ratio) = log_largest_ratio(&p, &q) {
+            prop_assert!(!ratio.is_nan(), "{:?} {:?}", p, q);
+        }
     }
 }

@@ -4,10 +4,10 @@
 //! `r = 0` means that `zA` is of the first target. The thesis computes `P(r = 0)` by a heuristic ([`AssociationRule::Tanh`]);
 //! [`AssociationRule::Exact`] is the exact value.
 
-use crate::Error;
 use fewbits_core::Gaussian;
 use fewbits_numerics::error::{non_negative, positive};
 use fewbits_numerics::normal;
+use fewbits_pf_mpa::Error;
 use serde::{Deserialize, Serialize};
 
 /// The printed constant of the tanh rule; `atanh(1/2)` rounded.

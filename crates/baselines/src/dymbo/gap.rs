@@ -1,7 +1,7 @@
 //! A scalar filter and the exact posterior of the same reports, on simulated runs. The difference bounds what a better estimator gains.
 
-use crate::{Error, ScalarFilter, ScalarPlant};
 use fewbits_core::{Belief, Dynamics, Factor, Gaussian, Observation, Scheme, Sensing};
+use fewbits_dymbo::{Error, ScalarFilter, ScalarPlant};
 use fewbits_filters::{PointMass, PointMassFilter, UniformGrid, smoother::smooth_step};
 use nalgebra::Vector1;
 use rand::Rng;
@@ -17,7 +17,7 @@ const REACH: f64 = 8.5;
 /// # Errors
 /// If the plant is unstable, or its process noise too small for a grid.
 pub fn exact_filter(plant: &ScalarPlant, steps: usize) -> Result<PointMassFilter, Error> {
-    let widest = plant.widest_variance(plant.steady_state(FRAC_2_PI)?.filtered_variance, steps);
+    let widest = super::widest_variance(plant, plant.steady_state(FRAC_2_PI)?.filtered_variance, steps)?;
     let spacing = SPACING * plant.process_variance().min(plant.measurement_variance()).sqrt();
     PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(REACH * widest.sqrt(), spacing)?)
 }
@@ -164,8 +164,8 @@ pub struct SmoothedGap {
 #[cfg(test)]
 mod tests {
     use super::{Twin, exact_filter};
-    use crate::{DymboFilter, MultibitFilter, ScalarFilter, ScalarPlant, chain};
     use fewbits_core::Link;
+    use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, ScalarPlant, chain};
     use fewbits_monte_carlo::{Moments, Stream};
 
     /// Minimum error and excess add up to the chain's error, within 4.5 standard errors over independent runs.

@@ -3,12 +3,11 @@
 //! For up to 16 steps all strings are enumerated, each with its exact density on a grid. The mean over the strings of the posterior
 //! variance is the minimum mean squared error given the bits that the Dymbo filter asked for. The mean squared difference between
 //! the Dymbo estimate and the posterior mean is the filter's excess. Their sum is the filter's mean squared error.
-//! [`chain`](crate::chain) computes it independently; the two agree to 13 digits.
+//! [`chain`](fewbits_dymbo::chain) computes it independently; the two agree to 13 digits.
 
-use crate::plant::scalar;
-use crate::{DymboFilter, Error, ScalarFilter, ScalarPlant};
 use fewbits_core::factor::InCell;
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
+use fewbits_dymbo::{DymboFilter, Error, ScalarFilter, ScalarPlant};
 use fewbits_filters::{PointMass, PointMassFilter, UniformGrid};
 use fewbits_numerics::error::{ArgumentError, positive};
 
@@ -47,10 +46,10 @@ pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) ->
     }
     let sigma = plant.measurement_variance().sqrt();
     let filter = DymboFilter::new(*plant);
-    let start = scalar(0.0, plant.measurement_variance() + tau * tau / 12.0);
+    let start = Gaussian::scalar(0.0, plant.measurement_variance() + tau * tau / 12.0)?;
 
     // The grid must hold the state for all bits: rare strings have their posterior in the far tail of the prior.
-    let widest = plant.widest_variance(start.covariance()[0], depth);
+    let widest = super::widest_variance(plant, start.covariance()[0], depth)?;
     let half_width = 0.5 * tau + REACH * widest.sqrt();
     let finest = plant.process_variance().sqrt().min(sigma);
     let grid = UniformGrid::symmetric(half_width, SPACING * positive("process_variance", finest)?)?;
@@ -106,7 +105,7 @@ impl Walk {
 #[cfg(test)]
 mod tests {
     use super::first_message_tree;
-    use crate::{ScalarPlant, chain};
+    use fewbits_dymbo::{ScalarPlant, chain};
 
     #[test]
     fn mmse_and_excess_add_up_to_the_chains_error() {

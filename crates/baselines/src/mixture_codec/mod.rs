@@ -1,4 +1,7 @@
-//! Reductions of the paper, for comparison. The recommended reduction is [`Reduction::default`](fewbits_mixture_codec::Reduction::default).
+//! Reductions of the paper, and its bounds between divergences. The recommended reduction is
+//! [`Reduction::default`](fewbits_mixture_codec::Reduction::default).
+
+pub mod divergence;
 
 use fewbits_densities::KernelEstimate;
 use fewbits_mixture_codec::Error;
