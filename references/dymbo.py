@@ -302,11 +302,11 @@ def threshold_excess(row):
     return mean / exact(a, gamma), error / exact(a, gamma)
 
 
-RECIPES.of("dymbo-threshold/riccati")(lambda row: steady(*numbers(row)))
+RECIPES.of("dymbo-escape/riccati")(lambda row: steady(*numbers(row)))
 RECIPES.of("dymbo-threshold/nees")(lambda row: exact(*numbers(row)) / steady(*numbers(row)))
 
 
-@RECIPES.of("dymbo-threshold/escaped")
+@RECIPES.of("dymbo-escape/escaped")
 def escaped(row):
     """Share of the runs of an unstable plant whose error passes 50 within 500 steps, after a first message of tau = 1."""
     a, gamma, _ = plant(row)

@@ -1,7 +1,7 @@
 //! Files: each is written under a temporary name and then renamed, so that none is ever half-written.
 
-use super::record::Record;
-use super::{Ending, draw, gallery, print, summary};
+use super::record::{Record, check_sum};
+use super::{Ending, gallery, print, summary};
 use crate::Error;
 use fewbits_experiments::{Outcome, Table};
 use serde::{Deserialize, Serialize};
@@ -94,10 +94,11 @@ impl Made {
             self.files.push((name, csv));
         }
         if plots {
-            self.files
-                .push((format!("{id}.svg"), draw::to_svg(&id, &outcome.plot)?));
+            let svg = fewbits_plot::to_svg(&outcome.plot.clone().typeset())?;
+            self.files.push((format!("{id}.svg"), svg));
         }
-        self.record.files = self.files.iter().map(|(name, _)| name.clone()).collect();
+        let named = |(name, text): &(String, String)| (name.clone(), check_sum(text.as_bytes()));
+        (self.record.files, self.record.sums) = self.files.iter().map(named).unzip();
         Ok(())
     }
 

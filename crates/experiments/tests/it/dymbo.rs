@@ -138,9 +138,9 @@ fn escapes(plant: &ScalarPlant, stream: Stream) -> bool {
 fn one_bit_cannot_hold_an_unstable_plant() {
     let wild = ScalarPlant::new_unstable(1.2, 0.5, 1.0).unwrap();
     let runs = trials("unstable", 20_000, |it| Ok(f64::from(escapes(&wild, it.stream))));
-    assert_agrees("dymbo-threshold/escaped/1.2 0.5", runs.into_iter().collect::<Measured>());
+    assert_agrees("dymbo-escape/escaped/1.2 0.5", runs.into_iter().collect::<Measured>());
     let steady = wild.steady_state(DymboFilter::new(wild).information()).unwrap();
-    assert_agrees("dymbo-threshold/riccati/1.2 0.5", exact(steady.filtered_variance));
+    assert_agrees("dymbo-escape/riccati/1.2 0.5", exact(steady.filtered_variance));
 }
 
 /// Several one-bit sensors a slot: two in turn are worth one unquantized sensor, but for 0.14 %; in turn is never worse than at
