@@ -17,7 +17,6 @@
 //! | several bits per sample, several sensors, vector states | [`MultibitFilter`], [`ParallelFilter`], [`SignFilter`] |
 //! | one slot of sensor, link and filter in one call | [`ScalarFilter::exchange`] |
 //! | expected errors | [`steady`] (closed forms, contours), [`chain`] and [`tree`] (exact errors), [`gap`] (beside the exact posterior) |
-//! | comparisons of the publications: how normal the posterior is, successive bits of one sample | [`published`] |
 //!
 //! The likelihood of a report is a [`Factor`](fewbits_core::Factor), for any threshold and any [`Link`](fewbits_core::Link).
 //! `fewbits_filters::assumed_density::update` applies it to a Gaussian belief; the filters here are closed forms of that update. A
@@ -53,7 +52,6 @@ mod innovation_word;
 mod multibit;
 mod parallel;
 mod plant;
-pub mod published;
 pub mod sign_bit;
 pub mod steady;
 pub mod tree;

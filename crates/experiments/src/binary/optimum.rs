@@ -2,7 +2,7 @@
 
 use super::{ERROR, Scene, crossing, descent_from, each, sweep, swept};
 use crate::prelude::*;
-use fewbits_binary_patterns::published::{Luo, by_information, tile};
+use fewbits_baselines::binary_patterns::{Luo, by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Optimum;

@@ -2,7 +2,7 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_dymbo::published::iterated;
+use fewbits_baselines::dymbo::iterated;
 use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain};
 
 parameters! {

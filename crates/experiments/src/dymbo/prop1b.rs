@@ -1,9 +1,9 @@
 //! How normal the posterior of one bit is.
 
 use crate::prelude::*;
+use fewbits_baselines::dymbo::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_core::Sign;
 use fewbits_core::factor::{Factor, InCell};
-use fewbits_dymbo::published::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_numerics::normal::log_pdf_with;
 
 parameters! {

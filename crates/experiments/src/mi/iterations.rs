@@ -3,7 +3,8 @@
 
 use super::common::{MI, MSE, lloyd_system, outer, over_bsc, scene};
 use crate::prelude::*;
-use fewbits_quantizer_design::{System, published};
+use fewbits_baselines::quantizer_design as baselines;
+use fewbits_quantizer_design::System;
 use std::f64::consts::LN_2;
 
 parameters! {
@@ -197,14 +198,14 @@ impl Figure for Iterations {
             for k in 1..=2 * steps {
                 let sensor = usize::from(k > steps);
                 let quantizer = match sensor {
-                    0 => published::alternating_step(&first_alone(&chain)?, 0, MI)?,
-                    _ => published::alternating_step(&chain, sensor, MI)?,
+                    0 => baselines::alternating_step(&first_alone(&chain)?, 0, MI)?,
+                    _ => baselines::alternating_step(&chain, sensor, MI)?,
                 };
                 chain = chain.with_quantizer(sensor, quantizer)?;
                 let row = step(crossover, [k, sensor + 1, k - sensor * steps], &chain)?;
                 rows.chain.push(row);
                 let sensor = (k - 1) % 2;
-                cyclic = cyclic.with_quantizer(sensor, published::alternating_step(&cyclic, sensor, MI)?)?;
+                cyclic = cyclic.with_quantizer(sensor, baselines::alternating_step(&cyclic, sensor, MI)?)?;
                 let row = step(crossover, [k, sensor + 1, k.div_ceil(2)], &cyclic)?;
                 rows.cyclic.push(row);
             }
