@@ -94,6 +94,12 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// A plot without panels, or with one in which nothing is seen.
+    #[error("the plot shows nothing in its panel `{title}`")]
+    Blank {
+        /// The panel's title.
+        title: String,
+    },
     /// A plot could not be drawn.
     #[error(transparent)]
     Draw(#[from] fewbits_plot::Error),

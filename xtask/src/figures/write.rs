@@ -4,6 +4,7 @@ use super::record::{Record, check_sum};
 use super::{Ending, gallery, print, summary};
 use crate::Error;
 use fewbits_experiments::{Outcome, Table};
+use fewbits_plot::{Axis, Layer, Panel, Plot, Scale, Shape};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -94,6 +95,9 @@ impl Made {
             self.files.push((name, csv));
         }
         if plots {
+            if let Some(title) = blank(&outcome.plot) {
+                return Err(Error::Blank { title });
+            }
             let svg = fewbits_plot::to_svg(&outcome.plot.clone().typeset())?;
             self.files.push((format!("{id}.svg"), svg));
         }
@@ -121,6 +125,23 @@ impl Made {
                 self.record.failed(error.to_string())
             }
         }
+    }
+}
+
+/// The title of a panel in which nothing would be seen, if there is one or no panel at all.
+fn blank(plot: &Plot) -> Option<String> {
+    let shows = |axis: &Axis, value: f64| value.is_finite() && (axis.scale == Scale::Linear || value > 0.0);
+    let is_seen = |panel: &Panel, layer: &Layer| match &layer.shape {
+        Shape::Line { points, .. } | Shape::Points { points, .. } | Shape::Bars { points, .. } => {
+            points.iter().any(|(x, y)| shows(&panel.x, *x) && shows(&panel.y, *y))
+        }
+        Shape::Heat { values, .. } => values.iter().flatten().any(|value| value.is_finite()),
+        _ => !layer.is_empty(),
+    };
+    let is_blank = |panel: &&Panel| !panel.layers.iter().any(|layer| is_seen(panel, layer));
+    match plot.panels.iter().find(is_blank) {
+        Some(panel) => Some(panel.title.clone()),
+        None => plot.panels.is_empty().then(String::new),
     }
 }
 
@@ -175,5 +196,22 @@ impl Summary<'_> {
         } else {
             Ending::Failed
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panel_in_which_nothing_is_seen_is_named() {
+        let panel =
+            |title: &str, y: f64| Panel::semilog(title, "x", "y").with(Layer::line("", vec![(0.0, y), (1.0, y)]));
+        assert_eq!(blank(&Plot::grid(2, vec![panel("a", 1.0), panel("b", 2.0)])), None);
+        for lost in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(blank(&Plot::grid(2, vec![panel("a", 1.0), panel("b", lost)])).as_deref(), Some("b"));
+        }
+        assert_eq!(blank(&Plot::of(Panel::linear("none", "x", "y"))).as_deref(), Some("none"));
+        assert_eq!(blank(&Plot::grid(1, Vec::new())).as_deref(), Some(""));
     }
 }

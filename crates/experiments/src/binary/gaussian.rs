@@ -97,8 +97,5 @@ impl Figure for GaussianSource {
         claims.all("gray-above", what, errors, |r| (r.masks == "3 4 6") == (r.snr_db > from));
         let what = "and never better than the best";
         claims.all("gray-no-better", what, errors, |r| r.mse_gray >= r.mse_opt * (1.0 - 1e-9));
-        claims.keyed("signs", "three sign bits", errors, |r| r.mse_signs);
-        claims.keyed("print", "where the print allows no less than", errors, |r| r.dr_print);
-        claims.keyed("corrected", "and the correct bound is", errors, |r| r.dr_per_n);
     }
 }

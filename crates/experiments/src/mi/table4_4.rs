@@ -156,7 +156,6 @@ impl Figure for Table44 {
         let here = claims.at_defaults();
         let designs = &rows.designs;
         claims.keyed("printed", "printed errors are within about 10 % of the exact ones", designs, |d| d.pe);
-        claims.keyed("equivocation", "ln 2 minus the information", designs, |d| d.equivocation_nats);
         let pe = |signal, method| first(designs, |d| d.signal == signal && d.method == method).map(|d| d.pe);
         for &signal in &p.signals {
             let what = "least error < Matusita < mutual information < J-divergence (erratum mi-11)";
