@@ -155,11 +155,7 @@ impl Figure for Table44 {
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let designs = &rows.designs;
-        claims.keyed("pe", "error probability", designs, |d| d.pe);
-        claims.keyed("t", "offset", designs, |d| d.t);
         claims.keyed("printed", "printed errors are within about 10 % of the exact ones", designs, |d| d.pe);
-        claims.keyed("equivocation", "ln 2 minus the information", designs, |d| d.equivocation_nats);
-        claims.keyed("unquantized_pe", "error from samples", &rows.checks, |c| c.unquantized_pe);
         let pe = |signal, method| first(designs, |d| d.signal == signal && d.method == method).map(|d| d.pe);
         for &signal in &p.signals {
             let what = "least error < Matusita < mutual information < J-divergence (erratum mi-11)";

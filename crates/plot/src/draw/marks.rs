@@ -2,7 +2,7 @@
 
 use super::frame::{Frame, MARK, mark};
 use super::style::{PAPER, TICK, colour, dashes, heat, marker, pen, text, wide};
-use fewbits_experiments::plot::{Layer, Shape};
+use crate::{Layer, Shape};
 use plotters::element::{PathElement, Polygon, Rectangle, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontTransform, RGBColor};

@@ -4,7 +4,7 @@ use super::Area;
 use super::frame::{mark, path};
 use super::scale::Scaled;
 use super::style::{LINE, PANEL_WIDTH, TEXT, TICK, colour, dashes, heat, marker, pen, text, wide};
-use fewbits_experiments::plot::{Axis, Layer, Panel, Shape};
+use crate::{Axis, Layer, Panel, Shape};
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::element::{Rectangle, Text};
 use plotters::style::Color;

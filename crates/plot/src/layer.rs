@@ -1,7 +1,22 @@
 //! What is drawn in a panel: lines, points, bars, fields, boxes, bands and texts, each with its entry in the legend.
 
-use crate::Measured;
-use crate::words::in_words;
+/// A value that is drawn as a mark, perhaps with an error bar.
+pub trait Mark {
+    /// The value and half the length of its error bar (0 for none), where there is a value.
+    fn mark(&self) -> Option<(f64, f64)>;
+}
+
+impl Mark for f64 {
+    fn mark(&self) -> Option<(f64, f64)> {
+        Some((*self, 0.0))
+    }
+}
+
+impl<M: Mark> Mark for Option<M> {
+    fn mark(&self) -> Option<(f64, f64)> {
+        self.as_ref()?.mark()
+    }
+}
 
 /// The points of a curve, a row each; rows without a value are left out.
 pub fn points<R, Y: Into<Option<f64>>>(
@@ -131,7 +146,7 @@ pub struct Layer {
 impl Layer {
     fn new(label: impl Into<String>, shape: Shape) -> Self {
         Self {
-            label: in_words(label.into()),
+            label: label.into(),
             colour: None,
             inline: false,
             shape,
@@ -177,15 +192,15 @@ impl Layer {
     }
 
     /// Markers with error bars of one standard error: simulated points, a row each.
-    pub fn measured<R, Y: Into<Option<Measured>>>(
+    pub fn measured<R, Y: Mark>(
         label: impl Into<String>,
         rows: impl IntoIterator<Item = R>,
         point: impl Fn(R) -> (f64, Y),
     ) -> Self {
         let place = |row| {
             let (x, y) = point(row);
-            let y: Measured = y.into()?;
-            Some(((x, y.value), y.error()))
+            let (y, error) = y.mark()?;
+            Some(((x, y), error))
         };
         let (points, errors) = rows.into_iter().filter_map(place).unzip();
         Self::points(label, points).with_errors(errors)
@@ -197,8 +212,8 @@ impl Layer {
     }
 
     /// A line through markers with error bars, in one colour.
-    pub fn curve(label: impl Into<String>, colour: usize, marks: Vec<(f64, Measured)>) -> [Self; 2] {
-        let line = Self::line(label, points(&marks, |(x, y)| (*x, y.value)));
+    pub fn curve<Y: Mark>(label: impl Into<String>, colour: usize, marks: Vec<(f64, Y)>) -> [Self; 2] {
+        let line = Self::line(label, points(&marks, |(x, y)| (*x, y.mark().map(|(y, _)| y))));
         [line, Self::measured("", marks, |mark| mark)].map(|layer| layer.coloured(colour))
     }
 

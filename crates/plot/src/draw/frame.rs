@@ -2,7 +2,7 @@
 
 use super::Area;
 use super::scale::Scaled;
-use fewbits_experiments::plot::Marker;
+use crate::Marker;
 use plotters::element::{Circle, PathElement, Polygon};
 use plotters::style::{RGBColor, ShapeStyle};
 

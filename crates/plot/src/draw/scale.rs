@@ -1,7 +1,7 @@
 //! One coordinate type for linear, logarithmic and named axes.
 
 use super::style::{TICK, wide};
-use fewbits_experiments::plot::{Axis, Scale};
+use crate::{Axis, Scale};
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 

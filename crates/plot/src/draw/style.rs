@@ -1,6 +1,6 @@
 //! Sizes, colours, dashes and marks. Schemes differ by dash and mark as well as by colour, so that grey prints can be read.
 
-use fewbits_experiments::plot::{Layer, Marker, Plot, Shape, Stroke};
+use crate::{Layer, Marker, Plot, Shape, Stroke};
 use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle, TextStyle};
 
 /// Width of a panel. Positions are whole units; a row of two panels is 7.16 inches in print, so that 7 points are 68 units.
@@ -167,7 +167,7 @@ pub(super) fn heat(share: f64) -> RGBColor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fewbits_experiments::plot::Panel;
+    use crate::Panel;
 
     #[test]
     fn schemes_have_marks_of_their_own_across_panels() {

@@ -1,25 +1,48 @@
-//! Pictures as data: what to draw, not how.
+//! Plots as data, and as SVG: what to draw is a value, how it is drawn is decided here alone.
 //!
-//! A [`Plot`] is a grid of [`Panel`]s, a panel a pair of axes and a stack of [`Layer`]s. `xtask figures` turns it into SVG.
-//! Colours are indices into one palette that stays readable in print and for colour-blind readers; give the same scheme
-//! the same index in every panel of a figure.
+//! A [`Plot`] is a grid of [`Panel`]s, a panel a pair of axes and a stack of [`Layer`]s. [`to_svg`] draws it: ticks, dashes, marks,
+//! error bars, heat maps with their colour bars, legends below the panels. Colours are indices into one palette that stays readable
+//! in print and for colour-blind readers; give the same scheme the same index in every panel. Schemes differ by mark or dash as well
+//! as by colour, and no two share a mark while there are any of the fourteen left.
+//!
+//! Text is at least 7 pt where a row of two panels is 7.16 inches wide. Axes `x / m` and `y / m` make a map: a metre is as long on both.
+//!
+//! Not here: data, files, a window. The axes' ticks and the SVG elements come from `plotters`.
 //!
 //! ```
-//! use fewbits_experiments::plot::{Axis, Layer, Panel, Plot};
+//! use crate::{Axis, Layer, Panel, Plot};
 //! let curve = vec![(0.001, 1.0), (1.0, 2.0)];
 //! let plot = Plot::of(
 //!     Panel::new("Loss", Axis::log("gamma = sigma_u^2 / sigma^2"), Axis::linear("loss"))
 //!         .with(Layer::line("closed form", curve.clone()).coloured(0))
 //!         .with(Layer::points("simulated", curve).with_errors(vec![0.1, 0.1]).coloured(1)),
 //! );
-//! assert_eq!(plot.panels.len(), 1);
+//! let svg = fewbits_plot::to_svg(&plot)?;
+//! assert!(svg.starts_with("<svg") && svg.contains("closed form"));
+//! # Ok::<(), fewbits_plot::Error>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
+mod draw;
 mod layer;
+mod typeset;
 
-pub use layer::{Layer, Marker, Shape, Stroke, points};
+pub use draw::to_svg;
+pub use layer::{Layer, Mark, Marker, Shape, Stroke, points};
+pub use typeset::typeset;
 
-use crate::words::in_words;
+/// Why a plot could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The back end refused an element.
+    #[error("the plot cannot be drawn: {reason}")]
+    Refused {
+        /// What the back end said.
+        reason: String,
+    },
+}
 
 /// A grid of panels, filled row by row.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +65,27 @@ impl Plot {
             panels,
             columns: columns.max(1),
         }
+    }
+
+    /// With other names of layers and of places on axes.
+    #[must_use]
+    pub fn renamed(mut self, name: impl Fn(&str) -> String) -> Self {
+        for panel in &mut self.panels {
+            let places = panel.x.names.iter_mut().chain(&mut panel.y.names).map(|(_, own)| own);
+            let layers = panel.layers.iter_mut().map(|layer| &mut layer.label);
+            places.chain(layers).for_each(|own| *own = name(own));
+        }
+        self
+    }
+
+    /// With all words in print ([`typeset()`]): `sigma^2` is `σ²`.
+    #[must_use]
+    pub fn typeset(mut self) -> Self {
+        for panel in &mut self.panels {
+            let titles = [&mut panel.title, &mut panel.x.label, &mut panel.y.label];
+            titles.into_iter().for_each(|text| *text = typeset(text));
+        }
+        self.renamed(typeset)
     }
 }
 
@@ -110,7 +154,7 @@ impl Axis {
     /// Names places: category axes.
     #[must_use]
     pub fn named(mut self, names: impl IntoIterator<Item = (f64, String)>) -> Self {
-        self.names = names.into_iter().map(|(at, name)| (at, in_words(name))).collect();
+        self.names = names.into_iter().collect();
         self
     }
 }

@@ -1,7 +1,5 @@
 //! Greek letters, superscripts and subscripts from the plain text that figures are written in.
 
-use fewbits_experiments::plot::Plot;
-
 const GREEK: [(&str, &str); 12] = [
     ("alpha", "α"),
     ("beta", "β"),
@@ -21,7 +19,7 @@ const RAISED: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺ⁱⁿᵘˣ";
 const LOWERED: &str = "₀₁₂₃₄₅₆₇₈₉₋₊ᵢₙᵤₓ";
 
 /// The text in print: `sigma_u^2` is `σᵤ²`. What has no such form stays as it is.
-pub(in crate::figures) fn typeset(text: &str) -> String {
+pub fn typeset(text: &str) -> String {
     let (mut printed, mut rest) = (String::with_capacity(text.len()), text);
     while let Some(first) = rest.chars().next() {
         let word = rest
@@ -68,22 +66,6 @@ pub(in crate::figures) fn typeset(text: &str) -> String {
         }
     }
     printed
-}
-
-/// A plot with all its words in print.
-pub(super) fn words(mut plot: Plot) -> Plot {
-    for panel in &mut plot.panels {
-        for text in [&mut panel.title, &mut panel.x.label, &mut panel.y.label] {
-            *text = typeset(text);
-        }
-        for (_, name) in panel.x.names.iter_mut().chain(&mut panel.y.names) {
-            *name = typeset(name);
-        }
-        for layer in &mut panel.layers {
-            layer.label = typeset(&layer.label);
-        }
-    }
-    plot
 }
 
 #[cfg(test)]

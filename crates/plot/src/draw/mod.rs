@@ -6,10 +6,8 @@ mod marks;
 mod names;
 mod scale;
 mod style;
-mod typeset;
 
-use crate::Error;
-use fewbits_experiments::plot::{Panel, Plot, Shape};
+use crate::{Error, Panel, Plot, Shape};
 use frame::Frame;
 use names::{GAP, Names};
 use plotters::backend::SVGBackend;
@@ -22,7 +20,6 @@ use plotters::style::ShapeStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use scale::Scaled;
 use style::{GRID, INK, LINE, PANEL_HEIGHT, PANEL_WIDTH, PAPER, TEXT, TICK, TITLE, text, wide};
-pub(super) use typeset::typeset;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
@@ -36,12 +33,14 @@ const ABOVE: i32 = 150;
 const RIGHT: i32 = 100;
 const MARGIN: i32 = 20;
 
-/// Draws a plot.
+/// Draws a plot as SVG, as wide as its window allows. Same plot, same bytes.
+///
+/// Values that have no place on an axis (not finite, or 0 and below on a logarithmic one) are left out.
 ///
 /// # Errors
 /// If the back end refuses an element.
-pub fn to_svg(id: &str, plot: &Plot) -> Result<String, Error> {
-    let plot = &style::numbered(typeset::words(plot.clone()));
+pub fn to_svg(plot: &Plot) -> Result<String, Error> {
+    let plot = &style::numbered(plot.clone());
     let columns = plot.columns.min(plot.panels.len()).clamp(1, COLUMNS);
     let rows: Vec<&[Panel]> = plot.panels.chunks(columns).collect();
     let legends = legend::of_rows(&rows, columns);
@@ -70,10 +69,7 @@ pub fn to_svg(id: &str, plot: &Plot) -> Result<String, Error> {
             }
             root.present().map_err(why)
         };
-        all().map_err(|reason| Error::Draw {
-            id: id.to_owned(),
-            reason,
-        })?;
+        all().map_err(|reason| Error::Refused { reason })?;
     }
     Ok(scaled(&svg))
 }
@@ -159,7 +155,7 @@ impl Layout {
 
 /// The name of a panel's field.
 fn field_of(panel: &Panel) -> Option<&str> {
-    let field = |layer: &&fewbits_experiments::plot::Layer| matches!(layer.shape, Shape::Heat { .. });
+    let field = |layer: &&crate::Layer| matches!(layer.shape, Shape::Heat { .. });
     panel.layers.iter().find(field).map(|layer| layer.label.as_str())
 }
 
