@@ -1,33 +1,17 @@
-//! Frames for a link that may lose, repeat and reorder them. A frame contains one block, or a piece of the header.
-//!
-//! [`FrameWriter`] converts rows to frames and [`FrameReader`] frames to rows; neither uses a socket or a clock. The reader
-//! needs each piece of the header once, in any order; the writer returns the pieces as often as it is asked to. Frames that arrive before
-//! the header is complete are kept, up to a limit.
-//!
-//! ```text
-//! frame    := block | piece
-//! piece    := 0, kind `H`, length varint, content, CRC-32 of 0, 0, 0, 0 and all of it
-//! content  := header's checksum (4 bytes), number of pieces - 1, number of this piece, bytes
-//! ```
+//! From rows to frames.
 
-use crate::block::{self, Block, Cells};
-use crate::error::{Damage, Error};
+use super::piece::{PIECE_OVERHEAD, Piece};
+use super::{MAX_PIECES, max_rows};
+use crate::block::{self, Cells};
+use crate::error::Error;
 use crate::header::{Header, MAX_START};
 use crate::schema::Schema;
 use crate::waiting::Waiting;
-use crate::wire::{Bytes, read_checked};
 use fewbits_adaptive::Effort;
 use fewbits_numerics::ArgumentError;
-use std::collections::VecDeque;
 
-/// Smallest allowed maximal length of a frame: a piece then has 26 bytes of the header.
+/// Smallest allowed maximal length of a frame: a piece then has 20 bytes of the header.
 pub const MIN_FRAME_BYTES: usize = 40;
-/// Bytes of a piece in addition to its part of the header.
-const PIECE_OVERHEAD: usize = 14;
-const PIECE: u8 = b'H';
-const MAX_PIECES: usize = 256;
-/// Largest number of frames that are kept while the header is incomplete.
-const MAX_WAITING: usize = 256;
 /// Share of a frame that is aimed at when the number of rows for the next trial is estimated.
 const FILLED: f64 = 0.97;
 /// A frame that is at least this full is returned.
@@ -44,15 +28,18 @@ pub struct FrameWriter {
     /// Number of rows at which it is next tried whether they fill a frame.
     next_trial: usize,
     has_sent: bool,
+    /// Number of frames that were returned.
+    frames: u64,
 }
 
 impl FrameWriter {
-    /// A writer of frames of at most `max_bytes` bytes, and at most the schema's rows per block.
+    /// A writer of frames of at most `max_bytes` bytes, and at most the schema's rows per block or 2^17 cells.
     ///
     /// # Errors
     /// If `max_bytes` is below [`MIN_FRAME_BYTES`], or the header needs more than 256 pieces.
-    pub fn new(schema: Schema, max_bytes: usize) -> Result<Self, Error> {
+    pub fn new(mut schema: Schema, max_bytes: usize) -> Result<Self, Error> {
         let columns = schema.columns.len();
+        schema.rows_per_block = schema.rows_per_block.min(max_rows(columns));
         // Origin and step of rows take at most 18 bytes more than those of no rows.
         let header = Header::new(schema.clone(), &[], vec![0.0; columns]).to_bytes().len() + 32 + MAX_START * columns;
         let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);
@@ -65,6 +52,7 @@ impl FrameWriter {
             rows: Waiting::new(columns),
             next_trial: 1,
             has_sent: false,
+            frames: 0,
             schema,
         })
     }
@@ -83,20 +71,29 @@ impl FrameWriter {
         self.header.as_ref().filter(|_| self.has_sent)
     }
 
-    /// Frames with the pieces of the header; none before the first frame with rows.
+    /// Frames with the pieces of the header; none before the first frame with rows. They state that all frames so far were sent.
     pub fn header_frames(&self) -> Vec<Vec<u8>> {
+        self.header_frames_after(self.frames)
+    }
+
+    /// The same, stating that `frames` frames were sent before: a reader then knows how many did not arrive.
+    pub fn header_frames_after(&self, frames: u64) -> Vec<Vec<u8>> {
         let Some(header) = self.sent_header() else {
             return Vec::new();
         };
         let bytes = header.to_bytes();
-        let room = self.max_bytes - PIECE_OVERHEAD;
-        let pieces = bytes.chunks(room);
+        let pieces = bytes.chunks(self.max_bytes - PIECE_OVERHEAD);
         let last = (pieces.len() - 1) as u8;
-        let frame = |(i, piece): (usize, &[u8])| {
-            let mut content = header.check.to_le_bytes().to_vec();
-            content.extend([last, i as u8]);
-            content.extend_from_slice(piece);
-            crate::index::special(0, PIECE, &content)
+        let frame = |(i, bytes): (usize, &[u8])| {
+            let number = i as u8;
+            Piece {
+                check: header.check,
+                last,
+                number,
+                frames,
+                bytes,
+            }
+            .to_frame()
         };
         pieces.enumerate().map(frame).collect()
     }
@@ -136,6 +133,7 @@ impl FrameWriter {
                 break;
             }
         }
+        self.frames += frames.len() as u64;
         Ok(frames)
     }
 
@@ -189,101 +187,4 @@ impl FrameWriter {
         let cells: Vec<Cells> = columns.iter().map(|cells| cells[..rows].to_vec()).collect();
         Ok(block::encode(header, &ticks[..rows], &cells, &own, Effort::Thorough).0)
     }
-}
-
-/// Converts frames to rows. Any bytes give rows, nothing, or an error.
-#[derive(Debug, Default)]
-pub struct FrameReader {
-    header: Option<Header>,
-    /// The incomplete header: its checksum and pieces.
-    pieces: Option<(u32, Vec<Option<Vec<u8>>>)>,
-    waiting: VecDeque<Vec<u8>>,
-}
-
-impl FrameReader {
-    /// A reader without header.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// The schema of the sender; `None` until the header is complete.
-    pub fn schema(&self) -> Option<&Schema> {
-        self.header.as_ref().map(|header| &header.schema)
-    }
-
-    /// Processes one received frame. Returns the blocks that became readable: its own, or, with the last piece of the header, those that
-    /// arrived before.
-    ///
-    /// # Errors
-    /// If the frame is damaged or belongs to another header. The reader is then unchanged.
-    pub fn handle(&mut self, frame: &[u8]) -> Result<Vec<Block>, Error> {
-        let damaged = |damage| Error::Block {
-            offset: 0,
-            bytes: frame.len() as u64,
-            damage,
-        };
-        if frame.first() == Some(&0) {
-            return self.piece(frame).map_err(damaged);
-        }
-        let Some(header) = &self.header else {
-            // The oldest is dropped: the memory is bounded, also if the header never comes.
-            if self.waiting.len() == MAX_WAITING {
-                self.waiting.pop_front();
-            }
-            self.waiting.push_back(frame.to_vec());
-            return Ok(Vec::new());
-        };
-        Ok(vec![read_block(header, frame).map_err(damaged)?])
-    }
-
-    fn piece(&mut self, frame: &[u8]) -> Result<Vec<Block>, Damage> {
-        if frame.get(1) != Some(&PIECE) {
-            return Err(Damage::NoBlock);
-        }
-        // The receiver of a piece has no header yet, so the checksum covers zeros in place of the header's.
-        let (content, whole) = read_checked(0, frame, 2, 0..=frame.len())?;
-        if whole != frame.len() {
-            return Err(Damage::Content("length"));
-        }
-        let mut content = Bytes(content);
-        let check = u32::from_le_bytes(content.array()?);
-        let [last, number] = content.array()?;
-        if number > last {
-            return Err(Damage::Content("number of a piece"));
-        }
-        if self.header.as_ref().is_some_and(|header| header.check == check) {
-            return Ok(Vec::new());
-        }
-        let count = usize::from(last) + 1;
-        // Pieces of another header replace those before: its sender has started anew.
-        let known = self
-            .pieces
-            .take()
-            .filter(|(known, pieces)| *known == check && pieces.len() == count);
-        let (_, mut pieces) = known.unwrap_or_else(|| (check, vec![None; count]));
-        pieces[usize::from(number)] = Some(content.0.to_vec());
-        if pieces.iter().any(Option::is_none) {
-            self.pieces = Some((check, pieces));
-            return Ok(Vec::new());
-        }
-        let bytes: Vec<u8> = pieces.into_iter().flatten().flatten().collect();
-        let header = match Header::read(&bytes) {
-            Ok(Some((header, length))) if length == bytes.len() && header.check == check => header,
-            _ => return Err(Damage::Content("header")),
-        };
-        let waiting = std::mem::take(&mut self.waiting);
-        let blocks = waiting
-            .iter()
-            .filter_map(|frame| read_block(&header, frame).ok())
-            .collect();
-        self.header = Some(header);
-        Ok(blocks)
-    }
-}
-
-fn read_block(header: &Header, frame: &[u8]) -> Result<Block, Damage> {
-    if block::length(header, frame)? != frame.len() {
-        return Err(Damage::Content("length"));
-    }
-    block::decode(header, frame, |_| true)
 }
