@@ -36,9 +36,11 @@
 //! | what is in it: kinds, ranges, gaps by spelling, sentinels, steps of time | [`Table::survey`], [`Profile`] |
 //! | lists of names in options | [`names`] |
 //!
-//! The features `gzip` and `zstd` read packed text, `parquet` reads Parquet through Arrow arrays (module `parquet`). Without features the
+//! The features `gzip` and `zstd` read packed text, `parquet` reads Parquet through Arrow arrays (`Table::open_parquet`). Without features the
 //! crate builds for WebAssembly; it opens no files. Not here: files and options (`fewbits-cli`), recordings (`fewbits-record`), estimation.
 
+#[cfg(feature = "parquet")]
+mod arrow;
 mod clock;
 mod column;
 mod detect;
@@ -51,6 +53,8 @@ mod missing;
 pub mod names;
 mod number;
 mod open;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod profile;
 mod source;
 mod table;

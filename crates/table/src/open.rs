@@ -25,6 +25,23 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
+    /// No rows of text, for tables of another source.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn none() -> Self {
+        Self {
+            lines: Lines::new(Box::new(Cursor::new(Vec::new())), b'\n'),
+            split: Split {
+                delimiter: Delimiter::Byte(b','),
+                quote: b'"',
+            },
+            comment: Vec::new(),
+            doubts_comments: false,
+            keys: None,
+            header: Vec::new(),
+            preamble: Vec::new(),
+        }
+    }
+
     /// Number of the last line.
     pub(crate) fn line(&self) -> u64 {
         self.lines.line()

@@ -103,9 +103,7 @@ impl Profile {
             self.gap(cell);
             return;
         }
-        if self.sample.len() < SAMPLE {
-            self.sample.push(cell.to_owned());
-        }
+        self.keep(cell);
         let parsed = number::parse(cell.as_bytes(), syntax);
         let parsed = match (&parsed, strips) {
             (Err(_), true) => {
@@ -180,6 +178,60 @@ impl Profile {
         }
         self.first_text.get_or_insert_with(|| (place, cell.to_owned()));
         self.word(cell);
+    }
+
+    /// Adds a cell that is a double.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn add_double(&mut self, value: Option<f64>, gaps: &Spellings) {
+        match value.filter(|value| !gaps.has_number(*value)) {
+            None => self.gap(""),
+            Some(value) => {
+                let text = if self.sample.len() < SAMPLE {
+                    format!("{value}")
+                } else {
+                    String::new()
+                };
+                self.keep(&text);
+                self.number(value, 0, &text);
+            }
+        }
+    }
+
+    /// Adds a cell that is a whole number.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn add_integer(&mut self, value: Option<i64>, gaps: &Spellings) {
+        match value {
+            Some(whole) if (whole as f64) as i128 != i128::from(whole) => {
+                self.keep(&whole.to_string());
+                self.integers += 1;
+                self.extend(whole as f64);
+            }
+            value => self.add_double(value.map(|whole| whole as f64), gaps),
+        }
+    }
+
+    /// Adds a cell that is a time, in seconds.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn add_time(&mut self, seconds: Option<f64>) {
+        match seconds {
+            None => self.gap(""),
+            Some(_) => self.times += 1,
+        }
+    }
+
+    /// Adds a cell that is a boolean.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn add_boolean(&mut self, value: Option<bool>) {
+        match value {
+            None => self.gap(""),
+            Some(_) => self.booleans += 1,
+        }
+    }
+
+    fn keep(&mut self, cell: &str) {
+        if self.sample.len() < SAMPLE {
+            self.sample.push(cell.to_owned());
+        }
     }
 
     /// The kind of the column.

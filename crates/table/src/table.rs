@@ -18,6 +18,8 @@ const MAX_FAULTS: usize = 10;
 /// A table that is read from front to end.
 pub struct Table {
     pub(crate) rows: Rows,
+    #[cfg(feature = "parquet")]
+    pub(crate) arrow: Option<crate::parquet::ArrowRows>,
     pub(crate) dialect: Dialect,
     pub(crate) syntax: number::Syntax,
     pub(crate) columns: Vec<Column>,
@@ -25,13 +27,13 @@ pub struct Table {
     /// Profiles of the columns over the first lines.
     pub(crate) profiles: Vec<Profile>,
     /// Words of each column, by their indices, and the clocks of columns of times.
-    words: Vec<Vec<String>>,
-    clocks: Vec<Option<Clock>>,
-    selected: Vec<usize>,
-    time: Option<(Vec<usize>, Clock)>,
-    label: Option<usize>,
+    pub(crate) words: Vec<Vec<String>>,
+    pub(crate) clocks: Vec<Option<Clock>>,
+    pub(crate) selected: Vec<usize>,
+    pub(crate) time: Option<(Vec<usize>, Clock)>,
+    pub(crate) label: Option<usize>,
     row: Row,
-    count: u64,
+    pub(crate) count: u64,
     pub(crate) skipped: Skipped,
     /// An error that came behind rows that were handed out first.
     late_error: Option<Error>,
@@ -70,6 +72,8 @@ impl Table {
                 .map(|column| dialect.missing_of(&column.name, &column.own_name))
                 .collect(),
             rows,
+            #[cfg(feature = "parquet")]
+            arrow: None,
             dialect,
             syntax,
             words: vec![Vec::new(); count],
@@ -91,11 +95,48 @@ impl Table {
         }
         let kinds: Vec<Kind> = table.profiles.iter().map(Profile::kind).collect();
         table.set_kinds(&kinds);
+        table.set_said_time()?;
+        Ok(table)
+    }
+
+    /// A table of Arrow arrays.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn of_arrow(
+        arrow: crate::parquet::ArrowRows,
+        mut dialect: Dialect,
+        columns: Vec<Column>,
+        profiles: Vec<Profile>,
+    ) -> Result<Self, Error> {
+        let said = std::mem::take(&mut dialect.time_column);
+        let mut table = Self::new(Rows::none(), dialect, columns, profiles)?;
+        table.arrow = Some(arrow);
+        let profiles = std::mem::take(&mut table.profiles);
+        table.set_arrow_kinds(&profiles);
+        table.profiles = profiles;
+        table.dialect.time_column = said;
+        table.set_said_time()?;
+        Ok(table)
+    }
+
+    #[cfg(feature = "parquet")]
+    fn set_arrow_kinds(&mut self, profiles: &[Profile]) {
+        if let Some(rows) = &self.arrow {
+            let kinds = profiles
+                .iter()
+                .enumerate()
+                .map(|(i, profile)| Self::arrow_kind(rows, i, profile));
+            let kinds: Vec<Kind> = kinds.collect();
+            self.set_kinds(&kinds);
+        }
+    }
+
+    fn set_said_time(&mut self) -> Result<(), Error> {
+        let table = self;
         if !table.dialect.time_column.is_empty() {
             let names = table.dialect.time_column.clone();
             table.set_time(&names)?;
         }
-        Ok(table)
+        Ok(())
     }
 
     fn set_kinds(&mut self, kinds: &[Kind]) {
@@ -114,6 +155,11 @@ impl Table {
 
     /// Uses what a [`survey`](Self::survey) of the same table found: the kinds of columns over all rows.
     pub fn use_survey(&mut self, survey: &Survey) {
+        #[cfg(feature = "parquet")]
+        if self.arrow.is_some() {
+            self.set_arrow_kinds(&survey.columns);
+            return;
+        }
         let kinds: Vec<Kind> = survey.columns.iter().map(Profile::kind).collect();
         self.set_kinds(&kinds);
     }
@@ -205,6 +251,22 @@ impl Table {
     }
 
     fn set_time_columns(&mut self, columns: Vec<usize>) -> Result<(), Error> {
+        #[cfg(feature = "parquet")]
+        if let (Some(rows), [column]) = (&self.arrow, columns.as_slice())
+            && let Some(scale) = rows.scale(*column)
+        {
+            let zone = self
+                .dialect
+                .time_zone
+                .as_deref()
+                .filter(|_| scale == Scale::Local)
+                .and_then(crate::time::zone);
+            let scale = if zone.is_some() { Scale::Utc } else { scale };
+            self.dialect.time_column = vec![self.columns[*column].name.clone()];
+            self.selected.retain(|other| other != column);
+            self.time = Some((columns, Clock::typed(scale, zone)));
+            return Ok(());
+        }
         let own: Vec<String> = columns.iter().map(|i| self.columns[*i].own_name.clone()).collect();
         let own: Vec<&str> = own.iter().map(String::as_str).collect();
         let length = columns
@@ -270,6 +332,10 @@ impl Table {
 
     /// The label of the last row that was read.
     pub fn label(&self) -> &str {
+        #[cfg(feature = "parquet")]
+        if let Some(rows) = &self.arrow {
+            return &rows.label;
+        }
         self.label.map_or("", |column| self.row.cell_text(column))
     }
 
@@ -285,10 +351,9 @@ impl Table {
             return Err(error);
         }
         while batch.rows < limit {
-            let outcome = match self.next_row() {
+            let outcome = match self.next_into(batch) {
                 Ok(false) => break,
-                Ok(true) => self.push(batch),
-                Err(error) => Err(error),
+                other => other,
             };
             if let Err(error) = outcome {
                 batch.cut();
@@ -311,6 +376,18 @@ impl Table {
             }
         }
         Ok(batch.rows)
+    }
+
+    /// Reads the next row into `batch`. Returns whether there was one.
+    fn next_into(&mut self, batch: &mut Batch) -> Result<bool, Error> {
+        #[cfg(feature = "parquet")]
+        if self.arrow.is_some() {
+            return self.next_arrow(batch);
+        }
+        if !self.next_row()? {
+            return Ok(false);
+        }
+        self.push(batch).map(|()| true)
     }
 
     fn skip(&mut self, error: &Error) {
@@ -458,6 +535,10 @@ impl Table {
     /// # Errors
     /// As [`read`](Self::read), but cells of values are counted, not refused.
     pub fn survey(mut self) -> Result<Survey, Error> {
+        #[cfg(feature = "parquet")]
+        if self.arrow.is_some() {
+            return self.survey_arrow();
+        }
         let mut survey = Survey {
             columns: vec![Profile::default(); self.columns.len()],
             ..Survey::default()
@@ -515,7 +596,7 @@ pub struct Times {
 }
 
 impl Times {
-    fn add(&mut self, time: Time) {
+    pub(crate) fn add(&mut self, time: Time) {
         self.decimals = self.decimals.max(time.decimals());
         let Some((first, last)) = self.ends else {
             self.ends = Some((time, time));
@@ -535,16 +616,16 @@ impl Times {
 }
 
 /// What is known of the cells of a column.
-struct Meaning<'a> {
-    syntax: number::Syntax,
-    gaps: &'a Spellings,
-    strips: bool,
-    clock: Option<&'a Clock>,
-    kind: Kind,
+pub(crate) struct Meaning<'a> {
+    pub(crate) syntax: number::Syntax,
+    pub(crate) gaps: &'a Spellings,
+    pub(crate) strips: bool,
+    pub(crate) clock: Option<&'a Clock>,
+    pub(crate) kind: Kind,
 }
 
 /// Adds a cell to the cells of its column.
-fn push_cell(
+pub(crate) fn push_cell(
     cells: &mut Cells,
     text: &str,
     meaning: &Meaning<'_>,

@@ -340,6 +340,18 @@ pub(crate) fn zone(text: &str) -> Option<TimeZone> {
 }
 
 impl Clock {
+    /// The clock of times that are typed as such.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn typed(scale: Scale, zone: Option<TimeZone>) -> Self {
+        Self {
+            syntax: Syntax::Number(Unit::Seconds),
+            zone,
+            scale,
+            takes_leap_seconds: false,
+            cuts: false,
+        }
+    }
+
     pub(crate) fn parse(&self, text: &str) -> Result<Time, Problem> {
         let text = text.trim();
         match &self.syntax {
@@ -362,6 +374,18 @@ impl Clock {
             Syntax::Date(order) => self.written(text, *order),
             Syntax::Format(format) => self.formatted(text, format),
             Syntax::Parts(..) => Err(NO_TIME),
+        }
+    }
+
+    /// A time of a local clock in the zone that was said.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn zoned(&self, time: Time) -> Result<Time, Problem> {
+        match &self.zone {
+            Some(zone) => {
+                let whole = i64::try_from(time.0.div_euclid(SECOND)).map_err(|_| NO_SUCH_DATE)?;
+                self.in_zone(zone, whole, time.0.rem_euclid(SECOND))
+            }
+            None => Ok(time),
         }
     }
 
