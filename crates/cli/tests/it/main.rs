@@ -4,8 +4,12 @@
 
 mod design;
 mod fleet;
+mod language;
+mod live;
 mod node;
+mod outputs;
 mod pages;
+mod streams;
 mod track;
 
 use std::io::{BufRead, BufReader, Write};
