@@ -119,7 +119,8 @@ impl Sheet {
             Rows::Json(sink) => {
                 let cells = cells.into_iter().map(|cell| cell.json());
                 let object: serde_json::Map<_, _> = self.names.iter().cloned().zip(cells).collect();
-                serde_json::to_writer(&mut *sink, &object)?;
+                serde_json::to_writer(&mut *sink, &object)
+                    .map_err(|error| Error::io(&self.file, "write")(error.into()))?;
                 writeln!(sink).map_err(Error::io(&self.file, "write"))
             }
         }
