@@ -64,7 +64,7 @@ stored! { RoundedSample as Numbers |scheme| {
 } => RoundedSample::new(noise_variance, resolution)?.with_bits(bits), Error }
 
 /// Largest word length whose cells are enumerated. A link that inverts bits needs the likelihood of every cell.
-const LONGEST_NOISY: u32 = 12;
+const MAX_NOISY_BITS: u32 = 12;
 
 impl RoundedSample {
     /// A sensor with measurement variance `sigma^2 > 0`, resolution `tau > 0` in measurement units and words of 16 bits.
@@ -187,7 +187,7 @@ impl Memoryless<1> for RoundedSample {
         if link.crossover() == 0.0 {
             return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());
         }
-        if self.bits > LONGEST_NOISY {
+        if self.bits > MAX_NOISY_BITS {
             let expected = "words of at most 12 bits over a link that inverts bits";
             return Err(ArgumentError::new("bits", self.bits, expected).into());
         }
@@ -213,7 +213,7 @@ pub struct FirstMessageValue {
 /// Cells are counted out to this many standard deviations of the sample; the rest has probability below 1e-32.
 const REACH: f64 = 12.0;
 /// Limit on the number of cells that are summed.
-const MOST_CELLS: f64 = 1e6;
+const MAX_CELLS: f64 = 1e6;
 
 /// Averages [`RoundedSample::belief_with_prior`] over all messages that the prior can cause.
 ///
@@ -222,7 +222,7 @@ const MOST_CELLS: f64 = 1e6;
 pub fn first_message_value(scheme: &RoundedSample, prior: &Gaussian<1>) -> Result<FirstMessageValue, Error> {
     let (r, tau) = (scheme.noise_variance, scheme.resolution);
     let reach = REACH * (prior.covariance()[0] + r).sqrt() + tau;
-    if reach / tau > MOST_CELLS {
+    if reach / tau > MAX_CELLS {
         return Err(ArgumentError::new("resolution", tau, "at most a million cells within the prior").into());
     }
     let mean = prior.mean()[0];

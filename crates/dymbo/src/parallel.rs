@@ -32,7 +32,7 @@ pub enum CountFusion {
 }
 
 /// Largest number of sensors.
-pub const MOST_SENSORS: usize = 1000;
+pub const MAX_SENSORS: usize = 1000;
 
 /// The filter for `K` sensors that answer the same threshold at once.
 ///
@@ -61,7 +61,7 @@ impl ParallelFilter {
     /// # Errors
     /// If `sensors` is outside `1..=1000`.
     pub fn new(plant: ScalarPlant, sensors: usize, fusion: CountFusion) -> Result<Self, Error> {
-        within("sensors", sensors as f64, 1.0, MOST_SENSORS as f64)?;
+        within("sensors", sensors as f64, 1.0, MAX_SENSORS as f64)?;
         Ok(Self {
             plant,
             sensors,

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// The proposal's covariance divided by that of Gaussian message passing.
 const INFLATION: f64 = 1.5;
 /// Below this effective sample size the draws do not determine a covariance.
-const LEAST: f64 = 2.5;
+const MIN_EFFECTIVE_SIZE: f64 = 2.5;
 
 /// A Gaussian particle filter whose proposal depends on the observations.
 ///
@@ -86,7 +86,7 @@ impl GuidedGaussian {
         kernels::exp_minus(logs, peak, weights);
         let total = kernels::sum(weights);
         let size = total * total / kernels::dot(weights, weights);
-        if size.is_nan() || size < LEAST {
+        if size.is_nan() || size < MIN_EFFECTIVE_SIZE {
             return Ok(None);
         }
         // Weighted moments. The factor ESS / (ESS - 1) removes the bias of the covariance.

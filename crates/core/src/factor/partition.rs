@@ -127,7 +127,7 @@ impl Partition {
 /// Number of means that are processed together.
 const BLOCK: usize = 256;
 /// Probabilities below this have lost digits; the sum is then taken over logarithms.
-const LEAST: f64 = 1e-280;
+const MIN_PROBABILITY: f64 = 1e-280;
 
 /// Adds `p P(lower < m + n < upper)` for every mean.
 fn add_cell(means: &[f64], lower: f64, upper: f64, scale: f64, p: f64, probabilities: &mut [f64]) {
@@ -183,14 +183,14 @@ impl Factor<1> for Partition {
                 || {
                     for (log_weight, p) in log_weights.iter_mut().zip(&*probabilities) {
                         // Where the probability is tiny, the logarithms below replace it.
-                        let p = if *p > LEAST { *p } else { 1.0 };
+                        let p = if *p > MIN_PROBABILITY { *p } else { 1.0 };
                         *log_weight += kernels::scalar::ln(if p < 1.0 { p } else { 1.0 });
                     }
                 },
             );
             for ((log_weight, m), p) in log_weights.iter_mut().zip(means).zip(&*probabilities) {
                 // The whole line has probability one even for a mean of NaN, which must not raise the weight.
-                if *p <= LEAST || p.is_nan() || m.is_nan() {
+                if *p <= MIN_PROBABILITY || p.is_nan() || m.is_nan() {
                     *log_weight += self.log_probability(*m);
                 }
             }
