@@ -5,7 +5,6 @@ use crate::cell::Cell;
 use crate::gaussian::Gaussian;
 use crate::message::Message;
 use fewbits_numerics::error::{ArgumentError, finite, within};
-use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +33,24 @@ pub struct Levels {
     bits: u32,
 }
 
-stored! { Levels as Numbers { #[serde(with = "fewbits_numerics::stored")] lower: f64, #[serde(with = "fewbits_numerics::stored")] upper: f64, bits: u32 } => Levels::new(lower, upper, bits), ArgumentError }
+/// The stored form of [`Levels`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    #[serde(with = "fewbits_numerics::stored")]
+    lower: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    upper: f64,
+    bits: u32,
+}
+
+impl TryFrom<Numbers> for Levels {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        Levels::new(parts.lower, parts.upper, parts.bits)
+    }
+}
 
 impl Levels {
     /// The levels from `lower` to `upper` (measurement units), `bits` of 1 to 32.

@@ -4,7 +4,6 @@ use crate::bits::BitString;
 use crate::error::Error;
 use crate::message::Message;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::stored;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
@@ -81,8 +80,25 @@ pub struct Link {
     crossover: f64,
 }
 
-stored! { Link as Numbers { #[serde(with = "fewbits_numerics::stored")] loss: f64, #[serde(default, with = "fewbits_numerics::stored")] erasure: f64, #[serde(with = "fewbits_numerics::stored")] crossover: f64 } =>
-Link::new(loss, crossover)?.with_erasure(erasure), ArgumentError }
+/// The stored form of [`Link`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    #[serde(with = "fewbits_numerics::stored")]
+    loss: f64,
+    #[serde(default, with = "fewbits_numerics::stored")]
+    erasure: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    crossover: f64,
+}
+
+impl TryFrom<Numbers> for Link {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        Link::new(parts.loss, parts.crossover)?.with_erasure(parts.erasure)
+    }
+}
 
 impl Link {
     /// A link that delivers every report as it was sent.

@@ -6,7 +6,6 @@ use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Memoryless, Message, Observation};
 use fewbits_numerics::error::{ArgumentError, finite, positive, within};
 use fewbits_numerics::normal;
-use fewbits_numerics::stored;
 use nalgebra::Vector1;
 use serde::{Deserialize, Serialize};
 
@@ -48,20 +47,33 @@ impl Message for Multiple {
 /// A sensor that reports its sample rounded to a multiple of the resolution `tau`, halves away from zero, in a word of fixed
 /// length. Multiples beyond the word saturate, so the outermost cells are unbounded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers", into = "Numbers")]
+#[serde(try_from = "Numbers")]
 pub struct RoundedSample {
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     resolution: f64,
     bits: u32,
 }
 
-stored! { RoundedSample as Numbers |scheme| {
+/// The stored form of [`RoundedSample`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64 = scheme.noise_variance,
+    noise_variance: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    resolution: f64 = scheme.resolution,
-    bits: u32 = scheme.bits,
-} => RoundedSample::new(noise_variance, resolution)?.with_bits(bits), Error }
+    resolution: f64,
+    bits: u32,
+}
+
+impl TryFrom<Numbers> for RoundedSample {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        RoundedSample::new(parts.noise_variance, parts.resolution)?.with_bits(parts.bits)
+    }
+}
 
 /// Largest word length whose cells are enumerated. A link that inverts bits needs the likelihood of every cell.
 const MAX_NOISY_BITS: u32 = 12;

@@ -14,7 +14,6 @@ use fewbits_numerics::binomial::log_row;
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::normal::{self, SQRT_2_OVER_PI};
 use fewbits_numerics::quadrature::gauss_legendre;
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 
@@ -40,7 +39,7 @@ pub const MAX_SENSORS: usize = 1000;
 /// `D = 1 + (K-1)(2/pi) asin rho`, `G = sqrt(2/pi) (P/s)/D`; over a link of crossover `eps` each `sqrt(2/pi)` shrinks by
 /// `1 - 2 eps`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers", into = "Numbers")]
+#[serde(try_from = "Numbers")]
 pub struct ParallelFilter {
     plant: ScalarPlant,
     sensors: usize,
@@ -48,12 +47,23 @@ pub struct ParallelFilter {
     link: Link,
 }
 
-stored! { ParallelFilter as Numbers |filter| {
-    plant: ScalarPlant = filter.plant,
-    sensors: usize = filter.sensors,
-    fusion: CountFusion = filter.fusion,
-    link: Link = filter.link,
-} => Ok(ParallelFilter::new(plant, sensors, fusion)?.with_link(link)), Error }
+/// The stored form of [`ParallelFilter`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    plant: ScalarPlant,
+    sensors: usize,
+    fusion: CountFusion,
+    link: Link,
+}
+
+impl TryFrom<Numbers> for ParallelFilter {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        Ok(ParallelFilter::new(parts.plant, parts.sensors, parts.fusion)?.with_link(parts.link))
+    }
+}
 
 impl ParallelFilter {
     /// The filter for 1 to 1000 sensors over perfect links.

@@ -9,7 +9,6 @@ use fewbits_core::{Gaussian, Likelihood};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
-use fewbits_numerics::stored;
 use nalgebra::{Matrix2, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -33,7 +32,20 @@ pub struct GuidedGaussian {
     draws: usize,
 }
 
-stored! { GuidedGaussian as Stored { draws: usize } => GuidedGaussian::new(draws), Error }
+/// The stored form of [`GuidedGaussian`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    draws: usize,
+}
+
+impl TryFrom<Stored> for GuidedGaussian {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        GuidedGaussian::new(parts.draws)
+    }
+}
 
 /// Buffers that are reused from step to step.
 #[derive(Debug, Clone, Default)]

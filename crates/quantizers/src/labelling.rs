@@ -3,7 +3,6 @@
 use crate::error::{Error, refuse};
 use fewbits_core::Message;
 use fewbits_core::bits::{BitReader, BitWriter, CodecError};
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of bits of a word.
@@ -24,10 +23,30 @@ pub struct Labelling {
     symbols: Vec<u32>,
 }
 
-stored! { Labelling as Stored |labelling| {
-    bits: u32 = labelling.bits,
-    words: Vec<u32> = labelling.words[..labelling.levels].to_vec(),
-} => Labelling::with_words(bits, words), Error }
+/// The stored form of [`Labelling`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    bits: u32,
+    words: Vec<u32>,
+}
+
+impl From<Labelling> for Stored {
+    fn from(labelling: Labelling) -> Self {
+        Self {
+            bits: labelling.bits,
+            words: labelling.words[..labelling.levels].to_vec(),
+        }
+    }
+}
+
+impl TryFrom<Stored> for Labelling {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        Labelling::with_words(parts.bits, parts.words)
+    }
+}
 
 impl Labelling {
     /// Level `z` is sent as the number `z` in `ceil(log2 levels)` bits.

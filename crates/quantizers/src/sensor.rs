@@ -8,7 +8,6 @@ use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::{SMatrix, SVector};
 use fewbits_core::{Link, MeasurementNoise, Memoryless, Observation};
 use fewbits_numerics::error::positive;
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// A sensor that reports the level of its scalar sample in every slot, as a [`Scheme`](fewbits_core::Scheme) that every filter accepts.
@@ -29,18 +28,29 @@ use serde::{Deserialize, Serialize};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "Stored")]
 pub struct QuantizingSensor {
     quantizer: Quantizer,
     labelling: Labelling,
     noise_variance: f64,
 }
 
-stored! { QuantizingSensor as Stored |sensor| {
-    quantizer: Quantizer = sensor.quantizer,
-    labelling: Labelling = sensor.labelling,
-    noise_variance: f64 = sensor.noise_variance,
-} => QuantizingSensor::with_variance(quantizer, labelling, noise_variance), Error }
+/// The stored form of [`QuantizingSensor`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    quantizer: Quantizer,
+    labelling: Labelling,
+    noise_variance: f64,
+}
+
+impl TryFrom<Stored> for QuantizingSensor {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        QuantizingSensor::with_variance(parts.quantizer, parts.labelling, parts.noise_variance)
+    }
+}
 
 impl QuantizingSensor {
     /// A sensor with this quantizer and these words, whose samples have noise of variance `noise_variance`.

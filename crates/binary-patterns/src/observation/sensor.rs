@@ -5,22 +5,32 @@ use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::SVector;
 use fewbits_core::{Link, Memoryless, Observation};
 use fewbits_numerics::error::positive;
-use fewbits_numerics::stored;
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
 /// A sensor that measures `Y = X + N(0, noise_deviation^2)` and reports the bit of its quantizer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredSensor", into = "StoredSensor")]
+#[serde(try_from = "StoredSensor")]
 pub struct PatternSensor {
     quantizer: BinaryQuantizer,
     noise_deviation: f64,
 }
 
-stored! { PatternSensor as StoredSensor |sensor| {
-    quantizer: BinaryQuantizer = sensor.quantizer,
-    noise_deviation: f64 = sensor.noise_deviation,
-} => PatternSensor::with_deviation(quantizer, noise_deviation), Error }
+/// The stored form of [`PatternSensor`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredSensor {
+    quantizer: BinaryQuantizer,
+    noise_deviation: f64,
+}
+
+impl TryFrom<StoredSensor> for PatternSensor {
+    type Error = Error;
+
+    fn try_from(parts: StoredSensor) -> Result<Self, Error> {
+        PatternSensor::with_deviation(parts.quantizer, parts.noise_deviation)
+    }
+}
 
 impl PatternSensor {
     /// A sensor with the given quantizer and standard deviation (not variance) of its noise.

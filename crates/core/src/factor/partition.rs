@@ -6,7 +6,6 @@ use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, all_finite, positive};
-use fewbits_numerics::stored;
 use fewbits_numerics::{kernels, normal};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -25,14 +24,35 @@ pub struct Partition {
     variance: f64,
 }
 
-stored! { Partition as Numbers |factor| {
+/// The stored form of [`Partition`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
     #[serde(with = "fewbits_numerics::stored")]
-    edges: Vec<f64> = factor.edges,
+    edges: Vec<f64>,
     #[serde(with = "fewbits_numerics::stored")]
-    given_cell: Vec<f64> = factor.given_cell,
+    given_cell: Vec<f64>,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64 = factor.variance,
-} => Partition::new(edges, given_cell, noise_variance), ArgumentError }
+    noise_variance: f64,
+}
+
+impl From<Partition> for Numbers {
+    fn from(factor: Partition) -> Self {
+        Self {
+            edges: factor.edges,
+            given_cell: factor.given_cell,
+            noise_variance: factor.variance,
+        }
+    }
+}
+
+impl TryFrom<Numbers> for Partition {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        Partition::new(parts.edges, parts.given_cell, parts.noise_variance)
+    }
+}
 
 impl Partition {
     /// The factor with `edges` (measurement units, strictly increasing) and one probability for each of the

@@ -2,7 +2,6 @@
 
 use crate::Error;
 use fewbits_numerics::error::{finite, positive, refuse};
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Evenly spaced points on a line, the nodes of a trapezoid rule.
@@ -16,18 +15,28 @@ pub struct UniformGrid {
     points: usize,
 }
 
-stored! { #[serde(rename = "Grid")] UniformGrid as Stored {
+/// The stored form of [`UniformGrid`].
+#[derive(Deserialize)]
+#[serde(rename = "Grid")]
+#[serde(deny_unknown_fields)]
+struct Stored {
     #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
     #[serde(with = "fewbits_numerics::stored")]
     spacing: f64,
     points: usize,
-} => {
-    if !(2..=MAX_NODES).contains(&points) {
-        return refuse("points", points, format!("2 to {MAX_NODES} nodes"));
+}
+
+impl TryFrom<Stored> for UniformGrid {
+    type Error = Error;
+
+    fn try_from(Stored { lower, spacing, points }: Stored) -> Result<Self, Error> {
+        if !(2..=MAX_NODES).contains(&points) {
+            return refuse("points", points, format!("2 to {MAX_NODES} nodes"));
+        }
+        UniformGrid::of_nodes(finite("lower", lower)?, spacing, points)
     }
-    UniformGrid::of_nodes(finite("lower", lower)?, spacing, points)
-}, Error }
+}
 
 /// Largest number of nodes of a grid.
 const MAX_NODES: usize = 1_000_000;
