@@ -213,6 +213,22 @@ impl Link {
         self.crossover.powi(different as i32) * (1.0 - self.crossover).powi((bits - different) as i32)
     }
 
+    /// `p(word arrives as received | cell i)` of a sensor that sends one word of `bits` bits for each cell: one entry per word of `sent`.
+    ///
+    /// # Errors
+    /// [`Error::Impossible`] if nothing arrives over this link.
+    pub fn received_given_words(
+        &self,
+        sent: impl Iterator<Item = u64>,
+        received: u64,
+        bits: u32,
+    ) -> Result<Vec<f64>, Error> {
+        let arrives = self.of_received()?;
+        Ok(sent
+            .map(|word| arrives * self.word_probability(word, received, bits))
+            .collect())
+    }
+
     /// Sends a report through the link at random: it is lost, or each of its bits may be inverted. Bits that do not decode to a report
     /// arrive as [`Observation::Lost`] (law 3 of [`Scheme`](crate::Scheme)); silence arrives as [`Observation::Nothing`].
     ///

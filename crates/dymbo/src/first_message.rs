@@ -195,9 +195,9 @@ impl Memoryless<1> for RoundedSample {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };
-        let (cell, arrives) = (self.cell(*multiple)?, link.of_received()?);
+        let cell = self.cell(*multiple)?;
         if link.crossover() == 0.0 {
-            return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());
+            return Ok(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into());
         }
         if self.bits > MAX_NOISY_BITS {
             let expected = "words of at most 12 bits over a link that inverts bits";
@@ -208,8 +208,8 @@ impl Memoryless<1> for RoundedSample {
         // Two's complement of `bits` bits, as the words travel.
         let mask = (1_u64 << self.bits) - 1;
         let word = |k: i64| k as u64 & mask;
-        let sent = |k: i64| arrives * link.word_probability(word(k), word(multiple.0), self.bits);
-        Ok(Partition::new(edges, (least..=most).map(sent).collect(), self.noise_variance)?.into())
+        let given = link.received_given_words((least..=most).map(word), word(multiple.0), self.bits)?;
+        Ok(Partition::new(edges, given, self.noise_variance)?.into())
     }
 }
 

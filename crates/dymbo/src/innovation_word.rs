@@ -196,14 +196,13 @@ impl Memoryless<1> for InnovationWord {
         let Observation::Received(word) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };
-        let arrives = link.of_received()?;
         if link.crossover() == 0.0 {
             let cell = self.cell(*word, prediction)?;
-            return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());
+            return Ok(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into());
         }
         let received = self.index(*word)? as u64;
-        let sent = (0..=edges.len() as u64).map(|i| arrives * link.word_probability(i, received, self.bits));
-        Ok(Partition::new(edges, sent.collect(), self.noise_variance)?.into())
+        let given = link.received_given_words(0..=edges.len() as u64, received, self.bits)?;
+        Ok(Partition::new(edges, given, self.noise_variance)?.into())
     }
 }
 

@@ -48,7 +48,6 @@
 #[doc(hidden)]
 pub mod engine {
     pub use crate::chain::draw;
-    pub use crate::leader::lower_factor;
 }
 
 mod bound;

@@ -117,17 +117,7 @@ impl Memoryless<1> for QuantizingSensor {
             Observation::Received(symbol) => *symbol,
             missing => return Ok(Constant::of_delivery(missing, link).into()),
         };
-        let arrival = link.of_received()?;
-        let word = |symbol: usize| self.labelling.word(symbol).map(u64::from);
-        let Some(received) = word(symbol.0) else {
-            return refuse("symbol", symbol.0, format!("a number below {}", self.labelling.symbols()));
-        };
-        // p(word received | level) = arrival c^d (1 - c)^(bits - d), `d` the bits in which the words differ.
-        let given_level = |level: usize| {
-            // A level below `levels` always has a word.
-            let sent = word(level).unwrap_or(received);
-            arrival * link.word_probability(sent, received, self.labelling.bits())
-        };
-        Ok(self.quantizer.factor_of(self.noise_variance, given_level)?)
+        let given = self.labelling.given_levels(symbol, link)?;
+        Ok(self.quantizer.factor_of(self.noise_variance, |level| given[level])?)
     }
 }

@@ -90,11 +90,10 @@ impl Memoryless<1> for PatternSensor {
             Observation::Received(bit) => *bit,
             missing => return Ok(Constant::of_delivery(missing, link).into()),
         };
-        let arrival = link.of_received()?;
+        let given = link.received_given_words(0..2, u64::from(bit), 1)?;
         let cells = Quantizer::try_from(self.quantizer())?;
         let variance = self.noise_deviation() * self.noise_deviation();
-        let given = |level: usize| arrival * link.word_probability(level as u64, u64::from(bit), 1);
-        Ok(cells.factor_of(variance, given)?)
+        Ok(cells.factor_of(variance, |level| given[level])?)
     }
 }
 

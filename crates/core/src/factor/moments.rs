@@ -3,9 +3,9 @@
 use super::Tilted;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
-use fewbits_numerics::kernels;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::{bisect, kernels};
 
 /// A place where a likelihood changes, such as the edge of a cell, and the distance over which it changes, such as the noise deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -284,15 +284,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
             inside = outside;
             outside = from + step;
         }
-        for _ in 0..4 {
-            let middle = 0.5 * (inside + outside);
-            if self.log(middle) > floor {
-                inside = middle;
-            } else {
-                outside = middle;
-            }
-        }
-        outside
+        bisect::boundary(|t| self.log(t) > floor, inside, outside, 4).1
     }
 
     /// `integral (1, t - mode, (t - mode)^2) exp(log density - peak) dt` between the breaks.
