@@ -58,7 +58,6 @@ mod grid;
 mod guided;
 pub mod leader;
 mod linearised;
-pub mod product;
 mod quantized;
 mod rao_blackwell;
 mod recording;

@@ -1,10 +1,10 @@
 //! Exact convergence of Gibbs sweeps over the labels of a product of mixtures.
 
+use crate::pf_mpa::product;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
 use fewbits_pf_mpa::Error;
-use fewbits_pf_mpa::product;
 use nalgebra::DMatrix;
 
 /// The Markov chain of label choices of a product of mixtures under systematic Gibbs sweeps, as a transition matrix.

@@ -4,11 +4,11 @@
 //! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form. This is exact if the labels can
 //! be enumerated; otherwise one draws from the product.
 
-use crate::Error;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::normal::LN_SQRT_2PI;
+use fewbits_pf_mpa::Error;
 use nalgebra::{SMatrix, SVector};
 
 /// Largest number of label choices that [`exact`] enumerates.
