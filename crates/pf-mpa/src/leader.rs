@@ -64,8 +64,8 @@ impl StepBits {
     pub fn new(sensors: usize, levels: usize, format: &NumberFormat) -> Result<Self, Error> {
         at_least_one("sensors", sensors)?;
         let word = fewbits_quantizers::Labelling::natural(levels)?.bits();
-        let known = RoundedGaussian::new(&Gaussian::known(Vector4::zeros())?, format);
-        let handover = known.and_then(|h| Ok(h.to_bits(format)?.bits()))?;
+        let known = RoundedGaussian::new(&Gaussian::known(Vector4::zeros())?, format)?;
+        let handover = known.to_bits(format)?.bits();
         Ok(Self {
             reports: sensors as u64 * u64::from(word),
             handover: handover as u64,
