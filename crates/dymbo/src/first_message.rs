@@ -4,7 +4,7 @@ use crate::Error;
 use crate::plant::scalar;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Memoryless, Message, Observation};
-use fewbits_numerics::error::{ArgumentError, finite, positive, within};
+use fewbits_numerics::error::{ArgumentError, finite, positive, refuse, within};
 use fewbits_numerics::normal;
 use nalgebra::Vector1;
 use serde::{Deserialize, Serialize};
@@ -200,14 +200,12 @@ impl Memoryless<1> for RoundedSample {
             return Ok(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into());
         }
         if self.bits > MAX_NOISY_BITS {
-            let expected = "words of at most 12 bits over a link that inverts bits";
-            return Err(ArgumentError::new("bits", self.bits, expected).into());
+            return refuse("bits", self.bits, "words of at most 12 bits over a link that inverts bits");
         }
         let (least, most) = self.range();
         let edges = (least..most).map(|k| self.resolution * (k as f64 + 0.5)).collect();
         // Two's complement of `bits` bits, as the words travel.
-        let mask = (1_u64 << self.bits) - 1;
-        let word = |k: i64| k as u64 & mask;
+        let word = |k: i64| k as u64 & ((1 << self.bits) - 1);
         let given = link.received_given_words((least..=most).map(word), word(multiple.0), self.bits)?;
         Ok(Partition::new(edges, given, self.noise_variance)?.into())
     }
