@@ -6,7 +6,6 @@ use crate::particles::weights::Categorical;
 use fewbits_core::{Belief, ColumnsMut, Density, Likelihood};
 use fewbits_numerics::error::{entries, finite, positive, refuse};
 use fewbits_numerics::normal::log_pdf_with;
-use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -20,11 +19,23 @@ pub struct PointMass {
     density: Vec<f64>,
 }
 
-stored! { #[serde(rename = "PointMass")] PointMass as Stored {
+/// The stored form of [`PointMass`].
+#[derive(Deserialize)]
+#[serde(rename = "PointMass")]
+#[serde(deny_unknown_fields)]
+struct Stored {
     grid: UniformGrid,
     #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
-} => check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density }), Error }
+}
+
+impl TryFrom<Stored> for PointMass {
+    type Error = Error;
+
+    fn try_from(Stored { grid, density }: Stored) -> Result<Self, Error> {
+        check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density })
+    }
+}
 
 /// Checks densities at `nodes` nodes of the given volume each: finite, non-negative, integrating to one.
 pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Result<(), Error> {
