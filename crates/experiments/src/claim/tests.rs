@@ -1,6 +1,7 @@
 //! Every kind of claim holds, fails, and fails about nothing.
 
 use super::*;
+use crate::Table;
 
 fn verdict(make: impl FnOnce(&Claims)) -> Verdict {
     let claims = Claims::about("demo-fig1", true, true);
