@@ -82,10 +82,16 @@ impl Claims {
                     .iter()
                     .position(|column| column.name == quantity.replace('-', "_"))
             };
+            // Of several tables with the column, that whose rows the references name.
+            let known = reference::group(self.figure, quantity).unwrap_or_default();
+            let is_named = |key: &&Option<String>| known.iter().any(|(name, _)| Some(*name) == key.as_deref());
+            let named = |table: &&Table| table.keys.iter().filter(is_named).count();
             let keyed = |table: &&Table| table.keys.iter().any(Option::is_some) && column(table).is_some();
             let Some((table, i)) = tables
                 .iter()
-                .find(keyed)
+                .rev()
+                .filter(keyed)
+                .max_by_key(named)
                 .and_then(|table| Some((table, column(table)?)))
             else {
                 let what =
