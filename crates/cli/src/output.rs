@@ -18,11 +18,19 @@ pub(crate) fn text(path: Option<&Path>, text: &str) -> Result<(), Error> {
 
 /// Writes text for people to standard output.
 pub(crate) fn print(text: &str) -> Result<(), Error> {
+    if say::is_collected(text) {
+        return Ok(());
+    }
     self::text(None, &say::plain(text))
 }
 
 /// Writes one JSON value and a line end to standard output.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
+    // Of several files each has a line.
+    if say::is_collecting() {
+        say::is_collected(&serde_json::to_string(value)?);
+        return Ok(());
+    }
     text(None, &(serde_json::to_string_pretty(value)? + "\n"))
 }
 

@@ -6,6 +6,7 @@ mod design;
 mod fleet;
 mod language;
 mod live;
+mod many;
 mod node;
 mod outputs;
 mod pages;
