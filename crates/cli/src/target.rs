@@ -7,8 +7,8 @@
 //! or, if there is an earlier file, beside it under a name that ends in `.partial`, which is kept if the task fails.
 
 use crate::error::Error;
-use crate::interrupt;
 use crate::say::say;
+use crate::{files, interrupt};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -126,6 +126,24 @@ impl Target {
         Self::open(path)
     }
 
+    /// A copy of a file, which replaces the file when it is finished.
+    pub(crate) fn copy_of(path: &Path) -> Result<Self, Error> {
+        let mut copy = Self::open(Some(path))?;
+        let failed = Error::io(&copy.name, "copy");
+        let mut source = File::open(path).map_err(&failed)?;
+        std::io::copy(&mut source, &mut copy).map_err(&failed)?;
+        Ok(copy)
+    }
+
+    /// Where the file stands until it is finished.
+    pub(crate) fn unfinished(&self) -> &Path {
+        match &self.place {
+            Place::Beside { temporary, .. } => temporary,
+            Place::New { path, .. } => path,
+            Place::Direct => Path::new(&self.name),
+        }
+    }
+
     /// The name in messages.
     pub(crate) fn name(&self) -> &str {
         &self.name
@@ -149,6 +167,28 @@ impl Target {
             }
         }
         Ok(())
+    }
+}
+
+/// Locks a file that is to be replaced, as long as the result lives.
+///
+/// # Errors
+/// If another command holds the lock.
+pub(crate) fn lock(path: &Path) -> Result<File, Error> {
+    let name = path.display().to_string();
+    loop {
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(path)
+            .map_err(Error::io(&name, "open"))?;
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(Error::content(&name, "another command writes to it: try again when it has ended"));
+        }
+        // Between opening and locking another command may have replaced the file: the lock is then that of the old one.
+        if files::is_at(&file, path) {
+            return Ok(file);
+        }
     }
 }
 
