@@ -18,6 +18,7 @@ mod input;
 mod interrupt;
 mod link;
 mod live;
+mod look;
 mod node;
 mod numbers;
 mod output;
@@ -38,6 +39,7 @@ mod target;
 mod track;
 mod unpack;
 mod verify;
+mod words;
 
 use arguments::{Cli, Task};
 use clap::Parser;
@@ -65,6 +67,7 @@ impl Ending {
 fn run(mut task: Task) -> Result<Ending, Error> {
     files::prepare(&mut task)?;
     match task {
+        Task::Look(options) => look::run(&options),
         Task::Plan(options) => plan::run(&options),
         Task::Pack(options) => pack::run(&options),
         Task::Unpack(options) => unpack::run(&options.whole()),

@@ -35,7 +35,7 @@ fn is_time_name(name: &str) -> bool {
 }
 
 /// The columns that give the time by their kinds and names; `None` if none does for certain.
-pub(crate) fn guess(columns: &[Column], dialect: &Dialect) -> Option<Vec<usize>> {
+pub(crate) fn guess(columns: &[Column], dialect: &Dialect, is_certain: bool) -> Option<Vec<usize>> {
     let named = |name: &str| columns.iter().position(|column| column.own_name.to_lowercase() == name);
     if dialect.format.as_deref() == Some("EPW") {
         return Some((0..5).collect());
@@ -58,9 +58,13 @@ pub(crate) fn guess(columns: &[Column], dialect: &Dialect) -> Option<Vec<usize>>
         }
     }
     let exact = NAMES.iter().find_map(|name| named(name));
-    exact
-        .or_else(|| columns.iter().position(|column| is_time_name(&column.own_name)))
-        .map(|column| vec![column])
+    let like = || {
+        columns
+            .iter()
+            .position(|column| is_time_name(&column.own_name))
+            .filter(|_| !is_certain)
+    };
+    exact.or_else(like).map(|column| vec![column])
 }
 
 /// Meanings of columns of numbers that give a date together.

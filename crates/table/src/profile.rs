@@ -259,6 +259,11 @@ impl Profile {
         }
     }
 
+    /// Number of cells that are no gaps.
+    pub fn values(&self) -> u64 {
+        self.numbers + self.integers + self.booleans + self.times + self.texts
+    }
+
     /// Number of gaps.
     pub fn gaps(&self) -> u64 {
         self.missing.values().sum()

@@ -244,7 +244,19 @@ impl Table {
     /// # Errors
     /// If the cells are no times, or may have the day or the month first.
     pub fn find_time(&mut self) -> Result<bool, Error> {
-        match clock::guess(&self.columns, &self.dialect) {
+        self.find(false)
+    }
+
+    /// As [`find_time`](Self::find_time), but a column of numbers is the time only if its whole name says so: `time`, not `idle_time`.
+    ///
+    /// # Errors
+    /// As [`find_time`](Self::find_time).
+    pub fn find_certain_time(&mut self) -> Result<bool, Error> {
+        self.find(true)
+    }
+
+    fn find(&mut self, is_certain: bool) -> Result<bool, Error> {
+        match clock::guess(&self.columns, &self.dialect, is_certain) {
             Some(columns) => self.set_time_columns(columns).map(|()| true),
             None => Ok(false),
         }
@@ -311,12 +323,20 @@ impl Table {
             .map(|(columns, clock)| (columns.as_slice(), clock.scale))
     }
 
-    /// Lets times be off a little: leap seconds become the next second, and decimals beyond the 18th are cut.
-    pub fn allow_inexact_times(&mut self) {
+    /// Lets times be off by so much: decimals beyond the 18th are cut if it is not 0, and a leap second becomes the next second if it is a
+    /// second or more.
+    pub fn allow_inexact_times(&mut self, nanoseconds: u64) {
         if let Some((_, clock)) = &mut self.time {
-            clock.takes_leap_seconds = true;
-            clock.cuts = true;
+            clock.takes_leap_seconds = nanoseconds >= 1_000_000_000;
+            clock.cuts = nanoseconds > 0;
         }
+    }
+
+    /// Whether the first lines have numbers in every selected column, and nothing else: then nothing is learned by a
+    /// [`survey`](Self::survey) of their kinds.
+    pub fn is_plain(&self) -> bool {
+        let mut selected = self.selected.iter();
+        selected.all(|i| self.columns[*i].kind == Kind::Number && self.profiles[*i].numbers > 0)
     }
 
     /// Keeps the text of a column for [`label`](Self::label), as the names of what rows report; it is then no column of values.
@@ -577,6 +597,16 @@ pub struct Survey {
     pub times: Times,
     /// Lines that were left out.
     pub skipped: Skipped,
+}
+
+impl Survey {
+    /// The kind of a column over all rows; types that a file states are kept.
+    pub fn kind(&self, column: &Column, profile: &Profile) -> Kind {
+        match (column.kind, profile.kind()) {
+            (Kind::Time, Kind::Number) => Kind::Time,
+            (_, kind) => kind,
+        }
+    }
 }
 
 /// Counts over the times of rows.
