@@ -1,7 +1,7 @@
 //! `fewbits design`: quantizers of few bits for one unknown that several sensors measure.
 
 use crate::Ending;
-use crate::arguments::TableOptions;
+use crate::arguments::{DialectOptions, TableOptions};
 use crate::design_options::{Criterion, DesignOptions, Form};
 use crate::error::Error;
 use crate::input::Table;
@@ -30,10 +30,12 @@ const PROBABILITY: &str = "one probability for all sensors, or one per sensor";
 fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     let mut table = Table::open(&TableOptions {
         file: file.to_owned(),
-        time: None,
-        time_column: None,
         columns: options.column.iter().cloned().collect(),
-        delimiter: options.delimiter,
+        dialect: DialectOptions {
+            delimiter: options.delimiter.clone(),
+            ..DialectOptions::default()
+        },
+        ..TableOptions::default()
     })?;
     if table.names.len() != 1 {
         let names = table.names.join(", ");

@@ -71,6 +71,13 @@ pub(crate) enum Error {
         problem: &'static str,
         mend: &'static str,
     },
+    /// A table was refused by what reads it.
+    #[error("{file}")]
+    Refusal {
+        file: String,
+        #[source]
+        source: fewbits_table::Error,
+    },
     /// The value of an option could not be parsed.
     #[error("{option}: `{value}` is not understood: expected {expected}")]
     Option {
@@ -187,6 +194,14 @@ impl Error {
                 file: file.clone(),
                 source,
             },
+        }
+    }
+
+    pub(crate) fn of_table(file: &str) -> impl Fn(fewbits_table::Error) -> Self + use<> {
+        let file = file.to_owned();
+        move |source| Self::Refusal {
+            file: file.clone(),
+            source,
         }
     }
 

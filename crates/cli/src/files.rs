@@ -119,6 +119,7 @@ impl Files {
 
     fn of(task: &Task) -> Self {
         match task {
+            Task::Look(options) => Self::reading(&options.table.file).writing([&None]),
             Task::Plan(options) => Self::reading(&options.table.file).writing([&None, &options.plot]),
             Task::Pack(options) => Self::reading(&options.table.file).writing([&options.output]),
             Task::Unpack(options) => Self::reading(&options.file).writing([&options.output]),
@@ -216,6 +217,7 @@ fn table(task: &mut Task) -> Option<&mut TableOptions> {
         Task::Plan(options) => Some(&mut options.table),
         Task::Pack(options) => Some(&mut options.table),
         Task::Verify(options) => Some(&mut options.table),
+        Task::Look(options) => Some(&mut options.table),
         Task::Bench(options) => Some(&mut options.table),
         Task::Track(TrackOptions { table, .. }) => Some(table),
         Task::Send(options) => Some(&mut options.table),

@@ -20,6 +20,7 @@ mod link;
 mod live;
 mod manifest;
 mod many;
+mod look;
 mod node;
 mod numbers;
 mod output;
@@ -40,6 +41,7 @@ mod target;
 mod track;
 mod unpack;
 mod verify;
+mod words;
 
 use arguments::{Cli, Task};
 use clap::Parser;
@@ -73,6 +75,7 @@ fn run(mut task: Task) -> Result<Ending, Error> {
         Task::Pack(options) if are_several => many::pack(&options),
         Task::Track(options) if are_several => many::track(&options),
         Task::Verify(options) if are_several => many::verify(&options),
+        Task::Look(options) => look::run(&options),
         Task::Plan(options) => plan::run(&options),
         Task::Pack(options) => pack::run(&options),
         Task::Unpack(options) => unpack::run(&options.whole()),

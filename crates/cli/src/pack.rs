@@ -10,7 +10,8 @@ use crate::say::say;
 use crate::target::{self, Target};
 use crate::{Ending, bounds};
 use fewbits_recipes::bounds::exact;
-use fewbits_record::{Bound, Effort, Playback, Recorder, Schema, TimeBase};
+use fewbits_record::{Bound, Column, Effort, Playback, Recorder, Schema, TimeBase};
+use fewbits_table::Kind;
 use serde::Serialize;
 use std::fs::File;
 use std::io::Write;
@@ -32,7 +33,13 @@ struct Done {
 /// be read once only (a pipe) is read once.
 pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Table, Schema), Error> {
     let mut open = Table::open(table)?;
-    let specs = bounds::parse(&options.bound, &open.names, open.file())?;
+    let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
+    for (i, spec) in specs.iter_mut().enumerate() {
+        // Between two words there is nothing.
+        if matches!(open.kind(i), Kind::Words | Kind::Boolean) {
+            *spec = bounds::LOSSLESS;
+        }
+    }
     let needs_range = specs.iter().any(|spec| matches!(spec.bound, Bound::ShareOfRange(_)));
     let has_time = table.time.is_some() || table.time_column.is_some();
     let survey: Option<Survey> = if is_regular(&table.file) && (needs_range || has_time) {
@@ -42,7 +49,18 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     };
     let unknown = vec![None; specs.len()];
     let ends = survey.as_ref().map_or(&unknown, |survey| &survey.ends);
-    let columns = bounds::columns(&open.names, &specs, ends, open.file())?;
+    let ends: Vec<_> = ends
+        .iter()
+        .zip(&specs)
+        .map(|(ends, spec)| ends.filter(|_| spec.bound != Bound::Lossless))
+        .collect();
+    let columns = bounds::columns(&open.names, &specs, &ends, open.file())?;
+    let columns: Result<Vec<_>, _> = columns
+        .into_iter()
+        .enumerate()
+        .map(|(i, column)| with_unit(&open, i, column))
+        .collect();
+    let columns = columns?;
     let time = open.time_base(table, survey.as_ref())?;
     let schema = Schema::new(columns, time).and_then(|schema| schema.with_rows_per_block(options.rows_per_block));
     let schema = schema.map_err(Error::recording(open.file()))?;
@@ -50,6 +68,20 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         warn_of_few(table, &schema)?;
     }
     Ok((open, schema))
+}
+
+/// The column with its unit, or with its words.
+fn with_unit(table: &Table, index: usize, column: Column) -> Result<Column, Error> {
+    let unit = table.unit(index);
+    if table.kind(index) == Kind::Words && unit.is_empty() {
+        let problem = format!(
+            "column `{}` has words, which must be known before the first row and together have 1024 bytes at most: give a file, not a \
+             pipe, or leave the column out with --without",
+            crate::say::name(column.name())
+        );
+        return Err(Error::content(table.file(), problem));
+    }
+    column.with_unit(unit).map_err(Error::recording(table.file()))
 }
 
 /// Warns if a bound is a share of a range that few cells make.
@@ -170,12 +202,7 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {
         let table = Table::open(&table_options)?;
-        if !schema
-            .columns()
-            .iter()
-            .map(fewbits_record::Column::name)
-            .eq(table.names.iter())
-        {
+        if !schema.columns().iter().map(Column::name).eq(table.names.iter()) {
             let names = table.names.join(", ");
             let problem = format!("columns {names}: {file} has other columns, choose and order them with --columns");
             return Err(Error::content(table.file(), problem));
@@ -254,7 +281,7 @@ impl Done {
     fn of(rows: u64, bytes: u64, schema: &Schema) -> Self {
         let columns = schema.columns();
         let samples = (rows * columns.len() as u64).max(1);
-        let bound = |column: &fewbits_record::Column| {
+        let bound = |column: &Column| {
             let bound = bounds::shown(column.bound(), column.period());
             (column.name().to_owned(), bound)
         };
