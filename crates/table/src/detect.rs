@@ -288,41 +288,41 @@ fn layout(
             ..Layout::default()
         });
     }
+    // Names may stand in the last comment before the data.
+    let in_comment = || {
+        let (number, line) = comments.iter().rev().find(|(number, _)| number < first_number)?;
+        let mark = dialect.comment.as_deref().unwrap_or("#");
+        let names = cells(line.trim_start_matches(mark).trim(), split);
+        let are_names = names.len() == first.len() && names.iter().all(|name| look(name, comma) == Look::Text);
+        are_names.then_some((*number, names))
+    };
+    let in_comment = if looks.first().is_some_and(is_data) {
+        in_comment()
+    } else {
+        None
+    };
+    if let Some(names) = in_comment {
+        dialect.skip.get_or_insert(0);
+        dialect.no_header.get_or_insert(false);
+        return Ok(Layout {
+            names: Some(names),
+            units: Vec::new(),
+            first_line: *first_number,
+        });
+    }
     if has_header_said {
         return Ok(from_header(rows, 0, dialect));
     }
     let data = looks.iter().position(is_data);
     match data {
-        // Names may stand in the last comment before the data.
-        Some(0) => {
-            let named = comments
-                .iter()
-                .rev()
-                .find(|(number, _)| number < first_number)
-                .map(|(number, line)| {
-                    let mark = dialect.comment.as_deref().unwrap_or("#");
-                    (*number, cells(line.trim_start_matches(mark).trim(), split))
-                });
-            if let Some((number, names)) = named
-                && names.len() == first.len()
-                && names.iter().all(|name| look(name, comma) == Look::Text)
-            {
-                dialect.skip.get_or_insert(0);
-                return Ok(Layout {
-                    names: Some((number, names)),
-                    units: Vec::new(),
-                    first_line: *first_number,
-                });
-            }
-            Err(Error::Line {
-                place: Place {
-                    line: *first_number,
-                    row: 0,
-                },
-                problem: "there is no line of names: the first line is a row of numbers".to_owned(),
-                mend: "say --no-header if it is a row, or --skip 0 if these are the names",
-            })
-        }
+        Some(0) => Err(Error::Line {
+            place: Place {
+                line: *first_number,
+                row: 0,
+            },
+            problem: "there is no line of names: the first line is a row of numbers".to_owned(),
+            mend: "say --no-header if it is a row, or --skip 0 if these are the names",
+        }),
         Some(data) => {
             let mut header = data - 1;
             if dialect.units_row.is_none() && dialect.skip_after_names.is_none() {
