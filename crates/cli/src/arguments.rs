@@ -175,6 +175,20 @@ impl DialectOptions {
     }
 }
 
+/// Several files for one task.
+#[derive(Args, Clone)]
+pub(crate) struct ManyOptions {
+    /// More files. `--output` is then a folder, and every file has one line of summary. Wildcards (`*`, `?`, `[...]`) are expanded.
+    #[arg(value_name = "MORE")]
+    pub(crate) more: Vec<String>,
+    /// Number of files that are worked on at once. Default: one per core.
+    #[arg(long, value_name = "NUMBER")]
+    pub(crate) jobs: Option<std::num::NonZeroUsize>,
+    /// Take only one of several equal shares of the files, as `2/3`, so that several machines can share the work.
+    #[arg(long, value_name = "I/N")]
+    pub(crate) shard: Option<crate::many::Shard>,
+}
+
 /// Error bounds of the columns.
 #[derive(Args, Clone)]
 pub(crate) struct BoundOptions {
@@ -214,13 +228,15 @@ pub(crate) struct PlanOptions {
     pub(crate) plot: Option<PathBuf>,
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct PackOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
     #[command(flatten)]
+    pub(crate) many: ManyOptions,
+    #[command(flatten)]
     pub(crate) bounds: BoundOptions,
-    /// File of the recording. Default: standard output.
+    /// File of the recording, or folder of the recordings of several files. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// Encode about ten times as fast, with 1.03 to 1.09 times the bits. Columns are then not predicted from each other.
@@ -276,12 +292,14 @@ pub(crate) struct InfoOptions {
     pub(crate) json: bool,
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct VerifyOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
-    /// The recording that was made of the table.
+    /// The recording that was made of the table. Behind several tables: the folder of their recordings.
     pub(crate) packed: PathBuf,
+    #[command(flatten)]
+    pub(crate) many: ManyOptions,
     /// Print JSON instead of text.
     #[arg(long)]
     pub(crate) json: bool,
@@ -390,10 +408,12 @@ pub(crate) enum Model {
     Ranges,
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct TrackOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
+    #[command(flatten)]
+    pub(crate) many: ManyOptions,
     /// Dynamics model of the state.
     #[arg(long, value_enum, default_value = "walk")]
     pub(crate) model: Model,

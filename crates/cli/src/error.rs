@@ -106,6 +106,13 @@ pub(crate) enum Error {
     /// An output is an input, or another output.
     #[error("{output}: this is the same file as {other}: name another output")]
     SameFile { output: String, other: String },
+    /// Two of several files would be written to the same place.
+    #[error("{output}: both {first} and {second} would be written there: give them other names, or pack them in turn")]
+    SameOutput {
+        output: String,
+        first: String,
+        second: String,
+    },
     /// A recipe was refused.
     #[error("{file}")]
     Recipe {

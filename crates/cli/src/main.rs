@@ -19,6 +19,8 @@ mod interrupt;
 mod link;
 mod live;
 mod look;
+mod manifest;
+mod many;
 mod node;
 mod numbers;
 mod output;
@@ -54,6 +56,8 @@ pub(crate) enum Ending {
     Good,
     /// An error bound is violated, or a part could not be read.
     Failed,
+    /// Some of several files were refused, and each was named.
+    Refused,
 }
 
 impl Ending {
@@ -66,8 +70,12 @@ impl Ending {
 
 fn run(mut task: Task) -> Result<Ending, Error> {
     files::prepare(&mut task)?;
+    let are_several = many::are_several(&task);
     match task {
         Task::Look(options) => look::run(&options),
+        Task::Pack(options) if are_several => many::pack(&options),
+        Task::Track(options) if are_several => many::track(&options),
+        Task::Verify(options) if are_several => many::verify(&options),
         Task::Plan(options) => plan::run(&options),
         Task::Pack(options) => pack::run(&options),
         Task::Unpack(options) => unpack::run(&options.whole()),
@@ -89,6 +97,7 @@ fn main() -> ExitCode {
     match run(Cli::parse().task) {
         Ok(Ending::Good) => ExitCode::SUCCESS,
         Ok(Ending::Failed) => ExitCode::FAILURE,
+        Ok(Ending::Refused) => ExitCode::from(2),
         // The reader of the output has closed the pipe: not an error.
         Err(error) if error.is_closed_pipe() => ExitCode::SUCCESS,
         Err(error) => {

@@ -19,11 +19,19 @@ pub(crate) fn text(path: Option<&Path>, text: &str) -> Result<(), Error> {
 
 /// Writes text for people to standard output.
 pub(crate) fn print(text: &str) -> Result<(), Error> {
+    if say::is_collected(text) {
+        return Ok(());
+    }
     self::text(None, &say::plain(text))
 }
 
 /// Writes one JSON value and a line end to standard output.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
+    // Of several files each has a line.
+    if say::is_collecting() {
+        say::is_collected(&serde_json::to_string(value)?);
+        return Ok(());
+    }
     text(None, &(serde_json::to_string_pretty(value)? + "\n"))
 }
 
@@ -120,7 +128,8 @@ impl Sheet {
             Rows::Json(sink) => {
                 let cells = cells.into_iter().map(|cell| cell.json());
                 let object: serde_json::Map<_, _> = self.names.iter().cloned().zip(cells).collect();
-                serde_json::to_writer(&mut *sink, &object)?;
+                serde_json::to_writer(&mut *sink, &object)
+                    .map_err(|error| Error::io(&self.file, "write")(error.into()))?;
                 writeln!(sink).map_err(Error::io(&self.file, "write"))
             }
         }

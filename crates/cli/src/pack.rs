@@ -13,6 +13,7 @@ use fewbits_recipes::bounds::exact;
 use fewbits_record::{Bound, Column, Effort, Playback, Recorder, Schema, TimeBase};
 use fewbits_table::Kind;
 use serde::Serialize;
+use std::fs::File;
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -204,7 +205,8 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
     })
 }
 
-/// Continues a recording. A table that is refused leaves the recording as it was.
+/// Continues a recording. Of a file, the rows go into a copy, which then replaces the recording: a table that is refused, a kill and a full
+/// disk leave the recording as it was.
 fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, Option<Error>), Error> {
     let file = path.display().to_string();
     let schema = Playback::open(path).map_err(Error::recording(&file))?.schema().clone();
@@ -220,16 +222,32 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
         Ok(table)
     };
     let table = open()?;
-    if is_regular(&options.table.file) {
-        TableRows::new(open()?, schema.time()).check()?;
+    // A live table is appended as it comes: its rows cannot be read again.
+    if target::is_live() {
+        let recorder = Recorder::resume(path).map_err(Error::recording(&file))?;
+        return appended(table, recorder.with_effort(effort), options, &file);
     }
-    let recorder = Recorder::resume(path)
-        .map_err(Error::recording(&file))?
-        .with_effort(effort);
+    TableRows::new(open()?, schema.time()).check()?;
+    // Of two commands that append to one recording the second is refused, instead of losing the rows of the first.
+    let lock = target::lock(path)?;
+    let copy = Target::copy_of(path)?;
+    let recorder = Recorder::resume(copy.unfinished()).map_err(Error::recording(&file))?;
+    let done = appended(table, recorder.with_effort(effort), options, &file)?;
+    copy.finish()?;
+    drop(lock);
+    Ok(done)
+}
+
+fn appended(
+    table: Table,
+    recorder: Recorder<File>,
+    options: &PackOptions,
+    file: &str,
+) -> Result<(Done, Option<Error>), Error> {
     // The old index was removed and counts as written anew.
-    let before = recorder.bytes();
-    let (mut sink, rows, error) = fill(table, recorder, options, &file)?;
-    let bytes = size_of(&mut sink).map_err(Error::recording(&file))?;
+    let (schema, before) = (recorder.schema().clone(), recorder.bytes());
+    let (mut sink, rows, error) = fill(table, recorder, options, file)?;
+    let bytes = size_of(&mut sink).map_err(Error::recording(file))?;
     Ok((Done::of(rows, bytes.saturating_sub(before), &schema), error))
 }
 
@@ -289,7 +307,7 @@ impl Done {
     }
 }
 
-fn size_of(file: &mut std::fs::File) -> Result<u64, fewbits_record::Error> {
+fn size_of(file: &mut File) -> Result<u64, fewbits_record::Error> {
     let size = file.metadata().map(|data| data.len());
     size.map_err(|source| fewbits_record::Error::Io { action: "read", source })
 }

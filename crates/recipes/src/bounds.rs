@@ -48,11 +48,8 @@ impl<T> PerColumn<T> {
     /// If a value is refused by `parse_one`, a value without a name stands behind another one (as with a decimal comma), or a column has
     /// two values.
     pub fn parse<E: From<Error>>(text: &str, others: T, parse_one: impl Fn(&str) -> Result<T, E>) -> Result<Self, E> {
-        let mut found = Self {
-            named: Vec::new(),
-            others,
-        };
-        let (mut before, mut has_others) = (None::<String>, false);
+        // All parts are checked before a value is parsed: with a decimal comma the values are right, but not what was meant.
+        let (mut before, mut values) = (None::<String>, Vec::<(Option<String>, String)>::new());
         for Part { quoted, rest } in names::parts(text)? {
             let (name, value) = match &quoted {
                 // A quoted name is followed by its value.
@@ -70,18 +67,24 @@ impl<T> PerColumn<T> {
                 let (text, part) = (text.to_owned(), value.to_owned());
                 return Err(Error::Stray { text, part, decimal }.into());
             }
-            let is_for_others = name.is_none() || (quoted.is_none() && name == Some("*"));
-            let name = name.unwrap_or("*");
-            if (is_for_others && has_others) || (!is_for_others && found.named.iter().any(|(known, _)| known == name)) {
-                let (text, name) = (text.to_owned(), name.to_owned());
+            // `None` stands for all other columns.
+            let name = name.filter(|name| quoted.is_some() || *name != "*").map(str::to_owned);
+            if values.iter().any(|(known, _)| *known == name) {
+                let (text, name) = (text.to_owned(), name.unwrap_or_else(|| "*".to_owned()));
                 return Err(Error::Twice { text, name }.into());
             }
-            if is_for_others {
-                (found.others, has_others) = (parse_one(value)?, true);
-            } else {
-                found.named.push((name.to_owned(), parse_one(value)?));
-            }
+            values.push((name, value.to_owned()));
             before = Some(rest);
+        }
+        let mut found = Self {
+            named: Vec::new(),
+            others,
+        };
+        for (name, value) in values {
+            match name {
+                Some(name) => found.named.push((name, parse_one(&value)?)),
+                None => found.others = parse_one(&value)?,
+            }
         }
         Ok(found)
     }

@@ -6,6 +6,7 @@ mod design;
 mod fleet;
 mod language;
 mod live;
+mod many;
 mod node;
 mod outputs;
 mod pages;
@@ -387,17 +388,4 @@ fn serial_line_is_received() {
     let received = text(&receiver.wait_with_output().unwrap().stdout);
     // The noise is one frame with the first piece of the header, which comes again.
     assert_eq!(received.lines().count(), 1001);
-}
-
-#[test]
-fn completions_and_manual_are_generated() {
-    let (_kept, folder) = folder();
-    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        assert!(text(&good(&folder, &["generate", shell], b"")).contains("rows-per-block"));
-    }
-    assert!(text(&good(&folder, &["generate", "man"], b"")).starts_with(".ie"));
-    good(&folder, &["generate", "man", "--folder", "."], b"");
-    for page in ["fewbits.1", "fewbits-track.1", "fewbits-design.1", "fewbits-pack.1"] {
-        assert!(folder.join(page).is_file(), "{page}");
-    }
 }
