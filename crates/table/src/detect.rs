@@ -2,7 +2,7 @@
 
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
-use crate::lines::{Row, Split};
+use crate::lines::{MAX_ROW_LINES, Row, Split};
 use crate::{known, missing, number, time};
 use std::io::BufRead;
 
@@ -190,6 +190,8 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
     if let Some(skip) = dialect.skip {
         lines.drain(..lines.len().min(usize::try_from(skip).unwrap_or(usize::MAX)));
     }
+    let joined = joined(&lines);
+    let lines: Vec<(u64, &str)> = joined.iter().map(|(number, line)| (*number, line.as_str())).collect();
     let filled: Vec<&str> = lines
         .iter()
         .map(|(_, line)| *line)
@@ -223,6 +225,32 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
     }
     let lines_before = |number: u64| lines.iter().filter(|(line, _)| *line < number).count() as u64;
     layout(&rows, &comments, count, split, dialect, &lines_before)
+}
+
+/// Lines with those that follow within an open quote.
+fn joined(lines: &[(u64, &str)]) -> Vec<(u64, String)> {
+    let quotes = |line: &str| line.bytes().filter(|c| *c == b'"').count();
+    let (mut rows, mut at) = (Vec::new(), 0);
+    while at < lines.len() {
+        let (number, first) = lines[at];
+        let mut count = quotes(first);
+        let limit = lines.len().min(at + 1 + MAX_ROW_LINES);
+        let end = (at + 1..limit).find(|end| {
+            let is_closed = count % 2 == 0;
+            count += quotes(lines[*end].1);
+            is_closed
+        });
+        // A quote that never closes is a mark like others.
+        let end = if quotes(first) % 2 == 0 {
+            at + 1
+        } else {
+            end.or((count % 2 == 0).then_some(limit)).unwrap_or(at + 1)
+        };
+        let text: Vec<&str> = lines[at..end].iter().map(|(_, line)| *line).collect();
+        rows.push((number, text.join("\n")));
+        at = end;
+    }
+    rows
 }
 
 /// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.

@@ -28,6 +28,8 @@ pub struct Table {
     pub(crate) profiles: Vec<Profile>,
     /// Words of each column, by their indices, and the clocks of columns of times.
     pub(crate) words: Vec<Vec<String>>,
+    /// Whether no further words may come.
+    pub(crate) is_fixed: Vec<bool>,
     pub(crate) clocks: Vec<Option<Clock>>,
     pub(crate) selected: Vec<usize>,
     pub(crate) time: Option<(Vec<usize>, Clock)>,
