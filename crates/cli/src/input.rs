@@ -258,6 +258,16 @@ impl Table {
         }
     }
 
+    /// States the words of the columns of a recording, so that cells are the numbers that it has for them.
+    pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) {
+        let selected = self.table.selected().to_vec();
+        for (column, recorded) in selected.into_iter().zip(columns) {
+            if let Some(words) = crate::words::of(recorded.unit()) {
+                self.table.fix_words(column, words);
+            }
+        }
+    }
+
     /// Loads rows if all were given out. Returns whether there are any.
     fn fill(&mut self) -> Result<bool, Error> {
         if self.next < self.batch.rows {

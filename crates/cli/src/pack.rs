@@ -18,6 +18,9 @@ use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 
+/// Largest number of columns of a recording.
+const MAX_COLUMNS: usize = 4096;
+
 /// Summary of what was packed.
 #[derive(Serialize)]
 struct Done {
@@ -33,6 +36,13 @@ struct Done {
 /// be read once only (a pipe) is read once.
 pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Table, Schema), Error> {
     let mut open = Table::open(table)?;
+    if open.names.len() > MAX_COLUMNS {
+        let problem = format!(
+            "{} columns, and a recording has at most {MAX_COLUMNS}: pack some of them into each of several files with --columns",
+            open.names.len()
+        );
+        return Err(Error::content(open.file(), problem));
+    }
     let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
     for (i, spec) in specs.iter_mut().enumerate() {
         // Between two words there is nothing.
@@ -64,6 +74,7 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     let time = open.time_base(table, survey.as_ref())?;
     let schema = Schema::new(columns, time).and_then(|schema| schema.with_rows_per_block(options.rows_per_block));
     let schema = schema.map_err(Error::recording(open.file()))?;
+    open.use_words(&schema.columns().iter().collect::<Vec<_>>());
     if needs_range && is_regular(&table.file) {
         warn_of_few(table, &schema)?;
     }
@@ -201,7 +212,8 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     let schema = Playback::open(path).map_err(Error::recording(&file))?.schema().clone();
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {
-        let table = Table::open(&table_options)?;
+        let mut table = Table::open(&table_options)?;
+        table.use_words(&schema.columns().iter().collect::<Vec<_>>());
         if !schema.columns().iter().map(Column::name).eq(table.names.iter()) {
             let names = table.names.join(", ");
             let problem = format!("columns {names}: {file} has other columns, choose and order them with --columns");

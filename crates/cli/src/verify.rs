@@ -81,6 +81,8 @@ fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result
         return Err(Error::content(&file, problem));
     }
     table.choose(options.time_column.as_deref(), time, &columns, schema.time())?;
+    let recorded: Vec<&fewbits_record::Column> = matches.iter().map(|index| &schema.columns()[*index]).collect();
+    table.use_words(&recorded);
     Ok(matches)
 }
 

@@ -6,7 +6,11 @@ use crate::error::Error;
 use crate::time::{self, Clock, Order, Problem, Scale, Syntax, Unit};
 
 /// Names of a column that is taken as time, if no column has dates.
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 18] = [
+    "second",
+    "sec",
+    "zeitstempel",
+    "when",
     "time",
     "timestamp",
     "datetime",
@@ -180,7 +184,9 @@ fn written(cells: &[&str]) -> Result<Syntax, Result<Error, (usize, Problem)>> {
             .copied()
             .filter(|cell| time::detect(&[cell]).is_some())
             .collect();
-        (2 * good.len() > cells.len()).then(|| time::detect(&good)).flatten()
+        (2 * good.len() >= cells.len() && !good.is_empty())
+            .then(|| time::detect(&good))
+            .flatten()
     });
     match found {
         Some(Ok(syntax)) => Ok(syntax),

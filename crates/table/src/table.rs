@@ -28,6 +28,8 @@ pub struct Table {
     pub(crate) profiles: Vec<Profile>,
     /// Words of each column, by their indices, and the clocks of columns of times.
     pub(crate) words: Vec<Vec<String>>,
+    /// Whether no further words may come.
+    pub(crate) is_fixed: Vec<bool>,
     pub(crate) clocks: Vec<Option<Clock>>,
     pub(crate) selected: Vec<usize>,
     pub(crate) time: Option<(Vec<usize>, Clock)>,
@@ -77,6 +79,7 @@ impl Table {
             dialect,
             syntax,
             words: vec![Vec::new(); count],
+            is_fixed: vec![false; count],
             clocks: vec![None; count],
             selected: (0..count).collect(),
             time: None,
@@ -95,6 +98,9 @@ impl Table {
         }
         let kinds: Vec<Kind> = table.profiles.iter().map(Profile::kind).collect();
         table.set_kinds(&kinds);
+        let profiles = std::mem::take(&mut table.profiles);
+        table.set_words(&profiles);
+        table.profiles = profiles;
         table.set_said_time()?;
         Ok(table)
     }
@@ -155,6 +161,7 @@ impl Table {
 
     /// Uses what a [`survey`](Self::survey) of the same table found: the kinds of columns over all rows.
     pub fn use_survey(&mut self, survey: &Survey) {
+        self.set_words(&survey.columns);
         #[cfg(feature = "parquet")]
         if self.arrow.is_some() {
             self.set_arrow_kinds(&survey.columns);
@@ -162,6 +169,27 @@ impl Table {
         }
         let kinds: Vec<Kind> = survey.columns.iter().map(Profile::kind).collect();
         self.set_kinds(&kinds);
+    }
+
+    fn set_words(&mut self, profiles: &[Profile]) {
+        for (i, profile) in profiles.iter().enumerate().take(self.words.len()) {
+            if profile.kind() == Kind::Words {
+                self.words[i] = profile.all_words(&self.gaps[i]);
+            }
+        }
+    }
+
+    /// States the words of a column: its cells are indices into this list, and other words are refused.
+    pub fn fix_words(&mut self, column: usize, words: Vec<String>) {
+        if let (Some(known), Some(is_fixed), Some(kind)) = (
+            self.words.get_mut(column),
+            self.is_fixed.get_mut(column),
+            self.columns.get_mut(column).map(|column| &mut column.kind),
+        ) {
+            *known = words;
+            *is_fixed = true;
+            *kind = Kind::Words;
+        }
     }
 
     /// How the table is written, completed by what was detected.
@@ -514,6 +542,7 @@ impl Table {
                     strips: self.dialect.strip_units,
                     clock: self.clocks[*column].as_ref(),
                     kind: self.columns[*column].kind,
+                    is_fixed: self.is_fixed[*column],
                 },
                 &mut self.words[*column],
             );
@@ -652,6 +681,7 @@ pub(crate) struct Meaning<'a> {
     pub(crate) strips: bool,
     pub(crate) clock: Option<&'a Clock>,
     pub(crate) kind: Kind,
+    pub(crate) is_fixed: bool,
 }
 
 /// Adds a cell to the cells of its column.
@@ -687,6 +717,12 @@ pub(crate) fn push_cell(
                 return Ok(());
             }
             let known = words.iter().position(|word| word == text);
+            if known.is_none() && meaning.is_fixed {
+                return Err((
+                    "is none of the words of the column",
+                    "mend the cell, or leave the row out with --skip-bad",
+                ));
+            }
             if known.is_none() && (words.len() == MAX_WORDS || meaning.kind == Kind::Text) {
                 return Err(("is text, and the column has more than 256 texts", "leave the column out with --without"));
             }

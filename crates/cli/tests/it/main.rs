@@ -11,6 +11,7 @@ mod node;
 mod outputs;
 mod pages;
 mod streams;
+mod tables;
 mod track;
 
 use std::io::{BufRead, BufReader, Write};

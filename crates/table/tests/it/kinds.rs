@@ -99,8 +99,12 @@ fn words_booleans_and_whole_numbers() {
     let kinds: Vec<Kind> = table.columns().iter().map(|column| column.kind).collect();
     assert_eq!(kinds, [Kind::Number, Kind::Words, Kind::Boolean, Kind::Integer, Kind::Words]);
     let batch = rows(&mut table);
-    assert_eq!(batch.columns[0], Cells::Words(vec![Some(0), Some(1), None, Some(0)]));
-    assert_eq!(table.words(1), ["off", "heat"]);
+    // Words that the first lines have stand in the order of their letters.
+    assert_eq!(table.words(1), ["heat", "off"]);
+    assert_eq!(batch.columns[0], Cells::Words(vec![Some(1), Some(0), None, Some(1)]));
+    let mut fixed = open(text);
+    fixed.fix_words(1, vec!["cool".to_owned(), "off".to_owned()]);
+    assert!(refusal(&mut fixed).contains("`heat` is none of the words"));
     assert_eq!(batch.columns[1], Cells::Booleans(vec![Some(true), Some(false), Some(true), None]));
     assert_eq!(
         batch.columns[2],
@@ -131,6 +135,20 @@ fn numbers_that_no_double_holds_are_refused() {
     }
     let message = refusal(&mut open("time,x\n0,1.5\n1,9007199254740993.0\n2,2.5\n"));
     assert!(message.contains("53 bits"), "{message}");
+}
+
+#[test]
+fn numbers_of_another_spelling_are_no_words() {
+    for cells in [
+        ["1,721", "2,881"],
+        ["19.75 °C", "20 °C"],
+        ["40%", "41%"],
+        ["1'000.5", "2'000.5"],
+    ] {
+        let mut table = open(&format!("t;x\n0;{}\n1;{}\n", cells[0], cells[1]));
+        assert_eq!(table.columns()[1].kind, Kind::Number);
+        assert!(refusal(&mut table).contains("line 2 (row 1), column `x`"));
+    }
 }
 
 #[test]
