@@ -238,18 +238,6 @@ fn damaged_recording_is_read_around_the_damage() {
 }
 
 #[test]
-fn appended_rows_follow() {
-    let (_kept, folder) = folder();
-    let options = ["pack", "a.csv", "-o", "a.fewb", "--columns", "price,temp"];
-    good(&folder, &[&options[..], &["--bound", "*=±0.01"]].concat(), b"");
-    good(&folder, &[&options[..], &["--append"]].concat(), b"");
-    let unpacked = text(&good(&folder, &["unpack", "a.fewb"], b""));
-    assert_eq!(unpacked.lines().count(), 2001);
-    let message = refused(&folder, &["pack", "a.csv", "-o", "a.fewb", "--append"], b"");
-    assert!(message.contains("--columns"), "{message}");
-}
-
-#[test]
 fn refusals_name_file_row_column_and_mend() {
     let (_kept, folder) = folder();
     std::fs::write(folder.join("bad.csv"), "t,x\n1,2\n2,abc\n").unwrap();
