@@ -6,7 +6,11 @@ use crate::error::Error;
 use crate::time::{self, Clock, Order, Problem, Scale, Syntax, Unit};
 
 /// Names of a column that is taken as time, if no column has dates.
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 18] = [
+    "second",
+    "sec",
+    "zeitstempel",
+    "when",
     "time",
     "timestamp",
     "datetime",
@@ -35,7 +39,7 @@ fn is_time_name(name: &str) -> bool {
 }
 
 /// The columns that give the time by their kinds and names; `None` if none does for certain.
-pub(crate) fn guess(columns: &[Column], dialect: &Dialect) -> Option<Vec<usize>> {
+pub(crate) fn guess(columns: &[Column], dialect: &Dialect, is_certain: bool) -> Option<Vec<usize>> {
     let named = |name: &str| columns.iter().position(|column| column.own_name.to_lowercase() == name);
     if dialect.format.as_deref() == Some("EPW") {
         return Some((0..5).collect());
@@ -58,9 +62,13 @@ pub(crate) fn guess(columns: &[Column], dialect: &Dialect) -> Option<Vec<usize>>
         }
     }
     let exact = NAMES.iter().find_map(|name| named(name));
-    exact
-        .or_else(|| columns.iter().position(|column| is_time_name(&column.own_name)))
-        .map(|column| vec![column])
+    let like = || {
+        columns
+            .iter()
+            .position(|column| is_time_name(&column.own_name))
+            .filter(|_| !is_certain)
+    };
+    exact.or_else(like).map(|column| vec![column])
 }
 
 /// Meanings of columns of numbers that give a date together.
@@ -176,7 +184,9 @@ fn written(cells: &[&str]) -> Result<Syntax, Result<Error, (usize, Problem)>> {
             .copied()
             .filter(|cell| time::detect(&[cell]).is_some())
             .collect();
-        (2 * good.len() > cells.len()).then(|| time::detect(&good)).flatten()
+        (2 * good.len() >= cells.len() && !good.is_empty())
+            .then(|| time::detect(&good))
+            .flatten()
     });
     match found {
         Some(Ok(syntax)) => Ok(syntax),

@@ -230,6 +230,7 @@ impl Table {
                         strips: self.dialect.strip_units,
                         clock: self.clocks[*column].as_ref(),
                         kind: self.columns[*column].kind,
+                        is_fixed: self.is_fixed[*column],
                     };
                     push_cell(into, rows.text(*column).trim(), &meaning, &mut self.words[*column])
                 }

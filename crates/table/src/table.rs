@@ -28,6 +28,8 @@ pub struct Table {
     pub(crate) profiles: Vec<Profile>,
     /// Words of each column, by their indices, and the clocks of columns of times.
     pub(crate) words: Vec<Vec<String>>,
+    /// Whether no further words may come.
+    pub(crate) is_fixed: Vec<bool>,
     pub(crate) clocks: Vec<Option<Clock>>,
     pub(crate) selected: Vec<usize>,
     pub(crate) time: Option<(Vec<usize>, Clock)>,
@@ -77,6 +79,7 @@ impl Table {
             dialect,
             syntax,
             words: vec![Vec::new(); count],
+            is_fixed: vec![false; count],
             clocks: vec![None; count],
             selected: (0..count).collect(),
             time: None,
@@ -95,6 +98,9 @@ impl Table {
         }
         let kinds: Vec<Kind> = table.profiles.iter().map(Profile::kind).collect();
         table.set_kinds(&kinds);
+        let profiles = std::mem::take(&mut table.profiles);
+        table.set_words(&profiles);
+        table.profiles = profiles;
         table.set_said_time()?;
         Ok(table)
     }
@@ -155,6 +161,7 @@ impl Table {
 
     /// Uses what a [`survey`](Self::survey) of the same table found: the kinds of columns over all rows.
     pub fn use_survey(&mut self, survey: &Survey) {
+        self.set_words(&survey.columns);
         #[cfg(feature = "parquet")]
         if self.arrow.is_some() {
             self.set_arrow_kinds(&survey.columns);
@@ -162,6 +169,27 @@ impl Table {
         }
         let kinds: Vec<Kind> = survey.columns.iter().map(Profile::kind).collect();
         self.set_kinds(&kinds);
+    }
+
+    fn set_words(&mut self, profiles: &[Profile]) {
+        for (i, profile) in profiles.iter().enumerate().take(self.words.len()) {
+            if profile.kind() == Kind::Words {
+                self.words[i] = profile.all_words(&self.gaps[i]);
+            }
+        }
+    }
+
+    /// States the words of a column: its cells are indices into this list, and other words are refused.
+    pub fn fix_words(&mut self, column: usize, words: Vec<String>) {
+        if let (Some(known), Some(is_fixed), Some(kind)) = (
+            self.words.get_mut(column),
+            self.is_fixed.get_mut(column),
+            self.columns.get_mut(column).map(|column| &mut column.kind),
+        ) {
+            *known = words;
+            *is_fixed = true;
+            *kind = Kind::Words;
+        }
     }
 
     /// How the table is written, completed by what was detected.
@@ -244,7 +272,19 @@ impl Table {
     /// # Errors
     /// If the cells are no times, or may have the day or the month first.
     pub fn find_time(&mut self) -> Result<bool, Error> {
-        match clock::guess(&self.columns, &self.dialect) {
+        self.find(false)
+    }
+
+    /// As [`find_time`](Self::find_time), but a column of numbers is the time only if its whole name says so: `time`, not `idle_time`.
+    ///
+    /// # Errors
+    /// As [`find_time`](Self::find_time).
+    pub fn find_certain_time(&mut self) -> Result<bool, Error> {
+        self.find(true)
+    }
+
+    fn find(&mut self, is_certain: bool) -> Result<bool, Error> {
+        match clock::guess(&self.columns, &self.dialect, is_certain) {
             Some(columns) => self.set_time_columns(columns).map(|()| true),
             None => Ok(false),
         }
@@ -311,12 +351,20 @@ impl Table {
             .map(|(columns, clock)| (columns.as_slice(), clock.scale))
     }
 
-    /// Lets times be off a little: leap seconds become the next second, and decimals beyond the 18th are cut.
-    pub fn allow_inexact_times(&mut self) {
+    /// Lets times be off by so much: decimals beyond the 18th are cut if it is not 0, and a leap second becomes the next second if it is a
+    /// second or more.
+    pub fn allow_inexact_times(&mut self, nanoseconds: u64) {
         if let Some((_, clock)) = &mut self.time {
-            clock.takes_leap_seconds = true;
-            clock.cuts = true;
+            clock.takes_leap_seconds = nanoseconds >= 1_000_000_000;
+            clock.cuts = nanoseconds > 0;
         }
+    }
+
+    /// Whether the first lines have numbers in every selected column, and nothing else: then nothing is learned by a
+    /// [`survey`](Self::survey) of their kinds.
+    pub fn is_plain(&self) -> bool {
+        let mut selected = self.selected.iter();
+        selected.all(|i| self.columns[*i].kind == Kind::Number && self.profiles[*i].numbers > 0)
     }
 
     /// Keeps the text of a column for [`label`](Self::label), as the names of what rows report; it is then no column of values.
@@ -494,6 +542,7 @@ impl Table {
                     strips: self.dialect.strip_units,
                     clock: self.clocks[*column].as_ref(),
                     kind: self.columns[*column].kind,
+                    is_fixed: self.is_fixed[*column],
                 },
                 &mut self.words[*column],
             );
@@ -579,6 +628,16 @@ pub struct Survey {
     pub skipped: Skipped,
 }
 
+impl Survey {
+    /// The kind of a column over all rows; types that a file states are kept.
+    pub fn kind(&self, column: &Column, profile: &Profile) -> Kind {
+        match (column.kind, profile.kind()) {
+            (Kind::Time, Kind::Number) => Kind::Time,
+            (_, kind) => kind,
+        }
+    }
+}
+
 /// Counts over the times of rows.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
@@ -622,6 +681,7 @@ pub(crate) struct Meaning<'a> {
     pub(crate) strips: bool,
     pub(crate) clock: Option<&'a Clock>,
     pub(crate) kind: Kind,
+    pub(crate) is_fixed: bool,
 }
 
 /// Adds a cell to the cells of its column.
@@ -657,6 +717,12 @@ pub(crate) fn push_cell(
                 return Ok(());
             }
             let known = words.iter().position(|word| word == text);
+            if known.is_none() && meaning.is_fixed {
+                return Err((
+                    "is none of the words of the column",
+                    "mend the cell, or leave the row out with --skip-bad",
+                ));
+            }
             if known.is_none() && (words.len() == MAX_WORDS || meaning.kind == Kind::Text) {
                 return Err(("is text, and the column has more than 256 texts", "leave the column out with --without"));
             }

@@ -91,7 +91,7 @@ pub(crate) type Problem = (&'static str, &'static str);
 
 pub(crate) const NO_TIME: Problem = (
     "is not a time",
-    "say how times are written with --time-format, as '%d.%m.%Y %H:%M', or name another column with --time-column",
+    "say how times are written with --time-format, as '%d.%m.%Y %H:%M', or name another column with --time-column; leave single rows out with --skip-bad",
 );
 const LEAP: Problem = (
     "is a leap second, which exact times cannot keep",
@@ -137,12 +137,12 @@ impl Time {
 
     /// Seconds, rounded to a double.
     pub fn seconds(self) -> f64 {
-        self.0 as f64 / SECOND as f64
+        as_seconds(self.0)
     }
 
     /// Seconds from an earlier time to this, rounded once.
     pub fn seconds_since(self, earlier: Self) -> f64 {
-        (self.0 - earlier.0) as f64 / SECOND as f64
+        as_seconds(self.0 - earlier.0)
     }
 
     fn checked(whole: i64, attoseconds: i128) -> Self {
@@ -172,6 +172,11 @@ impl Time {
         let point = if fraction.is_empty() { "" } else { "." };
         format!("{sign}{whole}{point}{fraction}")
     }
+}
+
+/// Attoseconds as seconds: whole seconds are exact.
+fn as_seconds(attoseconds: i128) -> f64 {
+    attoseconds.div_euclid(SECOND) as f64 + attoseconds.rem_euclid(SECOND) as f64 / SECOND as f64
 }
 
 /// A plain number of units as attoseconds.

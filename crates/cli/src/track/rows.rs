@@ -53,7 +53,7 @@ impl Instants {
             time: options.table.time.clone(),
             ..table_options.clone()
         })?;
-        table.find_time();
+        table.find_time(2)?;
         if let Some(name) = &options.by {
             table = table.with_labels(name)?;
             if table.names.len() != 1 {

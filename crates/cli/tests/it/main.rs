@@ -6,10 +6,12 @@ mod design;
 mod fleet;
 mod language;
 mod live;
+mod many;
 mod node;
 mod outputs;
 mod pages;
 mod streams;
+mod tables;
 mod track;
 
 use std::io::{BufRead, BufReader, Write};
@@ -236,18 +238,6 @@ fn damaged_recording_is_read_around_the_damage() {
 }
 
 #[test]
-fn appended_rows_follow() {
-    let (_kept, folder) = folder();
-    let options = ["pack", "a.csv", "-o", "a.fewb", "--columns", "price,temp"];
-    good(&folder, &[&options[..], &["--bound", "*=±0.01"]].concat(), b"");
-    good(&folder, &[&options[..], &["--append"]].concat(), b"");
-    let unpacked = text(&good(&folder, &["unpack", "a.fewb"], b""));
-    assert_eq!(unpacked.lines().count(), 2001);
-    let message = refused(&folder, &["pack", "a.csv", "-o", "a.fewb", "--append"], b"");
-    assert!(message.contains("--columns"), "{message}");
-}
-
-#[test]
 fn refusals_name_file_row_column_and_mend() {
     let (_kept, folder) = folder();
     std::fs::write(folder.join("bad.csv"), "t,x\n1,2\n2,abc\n").unwrap();
@@ -399,17 +389,4 @@ fn serial_line_is_received() {
     good(&folder, &words, table().as_bytes());
     // The noise is one frame with the first piece of the header, which comes again.
     assert_eq!(first_lines(receiver, 1001).len(), 1001);
-}
-
-#[test]
-fn completions_and_manual_are_generated() {
-    let (_kept, folder) = folder();
-    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        assert!(text(&good(&folder, &["generate", shell], b"")).contains("rows-per-block"));
-    }
-    assert!(text(&good(&folder, &["generate", "man"], b"")).starts_with(".ie"));
-    good(&folder, &["generate", "man", "--folder", "."], b"");
-    for page in ["fewbits.1", "fewbits-track.1", "fewbits-design.1", "fewbits-pack.1"] {
-        assert!(folder.join(page).is_file(), "{page}");
-    }
 }
