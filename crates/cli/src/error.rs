@@ -61,16 +61,6 @@ pub(crate) enum Error {
         column: String,
         existing: String,
     },
-    /// A cell is not a number.
-    #[error("{file}: row {row}, column `{column}`: `{cell}` {problem}: {mend}")]
-    Cell {
-        file: String,
-        row: u64,
-        column: String,
-        cell: String,
-        problem: &'static str,
-        mend: &'static str,
-    },
     /// A table was refused by what reads it.
     #[error("{file}")]
     Refusal {
