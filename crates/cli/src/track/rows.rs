@@ -65,7 +65,11 @@ impl Instants {
         if table.names.is_empty() {
             return Err(Error::empty(table.file(), "columns of values"));
         }
+        table.require_numbers()?;
         let base = table.time_base(&table_options, None)?;
+        if table.is_at_end()? {
+            return Err(Error::empty(table.file(), "rows"));
+        }
         let tick = match base {
             TimeBase::Clock { decimals, .. } => 0.1_f64.powi(i32::from(decimals)),
             _ => 1.0,
