@@ -2,6 +2,7 @@
 
 use super::centre::{Estimator, Step, Use, centre};
 use super::report::{BAND, first_cell, first_name, summarise};
+use super::rhythm::Rhythm;
 use super::rows::{Instant, Instants};
 use super::settings::Settings;
 use crate::Ending;
@@ -263,7 +264,11 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         .chain(last);
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
-    while let Some(instant) = instants.next()? {
+    let mut rhythm = options.by.is_some().then(Rhythm::default);
+    while let Some(mut instant) = instants.next()? {
+        if let Some(rhythm) = &mut rhythm {
+            rhythm.fill(&mut instant);
+        }
         let step = run.step(&instant, &instants.names)?;
         if !options.reports {
             let values = instant

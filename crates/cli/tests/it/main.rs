@@ -7,6 +7,7 @@ mod fleet;
 mod node;
 mod pages;
 mod track;
+mod track_faults;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
