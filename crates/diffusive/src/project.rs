@@ -43,9 +43,9 @@ pub enum Form {
 impl Form {
     pub(crate) fn check(&self, rate: &RateModel) -> Result<(), Error> {
         match *self {
-            Self::Mixture(n) | Self::Particles(n) => check_components(n)?,
+            Self::Mixture(n) | Self::Particles(n) => at_least_one("components", n).map(|_| ())?,
             Self::Lpg { components, degree } => {
-                check_components(components)?;
+                at_least_one("components", components)?;
                 check_degree(degree)?;
             }
             Self::Raw | Self::Gaussian | Self::Laplace => {}
@@ -64,23 +64,10 @@ impl Form {
             Self::Raw => None,
             Self::Gaussian | Self::Laplace => Some(gaussian_scalars(carried)),
             Self::Mixture(n) => Some(n * (1 + gaussian_scalars(carried)) - 1),
-            // The coefficients include the norm of each component.
-            Self::Lpg { components, degree } => Some(components * lpg_scalars(degree, carried)),
-            // They travel as a mixture: weight, mean and covariance of each.
-            Self::Particles(n) => Some(n * (1 + gaussian_scalars(carried)) - 1),
+            Self::Lpg { components, degree } => Some(components * lpg_scalars(degree, carried) - 1),
+            Self::Particles(n) => Some(2 * n),
         }
     }
-}
-
-/// Largest number of components of a form: a message counts them in five bits.
-pub(crate) const MAX_COMPONENTS: usize = 31;
-
-fn check_components(count: usize) -> Result<(), Error> {
-    at_least_one("components", count)?;
-    if count > MAX_COMPONENTS {
-        return refuse("components", count, format!("at most {MAX_COMPONENTS}"));
-    }
-    Ok(())
 }
 
 /// Numbers of one Gaussian over the position, or over position and rate: its mean and the lower triangle of its Cholesky factor.

@@ -3,7 +3,7 @@
 use crate::message::{Contract, Packet};
 use crate::{Form, Outcome, Search, SourceSensor, Status};
 use fewbits_core::rand::Rng;
-use fewbits_core::{BitString, Message};
+use fewbits_core::{BitString, Message, NumberFormat};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::entries;
 use fewbits_protocol::{BoxError, Lead, Leader};
@@ -37,8 +37,7 @@ impl SourceChain {
         if search.form != Form::Raw {
             return Err(ArgumentError::new("form", format!("{:?}", search.form), "raw records"));
         }
-        // The node's own samples are not those of the code, so that every message with them would be refused.
-        if search.wire.samples.is_some() {
+        if search.wire.samples.is_some() && search.wire.numbers == NumberFormat::Double {
             return Err(ArgumentError::new("wire", "samples of a code", "plain samples"));
         }
         Ok(Self {

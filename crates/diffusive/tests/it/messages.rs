@@ -79,7 +79,7 @@ fn beliefs_arrive_as_they_were_sent() {
                 Form::Gaussian => assert_eq!(count, 9),
                 // Mean, covariance and polynomials, norm included: one component may be all there is.
                 Form::Lpg { .. } => {
-                    let own = form.scalars(&rate).unwrap();
+                    let own = form.scalars(&rate).unwrap() + 1;
                     assert!(count == own || 2 * count == own, "{count} {own}");
                 }
                 _ => {}

@@ -144,6 +144,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             shown: Vec::with_capacity(readings.len()),
         };
         let mut before: Vec<&Reading<'_, D>> = Vec::new();
+        // A report that is the only one was tested given the prediction alone.
+        let mut used = readings
+            .iter()
+            .zip(&*verdicts)
+            .filter(|(reading, verdict)| reading.content != Content::Nothing && verdict.fate == Fate::Used);
+        let is_only = used.next().is_some() && used.next().is_none();
         for (reading, verdict) in readings.iter().zip(verdicts) {
             let member = &self.members[reading.seat];
             let is_tested = self.health != Health::Off && reading.content == Content::Report;
@@ -156,7 +162,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 }
                 (Law::Moments(_), Content::Nothing, _) => Shown::Silence(member.silence(reading, predicted)?),
                 (Law::Points(_), _, Some(_)) if verdict.fate == Fate::Used => {
-                    let tested = is_tested.then(|| self.test_given(law, &before, reading));
+                    let tested = is_tested.then(|| match is_only {
+                        true => verdict.tested,
+                        false => self.test_given(law, &before, reading),
+                    });
                     before.push(reading);
                     Shown::Report(tested.and_then(|tested| tested.residual))
                 }
@@ -165,7 +174,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                     match known.condition(&mut found.given) {
                         Ok(one) if one.log_likelihood > f64::NEG_INFINITY && found.given.is_finite() => {
                             found.log_likelihood += one.log_likelihood;
-                            let residual = || member.judged(reading, &before, one).residual;
+                            let residual = || match is_only {
+                                true => verdict.tested.residual,
+                                false => member.judged(reading, &before, one).residual,
+                            };
                             Shown::Report(is_tested.then(residual).flatten())
                         }
                         failed => {

@@ -15,6 +15,7 @@ mod state_noise;
 mod stored;
 mod tangent;
 mod wild;
+mod words;
 
 use fewbits_core::Likelihood;
 use fewbits_filters::{PointMass, PointMassFilter, UniformGrid};
