@@ -170,7 +170,8 @@ impl<const D: usize> Evolution<D> for ContinuousLinear<D> {
         let norm = (0..D).map(|j| self.drift.column(j).abs().sum()).fold(0.0, f64::max) * seconds;
         finite("seconds", norm)?;
         let doublings = if norm > 0.5 {
-            (2.0 * norm).log2().ceil() as u32
+            // Not of `2 norm`, which may overflow.
+            (norm.log2() + 1.0).ceil() as u32
         } else {
             0
         };

@@ -13,6 +13,7 @@ mod pages;
 mod streams;
 mod tables;
 mod track;
+mod track_faults;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

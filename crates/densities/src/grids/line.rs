@@ -176,13 +176,15 @@ impl PointMass {
     /// Replaces the density: `fill` writes one value per node, up to a common factor; the result is normalised.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if all values are zero; the density is then uniform.
+    /// [`Error::Impossible`] if all values are zero. The density is then unchanged.
     pub fn refill(&mut self, fill: impl FnOnce(&mut [f64])) -> Result<(), Error> {
+        let before = self.density.clone();
         fill(&mut self.density);
-        normalise(&mut self.density, self.grid.spacing()).inspect_err(|_| {
-            let uniform = 1.0 / (self.grid.points() as f64 * self.grid.spacing());
-            self.density.fill(uniform);
-        })
+        let done = normalise(&mut self.density, self.grid.spacing());
+        if done.is_err() {
+            self.density = before;
+        }
+        done
     }
 }
 
