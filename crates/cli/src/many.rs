@@ -1,8 +1,8 @@
 //! Several files for one task: `pack`, `track` and `verify` of many tables, each with a file of its own in a folder.
 //!
 //! Files are worked on in parallel, each with one line of summary; one that fails does not stop the others. A manifest in the folder
-//! names the files that are done. After a kill the same command goes on with the others, and with the same options the folder has the
-//! same bytes as without the kill. `--shard 2/3` takes every third file, so that machines share the work.
+//! names the files that are done: after a kill the same command does the others, and what is done keeps its bytes. `--shard 2/3` takes
+//! every third file, so that machines share the work.
 
 use crate::Ending;
 use crate::arguments::{ManyOptions, PackOptions, Task, TrackOptions, VerifyOptions};
