@@ -37,6 +37,7 @@ mod say;
 mod send;
 mod sensor;
 mod serial;
+mod table_options;
 mod target;
 mod track;
 mod unpack;
@@ -72,10 +73,10 @@ fn run(mut task: Task) -> Result<Ending, Error> {
     files::prepare(&mut task)?;
     let are_several = many::are_several(&task);
     match task {
-        Task::Look(options) => look::run(&options),
         Task::Pack(options) if are_several => many::pack(&options),
         Task::Track(options) if are_several => many::track(&options),
         Task::Verify(options) if are_several => many::verify(&options),
+        Task::Look(options) => look::run(&options),
         Task::Plan(options) => plan::run(&options),
         Task::Pack(options) => pack::run(&options),
         Task::Unpack(options) => unpack::run(&options.whole()),

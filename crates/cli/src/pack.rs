@@ -142,8 +142,9 @@ impl<W: Write> RowSink for Recording<W> {
             None => self.recorder.push_next(cells),
         };
         pushed.map_err(Error::recording(&self.file))?;
+        // Behind a block at most this row waits.
         self.waiting = if self.recorder.bytes() > before {
-            0
+            1
         } else {
             self.waiting + 1
         };

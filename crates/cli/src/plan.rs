@@ -44,7 +44,7 @@ pub(crate) fn run(options: &PlanOptions) -> Result<Ending, Error> {
 /// Bits per sample against the bound, one line per column.
 fn picture(file: &str, plan: &Plan) -> Picture {
     let line = |(colour, column): (usize, &ColumnPlan)| Layer::Line {
-        points: column.bounds.iter().map(|bound| (bound.0.log10(), bound.2)).collect(),
+        points: column.bounds.iter().map(|bound| (bound.0, bound.2)).collect(),
         colour,
         name: format!("{} (lossless {:.1})", column.name, column.lossless_bits),
     };

@@ -5,7 +5,6 @@ use crate::{BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_numerics::binomial;
 use fewbits_numerics::error::{at_least_one, entries};
 use fewbits_numerics::quadrature::gauss_legendre;
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of outcomes that may be enumerated.
@@ -37,10 +36,30 @@ pub(crate) struct Exchangeable {
     pub count: usize,
 }
 
-stored! { Bank as StoredBank |bank| {
-    source: Source = bank.source,
-    sensors: Vec<PatternSensor> = (0..bank.sensors()).map(|n| bank.sensor(n).clone()).collect(),
-} => Bank::new(source, sensors), Error }
+/// The stored form of [`Bank`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredBank {
+    source: Source,
+    sensors: Vec<PatternSensor>,
+}
+
+impl From<Bank> for StoredBank {
+    fn from(bank: Bank) -> Self {
+        Self {
+            source: bank.source,
+            sensors: (0..bank.sensors()).map(|n| bank.sensor(n).clone()).collect(),
+        }
+    }
+}
+
+impl TryFrom<StoredBank> for Bank {
+    type Error = Error;
+
+    fn try_from(parts: StoredBank) -> Result<Self, Error> {
+        Bank::new(parts.source, parts.sensors)
+    }
+}
 
 impl Bank {
     /// The bank of these sensors. Bits are decoded in the same order.
@@ -145,7 +164,8 @@ impl Bank {
     }
 
     /// All thresholds, with the noise of their sensors.
-    pub(crate) fn thresholds(&self) -> Vec<Threshold> {
+    #[doc(hidden)]
+    pub fn thresholds(&self) -> Vec<Threshold> {
         let sensors = self.groups.iter().map(|g| &g.sensor);
         sensors
             .flat_map(|s| Threshold::of(s.quantizer().breakpoints(), s.noise_deviation()))
@@ -207,7 +227,8 @@ fn descend(tables: &[CountTable], levels: &mut [Vec<f64>], index: usize, visit: 
 }
 
 /// `rows[k][i] = C(m, k) P1(x_i)^k P0(x_i)^(m-k)`.
-pub(crate) struct CountTable {
+pub struct CountTable {
+    /// One row per count, one entry per node.
     pub rows: Vec<Vec<f64>>,
 }
 
@@ -215,6 +236,7 @@ pub(crate) struct CountTable {
 const LOG_COUNT: usize = 60;
 
 impl CountTable {
+    /// The table of `count` sensors whose bits have the probabilities `p` at the nodes.
     pub fn from_probabilities(p: &[[f64; 2]], count: usize) -> Self {
         // Row `k`: the probability that `k` of the sensors report 1.
         let log_choose = binomial::log_row(count);

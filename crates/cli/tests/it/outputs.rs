@@ -314,3 +314,15 @@ fn killed_append_leaves_the_recording_or_completes_it() {
         .count();
     assert_eq!(left, 0);
 }
+
+#[test]
+fn appended_rows_follow() {
+    let (_kept, folder) = folder();
+    let options = ["pack", "a.csv", "-o", "a.fewb", "--columns", "price,temp"];
+    good(&folder, &[&options[..], &["--bound", "*=±0.01"]].concat(), b"");
+    good(&folder, &[&options[..], &["--append"]].concat(), b"");
+    let unpacked = text(&good(&folder, &["unpack", "a.fewb"], b""));
+    assert_eq!(unpacked.lines().count(), 2001);
+    let message = refused(&folder, &["pack", "a.csv", "-o", "a.fewb", "--append"], b"");
+    assert!(message.contains("--columns"), "{message}");
+}
