@@ -216,7 +216,9 @@ impl Table {
                 self.table.set_time(&name).map_err(&failed)?;
             }
             let tick = 10_u64.pow(u32::from(clock::NANOSECONDS.saturating_sub(decimals)));
-            self.table.allow_inexact_times(tolerance.saturating_mul(tick));
+            // One tick was reserved for decimals beyond a tick.
+            let ticks = if tolerance == 0 { 0 } else { tolerance.saturating_add(1) };
+            self.table.allow_inexact_times(ticks.saturating_mul(tick));
         }
         let names: Vec<&String> = columns.iter().map(|i| &all[*i]).collect();
         self.table.select(&names).map_err(&failed)?;
