@@ -11,11 +11,13 @@ mod clock;
 mod design;
 mod design_options;
 mod error;
+mod fleet_options;
 mod generate;
 mod info;
 mod input;
 mod link;
 mod node;
+mod notes;
 mod numbers;
 mod output;
 mod pack;
@@ -24,6 +26,7 @@ mod parquet;
 mod place;
 mod plan;
 mod plot;
+mod private;
 mod report;
 mod sensor;
 mod serial;
@@ -63,10 +66,11 @@ fn main() -> ExitCode {
         Task::Bench(options) => bench::run(&options),
         Task::Track(options) => track::run(&options),
         Task::Design(options) => design::run(&options),
-        Task::Send(options) => link::send(&options),
-        Task::Receive(options) => link::receive(&options),
+        Task::Send(options) => link::send::run(&options),
+        Task::Receive(options) => link::receive::run(&options),
         Task::Generate(options) => generate::run(&options),
         Task::Centre(options) => centre::run(&options),
+        Task::Check(options) => centre::check(&options.configuration),
         Task::Sensor(options) => sensor::run(&options),
     };
     match done {

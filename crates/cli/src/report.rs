@@ -1,21 +1,25 @@
-//! Kinds of reports with their two halves, at sensor and centre, and reading of configuration files.
+//! Kinds of reports with their two halves, at sensor and centre.
 
-use crate::error::{Error, Failure};
+use crate::error::Failure;
 use fewbits_cfwmd::scheme::CovarianceFeedback;
 use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, OnAxes, SchemeNode, SensorNode};
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{RemoteSensor, Reporting};
 use fewbits_models::LinearSensor;
 use nalgebra::SVector;
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
-use std::path::Path;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 
-/// Kind of a sensor's reports. The files of sensor and centre must state the same.
+/// Kind of a sensor's reports: `bit`, `word:3`, `value` or `silent:1.5`, or as a table `{ kind = "word", bits = 3 }`. The files of sensor
+/// and centre must state the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Report(Kind);
+
 #[derive(Debug, Deserialize, Clone, Copy, PartialEq)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub(crate) enum Report {
+enum Kind {
     /// One bit: whether the sample is at or above the prediction.
+    #[serde(alias = "bit")]
     Sign,
     /// The cell of the innovation, in 2 to 4 bits.
     Word {
@@ -25,13 +29,48 @@ pub(crate) enum Report {
     /// Every sample, in double precision.
     Value,
     /// The sample if its innovation reaches `threshold` standard deviations, otherwise silence.
+    #[serde(alias = "silent")]
     Censored {
         /// Standard deviations.
         threshold: f64,
     },
 }
 
+impl<'de> Deserialize<'de> for Report {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match toml::Value::deserialize(deserializer)? {
+            toml::Value::String(word) => Self::of_word(&word).map_err(D::Error::custom),
+            table => table
+                .try_into()
+                .map(Self)
+                .map_err(|error| D::Error::custom(error.message())),
+        }
+    }
+}
+
 impl Report {
+    /// The words of `track --send`.
+    fn of_word(word: &str) -> Result<Self, String> {
+        let (name, number) = word
+            .split_once(':')
+            .map_or((word, None), |(name, number)| (name, Some(number)));
+        let kind = match (name, number) {
+            ("bit", None) => Some(Kind::Sign),
+            ("value", None) => Some(Kind::Value),
+            ("word", Some(bits)) => bits.parse().ok().map(|bits| Kind::Word { bits }),
+            ("silent", Some(threshold)) => threshold.parse().ok().map(|threshold| Kind::Censored { threshold }),
+            _ => None,
+        };
+        let expected = "`bit`, `word:2` to `word:4`, `value`, or `silent:1.5` (standard deviations)";
+        kind.map(Self)
+            .ok_or_else(|| format!("report is `{word}`: expected {expected}"))
+    }
+
+    /// Whether the sensor is told the covariance of the state.
+    pub(crate) fn needs_coordinates(self) -> bool {
+        matches!(self.0, Kind::Censored { .. })
+    }
+
     /// The centre's half of a sensor that reads coordinate `reads` of the state, with the variance of its noise.
     pub(crate) fn remote<const D: usize>(
         self,
@@ -40,12 +79,12 @@ impl Report {
         link: Link,
     ) -> Result<Box<dyn RemoteSensor<D>>, Failure> {
         let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(variance)?, [reads])?;
-        Ok(match self {
-            Self::Sign => {
+        Ok(match self.0 {
+            Kind::Sign => {
                 let ask = |_: &Gaussian<D>, m: &Gaussian<1>| m.mean()[0];
                 Box::new(Reporting::new(sensing, SignBit::new(variance)?, link, ask))
             }
-            Self::Word { bits } => {
+            Kind::Word { bits } => {
                 let ask = |_: &Gaussian<D>, m: &Gaussian<1>| Prediction {
                     mean: m.mean()[0],
                     deviation: m.covariance()[0].sqrt(),
@@ -53,8 +92,8 @@ impl Report {
                 let scheme = InnovationWord::new(variance, bits as usize)?;
                 Box::new(Reporting::new(sensing, scheme, link, ask))
             }
-            Self::Value => Box::new(Reporting::values(sensing, FullValue::new(variance)?, link)),
-            Self::Censored { threshold } => {
+            Kind::Value => Box::new(Reporting::values(sensing, FullValue::new(variance)?, link)),
+            Kind::Censored { threshold } => {
                 let ask = |state: &Gaussian<D>, _: &Gaussian<1>| *state;
                 let scheme = censored::<D>(reads, variance, threshold)?;
                 Box::new(Reporting::new(coordinate::<D>(reads, variance)?, scheme, link, ask))
@@ -64,11 +103,11 @@ impl Report {
 
     /// The sensor's half. Only that of censored reports uses `D` and `reads`, because it is told the covariance of the state.
     pub(crate) fn node<const D: usize>(self, reads: usize, variance: f64) -> Result<Box<dyn SensorNode<1>>, Failure> {
-        Ok(match self {
-            Self::Sign => Box::new(SchemeNode::new(SignBit::new(variance)?)),
-            Self::Word { bits } => Box::new(SchemeNode::new(InnovationWord::new(variance, bits as usize)?)),
-            Self::Value => Box::new(SchemeNode::new(FullValue::new(variance)?)),
-            Self::Censored { threshold } => Box::new(SchemeNode::new(censored::<D>(reads, variance, threshold)?)),
+        Ok(match self.0 {
+            Kind::Sign => Box::new(SchemeNode::new(SignBit::new(variance)?)),
+            Kind::Word { bits } => Box::new(SchemeNode::new(InnovationWord::new(variance, bits as usize)?)),
+            Kind::Value => Box::new(SchemeNode::new(FullValue::new(variance)?)),
+            Kind::Censored { threshold } => Box::new(SchemeNode::new(censored::<D>(reads, variance, threshold)?)),
         })
     }
 }
@@ -90,17 +129,4 @@ fn censored<const D: usize>(
 ) -> Result<CovarianceFeedback<LinearSensor<D, 1>, D, 1>, Failure> {
     let sensing = coordinate::<D>(reads, variance)?;
     Ok(CovarianceFeedback::new(sensing, threshold, NumberFormat::Double)?)
-}
-
-/// Reads a TOML file.
-pub(crate) fn configuration<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(Error::io(&name, "read"))?;
-    toml::from_str(&text).map_err(configured(path))
-}
-
-/// An error of a value in a configuration file.
-pub(crate) fn configured<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Error + use<E> {
-    let file = path.display().to_string();
-    move |error| Error::content(&file, error)
 }

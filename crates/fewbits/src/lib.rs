@@ -19,7 +19,7 @@
 //! | `pf_mpa` | `pf-mpa` | tracking from quantized ranges |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `record` | `record` | files and frames of many columns within guaranteed errors |
-//! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh`, `link-live` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh, with a page |
+//! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh |
 //! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
 //! | `network`, `protocol` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
