@@ -1,7 +1,7 @@
 //! Addresses in the configuration files of centres and sensors.
 
 #[cfg(feature = "mqtt")]
-use fewbits_link::mqtt::rumqttc::MqttOptions;
+use fewbits_link::mqtt::rumqttc::v5::MqttOptions;
 #[cfg(feature = "zenoh")]
 use fewbits_link::zenoh::zenoh::{Config, Session, Wait};
 

@@ -13,13 +13,8 @@ use serde::{Deserialize, Deserializer};
 /// Kind of a sensor's reports: `bit`, `word:3`, `value` or `silent:1.5`, or as a table `{ kind = "word", bits = 3 }`. The files of sensor
 /// and centre must state the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Report(Kind);
-
-#[derive(Debug, Deserialize, Clone, Copy, PartialEq)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-enum Kind {
+pub(crate) enum Report {
     /// One bit: whether the sample is at or above the prediction.
-    #[serde(alias = "bit")]
     Sign,
     /// The cell of the innovation, in 2 to 4 bits.
     Word {
@@ -29,9 +24,25 @@ enum Kind {
     /// Every sample, in double precision.
     Value,
     /// The sample if its innovation reaches `threshold` standard deviations, otherwise silence.
-    #[serde(alias = "silent")]
     Censored {
         /// Standard deviations.
+        threshold: f64,
+    },
+}
+
+/// The form of a table.
+#[derive(Deserialize)]
+#[expect(dead_code, reason = "only serde reads by it")]
+#[serde(remote = "Report", tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+enum Table {
+    #[serde(alias = "bit")]
+    Sign,
+    Word {
+        bits: u32,
+    },
+    Value,
+    #[serde(alias = "silent")]
+    Censored {
         threshold: f64,
     },
 }
@@ -40,10 +51,7 @@ impl<'de> Deserialize<'de> for Report {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         match toml::Value::deserialize(deserializer)? {
             toml::Value::String(word) => Self::of_word(&word).map_err(D::Error::custom),
-            table => table
-                .try_into()
-                .map(Self)
-                .map_err(|error| D::Error::custom(error.message())),
+            table => table.try_into().map_err(|error| D::Error::custom(error.message())),
         }
     }
 }
@@ -55,20 +63,19 @@ impl Report {
             .split_once(':')
             .map_or((word, None), |(name, number)| (name, Some(number)));
         let kind = match (name, number) {
-            ("bit", None) => Some(Kind::Sign),
-            ("value", None) => Some(Kind::Value),
-            ("word", Some(bits)) => bits.parse().ok().map(|bits| Kind::Word { bits }),
-            ("silent", Some(threshold)) => threshold.parse().ok().map(|threshold| Kind::Censored { threshold }),
+            ("bit", None) => Some(Self::Sign),
+            ("value", None) => Some(Self::Value),
+            ("word", Some(bits)) => bits.parse().ok().map(|bits| Self::Word { bits }),
+            ("silent", Some(threshold)) => threshold.parse().ok().map(|threshold| Self::Censored { threshold }),
             _ => None,
         };
         let expected = "`bit`, `word:2` to `word:4`, `value`, or `silent:1.5` (standard deviations)";
-        kind.map(Self)
-            .ok_or_else(|| format!("report is `{word}`: expected {expected}"))
+        kind.ok_or_else(|| format!("report is `{word}`: expected {expected}"))
     }
 
     /// Whether the sensor is told the covariance of the state.
     pub(crate) fn needs_coordinates(self) -> bool {
-        matches!(self.0, Kind::Censored { .. })
+        matches!(self, Self::Censored { .. })
     }
 
     /// The centre's half of a sensor that reads coordinate `reads` of the state, with the variance of its noise.
@@ -79,12 +86,12 @@ impl Report {
         link: Link,
     ) -> Result<Box<dyn RemoteSensor<D>>, Failure> {
         let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(variance)?, [reads])?;
-        Ok(match self.0 {
-            Kind::Sign => {
+        Ok(match self {
+            Self::Sign => {
                 let ask = |_: &Gaussian<D>, m: &Gaussian<1>| m.mean()[0];
                 Box::new(Reporting::new(sensing, SignBit::new(variance)?, link, ask))
             }
-            Kind::Word { bits } => {
+            Self::Word { bits } => {
                 let ask = |_: &Gaussian<D>, m: &Gaussian<1>| Prediction {
                     mean: m.mean()[0],
                     deviation: m.covariance()[0].sqrt(),
@@ -92,8 +99,8 @@ impl Report {
                 let scheme = InnovationWord::new(variance, bits as usize)?;
                 Box::new(Reporting::new(sensing, scheme, link, ask))
             }
-            Kind::Value => Box::new(Reporting::values(sensing, FullValue::new(variance)?, link)),
-            Kind::Censored { threshold } => {
+            Self::Value => Box::new(Reporting::values(sensing, FullValue::new(variance)?, link)),
+            Self::Censored { threshold } => {
                 let ask = |state: &Gaussian<D>, _: &Gaussian<1>| *state;
                 let scheme = censored::<D>(reads, variance, threshold)?;
                 Box::new(Reporting::new(coordinate::<D>(reads, variance)?, scheme, link, ask))
@@ -103,11 +110,11 @@ impl Report {
 
     /// The sensor's half. Only that of censored reports uses `D` and `reads`, because it is told the covariance of the state.
     pub(crate) fn node<const D: usize>(self, reads: usize, variance: f64) -> Result<Box<dyn SensorNode<1>>, Failure> {
-        Ok(match self.0 {
-            Kind::Sign => Box::new(SchemeNode::new(SignBit::new(variance)?)),
-            Kind::Word { bits } => Box::new(SchemeNode::new(InnovationWord::new(variance, bits as usize)?)),
-            Kind::Value => Box::new(SchemeNode::new(FullValue::new(variance)?)),
-            Kind::Censored { threshold } => Box::new(SchemeNode::new(censored::<D>(reads, variance, threshold)?)),
+        Ok(match self {
+            Self::Sign => Box::new(SchemeNode::new(SignBit::new(variance)?)),
+            Self::Word { bits } => Box::new(SchemeNode::new(InnovationWord::new(variance, bits as usize)?)),
+            Self::Value => Box::new(SchemeNode::new(FullValue::new(variance)?)),
+            Self::Censored { threshold } => Box::new(SchemeNode::new(censored::<D>(reads, variance, threshold)?)),
         })
     }
 }

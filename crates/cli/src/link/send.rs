@@ -142,9 +142,10 @@ pub(crate) fn run(options: &SendOptions) -> Result<Ending, Error> {
         next = tick.wrapping_add(1);
         let before = writer.waiting();
         let frames = writer.push(tick, &row.1).map_err(&failed)?;
+        let is_first = before == 0 || !frames.is_empty();
         sink.send(&writer, frames)?;
         // Behind a frame only the last rows are left, and their time is counted from here.
-        if before == 0 || !frames.is_empty() {
+        if is_first {
             oldest = (writer.waiting() > 0).then(Instant::now);
         }
     }

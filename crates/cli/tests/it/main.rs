@@ -4,6 +4,7 @@
 
 mod design;
 mod fleet;
+mod links;
 mod node;
 mod pages;
 mod track;
