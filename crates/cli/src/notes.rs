@@ -1,5 +1,6 @@
 //! Notes on standard error at a limited rate: what happens in each slot is said once a minute, with how often it happened.
 
+use crate::say::say;
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
@@ -16,7 +17,7 @@ impl Limiter {
     /// Says the note, unless one of this kind was said within the last minute. Then the next one says how many there were.
     pub(crate) fn say(&mut self, kind: &str, note: &str) {
         if let Some(text) = self.text(kind, note, Instant::now()) {
-            eprintln!("{text}");
+            say!("{text}");
         }
     }
 

@@ -7,6 +7,7 @@ use crate::notes::Limiter;
 use crate::place::Place;
 use crate::private::{configuration, configured};
 use crate::report::Report;
+use crate::say::say;
 use fewbits_core::{BitString, SensorNode};
 use fewbits_link::{Key, Program, SensorLink, Store, Udp, run_sensor};
 use fewbits_monte_carlo::Stream;
@@ -64,7 +65,7 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
         return Err(configured(file)(format!("deviation is {}: expected above 0", given.deviation)));
     }
     if given.state.is_none() {
-        eprintln!(
+        say!(
             "note: no `state`: when this sensor starts again, its centre refuses it until it has a new key, and it accepts old \
              questions"
         );
@@ -203,6 +204,6 @@ impl Program for Samples {
             (0, old, _) => format!("{old} frames came that were used before: has the centre lost its state?"),
             (forged, ..) => format!("{forged} frames under another key were refused: do both ends have the same?"),
         };
-        eprintln!("no answer from {} for {seconds} s: {reason}", self.centre);
+        say!("no answer from {} for {seconds} s: {reason}", self.centre);
     }
 }

@@ -3,6 +3,7 @@
 use super::configuration::Configuration;
 use crate::Ending;
 use crate::error::Error;
+use crate::say::say;
 use fewbits_link::{FleetKey, write_private};
 use std::io::Read;
 use std::path::Path;
@@ -70,7 +71,7 @@ pub(super) fn run(file: &Path, sensors: u32) -> Result<Ending, Error> {
     }
     for (path, text) in &files {
         write_private(path, text)?;
-        eprintln!("{} written", path.display());
+        say!("{} written", path.display());
     }
     Ok(Ending::Good)
 }
@@ -87,10 +88,10 @@ pub(super) fn print_sensor(file: &Path, given: &Configuration, number: u32) -> R
     // The version is not kept: the key whose fingerprint is that of the configuration is the one.
     for version in 1..=u32::from(u16::MAX) {
         if fleet.key_of(number, version)?.fingerprint() == like.key.fingerprint() {
-            print!(
-                "{}",
-                sensor(number, &fleet.hex_of(number, version)?, &crate::place::shown(&given.listen), Some(like))
-            );
+            crate::output::text(
+                None,
+                &sensor(number, &fleet.hex_of(number, version)?, &crate::place::shown(&given.listen), Some(like)),
+            )?;
             return Ok(Ending::Good);
         }
     }

@@ -3,6 +3,7 @@
 use crate::Ending;
 use crate::error::Error;
 use crate::notes::Limiter;
+use crate::say::say;
 use fewbits_core::Observation;
 use fewbits_link::{Counts, Output, Station};
 use fewbits_protocol::{Note, Receiver};
@@ -76,12 +77,12 @@ impl Log {
                 }
                 if self.slots == SILENT_SLOTS && self.reports == 0 {
                     self.silence_said = true;
-                    eprintln!(
+                    say!(
                         "no report in the first {SILENT_SLOTS} slots: do the sensors run, and is this their centre's address?"
                     );
                 }
                 if self.reports > 0 && std::mem::take(&mut self.silence_said) {
-                    eprintln!("slot {}: the first report has come", step.slot);
+                    say!("slot {}: the first report has come", step.slot);
                 }
             }
             Output::Passed { slot, reason } => {
@@ -90,7 +91,7 @@ impl Log {
             }
             Output::ClockBehind { wait } => {
                 let seconds = *wait as f64 / 1e9;
-                eprintln!(
+                say!(
                     "no slot begins for {seconds:.0} s: the clock is behind the last slot, so it was ahead or is not set; set it, or start \
                      anew with --new-start"
                 );
@@ -133,7 +134,7 @@ impl Log {
                 (counts.replayed - before.replayed, "that were used before"),
             ] {
                 if more > 0 {
-                    eprintln!("sensor {number}: {more} frames {what} were refused");
+                    say!("sensor {number}: {more} frames {what} were refused");
                 }
             }
         }
@@ -143,7 +144,7 @@ impl Log {
             (all.short - before.short, "that are no frames"),
         ] {
             if more > 0 {
-                eprintln!("{more} frames {what} were refused");
+                say!("{more} frames {what} were refused");
             }
         }
     }
@@ -172,18 +173,18 @@ impl Log {
                 "silent_sensors": missing,
                 "envelopes": counts,
             });
-            eprintln!("{summary}");
+            say!("{summary}");
         } else {
             let Self {
                 slots, reports, passed, ..
             } = &self;
             let (heard, all, refused) = (self.heard.len(), self.numbers.len(), counts.refused());
-            eprintln!(
+            say!(
                 "{slots} slots, {passed} passed; {reports} reports of {heard} of {all} sensors; {refused} frames refused"
             );
             if !missing.is_empty() && self.reports > 0 {
                 let named: Vec<String> = missing.iter().take(20).map(u32::to_string).collect();
-                eprintln!("no report of sensors {}{}", named.join(", "), if missing.len() > 20 { ", ..." } else { "" });
+                say!("no report of sensors {}{}", named.join(", "), if missing.len() > 20 { ", ..." } else { "" });
             }
         }
         let nothing = self.reports == 0 && (self.slots >= SILENT_SLOTS || counts.refused() > 0);

@@ -10,6 +10,7 @@ use crate::arguments::CentreOptions;
 use crate::error::{Error, Failure};
 use crate::place::Place;
 use crate::private::configured;
+use crate::say::say;
 use configuration::{Configuration, Faults, Model, Sensor};
 use fewbits_core::{Gaussian, Link};
 use fewbits_filters::MomentFilter;
@@ -70,7 +71,11 @@ pub(crate) fn check(file: &Path) -> Result<Ending, Error> {
         #[cfg(any(feature = "mqtt", feature = "zenoh"))]
         _ => Ending::Good,
     };
-    println!("{}: no fault; {} sensors, slots of {} s", file.display(), given.sensors.len(), given.period);
+    let (name, sensors, period) = (file.display(), given.sensors.len(), given.period);
+    crate::output::print(&format!(
+        "{name}: no fault; {sensors} sensors, slots of {period} s
+"
+    ))?;
     Ok(Ending::Good)
 }
 
@@ -147,7 +152,7 @@ fn with<const D: usize, T: Transport>(
     });
     let receiver = FusionReceiver::new(centre, given.period, stream);
     if store.is_none() {
-        eprintln!("note: no `state`: frames that were accepted before this start cannot be refused as replays");
+        say!("note: no `state`: frames that were accepted before this start cannot be refused as replays");
     }
     let start = match options.new_start {
         true => Start::Anew,
@@ -181,7 +186,7 @@ fn serve<R: Receiver, T: Transport>(
     let page = match options.live {
         Some(address) => {
             let page = fewbits_link::LivePage::serve(address, numbers, given.period)?;
-            eprintln!("page at http://{}/", page.address());
+            say!("page at http://{}/", page.address());
             Some(page)
         }
         None => None,

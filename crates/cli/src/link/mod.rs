@@ -1,5 +1,4 @@
-//! Rows as frames over links, and back.
+//! Frames of links to rows.
 
 pub(crate) mod receive;
-pub(crate) mod send;
 mod tables;

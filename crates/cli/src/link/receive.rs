@@ -4,11 +4,10 @@ use super::tables::{Senders, Tables};
 use crate::arguments::ReceiveOptions;
 use crate::error::Error;
 use crate::output::{Shape, Writer};
+use crate::say::say;
 use crate::unpack::{all_columns, write_blocks};
-use crate::{Ending, node, serial};
+use crate::{Ending, node, recording, serial};
 use fewbits_record::BlockReader;
-use std::fs::File;
-use std::io::Read;
 use std::net::UdpSocket;
 
 /// Largest length of a datagram in bytes.
@@ -30,23 +29,15 @@ pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
             }
         }
         (None, None, Some(config)) => {
-            let (source, name) = open(&options.file)?;
+            let (source, name) = recording::stream(&options.file)?;
             node::receive(options, config, &mut serial::Frames::of_stream(source), name)
         }
         (None, None, None) => receive_stream(options),
     }
 }
 
-/// Opens a file or standard input. Returns its name for messages too.
-fn open(file: &str) -> Result<(Box<dyn Read + Send>, &str), Error> {
-    Ok(match file {
-        "-" => (Box::new(std::io::stdin()), "standard input"),
-        file => (Box::new(File::open(file).map_err(Error::io(file, "open"))?), file),
-    })
-}
-
 fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
-    let (source, name) = open(&options.file)?;
+    let (source, name) = recording::stream(&options.file)?;
     let blocks = BlockReader::new(source).map_err(Error::recording(name))?;
     let (columns, names) = all_columns(blocks.schema());
     let mut writer = Writer::new(options.output.as_deref(), Shape::Csv, blocks.schema(), &names)?;
@@ -67,7 +58,7 @@ fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, 
         .set_read_timeout(options.timeout)
         .map_err(Error::io(address, "set the timeout"))?;
     if let Ok(local) = socket.local_addr() {
-        eprintln!("listening at {local}");
+        say!("listening at {local}");
     }
     let mut datagram = vec![0; MAX_DATAGRAM];
     receive_frames(options, address, Senders::Any, || match socket.recv(&mut datagram) {

@@ -3,6 +3,7 @@
 use crate::Ending;
 use crate::error::Error;
 use crate::output::{Shape, Writer};
+use crate::say::say;
 use crate::unpack::{all_columns, write_blocks};
 use fewbits_record::{Block, FrameReader, Schema};
 use std::path::{Path, PathBuf};
@@ -110,7 +111,7 @@ impl<'a> Tables<'a> {
                 .checked_sub(1)
                 .filter(|last| is_same(&self.sheets[*last]))
         {
-            eprintln!("note: {address}: the sender has started anew: its rows go on in the same table");
+            say!("note: {address}: the sender has started anew: its rows go on in the same table");
             return Ok(Some(last));
         }
         let path = match (self.sheets.len(), self.output) {
@@ -118,7 +119,7 @@ impl<'a> Tables<'a> {
             (number, Some(output)) => Some(numbered(output, number + 1)),
             (_, None) => {
                 let mend = "its rows are refused; with --output each table has a file of its own";
-                eprintln!("warning: {address}: another table begins: {mend}");
+                say!("warning: {address}: another table begins: {mend}");
                 return Ok(None);
             }
         };
@@ -126,7 +127,7 @@ impl<'a> Tables<'a> {
             return Ok(None);
         }
         if let (Some(path), true) = (&path, !self.sheets.is_empty()) {
-            eprintln!("note: {address}: another table begins: {}", path.display());
+            say!("note: {address}: another table begins: {}", path.display());
         }
         let (columns, names) = all_columns(&schema);
         let writer = Writer::new(path.as_deref(), Shape::Csv, &schema, &names)?;
@@ -153,7 +154,7 @@ impl<'a> Tables<'a> {
     fn report(&mut self, reason: &str) {
         if self.reported.is_none_or(|last| last.elapsed() >= REPORT_EVERY) {
             self.reported = Some(Instant::now());
-            eprintln!("warning: {}: a frame was not used: {reason}", self.address);
+            say!("warning: {}: a frame was not used: {reason}", self.address);
         }
     }
 
@@ -166,7 +167,7 @@ impl<'a> Tables<'a> {
         if self.tables.is_empty() {
             if let Some((some, all)) = self.collecting.pieces() {
                 let frames = self.collecting.waiting();
-                eprintln!("error: {address}: {some} of {all} pieces of the header came, and {frames} frames of rows");
+                say!("error: {address}: {some} of {all} pieces of the header came, and {frames} frames of rows");
             }
             return Ok(Ending::no_frame(address));
         }
@@ -174,17 +175,17 @@ impl<'a> Tables<'a> {
         let (received, missing, repeated) =
             (sum(FrameReader::received), sum(FrameReader::missing), sum(FrameReader::repeated));
         if missing > 0 {
-            eprintln!(
+            say!(
                 "warning: {address}: {missing} of {} frames did not arrive: their rows are missing",
                 received + missing
             );
         }
         if repeated > 0 {
-            eprintln!("note: {address}: {repeated} frames came again and were used once");
+            say!("note: {address}: {repeated} frames came again and were used once");
         }
         let unused = self.refused + self.collecting.waiting() as u64;
         if unused > 0 {
-            eprintln!("warning: {address}: {unused} frames were damaged or of another table and not used");
+            say!("warning: {address}: {unused} frames were damaged or of another table and not used");
         }
         let has_refused_table = self.tables.iter().any(|table| table.writer.is_none());
         Ok(match missing > 0 || has_refused_table {

@@ -87,7 +87,9 @@ fn idle_connections_end_nothing_and_make_room() {
     let page = page();
     let folder = tempfile::tempdir().unwrap();
     let store = fewbits_link::Store::new(folder.path().join("state"));
-    let idle: Vec<_> = (0..200).filter_map(|_| TcpStream::connect(page.address()).ok()).collect();
+    let idle: Vec<_> = (0..200)
+        .filter_map(|_| TcpStream::connect(page.address()).ok())
+        .collect();
     assert!(idle.len() > 64);
     // The centre goes on: it stores and shows.
     store.save(&1).unwrap();
@@ -111,7 +113,10 @@ fn idle_connections_end_nothing_and_make_room() {
 #[test]
 fn other_requests_are_refused() {
     let page = page();
-    for (request, answer) in [("GET /other HTTP/1.1", "HTTP/1.1 404"), ("POST / HTTP/1.1", "HTTP/1.1 405")] {
+    for (request, answer) in [
+        ("GET /other HTTP/1.1", "HTTP/1.1 404"),
+        ("POST / HTTP/1.1", "HTTP/1.1 405"),
+    ] {
         let mut stream = TcpStream::connect(page.address()).unwrap();
         write!(stream, "{request}\r\n\r\n").unwrap();
         let mut text = String::new();
