@@ -51,7 +51,7 @@ impl<'de> Deserialize<'de> for Report {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         match toml::Value::deserialize(deserializer)? {
             toml::Value::String(word) => Self::of_word(&word).map_err(D::Error::custom),
-            table => table.try_into().map_err(|error| D::Error::custom(error.message())),
+            table => Table::deserialize(table).map_err(|error| D::Error::custom(error.message())),
         }
     }
 }
