@@ -32,7 +32,6 @@ pub(crate) enum Report {
 
 /// The form of a table.
 #[derive(Deserialize)]
-#[expect(dead_code, reason = "only serde reads by it")]
 #[serde(remote = "Report", tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 enum Table {
     #[serde(alias = "bit")]
