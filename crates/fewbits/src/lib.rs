@@ -21,7 +21,7 @@
 //! | `record` | `record` | files and frames of many columns within guaranteed errors |
 //! | `table` | `table` | tables of strangers: dialects, times, gaps and kinds of columns |
 //! | `recipes` | `recipes` | what a person does with a table: bounds, plan, pack, verify, as functions |
-//! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh`, `link-live` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh, with a page |
+//! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh |
 //! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
 //! | `network`, `protocol` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |

@@ -1,19 +1,20 @@
-//! `fewbits receive`: frames over a stream, UDP or a serial line to rows.
+//! `fewbits receive`: the rows of frames from a stream, UDP or a serial line.
 
+use super::tables::{Senders, Tables};
 use crate::arguments::ReceiveOptions;
 use crate::error::Error;
 use crate::output::{Shape, Writer};
 use crate::say::say;
 use crate::unpack::{all_columns, write_blocks};
 use crate::{Ending, node, recording, serial};
-use fewbits_record::{BlockReader, FrameReader};
+use fewbits_record::BlockReader;
 use std::net::UdpSocket;
 
 /// Largest length of a datagram in bytes.
 const MAX_DATAGRAM: usize = 1 << 16;
 
 /// Runs `receive`.
-pub(crate) fn receive(options: &ReceiveOptions) -> Result<Ending, Error> {
+pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
     let sensor = options.sensor.as_deref();
     let sensor = sensor
         .map(|bound| node::config(bound, options.sequence_bits))
@@ -24,7 +25,7 @@ pub(crate) fn receive(options: &ReceiveOptions) -> Result<Ending, Error> {
             let mut frames = serial::Frames::of_line(serial::open(device, options.baud)?, options.timeout);
             match sensor {
                 Some(config) => node::receive(options, config, &mut frames, device),
-                None => receive_frames(options, device, || frames.next()),
+                None => receive_frames(options, device, Senders::One, || frames.next()),
             }
         }
         (None, None, Some(config)) => {
@@ -60,39 +61,27 @@ fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, 
         say!("listening at {local}");
     }
     let mut datagram = vec![0; MAX_DATAGRAM];
-    receive_frames(options, address, || match socket.recv(&mut datagram) {
+    receive_frames(options, address, Senders::Any, || match socket.recv(&mut datagram) {
         Ok(length) => Ok(Some(datagram[..length].to_vec())),
         Err(error) if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => Ok(None),
+        // An answer to nothing that was sent here.
+        Err(error) if error.kind() == std::io::ErrorKind::ConnectionReset => Ok(Some(Vec::new())),
         Err(error) => Err(error),
     })
 }
 
-/// Writes the rows of frames as they arrive, until there are no more. The result is a failure if the header never became complete.
+/// Writes the rows of frames as they arrive, until there are no more. The result is a failure if a table is not whole.
 fn receive_frames(
     options: &ReceiveOptions,
     address: &str,
+    senders: Senders,
     mut next: impl FnMut() -> std::io::Result<Option<Vec<u8>>>,
 ) -> Result<Ending, Error> {
-    let (mut reader, mut writer) = (FrameReader::new(), None::<(Writer, Vec<usize>)>);
+    let mut tables = Tables::new(options.output.as_deref(), address, senders);
     while let Some(frame) = next().map_err(Error::io(address, "receive"))? {
-        let blocks = match reader.handle(&frame) {
-            Ok(blocks) => blocks,
-            Err(error) => {
-                say!("warning: {address}: a frame was refused: {error}");
-                continue;
-            }
-        };
-        let Some(schema) = reader.schema() else { continue };
-        if writer.is_none() {
-            let (columns, names) = all_columns(schema);
-            writer = Some((Writer::new(options.output.as_deref(), Shape::Csv, schema, &names)?, columns));
-        }
-        if let Some((writer, columns)) = &mut writer {
-            write_blocks(blocks.into_iter().map(Ok), writer, (i64::MIN, i64::MAX), columns, address)?;
+        if !frame.is_empty() {
+            tables.take(&frame)?;
         }
     }
-    match writer {
-        Some((writer, _)) => writer.finish().map(|()| Ending::Good),
-        None => Ok(Ending::no_frame(address)),
-    }
+    tables.finish()
 }
