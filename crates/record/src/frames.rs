@@ -12,12 +12,12 @@
 
 use crate::block::{self, Block, Cells};
 use crate::error::{Damage, Error};
-use crate::header::{Header, MAX_START};
+use crate::header::{Form, Header, Known, MAX_START};
 use crate::schema::Schema;
 use crate::waiting::Waiting;
 use crate::wire::{Bytes, read_checked};
-use fewbits_adaptive::Effort;
-use fewbits_numerics::ArgumentError;
+use fewbits_block_codec::ArgumentError;
+use fewbits_block_codec::Effort;
 use std::collections::VecDeque;
 
 /// Smallest allowed maximal length of a frame: a piece then has 26 bytes of the header.
@@ -26,6 +26,8 @@ pub const MIN_FRAME_BYTES: usize = 40;
 const PIECE_OVERHEAD: usize = 14;
 const PIECE: u8 = b'H';
 const MAX_PIECES: usize = 256;
+/// Largest number of rows of a frame.
+const MAX_ROWS: usize = 512;
 /// Largest number of frames that are kept while the header is incomplete.
 const MAX_WAITING: usize = 256;
 /// Share of a frame that is aimed at when the number of rows for the next trial is estimated.
@@ -44,10 +46,13 @@ pub struct FrameWriter {
     /// Number of rows at which it is next tried whether they fill a frame.
     next_trial: usize,
     has_sent: bool,
+    /// Number of the next frame.
+    next_number: u64,
 }
 
 impl FrameWriter {
-    /// A writer of frames of at most `max_bytes` bytes, and at most the schema's rows per block.
+    /// A writer of frames of at most `max_bytes` bytes, and at most the schema's rows per block or 512, whichever are fewer: rows of a
+    /// signal that stands still wait no longer.
     ///
     /// # Errors
     /// If `max_bytes` is below [`MIN_FRAME_BYTES`], or the header needs more than 256 pieces.
@@ -59,12 +64,15 @@ impl FrameWriter {
         if max_bytes < least {
             return Err(ArgumentError::new("max_bytes", max_bytes, format!("at least {least} for this header")).into());
         }
+        let rows = schema.rows_per_block().min(MAX_ROWS);
+        let schema = schema.with_exact_rows(rows)?;
         Ok(Self {
             header: None,
             max_bytes,
             rows: Waiting::new(columns),
             next_trial: 1,
             has_sent: false,
+            next_number: 0,
             schema,
         })
     }
@@ -172,6 +180,7 @@ impl FrameWriter {
 
     fn forget(&mut self, rows: usize) {
         self.has_sent = true;
+        self.next_number += 1;
         self.rows.remove(rows);
         self.next_trial = rows.max(1);
     }
@@ -179,7 +188,12 @@ impl FrameWriter {
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
         // The first frame: the header's starts follow from all waiting rows.
         if !self.has_sent {
-            self.header = Some(self.rows.header(&self.schema).with_starts(&self.rows.columns));
+            self.header = Some(
+                self.rows
+                    .header(&self.schema)
+                    .with_starts(&self.rows.columns)
+                    .with_form(Form::Stream),
+            );
         }
         let Some(header) = &self.header else {
             return Err(Error::Broken);
@@ -187,7 +201,7 @@ impl FrameWriter {
         let Waiting { ticks, columns, ranges } = &self.rows;
         let own = ranges.own_bounds(header);
         let cells: Vec<Cells> = columns.iter().map(|cells| cells[..rows].to_vec()).collect();
-        Ok(block::encode(header, &ticks[..rows], &cells, &own, Effort::Thorough).0)
+        Ok(block::encode(header, self.next_number, &ticks[..rows], &cells, &own, Effort::Thorough).0)
     }
 }
 
@@ -268,7 +282,7 @@ impl FrameReader {
         }
         let bytes: Vec<u8> = pieces.into_iter().flatten().flatten().collect();
         let header = match Header::read(&bytes) {
-            Ok(Some((header, length))) if length == bytes.len() && header.check == check => header,
+            Ok(Known::Header(header, length)) if length == bytes.len() && header.check == check => *header,
             _ => return Err(Damage::Content("header")),
         };
         let waiting = std::mem::take(&mut self.waiting);

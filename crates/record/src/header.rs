@@ -5,13 +5,34 @@ use crate::codec::{Target, adaptive};
 use crate::error::{Damage, Error};
 use crate::schema::{Column, Schema, TimeBase, TimeFormat};
 use crate::time::Grid;
-use crate::wire::{Bytes, CHECK_BYTES, checksum, push_text, push_varint, zigzag};
-use fewbits_adaptive::Start;
+use crate::wire::{Bytes, CHECK_BYTES, checksum, push_text, push_varint, text, zigzag};
+use fewbits_block_codec::Start;
+use fewbits_block_codec::bytes::Unread;
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher, Hasher};
+use std::ops::Range;
+use std::time::{SystemTime, UNIX_EPOCH};
 
-/// The first bytes of a recording. As in PNG, a byte above 127 and a line end reveal a conversion as text.
-const MAGIC: [u8; 7] = *b"\x8bfewb\r\n";
+/// The first bytes of a recording: a byte above 127 reveals a conversion as text.
+const MAGIC: [u8; 4] = *b"\x8bfew";
+/// What followed the first bytes in version 5.
+const MAGIC_5: [u8; 4] = *b"b\r\n\x05";
 /// Version of the format.
-pub(crate) const VERSION: u8 = 5;
+pub(crate) const VERSION: u8 = 6;
+pub(crate) const VERSION_5: u8 = 5;
+/// Bytes of a recording's identity.
+const IDENTITY_BYTES: usize = 4;
+
+/// How the blocks follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// The only block follows the header, up to a checksum of the whole recording.
+    Single,
+    /// Blocks, segments of the index, and an end.
+    File,
+    /// Blocks over a link. There is no end.
+    Stream,
+}
 /// Largest length of a header in bytes: 4096 columns with names and units.
 pub(crate) const MAX_HEADER: usize = 1 << 24;
 
@@ -21,6 +42,10 @@ pub(crate) const MAX_START: usize = 32;
 /// The decoded header.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Header {
+    pub(crate) version: u8,
+    pub(crate) form: Form,
+    /// Random: the headers of two recordings differ even if their columns are the same. Zero in version 5.
+    identity: u32,
     pub(crate) schema: Schema,
     pub(crate) origin: i64,
     pub(crate) step: i64,
@@ -45,6 +70,9 @@ impl Header {
             TimeBase::Clock { tolerance, .. } => Grid::of(ticks, schema.rows_per_block, tolerance),
         };
         let header = Self {
+            version: VERSION,
+            form: Form::File,
+            identity: random(),
             starts: vec![None; schema.columns.len()],
             schema,
             origin: grid.origin,
@@ -66,9 +94,32 @@ impl Header {
         self.checked()
     }
 
+    /// The same header for blocks that follow in another form.
+    pub(crate) fn with_form(self, form: Form) -> Self {
+        Self { form, ..self }.checked()
+    }
+
+    /// The header of a recording of this version with the same columns.
+    pub(crate) fn renewed(self) -> Self {
+        Self {
+            version: VERSION,
+            identity: random(),
+            ..self
+        }
+        .checked()
+    }
+
+    /// Whether the index of a finished recording must follow.
+    pub(crate) fn has_end(&self) -> bool {
+        self.form == Form::File
+    }
+
     fn checked(mut self) -> Self {
         let bytes = self.to_bytes();
-        self.check = bytes.last_chunk::<4>().map_or(0, |check| u32::from_le_bytes(*check));
+        self.check = match self.form {
+            Form::Single => 0,
+            _ => bytes.last_chunk::<4>().map_or(0, |check| u32::from_le_bytes(*check)),
+        };
         self
     }
 
@@ -99,20 +150,47 @@ impl Header {
         }
     }
 
-    /// The encoded header: magic bytes, version, length, content, checksum.
+    /// The encoded header: magic bytes, version, length, identity, content, checksum. That of a single block has neither length nor
+    /// identity nor checksum.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        let body = self.body();
+        let mut bytes = MAGIC.to_vec();
+        match (self.version, self.form) {
+            (VERSION_5, _) => {
+                bytes.extend(MAGIC_5);
+                push_varint(&mut bytes, body.len() as u64);
+            }
+            (_, Form::Single) => {
+                bytes.extend([VERSION, 0]);
+                bytes.extend(body);
+                return bytes;
+            }
+            _ => {
+                bytes.push(VERSION);
+                push_varint(&mut bytes, body.len() as u64);
+                bytes.extend(self.identity.to_le_bytes());
+            }
+        }
+        bytes.extend(body);
+        let check = checksum(&[&bytes]);
+        bytes.extend(check.to_le_bytes());
+        bytes
+    }
+
+    fn body(&self) -> Vec<u8> {
         let mut body = Vec::new();
         push_varint(&mut body, self.schema.rows_per_block as u64);
+        let stream = if self.form == Form::Stream { STREAM } else { 0 };
         match self.schema.time {
-            TimeBase::Numbered => body.push(0),
+            TimeBase::Numbered => body.push(stream),
             TimeBase::Clock {
                 decimals,
                 tolerance,
                 format,
             } => {
                 body.push(match format {
-                    TimeFormat::Seconds => 1,
-                    TimeFormat::Utc => 2,
+                    TimeFormat::Seconds => 1 | stream,
+                    TimeFormat::Utc => 2 | stream,
                 });
                 body.push(decimals);
                 push_varint(&mut body, tolerance);
@@ -125,54 +203,113 @@ impl Header {
         for ((column, share_bound), start) in columns {
             push_column(&mut body, column, *share_bound, start.as_ref());
         }
-        let mut bytes = MAGIC.to_vec();
-        bytes.push(VERSION);
-        push_varint(&mut bytes, body.len() as u64);
-        bytes.extend(body);
-        let check = checksum(&[&bytes]);
-        bytes.extend(check.to_le_bytes());
-        bytes
+        body
     }
 
-    /// Reads a header from the front of `bytes`. Returns it with its length; `None` if more bytes are needed.
-    pub(crate) fn read(bytes: &[u8]) -> Result<Option<(Self, usize)>, Error> {
+    /// Reads a header from the front of `bytes`, with its length.
+    ///
+    /// # Errors
+    /// If the bytes are no header.
+    pub(crate) fn read(bytes: &[u8]) -> Result<Known, Error> {
         let known = bytes.len().min(MAGIC.len());
         if bytes[..known] != MAGIC[..known] {
             return Err(Error::NotARecording);
         }
         let mut reader = Bytes(&bytes[known..]);
-        let Ok(found) = reader.byte() else { return Ok(None) };
-        if found != VERSION {
-            return Err(Error::Version {
-                found,
-                supported: VERSION,
-            });
-        }
-        let length = match reader.count(MAX_HEADER, "length of the header") {
-            Ok(length) => length,
-            Err(Damage::CutOff) => return Ok(None),
-            Err(damage) => return Err(Error::Header(damage)),
+        let Ok(version) = reader.byte() else {
+            return Ok(Known::More);
         };
-        let Ok(body) = reader.take(length) else { return Ok(None) };
+        let version = match version {
+            VERSION => VERSION,
+            first if first == MAGIC_5[0] => {
+                let Ok(rest) = reader.array::<3>() else {
+                    return Ok(Known::More);
+                };
+                match rest {
+                    [b'\r', b'\n', VERSION_5] => VERSION_5,
+                    [b'\r', b'\n', found] => return Err(version_error(found)),
+                    _ => return Err(Error::NotARecording),
+                }
+            }
+            found => return Err(version_error(found)),
+        };
+        let length = match reader.count(MAX_HEADER, "length of the header") {
+            Ok(0) if version == VERSION => return Ok(Known::Single),
+            Ok(length) => length,
+            Err(Unread::CutOff) => return Ok(Known::More),
+            Err(unread) => return Err(Error::Header(unread.into())),
+        };
+        let mut identity = [0; IDENTITY_BYTES];
+        if version == VERSION {
+            let Ok(found) = reader.array() else {
+                return Ok(Known::More);
+            };
+            identity = found;
+        }
+        let Ok(body) = reader.take(length) else {
+            return Ok(Known::More);
+        };
         let end = bytes.len() - reader.0.len();
         let Ok(check) = reader.array::<CHECK_BYTES>().map(u32::from_le_bytes) else {
-            return Ok(None);
+            return Ok(Known::More);
         };
         if check != checksum(&[&bytes[..end]]) {
             return Err(Error::Header(Damage::Checksum));
         }
-        let header = Self::read_body(Bytes(body), check)?;
-        Ok(Some((header, end + CHECK_BYTES)))
+        let mut body = Bytes(body);
+        let mut header = Self::read_body(&mut body, check)?;
+        body.finish().map_err(damaged)?;
+        (header.version, header.identity) = (version, u32::from_le_bytes(identity));
+        if version == VERSION_5 && header.form == Form::Stream {
+            return Err(Error::Header(Damage::Content("time base")));
+        }
+        // Streams of version 5 are not marked.
+        Ok(Known::Header(Box::new(header), end + CHECK_BYTES))
     }
 
-    fn read_body(mut body: Bytes<'_>, check: u32) -> Result<Self, Error> {
-        let damaged = Error::Header;
+    /// Reads a whole recording of a single block: its header, and where the block's content stands.
+    ///
+    /// # Errors
+    /// If the bytes are not a whole recording of a single block.
+    pub(crate) fn read_single(bytes: &[u8]) -> Result<(Self, Range<usize>), Error> {
+        let (content, check) = bytes
+            .split_last_chunk::<CHECK_BYTES>()
+            .ok_or(Error::Header(Damage::CutOff))?;
+        if u32::from_le_bytes(*check) != checksum(&[content]) {
+            return Err(Error::Header(Damage::Checksum));
+        }
+        // Magic bytes, version, and a length of zero.
+        let mut body = Bytes(content.get(MAGIC.len() + 2..).ok_or(Error::Header(Damage::CutOff))?);
+        let header = Self::read_body(&mut body, 0)?;
+        if header.form == Form::Stream {
+            return Err(Error::Header(Damage::Content("time base")));
+        }
+        let start = content.len() - body.0.len();
+        let header = Self {
+            form: Form::Single,
+            ..header
+        };
+        Ok((header, start..content.len()))
+    }
+
+    /// A recording of a single block with this content.
+    pub(crate) fn single(&self, content: &[u8]) -> Vec<u8> {
+        let mut bytes = self.to_bytes();
+        bytes.extend_from_slice(content);
+        let check = checksum(&[&bytes]);
+        bytes.extend(check.to_le_bytes());
+        bytes
+    }
+
+    fn read_body(body: &mut Bytes<'_>, check: u32) -> Result<Self, Error> {
         let rows = body.count(usize::MAX, "rows per block").map_err(damaged)?;
-        let format = match body.byte().map_err(damaged)? {
+        let kind = body.byte().map_err(damaged)?;
+        let form = if kind & STREAM == 0 { Form::File } else { Form::Stream };
+        let format = match kind & !STREAM {
             0 => None,
             1 => Some(TimeFormat::Seconds),
             2 => Some(TimeFormat::Utc),
-            _ => return Err(damaged(Damage::Content("time base"))),
+            _ => return Err(Error::Header(Damage::Content("time base"))),
         };
         let time = match format {
             None => TimeBase::Numbered,
@@ -187,14 +324,16 @@ impl Header {
         let count = body.count(body.0.len(), "number of columns").map_err(damaged)?;
         let (mut columns, mut share_bounds, mut starts) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..count {
-            let (column, share_bound, start) = read_column(&mut body)?;
+            let (column, share_bound, start) = read_column(body)?;
             columns.push(column);
             share_bounds.push(share_bound);
             starts.push(start);
         }
-        body.finish().map_err(damaged)?;
         Ok(Self {
-            schema: Schema::new(columns, time)?.with_rows_per_block(rows)?,
+            version: VERSION,
+            form,
+            identity: 0,
+            schema: Schema::new(columns, time)?.with_exact_rows(rows)?,
             origin,
             step,
             share_bounds,
@@ -204,11 +343,45 @@ impl Header {
     }
 }
 
+/// What the first bytes of a recording are.
+pub(crate) enum Known {
+    /// A header, with its length.
+    Header(Box<Header>, usize),
+    /// The beginning of a recording of a single block.
+    Single,
+    /// Too few bytes.
+    More,
+}
+
+fn damaged(damage: impl Into<Damage>) -> Error {
+    Error::Header(damage.into())
+}
+
+fn version_error(found: u8) -> Error {
+    Error::Version {
+        found,
+        supported: VERSION,
+    }
+}
+
+/// Random bits from the standard library's keys for hash tables, which differ from call to call and from process to process.
+fn random() -> u32 {
+    let mut hasher = RandomState::new().build_hasher();
+    hasher.write_u128(
+        SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .map_or(0, |time| time.as_nanos()),
+    );
+    hasher.finish() as u32
+}
+
 /// The largest double with 12 bits of mantissa that does not exceed `bound`; it is stored in three bytes.
 pub(crate) fn rounded_down(bound: f64) -> f64 {
     f64::from_bits(bound.to_bits() & !0xff_ffff_ffff)
 }
 
+/// Flag beside the time base: blocks over a link, which have no end.
+const STREAM: u8 = 0x10;
 /// Flags beside the kind of a bound: a period follows, a start follows, a unit follows.
 const HAS_PERIOD: u8 = 0x10;
 const HAS_START: u8 = 0x20;
@@ -237,7 +410,7 @@ fn push_number(body: &mut Vec<u8>, number: f64) {
 
 fn read_number(body: &mut Bytes<'_>) -> Result<f64, Damage> {
     match body.byte()? {
-        DOUBLE => body.f64(),
+        DOUBLE => Ok(body.f64()?),
         decimals => {
             let ten = TENS
                 .get(usize::from(decimals))
@@ -281,8 +454,7 @@ fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64, start: Opt
 }
 
 fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<Start>), Error> {
-    let damaged = Error::Header;
-    let name = body.text().map_err(damaged)?;
+    let name = text(body).map_err(damaged)?;
     let kind = body.byte().map_err(damaged)?;
     let mut share_bound = 0.0;
     let bound = match kind & !(HAS_PERIOD | HAS_START | HAS_UNIT) {
@@ -293,16 +465,16 @@ fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<Start>), Err
             let [a, b, c] = body.array().map_err(damaged)?;
             share_bound = f64::from_be_bytes([a, b, c, 0, 0, 0, 0, 0]);
             if !(share_bound >= 0.0 && (2.0 * share_bound).is_finite()) {
-                return Err(damaged(Damage::Content("bound of a share")));
+                return Err(Error::Header(Damage::Content("bound of a share")));
             }
             Bound::ShareOfRange(share)
         }
         3 => Bound::Decimals(body.byte().map_err(damaged)?),
-        _ => return Err(damaged(Damage::Content("bound"))),
+        _ => return Err(Error::Header(Damage::Content("bound"))),
     };
     let mut column = Column::new(name, bound)?;
     if kind & HAS_UNIT != 0 {
-        column = column.with_unit(body.text().map_err(damaged)?)?;
+        column = column.with_unit(text(body).map_err(damaged)?)?;
     }
     if kind & HAS_PERIOD != 0 {
         column = column.with_period(read_number(body).map_err(damaged)?)?;

@@ -45,9 +45,10 @@
 //! | reading from front to end, for example from a pipe | [`BlockReader`] |
 //! | frames for a link that loses some | [`FrameWriter`], [`FrameReader`] |
 //!
-//! Not here: how values are predicted and coded (`fewbits-adaptive`), text formats and the command line (`fewbits-cli`). The format
+//! Not here: how values are predicted and coded (`fewbits-block-codec`), text formats and the command line (`fewbits-cli`). The format
 //! is described byte by byte in `docs/record.md`.
 
+mod append;
 #[cfg(feature = "arrow")]
 pub mod arrow;
 mod block;
@@ -62,6 +63,7 @@ mod ranges;
 mod recorder;
 mod related;
 mod resume;
+mod rolling;
 mod scan;
 mod schema;
 mod specials;
@@ -72,7 +74,7 @@ mod wire;
 pub use block::{Block, Cells};
 pub use bound::{Bound, MAX_DECIMALS, is_within, is_within_on_circle};
 pub use error::{Damage, Error};
-pub use fewbits_adaptive::Effort;
+pub use fewbits_block_codec::Effort;
 pub use frames::{FrameReader, FrameWriter, MIN_FRAME_BYTES};
 pub use playback::{BlockInfo, Blocks, Playback, Row, Rows};
 pub use recorder::Recorder;

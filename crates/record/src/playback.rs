@@ -1,14 +1,15 @@
 //! Reading of recordings with random access.
 
+use crate::append;
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::Header;
 use crate::index::{self, END, Entry, Segment, TRAILER_BYTES};
-use crate::scan::{Kind, Scanner, decoded};
+use crate::scan::{Found, Kind, Order, Scanner, damage_of, decoded};
 use crate::schema::Schema;
 use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{ErrorKind, Read, Seek, SeekFrom, Take};
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// One row: its tick, and one cell per requested column.
@@ -45,18 +46,42 @@ pub struct Playback<R> {
     header: Header,
     /// Offsets of the first byte after the header, and of the end.
     span: (u64, u64),
-    segments: Option<Vec<Segment>>,
+    index: Index,
+    /// Content of the only block.
+    single: Option<Vec<u8>>,
     /// Indices of the requested columns.
     chosen: Vec<usize>,
 }
 
+/// What is known of the index of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Index {
+    /// The index is whole, and its lengths are those of the recording.
+    Whole(Vec<Segment>),
+    /// The index is whole and describes other bytes.
+    Other,
+    /// There is no end, or it is damaged.
+    Missing,
+    /// None is needed: blocks of a stream, or what was there before an append that did not end.
+    NotNeeded,
+}
+
 impl Playback<File> {
-    /// Opens a file.
+    /// Opens a file. If an append to it did not end, it is read as it was before.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
-        Self::new(File::open(path).map_err(Error::io("open"))?)
+        let path = path.as_ref();
+        let mut playback = Self::new(File::open(path).map_err(Error::io("open"))?)?;
+        if !matches!(playback.index, Index::Whole(_) | Index::NotNeeded)
+            && let Some((offset, _)) = append::kept(path)
+            && (playback.span.0..=playback.span.1).contains(&offset)
+        {
+            playback.index = Index::NotNeeded;
+            playback.span.1 = offset;
+        }
+        Ok(playback)
     }
 }
 
@@ -67,17 +92,21 @@ impl<R: Read + Seek> Playback<R> {
     /// If reading fails or the header is incomplete or damaged. Damage after the header is reported later.
     pub fn new(mut reader: R) -> Result<Self, Error> {
         reader.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
-        let mut scanner = Scanner::new(&mut reader, 0);
-        let header = scanner.header()?;
+        let mut scanner = Scanner::new(0);
+        let (header, single) = scanner.header(&mut reader)?;
         let start = scanner.consumed();
-        let segments = segments(&mut reader, &header)?;
+        let index = match single {
+            Some(_) => Index::Whole(Vec::new()),
+            None => index_of(&mut reader, &header)?,
+        };
         let end = reader.seek(SeekFrom::End(0)).map_err(Error::io("read"))?;
         Ok(Self {
             reader,
             chosen: (0..header.schema.columns.len()).collect(),
             header,
             span: (start, end),
-            segments,
+            index,
+            single,
         })
     }
 
@@ -86,9 +115,14 @@ impl<R: Read + Seek> Playback<R> {
         &self.header.schema
     }
 
-    /// Whether the recording was finished and its index is undamaged.
+    /// Whether the recording was finished and its index is undamaged. A recording of a single block needs none.
     pub fn has_index(&self) -> bool {
-        self.segments.is_some()
+        matches!(self.index, Index::Whole(_))
+    }
+
+    /// Whether the recording has its end, or needs none. Reading one without its end gives an error that says so.
+    pub fn is_finished(&self) -> bool {
+        self.index != Index::Missing
     }
 
     /// Length of the whole recording in bytes.
@@ -121,6 +155,10 @@ impl<R: Read + Seek> Playback<R> {
             entries: VecDeque::new(),
             scan: None,
             scanned: false,
+            order: Order::default(),
+            last_number: None,
+            pending: VecDeque::new(),
+            single: self.single.is_some(),
             playback: self,
         }
     }
@@ -147,7 +185,27 @@ impl<R: Read + Seek> Playback<R> {
     /// If reading fails or a part of the index is damaged.
     pub fn index(&mut self) -> Result<Vec<BlockInfo>, Error> {
         let mut infos = Vec::new();
-        for segment in self.segments.clone().unwrap_or_default() {
+        if let Some(content) = &self.single {
+            let length = content.len() as u64;
+            let block = block::decode_content(&self.header, content, |_| true).map_err(|damage| Error::Block {
+                offset: 0,
+                bytes: self.span.1,
+                damage,
+            })?;
+            let entry = Entry::of(length, &block.ticks, &block.columns);
+            infos.push(BlockInfo {
+                // The checksum of the whole recording follows the content.
+                offset: self.span.1.saturating_sub(length + 4),
+                bytes: length,
+                rows: entry.rows,
+                ticks: entry.ticks,
+                ends: entry.ends,
+            });
+        }
+        let Index::Whole(segments) = self.index.clone() else {
+            return Ok(infos);
+        };
+        for segment in segments {
             let Some(found) = entries(&mut self.reader, &self.header, &segment)? else {
                 return Err(Error::Block {
                     offset: segment.start + segment.blocks,
@@ -172,7 +230,7 @@ impl<R: Read + Seek> Playback<R> {
 }
 
 /// Reads `length` bytes at an offset; `None` if the file ends earlier.
-fn read_at(reader: &mut (impl Read + Seek), offset: u64, length: u64) -> Result<Option<Vec<u8>>, Error> {
+pub(crate) fn read_at(reader: &mut (impl Read + Seek), offset: u64, length: u64) -> Result<Option<Vec<u8>>, Error> {
     reader.seek(SeekFrom::Start(offset)).map_err(Error::io("read"))?;
     let mut bytes = Vec::new();
     match reader.take(length).read_to_end(&mut bytes) {
@@ -182,24 +240,29 @@ fn read_at(reader: &mut (impl Read + Seek), offset: u64, length: u64) -> Result<
     }
 }
 
-/// The segments of a finished recording; `None` without an undamaged footer.
-pub(crate) fn segments(reader: &mut (impl Read + Seek), header: &Header) -> Result<Option<Vec<Segment>>, Error> {
+/// The index of a recording of several blocks.
+pub(crate) fn index_of(reader: &mut (impl Read + Seek), header: &Header) -> Result<Index, Error> {
+    let without = if header.has_end() {
+        Index::Missing
+    } else {
+        Index::NotNeeded
+    };
     let end = reader.seek(SeekFrom::End(0)).map_err(Error::io("read"))?;
     let Some(trailer) = end.checked_sub(TRAILER_BYTES as u64) else {
-        return Ok(None);
+        return Ok(without);
     };
     let Some(bytes) = read_at(reader, trailer, TRAILER_BYTES as u64)? else {
-        return Ok(None);
+        return Ok(without);
     };
     let Some((length, mark)) = bytes.split_first_chunk::<4>() else {
-        return Ok(None);
+        return Ok(without);
     };
     let length = u64::from(u32::from_le_bytes(*length));
     let Some(start) = trailer.checked_sub(length).filter(|_| mark == END) else {
-        return Ok(None);
+        return Ok(without);
     };
     let Some(bytes) = read_at(reader, start, length)? else {
-        return Ok(None);
+        return Ok(without);
     };
     let first = header.to_bytes().len() as u64;
     let (found, expected) = match index::read_special(header, &bytes) {
@@ -210,11 +273,11 @@ pub(crate) fn segments(reader: &mut (impl Read + Seek), header: &Header) -> Resu
             let entries = index::read_segment(header, content);
             (entries.map(|entries| vec![Segment::new(first, length, &entries)]), trailer)
         }
-        _ => return Ok(None),
+        _ => return Ok(without),
     };
     // The segments must fill the file up to the footer: offsets of blocks are sums of lengths.
     let ends = |segments: &Vec<Segment>| segments.last().map_or(first, Segment::end) == expected;
-    Ok(found.ok().filter(ends))
+    Ok(found.ok().filter(ends).map_or(Index::Other, Index::Whole))
 }
 
 /// The entries of a segment; `None` if it is damaged.
@@ -246,9 +309,24 @@ pub struct Blocks<'a, R> {
     next_segment: usize,
     /// Offsets and entries of the segment that is read at present.
     entries: VecDeque<(u64, Entry)>,
-    /// Start and end of the bytes without index that are scanned at present.
-    scan: Option<(u64, u64)>,
+    /// The bytes without index that are scanned at present, and the offset of their end.
+    scan: Option<(Scanner, u64)>,
     scanned: bool,
+    /// The order of scanned blocks, and the number of the last indexed one.
+    order: Order,
+    last_number: Option<u64>,
+    /// What is returned next.
+    pending: VecDeque<Result<Block, Error>>,
+    /// Whether the only block is still to be read.
+    single: bool,
+}
+
+fn no_bytes(offset: u64, damage: Damage) -> Error {
+    Error::Block {
+        offset,
+        bytes: 0,
+        damage,
+    }
 }
 
 impl<R: Read + Seek> Blocks<'_, R> {
@@ -274,31 +352,39 @@ impl<R: Read + Seek> Blocks<'_, R> {
             return Err(damaged(Damage::NoBlock));
         }
         let chosen = &self.playback.chosen;
-        block::decode(header, &bytes, |column| chosen.contains(&column)).map_err(damaged)
+        let block = block::decode(header, &bytes, |column| chosen.contains(&column)).map_err(damaged)?;
+        // Another block of the recording that was put here is not what the index describes, or has been read before.
+        let tolerance = header.schema.time.tolerance();
+        let ends = block
+            .ticks
+            .iter()
+            .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));
+        let is_described = block.rows() as u64 == entry.rows
+            && ends.0.abs_diff(entry.ticks.0) <= tolerance
+            && ends.1.abs_diff(entry.ticks.1) <= tolerance;
+        if !is_described || (block.number.is_some() && block.number <= self.last_number) {
+            return Err(damaged(Damage::Misplaced));
+        }
+        self.last_number = block.number;
+        Ok(block)
     }
 
-    /// The next block of a stretch without index.
-    fn scanned(&mut self, (start, end): (u64, u64)) -> Option<Result<Block, Error>> {
-        let reader = &mut self.playback.reader;
-        if let Err(error) = reader.seek(SeekFrom::Start(start)) {
-            self.scan = None;
-            return Some(Err(Error::io("read")(error)));
-        }
-        // Each block has a new scanner, because a scanner borrows the reader. The stretch then begins after that block.
-        let header = &self.playback.header;
-        let mut scanner: Scanner<Take<&mut R>> = Scanner::new(reader.take(end - start), start);
+    /// The next block of the stretch without index that is scanned; `None` at its end.
+    fn scanned(&mut self) -> Option<Result<Block, Error>> {
+        let (scanner, end) = self.scan.as_mut()?;
+        let (end, header) = (*end, &self.playback.header);
         loop {
-            let found = match scanner.next(header) {
+            let mut reader = (&mut self.playback.reader).take(end.saturating_sub(scanner.read_to()));
+            let found: Found = match scanner.next(&mut reader, header) {
                 Ok(Some(found)) => found,
                 Ok(None) => {
                     self.scan = None;
                     return None;
                 }
                 Err(error) => {
-                    self.scan = match &error {
-                        Error::Block { offset, bytes, .. } => Some((offset + bytes, end)),
-                        _ => None,
-                    };
+                    if !matches!(error, Error::Block { .. }) {
+                        self.scan = None;
+                    }
                     return Some(Err(error));
                 }
             };
@@ -306,10 +392,35 @@ impl<R: Read + Seek> Blocks<'_, R> {
                 continue;
             }
             let chosen = &self.playback.chosen;
-            let block = decoded(header, &scanner, &found, |column| chosen.contains(&column));
-            self.scan = Some((found.offset + found.length as u64, end));
-            return Some(block);
+            let block = decoded(header, scanner, &found, |column| chosen.contains(&column));
+            let damage = block.as_ref().ok().and_then(|block| self.order.judge(block.number));
+            let Some(damage) = damage else { return Some(block) };
+            if damage == Damage::Missing {
+                self.pending.push_back(block);
+            }
+            return Some(Err(damage_of(&found, damage)));
         }
+    }
+
+    /// Begins to scan a stretch. What is said of missing blocks refers to those after the first one found.
+    fn start_scan(&mut self, (start, end): (u64, u64), order: Order) -> Result<(), Error> {
+        let sought = self.playback.reader.seek(SeekFrom::Start(start));
+        sought.map_err(Error::io("read"))?;
+        self.scan = Some((Scanner::new(start), end));
+        self.order = order;
+        Ok(())
+    }
+
+    /// The only block of a recording.
+    fn only(&self) -> Result<Block, Error> {
+        let chosen = &self.playback.chosen;
+        let content = self.playback.single.as_deref().unwrap_or_default();
+        let block = block::decode_content(&self.playback.header, content, |column| chosen.contains(&column));
+        block.map_err(|damage| Error::Block {
+            offset: 0,
+            bytes: self.playback.span.1,
+            damage,
+        })
     }
 }
 
@@ -317,10 +428,19 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
     type Item = Result<Block, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
+        if std::mem::take(&mut self.single) {
+            return Some(self.only());
+        }
         loop {
-            if let Some(stretch) = self.scan {
-                match self.scanned(stretch) {
+            if let Some(next) = self.pending.pop_front() {
+                return Some(next);
+            }
+            if self.scan.is_some() {
+                match self.scanned() {
                     Some(block) => return Some(block),
+                    None if self.playback.index == Index::Missing => {
+                        return Some(Err(no_bytes(self.playback.span.1, Damage::NoEnd)));
+                    }
                     None => continue,
                 }
             }
@@ -331,12 +451,17 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
                 }
                 return Some(self.indexed(offset, &entry));
             }
-            let Some(segments) = &self.playback.segments else {
+            let Index::Whole(segments) = &self.playback.index else {
                 if self.scanned {
                     return None;
                 }
                 self.scanned = true;
-                self.scan = Some(self.playback.span);
+                if let Err(error) = self.start_scan(self.playback.span, Order::default()) {
+                    return Some(Err(error));
+                }
+                if self.playback.index == Index::Other {
+                    return Some(Err(no_bytes(self.playback.span.1, Damage::Index)));
+                }
                 continue;
             };
             let segment = *segments.get(self.next_segment)?;
@@ -354,7 +479,13 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
                     }
                 }
                 // Only the segment itself is damaged: scan for its blocks.
-                Ok(None) => self.scan = Some((segment.start, segment.start.saturating_add(segment.blocks))),
+                Ok(None) => {
+                    let stretch = (segment.start, segment.start.saturating_add(segment.blocks));
+                    let order = Order::after(self.last_number.filter(|_| self.ticks == (i64::MIN, i64::MAX)));
+                    if let Err(error) = self.start_scan(stretch, order) {
+                        return Some(Err(error));
+                    }
+                }
                 Err(error) => return Some(Err(error)),
             }
         }
