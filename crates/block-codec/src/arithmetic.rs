@@ -235,7 +235,7 @@ impl Coder for Reader<'_> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use crate::*;
+    use super::*;
 
     /// Decisions of very even and very uneven probabilities return, and bytes behind the end are refused.
     #[test]

@@ -290,7 +290,7 @@ impl Frequencies {
 
 #[cfg(test)]
 mod tests {
-    use crate::*;
+    use super::*;
 
     #[test]
     fn frequencies_count_as_brute_force_does() {

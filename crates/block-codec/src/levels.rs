@@ -23,8 +23,9 @@ const BY_MODELS: u32 = 61_440;
 const ROWS_PER_LEVEL: usize = 2;
 /// Largest number of levels: the models count that many numbers one by one.
 const MOST_LEVELS: usize = 1 << 16;
-/// Lengths of distances, and contexts by the length before.
+/// Lengths of distances, which are contexts of the next one; nodes of the tree of their seven bits.
 const LENGTHS: usize = 65;
+const NODES: usize = 128;
 const TOP: u64 = 1 << 63;
 
 /// Indices as unsigned integers of the same order.
@@ -76,7 +77,7 @@ fn code_levels<C: Coder>(coder: &mut C, wanted: Option<&[u64]>, rows: usize) -> 
     };
     let zeros = distances().fold(u64::MAX, |zeros, distance| zeros.min(u64::from(distance.trailing_zeros())));
     let zeros = coder.raw(zeros.min(63), 6) as u32;
-    let mut counts = vec![[Count::NEW; LENGTHS]; LENGTHS];
+    let mut counts = vec![[Count::NEW; NODES]; LENGTHS];
     let (mut before, mut levels) = (0, vec![level]);
     for i in 1..count as usize {
         let wanted = wanted.map_or(0, |levels| (levels[i] - levels[i - 1]) >> zeros);
@@ -84,12 +85,7 @@ fn code_levels<C: Coder>(coder: &mut C, wanted: Option<&[u64]>, rows: usize) -> 
         // Bit by bit through a tree of lengths, which are below 128.
         let mut node = 1_usize;
         for bit in (0..7).rev() {
-            let slot = &mut counts[before][node % LENGTHS];
-            let up = if node < LENGTHS {
-                slot.decide(coder, length >> bit & 1 == 1)
-            } else {
-                coder.raw(u64::from(length >> bit & 1), 1) == 1
-            };
+            let up = counts[before][node % NODES].decide(coder, length >> bit & 1 == 1);
             node = 2 * node + usize::from(up);
         }
         let length = (node & 127) as u32;

@@ -3,7 +3,7 @@
 use crate::bound::{Bound, TENS};
 use crate::codec::{Target, adaptive};
 use crate::error::{Damage, Error};
-use crate::schema::{Column, Schema, TimeBase, TimeFormat};
+use crate::schema::{Column, Schema, TimeBase, TimeFormat, default_rows};
 use crate::time::Grid;
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_text, push_varint, text, zigzag};
 use fewbits_block_codec::Start;
@@ -46,6 +46,8 @@ pub(crate) struct Header {
     pub(crate) form: Form,
     /// Random: the headers of two recordings differ even if their columns are the same. Zero in version 5.
     identity: u32,
+    /// Number of rows of the only block.
+    only: Option<usize>,
     pub(crate) schema: Schema,
     pub(crate) origin: i64,
     pub(crate) step: i64,
@@ -73,6 +75,7 @@ impl Header {
             version: VERSION,
             form: Form::File,
             identity: random(),
+            only: None,
             starts: vec![None; schema.columns.len()],
             schema,
             origin: grid.origin,
@@ -96,7 +99,24 @@ impl Header {
 
     /// The same header for blocks that follow in another form.
     pub(crate) fn with_form(self, form: Form) -> Self {
-        Self { form, ..self }.checked()
+        let only = self.only.filter(|_| form == Form::Single);
+        Self { form, only, ..self }.checked()
+    }
+
+    /// The same header for a recording of a single block of so many rows.
+    pub(crate) fn of_single(self, rows: usize) -> Self {
+        let only = Some(rows);
+        Self { only, ..self }.with_form(Form::Single)
+    }
+
+    /// Number of rows of a block that does not state it.
+    pub(crate) fn block_rows(&self) -> usize {
+        self.only.unwrap_or(self.schema.rows_per_block)
+    }
+
+    /// Number of rows of the only block, if a block elsewhere must state it.
+    pub(crate) fn odd_rows(&self) -> Option<usize> {
+        self.only.filter(|rows| *rows != self.schema.rows_per_block)
     }
 
     /// The header of a recording of this version with the same columns.
@@ -179,7 +199,18 @@ impl Header {
 
     fn body(&self) -> Vec<u8> {
         let mut body = Vec::new();
-        push_varint(&mut body, self.schema.rows_per_block as u64);
+        let rows_per_block = self.schema.rows_per_block;
+        match self.only {
+            Some(rows) => {
+                // The default needs no telling.
+                let own = rows_per_block != default_rows(self.schema.columns.len());
+                push_varint(&mut body, 2 * rows as u64 + u64::from(own));
+                if own {
+                    push_varint(&mut body, rows_per_block as u64);
+                }
+            }
+            None => push_varint(&mut body, rows_per_block as u64),
+        }
         let stream = if self.form == Form::Stream { STREAM } else { 0 };
         match self.schema.time {
             TimeBase::Numbered => body.push(stream),
@@ -197,7 +228,9 @@ impl Header {
             }
         }
         push_varint(&mut body, zigzag(self.origin));
-        push_varint(&mut body, zigzag(self.step));
+        if self.version == VERSION_5 || self.schema.time != TimeBase::Numbered {
+            push_varint(&mut body, zigzag(self.step));
+        }
         push_varint(&mut body, self.schema.columns.len() as u64);
         let columns = self.schema.columns.iter().zip(&self.share_bounds).zip(&self.starts);
         for ((column, share_bound), start) in columns {
@@ -257,7 +290,12 @@ impl Header {
             return Err(Error::Header(Damage::Checksum));
         }
         let mut body = Bytes(body);
-        let mut header = Self::read_body(&mut body, check)?;
+        let length = if version == VERSION {
+            Length::Known
+        } else {
+            Length::Version5
+        };
+        let mut header = Self::read_body(&mut body, length, check)?;
         body.finish().map_err(damaged)?;
         (header.version, header.identity) = (version, u32::from_le_bytes(identity));
         if version == VERSION_5 && header.form == Form::Stream {
@@ -280,7 +318,7 @@ impl Header {
         }
         // Magic bytes, version, and a length of zero.
         let mut body = Bytes(content.get(MAGIC.len() + 2..).ok_or(Error::Header(Damage::CutOff))?);
-        let header = Self::read_body(&mut body, 0)?;
+        let header = Self::read_body(&mut body, Length::Single, 0)?;
         if header.form == Form::Stream {
             return Err(Error::Header(Damage::Content("time base")));
         }
@@ -301,8 +339,17 @@ impl Header {
         bytes
     }
 
-    fn read_body(body: &mut Bytes<'_>, check: u32) -> Result<Self, Error> {
-        let rows = body.count(usize::MAX, "rows per block").map_err(damaged)?;
+    fn read_body(body: &mut Bytes<'_>, length: Length, check: u32) -> Result<Self, Error> {
+        let mut rows = body.count(usize::MAX, "rows per block").map_err(damaged)?;
+        let mut rows_per_block = Some(rows);
+        if length == Length::Single {
+            let own = rows & 1 == 1;
+            rows_per_block = own
+                .then(|| body.count(usize::MAX, "rows per block"))
+                .transpose()
+                .map_err(damaged)?;
+            rows /= 2;
+        }
         let kind = body.byte().map_err(damaged)?;
         let form = if kind & STREAM == 0 { Form::File } else { Form::Stream };
         let format = match kind & !STREAM {
@@ -320,7 +367,10 @@ impl Header {
             },
         };
         let origin = body.signed().map_err(damaged)?;
-        let step = body.signed().map_err(damaged)?;
+        let step = match time {
+            TimeBase::Numbered if length != Length::Version5 => 1,
+            _ => body.signed().map_err(damaged)?,
+        };
         let count = body.count(body.0.len(), "number of columns").map_err(damaged)?;
         let (mut columns, mut share_bounds, mut starts) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..count {
@@ -329,11 +379,17 @@ impl Header {
             share_bounds.push(share_bound);
             starts.push(start);
         }
+        let rows_per_block = rows_per_block.unwrap_or(default_rows(columns.len()));
+        let schema = Schema::new(columns, time)?.with_exact_rows(rows_per_block)?;
+        if length == Length::Single && !(1..=rows_per_block).contains(&rows) {
+            return Err(Error::Header(Damage::Content("number of rows")));
+        }
         Ok(Self {
             version: VERSION,
             form,
             identity: 0,
-            schema: Schema::new(columns, time)?.with_exact_rows(rows)?,
+            only: (length == Length::Single).then_some(rows),
+            schema,
             origin,
             step,
             share_bounds,
@@ -341,6 +397,16 @@ impl Header {
             check,
         })
     }
+}
+
+/// What is known of a body before it is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Length {
+    Known,
+    /// The block follows it.
+    Single,
+    /// As known, with the step of numbered rows.
+    Version5,
 }
 
 /// What the first bytes of a recording are.

@@ -3,7 +3,7 @@
 use crate::append::{self, Append};
 use crate::block;
 use crate::error::Error;
-use crate::header::{Form, Header};
+use crate::header::Header;
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::resume;
 use crate::schema::Schema;
@@ -233,7 +233,7 @@ impl<W: Write> Recorder<W> {
     /// The whole recording of the waiting rows as a single block.
     fn single(&self) -> Vec<u8> {
         let Waiting { ticks, columns, ranges } = &self.rows;
-        let plain = self.rows.header(&self.schema).with_form(Form::Single);
+        let plain = self.rows.header(&self.schema).of_single(ticks.len());
         let own = ranges.own_bounds(&plain);
         let written = |header: &Header| {
             let (content, _) = block::content(header, 0, ticks, columns, &own, self.effort);

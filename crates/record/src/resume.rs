@@ -104,7 +104,8 @@ fn renewed(mut locked: File, path: &Path, old: &Header) -> Result<(File, Append,
             continue;
         }
         let block = decoded(old, &scanner, &found, |_| true)?;
-        let content = block::renewed(old, scanner.bytes(&found), state.next_number);
+        let content = block::content_of(scanner.bytes(&found));
+        let content = content.and_then(|content| block::renewed(old, content, state.next_number));
         let content = content.map_err(|damage| Error::Block {
             offset: found.offset,
             bytes: found.length as u64,
@@ -133,13 +134,15 @@ fn renewed(mut locked: File, path: &Path, old: &Header) -> Result<(File, Append,
 
 /// A copy of a recording of a single block in the form that can be continued.
 fn copied(locked: File, path: &Path, header: Header, content: &[u8]) -> Result<(File, Append, Resumed), Error> {
-    let header = header.with_form(Form::File);
-    let block = block::decode_content(&header, content, |_| true).map_err(|damage| Error::Block {
+    let damaged = |damage| Error::Block {
         offset: 0,
         bytes: content.len() as u64,
         damage,
-    })?;
-    let (start, bytes) = (header.to_bytes(), checked(header.check, &[], content));
+    };
+    let block = block::decode_content(&header, content, |_| true).map_err(damaged)?;
+    let content = block::renewed(&header, content, 0).map_err(damaged)?;
+    let header = header.with_form(Form::File).renewed();
+    let (start, bytes) = (header.to_bytes(), checked(header.check, &[], &content));
     let (mut file, append) = copy(locked, path)?;
     file.write_all(&[start.as_slice(), &bytes].concat())
         .map_err(Error::io("copy"))?;

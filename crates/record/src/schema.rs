@@ -207,8 +207,8 @@ const DEFAULT_CELLS: usize = 1 << 20;
 const LEAST_ROWS: usize = 512;
 
 /// Number of rows per block if none is asked for.
-fn default_rows(columns: usize) -> usize {
-    (DEFAULT_CELLS / columns).clamp(LEAST_ROWS, ROWS_PER_BLOCK)
+pub(crate) fn default_rows(columns: usize) -> usize {
+    (DEFAULT_CELLS / columns.max(1)).clamp(LEAST_ROWS, ROWS_PER_BLOCK)
 }
 
 impl Schema {

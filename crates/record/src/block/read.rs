@@ -15,9 +15,7 @@ use fewbits_block_codec::arithmetic::Reader;
 
 /// Decodes one block whose checksum was verified. Columns that are not `wanted` stay empty.
 pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Damage> {
-    let mut reader = Bytes(bytes);
-    let length = reader.count(bytes.len(), "length")?;
-    decode_content(header, reader.take(length)?, wanted)
+    decode_content(header, content_of(bytes)?, wanted)
 }
 
 /// The first numbers of a block's content.
@@ -61,21 +59,28 @@ fn read_head(header: &Header, body: &mut Bytes<'_>) -> Result<Head, Damage> {
     })
 }
 
-/// The content of a block of version 5, with a head of this version: only the first numbers differ.
-pub(crate) fn renewed(header: &Header, bytes: &[u8], number: u64) -> Result<Vec<u8>, Damage> {
+/// The content of a block.
+pub(crate) fn content_of(bytes: &[u8]) -> Result<&[u8], Damage> {
     let mut reader = Bytes(bytes);
     let length = reader.count(bytes.len(), "length")?;
-    let mut body = Bytes(reader.take(length)?);
+    Ok(reader.take(length)?)
+}
+
+/// The content of a block of version 5, or of an only block, as a block of this version and number: only the first numbers differ.
+pub(crate) fn renewed(header: &Header, content: &[u8], number: u64) -> Result<Vec<u8>, Damage> {
+    let mut body = Bytes(content);
     let Head { usual, flags, .. } = read_head(header, &mut body)?;
+    let rows = header.odd_rows().filter(|_| flags & ROWS_FOLLOW == 0);
     let mut content = Vec::new();
     let first = 4 * number + 2 * u64::from(flags & APART != 0);
-    match usual {
-        Some(on_grid) if on_grid == number => push_varint(&mut content, first),
-        _ => {
-            push_varint(&mut content, first + 1);
-            push_varint(&mut content, flags & !APART);
-            usual.into_iter().for_each(|on_grid| push_varint(&mut content, on_grid));
-        }
+    if usual == Some(number) && rows.is_none() {
+        push_varint(&mut content, first);
+    } else {
+        push_varint(&mut content, first + 1);
+        let rows_follow = if rows.is_some() { ROWS_FOLLOW } else { 0 };
+        push_varint(&mut content, flags & !APART | rows_follow);
+        rows.into_iter().for_each(|rows| push_varint(&mut content, rows as u64));
+        usual.into_iter().for_each(|on_grid| push_varint(&mut content, on_grid));
     }
     content.extend_from_slice(body.0);
     Ok(content)
@@ -85,7 +90,7 @@ pub(crate) fn renewed(header: &Header, bytes: &[u8], number: u64) -> Result<Vec<
 pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Damage> {
     let mut body = Bytes(content);
     let (grid, columns) = (header.grid(), header.schema.columns.len());
-    let mut rows = header.schema.rows_per_block;
+    let mut rows = header.block_rows();
     let mut descriptors: Vec<u8> = (0..columns).map(|i| plain(header, false, i)).collect();
     let mut specials = Vec::new();
     let Head { number, usual, flags } = read_head(header, &mut body)?;

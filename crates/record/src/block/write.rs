@@ -185,7 +185,7 @@ impl Rows<'_> {
             .map(|(i, column)| column.descriptor != plain(header, apart, i))
             .collect();
         let all_plain = !has_own.contains(&true);
-        let whole = ticks.len() == header.schema.rows_per_block;
+        let whole = ticks.len() == header.block_rows();
         let specials: Vec<Specials> = coded
             .iter_mut()
             .map(|column| std::mem::take(&mut column.specials))
