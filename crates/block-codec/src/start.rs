@@ -175,9 +175,13 @@ impl BlockCodec {
                 found.push(self.started(start, &indices, Some(&Others::new(others)))?);
             }
         }
+        let fine = match self.effort {
+            Effort::Thorough => crate::FINE,
+            Effort::Fast => crate::FINE_IF_FAST,
+        };
         let is_fine = found
             .first()
-            .is_none_or(|block| block.bytes.len() > crate::FINE_IF_FAST * samples.len() / 8);
+            .is_none_or(|block| block.bytes.len() > fine * samples.len() / 8);
         // If the start does not fit the block, a block of its own is shorter.
         if is_fine || !self.grid(samples).is_some_and(|grid| grid.is_like(&start.grid)) {
             let alone = self.encode_with(samples, others)?;
