@@ -150,7 +150,7 @@ impl BlockCodec {
             _ => return Err(Damaged::new("grid", kind, "one of the agreed accuracy").into()),
         };
         if head & MOVED != 0 {
-            grid = crate::read_phase(grid, &mut reader)?;
+            grid = crate::decode::read_phase(grid, &mut reader)?;
         }
         let usual = unzigzag(reader.varint()?);
         let [k] = reader.array()?;
@@ -176,8 +176,8 @@ impl BlockCodec {
             }
         }
         let fine = match self.effort {
-            Effort::Thorough => crate::FINE,
-            Effort::Fast => crate::FINE_IF_FAST,
+            Effort::Thorough => crate::encode::FINE,
+            Effort::Fast => crate::encode::FINE_IF_FAST,
         };
         let is_fine = found
             .first()

@@ -12,7 +12,8 @@
 
 use crate::block::{self, Block, Cells};
 use crate::error::{Damage, Error};
-use crate::header::{Form, Header, Known, MAX_START};
+use crate::header::{Form, Header, MAX_START};
+use crate::header_read::Known;
 use crate::schema::Schema;
 use crate::waiting::Waiting;
 use crate::wire::{Bytes, read_checked};

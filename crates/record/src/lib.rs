@@ -52,11 +52,14 @@ mod append;
 #[cfg(feature = "arrow")]
 pub mod arrow;
 mod block;
+mod blocks;
 mod bound;
 mod codec;
 mod error;
 mod frames;
 mod header;
+mod header_column;
+mod header_read;
 mod index;
 mod playback;
 mod ranges;
@@ -72,11 +75,12 @@ mod waiting;
 mod wire;
 
 pub use block::{Block, Cells};
+pub use blocks::{Blocks, Rows};
 pub use bound::{Bound, MAX_DECIMALS, is_within, is_within_on_circle};
 pub use error::{Damage, Error};
 pub use fewbits_block_codec::Effort;
 pub use frames::{FrameReader, FrameWriter, MIN_FRAME_BYTES};
-pub use playback::{BlockInfo, Blocks, Playback, Row, Rows};
+pub use playback::{BlockInfo, Playback, Row};
 pub use recorder::Recorder;
 pub use scan::BlockReader;
 pub use schema::{Column, MAX_CELLS, ROWS_PER_BLOCK, Schema, TimeBase, TimeFormat};

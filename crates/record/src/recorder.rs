@@ -50,16 +50,6 @@ pub struct Recorder<W> {
     broken: bool,
 }
 
-/// State of a recording that is to be continued.
-pub(crate) struct Resumed {
-    pub(crate) header: Header,
-    pub(crate) offset: u64,
-    pub(crate) segments: Vec<Segment>,
-    pub(crate) entries: Vec<Entry>,
-    pub(crate) next_tick: i64,
-    pub(crate) next_number: u64,
-}
-
 impl Recorder<File> {
     /// Creates a file, and locks it against other writers. An existing one is replaced.
     ///

@@ -6,12 +6,21 @@ use crate::error::Error;
 use crate::header::{Form, Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::playback::{self, Index};
-use crate::recorder::Resumed;
 use crate::scan::{Kind, Scanner, decoded};
 use crate::wire::checked;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
+
+/// State of a recording that is to be continued.
+pub(crate) struct Resumed {
+    pub(crate) header: Header,
+    pub(crate) offset: u64,
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) entries: Vec<Entry>,
+    pub(crate) next_tick: i64,
+    pub(crate) next_number: u64,
+}
 
 /// Opens a recording and locks it. The file where blocks are to be written stands at their place; nothing is overwritten yet.
 pub(crate) fn open(path: &Path) -> Result<(File, Append, Resumed), Error> {

@@ -2,7 +2,8 @@
 
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
-use crate::header::{Form, Header, Known, MAX_HEADER};
+use crate::header::{Form, Header, MAX_HEADER};
+use crate::header_read::Known;
 use crate::index::{self, TRAILER_BYTES};
 use crate::rolling::Prefixes;
 use crate::schema::{MAX_CELLS, Schema};

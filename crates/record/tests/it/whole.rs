@@ -98,13 +98,14 @@ fn doubled_and_moved_blocks_are_not_read() {
 #[test]
 fn exchanged_blocks_of_equal_length_are_not_read() {
     let value = |i: usize| ((3 * i) % 16) as f64 + (i / PER_BLOCK) as f64;
-    let truth: Vec<Cells> = (0..ROWS)
-        .map(|i| vec![Some(0.0), Some(0.0), Some(value(i))])
-        .collect();
+    let truth: Vec<Cells> = (0..ROWS).map(|i| vec![Some(0.0), Some(0.0), Some(value(i))]).collect();
     let bytes = record(schema(PER_BLOCK, TimeBase::Numbered), &truth);
     let places = places(&bytes);
     let pairs = (0..places.len()).flat_map(|i| (i + 1..places.len()).map(move |j| (i, j)));
-    let (i, j) = pairs.into_iter().find(|(i, j)| places[*i].len() == places[*j].len()).unwrap();
+    let (i, j) = pairs
+        .into_iter()
+        .find(|(i, j)| places[*i].len() == places[*j].len())
+        .unwrap();
     let mut exchanged = bytes.clone();
     exchanged[places[i].clone()].copy_from_slice(&bytes[places[j].clone()]);
     exchanged[places[j].clone()].copy_from_slice(&bytes[places[i].clone()]);
