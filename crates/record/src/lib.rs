@@ -43,7 +43,7 @@
 //! | writing | [`Recorder`] |
 //! | reading with random access | [`Playback`] |
 //! | reading from front to end, for example from a pipe | [`BlockReader`] |
-//! | frames for a link that loses some | [`FrameWriter`], [`FrameReader`] |
+//! | frames for a link that loses some | [`FrameWriter`], [`HeaderRepeats`], [`FrameReader`] |
 //!
 //! Not here: how values are predicted and coded (`fewbits-block-codec`), text formats and the command line (`fewbits-cli`). The format
 //! is described byte by byte in `docs/record.md`.
@@ -79,7 +79,7 @@ pub use blocks::{Blocks, Rows};
 pub use bound::{Bound, MAX_DECIMALS, is_within, is_within_on_circle};
 pub use error::{Damage, Error};
 pub use fewbits_block_codec::Effort;
-pub use frames::{FrameReader, FrameWriter, MIN_FRAME_BYTES};
+pub use frames::{FrameReader, FrameWriter, HeaderRepeats, MIN_FRAME_BYTES};
 pub use playback::{BlockInfo, Playback, Row};
 pub use recorder::Recorder;
 pub use scan::BlockReader;
