@@ -223,6 +223,7 @@ impl Header {
                 body.push(match format {
                     TimeFormat::Seconds => 1 | flags,
                     TimeFormat::Utc => 2 | flags,
+                    TimeFormat::Local => 3 | flags,
                 });
                 body.push(decimals);
                 push_varint(&mut body, tolerance);

@@ -123,6 +123,7 @@ impl Header {
             0 => None,
             1 => Some(TimeFormat::Seconds),
             2 => Some(TimeFormat::Utc),
+            3 => Some(TimeFormat::Local),
             _ => return Err(Error::Header(Damage::Content("time base"))),
         };
         let time = match format {
