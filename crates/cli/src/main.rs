@@ -23,6 +23,7 @@ mod manifest;
 mod many;
 mod node;
 mod numbers;
+mod opening;
 mod output;
 mod pack;
 #[cfg(feature = "parquet")]
