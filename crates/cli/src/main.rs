@@ -25,6 +25,7 @@ mod many;
 mod node;
 mod notes;
 mod numbers;
+mod opening;
 mod output;
 mod pack;
 #[cfg(feature = "parquet")]
