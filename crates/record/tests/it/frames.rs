@@ -131,8 +131,8 @@ fn too_short_frames_are_refused() {
     let refused = FrameWriter::new(schema(128, TimeBase::Numbered), 20).unwrap_err();
     assert!(matches!(refused, Error::Argument(_)));
     // A row of samples that must all be stored whole.
-    let columns = (0..9).map(|i| fewbits_record::Column::new(format!("{i}"), fewbits_record::Bound::Lossless).unwrap());
-    let schema = fewbits_record::Schema::new(columns.collect(), TimeBase::Numbered).unwrap();
+    let columns = (0..9).map(|i| Column::new(format!("{i}"), Bound::Lossless).unwrap());
+    let schema = Schema::new(columns.collect(), TimeBase::Numbered).unwrap();
     let mut writer = FrameWriter::new(schema, 51).unwrap();
     let row: Cells = (0..9)
         .map(|i| Some(0.1 + std::f64::consts::PI / f64::from(i + 1)))

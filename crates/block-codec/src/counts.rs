@@ -9,9 +9,9 @@
 //!
 //! A second set of counts given the last index was measured: 3 % fewer bits, but reading takes a third longer.
 
-use super::coder::Coder;
-use super::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
-use fewbits_core::CodecError;
+use crate::arithmetic::Coder;
+use crate::error::Damaged;
+use crate::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
 
 /// Number of decisions in a context: zero, sign, and whether the size is at least 2 to 15.
 const NODES: usize = 16;
@@ -27,7 +27,7 @@ const MOST_SEEN: u16 = 40;
 
 /// Probability of `true` in units of `2^-16`, and how often the decision was seen.
 #[derive(Debug, Clone, Copy)]
-struct Count {
+pub(crate) struct Count {
     one: u16,
     seen: u16,
 }
@@ -48,7 +48,7 @@ const LEAST: i32 = 32;
 const MOST: i32 = 65_535 - LEAST;
 
 impl Count {
-    const NEW: Self = Self { one: 1 << 15, seen: 0 };
+    pub(crate) const NEW: Self = Self { one: 1 << 15, seen: 0 };
 
     #[inline(always)]
     fn learn(&mut self, bit: bool) {
@@ -59,7 +59,7 @@ impl Count {
     }
 
     #[inline(always)]
-    fn decide<C: Coder>(&mut self, coder: &mut C, bit: bool) -> bool {
+    pub(crate) fn decide<C: Coder>(&mut self, coder: &mut C, bit: bool) -> bool {
         let bit = coder.bit(u32::from(self.one), bit);
         self.learn(bit);
         bit
@@ -68,7 +68,7 @@ impl Count {
 
 /// The state of the coder, the same at writer and reader.
 #[derive(Debug, Clone)]
-pub(super) struct Counts {
+pub(crate) struct Counts {
     counts: Box<[[Count; NODES]; CONTEXTS]>,
     /// Whether differences of differences are coded.
     second: bool,
@@ -82,7 +82,7 @@ pub(super) struct Counts {
 
 impl Counts {
     /// The state after the first index.
-    pub(super) fn new(first: i64, second: bool) -> Self {
+    pub(crate) fn new(first: i64, second: bool) -> Self {
         Self {
             counts: Box::new([[Count::NEW; NODES]; CONTEXTS]),
             second,
@@ -100,7 +100,7 @@ impl Counts {
     }
 
     /// Whether differences of differences are smaller than differences.
-    pub(super) fn prefers_second(indices: &[i64]) -> bool {
+    pub(crate) fn prefers_second(indices: &[i64]) -> bool {
         let bits = |d: i64| u64::from(64 - d.unsigned_abs().leading_zeros());
         let (mut first, mut second, mut slope) = (0, 0, 0);
         for pair in indices.windows(2) {
@@ -119,12 +119,7 @@ impl State for Counts {
     }
 
     #[inline(always)]
-    fn code<C: Coder>(
-        &mut self,
-        coder: &mut C,
-        wanted: Option<i64>,
-        _: [f64; JOINT_COLUMNS],
-    ) -> Result<i64, CodecError> {
+    fn code<C: Coder>(&mut self, coder: &mut C, wanted: Option<i64>, _: [f64; JOINT_COLUMNS]) -> Result<i64, Damaged> {
         let expected = self.expected();
         // From mean size 4 on the lowest bits of differences are noise.
         let k = 64 - (self.size / 64).leading_zeros();
@@ -172,7 +167,7 @@ impl State for Counts {
 
 /// Elias gamma code of a number above zero.
 #[inline(always)]
-pub(super) fn gamma<C: Coder>(coder: &mut C, value: u64) -> Result<u64, CodecError> {
+pub(crate) fn gamma<C: Coder>(coder: &mut C, value: u64) -> Result<u64, Damaged> {
     let wanted = 63 - value.max(1).leading_zeros();
     let mut bits = 0;
     while coder.bit(1 << 15, bits < wanted) {

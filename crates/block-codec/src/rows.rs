@@ -1,20 +1,20 @@
 //! The loop over rows that writer and reader share, for any coder of indices.
 
-use super::coder::Coder;
-use fewbits_core::CodecError;
-use fewbits_numerics::kernels::vectorised_narrow;
+use crate::arithmetic::Coder;
+use crate::error::Damaged;
+use crate::vectors::vectorised_narrow;
 
 /// Largest size of an index: sums of a few fit into an `i64`.
-pub(super) const LARGEST: i64 = 1 << 46;
+pub(crate) const LARGEST: i64 = 1 << 46;
 /// Largest number of other columns that a joint block uses.
 pub const JOINT_COLUMNS: usize = 3;
 /// Differences of other columns from row to row, divided by their mean size. Both ends compute the same numbers.
-pub(super) struct Others<'a> {
+pub(crate) struct Others<'a> {
     columns: Vec<(&'a [f64], f64)>,
 }
 
 impl<'a> Others<'a> {
-    pub(super) fn new(others: &[&'a [f64]]) -> Self {
+    pub(crate) fn new(others: &[&'a [f64]]) -> Self {
         let columns = others.iter().take(JOINT_COLUMNS).map(|column| {
             let sizes = column.windows(2).map(|pair| (pair[1] - pair[0]).abs());
             let (mut sum, mut count) = (0.0, 0.0);
@@ -44,7 +44,7 @@ impl<'a> Others<'a> {
 const EXPECTED_ROWS: usize = 4096;
 
 /// The state of a coder of indices, the same at writer and reader.
-pub(super) trait State {
+pub(crate) trait State {
     /// The index that was coded last.
     fn last(&self) -> i64;
 
@@ -55,7 +55,7 @@ pub(super) trait State {
         coder: &mut C,
         wanted: Option<i64>,
         others: [f64; JOINT_COLUMNS],
-    ) -> Result<i64, CodecError>;
+    ) -> Result<i64, Damaged>;
 
     /// Updates the state with the index that was coded, of at most [`LARGEST`] in size.
     fn learn(&mut self, index: i64);
@@ -63,13 +63,13 @@ pub(super) trait State {
 
 /// Codes the indices after the first one: `wanted` at the writer, `None` at the reader, which stops if the bytes end too early. Returns all
 /// indices. After an error the coder must not be used.
-pub(super) fn code_all<C: Coder, S: State>(
+pub(crate) fn code_all<C: Coder, S: State>(
     coder: &mut C,
     state: S,
     wanted: Option<&[i64]>,
     rows: usize,
     others: Option<&Others<'_>>,
-) -> Result<Vec<i64>, CodecError> {
+) -> Result<Vec<i64>, Damaged> {
     vectorised_narrow(
         #[inline(always)]
         move || {
@@ -97,6 +97,6 @@ pub(super) fn code_all<C: Coder, S: State>(
     )
 }
 
-pub(super) fn damaged(value: i64) -> CodecError {
-    CodecError::invalid("index", value, "at most 2^46 in size")
+pub(crate) fn damaged(value: i64) -> Damaged {
+    Damaged::new("index", value, "at most 2^46 in size")
 }

@@ -4,7 +4,7 @@
 //! equal in both ends are output. The code ends with the fewest bytes that, followed by zeros, lie in the interval. The decoder computes
 //! them again, so it detects bytes after the end.
 
-use fewbits_core::CodecError;
+use crate::error::Damaged;
 use std::hint::select_unpredictable;
 
 /// Bits of a probability.
@@ -182,7 +182,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// If the bytes are not those that a writer of the same decisions would have written.
-    pub fn finish(&self) -> Result<(), CodecError> {
+    pub fn finish(&self) -> Result<(), Damaged> {
         let (end, count) = self.interval.end();
         // The bytes that were shifted out of the interval are settled; the end follows them.
         let settled = self.taken - AHEAD;
@@ -191,7 +191,7 @@ impl<'a> Reader<'a> {
             return Ok(());
         }
         let expected = "the bytes that a writer of as many rows ends with";
-        Err(CodecError::invalid("block", format!("{} bytes", self.bytes.len()), expected))
+        Err(Damaged::new("block", format!("{} bytes", self.bytes.len()), expected))
     }
 }
 

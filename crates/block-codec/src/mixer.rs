@@ -7,17 +7,17 @@
 //!
 //! All inputs of a decision are in one array, so that vector instructions process them together.
 
-use super::priors::MIXER_WEIGHTS;
+use crate::priors::MIXER_WEIGHTS;
 use fewbits_node::elementary::{greater, lesser, log2, squash};
 
 /// Number of contexts in which outcomes are counted.
-pub(super) const CONTEXTS: usize = 4;
+pub(crate) const CONTEXTS: usize = 4;
 /// Number of experts. Their inputs follow those of the contexts.
-pub(super) const EXPERTS: usize = 4;
+pub(crate) const EXPERTS: usize = 4;
 /// Number of inputs: they fill a vector register.
-pub(super) const INPUTS: usize = CONTEXTS + EXPERTS;
+pub(crate) const INPUTS: usize = CONTEXTS + EXPERTS;
 /// Number of classes of decisions, each with its own weights: zero, sign, three magnitudes, further ones, inside an interval, low bits.
-pub(super) const CLASSES: usize = 8;
+pub(crate) const CLASSES: usize = 8;
 /// Largest size of the log odds of a decision and of an input, in bits.
 const FARTHEST: f32 = 15.0;
 const FARTHEST_INPUT: f32 = 12.0;
@@ -48,13 +48,13 @@ fn seen(slot: Slot) -> u32 {
 
 /// Contexts, experts' inputs and weights.
 #[derive(Debug, Clone)]
-pub(super) struct Mixer {
+pub(crate) struct Mixer {
     /// Pairs of slots, context after context.
     slots: Vec<[Slot; 2]>,
     /// Number of pairs per context.
     pairs: u32,
     /// Hashes of the contexts of this row.
-    pub(super) contexts: [u32; CONTEXTS],
+    pub(crate) contexts: [u32; CONTEXTS],
     /// Shares of the two outcomes. The caller sets those of the experts before each decision.
     yes: [f32; INPUTS],
     no: [f32; INPUTS],
@@ -71,7 +71,7 @@ pub(super) struct Mixer {
 
 impl Mixer {
     /// A mixer for a block of `rows` rows.
-    pub(super) fn new(rows: usize) -> Self {
+    pub(crate) fn new(rows: usize) -> Self {
         let pairs = rows.min(1 << 13).next_power_of_two().max(1 << 8);
         Self {
             slots: vec![[0; 2]; CONTEXTS * pairs],
@@ -96,7 +96,7 @@ impl Mixer {
     /// Decisions of one context are adjacent, sixteen per cache line. A slot is one of a pair. If neither is of this
     /// context, the one with fewer occurrences is replaced. The code has no branches, because the processor would mispredict them.
     #[inline(always)]
-    pub(super) fn look_up(&mut self, node: u32, class: usize) {
+    pub(crate) fn look_up(&mut self, node: u32, class: usize) {
         self.class = class;
         let far = (node >> 4).wrapping_mul(0x9E37_79B1);
         let (mut places, mut checks) = ([0; CONTEXTS], [0; CONTEXTS]);
@@ -129,7 +129,7 @@ impl Mixer {
 
     /// Sets the shares that the experts give to the two outcomes.
     #[inline(always)]
-    pub(super) fn set_experts(&mut self, yes: [f32; EXPERTS], no: [f32; EXPERTS]) {
+    pub(crate) fn set_experts(&mut self, yes: [f32; EXPERTS], no: [f32; EXPERTS]) {
         for e in 0..EXPERTS {
             self.yes[CONTEXTS + e] = greater(yes[e], LEAST);
             self.no[CONTEXTS + e] = greater(no[e], LEAST);
@@ -138,7 +138,7 @@ impl Mixer {
 
     /// Probability that the decision looked up is `true`: in units of `2^-16`, in `1..2^16`.
     #[inline(always)]
-    pub(super) fn predict(&mut self) -> u32 {
+    pub(crate) fn predict(&mut self) -> u32 {
         let mut inputs = [0.0; INPUTS];
         for i in 0..INPUTS {
             let odds = log2(self.yes[i] / self.no[i]);
@@ -163,7 +163,7 @@ impl Mixer {
 
     /// Updates counts and weights with the outcome of the decision.
     #[inline(always)]
-    pub(super) fn update(&mut self, bit: bool) {
+    pub(crate) fn update(&mut self, bit: bool) {
         let decisions = &mut self.decisions[self.class];
         let rate = RATE * (1.0 + FIRST_RATES / (1.0 + *decisions * (1.0 / RATE_FALLS)));
         *decisions += 1.0;

@@ -4,11 +4,11 @@
 //! ranges of a vehicle, server metrics, electricity) at bounds of .25 to 2 % of their ranges. They are part of the format: with other
 //! numbers a reader decodes other samples.
 
-use super::mixer::{CLASSES, INPUTS};
+use crate::mixer::{CLASSES, INPUTS};
 
 /// Weights of the inputs of each class of decisions: contexts, then experts.
 #[rustfmt::skip]
-pub(super) const MIXER_WEIGHTS: [[f32; INPUTS]; CLASSES] = [
+pub(crate) const MIXER_WEIGHTS: [[f32; INPUTS]; CLASSES] = [
     // zero
     [0.196, 0.173, 0.161, 0.210, 0.076, 0.123, -0.015, 0.113],
     // sign

@@ -1,12 +1,13 @@
 //! The grid of a block's reconstructions: conversion between samples and integers.
 
-use crate::Config;
-use fewbits_core::CodecError;
+use crate::bytes::{push_varint, zigzag};
+use crate::vectors::vectorised_narrow;
 use fewbits_node::adaptive::TENS;
-use fewbits_numerics::kernels::vectorised_narrow;
 
 /// Largest sample as a decimal integer: sums of two are exact doubles.
 const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
+/// Largest sample of single precision as a decimal integer: beyond that neighbours are the same number.
+const LARGEST_SINGLE_DIGITS: f64 = (1_u64 << 24) as f64;
 /// Integers up to this size are exact doubles.
 const WHOLE: i64 = 1 << 53;
 /// Share by which steps are shorter than `2 delta`, so that rounding cannot move a reconstruction out of its bound.
@@ -15,7 +16,7 @@ const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
 const LARGEST_CIRCLE: f64 = (1_u64 << 40) as f64;
 /// A grid can be moved by multiples of `2^-PHASE_BITS` of a cell.
 const PHASE_BITS: u32 = 4;
-pub(super) const PHASES: u8 = 1 << PHASE_BITS;
+pub(crate) const PHASES: u8 = 1 << PHASE_BITS;
 /// Number of samples from which the phase of a grid is chosen.
 const FITTED: usize = 1 << 20;
 /// Distance from the first sample, in cells, beyond which the phase is not determined.
@@ -23,16 +24,18 @@ const FARTHEST_PLACE: f64 = (1 << 28) as f64;
 /// Number of changes of the cell between neighbouring samples that together cost about a byte.
 const CROSSINGS_OF_A_BYTE: u32 = 4;
 /// Number of decimal grids that are tried.
-pub(super) const DECIMALS: u8 = 13;
+pub(crate) const DECIMALS: u8 = 13;
 
 /// The reconstructions: points with integer indices.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Grid {
+pub(crate) enum Grid {
     /// Samples are integer multiples of `10^-decimals`. A cell has `width` neighbouring multiples, as many as lie within the bound of its
     /// middle. The first of them is `phase` sixteenths of the width, rounded up, from a multiple of the width.
     Decimal { decimals: u8, width: i64, phase: u8 },
     /// Samples are exactly `(origin + unit j) / 10^decimals`.
     Stepped { decimals: u8, unit: i64, origin: i64 },
+    /// As [`Stepped`](Self::Stepped), rounded to single precision.
+    Single { decimals: u8, unit: i64, origin: i64 },
     /// `anchor + step (j + phase / 16)`.
     Line { anchor: f64, step: f64, phase: u8 },
     /// `cells` equal cells on a circle.
@@ -46,6 +49,14 @@ fn digits(sample: f64, ten: f64) -> Option<i64> {
     (whole.abs() < LARGEST_DIGITS && (whole / ten).to_bits() == sample.to_bits()).then_some(whole as i64)
 }
 
+/// The integer `digits` with `sample == digits / ten` rounded to single precision, if there is one.
+#[inline(always)]
+fn single_digits(sample: f64, ten: f64) -> Option<i64> {
+    let whole = (sample * ten).round();
+    let rounded = f64::from((whole / ten) as f32);
+    (whole.abs() < LARGEST_SINGLE_DIGITS && rounded.to_bits() == sample.to_bits()).then_some(whole as i64)
+}
+
 fn greatest_common_divisor(mut a: i64, mut b: i64) -> i64 {
     while b != 0 {
         (a, b) = (b, a % b);
@@ -55,7 +66,7 @@ fn greatest_common_divisor(mut a: i64, mut b: i64) -> i64 {
 
 impl Grid {
     /// The decimal grid that fits all samples, if there is one. `delta` is zero if samples must be exact.
-    pub(super) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
+    pub(crate) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
         let decimals = (0..DECIMALS).find(|decimals| {
             let ten = TENS[usize::from(*decimals)];
             samples.iter().all(|x| digits(*x, ten).is_some())
@@ -81,14 +92,36 @@ impl Grid {
         })
     }
 
+    /// The grid of decimal numbers that were rounded to single precision, if it fits all samples.
+    pub(crate) fn single(samples: &[f64]) -> Option<Self> {
+        let decimals = (0..DECIMALS).find(|decimals| {
+            let ten = TENS[usize::from(*decimals)];
+            samples.iter().all(|x| single_digits(*x, ten).is_some())
+        })?;
+        let ten = TENS[usize::from(decimals)];
+        let mut all = samples.iter().filter_map(|x| single_digits(*x, ten));
+        let origin = all.next()?;
+        let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
+        let unit = unit.max(1);
+        Some(Self::Single { decimals, unit, origin })
+    }
+
+    /// The same grid of samples of single precision, if it has steps.
+    pub(crate) fn rounded_to_single(self) -> Self {
+        match self {
+            Self::Stepped { decimals, unit, origin } => Self::Single { decimals, unit, origin },
+            grid => grid,
+        }
+    }
+
     /// Number of neighbouring multiples of `1 / ten` within `delta` of their middle; `None` if it is too large.
-    pub(super) fn width(delta: f64, ten: f64) -> Option<i64> {
+    pub(crate) fn width(delta: f64, ten: f64) -> Option<i64> {
         let neighbours = (2.0 * delta * ten * (1.0 - SLACK)).floor();
         (neighbours < LARGEST_DIGITS).then(|| neighbours as i64 + 1)
     }
 
     /// The grid of a bound for samples that are not decimal numbers.
-    pub(super) fn line(delta: f64, anchor: f64) -> Self {
+    pub(crate) fn line(delta: f64, anchor: f64) -> Self {
         Self::Line {
             anchor,
             step: 2.0 * delta * (1.0 - SLACK),
@@ -97,7 +130,7 @@ impl Grid {
     }
 
     /// The same grid moved by `moved` sixteenths of a cell, if the grid can be moved.
-    pub(super) fn with_phase(mut self, moved: u8) -> Self {
+    pub(crate) fn with_phase(mut self, moved: u8) -> Self {
         if let Self::Decimal { phase, .. } | Self::Line { phase, .. } = &mut self {
             *phase = moved;
         }
@@ -105,7 +138,7 @@ impl Grid {
     }
 
     /// Sixteenths of a cell by which the grid is moved.
-    pub(super) fn phase(&self) -> u8 {
+    pub(crate) fn phase(&self) -> u8 {
         match self {
             Self::Decimal { phase, .. } | Self::Line { phase, .. } => *phase,
             _ => 0,
@@ -113,7 +146,7 @@ impl Grid {
     }
 
     /// The grid moved so that neighbouring samples are most often in one cell, if that saves more than the byte for the phase.
-    pub(super) fn fitted(self, samples: &[f64]) -> Self {
+    pub(crate) fn fitted(self, samples: &[f64]) -> Self {
         let phases = f64::from(PHASES);
         let (scale, offset) = match self {
             // Half a digit from the next cell, so that rounding cannot move a sample there.
@@ -153,9 +186,9 @@ impl Grid {
         }
     }
 
-    /// The grid of a bound on a circle. [`Config::circular`] allows at most `2^40` cells.
-    pub(super) fn circle(config: &Config, period: f64) -> Self {
-        let cells = (period / (2.0 * config.delta() * (1.0 - SLACK)))
+    /// The grid of a bound on a circle. [`BlockCodec::on_circle`](crate::BlockCodec::on_circle) allows at most `2^40` cells.
+    pub(crate) fn circle(delta: f64, period: f64) -> Self {
+        let cells = (period / (2.0 * delta * (1.0 - SLACK)))
             .ceil()
             .clamp(1.0, LARGEST_CIRCLE);
         Self::Circle {
@@ -172,7 +205,7 @@ impl Grid {
     }
 
     /// Whether both grids have the same kind and spacing; their origins may differ.
-    pub(super) fn is_like(&self, other: &Self) -> bool {
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Line { .. }, Self::Line { .. }) => true,
             (
@@ -181,12 +214,18 @@ impl Grid {
                     decimals: d, unit: u, ..
                 },
             ) => (decimals, unit) == (d, u),
+            (
+                Self::Single { decimals, unit, .. },
+                Self::Single {
+                    decimals: d, unit: u, ..
+                },
+            ) => (decimals, unit) == (d, u),
             _ => self.with_phase(0) == other.with_phase(0),
         }
     }
 
     /// Number of points on the circle; `None` for other grids.
-    pub(super) fn cells(&self) -> Option<i64> {
+    pub(crate) fn cells(&self) -> Option<i64> {
         match self {
             Self::Circle { cells, .. } => Some(*cells),
             _ => None,
@@ -195,7 +234,7 @@ impl Grid {
 
     /// The reconstruction of an index.
     #[inline(always)]
-    pub(super) fn value(&self, index: i64) -> f64 {
+    pub(crate) fn value(&self, index: i64) -> f64 {
         match self {
             Self::Decimal { decimals, width, phase } => {
                 let moved = width - 1 + 2 * Self::digits_moved(*width, *phase);
@@ -212,6 +251,11 @@ impl Grid {
             Self::Stepped { decimals, unit, origin } => {
                 (i128::from(*origin) + i128::from(*unit) * i128::from(index)) as f64 / TENS[usize::from(*decimals)]
             }
+            Self::Single { decimals, unit, origin } => {
+                let digits = (i128::from(*origin) + i128::from(*unit) * i128::from(index)) as f64;
+                let rounded = f64::from((digits / TENS[usize::from(*decimals)]) as f32);
+                rounded.clamp(f64::MIN, f64::MAX)
+            }
             Self::Line { anchor, step, phase } => {
                 (anchor + step * (index as f64 + f64::from(*phase) / f64::from(PHASES))).clamp(f64::MIN, f64::MAX)
             }
@@ -223,7 +267,7 @@ impl Grid {
     }
 
     /// The reconstructions of indices.
-    pub(super) fn values(&self, indices: &[i64]) -> Vec<f64> {
+    pub(crate) fn values(&self, indices: &[i64]) -> Vec<f64> {
         // If all indices are a little smaller than these limits, arithmetic in doubles is exact and can be vectorised.
         let exact = |largest: i64| indices.iter().all(|index| index.unsigned_abs() < largest as u64);
         match *self {
@@ -240,8 +284,8 @@ impl Grid {
     /// The index of a sample; on a circle, of its equivalent indices the one nearest to `near`. `None` if it is too large. The caller must
     /// check that the reconstruction is within the bound.
     #[inline(always)]
-    pub(super) fn index(&self, sample: f64, near: i64) -> Option<i64> {
-        let whole = |x: f64| (x.abs() < super::rows::LARGEST as f64).then(|| x.round() as i64);
+    pub(crate) fn index(&self, sample: f64, near: i64) -> Option<i64> {
+        let whole = |x: f64| (x.abs() < crate::rows::LARGEST as f64).then(|| x.round() as i64);
         match self {
             Self::Decimal { decimals, width, phase } => {
                 let digits = (sample * TENS[usize::from(*decimals)]).round();
@@ -249,8 +293,14 @@ impl Grid {
                     .then_some(digits as i64)
                     .map(|digits| (digits - Self::digits_moved(*width, *phase)).div_euclid(*width))
             }
-            Self::Stepped { decimals, unit, origin } => {
-                let digits = digits(sample, TENS[usize::from(*decimals)])?;
+            Self::Stepped { decimals, unit, origin } | Self::Single { decimals, unit, origin } => {
+                let ten = TENS[usize::from(*decimals)];
+                let is_single = matches!(self, Self::Single { .. });
+                let digits = if is_single {
+                    single_digits(sample, ten)
+                } else {
+                    digits(sample, ten)
+                }?;
                 let offset = i128::from(digits) - i128::from(*origin);
                 i64::try_from(offset.div_euclid(i128::from(*unit))).ok()
             }
@@ -266,13 +316,13 @@ impl Grid {
                 near.checked_add(shortest)
             }
         }
-        .filter(|index| index.abs() <= super::rows::LARGEST)
+        .filter(|index| index.abs() <= crate::rows::LARGEST)
     }
 
     /// Writes what the reader needs besides the configuration.
-    pub(super) fn write(&self, bytes: &mut Vec<u8>) {
+    pub(crate) fn write(&self, bytes: &mut Vec<u8>) {
         match self {
-            Self::Stepped { unit, origin, .. } => {
+            Self::Stepped { unit, origin, .. } | Self::Single { unit, origin, .. } => {
                 push_varint(bytes, *unit as u64);
                 push_varint(bytes, zigzag(*origin));
             }
@@ -282,54 +332,5 @@ impl Grid {
         if self.phase() != 0 {
             bytes.push(self.phase());
         }
-    }
-}
-
-pub(super) fn zigzag(k: i64) -> u64 {
-    ((k << 1) ^ (k >> 63)) as u64
-}
-
-pub(crate) fn unzigzag(z: u64) -> i64 {
-    (z >> 1) as i64 ^ -((z & 1) as i64)
-}
-
-/// Appends seven bits per byte, the lowest first. The highest bit of a byte says that more follow.
-pub(super) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
-    while value >= 128 {
-        bytes.push(value as u8 | 128);
-        value >>= 7;
-    }
-    bytes.push(value as u8);
-}
-
-/// Reads bytes from the front.
-#[derive(Debug)]
-pub(super) struct Bytes<'a>(pub(super) &'a [u8]);
-
-impl Bytes<'_> {
-    pub(super) fn array<const N: usize>(&mut self) -> Result<[u8; N], CodecError> {
-        let (taken, rest) = self.0.split_first_chunk::<N>().ok_or(CodecError::EndOfMessage {
-            requested: 8 * N as u32,
-            available: 8 * self.0.len(),
-        })?;
-        let taken = *taken;
-        self.0 = rest;
-        Ok(taken)
-    }
-
-    pub(super) fn varint(&mut self) -> Result<u64, CodecError> {
-        let mut value = 0_u64;
-        for shift in (0..70).step_by(7) {
-            let [byte] = self.array()?;
-            let low = u64::from(byte & 127);
-            if shift == 63 && low > 1 {
-                break;
-            }
-            value |= low << shift;
-            if byte < 128 {
-                return Ok(value);
-            }
-        }
-        Err(CodecError::invalid("number", "more than 64 bits", "at most 64 bits"))
     }
 }

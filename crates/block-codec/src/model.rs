@@ -7,11 +7,11 @@
 //! cell 0?   sign   at least 2, 3, 4, 6, 10, .. cells away?   where in the interval?   k low bits, the highest two with a model
 //! ```
 
-use super::coder::Coder;
-use super::experts::{Frequencies, LeastSquares, PREDICTED, Tails, Tracks};
-use super::mixer::{EXPERTS, Mixer};
-use super::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
-use fewbits_core::CodecError;
+use crate::arithmetic::Coder;
+use crate::error::Damaged;
+use crate::experts::{Frequencies, LeastSquares, PREDICTED, Tails, Tracks};
+use crate::mixer::{EXPERTS, Mixer};
+use crate::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
 use fewbits_node::elementary::round;
 
 /// Number of past differences used as regressors.
@@ -45,7 +45,7 @@ impl State for Model {
         coder: &mut C,
         wanted: Option<i64>,
         others: [f64; JOINT_COLUMNS],
-    ) -> Result<i64, CodecError> {
+    ) -> Result<i64, Damaged> {
         let grid = self.expect(others);
         self.decide(coder, grid, wanted)
     }
@@ -91,7 +91,7 @@ impl Grid {
 
 /// The state of the coder, the same at writer and reader.
 #[derive(Debug, Clone)]
-pub(super) struct Model {
+pub(crate) struct Model {
     mixer: Mixer,
     squares: LeastSquares<4>,
     /// Least squares with other columns too.
@@ -116,7 +116,7 @@ fn less(a: [f32; EXPERTS], b: [f32; EXPERTS]) -> [f32; EXPERTS] {
 
 impl Model {
     /// The state after the first index of a block of `rows` rows. `cells`: number of points on a circle.
-    pub(super) fn new(rows: usize, first: i64, cells: Option<i64>, joint: bool) -> Self {
+    pub(crate) fn new(rows: usize, first: i64, cells: Option<i64>, joint: bool) -> Self {
         let mut frequencies = Frequencies::new(first, cells);
         frequencies.add(first, true);
         Self {
@@ -202,7 +202,7 @@ impl Model {
     }
 
     #[inline(always)]
-    fn decide<C: Coder>(&mut self, coder: &mut C, grid: Grid, wanted: Option<i64>) -> Result<i64, CodecError> {
+    fn decide<C: Coder>(&mut self, coder: &mut C, grid: Grid, wanted: Option<i64>) -> Result<i64, Damaged> {
         self.mixer.look_up(0, 0);
         let (first, next) = (grid.first(0), grid.first(1));
         let mut tails = [

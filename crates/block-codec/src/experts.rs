@@ -2,14 +2,14 @@
 //!
 //! Positions are relative to the last index. A prediction has a logistic law whose scale follows its past errors.
 
-use super::mixer::EXPERTS;
+use crate::mixer::EXPERTS;
 use fewbits_node::elementary::power;
 
 /// Each expert's probability below and above an edge, both with a small relative error.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Tails {
-    pub(super) below: [f32; EXPERTS],
-    pub(super) above: [f32; EXPERTS],
+pub(crate) struct Tails {
+    pub(crate) below: [f32; EXPERTS],
+    pub(crate) above: [f32; EXPERTS],
 }
 
 /// `log2 e`: logistic laws are written in powers of two.
@@ -19,21 +19,21 @@ const FLAT: f32 = 60.0;
 /// Weight of the newest error in the mean, after many errors.
 const FADING: f32 = 0.02;
 /// Number of the expert [`Frequencies`]; other experts are predictions.
-pub(super) const PREDICTED: usize = 1;
-pub(super) const COUNTED: usize = EXPERTS - 1;
+pub(crate) const PREDICTED: usize = 1;
+pub(crate) const COUNTED: usize = EXPERTS - 1;
 /// Places for predictions; one is unused.
 const TRACKS: usize = EXPERTS;
 
 /// Predictions with exponentially weighted means of their absolute errors.
 #[derive(Debug, Clone)]
-pub(super) struct Tracks {
-    pub(super) at: [f32; TRACKS],
-    pub(super) errors: [f32; TRACKS],
+pub(crate) struct Tracks {
+    pub(crate) at: [f32; TRACKS],
+    pub(crate) errors: [f32; TRACKS],
     sharpness: [f32; TRACKS],
 }
 
 impl Tracks {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let mut tracks = Self {
             at: [0.0; TRACKS],
             errors: [1.0; TRACKS],
@@ -53,7 +53,7 @@ impl Tracks {
 
     /// Updates the errors with the actual step; `seen` is the number of earlier steps.
     #[inline(always)]
-    pub(super) fn update(&mut self, step: f32, seen: f32) {
+    pub(crate) fn update(&mut self, step: f32, seen: f32) {
         let rate = (1.0 / (seen + 1.5)).max(FADING);
         for i in 0..TRACKS {
             self.errors[i] += ((step - self.at[i]).abs() - self.errors[i]) * rate;
@@ -63,7 +63,7 @@ impl Tracks {
 
     /// The probabilities below and above an edge.
     #[inline(always)]
-    pub(super) fn tails(&self, edge: f32) -> Tails {
+    pub(crate) fn tails(&self, edge: f32) -> Tails {
         let mut tails = Tails::default();
         for i in 0..TRACKS {
             let odds = (self.at[i] - edge) * self.sharpness[i];
@@ -77,8 +77,8 @@ impl Tracks {
 
 /// Recursive least squares for the next difference on `N` regressors (a power of two), with exponential forgetting.
 #[derive(Debug, Clone)]
-pub(super) struct LeastSquares<const N: usize> {
-    pub(super) regressors: [f64; N],
+pub(crate) struct LeastSquares<const N: usize> {
+    pub(crate) regressors: [f64; N],
     coefficients: [f64; N],
     covariance: [[f64; N]; N],
 }
@@ -110,7 +110,7 @@ fn product<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
 }
 
 impl<const N: usize> LeastSquares<N> {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             regressors: [0.0; N],
             coefficients: [0.0; N],
@@ -123,13 +123,13 @@ impl<const N: usize> LeastSquares<N> {
     }
 
     #[inline(always)]
-    pub(super) fn predict(&self) -> f32 {
+    pub(crate) fn predict(&self) -> f32 {
         product(&self.coefficients, &self.regressors).clamp(-FARTHEST, FARTHEST) as f32
     }
 
     /// Updates with the actual `step` that followed the regressors.
     #[inline(always)]
-    pub(super) fn update(&mut self, step: f64) {
+    pub(crate) fn update(&mut self, step: f64) {
         // `P x`, from the rows of the symmetric `P`.
         let mut gain = [0.0; N];
         for (row, regressor) in self.covariance.iter().zip(&self.regressors) {
@@ -176,7 +176,7 @@ const BLOCK: usize = 64;
 
 /// How often each index occurred, for signals whose values return.
 #[derive(Debug, Clone)]
-pub(super) struct Frequencies {
+pub(crate) struct Frequencies {
     counts: Vec<[u32; BLOCK]>,
     /// Sum of the counts below each group of `BLOCK` indices.
     below: [u32; WINDOW / BLOCK],
@@ -190,7 +190,7 @@ pub(super) struct Frequencies {
 
 impl Frequencies {
     /// A window centred on the first index. On a circle of at most `WINDOW` cells it holds all of them.
-    pub(super) fn new(first: i64, cells: Option<i64>) -> Self {
+    pub(crate) fn new(first: i64, cells: Option<i64>) -> Self {
         let cells = cells.filter(|cells| *cells <= WINDOW as i64);
         Self {
             counts: vec![[0; BLOCK]; WINDOW / BLOCK],
@@ -203,7 +203,7 @@ impl Frequencies {
     }
 
     #[inline(always)]
-    pub(super) fn add(&mut self, index: i64, changed: bool) {
+    pub(crate) fn add(&mut self, index: i64, changed: bool) {
         let offset = self.offset(index);
         if !(0..WINDOW as i64).contains(&offset) || self.total >= MOST_COUNTED {
             return;
@@ -253,7 +253,7 @@ impl Frequencies {
 
     /// Adds the law of the counts, combined with a prediction's law as prior, to the tails at an edge (the first index above it).
     #[inline(always)]
-    pub(super) fn complete(&self, edge: i64, centre: i64, tails: &mut Tails) {
+    pub(crate) fn complete(&self, edge: i64, centre: i64, tails: &mut Tails) {
         self.fill(self.below(edge, centre), tails);
     }
 
@@ -265,7 +265,7 @@ impl Frequencies {
 
     /// As [`complete`](Self::complete), for both edges of the cell `first..next`.
     #[inline(always)]
-    pub(super) fn complete_cell(&self, first: i64, next: i64, centre: i64, tails: &mut [Tails; 2]) {
+    pub(crate) fn complete_cell(&self, first: i64, next: i64, centre: i64, tails: &mut [Tails; 2]) {
         let below = self.below(first, centre);
         let inside = if next - first == 1 {
             let offset = self.offset(first);

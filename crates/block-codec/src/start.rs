@@ -11,15 +11,15 @@
 //! The start itself: grid (byte: decimals, or 13 line, 14 circle, 16 more if steps follow, 32 more if a phase does), steps (unit and origin as in
 //! blocks), phase (byte, as in blocks), usual index (zigzag varint), `k` (byte).
 
-use super::coder::{Coder, Reader, Writer};
-use super::counts::gamma;
-use super::grid::{Bytes, DECIMALS, Grid, push_varint, unzigzag, zigzag};
-use super::head::{CIRCLE, LINE};
-use super::indices::code_rest;
-use super::rows::{LARGEST, Others};
-use super::{Accuracy, BlockCodec, Effort, check_rows};
-use crate::Error;
-use fewbits_core::CodecError;
+use crate::arithmetic::{Coder, Reader, Writer};
+use crate::bytes::{Bytes, push_varint, unzigzag, zigzag};
+use crate::counts::gamma;
+use crate::error::Damaged;
+use crate::grid::{DECIMALS, Grid};
+use crate::head::{CIRCLE, LINE};
+use crate::indices::code_rest;
+use crate::rows::{LARGEST, Others};
+use crate::{Accuracy, BlockCodec, Effort, Error, check_rows};
 
 /// Probabilities, in units of `2^-16`, that a block uses the start, and that it is coded by models.
 const WITH_START: u32 = 65_280;
@@ -34,6 +34,8 @@ const FEW_ROWS: usize = 1024;
 const STEPPED: u8 = 16;
 /// Flag beside the grid: a phase follows.
 const MOVED: u8 = 32;
+/// Flag beside the grid, together with steps: the samples are rounded to single precision.
+const SINGLE: u8 = 64;
 /// Indices are smaller than `2^47` in zigzag form.
 const MOST_BITS: u8 = 47;
 
@@ -64,6 +66,7 @@ impl Start {
                 | match self.grid {
                     Grid::Decimal { decimals, .. } => decimals,
                     Grid::Stepped { decimals, .. } => decimals | STEPPED,
+                    Grid::Single { decimals, .. } => decimals | STEPPED | SINGLE,
                     Grid::Line { .. } => LINE,
                     Grid::Circle { .. } => CIRCLE,
                 },
@@ -79,7 +82,7 @@ impl Start {
         self.grid.values(indices)
     }
 
-    fn first_index<C: Coder>(&self, coder: &mut C, wanted: Option<i64>) -> Result<i64, CodecError> {
+    fn first_index<C: Coder>(&self, coder: &mut C, wanted: Option<i64>) -> Result<i64, Damaged> {
         let k = u32::from(self.k);
         let z = wanted.map_or(0, |index| zigzag(index - self.usual));
         // The gamma code begins at one.
@@ -88,7 +91,7 @@ impl Start {
         let offset = high.checked_mul(1 << k).map(|high| unzigzag(high | low));
         match offset.and_then(|offset| offset.checked_add(self.usual)) {
             Some(index) if index.unsigned_abs() <= LARGEST as u64 => Ok(index),
-            _ => Err(CodecError::invalid("first index", "too large", "at most 2^46 in size")),
+            _ => Err(Damaged::new("first index", "too large", "at most 2^46 in size")),
         }
     }
 }
@@ -134,20 +137,25 @@ impl BlockCodec {
     pub fn read_start(&self, bytes: &mut &[u8]) -> Result<Start, Error> {
         let mut reader = Bytes(bytes);
         let [head] = reader.array()?;
-        let kind = head & !MOVED;
+        let kind = head & !(MOVED | SINGLE);
+        let is_single = head & SINGLE != 0;
         let mut grid = match (kind & !STEPPED, self.accuracy) {
-            (0..DECIMALS, _) => self.decimal_grid(kind & !STEPPED, kind & STEPPED != 0, &mut reader)?,
-            (LINE, Accuracy::Within(config)) if kind == LINE => Grid::line(config.delta(), 0.0),
-            (CIRCLE, Accuracy::Within(config)) if kind == CIRCLE => self.circle(&config)?,
-            _ => return Err(CodecError::invalid("grid", kind, "one of the agreed accuracy").into()),
+            (0..DECIMALS, _) if !is_single || kind & STEPPED != 0 => {
+                let grid = self.decimal_grid(kind & !STEPPED, kind & STEPPED != 0, &mut reader)?;
+                if is_single { grid.rounded_to_single() } else { grid }
+            }
+            _ if is_single => return Err(Damaged::new("grid", kind, "decimals with steps").into()),
+            (LINE, Accuracy::Within { delta, .. }) if kind == LINE => Grid::line(delta, 0.0),
+            (CIRCLE, Accuracy::Within { .. }) if kind == CIRCLE => self.circle()?,
+            _ => return Err(Damaged::new("grid", kind, "one of the agreed accuracy").into()),
         };
         if head & MOVED != 0 {
-            grid = super::read_phase(grid, &mut reader)?;
+            grid = crate::decode::read_phase(grid, &mut reader)?;
         }
         let usual = unzigzag(reader.varint()?);
         let [k] = reader.array()?;
         if usual.unsigned_abs() > LARGEST as u64 || k > MOST_BITS {
-            return Err(CodecError::invalid("usual index", usual, "at most 2^46 in size").into());
+            return Err(Damaged::new("usual index", usual, "at most 2^46 in size").into());
         }
         *bytes = reader.0;
         Ok(Start { grid, usual, k })
@@ -167,9 +175,13 @@ impl BlockCodec {
                 found.push(self.started(start, &indices, Some(&Others::new(others)))?);
             }
         }
+        let fine = match self.effort {
+            Effort::Thorough => crate::encode::FINE,
+            Effort::Fast => crate::encode::FINE_IF_FAST,
+        };
         let is_fine = found
             .first()
-            .is_none_or(|block| block.bytes.len() > super::FINE * samples.len() / 8);
+            .is_none_or(|block| block.bytes.len() > fine * samples.len() / 8);
         // If the start does not fit the block, a block of its own is shorter.
         if is_fine || !self.grid(samples).is_some_and(|grid| grid.is_like(&start.grid)) {
             let alone = self.encode_with(samples, others)?;
@@ -179,7 +191,7 @@ impl BlockCodec {
             });
         }
         let shortest = found.into_iter().min_by_key(|block| block.bytes.len());
-        shortest.ok_or_else(|| CodecError::invalid("block", "none", "a coding that holds the samples").into())
+        shortest.ok_or_else(|| Damaged::new("block", "none", "a coding that holds the samples").into())
     }
 
     /// The samples as indices on the start's grid, for [`code_shared`](Self::code_shared). `None` if a block of its own may be shorter: a
@@ -227,13 +239,13 @@ impl BlockCodec {
         wanted: Option<&[i64]>,
         rows: usize,
         others: Option<&Others<'_>>,
-    ) -> Result<Vec<i64>, CodecError> {
+    ) -> Result<Vec<i64>, Damaged> {
         let by_models = coder.bit(BY_MODELS, self.effort == Effort::Thorough);
         let first = start.first_index(coder, wanted.and_then(|wanted| wanted.first().copied()))?;
-        code_rest(coder, by_models, &start.grid, first, wanted, rows, others)
+        code_rest(coder, by_models, start.grid.cells(), first, wanted, rows, others)
     }
 
-    fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, CodecError> {
+    fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, Damaged> {
         let mut writer = Writer::new(Vec::with_capacity(64 + indices.len() / 2));
         writer.bit(WITH_START, true);
         self.code(&mut writer, start, Some(indices), indices.len(), others)?;
