@@ -282,14 +282,23 @@ pub(crate) struct TrackOptions {
     /// of that on.
     #[arg(long, default_value = "", value_name = "DEVIATION")]
     pub(crate) noise: String,
-    /// Standard deviation of the level from its forecast after a time, as `0.5/1h`. Default: estimated from the first 200 rows. The
-    /// process noise is adapted during the run in either case.
+    /// Standard deviation of the level from its forecast after a time, as `0.5/1h`. Default: estimated from the first 200 rows.
     #[arg(long, value_name = "SIZE/TIME")]
     pub(crate) change: Option<String>,
     /// Mean and standard deviation of the level before the first row, as `20±5`. Default: estimated from the first 200 rows.
     #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
     pub(crate) prior: Option<String>,
-    /// Subtract from each sensor its mean difference from the median of all sensors over this many first rows. Default: no correction.
+    /// Whether the change is adapted during the run. Default: off if `--change` states it, otherwise on.
+    #[arg(long, value_enum, value_name = "on|off")]
+    pub(crate) learning: Option<Switch>,
+    /// With `--model velocity` and `acceleration`: mean and standard deviation of the slope per second before the first row, as `0±3`.
+    /// Default: 0, and ten times the change.
+    #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
+    pub(crate) slope: Option<String>,
+    /// The level is an angle with this period, as 360: values that differ by whole periods are equal.
+    #[arg(long, value_name = "PERIOD")]
+    pub(crate) period: Option<f64>,
+    /// Subtract from each sensor its offset, found from this many first rows. The median of all offsets is zero. Default: no correction.
     #[arg(long, value_name = "ROWS")]
     pub(crate) align: Option<usize>,
     /// With `--model ranges`: CSV file of the anchors with columns name, x, y.
@@ -314,6 +323,13 @@ pub(crate) struct TrackOptions {
     /// File of the estimates. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+}
+
+/// On or off.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Switch {
+    On,
+    Off,
 }
 
 /// Kind of the output.

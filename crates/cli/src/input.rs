@@ -254,8 +254,28 @@ impl Table {
         };
         match self.kind(index) {
             Kind::Words => crate::words::unit(self.table.words(*column)),
+            Kind::Time => "s since 1970".to_owned(),
             _ => self.table.columns()[*column].unit.clone(),
         }
+    }
+
+    /// Refuses columns of words, for tasks that compute with cells.
+    pub(crate) fn require_numbers(&self) -> Result<(), Error> {
+        match (0..self.names.len()).find(|i| matches!(self.kind(*i), Kind::Words | Kind::Text)) {
+            None => Ok(()),
+            Some(i) => {
+                let problem = format!(
+                    "column `{}` holds words, and numbers are expected: choose columns with --columns, or name gaps with --missing",
+                    crate::say::name(&self.names[i])
+                );
+                Err(Error::content(&self.file, problem))
+            }
+        }
+    }
+
+    /// Whether there is no further row.
+    pub(crate) fn is_at_end(&mut self) -> Result<bool, Error> {
+        self.fill().map(|more| !more)
     }
 
     /// States the words of the columns of a recording, so that cells are the numbers that it has for them.
@@ -386,6 +406,9 @@ impl Table {
         };
         let mut cells = Vec::with_capacity(self.batch.columns.len());
         for (i, column) in self.batch.columns.iter().enumerate() {
+            if matches!(column, fewbits_table::Cells::Times(_)) && self.batch.times.is_empty() {
+                return Err(self.cell_error(i, String::new()));
+            }
             cells.push(column.number(row).map_err(|cell| self.cell_error(i, cell))?);
         }
         self.next += 1;
@@ -394,6 +417,10 @@ impl Table {
 
     fn cell_error(&self, index: usize, cell: String) -> Error {
         let (problem, mend) = match self.kind(index) {
+            Kind::Time if self.batch.times.is_empty() => (
+                "is a time",
+                "if this is the time of the row, add --time exact; otherwise leave the column out with --without",
+            ),
             Kind::Time => ("is a time, and its seconds are no double", "leave the column out with --without"),
             _ => (
                 "is a whole number of more than 53 bits, which no double holds",

@@ -34,6 +34,7 @@
 //! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
 
 pub mod assumed_density;
+pub mod calibration;
 pub mod centre;
 pub mod contract;
 pub mod cramer_rao;
@@ -50,7 +51,7 @@ pub mod smoother;
 mod steady_state;
 mod switching;
 
-pub use contract::{Info, LinearScalar, MomentFilter, StateFilter, StateLikelihood};
+pub use contract::{Info, LinearScalar, MomentFilter, Points, StateFilter, StateLikelihood};
 pub use fewbits_core::Error;
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
 pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};

@@ -3,7 +3,7 @@
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::lines::{MAX_ROW_LINES, Row, Split};
-use crate::{known, missing, number, time};
+use crate::{guess, known, missing, number};
 use std::io::BufRead;
 
 /// Largest number of lines and of bytes that are examined.
@@ -41,8 +41,13 @@ impl Head {
         if !ended || pieces.last().is_some_and(|piece| piece.is_empty()) {
             pieces.pop();
         }
-        let text = |line: &[u8]| String::from_utf8_lossy(line).trim_end_matches(['\r', '\n']).to_owned();
-        let lines = (1..).zip(pieces.iter().map(|line| text(line))).collect();
+        // Ends of lines of several systems in one file: as `Lines` splits them.
+        let parts = pieces.iter().flat_map(|line| {
+            let trimmed = line.len() - line.iter().rev().take_while(|c| matches!(c, b'\r' | b'\n')).count();
+            line[..trimmed].split(|c| *c == b'\r')
+        });
+        let text = |line: &[u8]| String::from_utf8_lossy(line).into_owned();
+        let lines = (1..).zip(parts.map(text)).collect();
         Ok(Self { bytes, lines, end })
     }
 }
@@ -84,7 +89,7 @@ fn look(cell: &str, decimal_comma: bool) -> Look {
         Look::Missing
     } else if number::parse(cell.as_bytes(), syntax).is_ok() {
         Look::Number
-    } else if time::looks_like_time(cell) {
+    } else if guess::looks_like_time(cell) {
         Look::Time
     } else {
         Look::Text

@@ -2,9 +2,9 @@
 
 use crate::column::{Kind, MAX_WORDS};
 use crate::error::Place;
+use crate::guess;
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
-use crate::time;
 use std::collections::BTreeMap;
 
 /// Number of cells that are kept to find out how times are written.
@@ -172,7 +172,7 @@ impl Profile {
             // A gap among numbers, a word among words.
             self.gap(cell);
             return;
-        } else if time::looks_like_time(cell) {
+        } else if guess::looks_like_time(cell) {
             self.times += 1;
             return;
         } else if number::looks_like_number(cell) {

@@ -51,6 +51,7 @@ fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
         return Err(Error::content(file, problem));
     };
     let mut table = Table::open(&options(vec![x.clone(), y.clone()]))?.with_labels(name)?;
+    table.require_numbers()?;
     let mut anchors: Vec<Anchor> = Vec::new();
     while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
         let (label, row) = (table.label().to_owned(), table.row());

@@ -13,6 +13,7 @@ mod pages;
 mod streams;
 mod tables;
 mod track;
+mod track_faults;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -244,8 +245,8 @@ fn refusals_name_file_row_column_and_mend() {
     let message = refused(&folder, &["pack", "bad.csv", "-o", "x"], b"");
     assert_eq!(
         message,
-        "error: bad.csv: row 2, column `x`: `abc` is not a number: mend the cell, leave it empty for a gap, or choose columns with \
-         --columns\n"
+        "error: bad.csv: line 3 (row 2), column `x`: `abc` is not a number: make it a gap with --missing, leave such lines out with \
+         --skip-bad, or the column with --without\n"
     );
     let message = refused(&folder, &["pack", "a.csv", "--bound", "x=1%", "-o", "x"], b"");
     assert_eq!(message, "error: a.csv: no column `x`: there are time, temp, flow, price, direction\n");
@@ -263,11 +264,14 @@ fn refusals_name_file_row_column_and_mend() {
     let message = refused(&folder, &["unpack", "a.csv"], b"");
     assert!(message.contains("a.csv: not a recording"), "{message}");
     let message = refused(&folder, &["pack", "bad.csv", "--time", "exact", "--time-column", "x", "-o", "x"], b"");
-    assert!(message.contains("row 2, column `x`") && message.contains("is not a time"), "{message}");
+    assert!(message.contains("(row 2), column `x`") && message.contains("is not a time"), "{message}");
     let message = refused(&folder, &["pack", "-", "-o", "x"], b"n\n18014398509481985\n");
     assert!(message.contains("more than 53 bits"), "{message}");
     let message = refused(&folder, &["pack", "-", "-o", "x"], b"time,x\n2026-01-31T12:00:00Z,1\n");
-    assert!(message.contains("row 1, column `time`") && message.contains("add --time exact"), "{message}");
+    assert!(
+        message.contains("line 2 (row 1), column `time`") && message.contains("add --time exact"),
+        "{message}"
+    );
 }
 
 #[cfg(not(feature = "parquet"))]

@@ -113,8 +113,12 @@ impl std::io::Read for Live {
         let Some(line) = self.0.pop_front() else {
             panic!("a read that would wait for ever")
         };
-        target[..line.len()].copy_from_slice(line.as_bytes());
-        Ok(line.len())
+        let count = line.len().min(target.len());
+        target[..count].copy_from_slice(&line.as_bytes()[..count]);
+        if count < line.len() {
+            self.0.push_front(&line[count..]);
+        }
+        Ok(count)
     }
 }
 
