@@ -178,7 +178,7 @@ impl Header {
                 push_varint(&mut bytes, body.len() as u64);
             }
             (_, Form::Single) => {
-                bytes.extend([VERSION, 0]);
+                bytes.push(VERSION | SINGLE);
                 bytes.extend(body);
                 return bytes;
             }
@@ -208,28 +208,36 @@ impl Header {
             }
             None => push_varint(&mut body, rows_per_block as u64),
         }
-        let stream = if self.form == Form::Stream { STREAM } else { 0 };
+        // In version 5 all of them follow.
+        let is_old = self.version == VERSION_5;
+        let flag = |given: bool, flag: u8| if given && !is_old { flag } else { 0 };
+        let count = self.schema.columns.len();
+        let flags = flag(self.form == Form::Stream, STREAM) | flag(self.origin != 0, ORIGIN) | flag(count > 1, COLUMNS);
         match self.schema.time {
-            TimeBase::Numbered => body.push(stream),
+            TimeBase::Numbered => body.push(flags),
             TimeBase::Clock {
                 decimals,
                 tolerance,
                 format,
             } => {
                 body.push(match format {
-                    TimeFormat::Seconds => 1 | stream,
-                    TimeFormat::Utc => 2 | stream,
-                    TimeFormat::Local => 3 | stream,
+                    TimeFormat::Seconds => 1 | flags,
+                    TimeFormat::Utc => 2 | flags,
+                    TimeFormat::Local => 3 | flags,
                 });
                 body.push(decimals);
                 push_varint(&mut body, tolerance);
             }
         }
-        push_varint(&mut body, zigzag(self.origin));
-        if self.version == VERSION_5 || self.schema.time != TimeBase::Numbered {
+        if is_old || self.origin != 0 {
+            push_varint(&mut body, zigzag(self.origin));
+        }
+        if is_old || self.schema.time != TimeBase::Numbered {
             push_varint(&mut body, zigzag(self.step));
         }
-        push_varint(&mut body, self.schema.columns.len() as u64);
+        if is_old || count > 1 {
+            push_varint(&mut body, count as u64);
+        }
         let columns = self.schema.columns.iter().zip(&self.share_bounds).zip(&self.starts);
         for ((column, share_bound), start) in columns {
             push_column(&mut body, column, *share_bound, start.as_ref());
@@ -247,8 +255,12 @@ impl Header {
     }
 }
 
-/// Flag beside the time base: blocks over a link, which have no end.
+/// Flags beside the time base: blocks over a link, which have no end; an origin follows; a number of columns follows (else one).
 pub(crate) const STREAM: u8 = 0x10;
+pub(crate) const ORIGIN: u8 = 0x20;
+pub(crate) const COLUMNS: u8 = 0x40;
+/// Flag beside the version: the only block follows.
+pub(crate) const SINGLE: u8 = 0x80;
 
 /// Random bits from the standard library's keys for hash tables, which differ from call to call and from process to process.
 fn random() -> u32 {

@@ -1,7 +1,9 @@
 //! Reading of headers.
 
 use crate::error::{Damage, Error};
-use crate::header::{Form, Header, IDENTITY_BYTES, MAGIC, MAGIC_5, MAX_HEADER, STREAM, VERSION, VERSION_5};
+use crate::header::{
+    COLUMNS, Form, Header, IDENTITY_BYTES, MAGIC, MAGIC_5, MAX_HEADER, ORIGIN, SINGLE, STREAM, VERSION, VERSION_5,
+};
 use crate::header_column::read_column;
 use crate::schema::{Schema, TimeBase, TimeFormat, default_rows};
 use crate::wire::{Bytes, CHECK_BYTES, checksum};
@@ -24,6 +26,7 @@ impl Header {
         };
         let version = match version {
             VERSION => VERSION,
+            first if first == VERSION | SINGLE => return Ok(Known::Single),
             first if first == MAGIC_5[0] => {
                 let Ok(rest) = reader.array::<3>() else {
                     return Ok(Known::More);
@@ -37,7 +40,6 @@ impl Header {
             found => return Err(version_error(found)),
         };
         let length = match reader.count(MAX_HEADER, "length of the header") {
-            Ok(0) if version == VERSION => return Ok(Known::Single),
             Ok(length) => length,
             Err(Unread::CutOff) => return Ok(Known::More),
             Err(unread) => return Err(Error::Header(unread.into())),
@@ -68,9 +70,6 @@ impl Header {
         let mut header = Self::read_body(&mut body, length, check)?;
         body.finish().map_err(Error::header)?;
         (header.version, header.identity) = (version, u32::from_le_bytes(identity));
-        if version == VERSION_5 && header.form == Form::Stream {
-            return Err(Error::Header(Damage::Content("time base")));
-        }
         // Streams of version 5 are not marked.
         Ok(Known::Header(Box::new(header), end + CHECK_BYTES))
     }
@@ -86,8 +85,8 @@ impl Header {
         if u32::from_le_bytes(*check) != checksum(&[content]) {
             return Err(Error::Header(Damage::Checksum));
         }
-        // Magic bytes, version, and a length of zero.
-        let mut body = Bytes(content.get(MAGIC.len() + 2..).ok_or(Error::Header(Damage::CutOff))?);
+        // Magic bytes and version.
+        let mut body = Bytes(content.get(MAGIC.len() + 1..).ok_or(Error::Header(Damage::CutOff))?);
         let header = Self::read_body(&mut body, Length::Single, 0)?;
         if header.form == Form::Stream {
             return Err(Error::Header(Damage::Content("time base")));
@@ -112,8 +111,15 @@ impl Header {
             rows /= 2;
         }
         let kind = body.byte().map_err(Error::header)?;
-        let form = if kind & STREAM == 0 { Form::File } else { Form::Stream };
-        let format = match kind & !STREAM {
+        let form = if kind & STREAM == 0 || length == Length::Version5 {
+            Form::File
+        } else {
+            Form::Stream
+        };
+        let is_old = length == Length::Version5;
+        let flags = if is_old { 0 } else { STREAM | ORIGIN | COLUMNS };
+        let follows = |flag: u8| is_old || kind & flag != 0;
+        let format = match kind & !flags {
             0 => None,
             1 => Some(TimeFormat::Seconds),
             2 => Some(TimeFormat::Utc),
@@ -128,12 +134,20 @@ impl Header {
                 format,
             },
         };
-        let origin = body.signed().map_err(Error::header)?;
+        let origin = if follows(ORIGIN) {
+            body.signed().map_err(Error::header)?
+        } else {
+            0
+        };
         let step = match time {
-            TimeBase::Numbered if length != Length::Version5 => 1,
+            TimeBase::Numbered if !is_old => 1,
             _ => body.signed().map_err(Error::header)?,
         };
-        let count = body.count(body.0.len(), "number of columns").map_err(Error::header)?;
+        let count = if follows(COLUMNS) {
+            body.count(body.0.len(), "number of columns").map_err(Error::header)?
+        } else {
+            1
+        };
         let (mut columns, mut share_bounds, mut starts) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..count {
             let (column, share_bound, start) = read_column(body)?;
