@@ -107,7 +107,7 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
         output::print(&text(&info))?;
     }
     // Whether rows are missing at the end cannot be told from a recording without its end.
-    Ok(if damaged == 0 && info.index {
+    Ok(if damaged == 0 && info.finished {
         Ending::Good
     } else {
         Ending::Failed
@@ -126,10 +126,10 @@ fn text(info: &Info) -> String {
         info.bytes,
         info.bits_per_sample
     );
-    let index = if info.index {
-        "with index"
-    } else {
-        "without index (not finished, or cut off)"
+    let index = match (info.finished, info.index) {
+        (false, _) => "without its end (not finished, or cut off)",
+        (true, true) => "with index",
+        (true, false) => "without index",
     };
     let _ = writeln!(text, "{} blocks of up to {} rows, {index}", info.blocks, info.rows_per_block);
     if info.damaged > 0 {

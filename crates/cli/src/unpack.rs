@@ -107,7 +107,7 @@ pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
     let mut writer = Writer::new(options.output.as_deref(), shape, playback.schema(), &selection.names)?;
     let names: Vec<&str> = selection.names.iter().map(String::as_str).collect();
     playback.columns(&names).map_err(Error::recording(file))?;
-    let is_finished = playback.has_index();
+    let is_finished = playback.is_finished();
     let ticks = (selection.from, selection.to);
     let blocks = playback.blocks_between(ticks.0, ticks.1);
     let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, file)?;

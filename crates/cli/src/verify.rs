@@ -101,7 +101,7 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
     let mut rows = TableRows::new(table, schema.time());
     let mut go = |_| ControlFlow::Continue(());
     let verdict = recipe(&mut playback, &mut rows, &matches, &mut go).map_err(Error::recipe(&file))?;
-    let verdict = shown(&verdict, &schema, playback.has_index());
+    let verdict = shown(&verdict, &schema, playback.is_finished());
     if options.json {
         output::json(&verdict)?;
     } else {
