@@ -8,9 +8,8 @@
 //! of the range (of the period); 0 is lossless. Numbers are means over the recordings; a CRC-32 per block is counted with blocks of
 //! 512 and 128 rows; with starts, what all blocks of a recording share is told once and counted.
 
-use fewbits_adaptive::{
-    BlockCodec, Config, CosetConfig, CosetReceiver, CosetSensor, Effort, Sensor, Silence, StreamWriter,
-};
+use fewbits_adaptive::{Config, CosetConfig, CosetReceiver, CosetSensor, Sensor, Silence, StreamWriter};
+use fewbits_block_codec::{BlockCodec, Effort};
 use fewbits_core::Observation;
 use pco::ChunkConfig;
 use pco::standalone::simple_compress;
@@ -158,8 +157,8 @@ fn main() -> Result<(), Failure> {
             let codec = if bound == 0.0 {
                 BlockCodec::lossless()
             } else {
-                let config = Config::new(delta)?;
-                BlockCodec::new(recording.period.map_or(Ok(config), |period| config.circular(period))?)
+                let codec = BlockCodec::new(delta)?;
+                recording.period.map_or(Ok(codec), |period| codec.on_circle(period))?
             };
             let n = recording.samples.len();
             let quick = codec.with_effort(Effort::Fast);

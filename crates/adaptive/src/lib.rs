@@ -1,4 +1,4 @@
-//! Compression of real signals within a guaranteed error, sample by sample or in blocks.
+//! Compression of real signals within a guaranteed error, sample by sample.
 //!
 //! A sensor and its receiver run the same bank of models of the signal and hold the same frequencies of past reports. Silence means
 //! that the sample is within `delta` of the prediction of both. Otherwise the residual is coded under the probability law that
@@ -26,9 +26,6 @@
 //! | configuration: error bound, circle, refreshes | [`Config`] |
 //! | sensor and receiver | [`Sensor`], [`Receiver`] |
 //! | the bits of one slot, and of a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
-//! | many samples at once, each block decodable alone | [`BlockCodec`] |
-//! | what many such blocks have in common, stored once | [`Start`] |
-//! | arithmetic coding of decisions with known probabilities | [`arithmetic`] |
 //! | links that lose packets: one lost packet affects only the slots until the next | [`CosetSensor`], [`CosetReceiver`] |
 //! | reports as likelihoods for other filters | [`SlotScheme`] |
 //! | the same number of bits in every slot | [`FixedRate`] |
@@ -46,9 +43,9 @@
 //! The shared state and the sensor's half are in [`fewbits_node::adaptive`], which a microcontroller runs unchanged. This crate has the
 //! receiver's half, streams, stored states and whole recordings.
 //!
-//! Not here: models of loss and the energy of a radio (`fewbits-network`), files (`fewbits-record`).
+//! Not here: models of loss and the energy of a radio (`fewbits-network`), many samples at once
+//! (`fewbits-block-codec`), files (`fewbits-record`).
 
-mod block;
 mod config;
 mod coset;
 mod fixed_rate;
@@ -60,8 +57,6 @@ mod sensor;
 mod stream;
 mod tuning;
 
-pub use block::coder as arithmetic;
-pub use block::{BlockCodec, Effort, JOINT_COLUMNS, Start, StartedBlock};
 pub use config::Config;
 pub use coset::{CosetConfig, CosetReceiver, CosetSensor, TOLERATED};
 pub use fewbits_core::Error;

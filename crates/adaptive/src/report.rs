@@ -1,7 +1,7 @@
 //! Decoding of reports: the receiver's half of `fewbits_node::adaptive::Content`.
 
-use crate::block::unzigzag;
 use crate::packet::{PacketReader, read_number};
+use fewbits_block_codec::bytes::unzigzag;
 use fewbits_core::CodecError;
 use fewbits_node::adaptive::{Config, Content, Law, PRECISION, Replica, Slot};
 

@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::design_options::DesignOptions;
+pub(crate) use crate::fleet_options::{CentreOptions, CheckOptions, SensorOptions};
 pub(crate) use crate::table_options::{BoundOptions, DialectOptions, ManyOptions, TableOptions};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -43,6 +44,8 @@ pub(crate) enum Task {
     Receive(ReceiveOptions),
     /// Run a fusion centre over UDP, MQTT or zenoh. Estimates go to standard output, a row per slot.
     Centre(CentreOptions),
+    /// Check the configuration of a fusion centre: all its faults are named.
+    Check(CheckOptions),
     /// Run a sensor over UDP. Samples come from standard input, one per line and slot.
     Sensor(SensorOptions),
     /// Write completions for a shell, or the manual page.
@@ -165,25 +168,6 @@ pub(crate) struct BenchOptions {
 }
 
 #[derive(Args)]
-pub(crate) struct CentreOptions {
-    /// Configuration (TOML): model, prior, sensors and their keys.
-    pub(crate) configuration: PathBuf,
-    /// Stop after this number of slots. Default: run until stopped.
-    #[arg(long)]
-    pub(crate) slots: Option<u64>,
-    /// Serve a live page over HTTP at this address, as 0.0.0.0:8080. Default: none.
-    #[cfg(feature = "live")]
-    #[arg(long, value_name = "HOST:PORT")]
-    pub(crate) live: Option<std::net::SocketAddr>,
-}
-
-#[derive(Args)]
-pub(crate) struct SensorOptions {
-    /// Configuration (TOML): the centre's address, the sensor's number, key and report.
-    pub(crate) configuration: PathBuf,
-}
-
-#[derive(Args)]
 pub(crate) struct SendOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
@@ -204,9 +188,12 @@ pub(crate) struct SendOptions {
     /// Bits per second of the serial line.
     #[arg(long, default_value_t = 115200, value_name = "BAUD")]
     pub(crate) baud: u32,
-    /// With UDP or a serial line: number of frames after which the header is repeated.
-    #[arg(long, default_value_t = 32, value_name = "FRAMES", value_parser = clap::value_parser!(u64).range(1..))]
-    pub(crate) header_every: u64,
+    /// With UDP or a serial line: percentage of the bytes that is used to repeat the header, so that a lost piece of it is soon replaced.
+    #[arg(long, default_value_t = 10.0, value_name = "PERCENT")]
+    pub(crate) header_share: f64,
+    /// With UDP or a serial line: repeat the whole header after this number of frames instead.
+    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u64).range(1..), conflicts_with = "header_share")]
+    pub(crate) header_every: Option<u64>,
     /// File of the stream. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,

@@ -12,7 +12,7 @@ pub(crate) type Problem = (&'static str, &'static str);
 
 pub(crate) const TOO_LARGE: Problem = (
     "does not fit ticks of 64 bits: it is too large, or times have too many decimals",
-    "allow an error of times, as --time ±1ns or ±1us",
+    "allow an error of times, as --time ±2ns or ±1us",
 );
 pub(crate) const TOO_FINE: Problem = (
     "has more decimals than a tick",

@@ -160,7 +160,7 @@ impl Files {
                 }
                 Self { is_live, ..files }
             }
-            Task::Generate(_) | Task::Centre(_) | Task::Sensor(_) => Self::default(),
+            Task::Generate(_) | Task::Centre(_) | Task::Check(_) | Task::Sensor(_) => Self::default(),
         }
     }
 

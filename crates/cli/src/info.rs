@@ -17,6 +17,7 @@ struct Info {
     rows_per_block: usize,
     bits_per_sample: f64,
     index: bool,
+    finished: bool,
     damaged: u64,
     time: String,
     from: Option<String>,
@@ -83,6 +84,7 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
         blocks,
         rows_per_block: schema.rows_per_block(),
         index: playback.has_index(),
+        finished: playback.is_finished(),
         damaged,
         time: match time {
             TimeBase::Clock { tolerance: 0, .. } => "exact".to_owned(),

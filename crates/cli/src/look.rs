@@ -2,7 +2,6 @@
 
 use crate::arguments::LookOptions;
 use crate::error::Error;
-use crate::input;
 use crate::numbers::exact;
 use crate::{Ending, output, say};
 use fewbits_table::{Column, Dialect, Kind, Profile, Scale, Survey, Time};
@@ -64,7 +63,7 @@ pub(crate) fn run(options: &LookOptions) -> Result<Ending, Error> {
     let mut table_options = options.table.clone();
     // All faults are shown, none stops.
     table_options.dialect.skip_bad = u64::MAX;
-    let (columns, mut dialect, scale, survey) = input::look(&table_options)?;
+    let (columns, mut dialect, scale, survey) = crate::opening::look(&table_options)?;
     dialect.skip_bad = options.table.dialect.skip_bad;
     if options.toml {
         return output::print(&dialect.to_toml()).map(|()| Ending::Good);

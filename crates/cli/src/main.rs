@@ -12,6 +12,7 @@ mod design;
 mod design_options;
 mod error;
 mod files;
+mod fleet_options;
 mod generate;
 mod info;
 mod input;
@@ -22,7 +23,9 @@ mod look;
 mod manifest;
 mod many;
 mod node;
+mod notes;
 mod numbers;
+mod opening;
 mod output;
 mod pack;
 #[cfg(feature = "parquet")]
@@ -30,6 +33,7 @@ mod parquet;
 mod place;
 mod plan;
 mod plot;
+mod private;
 mod recording;
 mod report;
 mod rows;
@@ -87,9 +91,10 @@ fn run(mut task: Task) -> Result<Ending, Error> {
         Task::Track(options) => track::run(&options),
         Task::Design(options) => design::run(&options),
         Task::Send(options) => send::run(&options),
-        Task::Receive(options) => link::receive(&options),
+        Task::Receive(options) => link::receive::run(&options),
         Task::Generate(options) => generate::run(&options),
         Task::Centre(options) => centre::run(&options),
+        Task::Check(options) => centre::check(&options.configuration),
         Task::Sensor(options) => sensor::run(&options),
     }
 }

@@ -86,8 +86,8 @@ fn with_unit(table: &Table, index: usize, column: Column) -> Result<Column, Erro
     let unit = table.unit(index);
     if table.kind(index) == Kind::Words && unit.is_empty() {
         let problem = format!(
-            "column `{}` has words, which must be known before the first row and together have 1024 bytes at most: give a file, not a \
-             pipe, or leave the column out with --without",
+            "column `{}` has words: together they may have 1024 bytes, and those of a pipe must stand in its first lines: leave the \
+             column out with --without",
             crate::say::name(column.name())
         );
         return Err(Error::content(table.file(), problem));

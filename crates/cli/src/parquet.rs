@@ -11,7 +11,6 @@ use fewbits_record::{Block, Schema, TimeBase, TimeFormat};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 

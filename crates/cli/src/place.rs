@@ -1,7 +1,7 @@
 //! Addresses in the configuration files of centres and sensors.
 
 #[cfg(feature = "mqtt")]
-use fewbits_link::mqtt::rumqttc::MqttOptions;
+use fewbits_link::mqtt::rumqttc::v5::MqttOptions;
 #[cfg(feature = "zenoh")]
 use fewbits_link::zenoh::zenoh::{Config, Session, Wait};
 
@@ -31,11 +31,28 @@ impl<'a> Place<'a> {
             #[cfg(feature = "zenoh")]
             ("zenoh", Some((endpoint, fleet))) => Ok(Self::Zenoh { endpoint, fleet }),
             #[cfg(not(feature = "mqtt"))]
-            ("mqtt", _) => Err(format!("{text}: this program was built without it: build it with `--features mqtt`")),
+            ("mqtt", _) => {
+                Err(format!("{}: this program was built without it: build it with `--features mqtt`", shown(text)))
+            }
             #[cfg(not(feature = "zenoh"))]
-            ("zenoh", _) => Err(format!("{text}: this program was built without it: build it with `--features zenoh`")),
-            _ => Err(format!("{text}: expected host:port, mqtt://host:port/fleet or zenoh://host:port/fleet")),
+            ("zenoh", _) => {
+                Err(format!("{}: this program was built without it: build it with `--features zenoh`", shown(text)))
+            }
+            _ => {
+                let expected = "host:port, mqtt://host:port/fleet or zenoh://host:port/fleet";
+                Err(format!("{}: expected {expected}", shown(text)))
+            }
         }
+    }
+}
+
+/// The text without user and password, for messages: what stands before the last `@` is left out.
+pub(crate) fn shown(text: &str) -> String {
+    let (kind, rest) = text.split_once("://").map_or(("", text), |(kind, rest)| (kind, rest));
+    let rest = rest.rsplit_once('@').map_or(rest, |(_, place)| place);
+    match kind {
+        "" => rest.to_owned(),
+        kind => format!("{kind}://{rest}"),
     }
 }
 

@@ -130,7 +130,7 @@ impl Picture {
         let axis = |label: &str, is_log| if is_log { Axis::log(label) } else { Axis::linear(label) };
         // Axes of these names have one scale.
         let names = if self.is_map {
-            ["x / m", "y / m"]
+            ["x / unit of the anchors", "y / unit of the anchors"]
         } else {
             [self.x.as_str(), &self.y]
         };

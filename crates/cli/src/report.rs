@@ -1,19 +1,18 @@
-//! Kinds of reports with their two halves, at sensor and centre, and reading of configuration files.
+//! Kinds of reports with their two halves, at sensor and centre.
 
-use crate::error::{Error, Failure};
+use crate::error::Failure;
 use fewbits_cfwmd::scheme::CovarianceFeedback;
 use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, OnAxes, SchemeNode, SensorNode};
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{RemoteSensor, Reporting};
 use fewbits_models::LinearSensor;
 use nalgebra::SVector;
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
-use std::path::Path;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 
-/// Kind of a sensor's reports. The files of sensor and centre must state the same.
-#[derive(Debug, Deserialize, Clone, Copy, PartialEq)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+/// Kind of a sensor's reports: `bit`, `word:3`, `value` or `silent:1.5`, or as a table `{ kind = "word", bits = 3 }`. The files of sensor
+/// and centre must state the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Report {
     /// One bit: whether the sample is at or above the prediction.
     Sign,
@@ -31,7 +30,53 @@ pub(crate) enum Report {
     },
 }
 
+/// The form of a table.
+#[derive(Deserialize)]
+#[serde(remote = "Report", tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+enum Table {
+    #[serde(alias = "bit")]
+    Sign,
+    Word {
+        bits: u32,
+    },
+    Value,
+    #[serde(alias = "silent")]
+    Censored {
+        threshold: f64,
+    },
+}
+
+impl<'de> Deserialize<'de> for Report {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match toml::Value::deserialize(deserializer)? {
+            toml::Value::String(word) => Self::of_word(&word).map_err(D::Error::custom),
+            table => Table::deserialize(table).map_err(|error| D::Error::custom(error.message())),
+        }
+    }
+}
+
 impl Report {
+    /// The words of `track --send`.
+    fn of_word(word: &str) -> Result<Self, String> {
+        let (name, number) = word
+            .split_once(':')
+            .map_or((word, None), |(name, number)| (name, Some(number)));
+        let kind = match (name, number) {
+            ("bit", None) => Some(Self::Sign),
+            ("value", None) => Some(Self::Value),
+            ("word", Some(bits)) => bits.parse().ok().map(|bits| Self::Word { bits }),
+            ("silent", Some(threshold)) => threshold.parse().ok().map(|threshold| Self::Censored { threshold }),
+            _ => None,
+        };
+        let expected = "`bit`, `word:2` to `word:4`, `value`, or `silent:1.5` (standard deviations)";
+        kind.ok_or_else(|| format!("report is `{word}`: expected {expected}"))
+    }
+
+    /// Whether the sensor is told the covariance of the state.
+    pub(crate) fn needs_coordinates(self) -> bool {
+        matches!(self, Self::Censored { .. })
+    }
+
     /// The centre's half of a sensor that reads coordinate `reads` of the state, with the variance of its noise.
     pub(crate) fn remote<const D: usize>(
         self,
@@ -90,17 +135,4 @@ fn censored<const D: usize>(
 ) -> Result<CovarianceFeedback<LinearSensor<D, 1>, D, 1>, Failure> {
     let sensing = coordinate::<D>(reads, variance)?;
     Ok(CovarianceFeedback::new(sensing, threshold, NumberFormat::Double)?)
-}
-
-/// Reads a TOML file.
-pub(crate) fn configuration<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(Error::io(&name, "read"))?;
-    toml::from_str(&text).map_err(configured(path))
-}
-
-/// An error of a value in a configuration file.
-pub(crate) fn configured<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Error + use<E> {
-    let file = path.display().to_string();
-    move |error| Error::content(&file, error)
 }

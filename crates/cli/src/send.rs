@@ -5,28 +5,27 @@ use crate::error::Error;
 use crate::live::{self, RowSink};
 use crate::target::Target;
 use crate::{Ending, pack, serial};
-use fewbits_record::FrameWriter;
+use fewbits_record::{FrameWriter, HeaderRepeats};
 use std::io::Write;
 use std::net::UdpSocket;
 
 /// Sends one frame.
-type Post = Box<dyn FnMut(&[u8]) -> std::io::Result<()>>;
+type SendFrame = Box<dyn FnMut(&[u8]) -> std::io::Result<()>>;
 
 /// Destination of frames.
-enum Way {
+enum FrameSink {
     /// A stream without losses: the header once, then frames. It is a recording without an index.
     Stream { sink: Target, begun: bool },
-    /// Single frames that may be lost: the header in pieces before every group of frames.
+    /// Single frames that may be lost: pieces of the header are sent between them.
     Frames {
-        post: Post,
+        send: SendFrame,
         address: String,
-        header_every: u64,
-        sent: u64,
+        repeats: HeaderRepeats,
     },
 }
 
-impl Way {
-    fn send(&mut self, writer: &FrameWriter, frames: &[Vec<u8>]) -> Result<(), Error> {
+impl FrameSink {
+    fn send(&mut self, writer: &FrameWriter, frames: Vec<Vec<u8>>) -> Result<(), Error> {
         for frame in frames {
             match self {
                 Self::Stream { sink, begun } => {
@@ -34,25 +33,12 @@ impl Way {
                     if !std::mem::replace(begun, true) {
                         sink.write_all(&writer.header().unwrap_or_default()).map_err(&failed)?;
                     }
-                    sink.write_all(frame).and_then(|()| sink.flush()).map_err(failed)?;
+                    sink.write_all(&frame).and_then(|()| sink.flush()).map_err(failed)?;
                 }
-                Self::Frames {
-                    post,
-                    address,
-                    header_every,
-                    sent,
-                } => {
-                    let pieces = if sent.is_multiple_of(*header_every) {
-                        writer.header_frames()
-                    } else {
-                        Vec::new()
-                    };
-                    let outcome = pieces
-                        .iter()
-                        .try_for_each(|piece| post(piece))
-                        .and_then(|()| post(frame));
-                    outcome.map_err(Error::io(address, "send"))?;
-                    *sent += 1;
+                Self::Frames { send, address, repeats } => {
+                    let mut all = repeats.around(writer, frame).into_iter();
+                    all.try_for_each(|frame| send(&frame))
+                        .map_err(Error::io(address, "send"))?;
                 }
             }
         }
@@ -60,19 +46,23 @@ impl Way {
     }
 }
 
-fn way(options: &SendOptions) -> Result<Way, Error> {
-    let frames = |address: &str, post| Way::Frames {
-        post,
+fn sink(options: &SendOptions) -> Result<FrameSink, Error> {
+    let repeats = match options.header_every {
+        Some(frames) => HeaderRepeats::every(frames),
+        None => HeaderRepeats::share(options.header_share / 100.0),
+    };
+    let repeats = repeats.map_err(Error::recording("--header-share"))?;
+    let frames = |address: &str, send| FrameSink::Frames {
+        send,
         address: address.to_owned(),
-        header_every: options.header_every,
-        sent: 0,
+        repeats,
     };
     if let Some(device) = &options.serial {
         let mut line = serial::open(device, options.baud)?;
         return Ok(frames(device, Box::new(move |frame: &[u8]| serial::write(&mut line, frame))));
     }
     let Some(address) = &options.udp else {
-        return Ok(Way::Stream {
+        return Ok(FrameSink::Stream {
             sink: Target::open_binary(options.output.as_deref())?,
             begun: false,
         });
@@ -98,7 +88,7 @@ fn way(options: &SendOptions) -> Result<Way, Error> {
 /// Rows into frames.
 struct Sender {
     writer: FrameWriter,
-    way: Way,
+    sink: FrameSink,
     next: i64,
     file: String,
 }
@@ -108,12 +98,12 @@ impl RowSink for Sender {
         let tick = tick.unwrap_or(self.next);
         self.next = tick.wrapping_add(1);
         let frames = self.writer.push(tick, cells).map_err(Error::recording(&self.file))?;
-        self.way.send(&self.writer, &frames)
+        self.sink.send(&self.writer, frames)
     }
 
     fn flush(&mut self) -> Result<(), Error> {
         let frames = self.writer.flush().map_err(Error::recording(&self.file))?;
-        self.way.send(&self.writer, &frames)
+        self.sink.send(&self.writer, frames)
     }
 
     fn waiting(&self) -> usize {
@@ -128,17 +118,23 @@ pub(crate) fn run(options: &SendOptions) -> Result<Ending, Error> {
     let writer = FrameWriter::new(schema, options.max_bytes).map_err(Error::recording(&file))?;
     let mut sender = Sender {
         writer,
-        way: way(options)?,
+        sink: sink(options)?,
         next: 0,
         file,
     };
     let ended = live::run(table, time, options.deadline, &mut sender)?;
+    // What was sent can be read, whatever ended the table: its last header says how many frames there were.
+    if let FrameSink::Frames { send, address, repeats } = &mut sender.sink {
+        let mut all = repeats.at_end(&sender.writer).into_iter();
+        all.try_for_each(|frame| send(&frame))
+            .map_err(Error::io(address, "send"))?;
+    }
     if let Some(error) = ended.error {
         return Err(error);
     }
-    match sender.way {
-        Way::Stream { sink, .. } => sink.finish()?,
-        Way::Frames { .. } => {}
+    match sender.sink {
+        FrameSink::Stream { sink, .. } => sink.finish()?,
+        FrameSink::Frames { .. } => {}
     }
     Ok(Ending::Good)
 }

@@ -3,8 +3,11 @@
 use crate::Ending;
 use crate::arguments::SensorOptions;
 use crate::error::Error;
+use crate::notes::Limiter;
 use crate::place::Place;
-use crate::report::{Report, configuration, configured};
+use crate::private::{configuration, configured};
+use crate::report::Report;
+use crate::say::say;
 use fewbits_core::{BitString, SensorNode};
 use fewbits_link::{Key, Program, SensorLink, Store, Udp, run_sensor};
 use fewbits_monte_carlo::Stream;
@@ -16,6 +19,7 @@ use std::net::ToSocketAddrs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::time::Duration;
 
 /// Content of `sensor.toml`.
 #[derive(Deserialize)]
@@ -25,8 +29,11 @@ struct Configuration {
     centre: String,
     number: u32,
     key: String,
-    /// File that stores the counter of envelopes between runs. Without it the centre refuses a restarted sensor as a replay.
+    /// File that stores the counters of envelopes between runs. Without it the centre refuses a restarted sensor as a replay.
     state: Option<PathBuf>,
+    /// Whether every write waits for the disk.
+    #[serde(default)]
+    durable: bool,
     /// Standard deviation of the measurement noise.
     deviation: f64,
     report: Report,
@@ -54,12 +61,27 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
     let mut settings = SensorSettings::new(Feedback::Told);
     settings.heartbeat_after = given.heartbeat_after;
     let key = Key::from_hex(&given.key).map_err(configured(file))?;
-    let mut link = SensorLink::new(settings, given.number, key, given.state.map(Store::new))?;
+    if !(given.deviation.is_finite() && given.deviation > 0.0) {
+        return Err(configured(file)(format!("deviation is {}: expected above 0", given.deviation)));
+    }
+    if given.state.is_none() {
+        say!(
+            "note: no `state`: when this sensor starts again, its centre refuses it until it has a new key, and it accepts old \
+             questions"
+        );
+    }
+    let store = given.state.clone().map(|path| match given.durable {
+        true => Store::new(path).durable(),
+        false => Store::new(path),
+    });
+    let mut link = SensorLink::new(settings, given.number, key, store)?;
     let mut program = Samples {
         lines: lines(),
         node,
         stream: Stream::new(given.seed).indexed(u64::from(given.number)),
         refused: None,
+        centre: crate::place::shown(&given.centre),
+        notes: Limiter::default(),
     };
     match Place::of(&given.centre).map_err(configured(file))? {
         Place::Udp(address) => {
@@ -93,12 +115,10 @@ type Node = Box<dyn SensorNode<1>>;
 
 fn node(file: &Path, given: &Configuration) -> Result<Node, Error> {
     let (report, reads, variance) = (given.report, given.reads, given.deviation * given.deviation);
-    let node = match (report, given.coordinates) {
-        (Report::Censored { .. }, 2) => report.node::<2>(reads, variance),
-        (Report::Censored { .. }, 4) => report.node::<4>(reads, variance),
-        (Report::Censored { .. }, other) if other != 1 => {
-            Err(format!("coordinates is {other}: expected 1, 2 or 4").into())
-        }
+    let node = match (report.needs_coordinates(), given.coordinates) {
+        (true, 2) => report.node::<2>(reads, variance),
+        (true, 4) => report.node::<4>(reads, variance),
+        (true, other) if other != 1 => Err(format!("coordinates is {other}: expected 1, 2 or 4").into()),
         _ => report.node::<1>(reads, variance),
     };
     node.map_err(configured(file))
@@ -122,6 +142,9 @@ struct Samples {
     node: Node,
     stream: Stream,
     refused: Option<Error>,
+    /// Where the centre is, without a password.
+    centre: String,
+    notes: Limiter,
 }
 
 impl Samples {
@@ -154,13 +177,33 @@ impl Program for Samples {
         match self.node.report(&mut rng, &Vector1::new(sample), feedback) {
             Ok(report) => ControlFlow::Continue(report),
             Err(error) => {
-                eprintln!("slot {}: {error}", slot.number());
+                self.notes
+                    .say("report", &format!("slot {}: no report: {error}", slot.number()));
                 ControlFlow::Continue(None)
             }
         }
     }
 
     fn note(&mut self, note: Note) {
-        eprintln!("{note}");
+        let text = note.to_string();
+        let kind = text.split(',').next().unwrap_or_default().to_owned();
+        self.notes.say(&kind, &text);
+    }
+
+    fn trouble(&mut self, error: &fewbits_link::Error) {
+        let cause = std::error::Error::source(error).map_or_else(String::new, |cause| format!(": {cause}"));
+        self.notes
+            .say("state", &format!("the state cannot be stored, nothing is sent: {error}{cause}"));
+    }
+
+    fn unanswered(&mut self, since: Duration, link: &SensorLink) {
+        let (seconds, counts) = (since.as_secs(), link.counts());
+        let reason = match (counts.forged, counts.replayed, counts.unknown + counts.short) {
+            (0, 0, 0) => "is it running, is this its address, and does it know this sensor and its key?".to_owned(),
+            (0, 0, other) => format!("{other} frames came that are not for this sensor"),
+            (0, old, _) => format!("{old} frames came that were used before: has the centre lost its state?"),
+            (forged, ..) => format!("{forged} frames under another key were refused: do both ends have the same?"),
+        };
+        say!("no answer from {} for {seconds} s: {reason}", self.centre);
     }
 }

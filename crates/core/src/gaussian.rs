@@ -120,8 +120,8 @@ impl<const D: usize> Gaussian<D> {
         Ok(self.factored()?.log_pdf(x))
     }
 
-    /// Squared Mahalanobis distance `(x - mean)' P^-1 (x - mean)`: the normalised estimation error squared (NEES) if `x` is
-    /// the truth, with expectation `D` for a consistent belief.
+    /// Squared Mahalanobis distance `(x - mean)' P^-1 (x - mean)`: of the truth from a consistent belief it has expectation `D`;
+    /// [`Gaussian::normalised_error_squared`] is the same over `D`.
     ///
     /// # Errors
     /// If the covariance is singular.
@@ -130,7 +130,7 @@ impl<const D: usize> Gaussian<D> {
         Ok(deviation.dot(&self.cholesky()?.solve(&deviation)))
     }
 
-    /// Normalised estimation error squared, `(x - mean)' P^-1 (x - mean) / D`: expectation 1 for a consistent belief.
+    /// Normalised estimation error squared (NEES), `(x - mean)' P^-1 (x - mean) / D`: expectation 1 for a consistent belief.
     ///
     /// # Errors
     /// If the covariance is singular.

@@ -18,10 +18,10 @@
 //! | `binary_patterns` | `binary-patterns` | one-bit quantizers with patterned cells |
 //! | `pf_mpa` | `pf-mpa` | tracking from quantized ranges |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
-//! | `record` | `record` | files and frames of many columns within guaranteed errors |
+//! | `block_codec`, `record` | `record` | blocks of samples in few bits; files and frames of many columns within guaranteed errors |
 //! | `table` | `table` | tables of strangers: dialects, times, gaps and kinds of columns |
 //! | `recipes` | `recipes` | what a person does with a table: bounds, plan, pack, verify, as functions |
-//! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh`, `link-live` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh, with a page |
+//! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh |
 //! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
 //! | `network`, `protocol` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
@@ -34,6 +34,8 @@ pub use fewbits_numerics as numerics;
 pub use fewbits_adaptive as adaptive;
 #[cfg(feature = "binary-patterns")]
 pub use fewbits_binary_patterns as binary_patterns;
+#[cfg(feature = "record")]
+pub use fewbits_block_codec as block_codec;
 #[cfg(feature = "cfwmd")]
 pub use fewbits_cfwmd as cfwmd;
 #[cfg(feature = "filters")]

@@ -49,21 +49,7 @@ impl Key {
     /// # Errors
     /// If a character is not a hexadecimal digit, the number of digits is odd, or the key is too short.
     pub fn from_hex(text: &str) -> Result<Self, Error> {
-        let digits: Option<Vec<u8>> = text
-            .chars()
-            .filter(|c| !c.is_whitespace())
-            .map(|c| c.to_digit(16).map(|digit| digit as u8))
-            .collect();
-        // The message must not contain the key itself.
-        let expected = "an even number of hexadecimal digits";
-        let Some(digits) = digits else {
-            return refuse("key", "no hexadecimal text", expected);
-        };
-        if digits.len() % 2 == 1 {
-            return refuse("key", "an odd number of digits", expected);
-        }
-        let bytes: Vec<u8> = digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect();
-        Self::new(&bytes)
+        Self::new(&bytes_of_hex(text)?)
     }
 
     /// A number that tells keys apart and tells nothing about them: 16 hexadecimal digits. States hold it.
@@ -110,6 +96,24 @@ impl Key {
         let counter = header.last_chunk().map_or(0, |bytes| u64::from_be_bytes(*bytes));
         Ok((counter, frame))
     }
+}
+
+/// The bytes of a secret that is written as hexadecimal digits; spaces are ignored.
+pub(crate) fn bytes_of_hex(text: &str) -> Result<Vec<u8>, Error> {
+    let digits: Option<Vec<u8>> = text
+        .chars()
+        .filter(|c| !c.is_whitespace())
+        .map(|c| c.to_digit(16).map(|digit| digit as u8))
+        .collect();
+    // The message must not contain the secret itself.
+    let expected = "an even number of hexadecimal digits";
+    let Some(digits) = digits else {
+        return refuse("key", "no hexadecimal text", expected);
+    };
+    if digits.len() % 2 == 1 {
+        return refuse("key", "an odd number of digits", expected);
+    }
+    Ok(digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
 }
 
 /// The sensor number of an envelope, without any check. `None` if it is too short.

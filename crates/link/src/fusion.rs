@@ -1,10 +1,10 @@
 //! The fusion centre of `fewbits-filters` as a [`Receiver`] over bits.
 
 use fewbits_core::{BitString, Observation};
-use fewbits_filters::centre::{CentreState, FusionCentre, Slot};
+use fewbits_filters::centre::{CentreState, Event, FusionCentre, Slot};
 use fewbits_filters::contract::StateFilter;
 use fewbits_monte_carlo::Stream;
-use fewbits_protocol::{BoxError, Receiver, SensorHealth};
+use fewbits_protocol::{BoxError, Receiver, ReceiverEvent, SensorHealth};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// A [`FusionCentre`] that advances by one period per slot. Sensors are numbered in increasing order of their numbers there.
@@ -18,6 +18,8 @@ pub struct FusionReceiver<const D: usize, F: StateFilter<D>> {
     /// The slot at whose time the prior applies: the one before the first predicted slot.
     origin: Option<u64>,
     slot: u64,
+    /// Events of the last update.
+    events: Vec<Event>,
 }
 
 impl<const D: usize, F: StateFilter<D>> std::fmt::Debug for FusionReceiver<D, F> {
@@ -39,6 +41,7 @@ impl<const D: usize, F: StateFilter<D>> FusionReceiver<D, F> {
             stream,
             origin: None,
             slot: 0,
+            events: Vec::new(),
         }
     }
 
@@ -77,7 +80,8 @@ where
         });
         let slots = slots.collect::<Result<Vec<_>, BoxError>>()?;
         let mut rng = self.stream.named("update").indexed(self.slot).rng();
-        self.centre.receive(&mut rng, &slots)?;
+        self.events.clear();
+        self.events = self.centre.receive(&mut rng, &slots)?.events;
         Ok(())
     }
 
@@ -97,6 +101,23 @@ where
         });
         // All numbers are those of sensors that have joined.
         judged.collect::<Option<_>>().unwrap_or_default()
+    }
+
+    fn events(&self) -> Vec<ReceiverEvent> {
+        let place = |number: u32| self.numbers.iter().position(|known| *known == number);
+        let event = |event: &Event| {
+            Some(match *event {
+                Event::Dead(number) => ReceiverEvent::Dead(place(number)?),
+                Event::Alive(number) => ReceiverEvent::Alive(place(number)?),
+                Event::Excluded(number) => ReceiverEvent::Excluded(place(number)?),
+                Event::Readmitted(number) => ReceiverEvent::Readmitted(place(number)?),
+                Event::Lost => ReceiverEvent::Lost,
+                Event::NoiseOverstated => ReceiverEvent::NoiseOverstated,
+                Event::Reacquired => ReceiverEvent::Reacquired,
+                _ => return None,
+            })
+        };
+        self.events.iter().filter_map(event).collect()
     }
 
     fn state(&self) -> Result<BitString, BoxError> {

@@ -8,7 +8,9 @@
 //! | `zenoh::Zenoh` (feature `zenoh`) | many sensors on several hosts, with or without routers |
 //! | [`Station`], [`SensorLink`] | you have your own sockets and clock, but need keys and a stored state |
 //! | [`FusionReceiver`] | the estimator is the fusion centre of `fewbits-filters` |
-//! | `LivePage` (feature `live`) | a web page is to show a running centre |
+//! | [`LivePage`] | a web page is to show a running centre, or Prometheus is to collect its numbers |
+//! | [`doors`] | estimates or reports are to be written or read in the formats of other programs |
+//! | [`FleetKey`] | the keys of many sensors are to be derived from one |
 //! | [`Key`], [`ReplayWindow`], [`Store`] | you need the parts |
 //!
 //! The state machines are those of `fewbits-protocol`, which the simulated network runs too. This crate adds what a real network needs:
@@ -32,10 +34,12 @@
 //!
 //! Not here: radio and energy (`fewbits-network`), estimators.
 
+pub mod doors;
 mod envelope;
 mod error;
+mod fleet;
 mod fusion;
-#[cfg(feature = "live")]
+mod http;
 mod live;
 #[cfg(feature = "mqtt")]
 pub mod mqtt;
@@ -52,8 +56,8 @@ pub mod zenoh;
 
 pub use envelope::{Direction, Key, Refusal, ReplayWindow, sensor_of};
 pub use error::Error;
+pub use fleet::FleetKey;
 pub use fusion::FusionReceiver;
-#[cfg(feature = "live")]
 pub use live::LivePage;
 pub use private::{require_private, write_private};
 pub use sensor::{Request, SensorLink};

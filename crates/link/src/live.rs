@@ -1,29 +1,25 @@
 //! A web page that shows a running centre: estimates with their band, the last reports and the health of each sensor, bits per second,
-//! refused envelopes.
+//! refused envelopes; and the same as metrics for Prometheus.
 //!
 //! The page is one file that loads no scripts from other servers. It receives server-sent events, and shows the last 300 slots when it is
-//! opened.
+//! opened. `/metrics` has the text format of Prometheus.
 
+use crate::doors::Metrics;
 use crate::error::Error;
+use crate::http::{Answer, Server};
 use crate::station::{Counts, Step};
-use axum::Router;
-use axum::extract::State;
-use axum::response::Html;
-use axum::response::sse::{Event, KeepAlive, Sse};
-use axum::routing::get;
 use fewbits_core::Observation;
 use fewbits_protocol::SensorHealth;
 use serde::Serialize;
 use std::collections::VecDeque;
-use std::convert::Infallible;
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, PoisonError};
-use tokio::sync::broadcast;
-use tokio_stream::wrappers::BroadcastStream;
-use tokio_stream::{Stream, StreamExt};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
 
 /// Number of slots that are shown when the page is opened.
 const HISTORY: usize = 300;
+/// Without a slot for so long, a comment is sent: a client that has gone is noticed.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
 const PAGE: &str = include_str!("live.html");
 
@@ -41,12 +37,45 @@ struct Shown<'a> {
     counts: Counts,
 }
 
-type Shared = Arc<(Mutex<VecDeque<String>>, broadcast::Sender<String>)>;
+#[derive(Debug, Default)]
+struct History {
+    /// The last slots, as text.
+    slots: VecDeque<Arc<str>>,
+    /// Number of slots that were ever shown.
+    shown: u64,
+    metrics: Metrics,
+}
 
-/// A page that a thread of its own serves.
+#[derive(Debug, Default)]
+struct Shared {
+    history: Mutex<History>,
+    changed: Condvar,
+}
+
+impl Shared {
+    fn history(&self) -> std::sync::MutexGuard<'_, History> {
+        self.history.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The slots after the first `seen`, and how many there were ever. Waits for one if there is none.
+    fn after(&self, seen: u64) -> (Vec<Arc<str>>, u64) {
+        let history = self.history();
+        let waited = self
+            .changed
+            .wait_timeout_while(history, KEEP_ALIVE, |history| history.shown == seen);
+        let history = waited.unwrap_or_else(PoisonError::into_inner).0;
+        let new = usize::try_from(history.shown - seen)
+            .unwrap_or(usize::MAX)
+            .min(history.slots.len());
+        let slots = history.slots.iter().skip(history.slots.len() - new).cloned();
+        (slots.collect(), history.shown)
+    }
+}
+
+/// A page that threads of its own serve.
 #[derive(Debug)]
 pub struct LivePage {
-    shared: Shared,
+    shared: Arc<Shared>,
     numbers: Vec<u32>,
     period: f64,
     address: SocketAddr,
@@ -54,38 +83,34 @@ pub struct LivePage {
 
 impl LivePage {
     /// Serves the page at this address, for these sensor numbers and slots of `period` seconds. The page has no password: bind it to a
-    /// trusted network.
+    /// trusted network. At most 64 connections are served at a time, and one that sends no request is closed after five seconds.
     ///
     /// # Errors
     /// If the address is in use or not an address of this machine.
     pub fn serve(address: SocketAddr, numbers: Vec<u32>, period: f64) -> Result<Self, Error> {
-        let failed = |source| Error::socket(address, source);
-        let listener = std::net::TcpListener::bind(address).map_err(failed)?;
-        listener.set_nonblocking(true).map_err(failed)?;
-        let address = listener.local_addr().map_err(failed)?;
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_io()
-            .enable_time()
-            .build();
-        let runtime = runtime.map_err(failed)?;
-        let shared: Shared = Arc::new((Mutex::default(), broadcast::Sender::new(64)));
-        let app = Router::new()
-            .route("/", get(|| async { Html(PAGE) }))
-            .route("/events", get(events))
-            .with_state(shared.clone());
-        std::thread::spawn(move || {
-            runtime.block_on(async move {
-                if let Ok(listener) = tokio::net::TcpListener::from_std(listener) {
-                    // The thread ends with the process.
-                    let _ = axum::serve(listener, app).await;
-                }
-            });
-        });
+        let shared = Arc::<Shared>::default();
+        let source = shared.clone();
+        let server = Server::start(address, move |path| match path {
+            "/" => Answer::whole("text/html; charset=utf-8", PAGE),
+            "/metrics" => {
+                let text = source.history().metrics.to_string();
+                Answer::whole("text/plain; version=0.0.4; charset=utf-8", text)
+            }
+            "/events" => {
+                let (source, mut seen) = (source.clone(), 0);
+                Answer::Events(Box::new(move || {
+                    let (slots, shown) = source.after(seen);
+                    seen = shown;
+                    slots
+                }))
+            }
+            _ => Answer::Missing,
+        })?;
         Ok(Self {
             shared,
             numbers,
             period,
-            address,
+            address: server.address(),
         })
     }
 
@@ -114,24 +139,14 @@ impl LivePage {
         let Ok(text) = serde_json::to_string(&shown) else {
             return;
         };
-        let mut history = self.shared.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if history.len() == HISTORY {
-            history.pop_front();
+        let mut history = self.shared.history();
+        if history.slots.len() == HISTORY {
+            history.slots.pop_front();
         }
-        history.push_back(text.clone());
-        // Without clients sending fails, which is no error.
-        let _ = self.shared.1.send(text);
+        history.slots.push_back(text.into());
+        history.shown += 1;
+        history.metrics.take(step, counts, &self.numbers);
+        drop(history);
+        self.shared.changed.notify_all();
     }
-}
-
-/// The stored slots, then new ones as they come.
-async fn events(State(shared): State<Shared>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
-    let (past, coming) = {
-        // Under one lock, so that no slot is missed or sent twice.
-        let history = shared.0.lock().unwrap_or_else(PoisonError::into_inner);
-        (history.iter().cloned().collect::<Vec<_>>(), shared.1.subscribe())
-    };
-    let coming = BroadcastStream::new(coming).filter_map(Result::ok);
-    let all = tokio_stream::iter(past).chain(coming);
-    Sse::new(all.map(|text| Ok(Event::default().data(text)))).keep_alive(KeepAlive::default())
 }

@@ -4,22 +4,25 @@ use crate::error::Error;
 use crate::topics::{QUEUE, Queue, Topics};
 use crate::transport::{Datagram, Transport};
 pub use rumqttc;
-use rumqttc::mqttbytes::v4::SubscribeReasonCode;
-use rumqttc::{Client, ConnectionError, Event, MqttOptions, NetworkOptions, Packet, QoS};
+use rumqttc::NetworkOptions;
+use rumqttc::v5::mqttbytes::QoS;
+use rumqttc::v5::mqttbytes::v5::{Filter, Packet, RetainForwardRule, SubscribeReasonCode};
+use rumqttc::v5::{Client, ConnectionError, Event, MqttOptions};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-/// Longest message that is accepted without ending the connection. A message longer than a datagram is ignored.
-const MAX_MESSAGE: usize = 1 << 20;
+/// Longest message, which the broker is told: it drops longer ones instead of sending them. A datagram with its topic is shorter.
+const MAX_MESSAGE: u32 = 1 << 17;
 const CONNECT_WITHIN: Duration = Duration::from_secs(10);
 const RECONNECT_AFTER: Duration = Duration::from_secs(1);
 
-/// The connection of one end to a broker. Addresses are sensor numbers.
+/// The connection of one end to a broker that speaks MQTT 5. Addresses are sensor numbers.
 ///
 /// Sensor 3 of the fleet `plant` sends on the topic `plant/3/up` and receives on `plant/3/down`. Both have quality of service 0: the
 /// protocol itself handles lost frames, and a frame that comes after its slot is useless. If the connection ends, a thread connects again;
-/// what is sent meanwhile is lost.
+/// what is sent meanwhile is lost. Messages that the broker keeps for those who come later are not asked for, and longer ones than a
+/// datagram are not sent by the broker: neither can keep an end from its own messages.
 pub struct Mqtt {
     client: Arc<Client>,
     is_connected: Arc<AtomicBool>,
@@ -53,31 +56,34 @@ impl Mqtt {
     }
 
     fn connect(mut options: MqttOptions, topics: Topics) -> Result<Self, Error> {
-        options
-            .set_max_packet_size(MAX_MESSAGE, MAX_MESSAGE)
-            .set_clean_session(true);
+        options.set_max_packet_size(Some(MAX_MESSAGE)).set_clean_start(true);
         let (host, port) = options.broker_address();
         let failed = |source| Error::socket(format!("{host}:{port}"), source);
-        let (client, mut connection) = Client::new(options, QUEUE);
         let mut network = NetworkOptions::new();
         network.set_tcp_nodelay(true);
-        connection.eventloop.set_network_options(network);
+        options.set_network_options(network);
+        let (client, mut connection) = Client::new(options, QUEUE);
         let (client, is_connected) = (Arc::new(client), Arc::new(AtomicBool::new(false)));
         let (inlet, queue) = Queue::new(topics.clone());
         let (sender, outcome) = mpsc::channel();
         // The thread ends when the last client is dropped, so it must not keep one.
-        let (weak, connected, filter) = (Arc::downgrade(&client), is_connected.clone(), topics.from("+"));
+        let (weak, connected, topic) = (Arc::downgrade(&client), is_connected.clone(), topics.from("+"));
+        let mut filter = Filter::new(topic.clone(), QoS::AtMostOnce);
+        filter.retain_forward_rule = RetainForwardRule::Never;
         std::thread::spawn(move || {
             let mut must_subscribe = false;
             for event in connection.iter() {
                 match event {
-                    Ok(Event::Incoming(Packet::Publish(message))) => inlet.leave(&message.topic, message.payload),
+                    Ok(Event::Incoming(Packet::Publish(message))) => {
+                        inlet.leave(&String::from_utf8_lossy(&message.topic), message.payload);
+                    }
                     // The broker forgets the subscriptions of an ended session.
                     Ok(Event::Incoming(Packet::ConnAck(_))) => must_subscribe = true,
                     Ok(Event::Incoming(Packet::SubAck(answer))) => {
-                        let refused = answer.return_codes.contains(&SubscribeReasonCode::Failure);
+                        let taken = |code: &SubscribeReasonCode| matches!(code, SubscribeReasonCode::Success(_));
+                        let refused = !answer.return_codes.iter().all(taken);
                         connected.store(!refused, Ordering::Relaxed);
-                        let refusal = std::io::Error::other(format!("the broker refuses the topic {filter}"));
+                        let refusal = std::io::Error::other(format!("the broker refuses the topic {topic}"));
                         let _ = sender.send(if refused { Err(refusal) } else { Ok(()) });
                     }
                     Ok(_) => {}
@@ -96,7 +102,7 @@ impl Mqtt {
                 }
                 // If the queue of requests is full, try again after the next event.
                 if must_subscribe && let Some(client) = weak.upgrade() {
-                    must_subscribe = client.try_subscribe(&filter, QoS::AtMostOnce).is_err();
+                    must_subscribe = client.try_subscribe_many([filter.clone()]).is_err();
                 }
             }
         });

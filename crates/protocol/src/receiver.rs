@@ -45,6 +45,11 @@ pub trait Receiver {
         Vec::new()
     }
 
+    /// What the last update found out about sensors and model. Empty if the estimator does not judge them.
+    fn events(&self) -> Vec<ReceiverEvent> {
+        Vec::new()
+    }
+
     /// The complete state of the estimator, without rounding.
     ///
     /// # Errors
@@ -56,6 +61,52 @@ pub trait Receiver {
     /// # Errors
     /// If the bits are not a state of this estimator.
     fn restore(&mut self, state: &BitString) -> Result<(), BoxError>;
+}
+
+/// What an update finds out. Sensors are numbered from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum ReceiverEvent {
+    /// The sensor is regarded as dead because of its silence.
+    Dead(usize),
+    /// A report came from a sensor that was regarded as dead.
+    Alive(usize),
+    /// The sensor's reports contradict the others' and are no longer used.
+    Excluded(usize),
+    /// An excluded sensor is used again.
+    Readmitted(usize),
+    /// The model does not hold for all sensors together.
+    Lost,
+    /// A stated noise is too large.
+    NoiseOverstated,
+    /// The estimate began anew.
+    Reacquired,
+}
+
+impl ReceiverEvent {
+    /// The event's name, as tables contain it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dead(_) => "dead",
+            Self::Alive(_) => "alive",
+            Self::Excluded(_) => "excluded",
+            Self::Readmitted(_) => "readmitted",
+            Self::Lost => "lost",
+            Self::NoiseOverstated => "noise overstated",
+            Self::Reacquired => "reacquired",
+        }
+    }
+
+    /// The sensor; `None` if the event is about all.
+    pub fn sensor(self) -> Option<usize> {
+        match self {
+            Self::Dead(sensor) | Self::Alive(sensor) | Self::Excluded(sensor) | Self::Readmitted(sensor) => {
+                Some(sensor)
+            }
+            Self::Lost | Self::NoiseOverstated | Self::Reacquired => None,
+        }
+    }
 }
 
 /// An estimator's judgement of one sensor.
@@ -92,6 +143,10 @@ impl<R: Receiver + ?Sized> Receiver for Box<R> {
 
     fn health(&self) -> Vec<SensorHealth> {
         (**self).health()
+    }
+
+    fn events(&self) -> Vec<ReceiverEvent> {
+        (**self).events()
     }
 
     fn state(&self) -> Result<BitString, BoxError> {

@@ -1,9 +1,9 @@
-//! Bits per sample of recordings on real series, beside the references of other programs.
+//! Bits per sample of whole recordings of real series, beside the references of other programs.
 //!
 //! `cargo run --release -p fewbits-record --example measure -- FOLDER [KEY]` reads `manifest.csv` (key, ..., period, range),
 //! `baselines.csv` (key, bound in percent of the range, codec, bits per sample) and for each key `KEY.f64`, little-endian doubles. It
-//! prints one line for each series, bound and size of blocks, then the summary. Every restored sample is checked. With `day` in place of
-//! a key it records the day of telemetry of `docs/record.md`.
+//! prints one line for each series and bound, then the summary. Every restored sample is checked. With `day` in place of a key it
+//! records the day of telemetry of `docs/record.md`.
 
 use fewbits_record::{Bound, Column, Playback, Recorder, Schema, TimeBase, TimeFormat};
 use std::collections::BTreeMap;
@@ -13,11 +13,13 @@ use std::path::Path;
 type Failure = Box<dyn std::error::Error>;
 
 const PERCENTS: [&str; 7] = ["0.0", "0.0001", "0.01", "0.25", "0.5", "1.0", "2.0"];
+/// Rows per block that are measured; the first is the default of files.
+const ROWS: [usize; 3] = [1 << 16, 512, 128];
 
-/// Bits of the blocks alone, and of the whole recording.
+/// Bits per sample of the whole recording, and of its blocks alone.
 struct Cost {
-    blocks: f64,
     whole: f64,
+    blocks: f64,
 }
 
 fn measure(samples: &[f64], column: &Column, rows: usize) -> Result<Cost, Failure> {
@@ -43,8 +45,8 @@ fn measure(samples: &[f64], column: &Column, rows: usize) -> Result<Cost, Failur
     assert_eq!(read, samples.len());
     let bits = |bytes: f64| 8.0 * bytes / samples.len() as f64;
     Ok(Cost {
-        blocks: bits(blocks as f64),
         whole: bits(bytes.len() as f64),
+        blocks: bits(blocks as f64),
     })
 }
 
@@ -112,6 +114,11 @@ fn day(folder: &Path, rows_per_block: usize) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Codecs of the list that are this library's own.
+fn is_own(codec: &str) -> bool {
+    codec.starts_with("fewbits")
+}
+
 fn main() -> Result<(), Failure> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().ok_or("which folder?")?;
@@ -129,16 +136,17 @@ fn main() -> Result<(), Failure> {
             .or_default()
             .insert(record[2].to_owned(), record[3].parse()?);
     }
-    let mut costs: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
-    let mut ratios: BTreeMap<(&str, String), Vec<f64>> = BTreeMap::new();
+    let only = |name: &str, all: &str| std::env::var(name).map_or(true, |given| given.split(',').any(|one| one == all));
+    let mut costs: BTreeMap<(&str, String), Vec<f64>> = BTreeMap::new();
+    let mut beaten: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for record in csv::Reader::from_path(folder.join("manifest.csv"))?.records() {
         let record = record?;
         let (key, period, range): (&str, f64, f64) = (&record[0], record[5].parse()?, record[6].parse()?);
-        if chosen.as_ref().is_some_and(|chosen| chosen != key) {
+        if chosen.as_ref().is_some_and(|chosen| !key.starts_with(chosen.as_str())) {
             continue;
         }
         let samples = series(folder, key)?;
-        for percent in PERCENTS {
+        for percent in PERCENTS.into_iter().filter(|percent| only("PERCENTS", percent)) {
             let delta = 0.01 * percent.parse::<f64>()? * range;
             let bound = if delta > 0.0 {
                 Bound::Absolute(delta)
@@ -149,43 +157,45 @@ fn main() -> Result<(), Failure> {
             if period > 0.0 {
                 column = column.with_period(period)?;
             }
-            let one = measure(&samples, &column, samples.len())?;
-            let large = measure(&samples, &column, 512)?;
-            let small = measure(&samples, &column, 128)?;
-            println!("{key},{percent},{:.4},{:.4},{:.4},{:.4}", one.blocks, large.blocks, large.whole, small.blocks);
-            for (kind, bits) in [
-                ("one block", one.blocks),
-                ("512 rows", large.blocks),
-                ("512 rows, file", large.whole),
-                ("128 rows", small.blocks),
-            ] {
-                costs.entry((percent, kind)).or_default().push(bits);
-            }
-            for (codec, bits) in references
-                .get(&(key.to_owned(), percent.to_owned()))
+            let name = (key.to_owned(), percent.to_owned());
+            let others = references
+                .get(&name)
                 .into_iter()
                 .flatten()
-            {
-                ratios
-                    .entry((percent, codec.clone()))
+                .filter(|(codec, _)| !is_own(codec));
+            let best = others.min_by(|a, b| a.1.total_cmp(b.1));
+            for rows in ROWS.into_iter().filter(|rows| only("ROWS", &rows.to_string())) {
+                let cost = measure(&samples, &column, rows)?;
+                print!("{key},{percent},{rows},{:.4},{:.4}", cost.whole, cost.blocks);
+                if let Some((codec, bits)) = best {
+                    print!(",{codec},{bits},{:.3}", cost.whole / bits);
+                    if rows == ROWS[0] && cost.whole > *bits {
+                        beaten.entry(percent).or_default().push(format!(
+                            "{key}: {:.4} ({:.4}) for {bits} of {codec}, {} rows",
+                            cost.whole,
+                            cost.blocks,
+                            samples.len()
+                        ));
+                    }
+                }
+                println!();
+                costs
+                    .entry((percent, format!("{rows} rows, file")))
                     .or_default()
-                    .push(one.blocks / bits);
+                    .push(cost.whole);
+                costs
+                    .entry((percent, format!("{rows} rows, blocks")))
+                    .or_default()
+                    .push(cost.blocks);
             }
         }
     }
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     for ((percent, kind), bits) in &costs {
-        println!("bound {percent} %, {kind}: mean {:.4} bits", mean(bits));
+        println!("bound {percent} %, {kind}: mean {:.4} bits", bits.iter().sum::<f64>() / bits.len() as f64);
     }
-    for ((percent, codec), ratio) in &ratios {
-        let logs: Vec<f64> = ratio.iter().map(|ratio| ratio.ln()).collect();
-        let larger = ratio.iter().filter(|ratio| **ratio > 1.0).count();
-        let worst = ratio.iter().fold(0.0, |worst: f64, ratio| worst.max(*ratio));
-        println!(
-            "bound {percent} %, one block / {codec}: geometric mean {:.3}, worst {worst:.3}, larger on {larger} of {}",
-            mean(&logs).exp(),
-            ratio.len()
-        );
+    for (percent, list) in &beaten {
+        println!("bound {percent} %: a file of another codec is smaller on {}", list.len());
+        list.iter().for_each(|line| println!("  {line}"));
     }
     Ok(())
 }

@@ -20,7 +20,7 @@ use arrow_array::types::{
 };
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, PrimitiveArray, RecordBatch};
 use arrow_schema::{DataType, Field, TimeUnit};
-use fewbits_numerics::ArgumentError;
+use fewbits_block_codec::ArgumentError;
 use std::collections::HashMap;
 use std::io::Write;
 use std::sync::Arc;

@@ -3,8 +3,7 @@
 //! The test is exact. In rounded arithmetic `|a - b| <= delta` accepts differences that exceed `delta` by half a unit in the last place.
 //! Here the rounding error of the difference decides if the rounded difference equals `delta`.
 
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::positive;
+use fewbits_block_codec::ArgumentError;
 
 /// The error bound of a column, for every finite sample. Gaps, NaN and infinities are always restored exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,13 +27,13 @@ impl Bound {
     pub(crate) fn checked(self) -> Result<Self, ArgumentError> {
         match self {
             Self::Absolute(delta) => {
-                positive("bound", delta)?;
+                ArgumentError::positive("bound", delta)?;
                 if !(2.0 * delta).is_finite() {
                     return Err(ArgumentError::new("bound", delta, "a number whose double is finite"));
                 }
             }
             Self::ShareOfRange(share) => {
-                positive("bound", share)?;
+                ArgumentError::positive("bound", share)?;
                 if share > 1.0 {
                     return Err(ArgumentError::new("bound", share, "a share of the range, at most 1"));
                 }

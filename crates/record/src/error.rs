@@ -1,6 +1,7 @@
 //! Errors of recordings.
 
-use fewbits_numerics::ArgumentError;
+use fewbits_block_codec::ArgumentError;
+use fewbits_block_codec::bytes::Unread;
 use std::io;
 
 /// Errors of this crate. After a refused row the recorder is unchanged.
@@ -25,19 +26,22 @@ pub enum Error {
     /// The bytes do not begin like a recording.
     #[error("not a recording: the first bytes are not those of one")]
     NotARecording,
+    /// Another program writes to the file.
+    #[error("the recording is being written by another program: wait until it ends")]
+    Locked,
     /// The recording is of another version of the format.
-    #[error("format version {found}: this program reads version {supported}")]
+    #[error("format version {found}: this program reads versions 5 to {supported}")]
     Version {
         /// Version of the recording.
         found: u8,
-        /// Version that this program reads.
+        /// Newest version that this program reads.
         supported: u8,
     },
     /// The header is incomplete or does not match its checksum. Then nothing can be decoded.
     #[error("the header is damaged ({0})")]
     Header(Damage),
     /// A block, or bytes between blocks, cannot be read. All other blocks can.
-    #[error("{bytes} bytes at offset {offset} are damaged ({damage})")]
+    #[error("{}", described(*.offset, *.bytes, *.damage))]
     Block {
         /// Offset of the first unreadable byte.
         offset: u64,
@@ -79,9 +83,48 @@ pub enum Damage {
     /// The bytes are a block of another recording, or not a block.
     #[error("no block begins here")]
     NoBlock,
+    /// Blocks that the recorder wrote are not there.
+    #[error("blocks are missing")]
+    Missing,
+    /// A whole block stands where another one belongs: a copy, or one that was moved. Its rows are not read.
+    #[error("a block out of its place")]
+    Misplaced,
+    /// The index is whole but describes other bytes: some were removed or inserted.
+    #[error("the index describes other bytes")]
+    Index,
+    /// The recording has no end: it was not finished, or its last bytes are missing.
+    #[error("not finished, or cut off")]
+    NoEnd,
+}
+
+/// Damage in words. Some kinds have no bytes of their own.
+fn described(offset: u64, bytes: u64, damage: Damage) -> String {
+    match damage {
+        Damage::Missing => format!("blocks are missing at offset {offset}"),
+        Damage::Index => "the index describes other bytes than the recording has: some were removed or inserted".into(),
+        Damage::NoEnd => {
+            format!("the recording has no end at offset {offset}: it was not finished, or its end is missing")
+        }
+        _ => format!("{bytes} bytes at offset {offset} are damaged ({damage})"),
+    }
+}
+
+impl From<Unread> for Damage {
+    fn from(unread: Unread) -> Self {
+        match unread {
+            Unread::CutOff => Self::CutOff,
+            Unread::Content(what) => Self::Content(what),
+            _ => Self::NoBlock,
+        }
+    }
 }
 
 impl Error {
+    /// Damage of the header.
+    pub(crate) fn header(damage: impl Into<Damage>) -> Self {
+        Self::Header(damage.into())
+    }
+
     pub(crate) fn io(action: &'static str) -> impl Fn(io::Error) -> Self {
         move |source| Self::Io { action, source }
     }

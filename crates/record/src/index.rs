@@ -103,7 +103,7 @@ pub(crate) fn special(check: u32, kind: u8, content: &[u8]) -> Vec<u8> {
 }
 
 /// The longest content of a special record of a recording.
-fn max_content(kind: u8, columns: usize) -> usize {
+pub(crate) fn max_content(kind: u8, columns: usize) -> usize {
     match kind {
         SEGMENT | ONLY => 16 + 8 * columns + BLOCKS_PER_SEGMENT * (40 + columns),
         FOOTER => MAX_FOOTER,

@@ -45,23 +45,28 @@
 //! | reading from front to end, for example from a pipe | [`BlockReader`] |
 //! | frames for a link that loses some | [`FrameWriter`], [`HeaderRepeats`], [`FrameReader`] |
 //!
-//! Not here: how values are predicted and coded (`fewbits-adaptive`), text formats and the command line (`fewbits-cli`). The format
+//! Not here: how values are predicted and coded (`fewbits-block-codec`), text formats and the command line (`fewbits-cli`). The format
 //! is described byte by byte in `docs/record.md`.
 
+mod append;
 #[cfg(feature = "arrow")]
 pub mod arrow;
 mod block;
+mod blocks;
 mod bound;
 mod codec;
 mod error;
 mod frames;
 mod header;
+mod header_column;
+mod header_read;
 mod index;
 mod playback;
 mod ranges;
 mod recorder;
 mod related;
 mod resume;
+mod rolling;
 mod scan;
 mod schema;
 mod specials;
@@ -70,11 +75,12 @@ mod waiting;
 mod wire;
 
 pub use block::{Block, Cells};
+pub use blocks::{Blocks, Rows};
 pub use bound::{Bound, MAX_DECIMALS, is_within, is_within_on_circle};
 pub use error::{Damage, Error};
-pub use fewbits_adaptive::Effort;
+pub use fewbits_block_codec::Effort;
 pub use frames::{FrameReader, FrameWriter, HeaderRepeats, MIN_FRAME_BYTES};
-pub use playback::{BlockInfo, Blocks, Playback, Row, Rows};
+pub use playback::{BlockInfo, Playback, Row};
 pub use recorder::Recorder;
 pub use scan::BlockReader;
 pub use schema::{Column, MAX_CELLS, ROWS_PER_BLOCK, Schema, TimeBase, TimeFormat};

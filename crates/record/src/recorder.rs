@@ -1,5 +1,6 @@
 //! Writing of recordings.
 
+use crate::append::{self, Append};
 use crate::block;
 use crate::error::Error;
 use crate::header::Header;
@@ -7,10 +8,13 @@ use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::resume;
 use crate::schema::Schema;
 use crate::waiting::Waiting;
-use fewbits_adaptive::Effort;
+use fewbits_block_codec::Effort;
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
+
+/// Largest number of rows of a single block for which a code that its columns share is tried.
+const SHARED_ROWS: usize = 1 << 13;
 
 /// Whether a new header contains starts of the columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,35 +42,38 @@ pub struct Recorder<W> {
     segment_start: u64,
     entries: Vec<Entry>,
     segments: Vec<Segment>,
+    /// Number of the next block.
+    next_number: u64,
+    /// The append that is undone if the recorder is dropped before it is complete.
+    append: Append,
     effort: Effort,
     broken: bool,
 }
 
-/// State of a recording that is to be continued.
-pub(crate) struct Resumed {
-    pub(crate) header: Header,
-    pub(crate) offset: u64,
-    pub(crate) segments: Vec<Segment>,
-    pub(crate) entries: Vec<Entry>,
-    pub(crate) next_tick: i64,
-}
-
 impl Recorder<File> {
-    /// Creates a file. An existing one is replaced.
+    /// Creates a file, and locks it against other writers. An existing one is replaced.
     ///
     /// # Errors
-    /// If the file cannot be created.
+    /// If the file cannot be created, or another program writes to it.
     pub fn create(path: impl AsRef<Path>, schema: Schema) -> Result<Self, Error> {
-        let file = File::create(path).map_err(Error::io("create"))?;
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false);
+        let file = options.open(path).map_err(Error::io("create"))?;
+        append::lock(&file)?;
+        file.set_len(0).map_err(Error::io("create"))?;
         Ok(Self::new(file, schema))
     }
 
-    /// Continues a recording, finished or not. The index, or what a crash left after the last complete block, is removed.
+    /// Continues a recording, finished or not, and locks it against other writers.
+    ///
+    /// Nothing is overwritten before the first block. If the recorder is dropped before [`finish`](Self::finish), [`flush`](Self::flush) or
+    /// [`sync`](Self::sync), the file is what it was. After a crash it is what it was, too, once it is resumed or read by
+    /// [`Playback::open`](crate::Playback::open); a file with `.append` added to the name keeps what is needed for that.
     ///
     /// # Errors
-    /// If the file cannot be opened, read or truncated, or its header is incomplete or damaged.
+    /// If the file cannot be opened or read, its header is incomplete or damaged, or another program writes to it.
     pub fn resume(path: impl AsRef<Path>) -> Result<Self, Error> {
-        let (file, resumed) = resume::open(path.as_ref())?;
+        let (file, append, resumed) = resume::open(path.as_ref())?;
         let schema = resumed.header.schema.clone();
         let first = resumed.header.to_bytes().len() as u64;
         Ok(Self {
@@ -76,6 +83,8 @@ impl Recorder<File> {
             segment_start: resumed.segments.last().map_or(first, Segment::end),
             segments: resumed.segments,
             entries: resumed.entries,
+            next_number: resumed.next_number,
+            append,
             ..Self::new(file, schema)
         })
     }
@@ -103,6 +112,8 @@ impl<W: Write> Recorder<W> {
             segment_start: 0,
             entries: Vec::new(),
             segments: Vec::new(),
+            next_number: 0,
+            append: Append::none(),
             effort: Effort::default(),
             broken: false,
         }
@@ -137,9 +148,14 @@ impl<W: Write> Recorder<W> {
         if self.broken {
             return Err(Error::Broken);
         }
+        let rows_per_block = self.schema.rows_per_block;
+        // The first block waits for one row more: if none follows, the recording is a single block, which takes fewer bytes.
+        if self.rows.ticks.len() == rows_per_block && row.len() == self.rows.columns.len() {
+            self.write_block(Starts::Learned)?;
+        }
         self.rows.push(tick, row)?;
         self.next_tick = tick.wrapping_add(1);
-        if self.rows.ticks.len() == self.schema.rows_per_block {
+        if self.rows.ticks.len() == rows_per_block && self.header.is_some() {
             self.write_block(Starts::Learned)?;
         }
         Ok(())
@@ -164,7 +180,8 @@ impl<W: Write> Recorder<W> {
         if !self.rows.ticks.is_empty() {
             self.write_block(Starts::Learned)?;
         }
-        self.writer.flush().map_err(Error::io("write"))
+        self.writer.flush().map_err(Error::io("write"))?;
+        self.append.commit()
     }
 
     /// Writes the remaining rows and the index. A recording that was not finished can be read too, but without index.
@@ -175,7 +192,12 @@ impl<W: Write> Recorder<W> {
         if self.broken {
             return Err(Error::Broken);
         }
-        // A single block contains itself what several would share.
+        if self.header.is_none() && !self.rows.ticks.is_empty() {
+            let bytes = self.single();
+            self.write(&bytes)?;
+            self.writer.flush().map_err(Error::io("write"))?;
+            return Ok(self.writer);
+        }
         if !self.rows.ticks.is_empty() {
             self.write_block(Starts::None)?;
         }
@@ -194,10 +216,31 @@ impl<W: Write> Recorder<W> {
         };
         self.write(&[footer, index::trailer(length)].concat())?;
         self.writer.flush().map_err(Error::io("write"))?;
+        self.append.commit()?;
         Ok(self.writer)
     }
 
+    /// The whole recording of the waiting rows as a single block.
+    fn single(&self) -> Vec<u8> {
+        let Waiting { ticks, columns, ranges } = &self.rows;
+        let plain = self.rows.header(&self.schema).of_single(ticks.len());
+        let own = ranges.own_bounds(&plain);
+        let written = |header: &Header| {
+            let (content, _) = block::content(header, 0, ticks, columns, &own, self.effort);
+            header.single(&content)
+        };
+        let apart = written(&plain);
+        // Columns with starts share one code. It is shorter if they have few rows or help each other.
+        let is_worth_it = columns.len() > 1 && ticks.len() <= SHARED_ROWS && self.effort == Effort::Thorough;
+        let shared = is_worth_it.then(|| written(&plain.with_starts(columns)));
+        match shared {
+            Some(shared) if shared.len() < apart.len() => shared,
+            _ => apart,
+        }
+    }
+
     fn write(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.append.begin()?;
         if let Err(error) = self.writer.write_all(bytes) {
             // The file may now end within a block, and nothing may follow that.
             self.broken = true;
@@ -228,11 +271,12 @@ impl<W: Write> Recorder<W> {
         };
         let Waiting { ticks, columns, ranges } = &self.rows;
         let own = ranges.own_bounds(header);
-        let (bytes, restored) = block::encode(header, ticks, columns, &own, self.effort);
+        let (bytes, restored) = block::encode(header, self.next_number, ticks, columns, &own, self.effort);
         // The index has the ends of what a reader gets, which may lie outside those of the samples.
         let entry = Entry::of(bytes.len() as u64, ticks, &restored);
         self.write(&bytes)?;
         self.entries.push(entry);
+        self.next_number += 1;
         self.rows.remove(self.rows.ticks.len());
         if self.entries.len() == BLOCKS_PER_SEGMENT {
             self.write_segment(index::SEGMENT)?;

@@ -1,31 +1,170 @@
 //! Finding the place where an existing recording is continued.
 
+use crate::append::{self, Append};
+use crate::block;
 use crate::error::Error;
-use crate::header::Header;
+use crate::header::{Form, Header, VERSION_5};
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
-use crate::playback;
-use crate::recorder::Resumed;
+use crate::playback::{self, Index};
 use crate::scan::{Kind, Scanner, decoded};
+use crate::wire::checked;
 use std::fs::File;
-use std::io::{Seek, SeekFrom};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Opens a recording, truncates it after its last complete block, and moves there.
-pub(crate) fn open(path: &Path) -> Result<(File, Resumed), Error> {
+/// State of a recording that is to be continued.
+pub(crate) struct Resumed {
+    pub(crate) header: Header,
+    pub(crate) offset: u64,
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) entries: Vec<Entry>,
+    pub(crate) next_tick: i64,
+    pub(crate) next_number: u64,
+}
+
+/// Opens a recording and locks it. The file where blocks are to be written stands at their place; nothing is overwritten yet.
+pub(crate) fn open(path: &Path) -> Result<(File, Append, Resumed), Error> {
     let mut file = File::options()
         .read(true)
         .write(true)
         .open(path)
         .map_err(Error::io("open"))?;
-    let header = Scanner::new(&mut file, 0).header()?;
-    let resumed = match from_index(&mut file, &header)? {
+    append::lock(&file)?;
+    if !is_still_there(&file, path) {
+        return Err(Error::Locked);
+    }
+    let (header, single) = Scanner::new(0).header(&mut file)?;
+    if let Some(content) = single {
+        return copied(file, path, header, &content);
+    }
+    if header.version == VERSION_5 {
+        return renewed(file, path, &header);
+    }
+    let mut index = playback::index_of(&mut file, &header)?;
+    if let Some((offset, tail)) = append::kept(path) {
+        // An append did not end. If its index is whole, only the kept bytes were not removed yet.
+        if !matches!(index, Index::Whole(_)) {
+            append::roll_back(&mut file, path, offset, &tail)?;
+            index = playback::index_of(&mut file, &header)?;
+        }
+    }
+    let resumed = match index {
+        Index::Whole(segments) => from_index(&mut file, &header, segments)?,
+        _ => None,
+    };
+    let resumed = match resumed {
         Some(resumed) => resumed,
         None => from_blocks(&mut file, header)?,
     };
-    // If the program stops after this line, the file is a recording that was not finished, which can be read and resumed.
-    file.set_len(resumed.offset).map_err(Error::io("truncate"))?;
     file.seek(SeekFrom::Start(resumed.offset)).map_err(Error::io("read"))?;
-    Ok((file, resumed))
+    let handle = file.try_clone().map_err(Error::io("open"))?;
+    let append = Append::planned(handle, path, resumed.offset);
+    Ok((file, append, resumed))
+}
+
+/// Whether the file has still this name: another writer may have put a new one into its place before the lock.
+fn is_still_there(file: &File, path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let (Ok(own), Ok(named)) = (file.metadata(), std::fs::metadata(path)) else {
+            return false;
+        };
+        (own.dev(), own.ino()) == (named.dev(), named.ino())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = (file, path);
+        true
+    }
+}
+
+/// An empty, locked file beside a recording, which takes its place when the append is complete.
+fn copy(locked: File, path: &Path) -> Result<(File, Append), Error> {
+    let mut options = File::options();
+    options.read(true).write(true).create(true).truncate(true);
+    let file = options.open(append::beside(path)).map_err(Error::io("copy"))?;
+    append::lock(&file)?;
+    let append = Append::copy(file.try_clone().map_err(Error::io("copy"))?, locked, path);
+    Ok((file, append))
+}
+
+/// A copy of a recording of version 5 with the heads of this version. Its blocks keep their bytes otherwise.
+fn renewed(mut locked: File, path: &Path, old: &Header) -> Result<(File, Append, Resumed), Error> {
+    locked.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
+    let mut scanner = Scanner::new(0);
+    scanner.header(&mut locked)?;
+    let mut reader = locked.try_clone().map_err(Error::io("open"))?;
+    let (mut file, append) = copy(locked, path)?;
+    let header = old.clone().renewed();
+    let start = header.to_bytes();
+    file.write_all(&start).map_err(Error::io("copy"))?;
+    let mut state = Resumed {
+        offset: start.len() as u64,
+        next_tick: 0,
+        next_number: 0,
+        header,
+        segments: Vec::new(),
+        entries: Vec::new(),
+    };
+    let mut segment_start = state.offset;
+    while let Some(found) = scanner.next(&mut reader, old)? {
+        if found.kind != Kind::Block {
+            continue;
+        }
+        let block = decoded(old, &scanner, &found, |_| true)?;
+        let content = block::content_of(scanner.bytes(&found));
+        let content = content.and_then(|content| block::renewed(old, content, state.next_number));
+        let content = content.map_err(|damage| Error::Block {
+            offset: found.offset,
+            bytes: found.length as u64,
+            damage,
+        })?;
+        let bytes = checked(state.header.check, &[], &content);
+        file.write_all(&bytes).map_err(Error::io("copy"))?;
+        state.offset += bytes.len() as u64;
+        state.next_number += 1;
+        state
+            .entries
+            .push(Entry::of(bytes.len() as u64, &block.ticks, &block.columns));
+        if state.entries.len() == BLOCKS_PER_SEGMENT {
+            let content = index::push_segment(&state.header, &state.entries);
+            let bytes = index::special(state.header.check, index::SEGMENT, &content);
+            file.write_all(&bytes).map_err(Error::io("copy"))?;
+            let segment = Segment::new(segment_start, bytes.len() as u64, &state.entries);
+            (segment_start, state.offset) = (segment.end(), segment.end());
+            state.segments.push(segment);
+            state.entries.clear();
+        }
+    }
+    state.next_tick = next_tick(&state.segments, &state.entries);
+    Ok((file, append, state))
+}
+
+/// A copy of a recording of a single block in the form that can be continued.
+fn copied(locked: File, path: &Path, header: Header, content: &[u8]) -> Result<(File, Append, Resumed), Error> {
+    let damaged = |damage| Error::Block {
+        offset: 0,
+        bytes: content.len() as u64,
+        damage,
+    };
+    let block = block::decode_content(&header, content, |_| true).map_err(damaged)?;
+    let content = block::renewed(&header, content, 0).map_err(damaged)?;
+    let header = header.with_form(Form::File).renewed();
+    let (start, bytes) = (header.to_bytes(), checked(header.check, &[], &content));
+    let (mut file, append) = copy(locked, path)?;
+    file.write_all(&[start.as_slice(), &bytes].concat())
+        .map_err(Error::io("copy"))?;
+    let entries = vec![Entry::of(bytes.len() as u64, &block.ticks, &block.columns)];
+    let resumed = Resumed {
+        offset: (start.len() + bytes.len()) as u64,
+        next_tick: next_tick(&[], &entries),
+        next_number: 1,
+        header,
+        segments: Vec::new(),
+        entries,
+    };
+    Ok((file, append, resumed))
 }
 
 fn next_tick(segments: &[Segment], entries: &[Entry]) -> i64 {
@@ -40,17 +179,19 @@ fn next_tick(segments: &[Segment], entries: &[Entry]) -> i64 {
         .map_or(0, |tick| tick.wrapping_add(1))
 }
 
-/// The state from footer and last segment; `None` if they are missing or damaged.
-fn from_index(file: &mut File, header: &Header) -> Result<Option<Resumed>, Error> {
-    let Some(mut segments) = playback::segments(file, header)? else {
-        return Ok(None);
-    };
+/// The state from footer and last segment; `None` if the last segment or block is damaged.
+fn from_index(file: &mut File, header: &Header, mut segments: Vec<Segment>) -> Result<Option<Resumed>, Error> {
     let start = header.to_bytes().len() as u64;
     let (mut entries, mut offset) = (Vec::new(), segments.last().map_or(start, Segment::end));
+    let mut next_number = 0;
     if let Some(last) = segments.last().copied() {
         let Some(found) = playback::entries(file, header, &last)? else {
             return Ok(None);
         };
+        let Some(number) = last_number(file, header, last.start, &found)? else {
+            return Ok(None);
+        };
+        next_number = number + 1;
         // The last segment is not full: it is overwritten, and its entries go into the next one.
         if found.len() < BLOCKS_PER_SEGMENT {
             offset = last.start + last.blocks;
@@ -62,21 +203,36 @@ fn from_index(file: &mut File, header: &Header) -> Result<Option<Resumed>, Error
         header: header.clone(),
         offset,
         next_tick: next_tick(&segments, &entries),
+        next_number,
         segments,
         entries,
     }))
 }
 
+/// The number of the last block of a segment; 0 in version 5. `None` if it cannot be read.
+fn last_number(file: &mut File, header: &Header, start: u64, entries: &[Entry]) -> Result<Option<u64>, Error> {
+    let Some(last) = entries.iter().rposition(|entry| entry.rows > 0) else {
+        return Ok(None);
+    };
+    let offset = start + entries[..last].iter().map(|entry| entry.length).sum::<u64>();
+    let Some(bytes) = playback::read_at(file, offset, entries[last].length)? else {
+        return Ok(None);
+    };
+    let block = block::length(header, &bytes).and_then(|_| block::decode(header, &bytes, |_| false));
+    Ok(block.ok().map(|block| block.number.unwrap_or(0)))
+}
+
 /// The state from the blocks themselves, which are decoded once for their ranges.
 fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     file.seek(SeekFrom::Start(0)).map_err(Error::io("read"))?;
-    let mut scanner = Scanner::new(file, 0);
-    scanner.header()?;
+    let mut scanner = Scanner::new(0);
+    scanner.header(file)?;
     let columns = header.schema.columns.len();
     let (mut offset, mut segment_start) = (scanner.consumed(), scanner.consumed());
     let (mut entries, mut segments): (Vec<Entry>, Vec<Segment>) = (Vec::new(), Vec::new());
+    let mut next_number = 0;
     loop {
-        let found = match scanner.next(&header) {
+        let found = match scanner.next(file, &header) {
             Ok(Some(found)) => found,
             Ok(None) => break,
             Err(Error::Block { .. }) => continue,
@@ -89,8 +245,12 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
         offset = found.offset + found.length as u64;
         match found.kind {
             Kind::Block => entries.push(match decoded(&header, &scanner, &found, |_| true) {
-                Ok(block) => Entry::of(found.length as u64, &block.ticks, &block.columns),
-                Err(_) => Entry::damaged(found.length as u64, columns),
+                // A block out of its place is not read.
+                Ok(block) if block.number.is_none_or(|number| number >= next_number) => {
+                    next_number = block.number.map_or(0, |number| number + 1);
+                    Entry::of(found.length as u64, &block.ticks, &block.columns)
+                }
+                _ => Entry::damaged(found.length as u64, columns),
             }),
             Kind::Segment if index_agrees(&header, scanner.bytes(&found), &entries) => {
                 let segment = Segment::new(segment_start, found.length as u64, &entries);
@@ -104,6 +264,7 @@ fn from_blocks(file: &mut File, header: Header) -> Result<Resumed, Error> {
     }
     Ok(Resumed {
         next_tick: next_tick(&segments, &entries),
+        next_number,
         header,
         offset,
         segments,

@@ -2,13 +2,19 @@
 
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
-use crate::header::{Header, MAX_HEADER};
+use crate::header::{Form, Header, MAX_HEADER};
+use crate::header_read::Known;
 use crate::index::{self, TRAILER_BYTES};
-use crate::schema::Schema;
+use crate::rolling::Prefixes;
+use crate::schema::{MAX_CELLS, Schema};
+use crate::wire::{Bytes, CHECK_BYTES, checksum};
 use std::io::Read;
+use std::ops::Range;
 
 /// Number of bytes requested at once.
 const CHUNK: usize = 1 << 16;
+/// Largest length of a recording of a single block: what a block of any schema can take.
+const MAX_SINGLE: usize = MAX_HEADER + 32 * MAX_CELLS;
 
 /// Kind of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,9 +32,9 @@ pub(crate) struct Found {
     pub(crate) length: usize,
 }
 
-/// Finds complete records and skips damaged bytes.
-pub(crate) struct Scanner<R> {
-    reader: R,
+/// Finds complete records and skips damaged bytes. The reader is handed in at each call, always the same one.
+#[derive(Debug, Default)]
+pub(crate) struct Scanner {
     buffer: Vec<u8>,
     /// Position of the next record in the buffer.
     position: usize,
@@ -38,29 +44,31 @@ pub(crate) struct Scanner<R> {
     /// Position of the last record found.
     current: usize,
     pending: Option<Found>,
+    /// Checksums of the buffer's prefixes, while a record is searched for.
+    prefixes: Prefixes,
 }
 
-impl<R: Read> Scanner<R> {
-    pub(crate) fn new(reader: R, offset: u64) -> Self {
+impl Scanner {
+    /// A scanner of a reader whose first byte has this offset.
+    pub(crate) fn new(offset: u64) -> Self {
         Self {
-            reader,
-            buffer: Vec::new(),
-            position: 0,
             offset,
-            ended: false,
-            current: 0,
-            pending: None,
+            ..Self::default()
         }
     }
 
-    /// Reads one more chunk and drops consumed bytes.
-    fn fill(&mut self) -> Result<(), Error> {
-        self.buffer.drain(..self.position);
-        self.offset += self.position as u64;
-        self.position = 0;
+    /// Reads one more chunk.
+    fn fill(&mut self, reader: &mut impl Read) -> Result<(), Error> {
+        // Consumed bytes are dropped when they are the larger part, so that each byte is moved once in the mean.
+        if 2 * self.position >= self.buffer.len() {
+            self.buffer.drain(..self.position);
+            self.prefixes.forget(self.position);
+            self.offset += self.position as u64;
+            self.position = 0;
+        }
         let before = self.buffer.len();
         self.buffer.resize(before + CHUNK, 0);
-        let outcome = self.reader.read(&mut self.buffer[before..]);
+        let outcome = reader.read(&mut self.buffer[before..]);
         let read = match outcome {
             Err(error) if error.kind() == std::io::ErrorKind::Interrupted => 0,
             Err(error) => {
@@ -76,26 +84,43 @@ impl<R: Read> Scanner<R> {
         Ok(())
     }
 
-    pub(crate) fn header(&mut self) -> Result<Header, Error> {
+    /// The header, and the content of the block if it is the only one.
+    pub(crate) fn header(&mut self, reader: &mut impl Read) -> Result<(Header, Option<Vec<u8>>), Error> {
         loop {
-            if let Some((header, length)) = Header::read(&self.buffer)? {
-                self.position = length;
-                return Ok(header);
+            match Header::read(&self.buffer)? {
+                Known::Header(header, length) => {
+                    self.position = length;
+                    return Ok((*header, None));
+                }
+                Known::Single if self.ended => {
+                    let (header, content) = Header::read_single(&self.buffer)?;
+                    self.position = self.buffer.len();
+                    let content: Range<usize> = content;
+                    return Ok((header, Some(self.buffer[content].to_vec())));
+                }
+                Known::Single if self.buffer.len() > MAX_SINGLE => return Err(Error::Header(Damage::NoBlock)),
+                Known::Single => {}
+                Known::More if self.ended || self.buffer.len() > MAX_HEADER + CHUNK => {
+                    return Err(if self.buffer.is_empty() {
+                        Error::NotARecording
+                    } else {
+                        Error::Header(Damage::CutOff)
+                    });
+                }
+                Known::More => {}
             }
-            if self.ended || self.buffer.len() > MAX_HEADER + CHUNK {
-                return Err(if self.buffer.is_empty() {
-                    Error::NotARecording
-                } else {
-                    Error::Header(Damage::CutOff)
-                });
-            }
-            self.fill()?;
+            self.fill(reader)?;
         }
     }
 
     /// Bytes consumed so far, from the beginning of the recording.
     pub(crate) fn consumed(&self) -> u64 {
         self.offset + self.position as u64
+    }
+
+    /// Offset of the first byte that was not requested yet.
+    pub(crate) fn read_to(&self) -> u64 {
+        self.offset + self.buffer.len() as u64
     }
 
     /// The bytes of the last record found.
@@ -120,6 +145,29 @@ impl<R: Read> Scanner<R> {
         }
     }
 
+    /// Whether a record with a right checksum may begin here: as [`record_at`](Self::record_at), in time that does not depend on the length.
+    fn may_begin(&self, header: &Header, at: usize) -> Result<(), Damage> {
+        let bytes = &self.buffer[at..];
+        let mut reader = Bytes(bytes);
+        let limit = if bytes.first() == Some(&0) {
+            let [_, kind] = reader.array()?;
+            index::max_content(kind, header.schema.columns.len())
+        } else {
+            block::max_bytes(header)
+        };
+        let length = usize::try_from(reader.varint()?).ok().filter(|length| *length <= limit);
+        let length = length.ok_or(Damage::NoBlock)?;
+        let end = bytes.len() - reader.0.len() + length;
+        let stored = bytes.get(end..end + CHECK_BYTES).ok_or(Damage::CutOff)?;
+        let before = checksum(&[&header.check.to_le_bytes()]);
+        let sum = self.prefixes.checksum(before, at, at + end).ok_or(Damage::CutOff)?;
+        if stored == sum.to_le_bytes() {
+            Ok(())
+        } else {
+            Err(Damage::Checksum)
+        }
+    }
+
     fn found(&mut self, kind: Kind, length: usize) -> Found {
         self.current = self.position;
         self.position += length;
@@ -134,14 +182,22 @@ impl<R: Read> Scanner<R> {
     ///
     /// # Errors
     /// If reading fails, or bytes are damaged. After damage the next call continues behind it.
-    pub(crate) fn next(&mut self, header: &Header) -> Result<Option<Found>, Error> {
+    pub(crate) fn next(&mut self, reader: &mut impl Read, header: &Header) -> Result<Option<Found>, Error> {
         if let Some(found) = self.pending.take() {
             return Ok(Some(found));
         }
         let mut first = None;
         let start = self.consumed();
+        self.prefixes.clear();
         loop {
-            match self.record_at(header, self.position) {
+            let searched = match first {
+                Some(_) => {
+                    self.prefixes.extend(&self.buffer);
+                    self.may_begin(header, self.position)
+                }
+                None => Ok(()),
+            };
+            match searched.and_then(|()| self.record_at(header, self.position)) {
                 Ok((kind, length)) => {
                     let found = self.found(kind, length);
                     let Some(damage) = first else { return Ok(Some(found)) };
@@ -153,7 +209,7 @@ impl<R: Read> Scanner<R> {
                         damage,
                     });
                 }
-                Err(Damage::CutOff) if !self.ended => self.fill()?,
+                Err(Damage::CutOff) if !self.ended => self.fill(reader)?,
                 Err(_) if self.position == self.buffer.len() => {
                     let Some(damage) = first else { return Ok(None) };
                     return Err(Error::Block {
@@ -172,50 +228,142 @@ impl<R: Read> Scanner<R> {
     }
 }
 
+/// The order of blocks: which number comes next; `None` before the first block of a stretch whose place is not known.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Order(Option<u64>);
+
+impl Default for Order {
+    /// The order from the first block of a recording on.
+    fn default() -> Self {
+        Self(Some(0))
+    }
+}
+
+impl Order {
+    /// The order after the block of this number; any block may come first if none is known.
+    pub(crate) fn after(number: Option<u64>) -> Self {
+        Self(number.map(|number| number.saturating_add(1)))
+    }
+
+    /// Judges the next block: [`Damage::Missing`] if others should stand before it, [`Damage::Misplaced`] if it must not be read.
+    pub(crate) fn judge(&mut self, number: Option<u64>) -> Option<Damage> {
+        let number = number?;
+        let expected = self.0.unwrap_or(number);
+        if number < expected {
+            return Some(Damage::Misplaced);
+        }
+        self.0 = Some(number.saturating_add(1));
+        (number > expected).then_some(Damage::Missing)
+    }
+}
+
 /// Iterator over the blocks of a recording from any source of bytes, from front to end.
 pub struct BlockReader<R> {
-    scanner: Scanner<R>,
+    reader: R,
+    scanner: Scanner,
     header: Header,
+    single: Option<Vec<u8>>,
+    order: Order,
+    /// A block whose missing neighbours were reported first.
+    pending: Option<Block>,
+    has_end: bool,
+    told_end: bool,
 }
 
 impl<R: Read> BlockReader<R> {
     /// Reads the header.
     ///
     /// # Errors
-    /// If reading fails, or the source does not begin with a complete header of this version.
-    pub fn new(reader: R) -> Result<Self, Error> {
-        let mut scanner = Scanner::new(reader, 0);
-        let header = scanner.header()?;
-        Ok(Self { scanner, header })
+    /// If reading fails, or the source does not begin with a complete header of a version that is known.
+    pub fn new(mut reader: R) -> Result<Self, Error> {
+        let mut scanner = Scanner::new(0);
+        let (header, single) = scanner.header(&mut reader)?;
+        Ok(Self {
+            reader,
+            scanner,
+            has_end: header.form == Form::Single,
+            header,
+            single,
+            order: Order::default(),
+            pending: None,
+            told_end: false,
+        })
     }
 
     /// Columns and time of the recording.
     pub fn schema(&self) -> &Schema {
         &self.header.schema
     }
+
+    /// The end, or an error once if there should be one and is none.
+    fn end(&mut self) -> Option<Result<Block, Error>> {
+        if self.has_end || !self.header.has_end() || std::mem::replace(&mut self.told_end, true) {
+            return None;
+        }
+        Some(Err(Error::Block {
+            offset: self.scanner.consumed(),
+            bytes: 0,
+            damage: Damage::NoEnd,
+        }))
+    }
 }
 
-/// An error about damaged bytes does not end the iteration: the next item is the first complete block after them.
+/// An error about damaged bytes does not end the iteration: the next item is the first complete block after them. The last item of a
+/// recording without its end is an error that says so.
 impl<R: Read> Iterator for BlockReader<R> {
     type Item = Result<Block, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
+        if let Some(block) = self.pending.take() {
+            return Some(Ok(block));
+        }
+        if let Some(content) = self.single.take() {
+            let block = block::decode_content(&self.header, &content, |_| true);
+            return Some(block.map_err(|damage| Error::Block {
+                offset: 0,
+                bytes: self.scanner.consumed(),
+                damage,
+            }));
+        }
         loop {
-            let found = match self.scanner.next(&self.header) {
-                Ok(found) => found?,
+            let found = match self.scanner.next(&mut self.reader, &self.header) {
+                Ok(Some(found)) => found,
+                Ok(None) => return self.end(),
                 Err(error) => return Some(Err(error)),
             };
+            self.has_end = found.kind == Kind::Footer;
             if found.kind == Kind::Block {
-                return Some(decoded(&self.header, &self.scanner, &found, |_| true));
+                let block = match decoded(&self.header, &self.scanner, &found, |_| true) {
+                    Ok(block) => block,
+                    Err(error) => return Some(Err(error)),
+                };
+                let Some(damage) = self.order.judge(block.number) else {
+                    return Some(Ok(block));
+                };
+                self.pending = (damage == Damage::Missing).then_some(block);
+                return Some(Err(damage_of(&found, damage)));
             }
         }
     }
 }
 
+/// Damage of the order of blocks, at a block.
+pub(crate) fn damage_of(found: &Found, damage: Damage) -> Error {
+    Error::Block {
+        offset: found.offset,
+        bytes: if damage == Damage::Missing {
+            0
+        } else {
+            found.length as u64
+        },
+        damage,
+    }
+}
+
 /// Decodes a block that the scanner found.
-pub(crate) fn decoded<R: Read>(
+pub(crate) fn decoded(
     header: &Header,
-    scanner: &Scanner<R>,
+    scanner: &Scanner,
     found: &Found,
     wanted: impl Fn(usize) -> bool,
 ) -> Result<Block, Error> {

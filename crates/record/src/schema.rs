@@ -2,8 +2,7 @@
 
 use crate::bound::{Bound, Promise};
 use crate::error::Error;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{finite, positive};
+use fewbits_block_codec::ArgumentError;
 
 /// Largest number of cells (rows times columns, time included) of one block, which a reader must hold in memory.
 pub const MAX_CELLS: usize = 1 << 24;
@@ -56,7 +55,7 @@ impl Column {
     /// # Errors
     /// If `period` is not positive and finite, exceeds `2^40` times the bound, or the bound is [`Bound::Decimals`].
     pub fn with_period(self, period: f64) -> Result<Self, Error> {
-        positive("period", period)?;
+        ArgumentError::positive("period", period)?;
         if let Bound::Decimals(places) = self.bound {
             let expected = "an absolute bound, a share or lossless for a column on a circle";
             return Err(ArgumentError::new("bound", format!("decimals:{places}"), expected).into());
@@ -81,8 +80,8 @@ impl Column {
     /// # Errors
     /// If an end is not finite or `from` is above `to`.
     pub fn with_range(self, from: f64, to: f64) -> Result<Self, Error> {
-        finite("from", from)?;
-        finite("to", to)?;
+        ArgumentError::finite("from", from)?;
+        ArgumentError::finite("to", to)?;
         let range = to - from;
         if range.is_nan() || range < 0.0 || range == f64::INFINITY {
             return Err(
@@ -202,11 +201,20 @@ pub struct Schema {
     pub(crate) rows_per_block: usize,
 }
 
-/// Default number of rows per block.
-pub const ROWS_PER_BLOCK: usize = 512;
+/// Default number of rows per block, for tables of few columns: a damaged block loses its rows, and larger ones save hardly a bit.
+pub const ROWS_PER_BLOCK: usize = 1 << 16;
+/// Largest number of cells of a block of default size: a reader of one row decodes all of them.
+const DEFAULT_CELLS: usize = 1 << 20;
+/// Smallest default number of rows per block.
+const LEAST_ROWS: usize = 512;
+
+/// Number of rows per block if none is asked for.
+pub(crate) fn default_rows(columns: usize) -> usize {
+    (DEFAULT_CELLS / columns.max(1)).clamp(LEAST_ROWS, ROWS_PER_BLOCK)
+}
 
 impl Schema {
-    /// A schema with blocks of 512 rows.
+    /// A schema with blocks of [`ROWS_PER_BLOCK`] rows; of fewer, if there are more than 16 columns.
     ///
     /// # Errors
     /// If there is no column, there are more than 4096, two have the same name, a clock has more than 18 decimals or its tolerance exceeds
@@ -233,19 +241,32 @@ impl Schema {
                 return Err(ArgumentError::new("tolerance", tolerance, "at most 2^52 ticks").into());
             }
         }
+        let rows_per_block = default_rows(columns.len());
         Ok(Self {
             columns,
             time,
-            rows_per_block: ROWS_PER_BLOCK,
+            rows_per_block,
         })
     }
 
-    /// Sets the number of rows per block. With small blocks fewer rows are lost with a block, and rows wait less on a link. Each block
+    /// Sets the number of rows per block; [`ROWS_PER_BLOCK`] stands for the default of this many columns. With small blocks fewer rows are lost with a block, and rows wait less on a link. Each block
     /// costs 7 to 10 bytes, and its models start anew.
     ///
     /// # Errors
     /// If `rows` is 0 or a block would have more than [`MAX_CELLS`] cells.
     pub fn with_rows_per_block(self, rows: usize) -> Result<Self, Error> {
+        match rows {
+            // The default holds for any number of columns.
+            ROWS_PER_BLOCK => {
+                let rows = default_rows(self.columns.len());
+                self.with_exact_rows(rows)
+            }
+            rows => self.with_exact_rows(rows),
+        }
+    }
+
+    /// As [`with_rows_per_block`](Self::with_rows_per_block), for what a header states.
+    pub(crate) fn with_exact_rows(self, rows: usize) -> Result<Self, Error> {
         let limit = MAX_CELLS / (self.columns.len() + 1);
         if rows == 0 || rows > limit {
             return Err(ArgumentError::new("rows_per_block", rows, format!("1 to {limit} rows")).into());

@@ -6,7 +6,7 @@
 //! more.
 
 use crate::error::Damage;
-use fewbits_adaptive::arithmetic::{Coder, Reader, Writer};
+use fewbits_block_codec::arithmetic::{Coder, Reader, Writer};
 
 /// Kind of a special cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,7 +13,7 @@ use crate::bound::Promise;
 use crate::codec::{self, CodecId, Context, Target};
 use crate::error::Damage;
 use crate::wire::{Bytes, push_varint, zigzag};
-use fewbits_adaptive::Effort;
+use fewbits_block_codec::Effort;
 
 /// How the ticks of a block are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use crate::block::Cells;
 use crate::header::Header;
 use crate::ranges::Ranges;
 use crate::schema::Schema;
-use fewbits_numerics::ArgumentError;
+use fewbits_block_codec::ArgumentError;
 
 /// Rows in the order of their arrival.
 #[derive(Debug)]

@@ -1,7 +1,9 @@
-//! Encoding of integers and texts as bytes, a reader that cannot read beyond the end, and the checksum.
+//! Texts as bytes, records with a length and a checksum. Integers and the byte reader are those of the block codec.
 
 use crate::error::Damage;
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use fewbits_block_codec::bytes::Unread;
+pub(crate) use fewbits_block_codec::bytes::{Bytes, push_varint, unzigzag, zigzag};
 use std::ops::RangeInclusive;
 
 /// The checksum of headers, blocks and index: CRC-32 as in zip and PNG.
@@ -42,8 +44,8 @@ pub(crate) fn read_checked(
 ) -> Result<(&[u8], usize), Damage> {
     let mut reader = Bytes(bytes);
     reader.take(head)?;
-    let length = reader.count(*lengths.end(), "length").map_err(|damage| match damage {
-        Damage::CutOff => damage,
+    let length = reader.count(*lengths.end(), "length").map_err(|unread| match unread {
+        Unread::CutOff => Damage::CutOff,
         _ => Damage::NoBlock,
     })?;
     if !lengths.contains(&length) {
@@ -58,119 +60,21 @@ pub(crate) fn read_checked(
     Ok((content, end + CHECK_BYTES))
 }
 
-/// Appends an integer in groups of seven bits, lowest first; every byte but the last has its top bit set.
-pub(crate) fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
-    while value >= 0x80 {
-        bytes.push(value as u8 | 0x80);
-        value >>= 7;
-    }
-    bytes.push(value as u8);
-}
-
-/// Maps integers to non-negative ones, small sizes to small numbers: 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
-pub(crate) fn zigzag(value: i64) -> u64 {
-    ((value << 1) ^ (value >> 63)) as u64
-}
-
-/// The inverse of [`zigzag`].
-pub(crate) fn unzigzag(value: u64) -> i64 {
-    (value >> 1) as i64 ^ -((value & 1) as i64)
-}
-
 /// Appends the length of a text and the text.
 pub(crate) fn push_text(bytes: &mut Vec<u8>, text: &str) {
     push_varint(bytes, text.len() as u64);
     bytes.extend_from_slice(text.as_bytes());
 }
 
-/// Reads from the front of a slice. Every method fails at the end of the slice.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Bytes<'a>(pub(crate) &'a [u8]);
-
-impl<'a> Bytes<'a> {
-    pub(crate) fn take(&mut self, count: usize) -> Result<&'a [u8], Damage> {
-        let (head, tail) = self.0.split_at_checked(count).ok_or(Damage::CutOff)?;
-        self.0 = tail;
-        Ok(head)
-    }
-
-    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], Damage> {
-        let (head, tail) = self.0.split_first_chunk::<N>().ok_or(Damage::CutOff)?;
-        self.0 = tail;
-        Ok(*head)
-    }
-
-    pub(crate) fn byte(&mut self) -> Result<u8, Damage> {
-        Ok(self.array::<1>()?[0])
-    }
-
-    pub(crate) fn f64(&mut self) -> Result<f64, Damage> {
-        Ok(f64::from_le_bytes(self.array()?))
-    }
-
-    pub(crate) fn varint(&mut self) -> Result<u64, Damage> {
-        let mut value = 0_u64;
-        for shift in (0..64).step_by(7) {
-            let byte = self.byte()?;
-            let group = u64::from(byte & 0x7f);
-            if shift == 63 && group > 1 {
-                return Err(Damage::Content("integer"));
-            }
-            value |= group << shift;
-            if byte & 0x80 == 0 {
-                return Ok(value);
-            }
-        }
-        Err(Damage::Content("integer"))
-    }
-
-    pub(crate) fn signed(&mut self) -> Result<i64, Damage> {
-        Ok(unzigzag(self.varint()?))
-    }
-
-    /// Reads an integer that must not exceed `limit`.
-    pub(crate) fn count(&mut self, limit: usize, what: &'static str) -> Result<usize, Damage> {
-        let value = self.varint()?;
-        usize::try_from(value)
-            .ok()
-            .filter(|count| *count <= limit)
-            .ok_or(Damage::Content(what))
-    }
-
-    pub(crate) fn text(&mut self) -> Result<&'a str, Damage> {
-        let length = self.count(self.0.len(), "length of a text")?;
-        std::str::from_utf8(self.take(length)?).map_err(|_| Damage::Content("text"))
-    }
-
-    pub(crate) fn finish(self) -> Result<(), Damage> {
-        if self.0.is_empty() {
-            Ok(())
-        } else {
-            Err(Damage::Content("length"))
-        }
-    }
+/// Reads a text of [`push_text`].
+pub(crate) fn text<'a>(bytes: &mut Bytes<'a>) -> Result<&'a str, Damage> {
+    let length = bytes.count(bytes.0.len(), "length of a text")?;
+    std::str::from_utf8(bytes.take(length)?).map_err(|_| Damage::Content("text"))
 }
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
-
-    #[test]
-    fn integers_return() {
-        for value in [0, 1, 127, 128, 300, u64::from(u32::MAX), u64::MAX] {
-            let mut bytes = Vec::new();
-            push_varint(&mut bytes, value);
-            let mut reader = Bytes(&bytes);
-            assert_eq!(reader.varint().unwrap(), value);
-            reader.finish().unwrap();
-            assert!(Bytes(&bytes[..bytes.len() - 1]).varint().is_err());
-        }
-        for value in [0, -1, 1, i64::MIN, i64::MAX] {
-            assert_eq!(unzigzag(zigzag(value)), value);
-        }
-        assert!(Bytes(&[0xff; 11]).varint().is_err());
-    }
 
     #[test]
     fn checksum_is_the_published_one() {

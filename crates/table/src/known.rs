@@ -1,7 +1,7 @@
 //! Formats of loggers that are known by their first lines, and words for units.
 
-use crate::detect::Head;
 use crate::dialect::Dialect;
+use crate::head::Head;
 
 /// Whether a first line announces a format whose data begin later.
 pub(crate) fn needs_more(line: &[u8]) -> bool {

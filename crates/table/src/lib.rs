@@ -47,6 +47,7 @@ mod detect;
 mod dialect;
 mod error;
 mod guess;
+mod head;
 mod json;
 mod known;
 mod lines;

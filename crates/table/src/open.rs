@@ -1,9 +1,10 @@
 //! Opening a table: from bytes to rows with a known dialect.
 
 use crate::column::Column;
-use crate::detect::{self, Head, Layout};
+use crate::detect::{self, Layout};
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
+use crate::head::Head;
 use crate::lines::{Line, Lines, Row, Split};
 use crate::profile::Profile;
 use crate::table::Table;

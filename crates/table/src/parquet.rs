@@ -12,7 +12,7 @@ use crate::table::Table;
 use crate::time::{Scale, Time};
 use ::parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use ::parquet::file::reader::ChunkReader;
-use arrow_array::{Array, RecordBatch};
+use arrow_array::RecordBatch;
 use arrow_schema::{FieldRef, SchemaRef};
 
 /// Rows of a batch of Arrow arrays.

@@ -36,7 +36,7 @@ const LEAP: Problem = (
     "allow --time ±1s, or leave the row out with --skip-bad 1",
 );
 const TOO_FINE: Problem =
-    ("has more decimals of a second than the 18 that are kept", "allow an error of times, as --time ±1ns");
+    ("has more decimals of a second than the 18 that are kept", "allow an error of times, as --time ±2ns");
 const NO_SUCH_DATE: Problem =
     ("is no date of the calendar", "mend the cell, or say the order with --time-format dmy, mdy or ymd");
 const NO_ZONE: Problem = ("has no offset, rows before have one", "mend the cell, or say --time-zone");

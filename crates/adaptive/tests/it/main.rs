@@ -5,7 +5,6 @@
 
 mod allocation;
 mod bank;
-mod blocks;
 mod common;
 mod cosets;
 mod damage;

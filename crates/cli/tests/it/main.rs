@@ -5,6 +5,7 @@
 mod design;
 mod fleet;
 mod language;
+mod links;
 mod live;
 mod many;
 mod node;

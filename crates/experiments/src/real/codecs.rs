@@ -3,7 +3,7 @@
 use super::bits::{geometric_mean, largest};
 use super::recordings::{Recording, Source, each};
 use crate::prelude::*;
-use fewbits_adaptive::{BlockCodec, Config};
+use fewbits_block_codec::BlockCodec;
 use pco::ChunkConfig;
 use pco::standalone::simple_compress;
 
@@ -55,9 +55,9 @@ fn measured(recording: &Recording, percent: f64) -> Result<Row, Error> {
     // A signal that stands still has no range.
     let bound = (0.01 * percent * recording.range()).max(f64::MIN_POSITIVE);
     let per_sample = |bytes: usize| 8.0 * bytes as f64 / count as f64;
-    let codec = BlockCodec::new(Config::new(bound)?);
-    let block = codec.encode(samples)?;
-    let restored = codec.decode(&block, count)?;
+    let codec = BlockCodec::new(bound).map_err(Error::failed)?;
+    let block = codec.encode(samples).map_err(Error::failed)?;
+    let restored = codec.decode(&block, count).map_err(Error::failed)?;
     let errors = samples.iter().zip(&restored).map(|(a, b)| (a - b).abs() / bound);
     let indices: Vec<i64> = samples.iter().map(|x| (x / (2.0 * bound)).round() as i64).collect();
     let packed = simple_compress(&indices, &ChunkConfig::default()).map_err(Error::failed)?;

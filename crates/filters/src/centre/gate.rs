@@ -84,7 +84,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             else {
                 break;
             };
-            let rivals = (0..found.len()).filter(|k| *k != worst && below(k)).filter(|k| {
+            // Of two, each is the other's rival: their misfits differ by chance only.
+            let is_rival = |k: &usize| *k != worst && (found.len() == 2 || below(k));
+            let rivals = (0..found.len()).filter(is_rival).filter(|k| {
                 let gap = found[worst].depth() - found[*k].depth();
                 // Both may be infinite.
                 !(gap > decisive)

@@ -101,15 +101,16 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let depth = apart.map_or(DEEPEST, |found| found.depth.min(DEEPEST));
             state.depth = MEMORY * state.depth + depth - USUAL_DEPTH;
             let is_alarm = state.monitor.add(terms, self.limits.sensor) == Some(Alarm::Contradiction);
-            // A report that is too unlikely beside another begins a dispute at once.
-            let is_contested =
-                matches!(fate, Fate::Contested(_)) && apart.is_some_and(|one| one.tail < self.limits.gate);
-            state.quiet = if is_alarm || is_contested {
+            // A report that is too unlikely beside another begins a dispute of both at once.
+            let is_contested = matches!(fate, Fate::Contested(_));
+            let is_unlikely = is_contested && apart.is_some_and(|one| one.tail < self.limits.gate);
+            state.quiet = if is_alarm || is_unlikely {
                 0
             } else {
                 state.quiet.saturating_add(1)
             };
             if is_contested && !std::mem::replace(&mut state.disputed, true) {
+                state.quiet = 0;
                 events.push(Event::Disputed(number));
             }
             if *fate == Fate::Excluded || state.excluded {

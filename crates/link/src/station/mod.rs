@@ -285,6 +285,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         };
         step.estimate = self.receiver.estimate();
         step.health = self.receiver.health();
+        step.events = self.receiver.events();
         self.last = Some(step);
         self.is_held = true;
         // If it cannot be stored now, it is published with the next slot that can be.

@@ -2,7 +2,7 @@
 
 use crate::envelope::{Key, Refusal};
 use fewbits_core::{BitString, Observation};
-use fewbits_protocol::{Note, SensorHealth};
+use fewbits_protocol::{Note, ReceiverEvent, SensorHealth};
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
 
@@ -35,6 +35,9 @@ pub struct Step {
     /// The estimator's judgement of each sensor after the slot; empty if it does not judge them.
     #[serde(default)]
     pub health: Vec<SensorHealth>,
+    /// What the update found out about sensors and model.
+    #[serde(default)]
+    pub events: Vec<ReceiverEvent>,
 }
 
 impl Step {
@@ -47,6 +50,7 @@ impl Step {
             estimate,
             trouble: None,
             health: Vec::new(),
+            events: Vec::new(),
         }
     }
 

@@ -81,3 +81,52 @@ fn page_is_drawn_by_a_browser() {
     eprintln!("{said}");
     assert!(drawn.status.success() && (said.starts_with("ok") || said.starts_with("skipped")), "{drawn:?}");
 }
+
+#[test]
+fn idle_connections_end_nothing_and_make_room() {
+    let page = page();
+    let folder = tempfile::tempdir().unwrap();
+    let store = fewbits_link::Store::new(folder.path().join("state"));
+    let idle: Vec<_> = (0..200)
+        .filter_map(|_| TcpStream::connect(page.address()).ok())
+        .collect();
+    assert!(idle.len() > 64);
+    // The centre goes on: it stores and shows.
+    store.save(&1).unwrap();
+    page.show(&step(7), Counts::default());
+    // Within the time that a request may take there is room again.
+    let start = std::time::Instant::now();
+    loop {
+        assert!(start.elapsed() < Duration::from_secs(20));
+        let mut stream = TcpStream::connect(page.address()).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(1))).unwrap();
+        let mut text = String::new();
+        let asked = write!(stream, "GET /metrics HTTP/1.1\r\n\r\n").is_ok();
+        if asked && stream.read_to_string(&mut text).is_ok() && text.contains("fewbits_slot 7") {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    drop(idle);
+}
+
+#[test]
+fn other_requests_are_refused() {
+    let page = page();
+    for (request, answer) in [
+        ("GET /other HTTP/1.1", "HTTP/1.1 404"),
+        ("POST / HTTP/1.1", "HTTP/1.1 405"),
+    ] {
+        let mut stream = TcpStream::connect(page.address()).unwrap();
+        write!(stream, "{request}\r\n\r\n").unwrap();
+        let mut text = String::new();
+        stream.read_to_string(&mut text).unwrap();
+        assert!(text.starts_with(answer), "{text}");
+    }
+    // One that is too long gets no answer.
+    let mut stream = TcpStream::connect(page.address()).unwrap();
+    let _ = stream.write_all(&[b'a'; 20_000]);
+    let mut rest = Vec::new();
+    let _ = stream.read_to_end(&mut rest);
+    assert!(rest.is_empty());
+}

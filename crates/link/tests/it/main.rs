@@ -3,7 +3,6 @@
 
 mod attacks;
 mod followed;
-#[cfg(feature = "live")]
 mod live;
 mod restarts;
 mod stops;

@@ -183,7 +183,7 @@ fn state_over_another_transport() {
 #[cfg(feature = "mqtt")]
 mod mqtt {
     use super::*;
-    use fewbits_link::mqtt::{Mqtt, rumqttc::MqttOptions};
+    use fewbits_link::mqtt::{Mqtt, rumqttc::v5::MqttOptions};
     use std::process::{Child, Command, Stdio};
 
     /// A broker that ends with the test.
@@ -275,6 +275,37 @@ mod mqtt {
         }
         centre.send(&3, b"down");
         assert_eq!(next(&mut sensor), (3, b"down".to_vec()));
+    }
+
+    /// The broker keeps a message of three megabytes on a sensor's topic: the centre hears its sensors nevertheless.
+    #[test]
+    fn large_kept_message_blinds_nobody() {
+        use fewbits_link::mqtt::rumqttc::{Client, Event, MqttOptions, Packet, QoS};
+        let Some(broker) = Broker::start() else { return };
+        let mut options = MqttOptions::new("large", "127.0.0.1", broker.port);
+        options.set_max_packet_size(1 << 22, 1 << 22);
+        let (client, mut connection) = Client::new(options, 10);
+        client
+            .publish("f/3/up", QoS::AtLeastOnce, true, vec![0; 3 << 20])
+            .unwrap();
+        let kept = connection
+            .iter()
+            .any(|event| matches!(event, Ok(Event::Incoming(Packet::PubAck(_)))));
+        assert!(kept);
+        let (mut centre, mut sensor) = (broker.end("f", None).unwrap(), broker.end("f", Some(3)).unwrap());
+        sensor.send(&3, b"small");
+        assert_eq!(next(&mut centre), (3, b"small".to_vec()));
+        // One that comes while the centre is connected is left out too.
+        client
+            .publish("f/3/up", QoS::AtLeastOnce, false, vec![0; 3 << 20])
+            .unwrap();
+        assert!(
+            connection
+                .iter()
+                .any(|event| matches!(event, Ok(Event::Incoming(Packet::PubAck(_)))))
+        );
+        sensor.send(&3, b"again");
+        assert_eq!(next(&mut centre), (3, b"again".to_vec()));
     }
 
     #[test]

@@ -3,11 +3,13 @@
 pub(crate) mod air;
 pub(crate) mod channel;
 pub(crate) mod field;
+pub(crate) mod lora;
 pub(crate) mod loss;
 pub(crate) mod radio;
 
 pub use air::on_air;
 pub use channel::{Channel, ReceivedCopy};
 pub use field::Field;
+pub use lora::{LORAWAN_OVERHEAD, Lora};
 pub use loss::Loss;
 pub use radio::{CC2420_OUTPUT, FRAGMENT_OVERHEAD, Radio, TWO_AA_CELLS, Transceiver};

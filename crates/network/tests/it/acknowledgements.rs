@@ -72,13 +72,13 @@ fn seconds(s: f64) -> Seconds {
 // 0 dBm: 57.42 mW sending, 62 mW receiving and awake, 250 kbit/s. In seconds, watts and joules:
 const FRAME: f64 = 201.0 / 250e3;
 const ANSWER: f64 = 88.0 / 250e3;
-const TURN: f64 = 0.01e-3;
+const TURN: f64 = 0.192e-3;
 const WAKE: f64 = 62e-3 * 0.244e-3;
 const SEND: f64 = 57.42e-3;
 const RECEIVE: f64 = 62e-3;
-// In nanoseconds: 804 us of frame, then 10 us of turnaround and 352 us of acknowledgement.
+// In nanoseconds: 804 us of frame, then 192 us of turnaround and 352 us of acknowledgement.
 const ARRIVAL: u64 = 804_000;
-const ANSWERED: u64 = ARRIVAL + 10_000 + 352_000;
+const ANSWERED: u64 = ARRIVAL + 192_000 + 352_000;
 /// The sender waits a nanosecond longer than the acknowledgement needs.
 const ATTEMPT: u64 = ANSWERED + 1;
 

@@ -6,4 +6,5 @@ mod frame;
 mod handover;
 mod over_bits;
 mod sensor;
+mod uplink;
 mod wild;

@@ -11,8 +11,8 @@ use crate::codec::CodecId;
 use crate::error::Damage;
 use crate::header::Header;
 use crate::wire::read_checked;
-pub(crate) use read::decode;
-pub(crate) use write::encode;
+pub(crate) use read::{content_of, decode, decode_content, renewed};
+pub(crate) use write::{content, encode};
 
 /// The cells of one column; `None` is a gap.
 pub type Cells = Vec<Option<f64>>;
@@ -21,6 +21,8 @@ pub type Cells = Vec<Option<f64>>;
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Block {
+    /// Which block of the recording it is, from 0 on; `None` in recordings of version 5.
+    pub number: Option<u64>,
     /// The tick of each row.
     pub ticks: Vec<i64>,
     /// One list of cells per column; `None` is a gap. The list of a column that was not requested is empty.

@@ -7,27 +7,93 @@ use super::{
 use crate::bound::Bound;
 use crate::codec::{self, CodecId, Context, JOINT_COLUMNS};
 use crate::error::Damage;
-use crate::header::Header;
+use crate::header::{Header, VERSION_5};
 use crate::specials::{self, Specials};
 use crate::time::{self, TimeKind};
 use crate::wire::{Bytes, push_varint};
-use fewbits_adaptive::arithmetic::Reader;
+use fewbits_block_codec::arithmetic::Reader;
 
 /// Decodes one block whose checksum was verified. Columns that are not `wanted` stay empty.
 pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Damage> {
+    decode_content(header, content_of(bytes)?, wanted)
+}
+
+/// The first numbers of a block's content.
+struct Head {
+    number: Option<u64>,
+    /// The number on the grid, if all rows are there, on the grid, and every column is usual.
+    usual: Option<u64>,
+    flags: u64,
+}
+
+fn read_head(header: &Header, body: &mut Bytes<'_>) -> Result<Head, Damage> {
+    let head = body.varint()?;
+    let apart = (head >> 1 & 1) * APART;
+    Ok(match (header.version, head & 1) {
+        (VERSION_5, 0) => Head {
+            number: None,
+            usual: Some(head >> 2),
+            flags: apart,
+        },
+        (VERSION_5, _) => Head {
+            number: None,
+            usual: None,
+            flags: head >> 1,
+        },
+        (_, 0) => Head {
+            number: Some(head >> 2),
+            usual: Some(head >> 2),
+            flags: apart,
+        },
+        _ => {
+            let flags = body.varint()?;
+            if flags & APART != 0 {
+                return Err(Damage::Content("flags"));
+            }
+            Head {
+                number: Some(head >> 2),
+                usual: None,
+                flags: flags | apart,
+            }
+        }
+    })
+}
+
+/// The content of a block.
+pub(crate) fn content_of(bytes: &[u8]) -> Result<&[u8], Damage> {
     let mut reader = Bytes(bytes);
     let length = reader.count(bytes.len(), "length")?;
-    let mut body = Bytes(reader.take(length)?);
+    Ok(reader.take(length)?)
+}
+
+/// The content of a block of version 5, or of an only block, as a block of this version and number: only the first numbers differ.
+pub(crate) fn renewed(header: &Header, content: &[u8], number: u64) -> Result<Vec<u8>, Damage> {
+    let mut body = Bytes(content);
+    let Head { usual, flags, .. } = read_head(header, &mut body)?;
+    let rows = header.odd_rows().filter(|_| flags & ROWS_FOLLOW == 0);
+    let mut content = Vec::new();
+    let first = 4 * number + 2 * u64::from(flags & APART != 0);
+    if usual == Some(number) && rows.is_none() {
+        push_varint(&mut content, first);
+    } else {
+        push_varint(&mut content, first + 1);
+        let rows_follow = if rows.is_some() { ROWS_FOLLOW } else { 0 };
+        push_varint(&mut content, flags & !APART | rows_follow);
+        rows.into_iter().for_each(|rows| push_varint(&mut content, rows as u64));
+        usual.into_iter().for_each(|on_grid| push_varint(&mut content, on_grid));
+    }
+    content.extend_from_slice(body.0);
+    Ok(content)
+}
+
+/// Decodes the content of a block.
+pub(crate) fn decode_content(header: &Header, content: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Block, Damage> {
+    let mut body = Bytes(content);
     let (grid, columns) = (header.grid(), header.schema.columns.len());
-    let mut rows = header.schema.rows_per_block;
+    let mut rows = header.block_rows();
     let mut descriptors: Vec<u8> = (0..columns).map(|i| plain(header, false, i)).collect();
     let mut specials = Vec::new();
-    let head = body.varint()?;
-    let flags = if head & 1 == 1 {
-        head >> 1
-    } else {
-        (head >> 1 & 1) * APART
-    };
+    let Head { number, usual, flags } = read_head(header, &mut body)?;
     if flags > 63 {
         return Err(Damage::Content("flags"));
     }
@@ -35,9 +101,9 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
     if flags & APART != 0 {
         descriptors.fill(CodecId::Adaptive as u8);
     }
-    let ticks = if head & 1 == 0 {
+    let ticks = if let Some(on_grid) = usual {
         let mut block = Vec::new();
-        push_varint(&mut block, head >> 2);
+        push_varint(&mut block, on_grid);
         time::decode(TimeKind::Grid, &mut Bytes(&block), rows, &grid)?
     } else {
         if flags & ROWS_FOLLOW != 0 {
@@ -102,6 +168,7 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
         *cells = Cells::new();
     }
     Ok(Block {
+        number,
         ticks,
         columns: decoded,
         share_bounds: sections

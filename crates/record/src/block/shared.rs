@@ -3,7 +3,7 @@
 //! ```text
 //! any special cells? (even odds)   if so: module `specials`   then column by column:
 //! predicted from other columns? (1 in 8; never the first)   if so: their number - 1 (2 bits), how far before this one each stands, less 1 (4 bits)
-//! indices behind the column's start (module `block::start` of fewbits-adaptive)
+//! indices behind the column's start (module `block::start` of fewbits-block-codec)
 //! ```
 
 use super::{Cells, aligned};
@@ -12,8 +12,8 @@ use crate::error::Damage;
 use crate::header::Header;
 use crate::related;
 use crate::specials::{self, Specials};
-use fewbits_adaptive::Effort;
-use fewbits_adaptive::arithmetic::{Coder, Reader, Writer};
+use fewbits_block_codec::Effort;
+use fewbits_block_codec::arithmetic::{Coder, Reader, Writer};
 
 /// Probabilities, in units of `2^-16`: that a block has special cells, and (`OTHERS`) that a column is predicted from others.
 const SPECIALS: u32 = 1 << 15;

@@ -1,9 +1,9 @@
 //! Encoding of a block.
 
-use super::read::decode;
+use super::read::decode_content;
 use super::{
-    APART, BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW,
-    aligned, plain, shared,
+    BOUND_FOLLOWS, Cells, DESCRIPTORS_FOLLOW, OTHERS_FOLLOW, ROWS_FOLLOW, SHARED_COLUMNS, SPECIALS_FOLLOW, aligned,
+    plain, shared,
 };
 use crate::codec::{self, CodecId, Context};
 use crate::header::Header;
@@ -11,7 +11,7 @@ use crate::related;
 use crate::specials::{self, Special, Specials};
 use crate::time::{self, TimeKind};
 use crate::wire::{Bytes, checked, push_varint};
-use fewbits_adaptive::Effort;
+use fewbits_block_codec::Effort;
 
 struct CodedColumn {
     descriptor: u8,
@@ -97,21 +97,42 @@ fn encode_column(
     }
 }
 
-/// A block's bytes, and the cells as a reader will restore them.
+/// A block's bytes, and the cells as a reader will restore them. `number` is that of the block in its recording.
 pub(crate) fn encode(
     header: &Header,
+    number: u64,
+    ticks: &[i64],
+    columns: &[Cells],
+    own_bounds: &[Option<f64>],
+    effort: Effort,
+) -> (Vec<u8>, Vec<Cells>) {
+    let (content, restored) = content(header, number, ticks, columns, own_bounds, effort);
+    (checked(header.check, &[], &content), restored)
+}
+
+/// As [`encode`], without length and checksum.
+pub(crate) fn content(
+    header: &Header,
+    number: u64,
     ticks: &[i64],
     columns: &[Cells],
     own_bounds: &[Option<f64>],
     effort: Effort,
 ) -> (Vec<u8>, Vec<Cells>) {
     let may_share = columns.len() <= SHARED_COLUMNS;
-    let (bytes, restored, shares) = encode_as(header, ticks, columns, own_bounds, effort, may_share);
+    let rows = Rows {
+        header,
+        number,
+        ticks,
+        columns,
+        own_bounds,
+        effort,
+    };
+    let (content, restored, shares) = rows.encoded(may_share);
     // Columns with bytes of their own were verified one by one.
     let is_read = || {
-        let read = decode(header, &bytes, |_| true)
-            .map(|block| block.columns)
-            .unwrap_or_default();
+        let read = decode_content(header, &content, |_| true);
+        let read = read.map(|block| block.columns).unwrap_or_default();
         let bits = |columns: &[Cells]| {
             columns
                 .iter()
@@ -122,86 +143,98 @@ pub(crate) fn encode(
         bits(&read) == bits(&restored)
     };
     if !shares || is_read() {
-        return (bytes, restored);
+        return (content, restored);
     }
-    let (bytes, restored, _) = encode_as(header, ticks, columns, own_bounds, effort, false);
-    (bytes, restored)
+    let (content, restored, _) = rows.encoded(false);
+    (content, restored)
 }
 
-/// As [`encode`], without verifying the shared code. The third value says whether there is one.
-fn encode_as(
-    header: &Header,
-    ticks: &[i64],
-    columns: &[Cells],
-    own_bounds: &[Option<f64>],
+/// The rows of a block, and what their code depends on.
+struct Rows<'a> {
+    header: &'a Header,
+    number: u64,
+    ticks: &'a [i64],
+    columns: &'a [Cells],
+    own_bounds: &'a [Option<f64>],
     effort: Effort,
-    may_share: bool,
-) -> (Vec<u8>, Vec<Cells>, bool) {
-    let (mut coded, mut restored) = (Vec::with_capacity(columns.len()), Vec::with_capacity(columns.len()));
-    for (cells, own) in columns.iter().zip(own_bounds) {
-        let mut column = encode_column(header, cells, *own, &restored, effort, may_share);
-        restored.push(std::mem::take(&mut column.restored));
-        coded.push(column);
-    }
-    let shares = coded.iter().any(|column| column.indices.is_some());
-    let apart = !shares && header.has_starts();
-    let (kind, time) = time::encode(ticks, &header.grid());
-    let mut body = Vec::new();
-    let has_own: Vec<bool> = (0..)
-        .zip(&coded)
-        .map(|(i, column)| column.descriptor != plain(header, apart, i))
-        .collect();
-    let all_plain = !has_own.contains(&true);
-    let whole = ticks.len() == header.schema.rows_per_block;
-    let specials: Vec<Specials> = coded
-        .iter_mut()
-        .map(|column| std::mem::take(&mut column.specials))
-        .collect();
-    let told = !shares && specials.iter().flatten().any(Option::is_some);
-    match (kind, Bytes(&time).varint()) {
-        (TimeKind::Grid, Ok(block)) if all_plain && whole && !told => {
-            // The usual block: bit 0 is 0, bit 1 says whether columns are apart, the rest is the number on the grid.
-            push_varint(&mut body, 4 * block + 2 * u64::from(apart))
+}
+
+impl Rows<'_> {
+    /// The content without verifying the shared code. The third value says whether there is one.
+    fn encoded(&self, may_share: bool) -> (Vec<u8>, Vec<Cells>, bool) {
+        let Self {
+            header,
+            number,
+            ticks,
+            columns,
+            own_bounds,
+            effort,
+        } = *self;
+        let (mut coded, mut restored) = (Vec::with_capacity(columns.len()), Vec::with_capacity(columns.len()));
+        for (cells, own) in columns.iter().zip(own_bounds) {
+            let mut column = encode_column(header, cells, *own, &restored, effort, may_share);
+            restored.push(std::mem::take(&mut column.restored));
+            coded.push(column);
         }
-        _ => {
-            let flag = |given: bool, flag: u64| if given { flag } else { 0 };
-            let flags = flag(!whole, ROWS_FOLLOW)
-                | flag(!all_plain, DESCRIPTORS_FOLLOW)
-                | flag(told, SPECIALS_FOLLOW)
-                | flag(apart, APART);
-            // Bit 0 is 1. Then come two bits of the kind of times, and the flags that say what follows.
-            push_varint(&mut body, 2 * (kind as u64 | flags) + 1);
-            if !whole {
-                push_varint(&mut body, ticks.len() as u64);
+        let shares = coded.iter().any(|column| column.indices.is_some());
+        let apart = !shares && header.has_starts();
+        let (kind, time) = time::encode(ticks, &header.grid());
+        let mut body = Vec::new();
+        let has_own: Vec<bool> = (0..)
+            .zip(&coded)
+            .map(|(i, column)| column.descriptor != plain(header, apart, i))
+            .collect();
+        let all_plain = !has_own.contains(&true);
+        let whole = ticks.len() == header.block_rows();
+        let specials: Vec<Specials> = coded
+            .iter_mut()
+            .map(|column| std::mem::take(&mut column.specials))
+            .collect();
+        let told = !shares && specials.iter().flatten().any(Option::is_some);
+        match (kind, Bytes(&time).varint()) {
+            (TimeKind::Grid, Ok(block)) if all_plain && whole && !told && block == number => {
+                // The usual block: bit 0 is 0, bit 1 says whether columns are apart, the rest is its number, also on the grid.
+                push_varint(&mut body, 4 * block + 2 * u64::from(apart))
             }
-            body.extend_from_slice(&time);
-            if !all_plain {
-                body.extend(has_own.chunks(8).map(|eight| {
-                    let bits = eight.iter().enumerate();
-                    bits.fold(0, |byte, (i, own)| byte | u8::from(*own) << i)
-                }));
-                let columns = coded.iter().zip(&has_own);
-                body.extend(columns.filter(|(_, own)| **own).map(|(column, _)| column.descriptor));
-            }
-            if told {
-                let bytes = specials::encode(&specials, ticks.len());
-                push_varint(&mut body, bytes.len() as u64);
-                body.extend(bytes);
+            _ => {
+                let flag = |given: bool, flag: u64| if given { flag } else { 0 };
+                let flags =
+                    flag(!whole, ROWS_FOLLOW) | flag(!all_plain, DESCRIPTORS_FOLLOW) | flag(told, SPECIALS_FOLLOW);
+                // Two bits of the kind of times, and the flags that say what follows.
+                push_varint(&mut body, 4 * number + 2 * u64::from(apart) + 1);
+                push_varint(&mut body, kind as u64 | flags);
+                if !whole {
+                    push_varint(&mut body, ticks.len() as u64);
+                }
+                body.extend_from_slice(&time);
+                if !all_plain {
+                    body.extend(has_own.chunks(8).map(|eight| {
+                        let bits = eight.iter().enumerate();
+                        bits.fold(0, |byte, (i, own)| byte | u8::from(*own) << i)
+                    }));
+                    let columns = coded.iter().zip(&has_own);
+                    body.extend(columns.filter(|(_, own)| **own).map(|(column, _)| column.descriptor));
+                }
+                if told {
+                    let bytes = specials::encode(&specials, ticks.len());
+                    push_varint(&mut body, bytes.len() as u64);
+                    body.extend(bytes);
+                }
             }
         }
-    }
-    let last = coded.len() - 1;
-    let alone = coded.iter().enumerate().filter(|(_, column)| column.indices.is_none());
-    for (i, column) in alone {
-        body.extend_from_slice(&column.head);
-        if shares || i < last {
-            push_varint(&mut body, column.bytes.len() as u64);
+        let last = coded.len() - 1;
+        let alone = coded.iter().enumerate().filter(|(_, column)| column.indices.is_none());
+        for (i, column) in alone {
+            body.extend_from_slice(&column.head);
+            if shares || i < last {
+                push_varint(&mut body, column.bytes.len() as u64);
+            }
+            body.extend_from_slice(&column.bytes);
         }
-        body.extend_from_slice(&column.bytes);
+        if shares {
+            let indices: Vec<Option<Vec<i64>>> = coded.into_iter().map(|column| column.indices).collect();
+            body.extend(shared::encode(header, columns, &specials, &indices, &restored, effort));
+        }
+        (body, restored, shares)
     }
-    if shares {
-        let indices: Vec<Option<Vec<i64>>> = coded.into_iter().map(|column| column.indices).collect();
-        body.extend(shared::encode(header, columns, &specials, &indices, &restored, effort));
-    }
-    (checked(header.check, &[], &body), restored, shares)
 }

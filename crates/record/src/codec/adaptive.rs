@@ -1,9 +1,9 @@
-//! Blocks of the adaptive codec (`fewbits-adaptive`), for every bound.
+//! Blocks of the adaptive codec (`fewbits-block-codec`), for every bound.
 
 use super::{Context, Target};
 use crate::bound::{Promise, TENS};
 use crate::error::Damage;
-use fewbits_adaptive::{BlockCodec, Config, Effort, Start};
+use fewbits_block_codec::{BlockCodec, Effort, Start};
 use std::borrow::Cow;
 
 /// The codec for a bound. For decimals, samples are rounded before and then restored exactly.
@@ -12,12 +12,11 @@ pub(crate) fn codec(target: &Target) -> Option<BlockCodec> {
         Promise::Exact | Promise::Decimals(_) => return Some(BlockCodec::lossless()),
         Promise::Within(delta) => delta,
     };
-    let config = Config::new(delta).ok()?;
-    let config = match target.period {
-        Some(period) => config.circular(period).ok()?,
-        None => config,
-    };
-    Some(BlockCodec::new(config))
+    let codec = BlockCodec::new(delta).ok()?;
+    match target.period {
+        Some(period) => codec.on_circle(period).ok(),
+        None => Some(codec),
+    }
 }
 
 /// The nearest number of `places` decimals. If its digits are not an exact double, the sample itself.

@@ -7,7 +7,7 @@
 //! |---|---|---|
 //! | 0 | doubles, little-endian | samples that no codec makes smaller |
 //! | 1 | the first bytes of one double, highest first | samples that are all within the bound of one number |
-//! | 2 | a block of `fewbits-adaptive` | everything else |
+//! | 2 | a block of `fewbits-block-codec` | everything else |
 //! | 3 | none: the column is in the block's shared code | samples on the grid of the column's start |
 
 pub(crate) mod adaptive;
@@ -15,9 +15,9 @@ mod plain;
 
 use crate::bound::Promise;
 use crate::error::Damage;
-use fewbits_adaptive::{Effort, Start};
+use fewbits_block_codec::{Effort, Start};
 
-pub(crate) use fewbits_adaptive::JOINT_COLUMNS;
+pub(crate) use fewbits_block_codec::JOINT_COLUMNS;
 
 /// Which codec wrote the bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

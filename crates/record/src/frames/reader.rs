@@ -5,6 +5,7 @@ use super::piece::Piece;
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
 use crate::header::{Header, MAX_HEADER};
+use crate::header_read::Known;
 use crate::schema::Schema;
 use std::collections::{HashSet, VecDeque};
 use std::hash::{BuildHasher, RandomState};
@@ -182,7 +183,7 @@ impl FrameReader {
         }
         let bytes: Vec<u8> = incomplete.pieces.into_iter().flatten().flatten().collect();
         let header = match Header::read(&bytes) {
-            Ok(Some((header, length))) if length == bytes.len() && header.check == piece.check => header,
+            Ok(Known::Header(header, length)) if length == bytes.len() && header.check == piece.check => *header,
             _ => return Err(Damage::Content("header")),
         };
         if header.schema.rows_per_block > max_rows(header.schema.columns.len()) {

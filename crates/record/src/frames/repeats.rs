@@ -2,7 +2,7 @@
 
 use super::writer::FrameWriter;
 use crate::error::Error;
-use fewbits_numerics::ArgumentError;
+use fewbits_block_codec::ArgumentError;
 
 /// Whole headers that may be sent in addition to the stated share of the bytes: the first, three more soon after it, and two at the end.
 const FREE: usize = 4;

@@ -4,16 +4,17 @@ use super::piece::{PIECE_OVERHEAD, Piece};
 use super::{MAX_PIECES, max_rows};
 use crate::block::{self, Cells};
 use crate::error::Error;
-use crate::header::{Header, MAX_START};
+use crate::header::{Form, Header, MAX_START};
 use crate::schema::Schema;
 use crate::waiting::Waiting;
-use fewbits_adaptive::Effort;
-use fewbits_numerics::ArgumentError;
+use fewbits_block_codec::{ArgumentError, Effort};
 
 /// Smallest allowed maximal length of a frame: a piece then has 20 bytes of the header.
 pub const MIN_FRAME_BYTES: usize = 40;
 /// Share of a frame that is aimed at when the number of rows for the next trial is estimated.
 const FILLED: f64 = 0.97;
+/// Largest number of rows of a frame.
+const MAX_ROWS: usize = 512;
 /// A frame that is at least this full is returned.
 const FULL: f64 = 0.93;
 
@@ -28,18 +29,19 @@ pub struct FrameWriter {
     /// Number of rows at which it is next tried whether they fill a frame.
     next_trial: usize,
     has_sent: bool,
-    /// Number of frames that were returned.
+    /// Number of frames so far, which is that of the next one.
     frames: u64,
 }
 
 impl FrameWriter {
-    /// A writer of frames of at most `max_bytes` bytes, and at most the schema's rows per block or 2^17 cells.
+    /// A writer of frames of at most `max_bytes` bytes, and at most the schema's rows per block, 512 rows or 2^17 cells: rows of a signal
+    /// that stands still wait no longer.
     ///
     /// # Errors
     /// If `max_bytes` is below [`MIN_FRAME_BYTES`], or the header needs more than 256 pieces.
     pub fn new(mut schema: Schema, max_bytes: usize) -> Result<Self, Error> {
         let columns = schema.columns.len();
-        schema.rows_per_block = schema.rows_per_block.min(max_rows(columns));
+        schema.rows_per_block = schema.rows_per_block.min(max_rows(columns)).min(MAX_ROWS);
         // Origin and step of rows take at most 18 bytes more than those of no rows.
         let header = Header::new(schema.clone(), &[], vec![0.0; columns]).to_bytes().len() + 32 + MAX_START * columns;
         let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);
@@ -133,7 +135,6 @@ impl FrameWriter {
                 break;
             }
         }
-        self.frames += frames.len() as u64;
         Ok(frames)
     }
 
@@ -170,6 +171,7 @@ impl FrameWriter {
 
     fn forget(&mut self, rows: usize) {
         self.has_sent = true;
+        self.frames += 1;
         self.rows.remove(rows);
         self.next_trial = rows.max(1);
     }
@@ -177,7 +179,12 @@ impl FrameWriter {
     fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
         // The first frame: the header's starts follow from all waiting rows.
         if !self.has_sent {
-            self.header = Some(self.rows.header(&self.schema).with_starts(&self.rows.columns));
+            self.header = Some(
+                self.rows
+                    .header(&self.schema)
+                    .with_starts(&self.rows.columns)
+                    .with_form(Form::Stream),
+            );
         }
         let Some(header) = &self.header else {
             return Err(Error::Broken);
@@ -185,6 +192,6 @@ impl FrameWriter {
         let Waiting { ticks, columns, ranges } = &self.rows;
         let own = ranges.own_bounds(header);
         let cells: Vec<Cells> = columns.iter().map(|cells| cells[..rows].to_vec()).collect();
-        Ok(block::encode(header, &ticks[..rows], &cells, &own, Effort::Thorough).0)
+        Ok(block::encode(header, self.frames, &ticks[..rows], &cells, &own, Effort::Thorough).0)
     }
 }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod appending;
 #[cfg(feature = "arrow")]
 mod arrow;
 mod common;
@@ -13,4 +14,6 @@ mod random;
 mod reading;
 mod resuming;
 mod times;
+mod versions;
+mod whole;
 mod wild;

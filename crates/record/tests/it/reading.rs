@@ -171,13 +171,17 @@ fn flushed_rows_can_be_read_at_once() {
     truth.iter().for_each(|row| recorder.push_next(row).unwrap());
     recorder.flush().unwrap();
     drop(recorder);
-    assert_eq!(
-        BlockReader::new(&bytes[..])
-            .unwrap()
-            .map(|block| block.unwrap().rows())
-            .sum::<usize>(),
-        10
-    );
+    let blocks: Vec<_> = BlockReader::new(&bytes[..]).unwrap().collect();
+    assert_eq!(blocks.len(), 2);
+    assert_eq!(blocks[0].as_ref().unwrap().rows(), 10);
+    // The recording has no end yet.
+    assert!(matches!(
+        blocks[1],
+        Err(Error::Block {
+            damage: fewbits_record::Damage::NoEnd,
+            ..
+        })
+    ));
 }
 
 #[test]

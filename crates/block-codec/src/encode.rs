@@ -1,0 +1,204 @@
+//! Encoding of blocks: the grids and codings that are tried.
+
+use crate::grid::Grid;
+use crate::head::{Coding, SAMPLES, write_head};
+use crate::indices::{smallest_pco, write_block};
+use crate::rows::Others;
+use crate::vectors::vectorised;
+use crate::{Accuracy, BlockCodec, Effort, Error, check_rows, levels};
+
+/// Smallest number of rows for which an anchor of eight bytes is stored.
+const ANCHORED_ROWS: usize = 1024;
+/// Bits per sample above which pco, and the samples themselves, are tried besides the models.
+pub(crate) const FINE: usize = 2;
+pub(crate) const FINE_IF_FAST: usize = 4;
+const VERY_FINE: usize = 6;
+/// Bits per sample up to which only the first grid is tried.
+const FEW: usize = 1;
+
+/// The shortest block so far.
+#[derive(Default)]
+struct Shortest(Option<Vec<u8>>);
+
+impl Shortest {
+    fn keep(&mut self, bytes: Vec<u8>) {
+        if self.0.as_ref().is_none_or(|best| bytes.len() < best.len()) {
+            self.0 = Some(bytes);
+        }
+    }
+}
+
+impl BlockCodec {
+    /// The samples of a column as one block. Samples that are not finite, and those without a grid point within the bound, return
+    /// to the last bit; each costs about nine bytes.
+    ///
+    /// # Errors
+    /// If pco fails, which no samples are known to cause.
+    pub fn encode(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
+        self.encode_with(samples, &[])
+    }
+
+    /// As [`encode`](Self::encode), with the same rows of other columns as regressors (at most [`JOINT_COLUMNS`] of them are
+    /// used, the first ones). `others` must be their reconstructions, which the reader has. If they do not help, the block is
+    /// the same as without them.
+    ///
+    /// # Errors
+    /// If a column has another number of rows, and as [`encode`](Self::encode).
+    pub fn encode_with(&self, samples: &[f64], others: &[&[f64]]) -> Result<Vec<u8>, Error> {
+        check_rows(samples.len(), others)?;
+        if samples.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut best = Shortest::default();
+        let thorough = self.effort == Effort::Thorough;
+        // Other columns may mislead the models: the shorter of both blocks is kept.
+        let others = (thorough && !others.is_empty()).then(|| Others::new(others));
+        let few = |best: &Shortest| best.0.as_ref().is_some_and(|b| b.len() <= FEW * samples.len() / 8);
+        for (i, grid) in self.grids(samples).into_iter().enumerate() {
+            if i > 0 && (!thorough || few(&best)) {
+                break;
+            }
+            self.encode_on(&grid, samples, others.as_ref(), &mut best)?;
+        }
+        if best.0.as_ref().is_none_or(|b| b.len() > VERY_FINE * samples.len() / 8) {
+            if let Some(numbers) = smallest_pco(samples, thorough)? {
+                best.keep([&[SAMPLES | 3 << 4], numbers.as_slice()].concat());
+            }
+            let keys: Vec<u64> = samples.iter().map(|sample| levels::key_of_sample(*sample)).collect();
+            if let Some(found) = levels::levels(&keys) {
+                best.keep(levels::write(vec![SAMPLES], thorough, &found, None)?);
+                if others.is_some() {
+                    best.keep(levels::write(vec![SAMPLES | 64], thorough, &found, others.as_ref())?);
+                }
+            }
+            let mut bytes = vec![SAMPLES | 2 << 4];
+            bytes.extend(samples.iter().flat_map(|x| x.to_le_bytes()));
+            best.keep(bytes);
+        }
+        Ok(best.0.unwrap_or_default())
+    }
+
+    /// Tries the codings of the samples' indices on a grid.
+    fn encode_on(
+        &self,
+        grid: &Grid,
+        samples: &[f64],
+        others: Option<&Others<'_>>,
+        best: &mut Shortest,
+    ) -> Result<(), Error> {
+        let (indices, exceptions) = self.indices(grid, samples);
+        let thorough = self.effort == Effort::Thorough;
+        let head = |coding, joint| {
+            let mut bytes = Vec::new();
+            write_head(grid, coding, joint, &exceptions, &mut bytes);
+            bytes
+        };
+        let mut shortest = Shortest::default();
+        shortest.keep(write_block(thorough, grid, &indices, &exceptions, None)?);
+        if others.is_some() {
+            shortest.keep(write_block(true, grid, &indices, &exceptions, others)?);
+        }
+        let is_above =
+            |bits: usize, best: &Shortest| best.0.as_ref().is_none_or(|b| b.len() > bits * samples.len() / 8);
+        // On coarse grids the models need far fewer bits. Try the general coder only if a sample takes many bits.
+        let is_fine = is_above(if thorough { FINE } else { FINE_IF_FAST }, &shortest);
+        if thorough || is_fine {
+            let keys: Vec<u64> = indices.iter().map(|index| levels::key_of_index(*index)).collect();
+            if let Some(found) = levels::levels(&keys) {
+                shortest.keep(levels::write(head(Coding::Levels, false), thorough, &found, None)?);
+                if others.is_some() {
+                    shortest.keep(levels::write(head(Coding::Levels, true), thorough, &found, others)?);
+                }
+            }
+        }
+        if is_fine && let Some(numbers) = smallest_pco(&indices, thorough)? {
+            let mut bytes = head(Coding::Wrapped, false);
+            bytes.extend(numbers);
+            shortest.keep(bytes);
+        }
+        shortest.0.into_iter().for_each(|bytes| best.keep(bytes));
+        Ok(())
+    }
+
+    /// The grids that are tried; none if only the samples' own bits fit.
+    fn grids(&self, samples: &[f64]) -> Vec<Grid> {
+        let mut grids: Vec<Grid> = self.grid(samples).into_iter().collect();
+        // Directions with few decimals have their own grid, which is better for fine bounds.
+        if let Accuracy::Within {
+            delta,
+            period: Some(period),
+        } = self.accuracy
+            && samples.iter().all(|x| (0.0..period).contains(x))
+        {
+            grids.extend(Grid::decimal(samples, delta));
+        }
+        grids.iter().map(|grid| grid.fitted(samples)).collect()
+    }
+
+    /// The grid that fits the samples; `None` if only their own bits do.
+    pub(crate) fn grid(&self, samples: &[f64]) -> Option<Grid> {
+        let finite = || samples.iter().copied().filter(|x| x.is_finite());
+        let first = finite().next()?;
+        if let Accuracy::Within {
+            delta,
+            period: Some(period),
+        } = self.accuracy
+        {
+            return Some(Grid::circle(delta, period));
+        }
+        let lossless = self.accuracy == Accuracy::Lossless;
+        // Only a lossless block distinguishes the two zeros.
+        let ordinary: Vec<f64> = finite()
+            .filter(|x| !lossless || x.to_bits() != (-0.0_f64).to_bits())
+            .map(|x| x + 0.0)
+            .collect();
+        Grid::decimal(&ordinary, self.delta()).or_else(|| match self.accuracy {
+            Accuracy::Lossless => Grid::single(&ordinary),
+            Accuracy::Within { delta, .. } => {
+                let anchor = if samples.len() >= ANCHORED_ROWS { first } else { 0.0 };
+                Some(Grid::line(delta, anchor))
+            }
+        })
+    }
+
+    /// Whether a reconstruction is within the bound of its sample.
+    #[inline(always)]
+    fn is_within(&self, value: f64, sample: f64) -> bool {
+        match self.accuracy {
+            Accuracy::Lossless => value.to_bits() == sample.to_bits(),
+            Accuracy::Within { delta, period } => match period {
+                None => (value - sample).abs() <= delta,
+                Some(period) => {
+                    let turned = sample.rem_euclid(period);
+                    let straight = (value - turned).abs();
+                    (0.0..period).contains(&value) && straight.min((period - straight).abs()) <= delta
+                }
+            },
+        }
+    }
+
+    /// The indices (an exception repeats the last one), and the exceptions with their rows.
+    pub(crate) fn indices(&self, grid: &Grid, samples: &[f64]) -> (Vec<i64>, Vec<(usize, f64)>) {
+        let mut exceptions = Vec::new();
+        let mut indices = Vec::with_capacity(samples.len());
+        let mut last = None;
+        // Instructions that round are among the vector instructions.
+        vectorised(
+            #[inline(always)]
+            || {
+                for (row, sample) in samples.iter().enumerate() {
+                    let near = last.unwrap_or(0);
+                    let index = grid.index(*sample, near);
+                    match index {
+                        Some(index) if self.is_within(grid.value(index), *sample) => last = Some(index),
+                        _ => exceptions.push((row, *sample)),
+                    }
+                    // Exceptions before the first ordinary sample: its index is not known yet.
+                    indices.push(last);
+                }
+            },
+        );
+        let first = indices.iter().find_map(|index| *index).unwrap_or(0);
+        (indices.into_iter().map(|index| index.unwrap_or(first)).collect(), exceptions)
+    }
+}

@@ -1,0 +1,336 @@
+//! The grid of a block's reconstructions: conversion between samples and integers.
+
+use crate::bytes::{push_varint, zigzag};
+use crate::vectors::vectorised_narrow;
+use fewbits_node::adaptive::TENS;
+
+/// Largest sample as a decimal integer: sums of two are exact doubles.
+const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
+/// Largest sample of single precision as a decimal integer: beyond that neighbours are the same number.
+const LARGEST_SINGLE_DIGITS: f64 = (1_u64 << 24) as f64;
+/// Integers up to this size are exact doubles.
+const WHOLE: i64 = 1 << 53;
+/// Share by which steps are shorter than `2 delta`, so that rounding cannot move a reconstruction out of its bound.
+const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
+/// Largest number of cells of a circle.
+const LARGEST_CIRCLE: f64 = (1_u64 << 40) as f64;
+/// A grid can be moved by multiples of `2^-PHASE_BITS` of a cell.
+const PHASE_BITS: u32 = 4;
+pub(crate) const PHASES: u8 = 1 << PHASE_BITS;
+/// Number of samples from which the phase of a grid is chosen.
+const FITTED: usize = 1 << 20;
+/// Distance from the first sample, in cells, beyond which the phase is not determined.
+const FARTHEST_PLACE: f64 = (1 << 28) as f64;
+/// Number of changes of the cell between neighbouring samples that together cost about a byte.
+const CROSSINGS_OF_A_BYTE: u32 = 4;
+/// Number of decimal grids that are tried.
+pub(crate) const DECIMALS: u8 = 13;
+
+/// The reconstructions: points with integer indices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Grid {
+    /// Samples are integer multiples of `10^-decimals`. A cell has `width` neighbouring multiples, as many as lie within the bound of its
+    /// middle. The first of them is `phase` sixteenths of the width, rounded up, from a multiple of the width.
+    Decimal { decimals: u8, width: i64, phase: u8 },
+    /// Samples are exactly `(origin + unit j) / 10^decimals`.
+    Stepped { decimals: u8, unit: i64, origin: i64 },
+    /// As [`Stepped`](Self::Stepped), rounded to single precision.
+    Single { decimals: u8, unit: i64, origin: i64 },
+    /// `anchor + step (j + phase / 16)`.
+    Line { anchor: f64, step: f64, phase: u8 },
+    /// `cells` equal cells on a circle.
+    Circle { period: f64, cells: i64 },
+}
+
+/// The integer `digits` with `sample == digits / ten` to the last bit, if there is one.
+#[inline(always)]
+fn digits(sample: f64, ten: f64) -> Option<i64> {
+    let whole = (sample * ten).round();
+    (whole.abs() < LARGEST_DIGITS && (whole / ten).to_bits() == sample.to_bits()).then_some(whole as i64)
+}
+
+/// The integer `digits` with `sample == digits / ten` rounded to single precision, if there is one.
+#[inline(always)]
+fn single_digits(sample: f64, ten: f64) -> Option<i64> {
+    let whole = (sample * ten).round();
+    let rounded = f64::from((whole / ten) as f32);
+    (whole.abs() < LARGEST_SINGLE_DIGITS && rounded.to_bits() == sample.to_bits()).then_some(whole as i64)
+}
+
+fn greatest_common_divisor(mut a: i64, mut b: i64) -> i64 {
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a.abs()
+}
+
+impl Grid {
+    /// The decimal grid that fits all samples, if there is one. `delta` is zero if samples must be exact.
+    pub(crate) fn decimal(samples: &[f64], delta: f64) -> Option<Self> {
+        let decimals = (0..DECIMALS).find(|decimals| {
+            let ten = TENS[usize::from(*decimals)];
+            samples.iter().all(|x| digits(*x, ten).is_some())
+        })?;
+        let ten = TENS[usize::from(decimals)];
+        let width = Self::width(delta, ten)?;
+        let plain = Self::Decimal {
+            decimals,
+            width,
+            phase: 0,
+        };
+        if width > 1 {
+            return Some(plain);
+        }
+        let mut all = samples.iter().filter_map(|x| digits(*x, ten));
+        let origin = all.next()?;
+        // If all samples are multiples of a larger unit (for example an ADC step in millivolts), count in that unit.
+        let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
+        Some(if unit <= 1 {
+            plain
+        } else {
+            Self::Stepped { decimals, unit, origin }
+        })
+    }
+
+    /// The grid of decimal numbers that were rounded to single precision, if it fits all samples.
+    pub(crate) fn single(samples: &[f64]) -> Option<Self> {
+        let decimals = (0..DECIMALS).find(|decimals| {
+            let ten = TENS[usize::from(*decimals)];
+            samples.iter().all(|x| single_digits(*x, ten).is_some())
+        })?;
+        let ten = TENS[usize::from(decimals)];
+        let mut all = samples.iter().filter_map(|x| single_digits(*x, ten));
+        let origin = all.next()?;
+        let unit = all.fold(0, |unit, digits| greatest_common_divisor(unit, digits - origin));
+        let unit = unit.max(1);
+        Some(Self::Single { decimals, unit, origin })
+    }
+
+    /// The same grid of samples of single precision, if it has steps.
+    pub(crate) fn rounded_to_single(self) -> Self {
+        match self {
+            Self::Stepped { decimals, unit, origin } => Self::Single { decimals, unit, origin },
+            grid => grid,
+        }
+    }
+
+    /// Number of neighbouring multiples of `1 / ten` within `delta` of their middle; `None` if it is too large.
+    pub(crate) fn width(delta: f64, ten: f64) -> Option<i64> {
+        let neighbours = (2.0 * delta * ten * (1.0 - SLACK)).floor();
+        (neighbours < LARGEST_DIGITS).then(|| neighbours as i64 + 1)
+    }
+
+    /// The grid of a bound for samples that are not decimal numbers.
+    pub(crate) fn line(delta: f64, anchor: f64) -> Self {
+        Self::Line {
+            anchor,
+            step: 2.0 * delta * (1.0 - SLACK),
+            phase: 0,
+        }
+    }
+
+    /// The same grid moved by `moved` sixteenths of a cell, if the grid can be moved.
+    pub(crate) fn with_phase(mut self, moved: u8) -> Self {
+        if let Self::Decimal { phase, .. } | Self::Line { phase, .. } = &mut self {
+            *phase = moved;
+        }
+        self
+    }
+
+    /// Sixteenths of a cell by which the grid is moved.
+    pub(crate) fn phase(&self) -> u8 {
+        match self {
+            Self::Decimal { phase, .. } | Self::Line { phase, .. } => *phase,
+            _ => 0,
+        }
+    }
+
+    /// The grid moved so that neighbouring samples are most often in one cell, if that saves more than the byte for the phase.
+    pub(crate) fn fitted(self, samples: &[f64]) -> Self {
+        let phases = f64::from(PHASES);
+        let (scale, offset) = match self {
+            // Half a digit from the next cell, so that rounding cannot move a sample there.
+            Self::Decimal { decimals, width, .. } if width > 1 => {
+                let scale = phases / width as f64;
+                (scale * TENS[usize::from(decimals)], scale * 0.5 / phases)
+            }
+            Self::Line { anchor, step, .. } => (phases / step, phases * (0.5 - anchor / step)),
+            _ => return self,
+        };
+        // Under phase `p` a sample is in cell `(place - p) / 16`, rounded down: for each phase, how often the cell changes.
+        let crossings = vectorised_narrow(
+            #[inline(always)]
+            || {
+                let mut crossings = [0_u32; PHASES as usize];
+                let (mut last, mut origin) = (0, None);
+                for sample in samples.iter().take(FITTED).filter(|sample| sample.is_finite()) {
+                    let place = sample * scale + offset;
+                    let origin = *origin.get_or_insert_with(|| (place / phases).floor() * phases);
+                    // Shifted to positive numbers, for which a conversion rounds down.
+                    let place = ((place - origin).clamp(-FARTHEST_PLACE, FARTHEST_PLACE) + 2.0 * FARTHEST_PLACE) as i32;
+                    let before = std::mem::replace(&mut last, place);
+                    for (phase, crossings) in (0..).zip(&mut crossings) {
+                        *crossings += u32::from((place - phase) >> PHASE_BITS != (before - phase) >> PHASE_BITS);
+                    }
+                }
+                crossings
+            },
+        );
+        let best = (0..PHASES).min_by_key(|phase| crossings[usize::from(*phase)]);
+        let best = best.unwrap_or(0);
+        let saved = crossings[0] - crossings[usize::from(best)];
+        if saved > CROSSINGS_OF_A_BYTE {
+            self.with_phase(best)
+        } else {
+            self
+        }
+    }
+
+    /// The grid of a bound on a circle. [`BlockCodec::on_circle`](crate::BlockCodec::on_circle) allows at most `2^40` cells.
+    pub(crate) fn circle(delta: f64, period: f64) -> Self {
+        let cells = (period / (2.0 * delta * (1.0 - SLACK)))
+            .ceil()
+            .clamp(1.0, LARGEST_CIRCLE);
+        Self::Circle {
+            period,
+            cells: cells as i64,
+        }
+    }
+
+    /// Number of multiples by which the first one of each cell is moved.
+    #[inline(always)]
+    fn digits_moved(width: i64, phase: u8) -> i64 {
+        let sixteenths = i128::from(width) * i128::from(phase);
+        ((sixteenths + i128::from(PHASES) - 1) >> PHASE_BITS) as i64
+    }
+
+    /// Whether both grids have the same kind and spacing; their origins may differ.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Line { .. }, Self::Line { .. }) => true,
+            (
+                Self::Stepped { decimals, unit, .. },
+                Self::Stepped {
+                    decimals: d, unit: u, ..
+                },
+            ) => (decimals, unit) == (d, u),
+            (
+                Self::Single { decimals, unit, .. },
+                Self::Single {
+                    decimals: d, unit: u, ..
+                },
+            ) => (decimals, unit) == (d, u),
+            _ => self.with_phase(0) == other.with_phase(0),
+        }
+    }
+
+    /// Number of points on the circle; `None` for other grids.
+    pub(crate) fn cells(&self) -> Option<i64> {
+        match self {
+            Self::Circle { cells, .. } => Some(*cells),
+            _ => None,
+        }
+    }
+
+    /// The reconstruction of an index.
+    #[inline(always)]
+    pub(crate) fn value(&self, index: i64) -> f64 {
+        match self {
+            Self::Decimal { decimals, width, phase } => {
+                let moved = width - 1 + 2 * Self::digits_moved(*width, *phase);
+                // Twice the middle in digits, because the middle may be half of a digit.
+                let short = width
+                    .checked_mul(index)
+                    .and_then(|middle| middle.checked_mul(2)?.checked_add(moved));
+                let twice = match short {
+                    Some(twice) => twice as f64,
+                    None => (2 * i128::from(*width) * i128::from(index) + i128::from(moved)) as f64,
+                };
+                0.5 * twice / TENS[usize::from(*decimals)]
+            }
+            Self::Stepped { decimals, unit, origin } => {
+                (i128::from(*origin) + i128::from(*unit) * i128::from(index)) as f64 / TENS[usize::from(*decimals)]
+            }
+            Self::Single { decimals, unit, origin } => {
+                let digits = (i128::from(*origin) + i128::from(*unit) * i128::from(index)) as f64;
+                let rounded = f64::from((digits / TENS[usize::from(*decimals)]) as f32);
+                rounded.clamp(f64::MIN, f64::MAX)
+            }
+            Self::Line { anchor, step, phase } => {
+                (anchor + step * (index as f64 + f64::from(*phase) / f64::from(PHASES))).clamp(f64::MIN, f64::MAX)
+            }
+            Self::Circle { period, cells } => {
+                let value = period / *cells as f64 * index.rem_euclid(*cells) as f64;
+                if value < *period { value } else { 0.0 }
+            }
+        }
+    }
+
+    /// The reconstructions of indices.
+    pub(crate) fn values(&self, indices: &[i64]) -> Vec<f64> {
+        // If all indices are a little smaller than these limits, arithmetic in doubles is exact and can be vectorised.
+        let exact = |largest: i64| indices.iter().all(|index| index.unsigned_abs() < largest as u64);
+        match *self {
+            Self::Decimal { decimals, width, phase } if exact(WHOLE / (4 * width)) => {
+                let moved = (width - 1 + 2 * Self::digits_moved(width, phase)) as f64;
+                let (width, ten) = (width as f64, TENS[usize::from(decimals)]);
+                let twice = indices.iter().map(|index| 2.0 * width * *index as f64 + moved);
+                twice.map(|twice| 0.5 * twice / ten).collect()
+            }
+            _ => indices.iter().map(|index| self.value(*index)).collect(),
+        }
+    }
+
+    /// The index of a sample; on a circle, of its equivalent indices the one nearest to `near`. `None` if it is too large. The caller must
+    /// check that the reconstruction is within the bound.
+    #[inline(always)]
+    pub(crate) fn index(&self, sample: f64, near: i64) -> Option<i64> {
+        let whole = |x: f64| (x.abs() < crate::rows::LARGEST as f64).then(|| x.round() as i64);
+        match self {
+            Self::Decimal { decimals, width, phase } => {
+                let digits = (sample * TENS[usize::from(*decimals)]).round();
+                (digits.abs() < LARGEST_DIGITS)
+                    .then_some(digits as i64)
+                    .map(|digits| (digits - Self::digits_moved(*width, *phase)).div_euclid(*width))
+            }
+            Self::Stepped { decimals, unit, origin } | Self::Single { decimals, unit, origin } => {
+                let ten = TENS[usize::from(*decimals)];
+                let is_single = matches!(self, Self::Single { .. });
+                let digits = if is_single {
+                    single_digits(sample, ten)
+                } else {
+                    digits(sample, ten)
+                }?;
+                let offset = i128::from(digits) - i128::from(*origin);
+                i64::try_from(offset.div_euclid(i128::from(*unit))).ok()
+            }
+            Self::Line { anchor, step, phase } => {
+                whole((sample - anchor) / step - f64::from(*phase) / f64::from(PHASES))
+            }
+            Self::Circle { period, cells } => {
+                let turned = sample.rem_euclid(*period);
+                let index = whole(turned / (period / *cells as f64))?;
+                // The turn nearest to the index before: a direction that passes north continues without a jump.
+                let around = (index - near).rem_euclid(*cells);
+                let shortest = if 2 * around > *cells { around - cells } else { around };
+                near.checked_add(shortest)
+            }
+        }
+        .filter(|index| index.abs() <= crate::rows::LARGEST)
+    }
+
+    /// Writes what the reader needs besides the configuration.
+    pub(crate) fn write(&self, bytes: &mut Vec<u8>) {
+        match self {
+            Self::Stepped { unit, origin, .. } | Self::Single { unit, origin, .. } => {
+                push_varint(bytes, *unit as u64);
+                push_varint(bytes, zigzag(*origin));
+            }
+            Self::Line { anchor, .. } if *anchor != 0.0 => bytes.extend_from_slice(&anchor.to_le_bytes()),
+            _ => {}
+        }
+        if self.phase() != 0 {
+            bytes.push(self.phase());
+        }
+    }
+}

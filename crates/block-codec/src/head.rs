@@ -1,0 +1,68 @@
+//! The head of a block, before the indices.
+
+use crate::bytes::push_varint;
+use crate::grid::Grid;
+
+/// Code of the line in the head; smaller codes are numbers of decimals.
+pub(crate) const LINE: u8 = 13;
+pub(crate) const CIRCLE: u8 = 14;
+pub(crate) const SAMPLES: u8 = 15;
+
+/// Flags of the second byte: decimals are rounded to single precision; pco is in its wrapped form.
+pub(crate) const SINGLE: u8 = 16;
+pub(crate) const WRAPPED: u8 = 32;
+
+/// How the indices are coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Coding {
+    Models,
+    Pco,
+    Raw,
+    Counts,
+    /// A list of levels, and their numbers.
+    Levels,
+    /// pco in its wrapped form.
+    Wrapped,
+}
+
+/// The head as it was read.
+pub(crate) struct Head {
+    pub(crate) grid: Option<Grid>,
+    pub(crate) coding: Coding,
+    pub(crate) joint: bool,
+    pub(crate) exceptions: Vec<(usize, f64)>,
+}
+
+pub(crate) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &[(usize, f64)], bytes: &mut Vec<u8>) {
+    let (kind, own) = match grid {
+        Grid::Decimal { decimals, .. } => (*decimals, 0),
+        Grid::Stepped { decimals, .. } => (*decimals, 2),
+        Grid::Single { decimals, .. } => (*decimals, 2 | SINGLE),
+        Grid::Line { anchor, .. } => (LINE, if *anchor == 0.0 { 0 } else { 4 }),
+        Grid::Circle { .. } => (CIRCLE, 0),
+    };
+    let coding_is_wrapped = coding == Coding::Wrapped;
+    let coding = match coding {
+        Coding::Models => 0,
+        Coding::Pco | Coding::Wrapped => 1,
+        Coding::Raw | Coding::Levels => 2,
+        Coding::Counts => 3,
+    };
+    let moved = if grid.phase() == 0 { 0 } else { 8 };
+    let wrapped = if coding_is_wrapped { WRAPPED } else { 0 };
+    let second = own | moved | wrapped | u8::from(!exceptions.is_empty());
+    bytes.push(kind | coding << 4 | u8::from(joint) << 6 | u8::from(second != 0) << 7);
+    if second != 0 {
+        bytes.push(second);
+    }
+    grid.write(bytes);
+    if !exceptions.is_empty() {
+        push_varint(bytes, exceptions.len() as u64);
+        let mut next = 0;
+        for (row, sample) in exceptions {
+            push_varint(bytes, (row - next) as u64);
+            bytes.extend_from_slice(&sample.to_le_bytes());
+            next = row + 1;
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Conversion of the indices of a block to bytes and back, in each of the codings.
+
+use crate::arithmetic::{Coder, Reader, Writer};
+use crate::bytes::{unzigzag, zigzag};
+use crate::counts::Counts;
+use crate::error::Damaged;
+use crate::grid::Grid;
+use crate::head::{Coding, write_head};
+use crate::model::Model;
+use crate::rows::{LARGEST, Others, code_all};
+use pco::data_types::Number;
+use pco::standalone::{DecompressorItem, FileDecompressor};
+use pco::wrapped::{self, FileCompressor};
+use pco::{ChunkConfig, DeltaSpec, PagingSpec};
+
+/// Bits of the length field of the first index.
+const FIRST_LENGTH: u32 = 6;
+
+fn from_pco(error: impl std::fmt::Display) -> Damaged {
+    Damaged::new("pco block", error, "what a writer of as many rows wrote")
+}
+
+/// Codes the first index of a block that has no [`Start`](crate::Start).
+fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>) -> Result<i64, Damaged> {
+    let z = wanted.map_or(0, zigzag);
+    let length = coder.raw(u64::from(u64::BITS - z.leading_zeros()), FIRST_LENGTH) as u32;
+    let first = unzigzag(coder.raw(z, length));
+    if first.unsigned_abs() > LARGEST as u64 {
+        return Err(Damaged::new("first index", first, "at most 2^46 in size"));
+    }
+    Ok(first)
+}
+
+/// Codes the indices after the first one (on a circle of so many `cells`, if there is one) by models, or by counts with one bit in front. Counts do not use `others`.
+pub(crate) fn code_rest<C: Coder>(
+    coder: &mut C,
+    by_models: bool,
+    cells: Option<i64>,
+    first: i64,
+    wanted: Option<&[i64]>,
+    rows: usize,
+    others: Option<&Others<'_>>,
+) -> Result<Vec<i64>, Damaged> {
+    if by_models {
+        let model = Model::new(rows, first, cells, others.is_some());
+        return code_all(coder, model, wanted, rows, others);
+    }
+    // The reader does not know the indices in advance: whether differences of differences are smaller is told.
+    let second = coder.raw(u64::from(wanted.is_some_and(Counts::prefers_second)), 1) == 1;
+    code_all(coder, Counts::new(first, second), wanted, rows, None)
+}
+
+/// A block whose indices are coded by models or by counts.
+pub(crate) fn write_block(
+    by_models: bool,
+    grid: &Grid,
+    indices: &[i64],
+    exceptions: &[(usize, f64)],
+    others: Option<&Others<'_>>,
+) -> Result<Vec<u8>, Damaged> {
+    let mut bytes = Vec::with_capacity(64 + indices.len() / 2);
+    let coding = if by_models { Coding::Models } else { Coding::Counts };
+    write_head(grid, coding, others.is_some(), exceptions, &mut bytes);
+    let mut writer = Writer::new(bytes);
+    let first = code_first(&mut writer, Some(indices.first().copied().unwrap_or(0)))?;
+    code_rest(&mut writer, by_models, grid.cells(), first, Some(indices), indices.len(), others)?;
+    Ok(writer.finish())
+}
+
+/// The indices of a block of [`write_block`], without its head.
+pub(crate) fn read_block(
+    bytes: &[u8],
+    by_models: bool,
+    grid: &Grid,
+    rows: usize,
+    others: Option<&Others<'_>>,
+) -> Result<Vec<i64>, Damaged> {
+    let mut reader = Reader::new(bytes);
+    let first = code_first(&mut reader, None)?;
+    let indices = code_rest(&mut reader, by_models, grid.cells(), first, None, rows, others)?;
+    reader.finish()?;
+    Ok(indices)
+}
+
+/// Orders of differences that are tried besides the one that pco chooses, which is bad for few distinct indices.
+const ORDERS: [usize; 2] = [0, 1];
+/// Effort of pco, which costs time only: to choose the order, and for the best order.
+const LEVEL: usize = 8;
+const MOST_LEVEL: usize = 12;
+/// Largest number of rows of a page of pco.
+const MOST_ROWS: usize = 1 << 24;
+/// Number of rows that are read at once: pco reads whole batches of 256.
+const BATCH: usize = 1 << 12;
+
+/// The shortest of several codes of pco, in its wrapped form: the container has the number of rows and the type. `None` for too many rows.
+pub(crate) fn smallest_pco<T: Number>(numbers: &[T], thorough: bool) -> Result<Option<Vec<u8>>, Damaged> {
+    if numbers.is_empty() || numbers.len() > MOST_ROWS {
+        return Ok(None);
+    }
+    let code = |delta: &DeltaSpec, level: usize| -> Result<Vec<u8>, Damaged> {
+        let config = ChunkConfig::default().with_compression_level(level);
+        let config = config
+            .with_delta_spec(delta.clone())
+            .with_paging_spec(PagingSpec::Exact(vec![numbers.len()]));
+        let file = FileCompressor::default();
+        let mut bytes = Vec::new();
+        file.write_header(&mut bytes).map_err(from_pco)?;
+        let mut chunk = file.chunk_compressor(numbers, &config).map_err(from_pco)?;
+        chunk.write_meta(&mut bytes).map_err(from_pco)?;
+        chunk.write_page(0, &mut bytes).map_err(from_pco)?;
+        Ok(bytes)
+    };
+    let mut delta = DeltaSpec::default();
+    let mut best = code(&delta, LEVEL)?;
+    for order in ORDERS.map(DeltaSpec::TryConsecutive) {
+        let bytes = code(&order, LEVEL)?;
+        if bytes.len() < best.len() {
+            (best, delta) = (bytes, order);
+        }
+    }
+    if thorough {
+        let bytes = code(&delta, MOST_LEVEL)?;
+        if bytes.len() < best.len() {
+            best = bytes;
+        }
+    }
+    Ok(Some(best))
+}
+
+/// Numbers of [`smallest_pco`]. Nothing may follow them.
+pub(crate) fn from_wrapped_pco<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, Damaged> {
+    if rows > MOST_ROWS {
+        return Err(from_pco(format!("{rows} rows")));
+    }
+    let (file, rest) = wrapped::FileDecompressor::new(bytes).map_err(from_pco)?;
+    let (mut chunk, rest) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)?;
+    let mut page = chunk.page_decompressor(rest, rows).map_err(from_pco)?;
+    let mut numbers: Vec<T> = Vec::new();
+    while numbers.len() < rows {
+        // Whole batches: memory grows only as far as the bytes reach.
+        let start = numbers.len();
+        numbers.resize(rows.min(start + BATCH), T::default());
+        page.read(&mut numbers[start..]).map_err(from_pco)?;
+    }
+    match page.into_src().len() {
+        0 => Ok(numbers),
+        left => Err(from_pco(format!("{left} bytes left"))),
+    }
+}
+
+pub(crate) fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, Damaged> {
+    let (samples, rest) = bytes.as_chunks::<8>();
+    if samples.len() != rows || !rest.is_empty() {
+        return Err(Damaged::new("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
+    }
+    Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+}
+
+/// Numbers of a standalone pco stream, which blocks had before the wrapped form. It must have as many as there are rows, and nothing after them.
+pub(crate) fn from_pco_bytes<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, Damaged> {
+    let mut numbers = Vec::new();
+    let (file, mut rest) = FileDecompressor::new(bytes).map_err(from_pco)?;
+    while let DecompressorItem::Chunk(mut chunk) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)? {
+        let (start, count) = (numbers.len(), chunk.n());
+        if count > rows - start {
+            return Err(from_pco(format!("{count} rows more")));
+        }
+        numbers.resize(start + count, T::default());
+        chunk.read(&mut numbers[start..]).map_err(from_pco)?;
+        rest = chunk.into_src();
+    }
+    // The footer of pco is one byte.
+    if numbers.len() != rows || rest.len() != 1 {
+        let missing = rows - numbers.len();
+        return Err(from_pco(format!("{missing} rows too few, {} bytes left", rest.len())));
+    }
+    Ok(numbers)
+}

@@ -1,0 +1,146 @@
+//! Blocks: many samples of one column as bytes, decodable alone.
+//!
+//! A stream must code each sample before the next one is known; a block is known as a whole. [`BlockCodec`] chooses the grid of
+//! reconstructions from all its samples and codes their indices by a mixture of models. Blocks are independent of each
+//! other.
+//!
+//! ```
+//! use fewbits_block_codec::BlockCodec;
+//! let samples: Vec<f64> = (0..512).map(|n| (20.0 + 3.0 * (f64::from(n) * 0.01).sin() * 10.0).round() / 10.0).collect();
+//! let codec = BlockCodec::new(0.05)?;
+//! let bytes = codec.encode(&samples)?;
+//! assert!(bytes.len() < 64); // one bit per sample
+//! let read = codec.decode(&bytes, samples.len())?;
+//! assert!(read.iter().zip(&samples).all(|(value, sample)| (value - sample).abs() <= 0.05));
+//! # Ok::<(), fewbits_block_codec::Error>(())
+//! ```
+//!
+//! # Bytes
+//!
+//! | part | bytes | when |
+//! |---|---|---|
+//! | head | 1 | always: low 4 bits the grid (0 to 12: decimals of the samples; 13: line; 14: circle; 15: the samples themselves), then 2 bits the coding (0: models, of samples levels; 1: pco; 2: levels, of samples as they are; 3: counts, of samples wrapped pco), 1 bit joint, 1 bit whether a second byte follows |
+//! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor; bit 3: phase; bit 4: decimals are rounded to single precision; bit 5: pco is in its wrapped form |
+//! | steps | 2 varints | unit and origin (zigzag) in units of the last decimal |
+//! | anchor | 8 | a point of the line, little-endian; otherwise zero is one |
+//! | phase | 1 | the grid of a line, or of cells of several decimals, is moved by so many sixteenths of a cell (1 to 15; whole decimals, rounded up) |
+//! | exceptions | varints and 8 each | number; rows since the last one; the sample |
+//! | indices | the rest | models: 6 bits length and as many bits of the first index (zigzag), then decisions (`block/model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`block/counts.rs`); levels: module `levels`; pco: its standalone or, as written since version 6 of recordings, its wrapped format with one chunk and one page |
+//!
+//! There is no checksum, no length and no number of rows: the container must store all three. An arithmetic code has no redundancy, so most
+//! truncated or damaged blocks decode to wrong samples. Trailing bytes are detected and refused.
+
+pub mod arithmetic;
+pub mod bytes;
+mod counts;
+mod decode;
+mod encode;
+mod error;
+mod experts;
+mod grid;
+mod head;
+mod indices;
+mod levels;
+mod mixer;
+mod model;
+mod priors;
+mod rows;
+mod start;
+mod vectors;
+
+pub use error::{ArgumentError, Damaged, Error};
+pub use rows::JOINT_COLUMNS;
+pub use start::{Start, StartedBlock};
+
+/// How much computing time the writer may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Effort {
+    /// Mixed models, and pco if the bound is fine: the fewest bits.
+    #[default]
+    Thorough,
+    /// Counts in few contexts, and pco if the bound is fine: faster, with more bits (`docs/adaptive.md` has both).
+    Fast,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Accuracy {
+    Within { delta: f64, period: Option<f64> },
+    Lossless,
+}
+
+/// Largest number of cells of a circle.
+const MOST_CELLS: f64 = (1_u64 << 40) as f64;
+
+/// Writes and reads blocks. Both ends must use the same accuracy; [`Effort`] matters only to the writer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlockCodec {
+    accuracy: Accuracy,
+    effort: Effort,
+}
+
+impl BlockCodec {
+    /// A codec that returns every finite sample within `delta`, in the units of the samples.
+    ///
+    /// # Errors
+    /// If `delta` is not above 0 or `2 delta` not finite.
+    pub fn new(delta: f64) -> Result<Self, Error> {
+        ArgumentError::positive("delta", delta)?;
+        if !(2.0 * delta).is_finite() {
+            return Err(ArgumentError::new("delta", delta, "a number whose double is finite").into());
+        }
+        Ok(Self {
+            accuracy: Accuracy::Within { delta, period: None },
+            effort: Effort::default(),
+        })
+    }
+
+    /// The same codec for samples on a circle: they are taken modulo `period` (360 for degrees), values lie in `[0, period)`, and the
+    /// bound holds around the circle. No effect on a lossless codec.
+    ///
+    /// # Errors
+    /// If `period` is not positive and finite, or above `2^40 delta`.
+    pub fn on_circle(self, period: f64) -> Result<Self, Error> {
+        ArgumentError::positive("period", period)?;
+        let Accuracy::Within { delta, .. } = self.accuracy else {
+            return Ok(self);
+        };
+        if period / delta > MOST_CELLS {
+            return Err(ArgumentError::new("period", period, "at most 2^40 times `delta`").into());
+        }
+        let period = Some(period);
+        Ok(Self {
+            accuracy: Accuracy::Within { delta, period },
+            ..self
+        })
+    }
+
+    /// A codec that returns every sample to the last bit.
+    pub fn lossless() -> Self {
+        Self {
+            accuracy: Accuracy::Lossless,
+            effort: Effort::default(),
+        }
+    }
+
+    /// The same codec with another effort.
+    #[must_use]
+    pub fn with_effort(self, effort: Effort) -> Self {
+        Self { effort, ..self }
+    }
+
+    /// The error bound of finite samples; zero if they are exact.
+    fn delta(&self) -> f64 {
+        match self.accuracy {
+            Accuracy::Within { delta, .. } => delta,
+            Accuracy::Lossless => 0.0,
+        }
+    }
+}
+
+fn check_rows(rows: usize, others: &[&[f64]]) -> Result<(), ArgumentError> {
+    match others.iter().find(|other| other.len() != rows) {
+        Some(other) => Err(ArgumentError::new("others", other.len(), format!("{rows} rows"))),
+        None => Ok(()),
+    }
+}

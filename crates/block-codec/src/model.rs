@@ -1,0 +1,304 @@
+//! Codes one column of integers, decision by decision, with mixed models.
+//!
+//! The index is coded relative to a centre, in cells of `2^k` indices. The centre is the prediction with the smallest error so far: the
+//! last index, least squares, or least squares with other columns (without any, the slow mean). `k` follows that error:
+//!
+//! ```text
+//! cell 0?   sign   at least 2, 3, 4, 6, 10, .. cells away?   where in the interval?   k low bits, the highest two with a model
+//! ```
+
+use crate::arithmetic::Coder;
+use crate::error::Damaged;
+use crate::experts::{Frequencies, LeastSquares, PREDICTED, Tails, Tracks};
+use crate::mixer::{EXPERTS, Mixer};
+use crate::rows::{JOINT_COLUMNS, LARGEST, State, damaged};
+use fewbits_node::elementary::round;
+
+/// Number of past differences used as regressors.
+const PAST: usize = 4;
+/// Smallest weight of a new index in the slow mean.
+const SLOW: f64 = 0.02;
+/// Number of low bits that are coded with a model.
+const MODELLED: u32 = 2;
+/// Numbers of decisions, by which contexts tell them apart.
+const MAGNITUDES: u32 = 2;
+const INSIDE: u32 = 40;
+const LOW: u32 = 44;
+/// Classes of decisions that share weights.
+const CLASS_MAGNITUDES: usize = 2;
+const CLASS_INSIDE: usize = 6;
+const CLASS_LOW: usize = 7;
+
+/// Numbers of the predictions: the last index, least squares, and least squares with other columns or else the slow mean.
+const HOLD: usize = 0;
+const RECURSION: usize = PREDICTED;
+const THIRD: usize = 2;
+
+impl State for Model {
+    fn last(&self) -> i64 {
+        self.last
+    }
+
+    #[inline(always)]
+    fn code<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        wanted: Option<i64>,
+        others: [f64; JOINT_COLUMNS],
+    ) -> Result<i64, Damaged> {
+        let grid = self.expect(others);
+        self.decide(coder, grid, wanted)
+    }
+
+    #[inline(always)]
+    fn learn(&mut self, index: i64) {
+        let step = index - self.last;
+        self.tracks.update(step as f32, self.seen as f32);
+        self.squares.update(step as f64);
+        if let Some(squares) = &mut self.joint {
+            squares.update(step as f64);
+        }
+        self.frequencies.add(index, step != 0);
+        self.past.rotate_right(1);
+        self.past[0] = step;
+        self.last = index;
+        self.seen += 1.0;
+        self.slow += (index as f64 - self.slow) * (1.0 / self.seen).max(SLOW);
+    }
+}
+
+/// Centre and cell size for the next index.
+#[derive(Debug, Clone, Copy)]
+struct Grid {
+    centre: i64,
+    /// A cell has `2^k` indices.
+    k: u32,
+}
+
+impl Grid {
+    /// First index of a cell.
+    #[inline(always)]
+    fn first(self, cell: i64) -> i64 {
+        self.centre + (cell << self.k) - ((1 << self.k) >> 1)
+    }
+
+    /// The edge beyond which an index is at least `cells` cells away.
+    #[inline(always)]
+    fn edge(self, cells: i64, up: bool) -> i64 {
+        self.first(if up { cells } else { 1 - cells })
+    }
+}
+
+/// The state of the coder, the same at writer and reader.
+#[derive(Debug, Clone)]
+pub(crate) struct Model {
+    mixer: Mixer,
+    squares: LeastSquares<4>,
+    /// Least squares with other columns too.
+    joint: Option<LeastSquares<8>>,
+    frequencies: Frequencies,
+    tracks: Tracks,
+    cells: Option<i64>,
+    last: i64,
+    past: [i64; PAST],
+    slow: f64,
+    seen: f64,
+}
+
+#[inline(always)]
+fn less(a: [f32; EXPERTS], b: [f32; EXPERTS]) -> [f32; EXPERTS] {
+    let mut differences = a;
+    for e in 0..EXPERTS {
+        differences[e] -= b[e];
+    }
+    differences
+}
+
+impl Model {
+    /// The state after the first index of a block of `rows` rows. `cells`: number of points on a circle.
+    pub(crate) fn new(rows: usize, first: i64, cells: Option<i64>, joint: bool) -> Self {
+        let mut frequencies = Frequencies::new(first, cells);
+        frequencies.add(first, true);
+        Self {
+            mixer: Mixer::new(rows),
+            squares: LeastSquares::new(),
+            joint: joint.then(LeastSquares::new),
+            frequencies,
+            tracks: Tracks::new(),
+            cells,
+            last: first,
+            past: [0; PAST],
+            slow: first as f64,
+            seen: 1.0,
+        }
+    }
+
+    /// Computes predictions, contexts and the centre.
+    #[inline(always)]
+    fn expect(&mut self, others: [f64; JOINT_COLUMNS]) -> Grid {
+        let [d0, d1, d2, d3] = self.past;
+        let level = self.last as f64 - self.slow;
+        let lags = [d0 as f64, d1 as f64, d2 as f64, d3 as f64];
+        self.squares.regressors = [lags[0], lags[1], lags[2], level];
+        self.tracks.at[RECURSION] = self.squares.predict();
+        self.tracks.at[THIRD] = match &mut self.joint {
+            Some(squares) => {
+                let [a, b, c] = others;
+                squares.regressors = [a, b, c, lags[0], lags[1], lags[2], lags[3], level];
+                squares.predict()
+            }
+            None => -level as f32,
+        };
+        // The last index is preferred to a prediction that is only a little better.
+        let (at, errors) = (&self.tracks.at, &self.tracks.errors);
+        let mut best = (errors[HOLD] * 0.96, 0.0);
+        for track in [RECURSION, THIRD] {
+            if errors[track] < best.0 {
+                best = (errors[track], at[track]);
+            }
+        }
+        // Predictions are within 2^22, where rounding is exact.
+        let offset = round(best.1.clamp(-4e6, 4e6)) as i64;
+        // k: base-2 logarithm of the error over the square root of two, rounded down, at least zero.
+        let k = ((best.0 * std::f32::consts::FRAC_1_SQRT_2).to_bits() >> 23).saturating_sub(127);
+
+        let step = |d: i64| ((d >> k).clamp(-20, 20) + 32) as u32;
+        let size = |d: i64| (d.unsigned_abs() >> k).min(3) as u32;
+        let point = |j: i64| self.cells.map_or(j, |cells| j.rem_euclid(cells)) as u32;
+        let centre = self.last + offset;
+        let here = step(offset) | k << 6;
+        let steps = step(d0) | step(d1) << 6;
+        let sizes = size(d0) << 6 | size(d1) << 4 | size(d2) << 2 | size(d3);
+        let last = point(self.last).wrapping_mul(0x2545_F491);
+        // The last two steps with the offset; the centre; the last index with the offset; rough sizes of four steps.
+        let contexts = [steps | here << 12, point(centre), last ^ here, sizes | k << 8];
+        // A product with an odd number mixes the highest bits best; the rotation brings them down to where the table is indexed.
+        for (context, word) in self.mixer.contexts.iter_mut().zip(contexts) {
+            *context = word.wrapping_mul(0x9E37_79B1).rotate_left(13);
+        }
+        Grid { centre, k }
+    }
+
+    /// Each expert's probabilities below and above an edge, given by the first index above it.
+    #[inline(always)]
+    fn tails(&self, grid: Grid, edge: i64) -> Tails {
+        let mut tails = self.tracks.tails(self.place(edge));
+        self.frequencies.complete(edge, grid.centre, &mut tails);
+        tails
+    }
+
+    /// Position of an edge relative to the last index.
+    #[inline(always)]
+    fn place(&self, edge: i64) -> f32 {
+        (edge - self.last) as f32 - 0.5
+    }
+
+    #[inline(always)]
+    fn decide_one<C: Coder>(&mut self, coder: &mut C, wanted: bool) -> bool {
+        let p = self.mixer.predict();
+        let bit = coder.bit(p, wanted);
+        self.mixer.update(bit);
+        bit
+    }
+
+    #[inline(always)]
+    fn decide<C: Coder>(&mut self, coder: &mut C, grid: Grid, wanted: Option<i64>) -> Result<i64, Damaged> {
+        self.mixer.look_up(0, 0);
+        let (first, next) = (grid.first(0), grid.first(1));
+        let mut tails = [
+            self.tracks.tails(self.place(first)),
+            self.tracks.tails(self.place(next)),
+        ];
+        self.frequencies.complete_cell(first, next, grid.centre, &mut tails);
+        let [low, high] = tails;
+        let (mut inside, mut outside) = ([0.0; EXPERTS], [0.0; EXPERTS]);
+        for e in 0..EXPERTS {
+            outside[e] = low.below[e] + high.above[e];
+            // Of the equivalent expressions for the share inside, use the one with the least cancellation.
+            let beside = if low.below[e] > 0.5 {
+                low.above[e] - high.above[e]
+            } else {
+                high.below[e] - low.below[e]
+            };
+            inside[e] = if outside[e] < 0.5 { 1.0 - outside[e] } else { beside };
+        }
+        self.mixer.set_experts(inside, outside);
+        if self.decide_one(coder, wanted.is_some_and(|j| (first..next).contains(&j))) {
+            return Ok(self.low_bits(coder, grid, first, wanted));
+        }
+        self.mixer.look_up(1, 1);
+        self.mixer.set_experts(high.above, low.below);
+        let up = self.decide_one(coder, wanted.is_some_and(|j| j >= next));
+        let side = |tails: Tails| if up { tails.above } else { tails.below };
+        let is_beyond = |edge: i64| wanted.is_some_and(|j| if up { j >= edge } else { j < edge });
+
+        // Outwards in growing steps: is the index at least this many cells away?
+        let mut near = side(if up { high } else { low });
+        let mut far;
+        let (mut begin, mut width, mut count) = (1_i64, 1_i64, 0_usize);
+        loop {
+            if begin + width > LARGEST >> grid.k << 2 {
+                return Err(damaged(i64::MAX));
+            }
+            let node = MAGNITUDES + 2 * count.min(18) as u32 + u32::from(up);
+            self.mixer.look_up(node, CLASS_MAGNITUDES + count.min(3));
+            let edge = grid.edge(begin + width, up);
+            far = side(self.tails(grid, edge));
+            self.mixer.set_experts(far, less(near, far));
+            if !self.decide_one(coder, is_beyond(edge)) {
+                break;
+            }
+            near = far;
+            begin += width;
+            count += 1;
+            if count >= 3 {
+                width *= 2;
+            }
+        }
+        // Inwards, by bisection.
+        let (mut end, mut depth) = (begin + width, 0);
+        while end - begin > 1 {
+            self.mixer.look_up(INSIDE + depth, CLASS_INSIDE);
+            let middle = begin + (end - begin) / 2;
+            let edge = grid.edge(middle, up);
+            let between = side(self.tails(grid, edge));
+            self.mixer.set_experts(less(between, far), less(near, between));
+            if self.decide_one(coder, is_beyond(edge)) {
+                (begin, near) = (middle, between);
+            } else {
+                (end, far) = (middle, between);
+            }
+            depth = (depth + 1).min(3);
+        }
+        let cell = if up { begin } else { -begin };
+        Ok(self.low_bits(coder, grid, grid.first(cell), wanted))
+    }
+
+    /// Codes the position within a cell.
+    #[inline(always)]
+    fn low_bits<C: Coder>(&mut self, coder: &mut C, grid: Grid, first: i64, wanted: Option<i64>) -> i64 {
+        let mut index = first;
+        for level in 0..grid.k.min(MODELLED) {
+            self.mixer.look_up(LOW + level, CLASS_LOW);
+            let half = 1 << (grid.k - level - 1);
+            let (a, b) = (self.tails(grid, index), self.tails(grid, index + half));
+            let c = self.tails(grid, index + 2 * half);
+            // Probabilities of the upper and lower half from each expert's distribution. In the upper tail they come from the survival
+            // function, which keeps its digits there.
+            let (mut upper, mut lower) = (less(c.below, b.below), less(b.below, a.below));
+            let (above, beneath) = (less(b.above, c.above), less(a.above, b.above));
+            for e in 0..EXPERTS {
+                if a.below[e] >= 0.5 {
+                    (upper[e], lower[e]) = (above[e], beneath[e]);
+                }
+            }
+            self.mixer.set_experts(upper, lower);
+            if self.decide_one(coder, wanted.is_some_and(|j| j >= index + half)) {
+                index += half;
+            }
+        }
+        let left = grid.k.saturating_sub(MODELLED);
+        let value = wanted.map_or(0, |j| (j - index) as u64);
+        index + coder.raw(value, left) as i64
+    }
+}

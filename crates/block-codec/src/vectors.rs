@@ -1,0 +1,17 @@
+//! Loops compiled for the vector instructions of this machine. The results have the same bits at every width.
+
+/// Runs `work`, compiled for the widest vector instructions of this machine. Give the closure `#[inline(always)]`.
+#[inline(always)]
+pub(crate) fn vectorised<R>(work: impl FnOnce() -> R) -> R {
+    pulp::Arch::new().dispatch(work)
+}
+
+/// As [`vectorised`], with registers of 256 bits at most: for loops over few numbers at a time, which wider registers slow down.
+#[inline(always)]
+pub(crate) fn vectorised_narrow<R>(work: impl FnOnce() -> R) -> R {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(narrow) = pulp::x86::V3::try_new() {
+        return narrow.vectorize(work);
+    }
+    work()
+}

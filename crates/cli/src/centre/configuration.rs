@@ -1,0 +1,311 @@
+//! `centre.toml`: what it contains, and all faults of it at once.
+
+use crate::error::Error;
+use crate::private;
+use crate::report::Report;
+use fewbits_link::{FleetKey, Key};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// Largest number of sensors that one entry names.
+const MAX_GROUP: u32 = 100_000;
+
+/// Content of `centre.toml`.
+pub(super) struct Configuration {
+    /// Address and port to listen at, or broker or endpoint with fleet.
+    pub(super) listen: String,
+    /// Length of a slot in seconds. All sensors that report by the clock must have the same.
+    pub(super) period: f64,
+    /// File that stores the state between runs.
+    pub(super) state: Option<PathBuf>,
+    /// Whether every write waits for the disk.
+    pub(super) durable: bool,
+    pub(super) seed: u64,
+    pub(super) model: Model,
+    pub(super) prior: Prior,
+    /// In increasing order of their numbers: the order in which the receiver counts sensors.
+    pub(super) sensors: Vec<Sensor>,
+    /// The secret from which the keys of sensors without one follow.
+    pub(super) fleet: Option<FleetKey>,
+}
+
+#[derive(Debug, Deserialize, Clone, Copy)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub(super) enum Model {
+    RandomWalk {
+        density: f64,
+    },
+    OrnsteinUhlenbeck {
+        mean: f64,
+        time_constant: f64,
+        variance: f64,
+    },
+    ConstantVelocity {
+        density: f64,
+    },
+    ConstantVelocity2d {
+        density: f64,
+    },
+}
+
+impl Model {
+    /// Number of coordinates of the state.
+    pub(super) fn coordinates(self) -> usize {
+        match self {
+            Self::RandomWalk { .. } | Self::OrnsteinUhlenbeck { .. } => 1,
+            Self::ConstantVelocity { .. } => 2,
+            Self::ConstantVelocity2d { .. } => 4,
+        }
+    }
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Prior {
+    pub(super) mean: Vec<f64>,
+    pub(super) deviation: Vec<f64>,
+}
+
+/// An entry `[[sensor]]`: one sensor, or several that are alike.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    number: Option<u32>,
+    /// Numbers as `1-40,50`.
+    numbers: Option<String>,
+    /// Without it the key follows from the fleet's.
+    key: Option<String>,
+    /// Version of a key that follows from the fleet's.
+    #[serde(default = "first")]
+    key_version: u32,
+    /// Address of the sensor, if it is known beforehand.
+    address: Option<String>,
+    /// Index of the coordinate of the state that the sensor measures.
+    #[serde(default)]
+    reads: usize,
+    /// Standard deviation of its measurement noise.
+    deviation: f64,
+    report: Report,
+    /// Probability that a question or its report is lost.
+    #[serde(default)]
+    loss: f64,
+}
+
+fn first() -> u32 {
+    1
+}
+
+#[derive(Clone)]
+pub(super) struct Sensor {
+    pub(super) number: u32,
+    pub(super) key: Key,
+    pub(super) address: Option<String>,
+    pub(super) reads: usize,
+    pub(super) deviation: f64,
+    pub(super) report: Report,
+    pub(super) loss: f64,
+}
+
+/// Collects faults, so that a person mends all of them at once.
+#[derive(Default)]
+pub(super) struct Faults(pub(super) Vec<String>);
+
+impl Faults {
+    pub(super) fn add(&mut self, fault: impl Display) {
+        self.0.push(fault.to_string());
+    }
+
+    fn keep<T, E: Display>(&mut self, what: &str, outcome: Result<T, E>) -> Option<T> {
+        outcome
+            .map_err(|error| self.add(format_args!("{what}: {}", one_line(error))))
+            .ok()
+    }
+
+    /// Takes a value out of a table.
+    fn take<T: DeserializeOwned>(&mut self, table: &mut Table, name: &str) -> Option<T> {
+        let value = table.remove(name)?;
+        self.keep(name, value.try_into())
+    }
+
+    fn need<T: DeserializeOwned>(&mut self, table: &mut Table, name: &str) -> Option<T> {
+        if !table.contains_key(name) {
+            self.add(format_args!("`{name}` is missing"));
+        }
+        self.take(table, name)
+    }
+
+    /// The error with all faults.
+    pub(super) fn error(self, file: &Path) -> Error {
+        let name = file.display().to_string();
+        match &self.0[..] {
+            [only] => Error::content(&name, only),
+            all => Error::content(&name, format_args!("{} faults\n  {}", all.len(), all.join("\n  "))),
+        }
+    }
+}
+
+/// An error of a value without the excerpt of the file, which may contain a key.
+fn one_line(error: impl Display) -> String {
+    error.to_string().trim().replace('\n', "; ")
+}
+
+impl Configuration {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// If it is not TOML, others may read it, or it has faults: all of them are named.
+    pub(super) fn read(file: &Path) -> Result<Self, Error> {
+        let table = private::table(file)?;
+        let mut faults = Faults::default();
+        let configuration = Self::of_table(table, file, &mut faults);
+        match configuration {
+            Some(configuration) if faults.0.is_empty() => Ok(configuration),
+            _ => Err(faults.error(file)),
+        }
+    }
+
+    fn of_table(mut table: Table, file: &Path, faults: &mut Faults) -> Option<Self> {
+        let listen = faults.need::<String>(&mut table, "listen");
+        if let Some(Err(fault)) = listen.as_deref().map(crate::place::Place::of) {
+            faults.add(fault);
+        }
+        let period = faults.need::<f64>(&mut table, "period");
+        if let Some(period) = period.filter(|period| !(1e-3..=1e6).contains(period)) {
+            faults.add(format_args!("period is {period}: expected .001 to 1000000 seconds"));
+        }
+        let (state, durable) = (faults.take(&mut table, "state"), faults.take(&mut table, "durable"));
+        let seed = faults.take(&mut table, "seed");
+        let model = faults.need::<Model>(&mut table, "model");
+        let prior = faults.need::<Prior>(&mut table, "prior");
+        if let (Some(model), Some(prior)) = (model, &prior) {
+            check_prior(model.coordinates(), prior, faults);
+        }
+        let fleet = fleet_key(&mut table, file, faults);
+        let revoked = faults.take::<Vec<u32>>(&mut table, "revoked").unwrap_or_default();
+        let entries = faults.need::<Vec<Value>>(&mut table, "sensor").unwrap_or_default();
+        for name in table.keys() {
+            faults.add(format_args!("`{name}` is unknown"));
+        }
+        let mut sensors = Vec::new();
+        for (i, entry) in entries.into_iter().enumerate() {
+            let name = match entry.get("number").and_then(Value::as_integer) {
+                Some(number) => format!("sensor {number}"),
+                None => format!("[[sensor]] {}", i + 1),
+            };
+            let Some(entry) = faults.keep(&name, entry.try_into::<Entry>()) else {
+                continue;
+            };
+            let Some(numbers) = faults.keep(&name, numbers(&entry)) else {
+                continue;
+            };
+            for number in numbers.into_iter().filter(|number| !revoked.contains(number)) {
+                sensors.extend(faults.keep(&format!("sensor {number}"), sensor(&entry, number, fleet.as_ref())));
+            }
+        }
+        if sensors.is_empty() && faults.0.is_empty() {
+            faults.add("no sensor is left: expected at least one that is not revoked");
+        }
+        sensors.sort_by_key(|sensor| sensor.number);
+        check_sensors(&sensors, faults);
+        Some(Self {
+            listen: listen?,
+            period: period?,
+            state,
+            durable: durable.unwrap_or_default(),
+            seed: seed.unwrap_or_default(),
+            model: model?,
+            prior: prior?,
+            sensors,
+            fleet,
+        })
+    }
+}
+
+fn check_prior(coordinates: usize, prior: &Prior, faults: &mut Faults) {
+    if (prior.mean.len(), prior.deviation.len()) != (coordinates, coordinates) {
+        faults.add(format_args!(
+            "prior: expected {coordinates} means and {coordinates} deviations, one per coordinate of the model"
+        ));
+    }
+    if let Some(deviation) = prior.deviation.iter().find(|d| !(d.is_finite() && **d > 0.0)) {
+        faults.add(format_args!("prior: a deviation is {deviation}: expected above 0"));
+    }
+    if let Some(mean) = prior.mean.iter().find(|mean| !mean.is_finite()) {
+        faults.add(format_args!("prior: a mean is {mean}: expected a finite number"));
+    }
+}
+
+/// The fleet's secret, in the file itself or, better, in one of its own.
+fn fleet_key(table: &mut Table, file: &Path, faults: &mut Faults) -> Option<FleetKey> {
+    let text = match faults.take::<PathBuf>(table, "fleet_key_file") {
+        Some(path) => {
+            // Beside the configuration, whatever folder the command runs in.
+            let path = file.parent().unwrap_or(Path::new("")).join(path);
+            Some(faults.keep("fleet_key_file", private::text(&path))?)
+        }
+        None => faults.take::<String>(table, "fleet_key"),
+    };
+    faults.keep("fleet key", FleetKey::from_hex(text?.trim()))
+}
+
+fn numbers(entry: &Entry) -> Result<Vec<u32>, String> {
+    let text = match (entry.number, &entry.numbers) {
+        (Some(number), None) => return Ok(vec![number]),
+        (None, Some(text)) if entry.key.is_none() && entry.address.is_none() => text,
+        (None, Some(_)) => return Err("`key` and `address` are those of one sensor: expected `number`".to_owned()),
+        _ => return Err("expected either `number` or `numbers`".to_owned()),
+    };
+    let mut all = Vec::new();
+    for part in text.split(',').map(str::trim) {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        match (first.trim().parse::<u32>(), last.trim().parse::<u32>()) {
+            (Ok(first), Ok(last)) if first <= last && last - first < MAX_GROUP => all.extend(first..=last),
+            _ => return Err(format!("numbers is `{text}`: expected numbers and ranges as `1-40,50`")),
+        }
+    }
+    Ok(all)
+}
+
+fn sensor(entry: &Entry, number: u32, fleet: Option<&FleetKey>) -> Result<Sensor, Error> {
+    let key = match (&entry.key, fleet) {
+        (Some(key), _) => Key::from_hex(key)?,
+        (None, Some(fleet)) => fleet.key_of(number, entry.key_version)?,
+        (None, None) => return Err(Error::content("key", "expected `key`, or `fleet_key_file` for all sensors")),
+    };
+    let fault = |problem: String| Err(Error::content("sensor", problem));
+    if !(entry.deviation.is_finite() && entry.deviation > 0.0) {
+        return fault(format!("deviation is {}: expected above 0", entry.deviation));
+    }
+    if !(0.0..1.0).contains(&entry.loss) {
+        return fault(format!("loss is {}: expected 0 or more, below 1", entry.loss));
+    }
+    Ok(Sensor {
+        number,
+        key,
+        address: entry.address.clone(),
+        reads: entry.reads,
+        deviation: entry.deviation,
+        report: entry.report,
+        loss: entry.loss,
+    })
+}
+
+fn check_sensors(sensors: &[Sensor], faults: &mut Faults) {
+    let mut keys = HashMap::new();
+    for pair in sensors.windows(2) {
+        if pair[0].number == pair[1].number {
+            faults.add(format_args!("sensor {} stands twice", pair[0].number));
+        }
+    }
+    for sensor in sensors {
+        if let Some(other) = keys.insert(sensor.key.fingerprint(), sensor.number)
+            && other != sensor.number
+        {
+            faults.add(format_args!("sensor {}: its key is that of sensor {other}: give each its own", sensor.number));
+        }
+    }
+}

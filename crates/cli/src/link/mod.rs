@@ -1,0 +1,4 @@
+//! Frames of links to rows.
+
+pub(crate) mod receive;
+mod tables;

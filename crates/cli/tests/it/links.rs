@@ -1,0 +1,152 @@
+//! `send` and `receive` over UDP between several senders, with losses, repetitions and noise.
+
+use super::{start, text};
+use std::io::{BufRead, BufReader};
+use std::net::UdpSocket;
+use std::path::Path;
+use std::process::{Child, Output};
+use std::time::Duration;
+
+/// A receiver, and its address.
+fn receiver(folder: &Path, words: &[&str]) -> (Child, String, std::thread::JoinHandle<String>) {
+    let all = [&["receive", "--udp", "127.0.0.1:0", "--timeout", "2s"], words].concat();
+    let mut receiver = start(folder, &all);
+    let mut stderr = BufReader::new(receiver.stderr.take().unwrap());
+    let mut line = String::new();
+    stderr.read_line(&mut line).unwrap();
+    let address = line.trim().strip_prefix("listening at ").unwrap().to_owned();
+    let rest = std::thread::spawn(move || stderr.lines().map_while(Result::ok).collect::<Vec<_>>().join("\n"));
+    (receiver, address, rest)
+}
+
+/// The datagrams by which `send` sends a table.
+fn datagrams(folder: &Path, table: &str, words: &[&str]) -> Vec<Vec<u8>> {
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = socket.local_addr().unwrap().to_string();
+    let all = [&["send", "-", "--udp", &address, "--max-bytes", "100"], words].concat();
+    let mut sender = start(folder, &all);
+    std::io::Write::write_all(&mut sender.stdin.take().unwrap(), table.as_bytes()).unwrap();
+    assert!(sender.wait().unwrap().success());
+    socket.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
+    let (mut all, mut buffer) = (Vec::new(), [0; 2048]);
+    while let Ok(length) = socket.recv(&mut buffer) {
+        all.push(buffer[..length].to_vec());
+    }
+    all
+}
+
+fn deliver(address: &str, datagrams: impl IntoIterator<Item = Vec<u8>>) {
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    for (i, datagram) in datagrams.into_iter().enumerate() {
+        socket.send_to(&datagram, address).unwrap();
+        if i % 32 == 0 {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+fn ended((mut child, _, rest): (Child, String, std::thread::JoinHandle<String>)) -> (Output, String) {
+    drop(child.stdin.take());
+    let output = child.wait_with_output().unwrap();
+    (output, rest.join().unwrap())
+}
+
+fn two_columns() -> String {
+    let rows: String = (0..400).map(|i| format!("{i},{}\n", 7 * i % 31)).collect();
+    "a,b\n".to_owned() + &rows
+}
+
+#[test]
+fn second_sender_neither_ends_nor_enters_the_first_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = datagrams(folder.path(), &two_columns(), &[]);
+    let narrow = datagrams(folder.path(), "only\n1\n2\n3\n", &[]);
+    let alike = datagrams(folder.path(), "c,d\n100000,5\n100001,6\n", &[]);
+    for output in [None, Some("day.csv")] {
+        let words: &[&str] = if output.is_some() { &["-o", "day.csv"] } else { &[] };
+        let receiver = receiver(folder.path(), words);
+        let half = first.len() / 2;
+        let all = first[..half].iter().chain(&narrow).chain(&alike).chain(&first[half..]);
+        deliver(&receiver.1, all.cloned());
+        let (ended, said) = ended(receiver);
+        let table = match output {
+            None => text(&ended.stdout),
+            Some(file) => std::fs::read_to_string(folder.path().join(file)).unwrap(),
+        };
+        assert_eq!(table, two_columns());
+        assert!(said.contains("another table begins"), "{said}");
+        match output {
+            // Rows were refused: the run says so.
+            None => assert_eq!(ended.status.code(), Some(1), "{said}"),
+            Some(_) => {
+                assert_eq!(ended.status.code(), Some(0), "{said}");
+                let other = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+                assert_eq!(other("day-2.csv"), "only\n1\n2\n3\n");
+                assert_eq!(other("day-3.csv"), "c,d\n100000,5\n100001,6\n");
+            }
+        }
+    }
+}
+
+#[test]
+fn doubled_datagrams_give_their_rows_once_and_lost_ones_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = datagrams(folder.path(), &two_columns(), &[]);
+    let one = receiver(folder.path(), &[]);
+    deliver(
+        &one.1,
+        all.iter()
+            .flat_map(|frame| [frame.clone(), frame.clone()])
+            .chain(all.clone()),
+    );
+    let (output, said) = ended(one);
+    assert_eq!(text(&output.stdout), two_columns());
+    assert!(output.status.success() && said.contains("came again and were used once"), "{said}");
+    // Any single datagram may be lost, the first one too; of rows, those of one frame.
+    for lost in [0, 1, 2, all.len() - 1] {
+        let one = receiver(folder.path(), &[]);
+        deliver(
+            &one.1,
+            all.iter()
+                .enumerate()
+                .filter(|(i, _)| *i != lost)
+                .map(|(_, frame)| frame.clone()),
+        );
+        let (output, said) = ended(one);
+        let (rows, has_rows) = (text(&output.stdout).lines().count(), all[lost][0] != 0);
+        assert_eq!(rows < 401, has_rows, "{said}");
+        assert_eq!(output.status.code(), Some(i32::from(has_rows)), "{said}");
+        assert_eq!(said.contains("1 of "), has_rows, "{said}");
+    }
+}
+
+/// Noise, cut and inverted datagrams between those of a sender: its rows are all there, and nothing else.
+#[test]
+fn noise_enters_no_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = datagrams(folder.path(), &two_columns(), &[]);
+    let receiver = receiver(folder.path(), &[]);
+    let mut state = 7_u64;
+    let mut next = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    let mut mixed = Vec::new();
+    for frame in &all {
+        for _ in 0..20 {
+            let mut noise = frame.clone();
+            match next() % 3 {
+                0 => noise.truncate(next() % frame.len()),
+                1 => noise[next() % frame.len()] ^= 1 << (next() % 8),
+                _ => noise = (0..next() % 60).map(|_| next() as u8).collect(),
+            }
+            mixed.push(noise);
+        }
+        mixed.push(frame.clone());
+    }
+    deliver(&receiver.1, mixed);
+    let (output, said) = ended(receiver);
+    assert_eq!(text(&output.stdout), two_columns(), "{said}");
+}

@@ -1,0 +1,183 @@
+//! Appending as a transaction: until it is complete, the recording can be put back as it was, also after a crash.
+//!
+//! Blocks are appended in place of the old index. Before that, the bytes that are overwritten are kept in a file beside, whose name is that
+//! of the recording with `.append` added:
+//!
+//! ```text
+//! kept := 66 65 77 55, offset (8 bytes), bytes from there to the old end, CRC-32 of all before it
+//! ```
+//!
+//! A recording of a single block has another header than one that goes on, so it is copied beside and takes the recording's place at the end.
+
+use crate::error::Error;
+use crate::wire::{CHECK_BYTES, checksum};
+use std::fs::File;
+use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+const MAGIC: [u8; 4] = *b"fewU";
+
+/// Where bytes are kept, or a copy grows.
+pub(crate) fn beside(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".append");
+    PathBuf::from(name)
+}
+
+/// Locks a file against other writers; the lock ends with the last handle.
+pub(crate) fn lock(file: &File) -> Result<(), Error> {
+    match file.try_lock() {
+        Ok(()) => Ok(()),
+        Err(std::fs::TryLockError::WouldBlock) => Err(Error::Locked),
+        // Some file systems have no locks.
+        Err(std::fs::TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(()),
+        Err(std::fs::TryLockError::Error(error)) => Err(Error::io("lock")(error)),
+    }
+}
+
+/// What an append that did not end has kept: the offset, and the bytes from there on.
+pub(crate) fn kept(path: &Path) -> Option<(u64, Vec<u8>)> {
+    let bytes = std::fs::read(beside(path)).ok()?;
+    let (content, check) = bytes.split_last_chunk::<CHECK_BYTES>()?;
+    let (offset, tail) = content.strip_prefix(&MAGIC)?.split_first_chunk::<8>()?;
+    (u32::from_le_bytes(*check) == checksum(&[content])).then(|| (u64::from_le_bytes(*offset), tail.to_vec()))
+}
+
+/// Puts a recording back to what it was before the append that kept these bytes.
+pub(crate) fn roll_back(file: &mut File, path: &Path, offset: u64, tail: &[u8]) -> Result<(), Error> {
+    let mut restore = || -> std::io::Result<()> {
+        file.set_len(offset)?;
+        file.seek(SeekFrom::Start(offset))?;
+        file.write_all(tail)?;
+        file.sync_data()?;
+        std::fs::remove_file(beside(path))
+    };
+    restore().map_err(Error::io("restore"))
+}
+
+/// An append that may be undone. Dropped before [`commit`](Self::commit), it puts the recording back.
+#[derive(Debug)]
+pub(crate) struct Append(State);
+
+#[derive(Debug)]
+enum State {
+    /// Nothing was written yet.
+    Planned {
+        file: File,
+        path: PathBuf,
+        offset: u64,
+    },
+    /// The bytes from `offset` on are overwritten.
+    InPlace {
+        file: File,
+        path: PathBuf,
+        offset: u64,
+        tail: Vec<u8>,
+    },
+    /// A copy grows beside. The lock is that of the recording.
+    Copy {
+        file: File,
+        #[expect(dead_code, reason = "held, not read")]
+        locked: File,
+        path: PathBuf,
+    },
+    Done,
+}
+
+impl Append {
+    /// Nothing to undo.
+    pub(crate) fn none() -> Self {
+        Self(State::Done)
+    }
+
+    /// An append to this file from `offset` on.
+    pub(crate) fn planned(file: File, path: &Path, offset: u64) -> Self {
+        let path = path.to_owned();
+        Self(State::Planned { file, path, offset })
+    }
+
+    /// An append to a copy beside; `locked` holds the lock of the recording.
+    pub(crate) fn copy(file: File, locked: File, path: &Path) -> Self {
+        let path = path.to_owned();
+        Self(State::Copy { file, locked, path })
+    }
+
+    /// Must be called before the first byte is written.
+    pub(crate) fn begin(&mut self) -> Result<(), Error> {
+        let State::Planned { file, path, offset } = &mut self.0 else {
+            return Ok(());
+        };
+        let offset = *offset;
+        let mut keep = || -> std::io::Result<Vec<u8>> {
+            let mut tail = Vec::new();
+            file.seek(SeekFrom::Start(offset))?;
+            file.read_to_end(&mut tail)?;
+            let mut bytes = MAGIC.to_vec();
+            bytes.extend(offset.to_le_bytes());
+            bytes.extend_from_slice(&tail);
+            let check = checksum(&[&bytes]);
+            bytes.extend(check.to_le_bytes());
+            let mut kept = File::create(beside(path))?;
+            kept.write_all(&bytes)?;
+            kept.sync_all()?;
+            sync_folder(path);
+            file.set_len(offset)?;
+            file.seek(SeekFrom::Start(offset))?;
+            Ok(tail)
+        };
+        let tail = keep().map_err(Error::io("keep the end of"))?;
+        if let State::Planned { file, path, offset } = std::mem::replace(&mut self.0, State::Done) {
+            self.0 = State::InPlace {
+                file,
+                path,
+                offset,
+                tail,
+            };
+        }
+        Ok(())
+    }
+
+    /// What was written so far stays.
+    pub(crate) fn commit(&mut self) -> Result<(), Error> {
+        let done = match &self.0 {
+            State::Planned { .. } | State::Done => return Ok(()),
+            State::InPlace { file, path, .. } => file.sync_data().and_then(|()| std::fs::remove_file(beside(path))),
+            State::Copy { file, path, .. } => file.sync_data().and_then(|()| {
+                std::fs::rename(beside(path), path)?;
+                sync_folder(path);
+                Ok(())
+            }),
+        };
+        done.map_err(Error::io("complete"))?;
+        self.0 = State::Done;
+        Ok(())
+    }
+}
+
+impl Drop for Append {
+    fn drop(&mut self) {
+        // Nobody can be told of a failure here: the bytes that were kept are still there, and the next append puts them back.
+        match &mut self.0 {
+            State::Planned { .. } | State::Done => {}
+            State::InPlace {
+                file,
+                path,
+                offset,
+                tail,
+            } => {
+                let _ = roll_back(file, path, *offset, tail);
+            }
+            State::Copy { path, .. } => {
+                let _ = std::fs::remove_file(beside(path));
+            }
+        }
+    }
+}
+
+/// Makes the names in a file's folder durable, where the system can.
+fn sync_folder(path: &Path) {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+        let _ = folder.sync_all();
+    }
+}

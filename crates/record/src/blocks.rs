@@ -1,0 +1,287 @@
+//! The blocks and rows of a recording one after the other, by its index or by a scan.
+
+use crate::block::{self, Block};
+use crate::error::{Damage, Error};
+use crate::index::Entry;
+use crate::playback::{Index, Playback, Row, entries, read_at};
+use crate::scan::{Found, Kind, Order, Scanner, damage_of, decoded};
+use std::collections::VecDeque;
+use std::io::{Read, Seek, SeekFrom};
+
+impl<R: Read + Seek> Playback<R> {
+    /// All blocks in order. Damaged bytes give one error per stretch; the iteration continues after them.
+    pub fn blocks(&mut self) -> Blocks<'_, R> {
+        self.blocks_between(i64::MIN, i64::MAX)
+    }
+
+    /// The blocks that may have rows with ticks in `from..=to`, whole.
+    pub fn blocks_between(&mut self, from: i64, to: i64) -> Blocks<'_, R> {
+        Blocks::new(self, (from, to))
+    }
+
+    /// All rows in order. Damaged bytes give one error per stretch; the iteration continues after them.
+    pub fn rows(&mut self) -> Rows<'_, R> {
+        self.range(i64::MIN, i64::MAX)
+    }
+
+    /// The rows with ticks in `from..=to`.
+    pub fn range(&mut self, from: i64, to: i64) -> Rows<'_, R> {
+        let chosen = self.chosen.clone();
+        Rows::new(self.blocks_between(from, to), chosen, (from, to))
+    }
+}
+
+/// Iterator over [`Block`]s.
+pub struct Blocks<'a, R> {
+    playback: &'a mut Playback<R>,
+    ticks: (i64, i64),
+    next_segment: usize,
+    /// Offsets and entries of the segment that is read at present.
+    entries: VecDeque<(u64, Entry)>,
+    /// The bytes without index that are scanned at present, and the offset of their end.
+    scan: Option<(Scanner, u64)>,
+    scanned: bool,
+    /// The order of scanned blocks, and the number of the last indexed one.
+    order: Order,
+    last_number: Option<u64>,
+    /// What is returned next.
+    pending: VecDeque<Result<Block, Error>>,
+    /// Whether the only block is still to be read.
+    single: bool,
+}
+
+impl<'a, R> Blocks<'a, R> {
+    /// The blocks that may have rows with these ticks.
+    pub(crate) fn new(playback: &'a mut Playback<R>, ticks: (i64, i64)) -> Self {
+        Self {
+            ticks,
+            next_segment: 0,
+            entries: VecDeque::new(),
+            scan: None,
+            scanned: false,
+            order: Order::default(),
+            last_number: None,
+            pending: VecDeque::new(),
+            single: playback.single.is_some(),
+            playback,
+        }
+    }
+}
+
+fn no_bytes(offset: u64, damage: Damage) -> Error {
+    Error::Block {
+        offset,
+        bytes: 0,
+        damage,
+    }
+}
+
+impl<R: Read + Seek> Blocks<'_, R> {
+    fn overlaps(&self, ticks: (i64, i64)) -> bool {
+        ticks.0 <= self.ticks.1 && ticks.1 >= self.ticks.0
+    }
+
+    /// The next block of an indexed segment.
+    fn indexed(&mut self, offset: u64, entry: &Entry) -> Result<Block, Error> {
+        let damaged = |damage| Error::Block {
+            offset,
+            bytes: entry.length,
+            damage,
+        };
+        let header = &self.playback.header;
+        // The length before a block and the checksum after it take at most 14 bytes. Nothing longer is read, whatever the index says.
+        let limit = block::max_bytes(header) as u64 + 16;
+        if entry.length > limit || entry.rows == 0 {
+            return Err(damaged(Damage::NoBlock));
+        }
+        let bytes = read_at(&mut self.playback.reader, offset, entry.length)?.ok_or(damaged(Damage::CutOff))?;
+        if block::length(header, &bytes).map_err(damaged)? as u64 != entry.length {
+            return Err(damaged(Damage::NoBlock));
+        }
+        let chosen = &self.playback.chosen;
+        let block = block::decode(header, &bytes, |column| chosen.contains(&column)).map_err(damaged)?;
+        // Another block of the recording that was put here is not what the index describes, or has been read before.
+        let tolerance = header.schema.time.tolerance();
+        let ends = block
+            .ticks
+            .iter()
+            .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));
+        let is_described = block.rows() as u64 == entry.rows
+            && ends.0.abs_diff(entry.ticks.0) <= tolerance
+            && ends.1.abs_diff(entry.ticks.1) <= tolerance;
+        if !is_described || (block.number.is_some() && block.number <= self.last_number) {
+            return Err(damaged(Damage::Misplaced));
+        }
+        self.last_number = block.number;
+        Ok(block)
+    }
+
+    /// The next block of the stretch without index that is scanned; `None` at its end.
+    fn scanned(&mut self) -> Option<Result<Block, Error>> {
+        let (scanner, end) = self.scan.as_mut()?;
+        let (end, header) = (*end, &self.playback.header);
+        loop {
+            let mut reader = (&mut self.playback.reader).take(end.saturating_sub(scanner.read_to()));
+            let found: Found = match scanner.next(&mut reader, header) {
+                Ok(Some(found)) => found,
+                Ok(None) => {
+                    self.scan = None;
+                    return None;
+                }
+                Err(error) => {
+                    if !matches!(error, Error::Block { .. }) {
+                        self.scan = None;
+                    }
+                    return Some(Err(error));
+                }
+            };
+            if found.kind != Kind::Block {
+                continue;
+            }
+            let chosen = &self.playback.chosen;
+            let block = decoded(header, scanner, &found, |column| chosen.contains(&column));
+            let damage = block.as_ref().ok().and_then(|block| self.order.judge(block.number));
+            let Some(damage) = damage else { return Some(block) };
+            if damage == Damage::Missing {
+                self.pending.push_back(block);
+            }
+            return Some(Err(damage_of(&found, damage)));
+        }
+    }
+
+    /// Begins to scan a stretch. What is said of missing blocks refers to those after the first one found.
+    fn start_scan(&mut self, (start, end): (u64, u64), order: Order) -> Result<(), Error> {
+        let sought = self.playback.reader.seek(SeekFrom::Start(start));
+        sought.map_err(Error::io("read"))?;
+        self.scan = Some((Scanner::new(start), end));
+        self.order = order;
+        Ok(())
+    }
+
+    /// The only block of a recording.
+    fn only(&self) -> Result<Block, Error> {
+        let chosen = &self.playback.chosen;
+        let content = self.playback.single.as_deref().unwrap_or_default();
+        let block = block::decode_content(&self.playback.header, content, |column| chosen.contains(&column));
+        block.map_err(|damage| Error::Block {
+            offset: 0,
+            bytes: self.playback.span.1,
+            damage,
+        })
+    }
+}
+
+impl<R: Read + Seek> Iterator for Blocks<'_, R> {
+    type Item = Result<Block, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if std::mem::take(&mut self.single) {
+            return Some(self.only());
+        }
+        loop {
+            if let Some(next) = self.pending.pop_front() {
+                return Some(next);
+            }
+            if self.scan.is_some() {
+                match self.scanned() {
+                    Some(block) => return Some(block),
+                    None if self.playback.index == Index::Missing => {
+                        return Some(Err(no_bytes(self.playback.span.1, Damage::NoEnd)));
+                    }
+                    None => continue,
+                }
+            }
+            if let Some((offset, entry)) = self.entries.pop_front() {
+                // An entry without rows stands for damaged bytes, whose times are unknown: they are reported for every range.
+                if entry.rows > 0 && !self.overlaps(entry.ticks) {
+                    continue;
+                }
+                return Some(self.indexed(offset, &entry));
+            }
+            let Index::Whole(segments) = &self.playback.index else {
+                if self.scanned {
+                    return None;
+                }
+                self.scanned = true;
+                if let Err(error) = self.start_scan(self.playback.span, Order::default()) {
+                    return Some(Err(error));
+                }
+                if self.playback.index == Index::Other {
+                    return Some(Err(no_bytes(self.playback.span.1, Damage::Index)));
+                }
+                continue;
+            };
+            let segment = *segments.get(self.next_segment)?;
+            self.next_segment += 1;
+            if segment.rows > 0 && !self.overlaps(segment.ticks) {
+                continue;
+            }
+            match entries(&mut self.playback.reader, &self.playback.header, &segment) {
+                Ok(Some(found)) => {
+                    let mut offset = segment.start;
+                    for entry in found {
+                        let next = offset.saturating_add(entry.length);
+                        self.entries.push_back((offset, entry));
+                        offset = next;
+                    }
+                }
+                // Only the segment itself is damaged: scan for its blocks.
+                Ok(None) => {
+                    let stretch = (segment.start, segment.start.saturating_add(segment.blocks));
+                    let order = Order::after(self.last_number.filter(|_| self.ticks == (i64::MIN, i64::MAX)));
+                    if let Err(error) = self.start_scan(stretch, order) {
+                        return Some(Err(error));
+                    }
+                }
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    }
+}
+
+/// Iterator over [`Row`]s.
+pub struct Rows<'a, R> {
+    blocks: Blocks<'a, R>,
+    chosen: Vec<usize>,
+    ticks: (i64, i64),
+    block: Block,
+    row: usize,
+}
+
+impl<'a, R> Rows<'a, R> {
+    pub(crate) fn new(blocks: Blocks<'a, R>, chosen: Vec<usize>, ticks: (i64, i64)) -> Self {
+        Self {
+            blocks,
+            chosen,
+            ticks,
+            block: Block::default(),
+            row: 0,
+        }
+    }
+}
+
+impl<R: Read + Seek> Iterator for Rows<'_, R> {
+    type Item = Result<Row, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            while let Some(tick) = self.block.ticks.get(self.row).copied() {
+                let row = self.row;
+                self.row += 1;
+                if tick < self.ticks.0 || tick > self.ticks.1 {
+                    continue;
+                }
+                let values = self
+                    .chosen
+                    .iter()
+                    .map(|column| self.block.columns[*column][row])
+                    .collect();
+                return Some(Ok(Row { tick, values }));
+            }
+            match self.blocks.next()? {
+                Ok(block) => (self.block, self.row) = (block, 0),
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    }
+}

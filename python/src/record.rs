@@ -1,0 +1,369 @@
+//! Recordings: any table into a file within stated bounds, and back.
+
+use crate::error::{Outcome, refused};
+use crate::table::{Cells, Given, Table};
+use arrow_array::RecordBatch;
+use arrow_schema::{DataType, TimeUnit};
+use fewbits_recipes::bounds::{self, Spec};
+use fewbits_recipes::source::{Batch, Columns};
+use fewbits_recipes::{Error as RecipeError, Progress};
+use fewbits_record::arrow::ticks;
+use fewbits_record::{Block, Effort, Playback, Recorder, Schema, TimeBase, TimeFormat};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// Largest number of decimals of seconds.
+const MAX_DECIMALS: u8 = 9;
+
+/// Looks at signals such as Ctrl-C between batches; the first exception is kept for the caller.
+fn watch(stopped: &mut Option<PyErr>) -> impl FnMut(Progress) -> ControlFlow<()> {
+    |_| match Python::attach(|py| py.check_signals()) {
+        Ok(()) => ControlFlow::Continue(()),
+        Err(error) => {
+            *stopped = Some(error);
+            ControlFlow::Break(())
+        }
+    }
+}
+
+/// What the exception of a callback becomes: itself.
+fn heard<T>(result: Result<T, RecipeError>, stopped: Option<PyErr>) -> Outcome<T> {
+    match (result, stopped) {
+        (Err(RecipeError::Stopped), Some(error)) => Err(error.into()),
+        (result, _) => Ok(result?),
+    }
+}
+
+/// Bounds as Python states them: one text for all columns, a number, or a dictionary of either by column.
+#[derive(FromPyObject)]
+pub(crate) enum Stated {
+    Number(f64),
+    Text(String),
+    ByColumn(BTreeMap<String, Each>),
+}
+
+#[derive(FromPyObject)]
+pub(crate) enum Each {
+    Number(f64),
+    Text(String),
+}
+
+impl Each {
+    fn parsed(&self) -> Result<Spec, RecipeError> {
+        match self {
+            Self::Number(bound) => bounds::parse_one(&format!("±{bound}")),
+            Self::Text(text) => bounds::parse_one(text),
+        }
+    }
+}
+
+impl Stated {
+    fn of(&self, names: &[String]) -> Result<Vec<Spec>, RecipeError> {
+        match self {
+            Self::Number(bound) => Ok(vec![Each::Number(*bound).parsed()?; names.len()]),
+            Self::Text(text) => bounds::parse(text, names),
+            Self::ByColumn(stated) => {
+                let others = stated.get("*").map_or(Ok(Spec::LOSSLESS), Each::parsed)?;
+                for name in stated.keys().filter(|name| *name != "*") {
+                    fewbits_recipes::names::position(names, name)?;
+                }
+                let of = |name: &String| stated.get(name).map_or(Ok(others), Each::parsed);
+                names.iter().map(of).collect()
+            }
+        }
+    }
+}
+
+/// A table as a recording takes it.
+struct Taken {
+    names: Vec<String>,
+    columns: Vec<Cells>,
+    time: TimeBase,
+    ticks: Option<Vec<i64>>,
+}
+
+impl Taken {
+    fn of(given: &Given, time: Option<&str>) -> Outcome<Self> {
+        let names: Vec<String> = given.names().into_iter().filter(|name| Some(name.as_str()) != time).collect();
+        let columns = names.iter().map(|name| given.numbers(name)).collect::<Outcome<_>>()?;
+        let (time, ticks) = match time {
+            Some(name) => {
+                let (base, ticks) = clock(given, name)?;
+                (base, Some(ticks))
+            }
+            None => (TimeBase::Numbered, None),
+        };
+        Ok(Self { names, columns, time, ticks })
+    }
+
+    fn ranges(&self) -> Vec<Option<(f64, f64)>> {
+        let range = |cells: &Cells| {
+            let finite = cells.iter().flatten().copied().filter(|x| x.is_finite());
+            finite.fold(None, |range: Option<(f64, f64)>, x| {
+                Some(range.map_or((x, x), |(from, to)| (from.min(x), to.max(x))))
+            })
+        };
+        self.columns.iter().map(range).collect()
+    }
+
+    fn source(self) -> Columns {
+        Columns::new(Batch { ticks: self.ticks, columns: self.columns })
+    }
+}
+
+/// The time base and the ticks of a column: timestamps in their own unit, numbers as seconds with as many decimals as they have.
+fn clock(given: &Given, name: &str) -> Outcome<(TimeBase, Vec<i64>)> {
+    let base = |decimals, format| TimeBase::Clock { decimals, format, tolerance: 0 };
+    if let DataType::Timestamp(unit, _) = given.kind(name)? {
+        let decimals = match unit {
+            TimeUnit::Second => 0,
+            TimeUnit::Millisecond => 3,
+            TimeUnit::Microsecond => 6,
+            TimeUnit::Nanosecond => 9,
+        };
+        let mut all = Vec::new();
+        for column in given.arrays(name)? {
+            all.extend(ticks(name, column, decimals)?);
+        }
+        return Ok((base(decimals, TimeFormat::Utc), all));
+    }
+    let Some(seconds) = given.numbers(name)?.into_iter().collect::<Option<Vec<f64>>>() else {
+        return refused("time", format!("'{name}' with gaps"), "a time in every row");
+    };
+    for decimals in 0..=MAX_DECIMALS {
+        let scale = 10_f64.powi(decimals.into());
+        // The quotient of two exact doubles is rounded once, so it is the number that was written with these decimals.
+        let tick = |x: &f64| {
+            let tick = (x * scale).round();
+            (tick.abs() < 9e15 && tick / scale == *x).then_some(tick as i64)
+        };
+        if let Some(ticks) = seconds.iter().map(tick).collect::<Option<Vec<_>>>() {
+            return Ok((base(decimals, TimeFormat::Seconds), ticks));
+        }
+    }
+    refused("time", format!("'{name}'"), "seconds of at most 9 decimals, or timestamps: round them first")
+}
+
+/// Writes a table into a recording, each cell within the bound of its column. Returns the number of bytes.
+///
+/// `table` is anything with `__arrow_c_stream__`. `time` names its column of times: timestamps, or numbers of seconds; without it rows are
+/// numbered. `bounds` is a number, a text such as "±0.1", "1%", "decimals:3" or "temp=±0.1,*=lossless", or a dictionary of these by column,
+/// with "*" for all others. Nulls and NaN return as they are. The file is complete or, after an error, as it was before.
+///
+/// >>> import pyarrow as pa, fewbits as fb, tempfile, os
+/// >>> path = os.path.join(tempfile.mkdtemp(), "room.fewb")
+/// >>> table = pa.table({"t": [0.0, 0.5, 1.0], "temp": [20.11, None, 20.32], "door": [0, 1, 1]})
+/// >>> size = fb.write(table, path, time="t", bounds={"temp": 0.05})
+/// >>> back = fb.read(path)
+/// >>> back.columns, len(back), bool(abs(back["temp"][0] - 20.11) <= 0.05)
+/// (['time', 'temp', 'door'], 3, True)
+/// >>> fb.verify(table, path, time="t")["holds"]
+/// True
+#[pyfunction]
+#[pyo3(signature = (table, path, *, time=None, bounds=Stated::Text("lossless".to_owned()), effort="thorough"))]
+pub(crate) fn write(
+    py: Python<'_>,
+    table: &Bound<'_, PyAny>,
+    path: PathBuf,
+    time: Option<&str>,
+    bounds: Stated,
+    effort: &str,
+) -> Outcome<u64> {
+    let effort = match effort {
+        "thorough" => Effort::Thorough,
+        "fast" => Effort::Fast,
+        other => return refused("effort", format!("'{other}'"), "'thorough' or 'fast'"),
+    };
+    let taken = Taken::of(&Given::read(table)?, time)?;
+    let specs = bounds.of(&taken.names)?;
+    let columns = bounds::columns(&taken.names, &specs, &taken.ranges())?;
+    let schema = Schema::new(columns, taken.time)?;
+    py.detach(|| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let beside = tempfile::NamedTempFile::new_in(folder)?;
+        let mut recorder = Recorder::new(BufWriter::new(beside), schema).with_effort(effort);
+        let mut stopped = None;
+        let filled = fewbits_recipes::pack::fill(&mut taken.source(), &mut recorder, &mut watch(&mut stopped));
+        heard(filled, stopped)?;
+        let mut written = recorder.finish()?;
+        written.flush()?;
+        let beside = written.into_inner().map_err(std::io::IntoInnerError::into_error)?;
+        let bytes = beside.as_file().metadata()?.len();
+        beside.persist(&path).map_err(|error| error.error)?;
+        Ok(bytes)
+    })
+}
+
+fn opened(path: &Path) -> Outcome<Playback<BufReader<File>>> {
+    Ok(Playback::new(BufReader::new(File::open(path)?))?)
+}
+
+/// A tick of a recording's clock: a number of seconds, or with a UTC clock a text or a NumPy datetime.
+fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBase) -> Outcome<i64> {
+    let TimeBase::Clock { decimals, format, .. } = time else {
+        return value.extract().or_else(|_| refused(name, value, "the number of a row"));
+    };
+    let scale = 10_f64.powi(decimals.into());
+    if let Ok(seconds) = value.extract::<f64>() {
+        let tick = (seconds * scale).round();
+        return if tick.abs() < i64::MAX as f64 { Ok(tick as i64) } else { refused(name, seconds, "a time within the clock's range") };
+    }
+    if matches!(format, TimeFormat::Utc) {
+        let numpy = value.py().import("numpy")?;
+        let stamp = numpy.call_method1("datetime64", (value, "ns"))?.call_method1("astype", ("int64",))?;
+        let nanoseconds: i64 = stamp.extract()?;
+        return Ok(nanoseconds.div_euclid(10_i64.pow(u32::from(MAX_DECIMALS - decimals))));
+    }
+    refused(name, value, "a number of seconds")
+}
+
+/// Reads a recording, whole or some columns between two times (`start` included, `end` excluded), as a table.
+///
+/// `start` and `end` are numbers of seconds, row numbers if the recording has no times, or what `numpy.datetime64` takes if its clock is UTC.
+/// Blocks outside are not decoded.
+#[pyfunction]
+#[pyo3(signature = (path, *, columns=None, start=None, end=None))]
+pub(crate) fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    columns: Option<Vec<String>>,
+    start: Option<&Bound<'_, PyAny>>,
+    end: Option<&Bound<'_, PyAny>>,
+) -> Outcome<Table> {
+    let mut playback = opened(&path)?;
+    let schema = playback.schema().clone();
+    let tick = |value: Option<&Bound<'_, PyAny>>, name, without| {
+        value.map_or(Ok(without), |value| tick_of(value, name, schema.time()))
+    };
+    let from = tick(start, "start", i64::MIN)?;
+    let to = match end {
+        None => i64::MAX,
+        Some(end) => match tick_of(end, "end", schema.time())?.checked_sub(1) {
+            Some(last) => last,
+            None => return refused("end", end, "a time above the smallest"),
+        },
+    };
+    if let Some(columns) = &columns {
+        let names: Vec<&str> = columns.iter().map(String::as_str).collect();
+        playback.columns(&names)?;
+    }
+    let batches = py.detach(|| -> Outcome<Vec<RecordBatch>> {
+        let mut batches = Vec::new();
+        for (number, block) in playback.blocks_between(from, to).enumerate() {
+            if number % 16 == 15 {
+                Python::attach(|py| py.check_signals())?;
+            }
+            let mut block = block?;
+            keep_between(&mut block, from, to);
+            batches.push(block.to_record_batch(&schema)?);
+        }
+        Ok(batches)
+    })?;
+    let places: Vec<usize> = match &columns {
+        None => (0..=schema.columns().len()).collect(),
+        Some(columns) => {
+            let at = |name: &String| schema.position(name).map(|at| at + 1);
+            let mut places = columns.iter().map(at).collect::<Result<Vec<_>, _>>()?;
+            places.push(0);
+            places.sort_unstable();
+            places
+        }
+    };
+    let fields = std::sync::Arc::new(schema.to_arrow().project(&places)?);
+    Ok(Table::of(arrow_select::concat::concat_batches(&fields, &batches)?))
+}
+
+/// Leaves only the rows whose ticks are in `from..=to`.
+fn keep_between(block: &mut Block, from: i64, to: i64) {
+    if block.ticks.iter().all(|tick| (from..=to).contains(tick)) {
+        return;
+    }
+    let kept: Vec<bool> = block.ticks.iter().map(|tick| (from..=to).contains(tick)).collect();
+    let mut rows = kept.iter();
+    block.ticks.retain(|_| rows.next().copied().unwrap_or(false));
+    for cells in &mut block.columns {
+        let mut rows = kept.iter();
+        cells.retain(|_| rows.next().copied().unwrap_or(false));
+    }
+}
+
+/// What a recording holds: rows, bytes, columns with their bounds and units, and whether its end is there.
+#[pyfunction]
+pub(crate) fn info(py: Python<'_>, path: PathBuf) -> Outcome<Bound<'_, PyDict>> {
+    let mut playback = opened(&path)?;
+    let rows: u64 = py.detach(|| playback.index())?.iter().map(|block| block.rows).sum();
+    let found = PyDict::new(py);
+    found.set_item("rows", rows)?;
+    found.set_item("bytes", playback.bytes())?;
+    found.set_item("finished", playback.has_index())?;
+    let bounds = PyDict::new(py);
+    let units = PyDict::new(py);
+    for column in playback.schema().columns() {
+        bounds.set_item(column.name(), bounds::shown(column.bound(), column.period()))?;
+        units.set_item(column.name(), column.unit())?;
+    }
+    found.set_item("bounds", bounds)?;
+    found.set_item("units", units)?;
+    Ok(found)
+}
+
+/// Compares every cell of a recording with the table that it was made of. Columns are matched by name.
+///
+/// Returns whether all promises hold, the rows compared, and the failed cells by column.
+#[pyfunction]
+#[pyo3(signature = (table, path, *, time=None))]
+pub(crate) fn verify<'py>(
+    py: Python<'py>,
+    table: &Bound<'py, PyAny>,
+    path: PathBuf,
+    time: Option<&str>,
+) -> Outcome<Bound<'py, PyDict>> {
+    let mut playback = opened(&path)?;
+    let mut taken = Taken::of(&Given::read(table)?, time)?;
+    if let (TimeBase::Clock { decimals, .. }, TimeBase::Clock { decimals: given, .. }, Some(ticks)) =
+        (playback.schema().time(), taken.time, &mut taken.ticks)
+    {
+        rescale(ticks, given, decimals)?;
+    }
+    let matches = taken.names.iter().map(|name| playback.schema().position(name)).collect::<Result<Vec<_>, _>>()?;
+    let verdict = py.detach(|| {
+        let mut stopped = None;
+        let verdict = fewbits_recipes::verify::verify(&mut playback, &mut taken.source(), &matches, &mut watch(&mut stopped));
+        heard(verdict, stopped)
+    })?;
+    let found = PyDict::new(py);
+    found.set_item("holds", verdict.holds)?;
+    found.set_item("rows", verdict.rows)?;
+    found.set_item("missing_rows", verdict.missing_rows)?;
+    found.set_item("extra_rows", verdict.extra_rows)?;
+    found.set_item("times_failed", verdict.ticks_failed)?;
+    found.set_item("damage", verdict.damage)?;
+    let failed = PyDict::new(py);
+    let largest = PyDict::new(py);
+    for column in &verdict.columns {
+        failed.set_item(&column.name, column.failed)?;
+        largest.set_item(&column.name, column.largest_error)?;
+    }
+    found.set_item("failed", failed)?;
+    found.set_item("largest_error", largest)?;
+    found.set_item("not_compared", verdict.not_compared)?;
+    Ok(found)
+}
+
+/// Ticks of one number of decimals as ticks of another.
+fn rescale(ticks: &mut [i64], from: u8, to: u8) -> Outcome<()> {
+    let scale = 10_i64.pow(u32::from(from.abs_diff(to)));
+    for tick in ticks {
+        let scaled = if to >= from { tick.checked_mul(scale) } else { (*tick % scale == 0).then(|| *tick / scale) };
+        match scaled {
+            Some(scaled) => *tick = scaled,
+            None => return refused("time", *tick, "times that are ticks of the recording"),
+        }
+    }
+    Ok(())
+}
