@@ -66,7 +66,7 @@ pub(crate) enum Error {
     Refusal {
         file: String,
         #[source]
-        source: fewbits_table::Error,
+        source: Box<fewbits_table::Error>,
     },
     /// The value of an option could not be parsed.
     #[error("{option}: `{value}` is not understood: expected {expected}")]
@@ -108,7 +108,7 @@ pub(crate) enum Error {
     Recipe {
         file: String,
         #[source]
-        source: fewbits_recipes::Error,
+        source: Box<fewbits_recipes::Error>,
     },
     /// Binary data would be written to a terminal.
     #[error("standard output is a terminal: name a file with --output, or redirect")]
@@ -182,7 +182,7 @@ impl Error {
             fewbits_recipes::Error::Record(source) => Self::recording(&file)(source),
             source => Self::Recipe {
                 file: file.clone(),
-                source,
+                source: Box::new(source),
             },
         }
     }
@@ -191,7 +191,7 @@ impl Error {
         let file = file.to_owned();
         move |source| Self::Refusal {
             file: file.clone(),
-            source,
+            source: Box::new(source),
         }
     }
 

@@ -47,12 +47,10 @@ struct State {
 fn options(names: &[&str]) -> String {
     let (mut kept, mut words) = (vec![env!("CARGO_PKG_VERSION").to_owned()], std::env::args().skip(1));
     while let Some(word) = words.next() {
-        let has_value = |option: &&str| word.strip_prefix(*option).is_some_and(|rest| rest.starts_with('='));
+        let has_value = |option: &str| word.strip_prefix(option).is_some_and(|rest| rest.starts_with('='));
         match word.as_str() {
             "--jobs" | "--shard" | "-o" | "--output" => drop(words.next()),
-            _ if ["--jobs", "--shard", "--output"]
-                .iter()
-                .any(|option| has_value(&option)) => {}
+            _ if ["--jobs", "--shard", "--output"].iter().any(|option| has_value(option)) => {}
             other if names.contains(&other) => {}
             _ => kept.push(word),
         }

@@ -11,6 +11,9 @@ use std::collections::VecDeque;
 /// Times above these are not seconds since 1970 but fractions of a second: the number of them in one second.
 const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)];
 
+/// Index of each sensor, and what it reported; `None` if the cell is empty.
+type Reports = Vec<(usize, Option<f64>)>;
+
 /// All reports of one time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Instant {
@@ -39,7 +42,7 @@ pub(super) struct Instants {
     /// Number of rows that were dropped because they repeat one of the same time.
     pub(super) copies: u64,
     /// Time and cells of the last row.
-    before: Option<(f64, Vec<(usize, Option<f64>)>)>,
+    before: Option<(f64, Reports)>,
     /// Rows that were read ahead.
     ahead: VecDeque<Instant>,
     /// The row after an instant that has several rows.
