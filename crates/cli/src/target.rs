@@ -21,6 +21,8 @@ const MAX_NAME: usize = 200;
 
 /// End of the name of an unfinished file.
 const UNFINISHED: &str = ".fewbits-new";
+/// What a recorder adds to the name of the recording that it appends to, for its own file beside it.
+const APPENDING: &str = ".append";
 
 /// Whether the task's source is live; set once from the arguments.
 static IS_LIVE: AtomicBool = AtomicBool::new(false);
@@ -238,18 +240,25 @@ fn remove_abandoned(own: &Path, kept: &str) {
     };
     for entry in entries.flatten() {
         let name = entry.file_name();
-        let is_other = name
-            .to_str()
-            .is_some_and(|name| name.starts_with(kept) && name.ends_with(UNFINISHED));
-        if !is_other || own.file_name() == Some(&name) {
+        let Some(name) = name.to_str() else { continue };
+        // A recorder that appends to a copy keeps a file of its own beside it.
+        let unfinished = name.strip_suffix(APPENDING).unwrap_or(name);
+        let is_other = unfinished.starts_with(kept) && unfinished.ends_with(UNFINISHED);
+        if !is_other || own.file_name().is_some_and(|own| own == unfinished) {
             continue;
         }
         let path = entry.path();
-        if let Ok(file) = File::open(&path)
-            && file.try_lock().is_ok()
-        {
+        if is_abandoned(&path) && is_abandoned(&path.with_file_name(unfinished)) {
             let _ = std::fs::remove_file(&path);
         }
+    }
+}
+
+/// Whether no living process holds the lock of a file, or it does not exist.
+fn is_abandoned(path: &Path) -> bool {
+    match File::open(path) {
+        Ok(file) => file.try_lock().is_ok(),
+        Err(error) => error.kind() == std::io::ErrorKind::NotFound,
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::belief::SentBelief;
 use crate::density::Lpg;
 use crate::fit::Fit;
-use crate::project::{Travelling, gaussian_scalars, lpg_scalars};
+use crate::project::{COUNT_BITS, Travelling, gaussian_scalars, lpg_scalars};
 use crate::{Error, Record, SourceSensor};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_densities::{Component, Mixture};
@@ -141,8 +141,6 @@ pub struct PackedBelief {
     pub samples: usize,
 }
 
-/// Bits of the number of components, and of the degree.
-pub(crate) const COUNT_BITS: u32 = 5;
 /// Bits of the number of records of a message.
 pub(crate) const RECORD_COUNT_BITS: u32 = 10;
 /// Bits of the number of samples so far; a larger number is sent as the largest.

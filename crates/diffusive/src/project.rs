@@ -4,13 +4,15 @@ use crate::belief::{JointBelief, PositionBelief};
 use crate::density::LpgFit;
 use crate::density::polynomials::check_degree;
 use crate::density::{Clumps, Lpg, MixtureFit};
-use crate::message::COUNT_BITS;
 use crate::posterior::Posterior;
 use crate::{Error, RateModel};
 use fewbits_core::Gaussian;
 use fewbits_densities::{Component, Mixture, systematic};
 use fewbits_numerics::error::{at_least_one, refuse};
 use serde::{Deserialize, Serialize};
+
+/// Bits of the number of components, and of the degree.
+pub(crate) const COUNT_BITS: u32 = 5;
 
 /// Number of clumps that a mixture is fitted to.
 const CLUMPS: usize = 200;

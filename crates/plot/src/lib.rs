@@ -10,7 +10,7 @@
 //! Not here: data, files, a window. The axes' ticks and the SVG elements come from `plotters`.
 //!
 //! ```
-//! use crate::{Axis, Layer, Panel, Plot};
+//! use fewbits_plot::{Axis, Layer, Panel, Plot};
 //! let curve = vec![(0.001, 1.0), (1.0, 2.0)];
 //! let plot = Plot::of(
 //!     Panel::new("Loss", Axis::log("gamma = sigma_u^2 / sigma^2"), Axis::linear("loss"))

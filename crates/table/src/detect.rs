@@ -110,7 +110,7 @@ pub(crate) struct Layout {
 
 /// Fills what is not said, and finds the line of names.
 pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error> {
-    known::recognise(head, dialect);
+    known::recognise(&head.lines, dialect);
     let mark = dialect.comment.get_or_insert_with(|| "#".to_owned()).clone();
     let is_comment = |line: &str| !mark.is_empty() && line.starts_with(mark.as_str());
     let mut lines: Vec<(u64, &str)> = head

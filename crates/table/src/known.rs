@@ -1,7 +1,6 @@
 //! Formats of loggers that are known by their first lines, and words for units.
 
 use crate::dialect::Dialect;
-use crate::head::Head;
 
 /// Whether a first line announces a format whose data begin later.
 pub(crate) fn needs_more(line: &[u8]) -> bool {
@@ -18,9 +17,9 @@ pub(crate) fn needs_more(line: &[u8]) -> bool {
     .any(|begin| line.starts_with(begin))
 }
 
-/// Sets what is known of a format and not said.
-pub(crate) fn recognise(head: &Head, dialect: &mut Dialect) {
-    let Some((_, first)) = head.lines.first() else { return };
+/// Sets what is known of a format by the first lines, with their numbers, and not said.
+pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
+    let Some((_, first)) = lines.first() else { return };
     let first = first.trim_start_matches('\u{feff}');
     let bare = first.trim_start_matches('"');
     let mut set = |format: &str, skip: Option<u64>, units_row: bool, skip_after_names: u64, delimiter: &str| {
@@ -45,7 +44,7 @@ pub(crate) fn recognise(head: &Head, dialect: &mut Dialect) {
         dialect.comment.get_or_insert(String::new());
     } else if first.starts_with("LOCATION,") {
         // EnergyPlus weather: eight lines or fewer, then rows without names.
-        let data = head.lines.iter().position(|(_, line)| line.starts_with("DATA PERIODS"));
+        let data = lines.iter().position(|(_, line)| line.starts_with("DATA PERIODS"));
         if let Some(data) = data.filter(|_| dialect.skip.is_none() && dialect.no_header.is_none()) {
             dialect.format.get_or_insert("EPW".to_owned());
             dialect.delimiter.get_or_insert(",".to_owned());
@@ -57,7 +56,7 @@ pub(crate) fn recognise(head: &Head, dialect: &mut Dialect) {
         dialect.comment.get_or_insert("#".to_owned());
     } else if first.starts_with('#') {
         // Tab-separated tables of the USGS: comments, names, and a line of widths and kinds, as `5s 15s 20d`.
-        let mut rows = head.lines.iter().filter(|(_, line)| !line.starts_with('#'));
+        let mut rows = lines.iter().filter(|(_, line)| !line.starts_with('#'));
         let (names, widths) = (rows.next(), rows.next());
         let is_width = |cell: &str| {
             let (number, kind) = cell.split_at(cell.len().saturating_sub(1));

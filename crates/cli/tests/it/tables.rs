@@ -83,8 +83,8 @@ fn words_and_booleans_are_kept_whatever_the_bound() {
         .skip(1)
         .map(|line| line.split_once(',').unwrap().1)
         .collect();
-    assert!(modes[0].starts_with("off,1.0,") && modes[1].starts_with("heat,0.0,"), "{back}");
-    assert!(modes[2].starts_with(",1.0,") && modes[3].starts_with("\"a, b\",,"), "{back}");
+    assert!(modes[0].starts_with("off,1,") && modes[1].starts_with("heat,0,"), "{back}");
+    assert!(modes[2].starts_with(",1,") && modes[3].starts_with("\"a, b\",,"), "{back}");
     // A word that the recording has not is refused.
     let folder = folder(&[
         ("t.csv", table),
@@ -170,6 +170,8 @@ fn bad_lines_are_left_out_counted_and_named() {
     let folder = folder(&[("t.csv", table)]);
     let words = ["pack", "t.csv", "--time", "exact", "-o", "t.fewb"];
     let message = refused(folder.path(), &words, b"");
+    assert!(message.contains("line 5 (row 4): 1 cell instead of 2"), "{message}");
+    let message = refused(folder.path(), &[&words[..], &["--skip-bad", "1"]].concat(), b"");
     assert!(message.contains("line 3 (row 2), column `x`: `2..5` is not a number"), "{message}");
     let output = fewbits(folder.path(), &[&words[..], &["--skip-bad", "2"]].concat(), b"");
     let message = text(&output.stderr);

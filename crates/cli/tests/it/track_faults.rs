@@ -240,5 +240,7 @@ fn a_stated_change_is_used_as_it_is() {
     assert_eq!(found.summary["noise_scale"], 1.0);
     let learnt = track(&wide(&values), &[&stated[..], &["--learning", "on"]].concat());
     assert_ne!(learnt.summary["noise_scale"], 1.0);
-    assert!(found.against(&truth, 0).0 <= learnt.against(&truth, 0).0);
+    let ((error, cover), (learnt_error, _)) = (found.against(&truth, 0), learnt.against(&truth, 0));
+    // The errors of 2000 rows are worth some 40 independent ones: two standard errors of a share of .95 are .07.
+    assert!(error < 1.05 * learnt_error && cover > 0.88, "{error} {learnt_error} {cover}");
 }

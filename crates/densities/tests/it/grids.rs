@@ -151,9 +151,9 @@ fn what_is_impossible_leaves_a_density_behind() {
     assert_eq!(belief.density(), [0.0, 0.5, 1.0, 0.5, 0.0]);
     assert_eq!((belief.mean(), belief.variance()), (1.0, 0.125));
     assert!(belief.refill(|density| density.fill(0.0)).is_err());
-    assert_eq!(belief.density(), [0.4; 5]);
+    assert_eq!(belief.density(), [0.0, 0.5, 1.0, 0.5, 0.0]);
     assert!(belief.refill(|density| density.fill(f64::INFINITY)).is_err());
-    assert_eq!(belief.density(), [0.4; 5]);
+    assert_eq!(belief.density(), [0.0, 0.5, 1.0, 0.5, 0.0]);
 }
 
 /// Defect: the density at a distance whose quotient by the spacing overflows was NaN.

@@ -213,7 +213,7 @@ fn case_6_a_batch_has_one_answer() {
         unreachable!()
     };
     // 120 bits of preamble and header, two frames of 81 bits and their lengths: 314 bits, 1.256 ms.
-    let (arrival, answered) = (1_256_000, 1_256_000 + 362_000);
+    let (arrival, answered) = (1_256_000, 1_256_000 + 192_000 + 352_000);
     assert_eq!(centre.received, [arrival, arrival]);
     assert_eq!(sensor.acknowledged, [(answered, sensor.sent[0]), (answered, sensor.sent[1])]);
     let frame = 314.0 / 250e3;

@@ -176,9 +176,9 @@ fn batteries_end() {
     let star = counted(Link::lossy(0.5).unwrap(), Feedback::Told, scalar(3, 300, 1));
     let mut network = star.simulate(10.0, Setup { radio, ..setup(1) }).unwrap();
     network.run_until(clock().end(300)).unwrap();
-    // 7.4 mW idle alone end it after 135 s.
+    // Idle, it listens 9.9 % of the time: 62 mW then and .066 mW asleep are 6.2 mW, which alone end it after 161.3 s.
     let died = network.ledger().accounts()[1].died.unwrap().since_start().value();
-    assert!((120.0..136.0).contains(&died), "{died}");
+    assert!((146.0..161.4).contains(&died), "{died}");
     assert!((network.energy(SensorId(1)).unwrap().value() - 1.0).abs() < 0.01);
     assert!(!network.is_alive(SensorId(1)));
 }
@@ -201,7 +201,7 @@ fn a_centre_on_the_mains_outlives_its_sensors() {
         .unwrap();
     network.run_until(clock().end(300)).unwrap();
     assert!(network.is_alive(SensorId(0)) && !network.is_alive(SensorId(1)));
-    assert!(network.energy(SensorId(0)).unwrap() > Joules::new(2.0).unwrap());
+    assert!(network.energy(SensorId(0)).unwrap() > Joules::new(1.8).unwrap());
     let (life, node) = network.summary().lifetime.unwrap();
-    assert!(node != SensorId(0) && (120.0..136.0).contains(&life.value()));
+    assert!(node != SensorId(0) && (146.0..161.4).contains(&life.value()));
 }

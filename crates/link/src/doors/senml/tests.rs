@@ -1,3 +1,5 @@
+//! SenML against the examples of RFC 8428.
+
 #![allow(clippy::unwrap_used)]
 use super::*;
 
