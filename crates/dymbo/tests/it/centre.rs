@@ -462,14 +462,14 @@ fn refused_calls_leave_the_centre_as_it_was() {
         plane.centre.receive(&mut plane.filter_rng, &[unknown]),
         Err(Error::Argument(e)) if e.value == "77"
     ));
-    // Another sensor's feedback does not decode.
-    let crossed = Slot::new(2, slots[0].feedback.clone(), slots[2].observation.clone());
-    assert!(
-        plane
-            .centre
-            .receive(&mut plane.filter_rng, &[slots[0].clone(), crossed])
-            .is_err()
-    );
     assert!(plane.centre.state() == before);
+    // Another sensor's feedback does not decode: that report is rejected, and the others are used.
+    let crossed = Slot::new(2, slots[0].feedback.clone(), slots[2].observation.clone());
+    let found = plane
+        .centre
+        .receive(&mut plane.filter_rng, &[slots[0].clone(), crossed])
+        .unwrap();
+    assert!(found.events.contains(&Event::Rejected(2)), "{:?}", found.events);
+    assert!(plane.centre.state() != before);
     assert!(plane.centre.leave(2) && !plane.centre.leave(2) && plane.centre.feedback(2).is_err());
 }
