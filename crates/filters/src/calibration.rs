@@ -137,7 +137,8 @@ where
             *count += 1;
             (low, high) = (low.min(*value), high.max(*value));
         }
-        if !(high > low) {
+        let is_wide = high > low;
+        if !is_wide {
             return refuse("values", "all equal", "values that vary");
         }
         let range = self.period.unwrap_or(high - low);
@@ -277,7 +278,8 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
                         }
                     }
                 }
-                if !(self.best > before) {
+                let has_risen = self.best > before;
+                if !has_risen {
                     break;
                 }
             }

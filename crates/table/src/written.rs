@@ -153,7 +153,7 @@ pub(crate) fn of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
     if matches!(word.to_ascii_lowercase().as_str(), "am" | "pm") {
         rest = rest
             .trim_start()
-            .trim_start_matches(|c: char| matches!(c, 'a' | 'A' | 'p' | 'P' | 'm' | 'M' | '.'));
+            .trim_start_matches(['a', 'A', 'p', 'P', 'm', 'M', '.']);
     }
     Some((hours * 3600 + minutes * 60 + seconds, fraction, seconds == 60, rest))
 }

@@ -33,6 +33,7 @@ pub enum Status {
 /// What follows a node's step.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
+#[allow(clippy::large_enum_variant)] // One exists at a time.
 pub enum Action {
     /// The state is sent to this node, which samples next.
     Ask {

@@ -42,8 +42,11 @@ fn search(place: &Place, form: Form, rate: RateModel) -> Search {
     search
 }
 
+/// Nodes in the order of their visits, with the means after each.
+type Visits = Vec<(usize, Vector2<f64>)>;
+
 /// The nodes, estimates and status of a search of which every node knows only the bits that it received; then all messages.
-fn by_messages(search: &Search, place: &Place) -> (Vec<(usize, Vector2<f64>)>, Status, Vec<BitString>) {
+fn by_messages(search: &Search, place: &Place) -> (Visits, Status, Vec<BitString>) {
     let (mut node, mut steps, mut messages) = (place.start, Vec::new(), Vec::new());
     loop {
         let state = match messages.last() {

@@ -89,7 +89,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let rivals = (0..found.len()).filter(is_rival).filter(|k| {
                 let gap = found[worst].depth() - found[*k].depth();
                 // Both may be infinite.
-                !(gap > decisive)
+                gap.partial_cmp(&decisive) != Some(std::cmp::Ordering::Greater)
             });
             // A report without that of its rival, given all others.
             let without = |gone: usize, left: usize| {

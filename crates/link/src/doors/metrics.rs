@@ -4,6 +4,11 @@ use crate::station::{Counts, Step};
 use fewbits_core::Observation;
 use std::fmt;
 
+/// Name, help and value of a counter of a sensor.
+type Counter = (&'static str, &'static str, fn(&Sensor) -> u64);
+/// Name, help and state of a flag of a sensor.
+type Flag = (&'static str, &'static str, fn(&Sensor) -> bool);
+
 /// What a sensor has done so far.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sensor {
@@ -73,7 +78,7 @@ impl fmt::Display for Metrics {
         for (i, (_, deviation)) in self.estimate.iter().enumerate() {
             writeln!(f, "fewbits_deviation{{coordinate=\"{i}\"}} {}", number(*deviation))?;
         }
-        let counters: [(&str, &str, fn(&Sensor) -> u64); 3] = [
+        let counters: [Counter; 3] = [
             ("reports_total", "Reports of a sensor.", |sensor| sensor.reports),
             ("report_bits_total", "Bits of a sensor's reports.", |sensor| sensor.bits),
             ("lost_reports_total", "Reports of a sensor that were not understood.", |sensor| sensor.lost),
@@ -90,7 +95,7 @@ impl fmt::Display for Metrics {
                 writeln!(f, "fewbits_sensor_working{{sensor=\"{}\"}} {}", sensor.number, number(working))?;
             }
         }
-        let flags: [(&str, &str, fn(&Sensor) -> bool); 2] = [
+        let flags: [Flag; 2] = [
             ("sensor_dead", "1 if a sensor is regarded as dead.", |sensor| sensor.dead),
             ("sensor_excluded", "1 if a sensor's reports are not used.", |sensor| sensor.excluded),
         ];
