@@ -14,9 +14,7 @@ pub(crate) struct Cli {
     pub(crate) task: Task,
 }
 
-// One is parsed per run, so its size is of no interest.
 #[derive(Subcommand)]
-#[expect(clippy::large_enum_variant)]
 pub(crate) enum Task {
     /// Show how a table is understood: dialect, columns, kinds, units, times, gaps, ranges and suspicious cells.
     Look(LookOptions),

@@ -198,11 +198,14 @@ pub trait AnyFigure: Sync {
     fn with(&self, parameters: Map<String, Json>) -> Result<Run<'_>, Error>;
 }
 
+/// The work of a figure with its typed parameters.
+type Work<'a> = dyn Fn(&Context<'_>) -> Result<Outcome, Error> + Send + Sync + 'a;
+
 /// A figure with checked parameters, ready to be run.
 pub struct Run<'a> {
     /// All parameters.
     pub parameters: Map<String, Json>,
-    work: Box<dyn Fn(&Context<'_>) -> Result<Outcome, Error> + Send + Sync + 'a>,
+    work: Box<Work<'a>>,
 }
 
 impl<'a> Run<'a> {

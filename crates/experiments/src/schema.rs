@@ -157,11 +157,14 @@ pub struct Described {
     pub(crate) tables: Vec<Table>,
 }
 
+/// Rows of a table, and the reference key of each.
+pub(crate) type Keyed = (Vec<Vec<Value>>, Vec<Option<String>>);
+
 /// The cells of a row, or the rows of the tables, in the order in which [`Described`] has columns and tables.
 #[derive(Debug, Default)]
 pub struct Cells {
     cells: Vec<Value>,
-    pub(crate) tables: Vec<(Vec<Vec<Value>>, Vec<Option<String>>)>,
+    pub(crate) tables: Vec<Keyed>,
 }
 
 /// A field of a row (a number, a label, a [`Measured`], an `Option` of these, another row, whose columns are then this row's too)

@@ -41,8 +41,10 @@ fn hello(link: &mut SensorLink) -> Vec<u8> {
     }
 }
 
+type Datagrams = Vec<(SocketAddr, Vec<u8>)>;
+
 /// What the station does at a time: its datagrams by address, and its steps.
-fn turn(station: &mut One, now: u64) -> (Vec<(SocketAddr, Vec<u8>)>, Vec<Step>, Vec<Output>) {
+fn turn(station: &mut One, now: u64) -> (Datagrams, Vec<Step>, Vec<Output>) {
     let mut outputs = Vec::new();
     station.on_time(now, &mut outputs).unwrap();
     let (mut datagrams, mut steps, mut others) = (Vec::new(), Vec::new(), Vec::new());
