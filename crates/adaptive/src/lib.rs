@@ -3,7 +3,7 @@
 //! A sensor and its receiver run the same bank of models of the signal and hold the same frequencies of past reports. Silence means
 //! that the sample is within `delta` of the prediction of both. Otherwise the residual is coded under the probability law that
 //! both compute. Neither knows anything of the signal beforehand, and only reports are sent. Blocks begin
-//! with weights that were fitted once on recordings ([`BlockCodec`]).
+//! with weights that were fitted once on recordings.
 //!
 //! ```
 //! use fewbits_adaptive::{Config, Receiver, Sensor};

@@ -38,7 +38,7 @@ impl BlockCodec {
         self.encode_with(samples, &[])
     }
 
-    /// As [`encode`](Self::encode), with the same rows of other columns as regressors (at most [`JOINT_COLUMNS`] of them are
+    /// As [`encode`](Self::encode), with the same rows of other columns as regressors (at most `JOINT_COLUMNS` of them are
     /// used, the first ones). `others` must be their reconstructions, which the reader has. If they do not help, the block is
     /// the same as without them.
     ///
