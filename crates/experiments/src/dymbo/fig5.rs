@@ -105,7 +105,7 @@ impl Figure for Convergence {
         "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
          exact (lines); the third curve starts from first message and stationary prior together. The level differs \
          by the loss, the convergence by a step or two (erratum dymbo-12); for the slow plant the first message without the \
-         prior is worse than the prior alone (erratum dymbo-13).");
+         prior is worse than the prior alone.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (mut errors, mut path) = (Vec::new(), Vec::new());
