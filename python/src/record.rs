@@ -89,7 +89,11 @@ struct Taken {
 
 impl Taken {
     fn of(given: &Given, time: Option<&str>) -> Outcome<Self> {
-        let names: Vec<String> = given.names().into_iter().filter(|name| Some(name.as_str()) != time).collect();
+        let names: Vec<String> = given
+            .names()
+            .into_iter()
+            .filter(|name| Some(name.as_str()) != time)
+            .collect();
         let columns = names.iter().map(|name| given.numbers(name)).collect::<Outcome<_>>()?;
         let (time, ticks) = match time {
             Some(name) => {
@@ -98,7 +102,12 @@ impl Taken {
             }
             None => (TimeBase::Numbered, None),
         };
-        Ok(Self { names, columns, time, ticks })
+        Ok(Self {
+            names,
+            columns,
+            time,
+            ticks,
+        })
     }
 
     fn ranges(&self) -> Vec<Option<(f64, f64)>> {
@@ -112,13 +121,20 @@ impl Taken {
     }
 
     fn source(self) -> Columns {
-        Columns::new(Batch { ticks: self.ticks, columns: self.columns })
+        Columns::new(Batch {
+            ticks: self.ticks,
+            columns: self.columns,
+        })
     }
 }
 
 /// The time base and the ticks of a column: timestamps in their own unit, numbers as seconds with as many decimals as they have.
 fn clock(given: &Given, name: &str) -> Outcome<(TimeBase, Vec<i64>)> {
-    let base = |decimals, format| TimeBase::Clock { decimals, format, tolerance: 0 };
+    let base = |decimals, format| TimeBase::Clock {
+        decimals,
+        format,
+        tolerance: 0,
+    };
     if let DataType::Timestamp(unit, _) = given.kind(name)? {
         let decimals = match unit {
             TimeUnit::Second => 0,
@@ -184,7 +200,10 @@ pub(crate) fn write(
     let columns = bounds::columns(&taken.names, &specs, &taken.ranges())?;
     let schema = Schema::new(columns, taken.time)?;
     py.detach(|| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = path
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
         let beside = tempfile::NamedTempFile::new_in(folder)?;
         let mut recorder = Recorder::new(BufWriter::new(beside), schema).with_effort(effort);
         let mut stopped = None;
@@ -211,11 +230,17 @@ fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBase) -> Outc
     let scale = 10_f64.powi(decimals.into());
     if let Ok(seconds) = value.extract::<f64>() {
         let tick = (seconds * scale).round();
-        return if tick.abs() < i64::MAX as f64 { Ok(tick as i64) } else { refused(name, seconds, "a time within the clock's range") };
+        return if tick.abs() < i64::MAX as f64 {
+            Ok(tick as i64)
+        } else {
+            refused(name, seconds, "a time within the clock's range")
+        };
     }
     if matches!(format, TimeFormat::Utc) {
         let numpy = value.py().import("numpy")?;
-        let stamp = numpy.call_method1("datetime64", (value, "ns"))?.call_method1("astype", ("int64",))?;
+        let stamp = numpy
+            .call_method1("datetime64", (value, "ns"))?
+            .call_method1("astype", ("int64",))?;
         let nanoseconds: i64 = stamp.extract()?;
         return Ok(nanoseconds.div_euclid(10_i64.pow(u32::from(MAX_DECIMALS - decimals))));
     }
@@ -300,7 +325,7 @@ pub(crate) fn info(py: Python<'_>, path: PathBuf) -> Outcome<Bound<'_, PyDict>> 
     let found = PyDict::new(py);
     found.set_item("rows", rows)?;
     found.set_item("bytes", playback.bytes())?;
-    found.set_item("finished", playback.has_index())?;
+    found.set_item("finished", playback.is_finished())?;
     let bounds = PyDict::new(py);
     let units = PyDict::new(py);
     for column in playback.schema().columns() {
@@ -330,10 +355,15 @@ pub(crate) fn verify<'py>(
     {
         rescale(ticks, given, decimals)?;
     }
-    let matches = taken.names.iter().map(|name| playback.schema().position(name)).collect::<Result<Vec<_>, _>>()?;
+    let matches = taken
+        .names
+        .iter()
+        .map(|name| playback.schema().position(name))
+        .collect::<Result<Vec<_>, _>>()?;
     let verdict = py.detach(|| {
         let mut stopped = None;
-        let verdict = fewbits_recipes::verify::verify(&mut playback, &mut taken.source(), &matches, &mut watch(&mut stopped));
+        let verdict =
+            fewbits_recipes::verify::verify(&mut playback, &mut taken.source(), &matches, &mut watch(&mut stopped));
         heard(verdict, stopped)
     })?;
     let found = PyDict::new(py);
@@ -359,7 +389,11 @@ pub(crate) fn verify<'py>(
 fn rescale(ticks: &mut [i64], from: u8, to: u8) -> Outcome<()> {
     let scale = 10_i64.pow(u32::from(from.abs_diff(to)));
     for tick in ticks {
-        let scaled = if to >= from { tick.checked_mul(scale) } else { (*tick % scale == 0).then(|| *tick / scale) };
+        let scaled = if to >= from {
+            tick.checked_mul(scale)
+        } else {
+            (*tick % scale == 0).then(|| *tick / scale)
+        };
         match scaled {
             Some(scaled) => *tick = scaled,
             None => return refused("time", *tick, "times that are ticks of the recording"),
