@@ -46,10 +46,13 @@ fn install() {
     });
 }
 
-/// Removes a file if a signal ends the command.
-pub(crate) fn remember(path: &Path) {
+/// Creates a file that is removed if a signal ends the command. A signal that comes meanwhile waits until the file is known.
+pub(crate) fn create<T, E>(create: impl FnOnce() -> Result<(T, PathBuf), E>) -> Result<(T, PathBuf), E> {
     install();
-    state().temporaries.push(path.to_owned());
+    let mut state = state();
+    let (file, path) = create()?;
+    state.temporaries.push(path.clone());
+    Ok((file, path))
 }
 
 /// The file is finished or removed.

@@ -93,13 +93,15 @@ impl Target {
                 if earlier.is_some() {
                     OpenOptions::new().write(true).open(&path).map_err(&failed)?;
                 }
-                let (file, temporary) = beside(&path, &name)?;
-                if let Some(earlier) = earlier {
-                    file.set_permissions(earlier.permissions()).map_err(&failed)?;
-                }
                 let is_kept = is_live();
-                if !is_kept {
-                    interrupt::remember(&temporary);
+                let create = || beside(&path, &name);
+                let (file, temporary) = if is_kept { create() } else { interrupt::create(create) }?;
+                if let Some(earlier) = earlier
+                    && let Err(error) = file.set_permissions(earlier.permissions())
+                {
+                    let _ = std::fs::remove_file(&temporary);
+                    interrupt::forget(&temporary);
+                    return Err(failed(error));
                 }
                 let is_empty = true;
                 (

@@ -128,7 +128,7 @@ impl Transport for Mqtt {
         if self.is_connected.load(Ordering::Relaxed) {
             let _ = self
                 .client
-                .try_publish(self.topics.to(*to), QoS::AtMostOnce, false, bytes);
+                .try_publish(self.topics.to(*to), QoS::AtMostOnce, false, bytes.to_vec());
         }
     }
 
