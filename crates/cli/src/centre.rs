@@ -5,10 +5,10 @@ use crate::arguments::CentreOptions;
 use crate::error::{Error, Failure};
 use crate::place::Place;
 use crate::report::{Report, configuration, configured};
+use fewbits_core::Evolution;
 use fewbits_core::{Gaussian, Link};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::FusionCentre;
-use fewbits_filters::contract::Evolving;
 use fewbits_link::{FusionReceiver, Key, Output, Peer, Station, Step, Store, Transport, Udp, run_station};
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
@@ -132,7 +132,7 @@ fn with<const D: usize, T: Transport>(
     options: &CentreOptions,
     given: &Configuration,
     open: impl FnOnce() -> Result<T, Error>,
-    world: Result<impl Evolving<D> + 'static, fewbits_models::Error>,
+    world: Result<impl Evolution<D> + 'static, fewbits_models::Error>,
 ) -> Result<Ending, Error> {
     let file = &options.configuration;
     let world = world.map_err(configured(file))?;

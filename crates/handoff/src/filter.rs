@@ -79,7 +79,7 @@ impl<R> HandoffFilter<R> {
     ///
     /// # Errors
     /// If there is no particle, or the measurement has probability zero for all ([`Error::Impossible`]).
-    pub fn posterior<const D: usize, G: Rng + ?Sized>(
+    pub fn posterior<const D: usize, G: Rng>(
         &self,
         rng: &mut G,
         received: &Mixture<D>,
@@ -116,7 +116,7 @@ impl<R> HandoffFilter<R> {
     /// # Errors
     /// As [`posterior`](Self::posterior) and [`estimate`](Self::estimate), or if the reducer returns an error. The received
     /// belief is unchanged.
-    pub fn step<const D: usize, G: Rng + ?Sized>(
+    pub fn step<const D: usize, G: Rng>(
         &self,
         rng: &mut G,
         received: &Mixture<D>,

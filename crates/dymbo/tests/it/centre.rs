@@ -245,7 +245,7 @@ impl Sensing<2, 1> for Range {
         nalgebra::Matrix1::new(self.1)
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, x: &nalgebra::Vector2<f64>) -> Vector1<f64> {
+    fn sample(&self, rng: &mut dyn Rng, x: &nalgebra::Vector2<f64>) -> Vector1<f64> {
         Gaussian::from_symmetric_parts(self.mean(x), nalgebra::Matrix1::new(self.1)).sample(rng)
     }
 }

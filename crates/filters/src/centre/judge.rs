@@ -3,7 +3,8 @@
 use super::health::{self, Alarm, Residual, SEQUENCES};
 use super::{Event, FusionCentre, Member};
 use crate::Error;
-use crate::contract::{Evidence, StateFilter};
+use crate::contract::StateFilter;
+use fewbits_core::Evidence;
 use rand::Rng;
 
 /// An excluded sensor is used again after this many observations without an alarm.

@@ -3,7 +3,8 @@
 use super::state::{Checkpoint, StoredSlot};
 use super::{FusionCentre, Slot};
 use crate::Error;
-use crate::contract::{Move, StateFilter, StateLikelihood};
+use crate::contract::StateFilter;
+use fewbits_core::{Likelihood, ScaledNoise};
 use fewbits_numerics::error::finite;
 use rand::Rng;
 
@@ -35,14 +36,14 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             self.moved(rng, &mut belief, checkpoint.time - now)?;
             now = checkpoint.time;
             checkpoint.belief = belief.clone();
-            let mut likelihoods: Vec<Box<dyn StateLikelihood<D>>> = Vec::new();
+            let mut likelihoods: Vec<Box<dyn Likelihood<D>>> = Vec::new();
             for slot in checkpoint.slots.iter().filter(|slot| slot.used) {
                 // A sensor may have left in the meantime.
                 if let Ok(member) = self.member(slot.sensor) {
                     likelihoods.push(member.sensor.likelihood(&slot.slot(), slot.working)?);
                 }
             }
-            let likelihoods: Vec<&dyn StateLikelihood<D>> = likelihoods.iter().map(|one| &**one).collect();
+            let likelihoods: Vec<&dyn Likelihood<D>> = likelihoods.iter().map(|one| &**one).collect();
             self.filter.update(rng, &mut belief, &likelihoods)?;
         }
         self.moved(rng, &mut belief, self.now - now)?;
@@ -55,9 +56,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Predicts a belief over `seconds`.
     pub(super) fn moved(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, seconds: f64) -> Result<(), Error> {
         if seconds > 0.0 {
-            let motion = self.world.over(seconds)?;
+            let dynamics = self.world.over(seconds)?;
             self.filter
-                .predict(rng, Move::new(&*motion, self.noise_scale), belief)?;
+                .predict(rng, &ScaledNoise::new(&*dynamics, self.noise_scale), belief)?;
         }
         Ok(())
     }

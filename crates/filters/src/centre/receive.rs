@@ -4,8 +4,8 @@ use super::health::Residual;
 use super::judge::Watched;
 use super::{FusionCentre, Member, Received, Slot};
 use crate::Error;
-use crate::contract::{Evidence, Info, StateFilter, StateLikelihood};
-use fewbits_core::{BitString, Gaussian, Observation};
+use crate::contract::{Info, StateFilter};
+use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
 use rand::Rng;
 
 /// Reports of at most this many bits are treated as words; the residual then sums over all possible words.
@@ -87,7 +87,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             info.log_likelihood = log_likelihood;
             belief = self.filter.of_moments(&apart.unwrap_or(given)).unwrap_or(belief);
         } else {
-            let used: Vec<&dyn StateLikelihood<D>> = used.iter().map(|one| &**one).collect();
+            let used: Vec<&dyn Likelihood<D>> = used.iter().map(|one| &**one).collect();
             info = self.filter.update(rng, &mut belief, &used)?;
         }
         let before = (self.window > 0.0).then(|| self.belief.clone());
@@ -110,7 +110,7 @@ struct Posterior<const D: usize> {
 
 impl<const D: usize> Posterior<D> {
     /// Updates with a silence or a loss.
-    fn missing(&mut self, missing: &dyn StateLikelihood<D>, given: &Gaussian<D>) -> Result<(), Error> {
+    fn missing(&mut self, missing: &dyn Likelihood<D>, given: &Gaussian<D>) -> Result<(), Error> {
         // A constant likelihood changes no moments.
         if let Some(log) = missing.as_constant().filter(|log| log.is_finite()) {
             self.log_likelihood += log;
@@ -132,12 +132,7 @@ impl<const D: usize> Member<D> {
     }
 
     /// Probability that a working sensor is silent, given the belief before the slot.
-    fn silence(
-        &self,
-        slot: &Slot,
-        likelihood: &dyn StateLikelihood<D>,
-        predicted: &Gaussian<D>,
-    ) -> Result<Watched, Error> {
+    fn silence(&self, slot: &Slot, likelihood: &dyn Likelihood<D>, predicted: &Gaussian<D>) -> Result<Watched, Error> {
         if slot.observation == Observation::Lost {
             return Ok(Watched::Nothing);
         }
