@@ -5,7 +5,9 @@
 use divan::{Bencher, black_box};
 use fewbits_core::Gaussian;
 use fewbits_diffusive::density::CellOptions;
-use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Search, SearchBox, SourceLikelihood, SourceSensor};
+use fewbits_diffusive::{
+    Posterior, Prior, RateModel, RateRange, Search, SearchBox, SearchField, SourceLikelihood, SourceSensor,
+};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
@@ -79,9 +81,10 @@ fn exact_chain(bencher: Bencher) {
     let search = Search::new(&alarm, 50.0, field(), joint(), 1e-5).unwrap();
     bencher.bench_local(|| {
         let graph = Graph::within(deployed.positions(), 15.0).unwrap();
+        let field = SearchField::new(sensor.clone(), deployed.clone(), graph).unwrap();
         let mut rng = Stream::new(4).rng();
         search
-            .run(&sensor, &deployed, &graph, start, |node| {
+            .run(&field, start, |node| {
                 sensor.sample(&mut rng, &deployed.positions()[node], &Vector2::new(62.0, 50.0), 1.0)
             })
             .unwrap()

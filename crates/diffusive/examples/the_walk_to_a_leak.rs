@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p fewbits-diffusive --example the_walk_to_a_leak`
 
-use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SourceSensor};
+use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
@@ -15,17 +15,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (source, rate) = (Vector2::new(62.0, 50.0), 1.0);
 
     let mut rng = Stream::new(3).rng();
-    let field = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], 300)?;
-    let graph = Graph::within(field.positions(), 15.0)?;
+    let nodes = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], 300)?;
+    let graph = Graph::within(nodes.positions(), 15.0)?;
     let alarm = Vector2::new(44.0, 52.0); // who noticed something
     let area = SearchBox {
         lower: [-20.0; 2],
         upper: [120.0; 2],
     };
     let search = Search::new(&alarm, 50.0, area, RateModel::Joint(RateRange::new(0.5, 1.5)?), 1e-5)?;
-    let outcome = search.run(&sensor, &field, &graph, field.nearest_to(&alarm), |node| {
-        sensor.sample(&mut rng, &field.positions()[node], &source, rate)
-    })?;
+    let start = nodes.nearest_to(&alarm);
+    let field = SearchField::new(sensor.clone(), nodes, graph)?;
+    let outcome = search
+        .run(&field, start, |node| sensor.sample(&mut rng, &field.deployment().positions()[node], &source, rate))?;
 
     for step in &outcome.steps {
         println!(

@@ -13,7 +13,8 @@
 //! | messages as bits | [`message`]: the next node knows only what it decodes |
 //! | choice of the next node | [`SelectionRule`], [`Selector`], [`information`] |
 //! | whether the model fits the samples | [`Fit`], [`Status::Misfit`] |
-//! | wind or diffusivity known up to a few candidates | [`ModelGrid`], [`Search::run_models`] |
+//! | wind or diffusivity known up to a few candidates | [`ModelGrid`] |
+//! | one node's part in a real network: decode, step, encode | [`Search::step`], [`SearchState`], [`SourceChain`] |
 //! | where the concentration exceeds a threshold | [`Envelope`] |
 //!
 //! **The posterior of every update is exact**, over cells; the form of the message is fitted to it afterwards. After
@@ -25,7 +26,7 @@
 //! the covariance becomes as small. Therefore every search at its end compares the residuals with the noise.
 //!
 //! ```
-//! use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SourceSensor, Status};
+//! use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor, Status};
 //! use fewbits_models::diffusion::{Air, Ground};
 //! use fewbits_topology::{Deployment, Graph};
 //! use nalgebra::{Vector2, Vector3};
@@ -34,17 +35,18 @@
 //! let mut rng = Pcg64Mcg::seed_from_u64(1);
 //! let air = Air::new(40.0, Vector3::zeros(), Ground::Impermeable)?;
 //! let sensor = SourceSensor::new(air, vec![5.0, 10.0, 15.0, 20.0, 25.0], 8e-6)?;
-//! let field = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], 300)?;
-//! let graph = Graph::within(field.positions(), 15.0)?;
-//! let start = field.nearest_to(&Vector2::new(44.0, 52.0));
+//! let nodes = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], 300)?;
+//! let graph = Graph::within(nodes.positions(), 15.0)?;
+//! let start = nodes.nearest_to(&Vector2::new(44.0, 52.0));
+//! let field = SearchField::new(sensor.clone(), nodes, graph)?;
+//! let positions = field.deployment().positions();
 //!
 //! let rate = RateModel::Joint(RateRange::new(0.5, 1.5)?);
 //! let everywhere = SearchBox { lower: [-20.0; 2], upper: [120.0; 2] };
-//! let search = Search::new(&field.positions()[start], 50.0, everywhere, rate, 1e-5)?;
+//! let search = Search::new(&positions[start], 50.0, everywhere, rate, 1e-5)?;
 //! let find = |source: Vector2<f64>, rate: f64| {
 //!     let mut rng = Pcg64Mcg::seed_from_u64(2);
-//!     let positions = field.positions();
-//!     search.run(&sensor, &field, &graph, start, |node| sensor.sample(&mut rng, &positions[node], &source, rate))
+//!     search.run(&field, start, |node| sensor.sample(&mut rng, &positions[node], &source, rate))
 //! };
 //! let source = Vector2::new(62.0, 50.0);
 //! let found = find(source, 1.0)?;
@@ -79,7 +81,7 @@ mod target;
 mod walk;
 
 pub use belief::{JointBelief, PositionBelief, Prior, SearchBox, SentBelief};
-pub use chain::{Outcome, Search, Status, Step};
+pub use chain::{Action, Next, Outcome, Search, SearchField, SearchState, Status, Step};
 pub use envelope::Envelope;
 pub use fewbits_core::Error;
 pub use fit::Fit;

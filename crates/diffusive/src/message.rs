@@ -4,12 +4,12 @@ use crate::belief::SentBelief;
 use crate::density::Lpg;
 use crate::fit::Fit;
 use crate::project::{Travelling, gaussian_scalars, lpg_scalars};
-use crate::{Error, Record};
+use crate::{Error, Record, SourceSensor};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{entries, non_negative, within};
-use nalgebra::{SMatrix, SVector};
+use fewbits_numerics::error::{all_finite, entries, non_negative, refuse, within};
+use nalgebra::{SMatrix, SVector, Vector2};
 use serde::{Deserialize, Serialize};
 
 /// Code of a sample: evenly spaced levels, `step` noise standard deviations apart.
@@ -69,15 +69,49 @@ impl Wire {
     /// # Errors
     /// If the bits of a sample are outside 1 to 32, its step is not positive, or a sample is not finite.
     pub fn quantised(&self, record: Record) -> Result<Record, Error> {
-        let Some(code) = self.samples else { return Ok(record) };
+        if self.samples.is_none() {
+            return Ok(record);
+        }
         let format = self.sample_format(record.noise())?;
-        let samples = record
-            .samples()
-            .iter()
-            .map(|y| format.rounded(*y))
-            .collect::<Result<Vec<_>, _>>()?;
-        let noise = record.noise() * (1.0 + code.step * code.step / 12.0).sqrt();
-        Record::new(record.sensor(), record.node(), samples, noise)
+        let samples = record.samples().iter().map(|y| format.rounded(*y));
+        self.received(record.sensor(), record.node(), &samples.collect::<Result<Vec<_>, _>>()?)
+    }
+
+    /// The record of samples that were received from a node, bias subtracted.
+    pub(crate) fn received(
+        &self,
+        sensor: &SourceSensor,
+        node: &Vector2<f64>,
+        samples: &[f64],
+    ) -> Result<Record, Error> {
+        all_finite("samples", samples)?;
+        let noise = match self.samples {
+            Some(code) => sensor.noise() * (1.0 + code.step * code.step / 12.0).sqrt(),
+            None => sensor.noise(),
+        };
+        Record::new(sensor, node, samples.to_vec(), noise)
+    }
+
+    /// Whether messages can hold so many records, and the indices of so many nodes.
+    ///
+    /// # Errors
+    /// If not.
+    pub(crate) fn check(&self, records: usize, nodes: usize) -> Result<(), Error> {
+        self.sample_format(1.0)?;
+        let most_records = (1 << RECORD_COUNT_BITS) - 1;
+        if records > most_records {
+            return refuse(
+                "max_nodes",
+                records,
+                format!("at most {most_records} nodes, of which a message holds records"),
+            );
+        }
+        let index_bits = self.index_bits;
+        if index_bits > 32 || nodes as u64 > 1 << index_bits {
+            let expected = format!("bits for the indices of {nodes} nodes, at most 32");
+            return refuse("index_bits", index_bits, expected);
+        }
+        Ok(())
     }
 }
 
@@ -108,9 +142,9 @@ pub struct PackedBelief {
 }
 
 /// Bits of the number of components, and of the degree.
-const COUNT_BITS: u32 = 5;
+pub(crate) const COUNT_BITS: u32 = 5;
 /// Bits of the number of records of a message.
-const RECORD_COUNT_BITS: u32 = 10;
+pub(crate) const RECORD_COUNT_BITS: u32 = 10;
 /// Bits of the number of samples so far; a larger number is sent as the largest.
 const SAMPLE_COUNT_BITS: u32 = 16;
 

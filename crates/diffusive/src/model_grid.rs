@@ -27,16 +27,21 @@ pub struct ModelGrid {
 
 impl ModelGrid {
     /// The models with the prior probabilities `weights`. The sensors may differ in the model of the medium and what follows from it, but
-    /// sample at the same instants.
+    /// they are the same sensors: their instants, noise and bias are equal.
     ///
     /// # Errors
-    /// If there is none, the weights are no probabilities or not one for each, or the sensors sample at different instants.
+    /// If there is none, the weights are no probabilities or not one for each, or the sensors differ in instants, noise or bias.
     pub fn new(sensors: Vec<SourceSensor>, weights: &[f64]) -> Result<Self, Error> {
         probabilities("weights", weights)?;
         entries("weights", weights.len(), sensors.len())?;
         if let Some(other) = sensors.iter().find(|s| s.instants() != sensors[0].instants()) {
             let expected = format!("{:?}, those of the first model", sensors[0].instants());
             return refuse("instants", format!("{:?}", other.instants()), expected);
+        }
+        let differs = |s: &&SourceSensor| s.noise() != sensors[0].noise() || s.bias() != sensors[0].bias();
+        if let Some(other) = sensors.iter().find(differs) {
+            let sent = |s: &SourceSensor| format!("noise {:e} and bias {:e}", s.noise(), s.bias());
+            return refuse("sensors", sent(other), format!("{}, those of the first model", sent(&sensors[0])));
         }
         Ok(Self {
             sensors,
@@ -69,6 +74,17 @@ impl ModelGrid {
     /// Never true: there is at least one model.
     pub fn is_empty(&self) -> bool {
         self.sensors.is_empty()
+    }
+
+    /// The instants at which the sensors sample, s.
+    pub fn instants(&self) -> &[f64] {
+        self.sensors.first().map_or(&[], SourceSensor::instants)
+    }
+
+    /// Standard deviation of the sensors' noise, kg/m^3.
+    pub fn noise(&self) -> f64 {
+        // There is at least one model.
+        self.sensors.first().map_or(f64::NAN, SourceSensor::noise)
     }
 
     /// The models with their prior probabilities.

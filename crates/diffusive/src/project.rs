@@ -4,6 +4,7 @@ use crate::belief::{JointBelief, PositionBelief};
 use crate::density::LpgFit;
 use crate::density::polynomials::check_degree;
 use crate::density::{Clumps, Lpg, MixtureFit};
+use crate::message::COUNT_BITS;
 use crate::posterior::Posterior;
 use crate::{Error, RateModel};
 use fewbits_core::Gaussian;
@@ -41,12 +42,16 @@ pub enum Form {
 }
 
 impl Form {
+    /// Whether messages can hold this form with this rate.
     pub(crate) fn check(&self, rate: &RateModel) -> Result<(), Error> {
         match *self {
-            Self::Mixture(n) | Self::Particles(n) => at_least_one("components", n).map(|_| ())?,
+            Self::Mixture(n) | Self::Particles(n) => check_components(n)?,
             Self::Lpg { components, degree } => {
-                at_least_one("components", components)?;
+                check_components(components)?;
                 check_degree(degree)?;
+                if degree >= MAX_COUNT {
+                    return refuse("degree", degree, format!("below {MAX_COUNT}, which stands for a mixture"));
+                }
             }
             Self::Raw | Self::Gaussian | Self::Laplace => {}
         }
@@ -57,17 +62,29 @@ impl Form {
         Ok(())
     }
 
-    /// How many numbers one message of this form has; `None` for raw records.
+    /// Largest number of numbers in one message of this form, besides the two of the fit; `None` for raw records. Fewer are sent if the
+    /// posterior needs fewer components.
     pub fn scalars(&self, rate: &RateModel) -> Option<usize> {
         let carried = matches!(rate, RateModel::Joint(_));
         match *self {
             Self::Raw => None,
             Self::Gaussian | Self::Laplace => Some(gaussian_scalars(carried)),
-            Self::Mixture(n) => Some(n * (1 + gaussian_scalars(carried)) - 1),
-            Self::Lpg { components, degree } => Some(components * lpg_scalars(degree, carried) - 1),
-            Self::Particles(n) => Some(2 * n),
+            // The first weight is not sent: they sum to one.
+            Self::Mixture(n) | Self::Particles(n) => Some((n * (1 + gaussian_scalars(carried))).saturating_sub(1)),
+            Self::Lpg { components, degree } => Some(components * lpg_scalars(degree, carried)),
         }
     }
+}
+
+/// Largest number of components and code of "no polynomials" in a message.
+const MAX_COUNT: usize = (1 << COUNT_BITS) - 1;
+
+fn check_components(count: usize) -> Result<(), Error> {
+    at_least_one("components", count)?;
+    if count > MAX_COUNT {
+        return refuse("components", count, format!("at most {MAX_COUNT}, the largest number in a message"));
+    }
+    Ok(())
 }
 
 /// Numbers of one Gaussian over the position, or over position and rate: its mean and the lower triangle of its Cholesky factor.

@@ -11,6 +11,7 @@ use fewbits_numerics::LogSum;
 pub(super) const EXCLUDED: f64 = 30.0;
 
 /// One model of the medium along a search.
+#[derive(Debug, Clone)]
 pub(super) struct Alternative {
     pub(super) sensor: SourceSensor,
     /// Logarithm of the prior probability; `-inf` once the model is excluded.

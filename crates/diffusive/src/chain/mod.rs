@@ -1,26 +1,28 @@
 //! The search: nodes update a belief of the source and send it on until its covariance is small.
 
 mod alternatives;
+mod field;
 mod outcome;
+mod state;
 mod update;
 
-pub use outcome::{Outcome, Status, Step};
+pub use field::SearchField;
+pub use outcome::{Action, Next, Outcome, Status, Step};
+pub use state::SearchState;
 
 use crate::belief::{PositionBelief, SearchBox};
 use crate::density::CellOptions;
 use crate::density::laplace::Peak;
 use crate::fit::Fit;
-use crate::message::{Contract, Packet, Wire};
-use crate::model_grid::ModelGrid;
+use crate::message::{Packet, Wire};
 use crate::posterior::Posterior;
 use crate::project::{Form, Travelling, project};
 use crate::select::{SelectionRule, Selector};
-use crate::{Error, RateModel, Record, SourceLikelihood, SourceSensor};
-use alternatives::{Alternative, log_evidence, mixed, mixed_fit, most_probable};
+use crate::{Error, RateModel, Record, SourceLikelihood};
+use alternatives::{log_evidence, mixed, mixed_fit, most_probable};
 use fewbits_core::{Gaussian, Message};
 use fewbits_densities::Mixture;
-use fewbits_numerics::error::{at_least_one, positive, refuse, within};
-use fewbits_topology::{Deployment, Graph};
+use fewbits_numerics::error::{at_least_one, entries, positive, refuse, within};
 use nalgebra::Vector2;
 use outcome::failure;
 
@@ -51,7 +53,7 @@ pub struct Search {
     /// The search has converged when the determinant of the position's covariance falls below this, m^4.
     pub threshold: f64,
     /// Largest number of nodes that sample.
-    pub most_nodes: usize,
+    pub max_nodes: usize,
     /// If the determinant has not halved over this many nodes, the next node is chosen by mutual information, whatever `rule` is.
     pub stall: Option<usize>,
     /// Encoding of the messages.
@@ -63,7 +65,7 @@ pub struct Search {
 }
 
 /// If the mass at the border of the box exceeds this, the source is taken to be outside.
-const LEANING: f64 = 0.5;
+const MAX_BORDER_MASS: f64 = 0.5;
 
 impl Search {
     /// A search that starts around the node `alarm`: the prior has standard deviation `deviation`, m, about that place. Nodes send raw
@@ -91,7 +93,7 @@ impl Search {
             form: Form::Raw,
             rule: SelectionRule::default(),
             threshold,
-            most_nodes: 40,
+            max_nodes: 40,
             stall: None,
             wire: Wire::default(),
             cells: CellOptions::default(),
@@ -101,174 +103,211 @@ impl Search {
 
     /// Runs the search from node `start`. `samples` returns what a node measures, kg/m^3, when it is asked.
     ///
-    /// A search that cannot continue ends with a [`Status`]; errors are for invalid arguments.
+    /// With several models estimate and determinant are those of the mixture; the most probable model chooses the next node. A search that
+    /// cannot continue ends with a [`Status`]; errors are for invalid arguments.
     ///
     /// # Errors
-    /// If `start` does not exist, graph and deployment differ in size, the model has no concentrations at a node, `samples` fails, a
-    /// sample is not finite, or messages of this form cannot contain the rate.
+    /// As [`start`](Self::start) and [`step`](Self::step), or if `samples` fails.
     pub fn run(
         &self,
-        sensor: &SourceSensor,
-        deployment: &Deployment,
-        graph: &Graph,
-        start: usize,
-        samples: impl FnMut(usize) -> Result<Vec<f64>, Error>,
-    ) -> Result<Outcome, Error> {
-        self.run_models(&ModelGrid::single(sensor.clone()), deployment, graph, start, samples)
-    }
-
-    /// Runs the search when a property of the medium, such as the wind or the diffusivity, is one of a few candidates. Every model has its
-    /// own posterior of all records, weighted by its evidence. Estimate and determinant are those of the mixture. The most probable model
-    /// chooses the next node.
-    ///
-    /// # Errors
-    /// As [`run`](Self::run); if there are several models and the form is not [`Form::Raw`].
-    pub fn run_models(
-        &self,
-        models: &ModelGrid,
-        deployment: &Deployment,
-        graph: &Graph,
+        field: &SearchField,
         start: usize,
         mut samples: impl FnMut(usize) -> Result<Vec<f64>, Error>,
     ) -> Result<Outcome, Error> {
-        self.check(models, deployment, graph, start)?;
-        let mut alternatives: Vec<Alternative> = models.iter().map(Alternative::new).collect();
-        let mut outcome = Outcome {
-            status: Status::NodeLimit,
-            steps: Vec::new(),
-            posterior: None,
-            records: Vec::new(),
-            models: models.iter().map(|(_, prior)| prior).collect(),
-        };
-        let mut visited = vec![false; deployment.len()];
-        // What the node received: a belief with the fit so far (only records, if the form is raw), and its number of bits.
-        let mut received: Option<(Travelling, Fit)> = None;
+        let (mut state, mut steps) = (self.start(field)?, Vec::new());
         let (mut node, mut hops, mut bits) = (start, 0, 0);
         loop {
-            // Sample and update.
-            visited[node] = true;
-            let taken = samples(node)?;
-            for alternative in &mut alternatives {
-                let record = alternative.sensor.record(&deployment.positions()[node], &taken)?;
-                alternative.records.push(match self.form {
-                    Form::Raw => self.wire.quantised(record)?,
-                    _ => record,
-                });
-            }
-            if let Some(status) = self.update(&mut alternatives, received.as_ref().map(|(belief, _)| belief))? {
-                outcome.records = alternatives.swap_remove(most_probable(&alternatives)).records;
-                return Ok(outcome.ended(status));
-            }
-            let best = most_probable(&alternatives);
-            outcome.models = alternatives.iter().map(|a| a.probability).collect();
-            outcome.records.clone_from(&alternatives[best].records);
-            let Some(updated) = alternatives[best].posterior.clone() else {
-                return Ok(outcome.ended(Status::Unresolved));
-            };
-            let fit = mixed_fit(&alternatives, updated.fit.samples);
-            let fit = received.as_ref().map_or(fit, |(_, before)| before.plus(&fit));
-
-            // Project, encode, and continue with what the next node will decode.
-            let ids: Vec<usize> = outcome.steps.iter().map(|step| step.node).chain([node]).collect();
-            let last = &outcome.records[outcome.records.len() - 1];
-            let projected = match project(&updated, self.form, &self.rate) {
-                Ok(Some(belief)) => {
-                    let before = received.as_ref().map(|(belief, _)| belief);
-                    Some(self.peak(belief, &updated, last, before)?)
-                }
-                Ok(None) => None,
-                Err(error) => return Ok(outcome.ended(failure(&error).ok_or(error)?)),
-            };
-            let packet = match &projected {
-                Some(belief) => Packet::belief_of(belief, &fit, &self.wire)?,
-                None => Packet::raw(&outcome.records, &ids),
-            };
-            let contract = Contract {
-                wire: self.wire,
-                noise: last.sensor().noise(),
-                samples: last.samples().len(),
-            };
-            let message = packet.to_bits(&contract)?;
-            received = match Packet::from_bits(&contract, &message)?.belief() {
-                Ok(decoded) => decoded,
-                Err(_) => {
-                    outcome.posterior = Some(updated);
-                    return Ok(outcome.ended(Status::Undecodable));
-                }
-            };
-            let estimate = received
-                .as_ref()
-                .map_or_else(|| mixed(&alternatives), |(belief, _)| belief.gaussian());
-            let determinant = estimate.covariance().determinant();
-            outcome.steps.push(Step {
-                node,
+            self.check_node(field, &state, node)?;
+            let next = self.step(field, state, node, &samples(node)?)?;
+            let bits_received = bits * hops;
+            steps.extend(next.step.map(|step| Step {
                 hops,
-                estimate,
-                log10_determinant: determinant.log10(),
-                bits: bits * hops,
-                evaluations: alternatives
-                    .iter()
-                    .filter_map(|a| a.posterior.as_ref())
-                    .map(|p| p.cells.evaluations())
-                    .sum(),
-                log_evidence: log_evidence(&alternatives),
-                fit,
-            });
-            bits = message.bits();
-
-            // Stop, or choose the next node.
-            let (candidates, distance) = graph.nearest(node, |other| !visited[other])?;
-            let reason = if determinant < self.threshold {
-                Some(Status::Converged)
-            } else if outcome.steps.len() >= self.most_nodes {
-                Some(Status::NodeLimit)
-            } else if candidates.is_empty() {
-                Some(Status::Exhausted)
-            } else {
-                None
-            };
-            if let Some(reason) = reason {
-                let status = self.ending(reason, &updated, &fit);
-                outcome.posterior = Some(updated);
-                return Ok(outcome.ended(status));
+                bits: bits_received,
+                ..step
+            }));
+            state = next.state;
+            match next.action {
+                Action::Ask {
+                    node: asked,
+                    hops: distance,
+                } => (node, hops, bits) = (asked, distance, next.bits),
+                Action::End {
+                    status,
+                    posterior,
+                    cause,
+                } => {
+                    return Ok(Outcome {
+                        status,
+                        cause,
+                        steps,
+                        posterior,
+                        models: state.models(),
+                        records: state.into_records(),
+                    });
+                }
             }
-            let rule = if self.stalled(&outcome.steps) {
-                SelectionRule::MutualInformation
-            } else {
-                self.rule
-            };
-            let selector = Selector::new(rule, &updated, &estimate, &self.rate)?;
-            let places: Vec<_> = candidates.iter().map(|c| (*c, deployment.positions()[*c])).collect();
-            let next = selector.best(&alternatives[best].sensor, &places);
-            // There is a candidate, so the selector returns one.
-            (node, hops) = (next.unwrap_or(candidates[0]), distance);
         }
     }
 
-    fn check(&self, models: &ModelGrid, deployment: &Deployment, graph: &Graph, start: usize) -> Result<(), Error> {
+    /// One node's part: it updates the received state with its samples, kg/m^3, and chooses the node to ask next.
+    ///
+    /// The state after the step goes to that node as the bits of [`encode`](Self::encode).
+    ///
+    /// # Errors
+    /// If the node does not exist or has sampled before, the number of samples is wrong, a sample is not finite, the state is not of
+    /// this field, or messages of this form cannot contain the rate.
+    pub fn step(
+        &self,
+        field: &SearchField,
+        mut state: SearchState,
+        node: usize,
+        samples: &[f64],
+    ) -> Result<Next, Error> {
+        self.check_node(field, &state, node)?;
+        state.route.push(node);
+        for alternative in &mut state.alternatives {
+            let record = alternative
+                .sensor
+                .record(&field.deployment().positions()[node], samples)?;
+            alternative.records.push(match self.form {
+                Form::Raw => self.wire.quantised(record)?,
+                _ => record,
+            });
+        }
+        let before = state.received.take();
+        if let Some(status) = self.update(&mut state.alternatives, before.as_ref().map(|(belief, _)| belief))? {
+            return Ok(Next::end(state, None, status));
+        }
+        let best = most_probable(&state.alternatives);
+        let Some(updated) = state.alternatives[best].posterior.clone() else {
+            return Ok(Next::end(state, None, Status::Unresolved));
+        };
+        let fit = mixed_fit(&state.alternatives, updated.fit.samples);
+        let fit = before.as_ref().map_or(fit, |(_, before)| before.plus(&fit));
+
+        // Project and encode, and continue with what the next node will decode.
+        let belief = match self.projected(&updated, &state, before.as_ref().map(|(belief, _)| belief)) {
+            Ok(belief) => belief,
+            Err(error) => {
+                let status = failure(&error).ok_or_else(|| error.clone())?;
+                return Ok(Next::end(state, None, status).because(error));
+            }
+        };
+        let packet = match &belief {
+            Some(belief) => Packet::belief_of(belief, &fit, &self.wire)?,
+            None => Packet::raw(&state.alternatives[0].records, &state.route),
+        };
+        let contract = self.contract(field);
+        let message = packet.to_bits(&contract)?;
+        let (packet, bits) = (Packet::from_bits(&contract, &message)?, message.bits());
+        state.received = match packet.belief() {
+            Ok(decoded) => decoded,
+            Err(error) => {
+                return Ok(Next::end(state, Some(updated), Status::Undecodable).because(error));
+            }
+        };
+        state.packet = Some(packet);
+        let estimate = state
+            .received
+            .as_ref()
+            .map_or_else(|| mixed(&state.alternatives), |(belief, _)| belief.gaussian());
+        let determinant = estimate.covariance().determinant();
+        let step = Step {
+            node,
+            hops: 0,
+            estimate,
+            log10_determinant: determinant.log10(),
+            bits: 0,
+            evaluations: state
+                .alternatives
+                .iter()
+                .filter_map(|a| a.posterior.as_ref())
+                .map(|p| p.cells.evaluations())
+                .sum(),
+            log_evidence: log_evidence(&state.alternatives),
+            fit,
+        };
+        let stalled = self.stalled(&mut state, step.log10_determinant);
+
+        // Stop, or choose the next node.
+        let (candidates, hops) = field.graph().nearest(node, |other| !state.route.contains(&other))?;
+        let reason = if determinant < self.threshold {
+            Some(Status::Converged)
+        } else if state.route.len() >= self.max_nodes {
+            Some(Status::NodeLimit)
+        } else if candidates.is_empty() {
+            Some(Status::Exhausted)
+        } else {
+            None
+        };
+        if let Some(reason) = reason {
+            let status = self.ending(reason, &updated, &fit);
+            return Ok(Next {
+                step: Some(step),
+                bits,
+                ..Next::end(state, Some(updated), status)
+            });
+        }
+        let rule = if stalled {
+            SelectionRule::MutualInformation
+        } else {
+            self.rule
+        };
+        let selector = Selector::new(rule, &updated, &estimate, &self.rate)?;
+        let positions = field.deployment().positions();
+        let places: Vec<_> = candidates.iter().map(|c| (*c, positions[*c])).collect();
+        // There is a candidate, so the selector returns one.
+        let asked = selector
+            .best(&state.alternatives[best].sensor, &places)
+            .unwrap_or(candidates[0]);
+        Ok(Next {
+            action: Action::Ask { node: asked, hops },
+            step: Some(step),
+            bits,
+            state,
+        })
+    }
+
+    fn check(&self, field: &SearchField) -> Result<(), Error> {
         self.form.check(&self.rate)?;
-        at_least_one("most_nodes", self.most_nodes)?;
+        at_least_one("max_nodes", self.max_nodes)?;
         if let Some(level) = self.refusal {
             within("refusal", level, 0.0, 1.0)?;
         }
-        if graph.len() != deployment.len() || start >= deployment.len() {
-            let expected = format!("a node of a graph of the {} deployed", deployment.len());
-            return refuse("start", format!("{start} in a graph of {}", graph.len()), expected);
-        }
-        if models.len() > 1 && self.form != Form::Raw {
+        if field.models().len() > 1 && self.form != Form::Raw {
             return refuse("form", format!("{:?}", self.form), "Raw with several models");
         }
-        for (sensor, _) in models.iter() {
-            for position in deployment.positions() {
-                sensor.receptor(position)?;
-            }
+        self.wire
+            .check(self.max_nodes.min(field.deployment().len()), field.deployment().len())
+    }
+
+    fn check_node(&self, field: &SearchField, state: &SearchState, node: usize) -> Result<(), Error> {
+        let nodes = field.deployment().len();
+        if node >= nodes || state.route.contains(&node) {
+            let expected = format!("one of the {nodes} nodes that has not sampled yet");
+            return refuse("node", format!("node {node}"), expected);
         }
+        entries("state.models", state.alternatives.len(), field.models().len())?;
         Ok(())
+    }
+
+    /// The belief of the next message; `None` if raw records are sent.
+    fn projected(
+        &self,
+        posterior: &Posterior,
+        state: &SearchState,
+        before: Option<&Travelling>,
+    ) -> Result<Option<Travelling>, Error> {
+        let Some(belief) = project(posterior, self.form, &self.rate)? else {
+            return Ok(None);
+        };
+        let records = state.records();
+        Ok(Some(self.peak(belief, posterior, &records[records.len() - 1], before)?))
     }
 
     /// The status of a search that ends here for the given reason.
     fn ending(&self, reason: Status, posterior: &Posterior, fit: &Fit) -> Status {
-        if posterior.mass_at_border(&self.search) > LEANING {
+        if posterior.mass_at_border(&self.search) > MAX_BORDER_MASS {
             Status::OutsideField
         } else if self.refusal.is_some_and(|level| fit.is_refused(level)) {
             Status::Misfit
@@ -307,13 +346,13 @@ impl Search {
         }
     }
 
-    fn stalled(&self, steps: &[Step]) -> bool {
-        let Some(patience) = self.stall else { return false };
-        let Some(past) = steps.len().checked_sub(patience + 1) else {
-            return false;
-        };
-        let now = steps.last().map_or(0.0, |step| step.log10_determinant);
+    /// Adds the determinant of this step, and returns whether it has not halved over `stall` nodes.
+    fn stalled(&self, state: &mut SearchState, log10_determinant: f64) -> bool {
+        let kept = self.compared_determinants();
+        let logs = &mut state.log10_determinants;
+        logs.push(log10_determinant);
+        logs.drain(..logs.len().saturating_sub(kept));
         // A factor of two is 0.3 in decimal logarithms.
-        now > steps[past].log10_determinant - 0.3
+        kept > 0 && logs.len() == kept && log10_determinant > logs[0] - 0.3
     }
 }

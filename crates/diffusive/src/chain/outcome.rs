@@ -1,5 +1,6 @@
 //! The outcome of a search: its steps, and the reason for its end.
 
+use super::state::SearchState;
 use crate::fit::Fit;
 use crate::posterior::Posterior;
 use crate::{Error, Record};
@@ -29,6 +30,66 @@ pub enum Status {
     Unresolved,
 }
 
+/// What follows a node's step.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Action {
+    /// The state is sent to this node, which samples next.
+    Ask {
+        /// Its index.
+        node: usize,
+        /// Hops to it.
+        hops: usize,
+    },
+    /// The search ends.
+    End {
+        /// Why.
+        status: Status,
+        /// The last posterior, before projection; `None` if the last update failed.
+        posterior: Option<Posterior>,
+        /// The error behind [`Status::Undecodable`] or a posterior that cannot be projected.
+        cause: Option<Error>,
+    },
+}
+
+/// Result of a node's step ([`Search::step`](super::Search::step)).
+#[derive(Debug, Clone)]
+pub struct Next {
+    /// The state after the step.
+    pub state: SearchState,
+    /// What was estimated, without the hops and bits of the message before (zero here); `None` if the update failed.
+    pub step: Option<Step>,
+    /// Bits of the records or the belief of the message to the next node, over one hop; zero if the update failed.
+    pub bits: usize,
+    /// What follows.
+    pub action: Action,
+}
+
+impl Next {
+    /// The end of a search at a node without an estimate.
+    pub(super) fn end(state: SearchState, posterior: Option<Posterior>, status: Status) -> Self {
+        let action = Action::End {
+            status,
+            posterior,
+            cause: None,
+        };
+        Self {
+            state,
+            step: None,
+            bits: 0,
+            action,
+        }
+    }
+
+    /// The same end with the error behind it.
+    pub(super) fn because(mut self, error: Error) -> Self {
+        if let Action::End { cause, .. } = &mut self.action {
+            *cause = Some(error);
+        }
+        self
+    }
+}
+
 /// One node's part in a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
@@ -40,7 +101,8 @@ pub struct Step {
     pub estimate: Gaussian<2>,
     /// `log10` of the determinant of that covariance, m^4.
     pub log10_determinant: f64,
-    /// Bits of the message from the node before, over all hops.
+    /// Bits of the records or the belief in the message from the node before, over all hops. The route, which
+    /// [`Search::encode`](super::Search::encode) adds to a belief, is not counted.
     pub bits: usize,
     /// Number of cells that were evaluated.
     pub evaluations: usize,
@@ -56,6 +118,8 @@ pub struct Step {
 pub struct Outcome {
     /// Why the search ended.
     pub status: Status,
+    /// The error behind [`Status::Undecodable`] or a posterior that cannot be projected.
+    pub cause: Option<Error>,
     /// Every node that sampled, in order.
     pub steps: Vec<Step>,
     /// The last posterior, before projection. With several models it is that of the most probable one.
@@ -75,11 +139,6 @@ impl Outcome {
     /// How the samples fit at the last node.
     pub fn fit(&self) -> Option<Fit> {
         self.steps.last().map(|step| step.fit)
-    }
-
-    /// The outcome of a search that ends for this reason.
-    pub(super) fn ended(self, status: Status) -> Self {
-        Self { status, ..self }
     }
 
     /// Total bits of all messages.

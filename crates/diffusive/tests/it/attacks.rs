@@ -8,7 +8,8 @@ use fewbits_diffusive::density::polynomials::{hermite, multi_indices};
 use fewbits_diffusive::density::{Clumps, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
-    Form, Prior, RateModel, RateRange, RateSums, Record, Search, SearchBox, SourceLikelihood, SourceSensor, Status,
+    Form, Prior, RateModel, RateRange, RateSums, Record, Search, SearchBox, SearchField, SourceLikelihood,
+    SourceSensor, Status,
 };
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_topology::{Deployment, Graph};
@@ -111,13 +112,12 @@ fn runs_refuse_what_they_cannot_do() {
         change(&mut search);
         search
     };
-    let run = |search: Search, start, samples: Vec<f64>| {
-        search.run(&sensor, &field_of, &graph, start, |_| Ok(samples.clone()))
-    };
+    let nodes = SearchField::new(sensor.clone(), field_of.clone(), graph).unwrap();
+    let run = |search: Search, start, samples: Vec<f64>| search.run(&nodes, start, |_| Ok(samples.clone()));
     assert!(run(search(|_| ()), 2, vec![0.0; 5]).is_err());
     assert!(run(search(|_| ()), 0, vec![0.0; 3]).is_err());
     assert!(run(search(|_| ()), 0, vec![f64::NAN; 5]).is_err());
-    assert!(run(search(|s| s.most_nodes = 0), 0, vec![0.0; 5]).is_err());
+    assert!(run(search(|s| s.max_nodes = 0), 0, vec![0.0; 5]).is_err());
     assert!(run(search(|s| s.form = Form::Mixture(0)), 0, vec![0.0; 5]).is_err());
     for form in [
         Form::Particles(25),
@@ -136,11 +136,7 @@ fn runs_refuse_what_they_cannot_do() {
         assert!(run(search, 0, vec![0.0; 5]).is_err(), "{form:?}");
     }
     let other = Graph::within(&[Vector2::zeros()], 1.0).unwrap();
-    assert!(
-        search(|_| ())
-            .run(&sensor, &field_of, &other, 0, |_| Ok(vec![0.0; 5]))
-            .is_err()
-    );
+    assert!(SearchField::new(sensor, field_of, other).is_err());
 }
 
 /// Samples that fit no source at all, or every source: a status or a belief, never a panic or NaN.
@@ -149,7 +145,7 @@ fn absurd_samples() {
     let field_of =
         Deployment::uniform(&mut fewbits_monte_carlo::Stream::new(2).rng(), [0.0; 2], [100.0; 2], 60).unwrap();
     let graph = Graph::within(field_of.positions(), 25.0).unwrap();
-    let sensor = sensor(1.0, false);
+    let nodes = SearchField::new(sensor(1.0, false), field_of, graph).unwrap();
     let all = [0.0, -1.0, 1e-9, 1e-3, 1.0, 1e6, 1e150];
     let lpg = Form::Lpg {
         components: 2,
@@ -162,10 +158,8 @@ fn absurd_samples() {
     ] {
         for &level in levels {
             let mut search = Search::new(&Vector2::new(44.0, 52.0), 50.0, field(1.0), joint(), 1e-5).unwrap();
-            (search.form, search.most_nodes) = (form, 4);
-            let outcome = search
-                .run(&sensor, &field_of, &graph, 0, |_| Ok(vec![level; 5]))
-                .unwrap();
+            (search.form, search.max_nodes) = (form, 4);
+            let outcome = search.run(&nodes, 0, |_| Ok(vec![level; 5])).unwrap();
             for step in &outcome.steps {
                 assert!(step.estimate.mean().iter().all(|x| x.is_finite()), "{form:?} {level} {:?}", outcome.status);
                 assert!(step.log10_determinant.is_finite() && !step.log_evidence.is_nan());
@@ -231,14 +225,13 @@ fn coincident_nodes_and_a_source_on_a_node() {
     let field_of = Deployment::given(positions).unwrap();
     let graph = Graph::within(field_of.positions(), 10.0).unwrap();
     let sensor = sensor(1.0, false);
+    let nodes = SearchField::new(sensor.clone(), field_of, graph).unwrap();
     for rule in RULES {
         let mut search = Search::new(&place, 50.0, field(1.0), joint(), 1e-5).unwrap();
         search.rule = rule;
         let mut rng = fewbits_monte_carlo::Stream::new(7).rng();
         let outcome = search
-            .run(&sensor, &field_of, &graph, 0, |node| {
-                sensor.sample(&mut rng, &field_of.positions()[node], &place, 1.0)
-            })
+            .run(&nodes, 0, |node| sensor.sample(&mut rng, &nodes.deployment().positions()[node], &place, 1.0))
             .unwrap();
         for step in &outcome.steps {
             assert!(step.estimate.mean().iter().all(|x| x.is_finite()) && step.log10_determinant.is_finite());
@@ -257,19 +250,25 @@ fn sources_outside_the_field_are_not_found() {
         let field_of = Deployment::uniform(&mut rng, [0.0; 2], [100.0 * unit; 2], 200).unwrap();
         let graph = Graph::within(field_of.positions(), 15.0 * unit).unwrap();
         let sensor = sensor(unit, false);
+        let nodes = SearchField::new(sensor.clone(), field_of, graph).unwrap();
         let places = [[190.0, 50.0], [-60.0, -60.0], [1e4, 0.0]];
         // Other units only for the nearest.
         for place in if unit == 1.0 { &places[..] } else { &places[..1] } {
             let source = Vector2::from(*place) * unit;
             for form in [Form::Raw, Form::Mixture(4)] {
-                let start = field_of.nearest_to(&(Vector2::new(50.0, 50.0) * unit));
-                let mut search =
-                    Search::new(&field_of.positions()[start], 50.0 * unit, field(unit), joint(), 1e-5 * unit.powi(4))
-                        .unwrap();
-                (search.form, search.most_nodes) = (form, 12);
+                let start = nodes.deployment().nearest_to(&(Vector2::new(50.0, 50.0) * unit));
+                let mut search = Search::new(
+                    &nodes.deployment().positions()[start],
+                    50.0 * unit,
+                    field(unit),
+                    joint(),
+                    1e-5 * unit.powi(4),
+                )
+                .unwrap();
+                (search.form, search.max_nodes) = (form, 12);
                 let outcome = search
-                    .run(&sensor, &field_of, &graph, start, |node| {
-                        sensor.sample(&mut rng, &field_of.positions()[node], &source, 1.0)
+                    .run(&nodes, start, |node| {
+                        sensor.sample(&mut rng, &nodes.deployment().positions()[node], &source, 1.0)
                     })
                     .unwrap();
                 assert_ne!(outcome.status, Status::Converged, "{place:?} {unit} {form:?}");

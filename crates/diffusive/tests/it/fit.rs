@@ -3,7 +3,7 @@
 use super::{field, joint, sensor};
 use fewbits_core::NumberFormat;
 use fewbits_diffusive::message::{SampleCode, Wire};
-use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Search, SearchBox, Status};
+use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Search, SearchBox, SearchField, Status};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::Vector2;
@@ -24,8 +24,9 @@ fn run(seed: u64, truth: &Truth, change: impl FnOnce(&mut Search)) -> Outcome {
     let mut search = Search::new(&alarm, 50.0, field(1.0), joint(), 1e-5).unwrap();
     change(&mut search);
     let sensor = sensor(1.0, false);
-    let asked = |node: usize| sensor.sample(&mut rng, &deployed.positions()[node], &truth.source, truth.rate);
-    search.run(&sensor, &deployed, &graph, start, asked).unwrap()
+    let nodes = SearchField::new(sensor.clone(), deployed, graph).unwrap();
+    let asked = |node: usize| sensor.sample(&mut rng, &nodes.deployment().positions()[node], &truth.source, truth.rate);
+    search.run(&nodes, start, asked).unwrap()
 }
 
 /// Of how many searches each status was the end, and how many converged more than a metre off.
@@ -39,7 +40,7 @@ fn refused(
     for seed in seeds {
         let truth = truth(seed);
         let outcome = run(seed, &truth, |search| {
-            (search.form, search.search, search.most_nodes) = (form, within, 12);
+            (search.form, search.search, search.max_nodes) = (form, within, 12);
             // Particles carry no rate.
             if matches!(form, Form::Particles(_)) {
                 search.rate = RateModel::Known(1.0);
@@ -183,11 +184,10 @@ fn refusal_can_be_switched_off() {
 fn samples_that_nothing_explains_are_a_misfit() {
     let field_of = Deployment::given(vec![Vector2::new(50.0, 50.0), Vector2::new(55.0, 50.0)]).unwrap();
     let graph = Graph::within(field_of.positions(), 10.0).unwrap();
+    let nodes = SearchField::new(sensor(1.0, false), field_of.clone(), graph).unwrap();
     for samples in [[1.0; 5], [1.0, 0.1, 1.0, 0.1, 1.0], [1e6; 5], [1e150; 5], [-1.0; 5]] {
         let search = Search::new(&Vector2::new(50.0, 50.0), 50.0, field(1.0), joint(), 1e-5).unwrap();
-        let outcome = search
-            .run(&sensor(1.0, false), &field_of, &graph, 0, |_| Ok(samples.to_vec()))
-            .unwrap();
+        let outcome = search.run(&nodes, 0, |_| Ok(samples.to_vec())).unwrap();
         assert_eq!(outcome.status, Status::Misfit, "{samples:?}");
     }
     // A source two centimetres from the node fits, though its ring is too thin for the cells.
@@ -196,9 +196,7 @@ fn samples_that_nothing_explains_are_a_misfit() {
         .responses(&node, &(node + Vector2::new(0.02, 0.0)))
         .unwrap();
     let search = Search::new(&node, 50.0, field(1.0), joint(), 1e-5).unwrap();
-    let outcome = search
-        .run(&sensor(1.0, false), &field_of, &graph, 0, |_| Ok(near.clone()))
-        .unwrap();
+    let outcome = search.run(&nodes, 0, |_| Ok(near.clone())).unwrap();
     assert_ne!(outcome.status, Status::Misfit);
 }
 

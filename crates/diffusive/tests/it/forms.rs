@@ -17,7 +17,7 @@ const DEPLOYMENTS: u64 = 12;
 /// The exact search until so many nodes have sampled.
 fn exact(seed: u64, nodes: usize) -> Option<(Posterior, Outcome)> {
     let mut outcome = run(seed, 1.0, false, 300, |search| {
-        (search.rule, search.most_nodes, search.threshold, search.refusal) =
+        (search.rule, search.max_nodes, search.threshold, search.refusal) =
             (SelectionRule::Mahalanobis, nodes, 1e-300, None);
     });
     Some((outcome.posterior.take()?, outcome))
@@ -221,7 +221,7 @@ fn searches_by_information_stall_less_than_by_distance() {
     let nodes = |rule| -> Vec<f64> {
         let search = |seed| {
             let outcome = run(seed, 1.0, false, 300, |search| {
-                (search.rule, search.most_nodes, search.refusal) = (rule, 30, None);
+                (search.rule, search.max_nodes, search.refusal) = (rule, 30, None);
             });
             (outcome.status == Status::Converged).then_some(outcome.steps.len() as f64)
         };

@@ -5,8 +5,8 @@ use fewbits_core::{Belief, Gaussian};
 use fewbits_diffusion::{Plan, PotentialFlow, Scheme, SensorField, Transport};
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
-    Envelope, Error, Form, Outcome, Posterior, Prior, Search, SearchBox, SelectionRule, SourceLikelihood, SourceSensor,
-    Status,
+    Envelope, Error, Form, Outcome, Posterior, Prior, Search, SearchBox, SearchField, SelectionRule, SourceLikelihood,
+    SourceSensor, Status,
 };
 use fewbits_models::SourceModel;
 use fewbits_models::diffusion::{Air, Ground};
@@ -68,11 +68,12 @@ fn run(seed: u64, model: &SourceSensor, truth: &SourceSensor, change: impl FnOnc
     let graph = Graph::within(deployed.positions(), 1.2).unwrap();
     let alarm = Vector2::new(5.3, 2.7);
     let mut search = Search::new(&alarm, 3.0, ROOMS, joint(), 1e-5).unwrap();
-    search.most_nodes = 12;
+    search.max_nodes = 12;
     change(&mut search);
     let start = deployed.nearest_to(&alarm);
-    let asked = |node: usize| reading(truth, seed, node, &deployed.positions()[node]);
-    search.run(model, &deployed, &graph, start, asked).unwrap()
+    let nodes = SearchField::new(model.clone(), deployed, graph).unwrap();
+    let asked = |node: usize| reading(truth, seed, node, &nodes.deployment().positions()[node]);
+    search.run(&nodes, start, asked).unwrap()
 }
 
 #[test]
@@ -105,7 +106,7 @@ fn free_space_is_refused_in_rooms() {
         .unwrap();
     let mut refused = 0;
     for seed in 0..2 {
-        let outcome = run(seed, &sensor(air), &truth, |search| search.most_nodes = 8);
+        let outcome = run(seed, &sensor(air), &truth, |search| search.max_nodes = 8);
         let error = outcome
             .estimate()
             .map_or(f64::INFINITY, |e| (e.mean() - Vector2::from(SOURCE)).norm());

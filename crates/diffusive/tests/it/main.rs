@@ -24,13 +24,14 @@ mod messages;
 mod searches;
 mod series;
 mod slices;
+mod steps;
 mod unknown_models;
 mod wild;
 
 use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
-    Error, Form, ModelGrid, Outcome, Posterior, Prior, RateModel, RateRange, Search, SearchBox, SelectionRule,
-    SourceLikelihood, SourceSensor,
+    Error, Form, ModelGrid, Outcome, Posterior, Prior, RateModel, RateRange, Search, SearchBox, SearchField,
+    SelectionRule, SourceLikelihood, SourceSensor,
 };
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
@@ -99,9 +100,9 @@ fn searched(
     let mut search = Search::new(&alarm, 50.0, field(1.0), joint(), threshold)?;
     search.form = form;
     let source = Vector2::new(62.0, 50.0);
-    let outcome = search.run_models(models, &deployed, &graph, start, |node| {
-        truth.sample(&mut rng, &deployed.positions()[node], &source, 1.0)
-    })?;
+    let nodes = SearchField::new(models.clone(), deployed, graph)?;
+    let outcome = search
+        .run(&nodes, start, |node| truth.sample(&mut rng, &nodes.deployment().positions()[node], &source, 1.0))?;
     let error = outcome.estimate().map_or(f64::NAN, |e| (e.mean() - source).norm());
     Ok((outcome, error))
 }

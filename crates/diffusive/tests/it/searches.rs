@@ -3,7 +3,7 @@
 use super::{RULES, field, joint, sensor};
 use fewbits_diffusive::message::{SampleCode, Wire};
 use fewbits_diffusive::{
-    Envelope, Form, Outcome, RateModel, Search, SelectionRule, Selector, SourceLikelihood, Status,
+    Envelope, Form, Outcome, RateModel, Search, SearchField, SelectionRule, Selector, SourceLikelihood, Status,
 };
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
@@ -22,10 +22,9 @@ pub fn run(seed: u64, unit: f64, windy: bool, nodes: usize, change: impl FnOnce(
     let mut search = Search::new(&alarm, 50.0 * unit, field(unit), joint(), 1e-5 * unit.powi(4)).unwrap();
     change(&mut search);
     let source = Vector2::from(SOURCE) * unit;
+    let field = SearchField::new(sensor.clone(), deployed, graph).unwrap();
     search
-        .run(&sensor, &deployed, &graph, start, |node| {
-            sensor.sample(&mut rng, &deployed.positions()[node], &source, 1.0)
-        })
+        .run(&field, start, |node| sensor.sample(&mut rng, &field.deployment().positions()[node], &source, 1.0))
         .unwrap()
 }
 
@@ -133,7 +132,7 @@ fn a_stalled_search_turns_to_information() {
         let all: Vec<usize> = (0..6)
             .map(|seed| {
                 run(seed, 1.0, true, 300, |search| {
-                    (search.rule, search.stall, search.most_nodes) = (SelectionRule::Mahalanobis, stall, 20);
+                    (search.rule, search.stall, search.max_nodes) = (SelectionRule::Mahalanobis, stall, 20);
                 })
                 .steps
                 .len()
@@ -174,7 +173,7 @@ fn envelopes_are_between_certainties() {
 /// Erratum `diffusive-8`.
 #[test]
 fn selectors_score_candidates() {
-    let outcome = run(3, 1.0, false, 300, |search| search.most_nodes = 2);
+    let outcome = run(3, 1.0, false, 300, |search| search.max_nodes = 2);
     let posterior = outcome.posterior.unwrap();
     let estimate = posterior.gaussian();
     let score = |rule, x: f64| {

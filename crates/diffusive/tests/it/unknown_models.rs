@@ -1,7 +1,9 @@
 //! Wind and diffusivity known up to a few models.
 
 use super::{field, joint, searched, sensor};
-use fewbits_diffusive::{Error, Form, ModelGrid, Posterior, Prior, Search, SourceLikelihood, SourceSensor, Status};
+use fewbits_diffusive::{
+    Error, Form, ModelGrid, Posterior, Prior, Search, SearchField, SourceLikelihood, SourceSensor, Status,
+};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;
 use fewbits_topology::{Deployment, Graph};
@@ -34,10 +36,11 @@ fn probabilities_of_models_are_bayes() {
     let sensors: Vec<SourceSensor> = candidates().iter().map(|(s, _)| s.clone()).collect();
     let grid = ModelGrid::new(sensors.clone(), &weights).unwrap();
     let mut search = Search::new(&nodes[0], 50.0, field(1.0), joint(), 1e-300).unwrap();
-    search.most_nodes = 2;
+    search.max_nodes = 2;
     let deployed = Deployment::given(nodes.to_vec()).unwrap();
     let graph = Graph::within(deployed.positions(), 30.0).unwrap();
-    let found = search.run_models(&grid, &deployed, &graph, 0, |node| Ok(taken[node].clone()));
+    let field_of = SearchField::new(grid, deployed, graph).unwrap();
+    let found = search.run(&field_of, 0, |node| Ok(taken[node].clone()));
     let found = found.unwrap().models;
     let evidences: Vec<f64> = sensors
         .iter()

@@ -3,7 +3,7 @@
 use fewbits_core::NumberFormat;
 use fewbits_core::laws::wild;
 use fewbits_diffusive::message::{SampleCode, Wire};
-use fewbits_diffusive::{RateModel, RateRange, RateSums, Search, SearchBox, SourceSensor};
+use fewbits_diffusive::{RateModel, RateRange, RateSums, Search, SearchBox, SearchField, SourceSensor};
 use fewbits_models::SourceGradient;
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
@@ -61,13 +61,14 @@ proptest! {
     fn searches_end_with_numbers(x in prop::array::uniform10(wild()), bits in 0..40_u32) {
         let deployment = Deployment::given(vec![Vector2::new(50.0, 50.0), Vector2::new(55.0, 50.0), Vector2::new(52.0, 58.0)]).unwrap();
         let graph = Graph::within(deployment.positions(), 10.0).unwrap();
+        let nodes = SearchField::new(super::sensor(1.0, false), deployment, graph).unwrap();
         let rate = RateRange::new(x[0], x[1]).map_or(RateModel::Known(x[0]), RateModel::Joint);
         let within = SearchBox { lower: [x[2], 0.0], upper: [x[3], 100.0] };
         for within in [within, SearchBox { lower: [0.0; 2], upper: [100.0; 2] }] {
             let Ok(mut search) = Search::new(&Vector2::new(50.0, 50.0), x[4], within, rate, x[5]) else { continue };
             search.wire = Wire { numbers: NumberFormat::Single, samples: Some(SampleCode { bits, step: x[6] }), ..Wire::default() };
-            search.most_nodes = 3;
-            if let Ok(outcome) = search.run(&super::sensor(1.0, false), &deployment, &graph, 0, |_| Ok(vec![x[7], x[8], x[9], 1e-4, 1e-4])) {
+            search.max_nodes = 3;
+            if let Ok(outcome) = search.run(&nodes, 0, |_| Ok(vec![x[7], x[8], x[9], 1e-4, 1e-4])) {
                 prop_assert!(outcome.estimate().is_none_or(|estimate| estimate.is_finite()), "{:?}", outcome.estimate());
                 prop_assert!(outcome.steps.iter().all(|step| step.estimate.is_finite()));
             }

@@ -83,7 +83,7 @@ pub static FIG5: Lobes = Lobes {
 pub static FIG6: Lobes = Lobes {
     about: About::of("diffusive-fig6", "The same belief in polynomial Gaussians", "Zhao and Nehorai 2007, Fig. 6")
         .showing(
-            "The belief of diffusive-fig5 as two polynomial Gaussians of degree 5 in square-root (Galerkin) form, 51 \
+            "The belief of diffusive-fig5 as two polynomial Gaussians of degree 5 in square-root (Galerkin) form, 52 \
          numbers, beside the exact one: decades below the exact peak.",
         ),
     form: Some(LPG),

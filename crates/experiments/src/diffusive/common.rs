@@ -2,7 +2,9 @@
 
 use crate::prelude::*;
 use fewbits_diffusive::message::Wire;
-use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Search, SearchBox, SelectionRule, SourceSensor, Status};
+use fewbits_diffusive::{
+    Form, Outcome, RateModel, RateRange, Search, SearchBox, SearchField, SelectionRule, SourceSensor, Status,
+};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
 
@@ -194,7 +196,7 @@ impl Scheme {
         let mut search = Search::new(&alarm, settings.prior_sd, search_box(), rate, self.example.threshold)?;
         search.form = self.form;
         search.rule = self.rule;
-        search.most_nodes = self.most_nodes;
+        search.max_nodes = self.most_nodes;
         search.wire = self.wire;
         // The figures compare the share of searches that reach the threshold, and their nodes and errors, with references of a program
         // that never refuses a model. A refused search would count as one that stopped short, most often where a form is shown to stop
@@ -210,16 +212,21 @@ impl Scheme {
 
     /// Runs it on the network and noise of a trial's stream, which all schemes share.
     pub fn run(&self, settings: &Settings, stream: Stream) -> Result<Outcome, Error> {
-        let network = Network::draw(stream, settings.nodes, self.range)?;
+        let Network {
+            deployment,
+            graph,
+            start,
+        } = Network::draw(stream, settings.nodes, self.range)?;
         let sensor = self.example.sensor(self.windy)?;
         let source = self.example.source();
-        let positions = network.deployment.positions();
+        let field = SearchField::new(sensor.clone(), deployment, graph)?;
+        let positions = field.deployment().positions();
         let samples = |node: usize| {
             let mut rng = stream.named("noise").indexed(node as u64).rng();
             sensor.sample(&mut rng, &positions[node], &source, RATE)
         };
         let search = self.search(settings)?;
-        Ok(search.run(&sensor, &network.deployment, &network.graph, network.start, samples)?)
+        Ok(search.run(&field, start, samples)?)
     }
 }
 
