@@ -138,7 +138,12 @@ impl Target {
     }
 
     /// Moves a state by one step under the given accelerations.
-    pub fn moved<R: Rng>(&self, rng: &mut R, state: &Vector4<f64>, acceleration: &Vector2<f64>) -> Vector4<f64> {
+    pub fn moved<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        state: &Vector4<f64>,
+        acceleration: &Vector2<f64>,
+    ) -> Vector4<f64> {
         let deviation = self.noise_variance.sqrt();
         let mut push = || deviation * rng.sample::<f64, _>(StandardNormal);
         let push = Vector2::new(push(), push()) + acceleration;
@@ -220,7 +225,7 @@ impl WithManoeuvre {
     }
 
     /// Draws the acceleration of this step after `last`.
-    pub(crate) fn next<R: Rng>(&self, rng: &mut R, last: f64) -> f64 {
+    pub(crate) fn next<R: Rng + ?Sized>(&self, rng: &mut R, last: f64) -> f64 {
         match self.step {
             0 => self.target.chain.sample(rng, 0),
             _ => self.target.chain.next(rng, last),

@@ -1,8 +1,7 @@
 //! Fusion centres of one-bit, three-bit and full sensors: health, learnt noise, late reports, stored states.
 
 use fewbits_core::{
-    Belief, Dynamics, Evolution, FullValue, Gaussian, Link, MeasurementNoise, Observation, OnAxes, SchemeNode, Sensing,
-    SensorNode,
+    Belief, Dynamics, FullValue, Gaussian, Link, MeasurementNoise, Observation, OnAxes, SchemeNode, Sensing, SensorNode,
 };
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, NoiseLearning, RemoteSensor, Reporting, Slot};

@@ -3,12 +3,12 @@
 use fewbits_core::factor::{Constant, Partition, Scalar, Value};
 use fewbits_core::rand::Rng;
 use fewbits_core::{
-    Belief, Deterministic, Dynamics, Error as CoreError, Evolution, Gaussian, Link, NumberFormat, Observation,
-    Observed, Scheme, Sensing, Sign, laws,
+    Belief, Deterministic, Dynamics, Error as CoreError, Evolution, Gaussian, Likelihood, Link, NumberFormat,
+    Observation, Observed, Scheme, Sensing, Sign, laws,
 };
 use fewbits_filters::{
-    BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, GuidedFilter, Likelihood, MomentFilter, NoiseBank,
-    ParticleFilter, PointMasses, RaoBlackwellised, StateFilter, Switching, UniformGrid, assumed_density,
+    BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, ParticleFilter,
+    PointMasses, RaoBlackwellised, StateFilter, Switching, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;

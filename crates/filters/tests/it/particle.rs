@@ -1,9 +1,9 @@
 //! Particle filters against the exact Kalman and grid filters.
 
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
-use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
+use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
-    BootstrapFilter, GuidedFilter, Likelihood, ParticleFilter, Particles, Resampling, Schedule, StateFilter, kalman,
+    BootstrapFilter, GuidedFilter, ParticleFilter, Particles, Resampling, Schedule, StateFilter, kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};

@@ -2,8 +2,10 @@
 
 use fewbits_core::factor::Factor;
 use fewbits_core::laws::{factor, likelihood, message, scheme};
-use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
-use fewbits_filters::{BootstrapFilter, Likelihood, MomentFilter, ParticleFilter, StateFilter};
+use fewbits_core::{
+    Belief, Dynamics, Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, Scheme, Sensing,
+};
+use fewbits_filters::{BootstrapFilter, MomentFilter, ParticleFilter, StateFilter};
 use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor};
