@@ -2,10 +2,9 @@
 
 use fewbits_core::{ArgumentError, Evolution, Gaussian, GaussianDynamics, Link, MeasurementNoise, Scheme, Sensing};
 use fewbits_filters::centre::{FusionCentre, Reporting};
-use fewbits_filters::{Error, MomentFilter};
+use fewbits_filters::MomentFilter;
 use fewbits_link::FusionReceiver;
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::error::refuse;
 use fewbits_protocol::BoxError;
 
 /// Dynamics of one slot, which is a second for the centre.
