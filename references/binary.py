@@ -170,7 +170,7 @@ def fig59(row):
     return equal((4, 5, 6), (4, 6, 7), 4.5, 5.8, True) if row.startswith("{4,5,6}") else equal((4, 6, 7), GRAY[3], 5.5, 7, True)
 
 
-RECIPES.of("binary-fig5-9/signs")(lambda row: Source(-5, 3, True).mse((4, 4, 4)))
+RECIPES.of("binary-fig5-9/mse_signs")(lambda row: Source(-5, 3, True).mse((4, 4, 4)))
 
 
 def rate_distortion(noise):
@@ -178,8 +178,8 @@ def rate_distortion(noise):
     return 0.1 - 0.01 / (0.1 + noise) * (1 - 2.0**-6)
 
 
-RECIPES.of("binary-fig5-9/print")(lambda row: rate_distortion(0.1 * 10**0.5))
-RECIPES.of("binary-fig5-9/corrected")(lambda row: rate_distortion(0.1 * 10**0.5 / 3))
+RECIPES.of("binary-fig5-9/dr_print")(lambda row: rate_distortion(0.1 * 10**0.5))
+RECIPES.of("binary-fig5-9/dr_per_n")(lambda row: rate_distortion(0.1 * 10**0.5 / 3))
 
 
 @RECIPES.of("binary-table5-2/mmse")
@@ -230,14 +230,14 @@ def eight_dmap():
     return sorted((s.dmap(masks), masks) for _, masks in eight())
 
 
-@RECIPES.of("binary-table5-1/mmse")
+@RECIPES.of("binary-table5-1/mse_mmse")
 def table51(row):
     return Source(18.2).mse(PRINTED51 if row == "printed" else eight()[0][1])
 
 
 RECIPES.of("binary-table5-1/rank")(lambda row: [m for _, m in eight()].index(tuple(sorted(PRINTED51))))
-RECIPES.of("binary-table5-1/dmap", "printed")(lambda row: Fine(18.2).dmap(PRINTED51))
-RECIPES.of("binary-table5-1/dmap")(lambda row: eight_dmap()[0][0])
+RECIPES.of("binary-table5-1/mse_dmap", "printed")(lambda row: Fine(18.2).dmap(PRINTED51))
+RECIPES.of("binary-table5-1/mse_dmap")(lambda row: eight_dmap()[0][0])
 RECIPES.of("binary-table5-1/rank-dmap")(lambda row: [m for _, m in eight_dmap()].index(tuple(sorted(PRINTED51))))
 
 

@@ -36,7 +36,7 @@ def tightness(row):
 
 # Figure 5.10: ten sensors
 
-RECIPES.of("binary-fig5-10/three-bits")(lambda row: Source(float(row[:-3]), pieces=1.6, nodes=8).search(10)[0][0])
+RECIPES.of("binary-fig5-10/lbqp_b3")(lambda row: Source(float(row[:-3]), pieces=1.6, nodes=8).search(10)[0][0])
 
 
 @lru_cache(None)
@@ -55,7 +55,7 @@ def resolutions(snr):
     return {bits: ten(bits, snr) for bits in range(3, 8)}
 
 
-RECIPES.of("binary-fig5-10/best")(lambda row: min(resolutions(float(row[:-3])).values()))
+RECIPES.of("binary-fig5-10/lbqp_best")(lambda row: min(resolutions(float(row[:-3])).values()))
 RECIPES.of("binary-fig5-10/bits")(lambda row: min((error, bits) for bits, error in resolutions(float(row[:-3])).items())[1])
 
 
@@ -75,7 +75,7 @@ def most_likely(thresholds, bits, s):
     return (low + high) / 2
 
 
-@RECIPES.of("binary-fig5-10/aq-ml")
+@RECIPES.of("binary-fig5-10/aqml_mle")
 def adaptive(row):
     """Each threshold at the most likely state so far, the answer the most likely state: exact over all 1024 strings."""
     s = Source(float(row[:-3]), nodes=12, pieces=1.0)
@@ -91,7 +91,7 @@ def adaptive(row):
     return np.sum(q * (s.x - answer[:, None]) ** 2 @ s.w)
 
 
-@RECIPES.of("binary-fig5-10/multi-threshold")
+@RECIPES.of("binary-fig5-10/ribeiro_relaxed")
 def multi_threshold(row):
     """Least E[1 / sum_k rho_k I(x; t_k)] over rho >= 0 that sum to ten, 401 thresholds."""
     s = Source(float(row[:-3]), nodes=6)

@@ -135,13 +135,13 @@ RECIPES.of("dymbo-fig4/double-exact")(
     lambda row: brentq(lambda g: exact(float(row), g) / steady(float(row), g, 1.0) - 2, 0.5, 1.5, xtol=1e-9))
 
 
-@RECIPES.of("dymbo-fig5/exact")
+@RECIPES.of("dymbo-fig5/dymbo_exact")
 def fig5_exact(row):
     a, gamma, (n,) = plant(row)
     return course(a, gamma)[int(n)]
 
 
-@RECIPES.of("dymbo-fig5/kalman")
+@RECIPES.of("dymbo-fig5/kf_pred")
 def fig5_kalman(row):
     a, gamma, (n,) = plant(row)
     return variances(a, gamma, 1.0, 50, 1.0)[int(n)]
@@ -175,13 +175,13 @@ def peak_exact(row):
     return np.max(course(a, gamma) / variances(a, gamma, 1.0, 30, 1.0))
 
 
-@RECIPES.of("dymbo-fig5/cold-sign-bit")
+@RECIPES.of("dymbo-start/cold-sign-bit")
 def cold_bit(row):
     a, gamma, (start,) = plant(row)
     return steps_to(variances(a, gamma, start, 60), steady(a, gamma))
 
 
-@RECIPES.of("dymbo-fig5/cold-Kalman")
+@RECIPES.of("dymbo-start/cold-Kalman")
 def cold_kalman(row):
     a, gamma, (start,) = plant(row)
     return steps_to(variances(a, gamma, start, 60, 1.0), steady(a, gamma, 1.0))
@@ -196,13 +196,13 @@ def first_cells(a, gamma):
     return prior, edges, between(edges[:-1] / s, edges[1:] / s), prior / s * mean, (prior + prior**2 * variance) / (prior + 1)
 
 
-@RECIPES.of("dymbo-fig5/e13")
+@RECIPES.of("dymbo-start/e13")
 def e13(row):
     _, _, mass, _, variance = first_cells(*numbers(row))
     return mass @ variance
 
 
-@RECIPES.of("dymbo-fig5/entropy")
+@RECIPES.of("dymbo-start/entropy")
 def entropy(row):
     mass = first_cells(*numbers(row))[2]
     return -np.sum(mass * np.log2(mass))
@@ -222,7 +222,7 @@ def informed_course(a, gamma):
     return total
 
 
-@RECIPES.of("dymbo-fig5/informed")
+@RECIPES.of("dymbo-fig5/informed_mse")
 def informed(row):
     a, gamma, (n,) = plant(row)
     return informed_course(a, gamma)[int(n)]
@@ -302,11 +302,11 @@ def threshold_excess(row):
     return mean / exact(a, gamma), error / exact(a, gamma)
 
 
-RECIPES.of("dymbo-threshold/riccati")(lambda row: steady(*numbers(row)))
+RECIPES.of("dymbo-escape/riccati")(lambda row: steady(*numbers(row)))
 RECIPES.of("dymbo-threshold/nees")(lambda row: exact(*numbers(row)) / steady(*numbers(row)))
 
 
-@RECIPES.of("dymbo-threshold/escaped")
+@RECIPES.of("dymbo-escape/escaped")
 def escaped(row):
     """Share of the runs of an unstable plant whose error passes 50 within 500 steps, after a first message of tau = 1."""
     a, gamma, _ = plant(row)

@@ -14,7 +14,7 @@ from dymbo import FIRST, ONE_BIT, RECIPES, Chain, exact, filtered, gain, plant, 
 
 # Distance from the exact posterior of the same bits
 
-@RECIPES.of("dymbo-gap/tree")
+@RECIPES.of("dymbo-gap/mmse")
 def tree(row):
     """Exact minimum error after n bits, over all strings: densities of the error that carry the string's probability."""
     a, gamma, (bits,) = plant(row)
@@ -155,7 +155,7 @@ def word_error(a, gamma, bits):
     return chain.moment(chain.stationary(step))
 
 
-@RECIPES.of("dymbo-bits/mse")
+@RECIPES.of("dymbo-bits/exact_mse")
 def bits_mse(row):
     a, gamma, (bits,) = plant(row)
     return word_error(a, gamma, int(bits))

@@ -21,7 +21,7 @@ def kl_total(row):
     return np.log(b) + 1 / (2 * b * b) - 0.5
 
 
-@RECIPES.of("handoff-fig2/kl-reverse")
+@RECIPES.of("handoff-fig2/kl-total-reverse")
 def kl_reverse(row):
     ratio, t = (float(w[1:]) for w in row.split("-"))
     b = ratio**t

@@ -219,7 +219,7 @@ def ceo(rate, noises):
     return np.exp(found.fun)
 
 
-RECIPES.of("mi-table4-2/ceo")(lambda row: ceo(np.log(int(row[0])), (1, 0.5)))
+RECIPES.of("mi-table4-2/ceo_bound")(lambda row: ceo(np.log(int(row[0])), (1, 0.5)))
 
 
 # Table 4.3: nine sensors, counts instead of words (mi-4)
@@ -356,7 +356,7 @@ def pe44(row):
 
 
 RECIPES.of("mi-table4-4/unquantized_pe")(lambda row: ndtr(-int(row) * np.sqrt(5) / 2))
-RECIPES.of("mi-table4-4/equivocation")(lambda row: np.log(2) - DETECTIONS[4].five("mi", t44(row)))
+RECIPES.of("mi-table4-4/equivocation_nats")(lambda row: np.log(2) - DETECTIONS[4].five("mi", t44(row)))
 
 
 # Table 4.5: words over a binary symmetric channel

@@ -2,12 +2,12 @@
 //! exact. References: `binary-beyond/...`.
 
 use crate::references::agree;
-use fewbits::binary_patterns::published::{AdaptiveRule, adaptive};
 use fewbits::binary_patterns::search::{Descent, LinearSearch, free_breakpoints};
 use fewbits::binary_patterns::{
     BinaryQuantizer, CellGrid, Mask, Pattern, PatternSensor, Source, gray_basis, linear_pattern, rank,
 };
 use fewbits::sensor_assignment::{CodedSensors, Estimator, all_errors, exchange, pair_costs};
+use fewbits_baselines::binary_patterns::{AdaptiveRule, adaptive};
 use fewbits_experiments::reference;
 
 /// A source, its cells and the noise at one signal-to-noise ratio in dB.

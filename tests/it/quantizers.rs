@@ -6,8 +6,9 @@ use fewbits::core::Link;
 use fewbits::quantizer_design::design::{self, Design};
 use fewbits::quantizer_design::{
     AllowedCells, BitBudget, Channel, Criterion, Labelling, Newton, ObservationModel, Quantizer, Request, SensorGroup,
-    System, bounds, lloyd_max, published,
+    System, bounds, lloyd_max,
 };
+use fewbits_baselines::quantizer_design as baselines;
 
 const MI: Criterion = Criterion::MutualInformation;
 const MSE: Criterion = Criterion::MeanSquaredError;
@@ -93,8 +94,8 @@ fn identical_sign_quantizers_lose_their_optimality() {
         let (varied, name) = row.split_once(' ').unwrap();
         let signs = |model| System::ideal(model, vec![Quantizer::new(vec![0.0]).unwrap(); 2]);
         let found = match varied {
-            "rho" => published::symmetry_breaking(0.1, 0.9, criterion(name), |rho| signs(pair(1.0, rho))),
-            _ => published::symmetry_breaking(0.2, 2.0, criterion(name), |sd| signs(pair(sd, 0.0))),
+            "rho" => baselines::symmetry_breaking(0.1, 0.9, criterion(name), |rho| signs(pair(1.0, rho))),
+            _ => baselines::symmetry_breaking(0.2, 2.0, criterion(name), |sd| signs(pair(sd, 0.0))),
         };
         found.unwrap()
     });
@@ -104,7 +105,7 @@ fn identical_sign_quantizers_lose_their_optimality() {
 fn gray_natural_and_three_words_by_crossover() {
     let model = sensors(2);
     let best = |crossover, criterion, words| {
-        published::assign_words(&model, 2, crossover, 2..=4, criterion, words)
+        baselines::assign_words(&model, 2, crossover, 2..=4, criterion, words)
             .unwrap()
             .remove(0)
     };
@@ -115,17 +116,17 @@ fn gray_natural_and_three_words_by_crossover() {
                 MSE if crossover == 0.05 => vec![0, 1, 2, 3],
                 _ => vec![0, 1, 3, 2],
             };
-            let found = best(crossover, criterion, published::Words::Shared);
+            let found = best(crossover, criterion, baselines::Words::Shared);
             assert_eq!(found.words, vec![expected; 2], "{crossover} {criterion:?}");
             if crossover == 0.05 {
-                let mixed = best(crossover, criterion, published::Words::PerSensor);
+                let mixed = best(crossover, criterion, baselines::Words::PerSensor);
                 let gain = criterion.sense() * (mixed.design.value - found.design.value);
                 assert!(gain <= 1e-10, "different words at the two sensors gain {gain}");
             }
         }
     }
     agree("mi-beyond", "three-words", "", |row| {
-        best(numbers(row)[0], MSE, published::Words::Shared).design.value
+        best(numbers(row)[0], MSE, baselines::Words::Shared).design.value
     });
 }
 
@@ -186,7 +187,7 @@ fn iterations_of_newton_and_of_alternating_maximisation() {
         let limit = newton(row).quantizers();
         let (mut current, mut steps) = (start(row), 0);
         while apart(&current.quantizers()[0], &limit[0]) > 1e-8 && steps < 1000 {
-            let quantizer = published::alternating_step(&current, 0, MI).unwrap();
+            let quantizer = baselines::alternating_step(&current, 0, MI).unwrap();
             current = current.with_quantizer(0, quantizer).unwrap();
             steps += 1;
         }

@@ -3,10 +3,10 @@
 
 use fewbits::core::{Belief, Dynamics, Gaussian, Link, Observed, Scheme, Sensing};
 use fewbits::densities::{Particles, PointMass};
-use fewbits::dymbo::gap::exact_filter;
 use fewbits::dymbo::{DymboFilter, MultibitFilter, ScalarFilter, ScalarPlant};
 use fewbits::filters::{ParticleFilter, Workspace};
 use fewbits::monte_carlo::Stream;
+use fewbits_baselines::dymbo::gap::exact_filter;
 
 const STEPS: usize = 40;
 const PARTICLES: usize = 20_000;

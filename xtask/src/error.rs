@@ -88,14 +88,21 @@ pub enum Error {
     /// A setting was refused.
     #[error(transparent)]
     Setting(fewbits_experiments::Error),
-    /// A plot could not be drawn.
-    #[error("cannot draw {id}: {reason}")]
-    Draw {
-        /// Which figure.
-        id: String,
-        /// Why.
-        reason: String,
+    /// A file of a figure is absent, or not as its record says.
+    #[error("{path} is not as it was written: make the figure again")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
     },
+    /// A plot without panels, or with one in which nothing is seen.
+    #[error("the plot shows nothing in its panel `{title}`")]
+    Blank {
+        /// The panel's title.
+        title: String,
+    },
+    /// A plot could not be drawn.
+    #[error(transparent)]
+    Draw(#[from] fewbits_plot::Error),
     /// The gallery cannot be served.
     #[error("cannot serve the gallery: {0}")]
     Serve(Box<dyn std::error::Error + Send + Sync>),

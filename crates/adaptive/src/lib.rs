@@ -2,7 +2,8 @@
 //!
 //! A sensor and its receiver run the same bank of models of the signal and hold the same frequencies of past reports. Silence means
 //! that the sample is within `delta` of the prediction of both. Otherwise the residual is coded under the probability law that
-//! both compute. There is no training beforehand, and only reports are sent.
+//! both compute. Neither knows anything of the signal beforehand, and only reports are sent. Blocks begin
+//! with weights that were fitted once on recordings ([`BlockCodec`]).
 //!
 //! ```
 //! use fewbits_adaptive::{Config, Receiver, Sensor};

@@ -31,11 +31,20 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+/// Parts of the exact enumeration, for the comparisons in `fewbits-baselines`. No promise is made of them.
+#[doc(hidden)]
+pub mod engine {
+    pub use crate::decoding::decoder::{moments, squared_error};
+    pub use crate::observation::bank::CountTable;
+    pub use crate::observation::source::Kind;
+    pub use crate::patterns::grid::bits_in_range;
+    pub use crate::patterns::linear::{grid_bits, sensors_of};
+}
+
 pub mod bounds;
 mod decoding;
 mod observation;
 mod patterns;
-pub mod published;
 pub mod search;
 
 pub use decoding::decoder::Decoder;

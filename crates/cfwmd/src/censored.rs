@@ -155,7 +155,8 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
 }
 
 /// Replaces each `log_p` of `logs` by `ln(floor + exp(log_share + log_p))`.
-pub(crate) fn mix(floor: f64, log_share: f64, logs: &mut [f64]) {
+#[doc(hidden)]
+pub fn mix(floor: f64, log_share: f64, logs: &mut [f64]) {
     logs.iter_mut().for_each(|log| *log += log_share);
     if floor > 0.0 {
         kernels::exp(logs);

@@ -14,7 +14,6 @@
 //! | fusion without feedback | [`no_feedback`] |
 //! | thresholds before deployment | [`expected_covariances`](schedule::expected_covariances) |
 //! | information of a message or of silence | [`information`] |
-//! | comparisons of the publications | [`published`] |
 //!
 //! **The likelihood of silence is computed in closed form or by quadrature, never by sampling.** With linear sensors
 //! the belief is the Gaussian with the exact mean and covariance after each observation
@@ -61,7 +60,6 @@ pub mod ellipsoid;
 pub mod information;
 pub mod network;
 pub mod no_feedback;
-pub mod published;
 pub mod rule;
 pub mod schedule;
 pub mod scheme;

@@ -115,7 +115,8 @@ impl<const M: usize> CensoringRule<M> {
     }
 
     /// Lower and upper end of the interval of silence about a prediction of the first component.
-    pub(crate) fn interval(&self, prediction: f64) -> (f64, f64) {
+    #[doc(hidden)]
+    pub fn interval(&self, prediction: f64) -> (f64, f64) {
         (prediction - self.half_width, prediction + self.half_width)
     }
 }

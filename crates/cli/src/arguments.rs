@@ -55,8 +55,8 @@ pub(crate) struct TableOptions {
     /// Column of times: seconds, or UTC as 2026-01-31T12:00:00.5Z. Default: the first column if `--time` is given.
     #[arg(long, value_name = "NAME")]
     pub(crate) time_column: Option<String>,
-    /// Columns of values, separated by commas. Default: all.
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    /// Columns of values, separated by commas; a name with commas in double quotes. Default: all.
+    #[arg(long, value_name = "NAMES")]
     pub(crate) columns: Vec<String>,
     /// Character between cells.
     #[arg(long, default_value_t = ',', value_name = "CHARACTER")]
@@ -67,7 +67,7 @@ pub(crate) struct TableOptions {
 #[derive(Args, Clone)]
 pub(crate) struct BoundOptions {
     /// Bounds as `column=bound,...`, `*` for all others: `±0.1`, `1%` of the range, `decimals:3`, `lossless`; a circle as `±2@360`.
-    /// Columns without a bound are lossless.
+    /// A bound without a column stands first. Numbers have a point. Columns without a bound are lossless.
     #[arg(long, value_name = "BOUNDS", allow_hyphen_values = true, default_value = "")]
     pub(crate) bound: String,
     /// Number of rows per block. A damaged block loses its rows only.
@@ -105,6 +105,9 @@ pub(crate) struct PackOptions {
     /// Continue the recording in `--output`, with its columns and bounds.
     #[arg(long, requires = "output", conflicts_with_all = ["bound", "rows_per_block"])]
     pub(crate) append: bool,
+    /// Longest time that a row of a pipe waits in memory, as `60s`. Default: until its block is full, or the pipe ends.
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub(crate) deadline: Option<std::time::Duration>,
     /// Print the summary as JSON on standard error.
     #[arg(long)]
     pub(crate) json: bool,
@@ -129,8 +132,8 @@ pub(crate) struct CatOptions {
     /// Last time or row number. Default: that of the last row.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) to: Option<String>,
-    /// Columns to write, in this order. Default: all.
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    /// Columns to write, in this order, separated by commas; a name with commas in double quotes. Default: all.
+    #[arg(long, value_name = "NAMES")]
     pub(crate) columns: Vec<String>,
     /// One JSON object per row instead of CSV.
     #[arg(long)]

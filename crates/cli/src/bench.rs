@@ -137,14 +137,13 @@ pub(crate) fn run(options: &BenchOptions) -> Result<Ending, Error> {
         output::json(&lines)?;
         return Ok(Ending::Good);
     }
-    println!("{} rows of {} columns, {} bytes as doubles", ticks.len(), columns.len(), 8 * samples);
-    println!(
-        "{:<20} {:>12} {:>10} {:>8} {:>12} {:>12}  promise",
-        "codec", "bytes", "bits each", "ratio", "M/s encode", "M/s decode"
-    );
+    let mut text = format!("{} rows of {} columns, {} bytes as doubles\n", ticks.len(), columns.len(), 8 * samples);
+    let head = ["codec", "bytes", "bits each", "ratio", "M/s encode", "M/s decode"];
+    let [codec, bytes, bits, ratio, encode, decode] = head;
+    text += &format!("{codec:<20} {bytes:>12} {bits:>10} {ratio:>8} {encode:>12} {decode:>12}  promise\n");
     for line in &lines {
-        println!(
-            "{:<20} {:>12} {:>10.3} {:>8.1} {:>12.2} {:>12.2}  {}",
+        text += &format!(
+            "{:<20} {:>12} {:>10.3} {:>8.1} {:>12.2} {:>12.2}  {}\n",
             line.codec,
             line.bytes,
             line.bits_per_sample,
@@ -154,6 +153,7 @@ pub(crate) fn run(options: &BenchOptions) -> Result<Ending, Error> {
             line.promise
         );
     }
+    output::print(&text)?;
     Ok(Ending::Good)
 }
 

@@ -8,6 +8,7 @@ use crate::input::Table;
 use crate::numbers::mean_and_deviation;
 use crate::output;
 use crate::plot::{Layer, Picture};
+use crate::say::say;
 use fewbits_core::Link;
 
 use fewbits_quantizer_design::solve::Rounded;
@@ -48,7 +49,7 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     }
     let prior = Prior::sample(&values).map_err(Error::refused("the sample cannot be a prior"))?;
     if let Some(fit) = prior.sample_fit() {
-        eprintln!(
+        say!(
             "sample of {}: mean {:.6} ({:.2e}), deviation {:.6} ({:.2e}; standard errors)",
             values.len(),
             prior.mean(),
@@ -160,7 +161,7 @@ fn solve(options: &DesignOptions, model: ObservationModel) -> Result<Solution, E
     let solutions = request.with_progress(&mut show).run().map_err(&failed)?;
     bar.finish_and_clear();
     if solutions.is_cut_short {
-        eprintln!("--time-limit ended the search: this is the best design so far");
+        say!("--time-limit ended the search: this is the best design so far");
     }
     Ok(solutions.best().clone())
 }

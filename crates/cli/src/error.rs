@@ -96,6 +96,16 @@ pub(crate) enum Error {
         #[source]
         source: Failure,
     },
+    /// An output is an input, or another output.
+    #[error("{output}: this is the same file as {other}: name another output")]
+    SameFile { output: String, other: String },
+    /// A recipe was refused.
+    #[error("{file}")]
+    Recipe {
+        file: String,
+        #[source]
+        source: fewbits_recipes::Error,
+    },
     /// Binary data would be written to a terminal.
     #[error("standard output is a terminal: name a file with --output, or redirect")]
     Terminal,
@@ -154,6 +164,22 @@ impl Error {
             option,
             value: value.to_owned(),
             expected,
+        }
+    }
+
+    /// An error of a recipe on this file. What the source of rows reported stays as it was.
+    pub(crate) fn recipe(file: &str) -> impl Fn(fewbits_recipes::Error) -> Self + use<> {
+        let file = file.to_owned();
+        move |source| match source {
+            fewbits_recipes::Error::Source(failure) => match failure.downcast::<Self>() {
+                Ok(error) => *error,
+                Err(failure) => Self::content(&file, failure),
+            },
+            fewbits_recipes::Error::Record(source) => Self::recording(&file)(source),
+            source => Self::Recipe {
+                file: file.clone(),
+                source,
+            },
         }
     }
 

@@ -3,12 +3,14 @@
 use crate::Ending;
 use crate::arguments::{Cli, GenerateOptions, Generated};
 use crate::error::Error;
+use crate::target::{STANDARD_OUTPUT, Target};
 use clap::CommandFactory;
+use std::io::Write;
 
 /// Writes completions or the manual page to standard output, or a page per task into a folder.
 pub(crate) fn run(options: &GenerateOptions) -> Result<Ending, Error> {
     use clap_complete::Shell;
-    let mut command = Cli::command();
+    let (mut command, mut text) = (Cli::command(), Vec::new());
     let shell = match options.what {
         Generated::Bash => Shell::Bash,
         Generated::Elvish => Shell::Elvish,
@@ -22,11 +24,17 @@ pub(crate) fn run(options: &GenerateOptions) -> Result<Ending, Error> {
                 return Ok(Ending::Good);
             }
             let page = clap_mangen::Man::new(command);
-            page.render(&mut std::io::stdout())
-                .map_err(Error::io("standard output", "write"))?;
-            return Ok(Ending::Good);
+            page.render(&mut text).map_err(Error::io(STANDARD_OUTPUT, "write"))?;
+            return written(&text);
         }
     };
-    clap_complete::generate(shell, &mut command, "fewbits", &mut std::io::stdout());
-    Ok(Ending::Good)
+    // The generator panics if its sink fails: memory does not.
+    clap_complete::generate(shell, &mut command, "fewbits", &mut text);
+    written(&text)
+}
+
+fn written(text: &[u8]) -> Result<Ending, Error> {
+    let mut target = Target::open(None)?;
+    target.write_all(text).map_err(Error::io(STANDARD_OUTPUT, "write"))?;
+    target.finish().map(|()| Ending::Good)
 }

@@ -3,9 +3,10 @@
 use crate::arguments::InfoOptions;
 use crate::error::Error;
 use crate::numbers::{exact, widened};
-use crate::{Ending, bounds, clock, output};
-use fewbits_record::{Playback, TimeBase};
+use crate::{Ending, bounds, clock, output, recording, say};
+use fewbits_record::TimeBase;
 use serde::Serialize;
+use std::fmt::Write;
 
 #[derive(Serialize)]
 struct Info {
@@ -36,7 +37,7 @@ struct ColumnInfo {
 /// Runs the task. It decodes everything once, so that what it reports was verified.
 pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
     let file = options.file.display().to_string();
-    let mut playback = Playback::open(&options.file).map_err(Error::recording(&file))?;
+    let mut playback = recording::open(&options.file)?;
     let schema = playback.schema().clone();
     let time = schema.time();
     let mut columns: Vec<ColumnInfo> = schema
@@ -101,13 +102,21 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
     if options.json {
         output::json(&info)?;
     } else {
-        print(&info);
+        output::print(&text(&info))?;
     }
-    Ok(if damaged == 0 { Ending::Good } else { Ending::Failed })
+    // Whether rows are missing at the end cannot be told from a recording without its end.
+    Ok(if damaged == 0 && info.index {
+        Ending::Good
+    } else {
+        Ending::Failed
+    })
 }
 
-fn print(info: &Info) {
-    println!(
+fn text(info: &Info) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
         "{}: {} rows, {} columns, {} bytes, {:.3} bits per sample",
         info.file,
         info.rows,
@@ -120,23 +129,24 @@ fn print(info: &Info) {
     } else {
         "without index (not finished, or cut off)"
     };
-    println!("{} blocks of up to {} rows, {index}", info.blocks, info.rows_per_block);
+    let _ = writeln!(text, "{} blocks of up to {} rows, {index}", info.blocks, info.rows_per_block);
     if info.damaged > 0 {
-        println!("{} damaged parts", info.damaged);
+        let _ = writeln!(text, "{} damaged parts", info.damaged);
     }
     if let (Some(from), Some(to)) = (&info.from, &info.to) {
-        println!("time {}: {from} to {to}", info.time);
+        let _ = writeln!(text, "time {}: {from} to {to}", info.time);
     }
     for column in &info.columns {
         let unit = if column.unit.is_empty() {
             String::new()
         } else {
-            format!(" {}", column.unit)
+            format!(" {}", say::name(&column.unit))
         };
         let ends = match (column.min, column.max) {
             (Some(min), Some(max)) => format!("{} to {}{unit}", exact(min), exact(max)),
             _ => "no values".to_owned(),
         };
-        println!("  {}: {}, {ends}, {} gaps", column.name, column.bound, column.gaps);
+        let _ = writeln!(text, "  {}: {}, {ends}, {} gaps", say::name(&column.name), column.bound, column.gaps);
     }
+    text
 }

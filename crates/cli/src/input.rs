@@ -187,6 +187,12 @@ impl Table {
         }
     }
 
+    /// Takes these columns of values and this column of times, by their indices among all columns.
+    pub(crate) fn choose(&mut self, time: Option<usize>, columns: Vec<usize>) {
+        self.names = columns.iter().map(|i| self.all_names[*i].clone()).collect();
+        (self.time_column, self.columns) = (time, columns);
+    }
+
     /// Reads a column as names instead of numbers: [`Table::label`].
     pub(crate) fn with_labels(mut self, name: &str) -> Result<Self, Error> {
         let column = position(&self.all_names, name, &self.file)?;

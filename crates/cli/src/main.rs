@@ -1,7 +1,7 @@
 //! The command `fewbits`: recordings and telemetry within guaranteed errors.
 //!
 //! Each task is a module with a function `run`. Results go to `--output` or standard output, everything else to standard error.
-//! Exit codes: 0 done, 1 an error bound is violated or a part is damaged, 2 refused.
+//! Exit codes: 0 done, 1 an error bound is violated or a part is damaged or missing, 2 refused, 130 ended by a signal.
 
 mod arguments;
 mod bench;
@@ -11,10 +11,13 @@ mod clock;
 mod design;
 mod design_options;
 mod error;
+mod files;
 mod generate;
 mod info;
 mod input;
+mod interrupt;
 mod link;
+mod live;
 mod node;
 mod numbers;
 mod output;
@@ -24,15 +27,22 @@ mod parquet;
 mod place;
 mod plan;
 mod plot;
+mod recording;
 mod report;
+mod rows;
+mod say;
+mod send;
 mod sensor;
 mod serial;
+mod target;
 mod track;
 mod unpack;
 mod verify;
 
 use arguments::{Cli, Task};
 use clap::Parser;
+use error::Error;
+use say::say;
 use std::error::Error as _;
 use std::process::ExitCode;
 
@@ -47,13 +57,14 @@ pub(crate) enum Ending {
 impl Ending {
     /// The end of a task that received no complete frame.
     pub(crate) fn no_frame(name: &str) -> Self {
-        eprintln!("error: {name}: no whole frame came: use the sender's link, options and baud rate, and wait longer");
+        say!("error: {name}: no whole frame came: use the sender's link, options and baud rate, and wait longer");
         Self::Failed
     }
 }
 
-fn main() -> ExitCode {
-    let done = match Cli::parse().task {
+fn run(mut task: Task) -> Result<Ending, Error> {
+    files::prepare(&mut task)?;
+    match task {
         Task::Plan(options) => plan::run(&options),
         Task::Pack(options) => pack::run(&options),
         Task::Unpack(options) => unpack::run(&options.whole()),
@@ -63,25 +74,28 @@ fn main() -> ExitCode {
         Task::Bench(options) => bench::run(&options),
         Task::Track(options) => track::run(&options),
         Task::Design(options) => design::run(&options),
-        Task::Send(options) => link::send(&options),
+        Task::Send(options) => send::run(&options),
         Task::Receive(options) => link::receive(&options),
         Task::Generate(options) => generate::run(&options),
         Task::Centre(options) => centre::run(&options),
         Task::Sensor(options) => sensor::run(&options),
-    };
-    match done {
+    }
+}
+
+fn main() -> ExitCode {
+    match run(Cli::parse().task) {
         Ok(Ending::Good) => ExitCode::SUCCESS,
         Ok(Ending::Failed) => ExitCode::FAILURE,
         // The reader of the output has closed the pipe: not an error.
         Err(error) if error.is_closed_pipe() => ExitCode::SUCCESS,
         Err(error) => {
-            eprint!("error: {error}");
+            let mut message = format!("error: {error}");
             let mut source = error.source();
             while let Some(cause) = source {
-                eprint!(": {cause}");
+                message += &format!(": {cause}");
                 source = cause.source();
             }
-            eprintln!();
+            say!("{message}");
             ExitCode::from(2)
         }
     }

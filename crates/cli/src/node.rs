@@ -5,6 +5,7 @@ use crate::arguments::ReceiveOptions;
 use crate::bounds::{self, Spec};
 use crate::error::Error;
 use crate::output::{Cell, Shape, Sheet};
+use crate::say::say;
 use crate::serial::Frames;
 use fewbits_adaptive::{Config, Packet, Receiver};
 use fewbits_core::{BitString, Message, Observation};
@@ -52,14 +53,13 @@ pub(crate) fn receive(
                 // A row is out as soon as it is known.
                 sheet.flush()?;
             }
-            Err(reason) => eprintln!("warning: {name}: a frame was refused: {reason}"),
+            Err(reason) => say!("warning: {name}: a frame was refused: {reason}"),
         }
     }
-    Ok(if understood {
-        Ending::Good
-    } else {
-        Ending::no_frame(name)
-    })
+    if !understood {
+        return Ok(Ending::no_frame(name));
+    }
+    sheet.finish().map(|()| Ending::Good)
 }
 
 /// Count of a slot, and its value.
@@ -141,7 +141,7 @@ impl Slots {
         match self.receive(&Observation::Received(packet)) {
             // No sensor of this configuration sent the packet: the two ends have different configurations.
             Err(reason) => {
-                eprintln!("warning: a packet was refused: {reason}");
+                say!("warning: a packet was refused: {reason}");
                 self.receive(&Observation::Lost)
             }
             value => value,

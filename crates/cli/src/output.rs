@@ -1,46 +1,29 @@
 //! Output of tables: rows of recordings and of other results.
 
-use crate::clock;
 use crate::error::Error;
+use crate::target::Target;
+use crate::{clock, say};
 use fewbits_record::{Schema, TimeBase};
-use std::fs::File;
 use std::io::{BufWriter, IsTerminal, Write};
 use std::path::Path;
 
-/// Name of standard output in messages.
-pub(crate) const STANDARD_OUTPUT: &str = "standard output";
-
-/// Opens a file, or standard output. Returns its name for messages too.
-pub(crate) fn open(path: Option<&Path>) -> Result<(Box<dyn Write>, String), Error> {
-    match path {
-        Some(path) => {
-            let name = path.display().to_string();
-            let file = File::create(path).map_err(Error::io(&name, "create"))?;
-            Ok((Box::new(file), name))
-        }
-        None => Ok((Box::new(std::io::stdout()), STANDARD_OUTPUT.to_owned())),
-    }
-}
-
-/// As [`open`], but refuses to write binary data to a terminal.
-pub(crate) fn open_binary(path: Option<&Path>) -> Result<(Box<dyn Write>, String), Error> {
-    if path.is_none() && std::io::stdout().is_terminal() {
-        return Err(Error::Terminal);
-    }
-    open(path)
-}
-
-/// Writes a whole text.
+/// Writes a whole text to a file or standard output.
 pub(crate) fn text(path: Option<&Path>, text: &str) -> Result<(), Error> {
-    let (mut sink, name) = open(path)?;
-    sink.write_all(text.as_bytes()).map_err(Error::io(&name, "write"))
+    let mut target = Target::open(path)?;
+    target
+        .write_all(text.as_bytes())
+        .map_err(Error::io(target.name(), "write"))?;
+    target.finish()
+}
+
+/// Writes text for people to standard output.
+pub(crate) fn print(text: &str) -> Result<(), Error> {
+    self::text(None, &say::plain(text))
 }
 
 /// Writes one JSON value and a line end to standard output.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
-    let mut out = std::io::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, value)?;
-    writeln!(out).map_err(Error::io(STANDARD_OUTPUT, "write"))
+    text(None, &(serde_json::to_string_pretty(value)? + "\n"))
 }
 
 /// A cell of a row.
@@ -93,8 +76,8 @@ impl Shape {
 
 /// Rows as CSV or as lines of JSON.
 enum Rows {
-    Csv(Box<csv::Writer<Box<dyn Write>>>),
-    Json(BufWriter<Box<dyn Write>>),
+    Csv(Box<csv::Writer<Target>>),
+    Json(BufWriter<Target>),
 }
 
 /// Writes rows of named cells.
@@ -107,11 +90,19 @@ pub(crate) struct Sheet {
 impl Sheet {
     /// Writes the names, for CSV.
     pub(crate) fn new(path: Option<&Path>, shape: Shape, names: Vec<String>) -> Result<Self, Error> {
-        let (sink, file) = open(path)?;
+        let sink = Target::open(path)?;
+        let file = sink.name().to_owned();
         let rows = match shape {
             Shape::Csv => {
+                // Names of a recording are another's text.
+                let is_shown = path.is_none() && std::io::stdout().is_terminal();
+                let shown = |name: &String| match is_shown {
+                    true => say::name(name).into_owned(),
+                    false => name.clone(),
+                };
                 let mut rows = csv::Writer::from_writer(sink);
-                rows.write_record(&names).map_err(Error::table(&file))?;
+                rows.write_record(names.iter().map(shown))
+                    .map_err(Error::table(&file))?;
                 Rows::Csv(Box::new(rows))
             }
             Shape::Json => Rows::Json(BufWriter::new(sink)),
@@ -128,7 +119,8 @@ impl Sheet {
             Rows::Json(sink) => {
                 let cells = cells.into_iter().map(|cell| cell.json());
                 let object: serde_json::Map<_, _> = self.names.iter().cloned().zip(cells).collect();
-                serde_json::to_writer(&mut *sink, &object)?;
+                serde_json::to_writer(&mut *sink, &object)
+                    .map_err(|error| Error::io(&self.file, "write")(error.into()))?;
                 writeln!(sink).map_err(Error::io(&self.file, "write"))
             }
         }
@@ -140,6 +132,17 @@ impl Sheet {
             Rows::Json(sink) => sink.flush(),
         }
         .map_err(Error::io(&self.file, "write"))
+    }
+
+    /// Completes the file.
+    pub(crate) fn finish(mut self) -> Result<(), Error> {
+        self.flush()?;
+        let failed = Error::io(&self.file, "write");
+        let sink = match self.rows {
+            Rows::Csv(rows) => rows.into_inner().map_err(|error| failed(error.into_error()))?,
+            Rows::Json(rows) => rows.into_inner().map_err(|error| failed(error.into_error()))?,
+        };
+        sink.finish()
     }
 }
 
@@ -208,9 +211,9 @@ impl Writer {
     }
 
     /// Completes the file.
-    pub(crate) fn finish(mut self) -> Result<(), Error> {
-        match &mut self {
-            Self::Sheet { sheet, .. } => sheet.flush(),
+    pub(crate) fn finish(self) -> Result<(), Error> {
+        match self {
+            Self::Sheet { sheet, .. } => sheet.finish(),
             #[cfg(feature = "parquet")]
             Self::Parquet(sink) => sink.finish(),
         }

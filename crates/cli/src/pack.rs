@@ -2,11 +2,19 @@
 
 use crate::arguments::{BoundOptions, PackOptions, TableOptions};
 use crate::error::Error;
+use crate::files::is_regular;
 use crate::input::{Survey, Table};
-use crate::{Ending, bounds, output};
-use fewbits_record::{Bound, Effort, Recorder, Schema};
+use crate::live::{self, RowSink};
+use crate::rows::{TableRows, few_cells};
+use crate::say::say;
+use crate::target::{self, Target};
+use crate::{Ending, bounds};
+use fewbits_recipes::bounds::exact;
+use fewbits_record::{Bound, Effort, Playback, Recorder, Schema, TimeBase};
 use serde::Serialize;
-use std::io::{Write, stderr};
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::Path;
 
 /// Summary of what was packed.
 #[derive(Serialize)]
@@ -14,15 +22,19 @@ struct Done {
     rows: u64,
     bytes: u64,
     bits_per_sample: f64,
+    bounds: Vec<(String, String)>,
+    #[serde(skip)]
+    summary: String,
 }
 
-/// The schema of a table, and the table at its first row. A file is read twice if ranges or the decimals of times are needed.
+/// The schema of a table, and the table at its first row. A file is read twice if ranges or the decimals of times are needed; what can
+/// be read once only (a pipe) is read once.
 pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Table, Schema), Error> {
     let mut open = Table::open(table)?;
     let specs = bounds::parse(&options.bound, &open.names, open.file())?;
     let needs_range = specs.iter().any(|spec| matches!(spec.bound, Bound::ShareOfRange(_)));
     let has_time = table.time.is_some() || table.time_column.is_some();
-    let survey: Option<Survey> = if table.file != "-" && (needs_range || has_time) {
+    let survey: Option<Survey> = if is_regular(&table.file) && (needs_range || has_time) {
         Some(Table::survey(table)?)
     } else {
         None
@@ -33,76 +45,209 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     let time = open.time_base(table, survey.as_ref())?;
     let schema = Schema::new(columns, time).and_then(|schema| schema.with_rows_per_block(options.rows_per_block));
     let schema = schema.map_err(Error::recording(open.file()))?;
+    if needs_range && is_regular(&table.file) {
+        warn_of_few(table, &schema)?;
+    }
     Ok((open, schema))
 }
 
-/// Packs all rows of the table.
-fn fill<W: Write>(table: &mut Table, recorder: &mut Recorder<W>, file: &str) -> Result<u64, Error> {
-    let (time, mut rows) = (recorder.schema().time(), 0);
-    while let Some((tick, cells)) = table.next(time)? {
-        let pushed = match tick {
-            Some(tick) => recorder.push(tick, &cells),
-            None => recorder.push_next(&cells),
+/// Warns if a bound is a share of a range that few cells make.
+fn warn_of_few(table: &TableOptions, schema: &Schema) -> Result<(), Error> {
+    // Times are of no interest here, and their column is no column of values.
+    let options = TableOptions {
+        time: None,
+        time_column: None,
+        columns: schema.columns().iter().map(|column| column.name().to_owned()).collect(),
+        ..table.clone()
+    };
+    let found = few_cells(Table::open(&options)?)?;
+    for (column, few) in schema.columns().iter().zip(found) {
+        let (Bound::ShareOfRange(share), None, Some(few)) = (column.bound(), column.period(), few) else {
+            continue;
         };
-        pushed.map_err(Error::recording(file))?;
-        rows += 1;
+        let (low, high) = few.ends;
+        say!(
+            "warning: {}: column `{}`: few cells ({:.2}%) make most of the range {} to {}, all others lie within {} to {}: {} is ±{}; if \
+             they mean gaps, mend them or name them with --missing, or write the bound as ±SIZE",
+            table.file,
+            column.name(),
+            100.0 * few.share_outside,
+            exact(low),
+            exact(high),
+            exact(few.most.0),
+            exact(few.most.1),
+            bounds::shown(column.bound(), None),
+            crate::numbers::short(share * (high - low)),
+        );
     }
-    Ok(rows)
+    Ok(())
+}
+
+/// Rows into a recording.
+struct Recording<W> {
+    recorder: Recorder<W>,
+    waiting: usize,
+    file: String,
+}
+
+impl<W: Write> RowSink for Recording<W> {
+    fn push(&mut self, tick: Option<i64>, cells: &[Option<f64>]) -> Result<(), Error> {
+        let before = self.recorder.bytes();
+        let pushed = match tick {
+            Some(tick) => self.recorder.push(tick, cells),
+            None => self.recorder.push_next(cells),
+        };
+        pushed.map_err(Error::recording(&self.file))?;
+        self.waiting = if self.recorder.bytes() > before {
+            0
+        } else {
+            self.waiting + 1
+        };
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), Error> {
+        self.waiting = 0;
+        self.recorder.flush().map_err(Error::recording(&self.file))
+    }
+
+    fn waiting(&self) -> usize {
+        self.waiting
+    }
+}
+
+/// Packs all rows of the table and finishes the recording. Of a live table all rows before an error are kept, and the error comes second.
+fn fill<W: Write>(
+    table: Table,
+    recorder: Recorder<W>,
+    options: &PackOptions,
+    file: &str,
+) -> Result<(W, u64, Option<Error>), Error> {
+    let time = recorder.schema().time();
+    if target::is_live() {
+        let mut recording = Recording {
+            recorder,
+            waiting: 0,
+            file: file.to_owned(),
+        };
+        let ended = live::run(table, time, options.deadline, &mut recording)?;
+        if ended.rows == 0
+            && let Some(error) = ended.error
+        {
+            return Err(error);
+        }
+        let sink = recording.recorder.finish().map_err(Error::recording(file))?;
+        return Ok((sink, ended.rows, ended.error));
+    }
+    let (mut rows, mut recorder) = (TableRows::new(table, time), recorder);
+    let mut go = |_| ControlFlow::Continue(());
+    let count = fewbits_recipes::pack::fill(&mut rows, &mut recorder, &mut go).map_err(Error::recipe(file))?;
+    let sink = recorder.finish().map_err(Error::recording(file))?;
+    Ok((sink, count, None))
+}
+
+/// The options with which a table continues a recording: its columns in their order, and its times.
+fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<TableOptions, Error> {
+    let has_time = schema.time() != TimeBase::Numbered;
+    if !has_time && (options.time.is_some() || options.time_column.is_some()) {
+        let problem =
+            "its rows have no times: leave out --time and --time-column, or pack the table into a file of its own";
+        return Err(Error::content(file, problem));
+    }
+    Ok(TableOptions {
+        // The recording's own tolerance holds.
+        time: has_time.then(|| "exact".to_owned()),
+        ..options.clone()
+    })
+}
+
+/// Continues a recording. A table that is refused leaves the recording as it was.
+fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, Option<Error>), Error> {
+    let file = path.display().to_string();
+    let schema = Playback::open(path).map_err(Error::recording(&file))?.schema().clone();
+    let table_options = continued(&options.table, &schema, &file)?;
+    let open = || -> Result<Table, Error> {
+        let table = Table::open(&table_options)?;
+        if !schema
+            .columns()
+            .iter()
+            .map(fewbits_record::Column::name)
+            .eq(table.names.iter())
+        {
+            let names = table.names.join(", ");
+            let problem = format!("columns {names}: {file} has other columns, choose and order them with --columns");
+            return Err(Error::content(table.file(), problem));
+        }
+        Ok(table)
+    };
+    let table = open()?;
+    if is_regular(&options.table.file) {
+        TableRows::new(open()?, schema.time()).check()?;
+    }
+    let recorder = Recorder::resume(path)
+        .map_err(Error::recording(&file))?
+        .with_effort(effort);
+    // The old index was removed and counts as written anew.
+    let before = recorder.bytes();
+    let (mut sink, rows, error) = fill(table, recorder, options, &file)?;
+    let bytes = size_of(&mut sink).map_err(Error::recording(&file))?;
+    Ok((Done::of(rows, bytes.saturating_sub(before), &schema), error))
+}
+
+fn create(options: &PackOptions, effort: Effort) -> Result<(Done, Option<Error>), Error> {
+    let (table, schema) = schema(&options.table, &options.bounds)?;
+    let sink = Target::open_binary(options.output.as_deref())?;
+    let file = sink.name().to_owned();
+    let recorder = Recorder::new(Counted { sink, bytes: 0 }, schema.clone()).with_effort(effort);
+    let (counted, rows, error) = fill(table, recorder, options, &file)?;
+    if error.is_none() {
+        counted.sink.finish()?;
+    }
+    Ok((Done::of(rows, counted.bytes, &schema), error))
 }
 
 /// Runs the task.
 pub(crate) fn run(options: &PackOptions) -> Result<Ending, Error> {
     let effort = if options.fast { Effort::Fast } else { Effort::Thorough };
-    let (rows, bytes, columns) = match (&options.output, options.append) {
-        (Some(path), true) => {
-            let file = path.display().to_string();
-            let mut recorder = Recorder::resume(path)
-                .map_err(Error::recording(&file))?
-                .with_effort(effort);
-            let mut table = Table::open(&options.table)?;
-            let columns = recorder.schema().columns();
-            if !columns.iter().map(fewbits_record::Column::name).eq(table.names.iter()) {
-                let names = table.names.join(", ");
-                let problem =
-                    format!("columns {names}: {file} has other columns, choose and order them with --columns");
-                return Err(Error::content(table.file(), problem));
-            }
-            // The old index was removed and counts as written anew.
-            let (columns, before) = (columns.len(), recorder.bytes());
-            let rows = fill(&mut table, &mut recorder, &file)?;
-            let bytes = recorder
-                .finish()
-                .and_then(|mut file| size_of(&mut file))
-                .map_err(Error::recording(&file))?;
-            (rows, bytes.saturating_sub(before), columns)
-        }
-        (path, _) => {
-            let (mut table, schema) = schema(&options.table, &options.bounds)?;
-            let (sink, file) = output::open_binary(path.as_deref())?;
-            let columns = schema.columns().len();
-            let mut recorder = Recorder::new(Counted { sink, bytes: 0 }, schema).with_effort(effort);
-            let rows = fill(&mut table, &mut recorder, &file)?;
-            let counted = recorder.finish().map_err(Error::recording(&file))?;
-            (rows, counted.bytes, columns)
-        }
-    };
-    let samples = (rows * columns as u64).max(1);
-    let done = Done {
-        rows,
-        bytes,
-        bits_per_sample: 8.0 * bytes as f64 / samples as f64,
+    let (done, error) = match (&options.output, options.append) {
+        (Some(path), true) => append(options, path, effort)?,
+        _ => create(options, effort)?,
     };
     if options.json {
-        serde_json::to_writer(stderr(), &done)?;
-        eprintln!();
+        say!("{}", serde_json::to_string(&done)?);
     } else {
-        eprint!("{rows} rows of {columns} columns in {bytes} bytes");
-        match rows {
-            0 => eprintln!(),
-            _ => eprintln!(", {:.3} bits per sample", done.bits_per_sample),
+        let (rows, columns, bytes) = (done.rows, done.bounds.len(), done.bytes);
+        let bits = match rows {
+            0 => String::new(),
+            _ => format!(", {:.3} bits per sample", done.bits_per_sample),
+        };
+        say!("{rows} rows of {columns} columns in {bytes} bytes{bits}; bounds: {}", done.summary);
+    }
+    match error {
+        None => Ok(Ending::Good),
+        Some(error) => {
+            say!("{} rows before the error were packed", done.rows);
+            Err(error)
         }
     }
-    Ok(Ending::Good)
+}
+
+impl Done {
+    fn of(rows: u64, bytes: u64, schema: &Schema) -> Self {
+        let columns = schema.columns();
+        let samples = (rows * columns.len() as u64).max(1);
+        let bound = |column: &fewbits_record::Column| {
+            let bound = bounds::shown(column.bound(), column.period());
+            (column.name().to_owned(), bound)
+        };
+        Self {
+            rows,
+            bytes,
+            bits_per_sample: 8.0 * bytes as f64 / samples as f64,
+            bounds: columns.iter().map(bound).collect(),
+            summary: bounds::summary(columns),
+        }
+    }
 }
 
 fn size_of(file: &mut std::fs::File) -> Result<u64, fewbits_record::Error> {

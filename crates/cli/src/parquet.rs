@@ -2,6 +2,7 @@
 
 use crate::clock;
 use crate::error::Error;
+use crate::target::Target;
 use arrow_array::cast::AsArray;
 use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::Field;
@@ -117,7 +118,7 @@ fn texts(batch: &RecordBatch) -> Vec<Vec<String>> {
 
 /// Rows of a recording as Parquet.
 pub(crate) struct Sink {
-    writer: ArrowWriter<File>,
+    writer: ArrowWriter<Target>,
     schema: Schema,
     block: Block,
     file: String,
@@ -127,7 +128,7 @@ impl Sink {
     /// Rows of these columns.
     pub(crate) fn create(path: &Path, schema: &Schema, names: &[String]) -> Result<Self, Error> {
         let file = path.display().to_string();
-        let target = File::create(path).map_err(Error::io(&file, "create"))?;
+        let target = Target::open(Some(path))?;
         let kept = names
             .iter()
             .map(|name| schema.position(name).map(|i| schema.columns()[i].clone()));
@@ -176,8 +177,8 @@ impl Sink {
     }
 
     /// Writes the remaining rows and the end of the file, without which it cannot be read.
-    pub(crate) fn finish(&mut self) -> Result<(), Error> {
+    pub(crate) fn finish(mut self) -> Result<(), Error> {
         self.write_batch()?;
-        self.writer.finish().map(drop).map_err(refused(&self.file))
+        self.writer.into_inner().map_err(refused(&self.file))?.finish()
     }
 }

@@ -2,8 +2,10 @@
 
 use crate::arguments::{CatOptions, UnpackOptions};
 use crate::error::Error;
+use crate::files::is_regular;
 use crate::output::{Shape, Writer};
-use crate::{Ending, clock};
+use crate::say::say;
+use crate::{Ending, clock, recording};
 use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase};
 
 impl UnpackOptions {
@@ -66,7 +68,7 @@ pub(crate) fn write_blocks(
         let block = match block {
             Ok(block) => block,
             Err(error @ fewbits_record::Error::Block { .. }) => {
-                eprintln!("warning: {file}: {error}; the rest is read");
+                say!("warning: {file}: {error}; the rest is read");
                 ending = Ending::Failed;
                 continue;
             }
@@ -88,25 +90,33 @@ pub(crate) fn write_blocks(
 
 /// Runs the task.
 pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
-    let file = options.file.as_str();
     let shape = Shape::of(options.json);
-    if file == "-" {
-        let blocks = BlockReader::new(std::io::stdin().lock()).map_err(Error::recording("standard input"))?;
+    // What is no file is read once, from front to end.
+    if !is_regular(&options.file) {
+        let (source, file) = recording::stream(&options.file)?;
+        let blocks = BlockReader::new(source).map_err(Error::recording(file))?;
         let selection = selection(options, blocks.schema())?;
         let mut writer = Writer::new(options.output.as_deref(), shape, blocks.schema(), &selection.names)?;
         let ticks = (selection.from, selection.to);
-        let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, "standard input")?;
+        let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, file)?;
         return writer.finish().map(|()| ending);
     }
+    let file = options.file.as_str();
     let mut playback = Playback::open(file).map_err(Error::recording(file))?;
     let selection = selection(options, playback.schema())?;
     let mut writer = Writer::new(options.output.as_deref(), shape, playback.schema(), &selection.names)?;
     let names: Vec<&str> = selection.names.iter().map(String::as_str).collect();
     playback.columns(&names).map_err(Error::recording(file))?;
+    let is_finished = playback.has_index();
     let ticks = (selection.from, selection.to);
     let blocks = playback.blocks_between(ticks.0, ticks.1);
     let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, file)?;
-    writer.finish().map(|()| ending)
+    writer.finish()?;
+    if !is_finished {
+        say!("warning: {file}: the end is missing (not finished, or cut off): rows may be missing behind the last");
+        return Ok(Ending::Failed);
+    }
+    Ok(ending)
 }
 
 /// All columns of a schema.

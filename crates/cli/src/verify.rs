@@ -1,141 +1,189 @@
 //! `fewbits verify`: checks a recording against its table and error bounds.
 
-use crate::arguments::VerifyOptions;
+use crate::arguments::{TableOptions, VerifyOptions};
 use crate::error::Error;
 use crate::input::Table;
-use crate::{Ending, bounds, clock, numbers, output};
-use fewbits_record::Playback;
+use crate::rows::TableRows;
+use crate::{Ending, clock, numbers, output, recording, say};
+use fewbits_recipes::names;
+use fewbits_recipes::verify::{CellFailure, Verdict, verify as recipe};
+use fewbits_record::{Schema, TimeBase};
 use serde::Serialize;
+use std::fmt::Write;
+use std::ops::ControlFlow;
 
-/// Largest number of failures of a column that are shown.
-const SHOWN: usize = 3;
-
+/// The verdict with failures as text.
 #[derive(Serialize)]
-struct Verdict {
+struct Shown<'a> {
     rows: u64,
+    times_checked: bool,
     ticks_failed: u64,
     missing_rows: u64,
+    extra_rows: u64,
+    damage: Option<&'a str>,
+    /// Whether the recording has its end.
+    finished: bool,
     holds: bool,
-    columns: Vec<ColumnVerdict>,
+    columns: Vec<ShownColumn<'a>>,
+    not_compared: &'a [String],
+    #[serde(skip)]
+    has_time: bool,
 }
 
 #[derive(Serialize)]
-struct ColumnVerdict {
-    name: String,
-    bound: String,
+struct ShownColumn<'a> {
+    name: &'a str,
+    bound: &'a str,
     largest_error: f64,
     failed: u64,
     first_failures: Vec<String>,
 }
 
+/// Names by which a column of times is known.
+const TIME_NAMES: [&str; 6] = ["time", "timestamp", "datetime", "date", "seconds", "t"];
+
+/// Index of the column of times among all names of a table: the named one, or the likeliest of those that the recording has not.
+fn time_column(options: &TableOptions, all: &[String], schema: &Schema, file: &str) -> Result<Option<usize>, Error> {
+    if schema.time() == TimeBase::Numbered {
+        return Ok(None);
+    }
+    if let Some(name) = &options.time_column {
+        return names::position(all, name).map(Some).map_err(Error::recipe(file));
+    }
+    // A name that stands once more in the table than in the recording is left over too.
+    let of_recording = |name: &str| schema.columns().iter().filter(|column| column.name() == name).count();
+    let of_table = |name: &str| all.iter().filter(|known| *known == name).count();
+    let left_over: Vec<usize> = (0..all.len())
+        .filter(|i| of_table(&all[*i]) > of_recording(&all[*i]))
+        .collect();
+    let is_time = |i: &&usize| TIME_NAMES.contains(&all[**i].to_lowercase().as_str());
+    let likeliest = left_over.iter().find(is_time).or(left_over.first());
+    Ok(likeliest.copied())
+}
+
+/// Chooses the columns of the table that the recording has, by name. Returns the index in the recording of each.
+fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result<Vec<usize>, Error> {
+    let (all, file) = (table.names.clone(), table.file().to_owned());
+    let time = time_column(options, &all, schema, &file)?;
+    let (mut columns, mut matches) = (Vec::new(), Vec::new());
+    for (index, column) in schema.columns().iter().enumerate() {
+        let name = column.name();
+        if !options.columns.is_empty() && !options.columns.iter().any(|asked| asked == name) {
+            continue;
+        }
+        let found = (0..all.len()).find(|i| all[*i] == name && Some(*i) != time && !columns.contains(i));
+        let Some(found) = found else {
+            return Err(Error::no_column(&file, name, &all));
+        };
+        columns.push(found);
+        matches.push(index);
+    }
+    if let Some(name) = options.columns.iter().find(|name| schema.position(name).is_err()) {
+        let names: Vec<&str> = schema.columns().iter().map(fewbits_record::Column::name).collect();
+        let problem = format!("--columns: the recording has no column `{name}`, there are {}", names::shown(&names));
+        return Err(Error::content(&file, problem));
+    }
+    table.choose(time, columns);
+    Ok(matches)
+}
+
 /// Runs the task.
 pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
     let file = options.packed.display().to_string();
-    let mut playback = Playback::open(&options.packed).map_err(Error::recording(&file))?;
+    let mut playback = recording::open(&options.packed)?;
     let schema = playback.schema().clone();
-    let (time, tolerance) = (schema.time(), schema.time().tolerance());
-    let mut table_options = options.table.clone();
-    let has_time = time != fewbits_record::TimeBase::Numbered;
-    if has_time && table_options.time.is_none() {
-        table_options.time = Some("exact".to_owned());
-    }
-    if table_options.columns.is_empty() {
-        table_options.columns = schema.columns().iter().map(|column| column.name().to_owned()).collect();
-    }
-    let mut table = Table::open(&table_options)?;
-    let mut verdict = Verdict {
-        rows: 0,
-        ticks_failed: 0,
-        missing_rows: 0,
-        holds: true,
-        columns: schema
-            .columns()
-            .iter()
-            .map(|column| ColumnVerdict {
-                name: column.name().to_owned(),
-                bound: bounds::shown(column.bound(), column.period()),
-                largest_error: 0.0,
-                failed: 0,
-                first_failures: Vec::new(),
-            })
-            .collect(),
-    };
-    for block in playback.blocks() {
-        let block = block.map_err(Error::recording(&file))?;
-        for (row, tick) in block.ticks.iter().enumerate() {
-            let Some((original, cells)) = table.next(time)? else {
-                let problem = format!("has more rows than {}, which has {}", table.file(), verdict.rows);
-                return Err(Error::content(&file, problem));
-            };
-            verdict.rows += 1;
-            if original.is_some_and(|original| original.abs_diff(*tick) > tolerance) {
-                verdict.ticks_failed += 1;
-            }
-            for (i, (column, sample)) in schema.columns().iter().zip(&cells).enumerate() {
-                let (restored, result) = (block.columns[i][row], &mut verdict.columns[i]);
-                if let (Some(a), Some(b)) = (sample, restored)
-                    && a.is_finite()
-                    && b.is_finite()
-                {
-                    // On a circle the error is the distance along the shorter arc.
-                    let turns = column
-                        .period()
-                        .map_or(0.0, |period| period * ((a - b) / period).round());
-                    result.largest_error = result.largest_error.max((a - b - turns).abs());
-                }
-                if !column.keeps(*sample, restored, block.share_bounds[i]) {
-                    result.failed += 1;
-                    if result.first_failures.len() < SHOWN {
-                        let (row, at) = (verdict.rows, clock::shown(*tick, time));
-                        let told = |cell: Option<f64>| cell.map_or("a gap".to_owned(), |value| value.to_string());
-                        let (sample, restored) = (told(*sample), told(restored));
-                        let failure = format!("row {row} (tick {at}): {sample} was restored as {restored}");
-                        result.first_failures.push(failure);
-                    }
-                }
-            }
-        }
-    }
-    while table.next(time)?.is_some() {
-        verdict.missing_rows += 1;
-    }
-    verdict.holds = verdict.ticks_failed == 0
-        && verdict.missing_rows == 0
-        && verdict.columns.iter().all(|column| column.failed == 0);
+    let mut table = Table::open(&TableOptions {
+        time: None,
+        time_column: None,
+        columns: Vec::new(),
+        ..options.table.clone()
+    })?;
+    let matches = matched(&mut table, &options.table, &schema)?;
+    let mut rows = TableRows::new(table, schema.time());
+    let mut go = |_| ControlFlow::Continue(());
+    let verdict = recipe(&mut playback, &mut rows, &matches, &mut go).map_err(Error::recipe(&file))?;
+    let verdict = shown(&verdict, &schema, playback.has_index());
     if options.json {
         output::json(&verdict)?;
     } else {
-        print(&verdict);
+        output::print(&text(&verdict))?;
     }
     Ok(if verdict.holds { Ending::Good } else { Ending::Failed })
 }
 
-fn print(verdict: &Verdict) {
+fn failure(failure: &CellFailure, time: TimeBase) -> String {
+    let told = |cell: Option<f64>| cell.map_or("a gap".to_owned(), |value| value.to_string());
+    let (sample, restored) = (told(failure.sample), told(failure.restored));
+    format!(
+        "row {} (tick {}): {sample} was restored as {restored}",
+        failure.row,
+        clock::shown(failure.tick, time)
+    )
+}
+
+fn shown<'a>(verdict: &'a Verdict, schema: &Schema, finished: bool) -> Shown<'a> {
+    let columns = verdict.columns.iter().map(|column| ShownColumn {
+        name: &column.name,
+        bound: &column.bound,
+        largest_error: column.largest_error,
+        failed: column.failed,
+        first_failures: column
+            .first_failures
+            .iter()
+            .map(|one| failure(one, schema.time()))
+            .collect(),
+    });
+    Shown {
+        rows: verdict.rows,
+        times_checked: verdict.times_checked,
+        ticks_failed: verdict.ticks_failed,
+        missing_rows: verdict.missing_rows,
+        extra_rows: verdict.extra_rows,
+        damage: verdict.damage.as_deref(),
+        finished,
+        holds: verdict.holds,
+        columns: columns.collect(),
+        not_compared: &verdict.not_compared,
+        has_time: schema.time() != TimeBase::Numbered,
+    }
+}
+
+/// The verdict for people. Writing to a string cannot fail.
+fn text(verdict: &Shown<'_>) -> String {
+    let mut text = String::new();
     for column in &verdict.columns {
-        let state = if column.failed == 0 {
-            "holds".to_owned()
-        } else {
-            format!("FAILS in {} rows", column.failed)
+        let state = match column.failed {
+            0 => "holds".to_owned(),
+            failed => format!("FAILS in {failed} rows"),
         };
-        let largest = numbers::short(column.largest_error);
-        println!("{}: {} {state}, largest error {largest}", column.name, column.bound);
+        let (name, largest) = (say::name(column.name), numbers::short(column.largest_error));
+        let _ = writeln!(text, "{name}: {} {state}, largest error {largest}", column.bound);
         for failure in &column.first_failures {
-            println!("  {failure}");
+            let _ = writeln!(text, "  {failure}");
         }
     }
     if verdict.ticks_failed > 0 {
-        println!("time: FAILS in {} rows", verdict.ticks_failed);
+        let _ = writeln!(text, "time: FAILS in {} rows", verdict.ticks_failed);
+    }
+    if verdict.has_time && !verdict.times_checked {
+        let _ = writeln!(text, "time: not compared, name the table's column with --time-column");
+    }
+    if let Some(damage) = verdict.damage {
+        let _ = writeln!(text, "{damage}; nothing was compared behind them");
     }
     if verdict.missing_rows > 0 {
-        println!("{} rows are missing at the end", verdict.missing_rows);
+        let _ = writeln!(text, "{} rows are missing at the end", verdict.missing_rows);
     }
-    println!(
-        "{} rows: {}",
-        verdict.rows,
-        if verdict.holds {
-            "all promises hold"
-        } else {
-            "promises FAIL"
-        }
-    );
+    if verdict.extra_rows > 0 {
+        let _ = writeln!(text, "the recording has more rows than the table, at least {}", verdict.extra_rows);
+    }
+    if !verdict.not_compared.is_empty() {
+        let _ = writeln!(text, "not compared: {}", say::name(&names::shown(verdict.not_compared)));
+    }
+    let all = match verdict.not_compared.is_empty() {
+        true => "all promises hold".to_owned(),
+        false => format!("the promises of {} columns hold", verdict.columns.len()),
+    };
+    let _ = writeln!(text, "{} rows: {}", verdict.rows, if verdict.holds { &all } else { "promises FAIL" });
+    text
 }

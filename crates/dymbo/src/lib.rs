@@ -6,8 +6,8 @@
 //! and Roumeliotis call it the sign-of-innovations filter; the paper that this crate follows calls it Dymbo.
 //!
 //! The filters keep **a mean and a variance and use closed forms**: no particles, no grid, no table. The variances do not depend on
-//! the data. The cost: the belief is a normal density with the posterior's moments, not the exact posterior. [`chain`] and [`tree`]
-//! compute what that adds to the mean squared error: 0.02 % for the paper's parameters, at most 0.14 % for `|a| <= 1`, `gamma <= 1`. A
+//! the data. The cost: the belief is a normal density with the posterior's moments, not the exact posterior. [`chain`]
+//! computes what that adds to the mean squared error: 0.02 % for the paper's parameters, at most 0.14 % for `|a| <= 1`, `gamma <= 1`. A
 //! better estimator from the same bits can gain no more.
 //!
 //! | task | item |
@@ -16,8 +16,7 @@
 //! | the filter, one bit | [`DymboFilter`] |
 //! | several bits per sample, several sensors, vector states | [`MultibitFilter`], [`ParallelFilter`], [`SignFilter`] |
 //! | one slot of sensor, link and filter in one call | [`ScalarFilter::exchange`] |
-//! | expected errors | [`steady`] (closed forms, contours), [`chain`] and [`tree`] (exact errors), [`gap`] (beside the exact posterior) |
-//! | comparisons of the publications: how normal the posterior is, successive bits of one sample | [`published`] |
+//! | expected errors | [`steady`] (closed forms, contours), [`chain`] (exact errors) |
 //!
 //! The likelihood of a report is a [`Factor`](fewbits_core::Factor), for any threshold and any [`Link`](fewbits_core::Link).
 //! `fewbits_filters::assumed_density::update` applies it to a Gaussian belief; the filters here are closed forms of that update. A
@@ -48,15 +47,12 @@ mod centre;
 pub mod chain;
 mod filter;
 mod first_message;
-pub mod gap;
 mod innovation_word;
 mod multibit;
 mod parallel;
 mod plant;
-pub mod published;
 pub mod sign_bit;
 pub mod steady;
-pub mod tree;
 mod vector;
 
 pub use centre::{ParallelEstimator, ScalarEstimator};

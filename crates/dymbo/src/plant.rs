@@ -110,12 +110,6 @@ impl ScalarPlant {
         scalar(self.coefficient() * belief.mean()[0], self.dynamics.predict_variance(belief.covariance()[0]))
     }
 
-    /// The largest variance of the state within `steps` slots without any message, from `start` on.
-    pub(crate) fn widest_variance(&self, start: f64, steps: usize) -> f64 {
-        let variances = std::iter::successors(Some(start), |variance| Some(self.dynamics.predict_variance(*variance)));
-        variances.take(steps + 1).fold(start, f64::max)
-    }
-
     /// The steady predicted and filtered variances if each message brings the fraction `information` of a full measurement's information.
     ///
     /// # Errors

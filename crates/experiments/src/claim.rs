@@ -9,9 +9,10 @@
 
 use crate::measured::Measured;
 use crate::reference;
-use crate::schema::Value;
+use crate::schema::{Table, Value};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::rc::Rc;
 
@@ -88,6 +89,8 @@ macro_rules! comparisons {
 pub struct Claims {
     figure: &'static str,
     made: Rc<RefCell<Vec<Claim>>>,
+    /// The quantities of which references were looked at.
+    compared: Rc<RefCell<BTreeSet<String>>>,
     erratum: Option<&'static str>,
     /// Whether a value may be below its reference by any amount.
     one_sided: bool,
@@ -103,6 +106,7 @@ impl Claims {
         Self {
             figure,
             made: Rc::default(),
+            compared: Rc::default(),
             erratum: None,
             one_sided: false,
             limits: [false; 2],
@@ -260,6 +264,7 @@ impl Claims {
         rows: impl IntoIterator<Item = R>,
         key_and_value: impl Fn(R) -> (String, V),
     ) {
+        self.compared.borrow_mut().insert(quantity.to_owned());
         let rows: Vec<_> = rows.into_iter().map(key_and_value).collect();
         let known = match reference::group(self.figure, quantity) {
             Ok(known) if !known.is_empty() => known,
@@ -300,6 +305,59 @@ impl Claims {
         value: impl Fn(&R) -> V,
     ) {
         self.references(quantity, statement, rows, |row| (row.key(), value(row)));
+    }
+
+    /// The references of this quantity stand in a column beside ours, and are not met: nothing is compared with them.
+    pub fn shown(&self, quantity: &str) {
+        self.compared.borrow_mut().insert(quantity.to_owned());
+    }
+
+    /// Compares each column of keyed rows that has references under its own name, unless the figure did so itself. References that
+    /// nothing was compared with fail.
+    pub(crate) fn compare(&self, tables: &[Table]) {
+        let quantities = reference::quantities(self.figure).unwrap_or_default();
+        let open: Vec<&str> = {
+            let compared = self.compared.borrow();
+            quantities
+                .into_iter()
+                .filter(|quantity| !compared.contains(*quantity))
+                .collect()
+        };
+        for quantity in open {
+            let column = |table: &Table| {
+                table
+                    .columns
+                    .iter()
+                    .position(|column| column.name == quantity.replace('-', "_"))
+            };
+            let keyed = |table: &&Table| table.keys.iter().any(Option::is_some) && column(table).is_some();
+            let Some((table, i)) = tables
+                .iter()
+                .find(keyed)
+                .and_then(|table| Some((table, column(table)?)))
+            else {
+                let what =
+                    format!("the references `{quantity}` are compared with a column of that name, or by a claim");
+                self.at_defaults()
+                    .at_least(format!("{quantity}-references"), what, 0.0, 1.0);
+                continue;
+            };
+            let number = |value: Option<&Value>| match value {
+                Some(Value::Number(number)) => Some(*number),
+                Some(Value::Integer(count)) => Some(*count as f64),
+                _ => None,
+            };
+            let has_error = table
+                .columns
+                .get(i + 1)
+                .is_some_and(|next| next.name == format!("{}_se", table.columns[i].name));
+            let cells = table.keys.iter().zip(&table.rows).map(|(key, row)| {
+                let error = if has_error { number(row.get(i + 1)) } else { None };
+                (key.clone().unwrap_or_default(), number(row.get(i)).map(|value| Measured::new(value, error)))
+            });
+            let statement = table.columns[i].meaning.trim_end_matches('.');
+            self.references(quantity, statement, cells, |cell| cell);
+        }
     }
 
     /// All that were made.

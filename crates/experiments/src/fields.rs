@@ -83,7 +83,7 @@ macro_rules! parameters {
             }
         }
 
-        $crate::rows! { @fields $name $($field: $type [] concat!("" $(, $doc)* $(, $meaning)?),)* }
+        $crate::rows! { @fields $name [] $($field: $type [] [] concat!("" $(, $doc)* $(, $meaning)?),)* }
     };
 }
 
@@ -105,8 +105,12 @@ macro_rules! limits {
 
 /// Structs of rows, and structs of lists of them ([`Field`](crate::schema::Field)): the fields are the columns, each with its unit
 /// and its meaning behind its type. The meaning is the field's documentation; one that is longer than a line may stand above the
-/// field instead. A row that is compared with references says by which of its fields it is found: `struct Row by "{distance} m"`
-/// ([`Claims::keyed`](crate::Claims::keyed)).
+/// field instead. A row that is compared with references says by which of its fields it is found: `struct Row by "{distance} m"`.
+/// Each column of such rows that has references under its own name is compared with them, without a word in the claims.
+///
+/// What a field is in the default plot stands behind its type and unit, with what it is called there: `as panel("ratio {}")`,
+/// `as x("time t")`, `as key`, `as line("exact")`, `as dashed("bound")`, `as points("simulated")`, `as curve("mean")`.
+/// [`figure!`](crate::figure!) then draws the rows.
 ///
 /// ```
 /// fewbits_experiments::rows! {
@@ -120,11 +124,12 @@ macro_rules! limits {
 /// ```
 #[macro_export]
 macro_rules! rows {
-    (@fields $name:ident $($field:ident: $type:ty [$($unit:tt)?] $meaning:expr,)*) => {
+    (@fields $name:ident [$($key:literal)?] $($field:ident: $type:ty [$($unit:tt)?] [$($role:ident $($label:literal)?)?] $meaning:expr,)*) => {
         impl $crate::schema::Field for $name {
             fn describe(_: $crate::Column, to: &mut $crate::schema::Described) {
                 $(<$type as $crate::schema::Field>::describe(
-                    $crate::Column::of(stringify!($field), concat!("" $(, $unit)?), $meaning),
+                    $crate::Column::of(stringify!($field), concat!("" $(, $unit)?), $meaning)
+                        $(.drawn($crate::role!($role), concat!("" $(, $label)?)))?,
                     to,
                 );)*
             }
@@ -132,6 +137,11 @@ macro_rules! rows {
             fn put(&self, to: &mut $crate::schema::Cells) {
                 $($crate::schema::Field::put(&self.$field, to);)*
             }
+
+            $(fn found_by(&self) -> Option<String> {
+                const _: &str = $key;
+                Some($crate::claim::Keyed::key(self))
+            })?
         }
     };
     (@keyed $name:ident [] [$($field:ident)*]) => {};
@@ -147,7 +157,8 @@ macro_rules! rows {
     ($(
         $(#[$outer:meta])*
         $visible:vis struct $name:ident $(by $key:literal)? {
-            $($(#[doc = $doc:literal])* $shown:vis $field:ident: $type:ty $([$unit:tt])? $(=> $meaning:literal)?,)*
+            $($(#[doc = $doc:literal])* $shown:vis $field:ident: $type:ty $([$unit:tt])? $(as $role:ident $(($label:literal))?)?
+                $(=> $meaning:literal)?,)*
         }
     )*) => {$(
         $crate::rows! { @keyed $name [$($key)?] [$($field)*] }
@@ -156,8 +167,35 @@ macro_rules! rows {
             $($(#[doc = $doc])* $(#[doc = $meaning])? $shown $field: $type,)*
         }
 
-        $crate::rows! { @fields $name $($field: $type [$($unit)?] concat!("" $(, $doc)* $(, $meaning)?),)* }
+        $crate::rows! { @fields $name [$($key)?] $($field: $type [$($unit)?] [$($role $($label)?)?] concat!("" $(, $doc)* $(, $meaning)?),)* }
     )*};
+}
+
+/// The [`Role`](crate::schema::Role) of a column as [`rows!`](crate::rows!) writes it.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! role {
+    (panel) => {
+        $crate::schema::Role::Panel
+    };
+    (x) => {
+        $crate::schema::Role::X
+    };
+    (key) => {
+        $crate::schema::Role::Key
+    };
+    (line) => {
+        $crate::schema::Role::Line
+    };
+    (dashed) => {
+        $crate::schema::Role::Dashed
+    };
+    (points) => {
+        $crate::schema::Role::Points
+    };
+    (curve) => {
+        $crate::schema::Role::Curve
+    };
 }
 
 /// What stands at the head of a [`Figure`](crate::Figure): its parameters and tables, its id, its title, where in the
@@ -165,9 +203,19 @@ macro_rules! rows {
 ///
 /// `figure!(Parameters => Vec<Row>, "demo-fig1", "Averages", "the paper, figure 1", "What it shows.");`
 ///
+/// With the axes behind the caption, `"What it shows."; semilog("error / m")` (or `linear`, `loglog`), it also draws the first table
+/// whose columns have roles ([`rows!`](crate::rows!)).
+///
 /// Where many figures are values of one type, a field says what stands above: `figure!(Parameters => Vec<Row>, about);`.
 #[macro_export]
 macro_rules! figure {
+    ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal; $panel:ident($y:expr)) => {
+        $crate::figure!($parameters => $tables, $id, $title, $source, $caption);
+
+        fn plot(&self, _: &Self::Parameters, tables: &Self::Tables) -> $crate::plot::Plot {
+            $crate::plotted(tables, $title, |title, x| $crate::plot::Panel::$panel(title, x, $y))
+        }
+    };
     ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal) => {
         type Parameters = $parameters;
         type Tables = $tables;

@@ -5,9 +5,10 @@ use crate::claim::{Claim, Claims};
 use crate::error::Error;
 use crate::kept::Kept;
 use crate::parameters;
-use crate::plot::Plot;
 use crate::schema::{self, Field, Table};
+use crate::words::in_words;
 use fewbits_monte_carlo::{MonteCarlo, Stream};
+use fewbits_plot::Plot;
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value as Json};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -121,7 +122,7 @@ pub trait Figure: Sync {
     /// A flat struct whose `Default` is the paper's setting unless [`Figure::defaults`] says otherwise, and whose fields have
     /// documentation and limits:
     /// [`parameters!`](crate::parameters!) writes it.
-    type Parameters: Serialize + DeserializeOwned + Argument + Default + Quick;
+    type Parameters: Serialize + DeserializeOwned + Argument + Default + Quick + Send + Sync;
 
     /// `Vec<Row>`, or a struct of such lists (the first is the main table): see [`Table::of`].
     type Tables: Field;
@@ -160,8 +161,6 @@ pub trait Figure: Sync {
 /// What came out of one run.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// All parameters as they were used.
-    pub parameters: Map<String, Json>,
     /// The tables, main table first.
     pub tables: Vec<Table>,
     /// The judged claims.
@@ -184,22 +183,48 @@ pub trait AnyFigure: Sync {
     /// The tables and their columns, main table first, without rows.
     fn tables(&self) -> Vec<Table>;
 
-    /// The defaults, quickened if asked for, with `overrides` (`name`, text) applied on top, checked.
+    /// A run of the defaults, quickened if asked for, with `overrides` (`name`, text) applied on top.
     ///
     /// A list is written `0.5,0.9`, a list of points `0.5:0.1,0.9:0.2` (entries in the order of the point's fields).
     ///
     /// # Errors
     /// If a parameter is unknown or out of range, or the run would be too large.
-    fn configure(&self, overrides: &[(String, String)], quick: bool) -> Result<Map<String, Json>, Error>;
+    fn configure(&self, overrides: &[(String, String)], quick: bool) -> Result<Run<'_>, Error>;
 
-    /// Runs the figure with a full set of parameters, as [`AnyFigure::configure`] gives it.
+    /// A run with a full set of parameters, as [`Run::parameters`] has it.
     ///
     /// # Errors
-    /// If a parameter is refused or a computation fails.
-    fn produce(&self, parameters: &Map<String, Json>, context: &Context<'_>) -> Result<Outcome, Error>;
+    /// If a parameter is refused, or the run would be too large.
+    fn with(&self, parameters: Map<String, Json>) -> Result<Run<'_>, Error>;
 }
 
-/// A checked set of parameters, as [`AnyFigure::produce`] takes it.
+/// A figure with checked parameters, ready to be run.
+pub struct Run<'a> {
+    /// All parameters.
+    pub parameters: Map<String, Json>,
+    work: Box<dyn Fn(&Context<'_>) -> Result<Outcome, Error> + Send + Sync + 'a>,
+}
+
+impl<'a> Run<'a> {
+    /// A run that does this.
+    pub fn of(
+        parameters: Map<String, Json>,
+        work: impl Fn(&Context<'_>) -> Result<Outcome, Error> + Send + Sync + 'a,
+    ) -> Self {
+        let work = Box::new(work);
+        Self { parameters, work }
+    }
+
+    /// Computes the rows, judges them and draws them.
+    ///
+    /// # Errors
+    /// If a computation fails or the run is cancelled.
+    pub fn outcome(&self, context: &Context<'_>) -> Result<Outcome, Error> {
+        (self.work)(context)
+    }
+}
+
+/// A checked set of parameters.
 fn typed<F: Figure>(figure: &F, map: &Map<String, Json>) -> Result<F::Parameters, Error> {
     let id = Figure::about(figure).id;
     let parameters: F::Parameters = parameters::typed(id, map)?;
@@ -237,7 +262,7 @@ impl<F: Figure> AnyFigure for F {
         schema::tables::<F::Tables>()
     }
 
-    fn configure(&self, overrides: &[(String, String)], quick: bool) -> Result<Map<String, Json>, Error> {
+    fn configure(&self, overrides: &[(String, String)], quick: bool) -> Result<Run<'_>, Error> {
         let figure = Figure::about(self).id;
         let mut start = self.defaults();
         if quick {
@@ -247,22 +272,21 @@ impl<F: Figure> AnyFigure for F {
         for (name, text) in overrides {
             parameters::set(figure, &mut values, &described, name, text)?;
         }
-        typed(self, &values)?;
-        Ok(values)
+        self.with(values)
     }
 
-    fn produce(&self, parameters: &Map<String, Json>, context: &Context<'_>) -> Result<Outcome, Error> {
-        let typed = typed(self, parameters)?;
-        let rows = self.run(&typed, context)?;
-        let tables = Table::of(&rows)?;
-        let (defaults, full) = parameters::meaning(parameters, &parameters::map(&self.defaults()));
-        let mut claims = Claims::about(Figure::about(self).id, defaults, full);
-        Figure::claims(self, &typed, &rows, &mut claims);
-        Ok(Outcome {
-            parameters: parameters.clone(),
-            tables,
-            claims: claims.made(),
-            plot: self.plot(&typed, &rows),
-        })
+    fn with(&self, parameters: Map<String, Json>) -> Result<Run<'_>, Error> {
+        let typed = typed(self, &parameters)?;
+        let (defaults, full) = parameters::meaning(&parameters, &parameters::map(&self.defaults()));
+        Ok(Run::of(parameters, move |context| {
+            let rows = self.run(&typed, context)?;
+            let tables = Table::of(&rows)?;
+            let mut claims = Claims::about(Figure::about(self).id, defaults, full);
+            Figure::claims(self, &typed, &rows, &mut claims);
+            claims.compare(&tables);
+            let plot = self.plot(&typed, &rows).renamed(in_words);
+            let claims = claims.made();
+            Ok(Outcome { tables, claims, plot })
+        }))
     }
 }

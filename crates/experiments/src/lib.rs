@@ -2,7 +2,7 @@
 //!
 //! A figure is a type that implements [`Figure`]: an id and a caption; a struct of parameters whose default is the paper's
 //! setting and whose fields carry their documentation and ranges; rows whose fields *are* the columns; [`Claims`] and a
-//! [`Plot`](plot::Plot) over these rows. From the two structs follow `describe`, the refusal of wrong settings before any work, and
+//! [`Plot`](fewbits_plot::Plot) over these rows. From the two structs follow `describe`, the refusal of wrong settings before any work, and
 //! the CSV. [`all`] lists every figure; `cargo xtask figures` runs them, writes CSV, JSON and SVG, and fails where a claim fails.
 //!
 //! The central choice is that a figure is judged by its claims and not by its looks: each statement of the paper about it,
@@ -30,7 +30,7 @@ pub mod mi;
 pub mod mpa;
 pub mod network;
 mod parameters;
-pub mod plot;
+mod picture;
 mod prelude;
 pub mod real;
 pub mod reference;
@@ -43,10 +43,16 @@ pub use arguments::Limits;
 pub use arguments::{Argument, Cost, Parameter, Quick, Refusal, plain};
 pub use claim::{Claim, Claims, Expected, Verdict};
 pub use error::Error;
-pub use figure::{About, AnyFigure, Context, Figure, Outcome};
+/// Plots as data.
+pub use fewbits_plot as plot;
+pub use figure::{About, AnyFigure, Context, Figure, Outcome, Run};
 pub use kept::Kept;
 pub use measured::Measured;
+pub use picture::plotted;
 pub use schema::{Column, Table, Value};
+
+/// The features with which this crate was built: results may depend on them.
+pub const FEATURES: &[&str] = if cfg!(feature = "zstd") { &["zstd"] } else { &[] };
 
 /// Every figure and table, in the order of the publications.
 pub fn all() -> Vec<&'static dyn AnyFigure> {

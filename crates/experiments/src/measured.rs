@@ -75,3 +75,10 @@ impl From<Measured> for Option<f64> {
         Some(measured.value)
     }
 }
+
+/// A mark with an error bar of one standard error.
+impl fewbits_plot::Mark for Measured {
+    fn mark(&self) -> Option<(f64, f64)> {
+        Some((self.value, self.error()))
+    }
+}

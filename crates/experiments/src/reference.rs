@@ -68,6 +68,20 @@ pub fn group(figure: &str, quantity: &str) -> Result<Vec<(&'static str, &'static
     Ok(of(figure)?.iter().filter_map(rest).collect())
 }
 
+/// The quantities of a figure that have references, each once, in the order of the file.
+///
+/// # Errors
+/// If the system's file cannot be read.
+pub fn quantities(figure: &str) -> Result<Vec<&'static str>, String> {
+    let own = format!("{figure}/");
+    let mut quantities = Vec::new();
+    for reference in of(figure)? {
+        let quantity = reference.key.strip_prefix(&own).and_then(|rest| rest.split('/').next());
+        quantities.extend(quantity.filter(|quantity| !quantities.contains(quantity)));
+    }
+    Ok(quantities)
+}
+
 /// What is known under `key`.
 pub fn find(key: &str) -> Option<&'static Reference> {
     of(key).ok()?.iter().find(|r| r.key == key)

@@ -18,6 +18,34 @@ pub struct Column {
     pub unit: &'static str,
     /// What the column holds, in a few words.
     pub meaning: String,
+    /// What it is in the default plot.
+    #[serde(skip)]
+    pub role: Role,
+    /// What it is called in a plot; its meaning if empty.
+    #[serde(skip)]
+    pub label: &'static str,
+}
+
+/// What a column is in the default plot ([`plotted`](crate::plotted)). [`rows!`](crate::rows!) writes it behind the type of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Role {
+    /// Not drawn.
+    #[default]
+    Data,
+    /// Each of its values has a panel.
+    Panel,
+    /// The horizontal axis.
+    X,
+    /// Each of its values has a curve.
+    Key,
+    /// Drawn as a solid line.
+    Line,
+    /// Drawn as a dashed line: a bound or a reference.
+    Dashed,
+    /// Drawn as marks, with error bars where it is a [`Measured`].
+    Points,
+    /// Drawn as a line through marks.
+    Curve,
 }
 
 impl Column {
@@ -27,7 +55,15 @@ impl Column {
             name: name.trim_start_matches("r#").to_owned(),
             unit,
             meaning: on_one_line(documentation),
+            role: Role::Data,
+            label: "",
         }
+    }
+
+    /// With what it is in the default plot, and what it is called there.
+    #[must_use]
+    pub fn drawn(self, role: Role, label: &'static str) -> Self {
+        Self { role, label, ..self }
     }
 }
 
@@ -75,6 +111,9 @@ pub struct Table {
     pub columns: Vec<Column>,
     /// A cell for each column.
     pub rows: Vec<Vec<Value>>,
+    /// The key of each row, by which its references are found; none for rows without.
+    #[serde(skip)]
+    pub keys: Vec<Option<String>>,
 }
 
 impl Table {
@@ -86,7 +125,7 @@ impl Table {
         let mut cells = Cells::default();
         result.put(&mut cells);
         let mut tables = tables::<T>();
-        for (table, rows) in tables.iter_mut().zip(cells.tables) {
+        for (table, (rows, keys)) in tables.iter_mut().zip(cells.tables) {
             for (index, row) in rows.iter().enumerate() {
                 for (column, cell) in table.columns.iter().zip(row) {
                     if let Value::Number(number) = cell
@@ -97,7 +136,7 @@ impl Table {
                     }
                 }
             }
-            table.rows = rows;
+            (table.rows, table.keys) = (rows, keys);
         }
         Ok(tables)
     }
@@ -122,7 +161,7 @@ pub struct Described {
 #[derive(Debug, Default)]
 pub struct Cells {
     cells: Vec<Value>,
-    pub(crate) tables: Vec<Vec<Vec<Value>>>,
+    pub(crate) tables: Vec<(Vec<Vec<Value>>, Vec<Option<String>>)>,
 }
 
 /// A field of a row (a number, a label, a [`Measured`], an `Option` of these, another row, whose columns are then this row's too)
@@ -135,6 +174,11 @@ pub trait Field {
 
     /// Adds the cells, or the rows of the table.
     fn put(&self, to: &mut Cells);
+
+    /// What a row is found by: what follows the quantity in the keys of its references.
+    fn found_by(&self) -> Option<String> {
+        None
+    }
 }
 
 /// Fields of one column.
@@ -170,6 +214,8 @@ impl Field for Measured {
             name: format!("{}_se", about.name),
             unit: about.unit,
             meaning: format!("{} (its standard error)", about.meaning),
+            role: Role::Data,
+            label: "",
         };
         to.columns.extend([about, error]);
     }
@@ -226,6 +272,7 @@ impl<T: Field> Field for Vec<T> {
             meaning: about.meaning,
             columns: columns::<T>(),
             rows: Vec::new(),
+            keys: Vec::new(),
         });
     }
 
@@ -235,7 +282,8 @@ impl<T: Field> Field for Vec<T> {
             row.put(&mut cells);
             cells.cells
         };
-        to.tables.push(self.iter().map(cells).collect());
+        to.tables
+            .push((self.iter().map(cells).collect(), self.iter().map(Field::found_by).collect()));
     }
 }
 

@@ -54,7 +54,7 @@ const WORDS: [(&str, &str); 49] = [
 ];
 
 /// The label with the scheme that it begins with in words.
-pub(crate) fn in_words(label: String) -> String {
+pub(crate) fn in_words(label: &str) -> String {
     let rest = |name: &str| {
         let rest = label.strip_prefix(name)?;
         let next = rest.chars().next();
@@ -65,7 +65,7 @@ pub(crate) fn in_words(label: String) -> String {
         whole.then_some(rest)
     };
     let known = |(name, words): &(&str, &str)| Some(format!("{words}{}", rest(name)?));
-    WORDS.iter().find_map(known).unwrap_or(label)
+    WORDS.iter().find_map(known).unwrap_or_else(|| label.to_owned())
 }
 
 #[cfg(test)]
@@ -83,7 +83,7 @@ mod tests {
             ("unquantized", "unquantized"),
             ("GMPAs", "GMPAs"),
         ] {
-            assert_eq!(in_words(name.to_owned()), words);
+            assert_eq!(in_words(name), words);
         }
     }
 }

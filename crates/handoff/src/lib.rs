@@ -2,13 +2,11 @@
 //!
 //! The sensor nearest to a target leads: it alone measures, and it sends its belief to the next leader. A cloud of 500 particles is 32
 //! kbit; a mixture of five Gaussians that approximates it takes 136 bits. Every step therefore loses some information, and the losses
-//! accumulate. This crate has the filter and bounds of the accumulated loss:
+//! accumulate. This crate has:
 //!
 //! - [`HandoffFilter`]: one leader's step, from the received mixture to the one that is sent. A [`Reducer`] reduces the belief:
 //!   to a number of components, to a number of bits, or by a type of your own.
 //! - [`Leaders`]: the same with messages as bits from node to node, over any network that runs the walks of `fewbits-protocol`.
-//! - [`published::bounds`]: bounds of the error after the last step from the losses of all steps, as printed, corrected and
-//!   tightened.
 //!
 //! ```
 //! use fewbits_core::factor::Value;
@@ -36,7 +34,6 @@
 
 mod filter;
 mod leaders;
-pub mod published;
 mod reducer;
 
 pub use fewbits_core::Error;

@@ -66,6 +66,15 @@ impl Key {
         Self::new(&bytes)
     }
 
+    /// A number that tells keys apart and tells nothing about them: 16 hexadecimal digits. States hold it.
+    pub fn fingerprint(&self) -> String {
+        let mut code = self.0.clone();
+        // No envelope begins with this byte, which stands for a direction.
+        code.update(b"\xfffingerprint");
+        let code = code.finalize().into_bytes();
+        code.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    }
+
     fn code(&self, direction: Direction, envelope: &[u8]) -> Hmac<Sha256> {
         let mut code = self.0.clone();
         code.update(&[match direction {
@@ -136,6 +145,11 @@ pub struct ReplayWindow {
 }
 
 impl ReplayWindow {
+    /// The highest accepted counter; 0 before the first.
+    pub fn highest(&self) -> u64 {
+        self.highest
+    }
+
     /// Accepts a counter if it is new.
     ///
     /// # Errors

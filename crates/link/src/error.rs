@@ -33,6 +33,20 @@ pub enum Error {
         /// What is wrong with it.
         reason: String,
     },
+    /// Another process uses the state, or another station or sensor of this one.
+    #[error("{path} is in use by another process: end it, or give each its own state")]
+    Locked {
+        /// Path of the state.
+        path: PathBuf,
+    },
+    /// Other users of the machine may read or change a file with keys or a state.
+    #[error("{path}: others than its owner may read or change it (mode {mode:o}): run `chmod 600 {path}`")]
+    Shared {
+        /// Path of the file.
+        path: PathBuf,
+        /// Its rights.
+        mode: u32,
+    },
     /// An argument is out of range.
     #[error(transparent)]
     Argument(#[from] fewbits_numerics::ArgumentError),
@@ -42,6 +56,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// Whether a file could not be read or written, which may pass: a full disk, too many open files.
+    pub fn is_of_file(&self) -> bool {
+        matches!(self, Self::File { .. })
+    }
+
     pub(crate) fn socket(address: impl ToString, source: std::io::Error) -> Self {
         let address = address.to_string();
         Self::Socket { address, source }

@@ -39,6 +39,7 @@ mod fusion;
 mod live;
 #[cfg(feature = "mqtt")]
 pub mod mqtt;
+mod private;
 mod sensor;
 mod station;
 mod store;
@@ -54,8 +55,9 @@ pub use error::Error;
 pub use fusion::FusionReceiver;
 #[cfg(feature = "live")]
 pub use live::LivePage;
+pub use private::{require_private, write_private};
 pub use sensor::{Request, SensorLink};
-pub use station::{Counts, Output, Peer, Station, Step};
+pub use station::{Counts, Output, Peer, Start, Station, Step};
 pub use store::Store;
 pub use transport::{Datagram, Program, Transport, now, run_sensor, run_station};
 pub use udp::Udp;

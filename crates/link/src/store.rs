@@ -1,16 +1,21 @@
 //! A file that is always complete: a new version is written beside the old one and then replaces it.
 
 use crate::error::Error;
+use crate::private::{created, require_private};
 use serde::{Serialize, de::DeserializeOwned};
-use std::fs::File;
-use std::io::Write;
+use std::fs::{File, TryLockError};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-/// A file with the state that a process must not lose.
+/// A file with the state that a process must not lose. Only its owner may read it.
+///
+/// `FILE.new.PID` is the next version while process PID writes it. `FILE.lock` is held by the process that uses the state.
 #[derive(Debug, Clone)]
 pub struct Store {
     path: PathBuf,
     durable: bool,
+    lock: Option<Arc<File>>,
 }
 
 impl Store {
@@ -19,6 +24,7 @@ impl Store {
         Self {
             path: path.into(),
             durable: false,
+            lock: None,
         }
     }
 
@@ -33,41 +39,112 @@ impl Store {
         &self.path
     }
 
+    /// The same store, held against other processes and other stores of this one until it and its copies are dropped. Removes what a
+    /// process that was stopped while it wrote has left behind.
+    ///
+    /// # Errors
+    /// [`Error::Locked`] if the state is held already; [`Error::File`] if the file of the lock cannot be created.
+    pub fn locked(mut self) -> Result<Self, Error> {
+        if self.lock.is_some() {
+            return Ok(self);
+        }
+        let path = self.beside(".lock");
+        let failed = |source| Error::File {
+            path: path.clone(),
+            source,
+        };
+        // The file stays: another process may wait for exactly this one.
+        let file = created().create(true).truncate(false).open(&path).map_err(failed)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(Error::Locked { path: self.path }),
+            // Some network file systems have no locks.
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(source)) => return Err(failed(source)),
+        }
+        self.lock = Some(Arc::new(file));
+        self.remove_unfinished();
+        Ok(self)
+    }
+
+    /// A name beside the file: its whole name with an ending, so that two files never share one.
+    fn beside(&self, ending: &str) -> PathBuf {
+        let mut name = self.path.clone().into_os_string();
+        name.push(ending);
+        name.into()
+    }
+
+    fn folder(&self) -> &Path {
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        folder.unwrap_or(Path::new("."))
+    }
+
+    fn remove_unfinished(&self) {
+        let start = self.beside(".new.");
+        let Some(start) = start.file_name().and_then(|name| name.to_str()) else {
+            return;
+        };
+        for entry in std::fs::read_dir(self.folder()).into_iter().flatten().flatten() {
+            let name = entry.file_name();
+            let process = name.to_str().and_then(|name| name.strip_prefix(start));
+            if process.is_some_and(|process| process.parse::<u32>().is_ok()) {
+                // One that stays does no harm.
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+
     /// Replaces the content by `value`.
     ///
     /// # Errors
     /// If a file cannot be written. The old content is then unchanged.
     pub fn save(&self, value: &impl Serialize) -> Result<(), Error> {
-        let beside = self.path.with_extension("new");
+        let beside = self.beside(&format!(".new.{}", std::process::id()));
         let failed = |path: &Path| {
             let path = path.to_owned();
             move |source| Error::File { path, source }
         };
         let bytes = serde_json::to_vec(value).map_err(|error| failed(&self.path)(error.into()))?;
-        let mut file = File::create(&beside).map_err(failed(&beside))?;
+        // A file of that name is left from a process of the same number: it may have other rights.
+        match std::fs::remove_file(&beside) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(&beside)(error)),
+            _ => {}
+        }
+        let mut file = created().create_new(true).open(&beside).map_err(failed(&beside))?;
         file.write_all(&bytes).map_err(failed(&beside))?;
         if self.durable {
             file.sync_all().map_err(failed(&beside))?;
         }
         drop(file);
-        std::fs::rename(&beside, &self.path).map_err(failed(&self.path))
+        std::fs::rename(&beside, &self.path).map_err(failed(&self.path))?;
+        // The new name is safe once the folder is.
+        if self.durable && cfg!(unix) {
+            let folder = self.folder();
+            File::open(folder)
+                .and_then(|folder| folder.sync_all())
+                .map_err(failed(folder))?;
+        }
+        Ok(())
     }
 
     /// The content; `None` if there is no file yet.
     ///
     /// # Errors
-    /// If the file cannot be read or is not of this type.
+    /// If the file cannot be read, is not of this type, or others than its owner may read it.
     pub fn load<T: DeserializeOwned>(&self) -> Result<Option<T>, Error> {
         let path = self.path.clone();
         match std::fs::read(&self.path) {
-            Ok(bytes) => match serde_json::from_slice(&bytes) {
-                Ok(value) => Ok(Some(value)),
-                Err(error) => Err(Error::State {
-                    path,
-                    reason: error.to_string(),
-                }),
-            },
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Ok(bytes) => {
+                require_private(&self.path)?;
+                match serde_json::from_slice(&bytes) {
+                    Ok(value) => Ok(Some(value)),
+                    Err(error) => Err(Error::State {
+                        path,
+                        reason: error.to_string(),
+                    }),
+                }
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
             Err(source) => Err(Error::File { path, source }),
         }
     }

@@ -8,7 +8,7 @@ use fewbits_protocol::{Note, Receiver, Slot};
 use std::fmt::{Debug, Display};
 use std::ops::ControlFlow;
 use std::str::FromStr;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Longest datagram in bytes.
 pub(crate) const MAX_DATAGRAM: usize = 65_535;
@@ -17,6 +17,11 @@ const BATCH: usize = 256;
 /// Longest wait: the caller is asked ten times a second whether to continue.
 const MAX_WAIT: Duration = Duration::from_millis(100);
 const HELLO_EVERY: Duration = Duration::from_secs(1);
+/// Without a frame of the centre for so long, and for each further minute, the program of a sensor is told.
+const UNANSWERED_AFTER: Duration = Duration::from_secs(10);
+const UNANSWERED_EVERY: Duration = Duration::from_secs(60);
+/// The beginning of 2020 in nanoseconds since 1970. A clock before it was never set.
+const EARLIEST: u64 = 1_577_836_800_000_000_000;
 
 /// Address of the sender, and the bytes.
 pub type Datagram<'a, A> = (A, &'a [u8]);
@@ -68,16 +73,26 @@ fn receive<T: Transport>(
 /// Runs a station until `watch` returns a break. `watch` is called with each step and note after it is stored, and at least ten times a
 /// second with an empty list.
 ///
+/// A clock before 2020 was never set: no slot begins by it, and [`Output::ClockBehind`] says so once a minute.
+///
 /// # Errors
-/// If the transport or the store fails.
+/// If the transport can receive no more, or the estimator's state cannot be written.
 pub fn run_station<R: Receiver, T: Transport>(
     transport: &mut T,
     station: &mut Station<R, T::Address>,
     mut watch: impl FnMut(&Station<R, T::Address>, &[Output<T::Address>]) -> ControlFlow<()>,
 ) -> Result<(), Error> {
     let mut outputs = Vec::new();
+    let mut said_unset = None::<Instant>;
     loop {
-        station.on_time(now(), &mut outputs)?;
+        let is_set = now() >= EARLIEST;
+        if is_set {
+            station.on_time(now(), &mut outputs)?;
+        } else if said_unset.is_none_or(|said| said.elapsed() >= UNANSWERED_EVERY) {
+            said_unset = Some(Instant::now());
+            let wait = EARLIEST - now();
+            outputs.push(Output::ClockBehind { wait });
+        }
         for output in &outputs {
             if let Output::Datagram { to, bytes } = output {
                 transport.send(to, bytes);
@@ -88,7 +103,7 @@ pub fn run_station<R: Receiver, T: Transport>(
         }
         outputs.clear();
         // What datagrams cause is sent in the next round, and watched then.
-        let until = station.next_timer().unwrap_or(u64::MAX);
+        let until = station.next_timer().filter(|_| is_set).unwrap_or(u64::MAX);
         receive(transport, until, BATCH, |from, bytes| station.on_datagram(from, bytes, &mut outputs))?;
     }
 }
@@ -101,16 +116,23 @@ pub trait Program {
     /// Records a note.
     fn note(&mut self, _: Note) {}
 
+    /// The state could not be stored, and nothing was sent because of that. It is tried again with the next frame.
+    fn trouble(&mut self, _: &Error) {}
+
+    /// No frame of the centre was accepted for this time. Called after ten seconds, and each minute from then on.
+    fn unanswered(&mut self, _: Duration, _: &SensorLink) {}
+
     /// Whether to continue. Called at least ten times a second.
     fn goes_on(&mut self) -> bool {
         true
     }
 }
 
-/// Runs a sensor until its program ends. Datagrams that are not from `centre` are ignored.
+/// Runs a sensor until its program ends. It sends to `centre`. Frames are accepted from any address under its key: a centre with several
+/// addresses answers from another one.
 ///
 /// # Errors
-/// If the transport or the store fails.
+/// If the transport can receive no more.
 pub fn run_sensor<T: Transport>(
     transport: &mut T,
     centre: &T::Address,
@@ -118,13 +140,16 @@ pub fn run_sensor<T: Transport>(
     program: &mut impl Program,
 ) -> Result<(), Error> {
     let mut requests = Vec::new();
-    let mut hello_at = 0;
+    // By a clock that is never set back.
+    let mut hello_at = Instant::now();
+    let (mut answered_at, mut say_at, mut taken) = (Instant::now(), UNANSWERED_AFTER, link.counts().taken);
     while program.goes_on() {
-        if now() >= hello_at {
-            requests.push(link.hello()?);
-            hello_at = now() + HELLO_EVERY.as_nanos() as u64;
+        if Instant::now() >= hello_at {
+            requests.extend(tolerate(link.hello(), program)?);
+            hello_at = Instant::now() + HELLO_EVERY;
         }
-        link.on_time(now(), &mut requests)?;
+        let outcome = link.on_time(now(), &mut requests);
+        tolerate(outcome, program)?;
         while !requests.is_empty() {
             for request in std::mem::take(&mut requests) {
                 match request {
@@ -134,20 +159,40 @@ pub fn run_sensor<T: Transport>(
                         let ControlFlow::Continue(report) = program.sample(slot, &feedback) else {
                             return Ok(());
                         };
-                        link.on_sample(now(), report.as_ref(), &mut requests)?;
+                        let outcome = link.on_sample(now(), report.as_ref(), &mut requests);
+                        tolerate(outcome, program)?;
                         // While the centre asks, it knows the sensor's address: no heartbeat is needed.
-                        hello_at = now() + HELLO_EVERY.as_nanos() as u64;
+                        hello_at = Instant::now() + HELLO_EVERY;
                     }
                 }
             }
         }
-        let until = link.next_timer().unwrap_or(u64::MAX).min(hello_at);
+        let hello = u64::try_from(hello_at.saturating_duration_since(Instant::now()).as_nanos()).unwrap_or(u64::MAX);
+        let until = link.next_timer().unwrap_or(u64::MAX).min(now().saturating_add(hello));
         // One datagram at a time: a second question that waits would replace the slot of the sample that the first one asks for, and the
         // report would be sent as that of the wrong slot.
-        receive(transport, until, 1, |from, bytes| match from == *centre {
-            true => link.on_datagram(now(), bytes, &mut requests),
-            false => Ok(()),
+        receive(transport, until, 1, |_, bytes| {
+            let outcome = link.on_datagram(now(), bytes, &mut requests);
+            tolerate(outcome, program).map(drop)
         })?;
+        if link.counts().taken != taken {
+            (answered_at, say_at, taken) = (Instant::now(), UNANSWERED_AFTER, link.counts().taken);
+        } else if answered_at.elapsed() >= say_at {
+            program.unanswered(answered_at.elapsed(), link);
+            say_at += UNANSWERED_EVERY;
+        }
     }
     Ok(())
+}
+
+/// Tells the program that the state could not be stored; other errors are returned.
+fn tolerate<T>(outcome: Result<T, Error>, program: &mut impl Program) -> Result<Option<T>, Error> {
+    match outcome {
+        Ok(value) => Ok(Some(value)),
+        Err(error) if error.is_of_file() => {
+            program.trouble(&error);
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
 }

@@ -6,6 +6,11 @@ use std::io::ErrorKind;
 use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::time::Duration;
 
+/// Pause after an error that may pass.
+const PAUSE: Duration = Duration::from_millis(100);
+/// Largest number of errors of earlier datagrams that one read skips.
+const MAX_ERRORS: usize = 64;
+
 /// A UDP socket.
 #[derive(Debug)]
 pub struct Udp {
@@ -59,14 +64,28 @@ impl Transport for Udp {
 
     fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, SocketAddr>>, Error> {
         self.wait(wait).map_err(|source| Error::socket(self.address, source))?;
-        loop {
+        // Errors of earlier datagrams are bounded, so that a router that refuses all does not keep the caller here.
+        for _ in 0..MAX_ERRORS {
             match self.socket.recv_from(&mut self.buffer) {
                 Ok((length, from)) => return Ok(Some((from, &self.buffer[..length]))),
-                // The machine of a sensor that has ended refuses a datagram; the error arrives here and is ignored.
-                Err(error) if error.kind() == ErrorKind::ConnectionRefused => {}
-                // No datagram is waiting.
-                Err(_) => return Ok(None),
+                Err(error) => match error.kind() {
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut => return Ok(None),
+                    // The machine of a receiver that has ended, or a router before it, refused a datagram that was sent earlier: the error
+                    // arrives here. It says nothing about those that come.
+                    ErrorKind::Interrupted
+                    | ErrorKind::ConnectionRefused
+                    | ErrorKind::ConnectionReset
+                    | ErrorKind::HostUnreachable
+                    | ErrorKind::NetworkUnreachable => {}
+                    // The interface may come back, and memory too. The pause keeps the caller from spinning.
+                    ErrorKind::NetworkDown | ErrorKind::OutOfMemory => {
+                        std::thread::sleep(wait.min(PAUSE));
+                        return Ok(None);
+                    }
+                    _ => return Err(Error::socket(self.address, error)),
+                },
             }
         }
+        Ok(None)
     }
 }

@@ -34,7 +34,6 @@
 //! Not in this crate: the densities themselves (`fewbits-densities`), and which node sends to which (`fewbits-handoff`).
 
 pub mod divergence;
-pub mod published;
 pub mod reduction;
 pub mod tree;
 pub mod wire;

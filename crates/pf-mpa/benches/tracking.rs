@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher};
+use fewbits_baselines::pf_mpa::MessagePassing;
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{
     Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeNoise, Ranged, Reports, Target,
     Tracker,

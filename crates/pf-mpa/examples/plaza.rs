@@ -10,6 +10,20 @@ fn rows<T: serde::de::DeserializeOwned>(file: Option<&String>) -> Result<Vec<T>,
     Ok(csv::Reader::from_path(file)?.deserialize().collect::<Result<_, _>>()?)
 }
 
+/// The true position at a time, on the straight line between its neighbours; the nearest end outside.
+fn place_at(truth: &[(f64, f64, f64)], time: f64) -> Option<Vector2<f64>> {
+    let next = truth
+        .partition_point(|row| row.0 < time)
+        .min(truth.len().checked_sub(1)?);
+    let ((t0, x0, y0), (t1, x1, y1)) = (truth[next.saturating_sub(1)], truth[next]);
+    let share = if t1 > t0 {
+        ((time - t0) / (t1 - t0)).clamp(0.0, 1.0)
+    } else {
+        1.0
+    };
+    Some(Vector2::new(x0, y0).lerp(&Vector2::new(x1, y1), share))
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let files: Vec<String> = std::env::args().skip(1).collect();
     let anchors: Vec<(String, f64, f64)> = rows(files.first())?;
@@ -24,10 +38,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let (mut squares, mut nees, mut speed) = (Vec::new(), Vec::new(), 0.0);
         for (time, anchor, range) in &ranges {
             if let Some(found) = tracker.push(&mut rng, *time, anchor, *range)? {
-                let at = truth.partition_point(|row| row.0 < *time);
-                let (_, x, y) = truth.get(at).or(truth.last()).ok_or("no true positions")?;
-                squares.push((found.position - Vector2::new(*x, *y)).norm_squared());
-                nees.extend(found.normalised_error(&Vector2::new(*x, *y)));
+                let place = place_at(&truth, *time).ok_or("no true positions")?;
+                squares.push((found.position - place).norm_squared());
+                nees.extend(found.normalised_error(&place));
                 speed = found.speed;
             }
         }

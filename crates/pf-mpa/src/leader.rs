@@ -83,7 +83,7 @@ fn triangle() -> impl Iterator<Item = (usize, usize)> {
 /// Cholesky factor of a covariance. The columns of directions without variance are zero.
 ///
 /// It does not pivot, so it is a continuous function of the covariance: a rounding error does not make draws jump.
-pub(crate) fn lower_factor<const D: usize>(covariance: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+pub fn lower_factor<const D: usize>(covariance: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let mut lower = SMatrix::<f64, D, D>::zeros();
     for j in 0..D {
         let own = covariance[(j, j)];

@@ -1,8 +1,8 @@
 //! Tracking a target from quantized ranges.
 //!
 //! Sensors at known places measure their distance to a target. The noise grows with the distance. Each sends the level of a quantizer of
-//! a few bits. Chapter 3 of the thesis that this crate follows uses particle message passing on a factor graph. The crate has that
-//! algorithm, as published and with its errata corrected, and trackers with smaller errors.
+//! a few bits. Chapter 3 of the thesis that this crate follows uses particle message passing on a factor graph. The trackers of this
+//! crate have smaller errors at lower cost.
 //!
 //! **The likelihood of a level is in closed form** ([`RangeFactor`]), instead of a ring of particles with kernels. As a function of the
 //! position it is `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))` at the *hypothesised* distance `d`. It needs no
@@ -20,9 +20,7 @@
 //! | recorded ranges with bias, outliers, missing anchors, unknown speed and start | [`RangeTracker`] |
 //! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
 //! | particles and draws | [`ParticleFilter`](fewbits_filters::ParticleFilter) on [`WithManoeuvre`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
-//! | Algorithm 6, its messages, the factor graphs behind it | [`published`] |
 //! | bounds | [`CramerRao`], [`level_information`] |
-//! | two targets, measurements in unknown order | [`association`] |
 //! | which sensor leads, what it hands over, in bits | [`leader`] |
 //!
 //! ```
@@ -46,7 +44,13 @@
 //!
 //! Not here: radio, energy and delays (`fewbits-network`); more than two targets; positions in three dimensions.
 
-pub mod association;
+/// Parts of the trackers, for the comparisons in `fewbits-baselines`. No promise is made of them.
+#[doc(hidden)]
+pub mod engine {
+    pub use crate::chain::draw;
+    pub use crate::leader::lower_factor;
+}
+
 mod bound;
 mod chain;
 mod encoder;
@@ -56,7 +60,6 @@ mod guided;
 pub mod leader;
 mod linearised;
 pub mod product;
-pub mod published;
 mod quantized;
 mod rao_blackwell;
 mod recording;

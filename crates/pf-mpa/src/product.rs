@@ -2,7 +2,7 @@
 //!
 //! The product of `F` mixtures is a mixture of one Gaussian for each choice of labels `b_1 .. b_F`, with
 //! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form. This is exact if the labels can
-//! be enumerated; otherwise [`ProductSampler`](crate::published::ProductSampler) draws from the product.
+//! be enumerated; otherwise one draws from the product.
 
 use crate::Error;
 use fewbits_densities::{Component, Mixture};

@@ -115,12 +115,26 @@ impl RangeSensor {
 
     /// The same sensor in a state of `D` coordinates that has the position at `axes`: `[0, 2]` for `[x, vx, y, vy]`.
     ///
-    /// ```compile_fail
-    /// // A state of four coordinates is no position: without axes it does not compile.
+    /// ```
     /// use fewbits_core::Sensing;
     /// use fewbits_pf_mpa::{RangeNoise, RangeSensor};
-    /// let sensor = RangeSensor::new([0.0, 0.0].into(), RangeNoise::constant(1.0).unwrap()).unwrap();
+    /// use nalgebra::{Vector2, Vector4};
+    /// let sensor = RangeSensor::new(Vector2::zeros(), RangeNoise::constant(1.0)?)?;
+    /// assert_eq!(sensor.mean(&Vector2::new(3.0, 4.0)).x, 5.0);
+    /// let of_state = sensor.on_axes::<4>([0, 2])?;
+    /// assert_eq!(of_state.mean(&Vector4::new(3.0, 0.5, 4.0, 0.5)).x, 5.0);
+    /// # Ok::<(), fewbits_pf_mpa::Error>(())
+    /// ```
+    ///
+    /// A state of four coordinates is no position: without axes the last line does not compile.
+    ///
+    /// ```compile_fail,E0308
+    /// # use fewbits_core::Sensing;
+    /// # use fewbits_pf_mpa::{RangeNoise, RangeSensor};
+    /// # use nalgebra::{Vector2, Vector4};
+    /// let sensor = RangeSensor::new(Vector2::zeros(), RangeNoise::constant(1.0)?)?;
     /// sensor.mean(&Vector4::new(3.0, 0.5, 4.0, 0.5));
+    /// # Ok::<(), fewbits_pf_mpa::Error>(())
     /// ```
     ///
     /// # Errors

@@ -171,6 +171,14 @@ impl Centre {
         self.heard.get(sensor).copied().flatten()
     }
 
+    /// Whether a frame answers what this sensor was sent in the slot that is open: a report, or a heartbeat in place of one.
+    pub fn is_answer(&self, sensor: usize, frame: &Frame<'_>) -> bool {
+        self.open
+            && matches!(frame.kind, Kind::Report | Kind::Heartbeat)
+            && frame.slot == Slot::of_count(self.slot)
+            && self.digests.get(sensor) == Some(&frame.digest)
+    }
+
     /// Tells the machine that the estimator has lost its state. It sends the whole state to followers next.
     pub fn on_memory_lost(&mut self) {
         self.open = false;

@@ -69,11 +69,13 @@ pub fn moments<const D: usize>(belief: &Gaussian<D>) -> Vec<(f64, f64)> {
 
 /// Bits of the slot number in a state.
 const SLOT_BITS: u32 = 64;
+/// Largest number of slots that are predicted in one step. A clock that jumps by more was wrong before or is wrong now.
+const MAX_SKIPPED: u64 = 1 << 20;
 
 /// A [`Receiver`] made from an [`Estimator`]. Its state is the slot in 64 bits, followed by the belief.
 ///
 /// The start belief applies to the slot before the first prediction, whichever slot that is. If slots are skipped later, the belief is
-/// predicted through them. Bits that are not a report of the scheme count as [`Observation::Lost`]: a report was sent but not understood.
+/// predicted through them, up to 2^20; a prediction through more fails. Bits that are not a report of the scheme count as [`Observation::Lost`]: a report was sent but not understood.
 /// A step whose estimate is not finite fails and leaves the state unchanged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverBits<E: Estimator> {
@@ -127,6 +129,10 @@ impl<E: Estimator> Receiver for OverBits<E> {
         } else {
             self.slot.saturating_add(1)
         };
+        if slot.saturating_sub(first) > MAX_SKIPPED {
+            let skipped = slot.saturating_sub(first);
+            return Err(format!("{skipped} slots were skipped: expected at most {MAX_SKIPPED}; begin anew").into());
+        }
         // A model predicts one slot, so the slots that were skipped are predicted too. The belief changes only if all succeed.
         for slot in first..=slot {
             predicted = Some(

@@ -5,7 +5,7 @@ use crate::observation_model::{Feature, ObservationModel};
 use serde::{Deserialize, Serialize};
 
 /// Smaller probabilities are treated as zero inside a logarithm.
-pub(crate) const LOG_FLOOR: f64 = 1e-300;
+pub const LOG_FLOOR: f64 = 1e-300;
 
 /// With at most this many values of the unknown, information is computed as the prior's entropy minus the equivocation. This keeps digits
 /// if decisions are almost certain.

@@ -7,10 +7,11 @@ const SPEED: f64 = 3e8;
 
 /// The instant by which a computation must end; `None` without a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Deadline(Option<Instant>);
+pub struct Deadline(Option<Instant>);
 
 impl Deadline {
-    pub(crate) const NEVER: Self = Self(None);
+    /// No deadline.
+    pub const NEVER: Self = Self(None);
 
     /// The instant `limit` after `start`. Never, if there is no limit or the sum overflows.
     pub(crate) fn after(start: Instant, limit: Option<Duration>) -> Self {

@@ -9,7 +9,7 @@ use fewbits_numerics::{kernels, normal};
 
 /// A group whose breakpoints may change.
 #[derive(Debug, Clone)]
-pub(crate) struct Active<'a> {
+pub struct Active<'a> {
     pub(crate) index: usize,
     pub(crate) group: &'a SensorGroup,
     pub(crate) compositions: Compositions,
@@ -17,7 +17,7 @@ pub(crate) struct Active<'a> {
     pub(crate) means: Vec<f64>,
     pub(crate) deviation: f64,
     /// `c[i][t]`: derivative of the probability of symbol `t` with respect to breakpoint `i`, divided by the density of the sample there.
-    pub(crate) exchange: Vec<Vec<f64>>,
+    pub exchange: Vec<Vec<f64>>,
 }
 
 /// Tables from which the node sums of one group are formed, at given breakpoints.
@@ -31,7 +31,11 @@ pub(crate) struct Slots {
 }
 
 impl<'a> Active<'a> {
-    pub(crate) fn new(system: &'a System, index: usize) -> Result<Self, Error> {
+    /// The group `index` of the system.
+    ///
+    /// # Errors
+    /// If there is no such group.
+    pub fn new(system: &'a System, index: usize) -> Result<Self, Error> {
         let group = system.group(index)?;
         let outputs = group.channel().outputs();
         let (means, deviation) = system.model().sample_law(group.sensors()[0]);
@@ -53,7 +57,8 @@ impl<'a> Active<'a> {
         })
     }
 
-    pub(crate) fn parameters(&self) -> usize {
+    /// Number of breakpoints.
+    pub fn parameters(&self) -> usize {
         self.exchange.len()
     }
 
@@ -68,7 +73,7 @@ impl<'a> Active<'a> {
     }
 
     /// Probability of each received symbol at each node.
-    pub(crate) fn symbols(&self, b: &[f64]) -> Vec<f64> {
+    pub fn symbols(&self, b: &[f64]) -> Vec<f64> {
         let nodes = self.means.len();
         let mut symbols = vec![0.0; self.compositions.parts * nodes];
         for (cell, column) in self.cells(b).iter().enumerate() {
@@ -110,7 +115,7 @@ impl<'a> Active<'a> {
     }
 
     /// Density of the sample at each breakpoint, and its derivative, at every node.
-    pub(crate) fn densities(&self, b: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    pub fn densities(&self, b: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         b.iter()
             .map(|b| {
                 let standardised = self.means.iter().map(|m| (b - m) / self.deviation);

@@ -25,7 +25,6 @@
 //! | [`design`] | local design for given numbers of levels by Newton's method: all sensors at once, or one after the other |
 //! | [`decoder`], [`table`] | the posterior of the unknown, decisions and tests |
 //! | [`bounds`] | bounds for every design |
-//! | [`published`] | algorithms of the publications, for reproducing their tables |
 //!
 //! Design rule: **every criterion is computed exactly, not by simulation.** Given the unknown (and a shared noise
 //! factor) the sensors are independent, so the probability of a joint outcome is a one-dimensional sum of products of
@@ -60,11 +59,21 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+/// Parts of the exact evaluation, for the comparisons in `fewbits-baselines`. No promise is made of them.
+#[doc(hidden)]
+pub mod engine {
+    pub use crate::criterion::LOG_FLOOR;
+    pub use crate::deadline::Deadline;
+    pub use crate::gains::{LevelGains, interval_values, single_sensor};
+    pub use crate::law::Active;
+    pub use crate::moments::dot;
+    pub use crate::newton::{Objective, Stationary, climb};
+}
+
 pub mod bounds;
 pub mod decoder;
 pub mod design;
 pub mod observation_model;
-pub mod published;
 pub mod solve;
 pub mod system;
 pub mod table;
@@ -76,6 +85,7 @@ mod deadline;
 mod derivatives;
 mod error;
 mod evaluate;
+mod gains;
 mod law;
 mod moments;
 mod newton;

@@ -100,8 +100,10 @@ impl Newton {
 }
 
 /// An objective to be maximised.
-pub(crate) trait Objective {
+pub trait Objective {
+    /// The value at `b`.
     fn value(&self, b: &[f64]) -> f64;
+    /// The value at `b` with its derivatives.
     fn derivatives(&self, b: &[f64]) -> Derivatives;
     /// Lengths of the parts of `b` that must be increasing.
     fn blocks(&self) -> Vec<usize>;
@@ -111,13 +113,19 @@ pub(crate) trait Objective {
 
 /// A stationary point that Newton's method found.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Stationary {
-    pub(crate) point: Vec<f64>,
-    pub(crate) value: f64,
-    pub(crate) largest_curvature: f64,
-    pub(crate) certificate: Certificate,
-    pub(crate) iterations: usize,
-    pub(crate) evaluations: usize,
+pub struct Stationary {
+    /// The point.
+    pub point: Vec<f64>,
+    /// The value there.
+    pub value: f64,
+    /// Largest eigenvalue of the Hessian.
+    pub largest_curvature: f64,
+    /// What is known of the point.
+    pub certificate: Certificate,
+    /// Number of iterations.
+    pub iterations: usize,
+    /// Number of evaluations without derivatives.
+    pub evaluations: usize,
 }
 
 /// Maximises from `start`. If the deadline ends the iteration, it counts as not converged.
@@ -131,7 +139,7 @@ pub(crate) struct Stationary {
 ///     b        <- b + step
 /// until |step| <= tolerance; at a saddle step off along the eigenvector of the largest eigenvalue and continue
 /// ```
-pub(crate) fn climb(
+pub fn climb(
     objective: &impl Objective,
     start: &[f64],
     scale: f64,

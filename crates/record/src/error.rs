@@ -46,6 +46,9 @@ pub enum Error {
         /// Kind of the damage.
         damage: Damage,
     },
+    /// A frame belongs to another table: its sender has started anew, or another sender uses the link too.
+    #[error("a frame of another table")]
+    OtherTable,
     /// The recording has no such column.
     #[error("no column `{name}`: the recording has {existing}")]
     UnknownColumn {

@@ -43,7 +43,7 @@
 //! | writing | [`Recorder`] |
 //! | reading with random access | [`Playback`] |
 //! | reading from front to end, for example from a pipe | [`BlockReader`] |
-//! | frames for a link that loses some | [`FrameWriter`], [`FrameReader`] |
+//! | frames for a link that loses some | [`FrameWriter`], [`HeaderRepeats`], [`FrameReader`] |
 //!
 //! Not here: how values are predicted and coded (`fewbits-adaptive`), text formats and the command line (`fewbits-cli`). The format
 //! is described byte by byte in `docs/record.md`.
@@ -73,7 +73,7 @@ pub use block::{Block, Cells};
 pub use bound::{Bound, MAX_DECIMALS, is_within, is_within_on_circle};
 pub use error::{Damage, Error};
 pub use fewbits_adaptive::Effort;
-pub use frames::{FrameReader, FrameWriter, MIN_FRAME_BYTES};
+pub use frames::{FrameReader, FrameWriter, HeaderRepeats, MIN_FRAME_BYTES};
 pub use playback::{BlockInfo, Blocks, Playback, Row, Rows};
 pub use recorder::Recorder;
 pub use scan::BlockReader;

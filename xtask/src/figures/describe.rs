@@ -43,7 +43,10 @@ pub(super) fn one(figure: &dyn AnyFigure) -> String {
     for table in figure.tables() {
         let _ = writeln!(page, "\n{}", table.file(about.id));
         wrap(&mut page, "  ", &table.meaning);
-        for Column { name, unit, meaning } in &table.columns {
+        for Column {
+            name, unit, meaning, ..
+        } in &table.columns
+        {
             let unit = if unit.is_empty() {
                 String::new()
             } else {

@@ -1,9 +1,9 @@
 //! `index.html`: the state of this run, failures first, then the systems in the order of the publications. Figures of earlier
 //! runs stand greyed at the end of their system.
 
-use super::draw::typeset;
 use super::record::{Record, expectation, measured};
 use fewbits_experiments::{Claim, Verdict, plain};
+use fewbits_plot::typeset;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value as Json;
 use std::collections::BTreeSet;
@@ -217,6 +217,7 @@ fn tally(record: &Record) -> String {
         return "not made".to_owned();
     }
     match record.count(Verdict::Fail) {
+        0 if record.is_undecided() => "undecided".to_owned(),
         0 => format!("{} hold", record.count(Verdict::Pass)),
         fail => format!("{fail} fail"),
     }
@@ -236,6 +237,7 @@ fn figure(standing: Standing, r: &Record) -> Markup {
                 @if standing == Standing::Earlier { " not run this time; made " (r.finished) " at commit " (r.commit) }
             }
             @if let Some(error) = &r.error { p.notice { "Not made: " (error) } }
+            @if r.is_undecided() { p.notice { "None of its claims was decided." } }
             div.columns {
                 figure {
                     @for svg in r.files.iter().filter(|name| name.ends_with(".svg")) {

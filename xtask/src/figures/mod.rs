@@ -1,7 +1,6 @@
 //! `cargo xtask figures`: every figure and table, and whether its claims hold.
 
 mod describe;
-mod draw;
 mod gallery;
 mod options;
 mod produce;
@@ -13,11 +12,12 @@ mod reuse;
 mod run;
 mod select;
 mod serve;
+#[cfg(test)]
+mod sources;
 mod summary;
 mod times;
 mod write;
 
-pub use draw::to_svg;
 pub use options::{Action, Options};
 
 use crate::{Error, errata, files, tidy};
@@ -95,6 +95,10 @@ fn merge(from: &[PathBuf], out: &Path, json: bool) -> Result<Ending, Error> {
     for folder in from {
         let folder = in_workspace(folder);
         for record in Record::read_all(&folder)?.into_values() {
+            if let Some(name) = record.damaged(&folder) {
+                let path = folder.join(name);
+                return Err(Error::Damaged { path });
+            }
             for name in record.files.iter().chain([&format!("{}.json", record.id)]) {
                 let path = folder.join(name);
                 let content = std::fs::read(&path).map_err(Error::reading(&path))?;

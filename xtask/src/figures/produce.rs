@@ -56,7 +56,7 @@ impl<'a> Maker<'a> {
         let result = produce(&self.pool, job, &context);
         // A user's file may change: its figure is made again.
         let fingerprint = reuse::fingerprint(job, self.options.seed).filter(|_| !has_read.load(Ordering::Relaxed));
-        let record = Record::new(about, &job.parameters, began.elapsed(), self.options, fingerprint);
+        let record = Record::new(about, &job.run.parameters, began.elapsed(), self.options, fingerprint);
         match result {
             Ok(outcome) => Some(Made::of(record, &outcome, !self.options.no_plots)),
             Err(Failure::Cancelled) => None,
@@ -78,7 +78,7 @@ enum Failure {
 
 /// Runs one figure; a panic in it is its own failure and nobody else's.
 fn produce(pool: &rayon::ThreadPool, job: &Job, context: &Context<'_>) -> Result<Outcome, Failure> {
-    let run = || pool.install(|| job.figure.produce(&job.parameters, context));
+    let run = || pool.install(|| job.run.outcome(context));
     match catch_unwind(AssertUnwindSafe(run)) {
         Ok(Ok(outcome)) => Ok(outcome),
         Ok(Err(fewbits_experiments::Error::Cancelled)) => Err(Failure::Cancelled),
@@ -97,8 +97,9 @@ fn message(payload: &(dyn Any + Send)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fewbits_experiments::{About, AnyFigure, Parameter, Table};
+    use fewbits_experiments::{About, AnyFigure, Claim, Expected, Parameter, Run, Table, Verdict};
     use serde_json::{Map, Value as Json};
+    use std::time::Duration;
 
     struct Panics;
 
@@ -115,12 +116,53 @@ mod tests {
         fn tables(&self) -> Vec<Table> {
             Vec::new()
         }
-        fn configure(&self, _: &[(String, String)], _: bool) -> Result<Map<String, Json>, fewbits_experiments::Error> {
-            Ok(Map::new())
+        fn configure(&self, _: &[(String, String)], _: bool) -> Result<Run<'_>, fewbits_experiments::Error> {
+            self.with(Map::new())
         }
-        fn produce(&self, _: &Map<String, Json>, _: &Context<'_>) -> Result<Outcome, fewbits_experiments::Error> {
-            panic!("as a figure might")
+        fn with(&self, parameters: Map<String, Json>) -> Result<Run<'_>, fewbits_experiments::Error> {
+            Ok(Run::of(parameters, |_| panic!("as a figure might")))
         }
+    }
+
+    /// A figure of ours whose claims were all left undecided, or that has none.
+    #[test]
+    fn a_figure_that_decides_nothing_at_full_counts_fails() {
+        use clap::Parser;
+        #[derive(Parser)]
+        struct Line {
+            #[command(flatten)]
+            options: Options,
+        }
+        let record = |arguments: &[&str], parameters: &Map<String, Json>, verdicts: &[Verdict]| {
+            let line = Line::parse_from([&["figures"], arguments].concat());
+            let about = About::of("mi-table4-2", "", "");
+            let mut record = Record::new(about, parameters, Duration::ZERO, &line.options, None);
+            let claim = |verdict: &Verdict| Claim {
+                id: String::new(),
+                statement: String::new(),
+                verdict: *verdict,
+                value: None,
+                expected: Expected::Number(0.0),
+                tolerance: None,
+            };
+            record.claims = verdicts.iter().map(claim).collect();
+            record
+        };
+        let figures = fewbits_experiments::all();
+        let figure = figures
+            .iter()
+            .find(|figure| figure.about().id == "mi-table4-2")
+            .unwrap();
+        let own = |quick| figure.configure(&[], quick).unwrap().parameters;
+        use Verdict::{Pass, Skipped};
+        let full = own(false);
+        assert!(!record(&[], &full, &[Skipped, Skipped]).good());
+        assert!(!record(&[], &full, &[]).good());
+        assert!(record(&[], &full, &[Skipped, Pass]).good());
+        assert!(record(&["--quick"], &own(true), &[Skipped]).good());
+        let mut other = full.clone();
+        other.insert("sensors".to_owned(), 3.into());
+        assert!(record(&[], &other, &[Skipped]).good());
     }
 
     #[test]
@@ -128,7 +170,7 @@ mod tests {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let job = Job {
             figure: &Panics,
-            parameters: Map::new(),
+            run: Panics.with(Map::new()).unwrap(),
         };
         let failure = produce(&pool, &job, &Context::new(1)).unwrap_err();
         assert!(failure.to_string().contains("as a figure might"));

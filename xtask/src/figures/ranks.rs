@@ -30,7 +30,7 @@ impl Order {
     pub(super) fn of(job: &Job) -> Self {
         Self {
             id: job.figure.about().id.to_owned(),
-            parameters: job.parameters.clone(),
+            parameters: job.run.parameters.clone(),
         }
     }
 
@@ -38,10 +38,8 @@ impl Order {
     pub(super) fn job(self) -> Option<Job> {
         let mut figures = fewbits_experiments::all().into_iter();
         let figure = figures.find(|figure| figure.about().id == self.id)?;
-        Some(Job {
-            figure,
-            parameters: self.parameters,
-        })
+        let run = figure.with(self.parameters).ok()?;
+        Some(Job { figure, run })
     }
 }
 

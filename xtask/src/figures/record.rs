@@ -2,11 +2,12 @@
 
 use super::Options;
 use crate::{Error, files};
-use fewbits_experiments::plot::{Plot, Shape};
 use fewbits_experiments::{About, Claim, Expected, Outcome, Verdict, plain};
+use fewbits_plot::{Plot, Shape};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hasher};
 use std::path::Path;
 use std::process::Command;
 use std::sync::LazyLock;
@@ -34,6 +35,9 @@ pub(super) struct Record {
     pub(super) finished: String,
     pub(super) wall_time_s: f64,
     pub(super) files: Vec<String>,
+    /// Check sums of the files, in their order.
+    #[serde(default)]
+    pub(super) sums: Vec<String>,
     #[serde(default)]
     pub(super) rows: usize,
     pub(super) columns: Map<String, Json>,
@@ -105,6 +109,7 @@ impl Record {
             finished: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
             wall_time_s: elapsed.as_secs_f64(),
             files: Vec::new(),
+            sums: Vec::new(),
             rows: 0,
             columns: Map::new(),
             claims: Vec::new(),
@@ -130,12 +135,7 @@ impl Record {
 
     /// The command that makes it again.
     pub(super) fn command(&self) -> String {
-        let figures = fewbits_experiments::all();
-        let defaults = figures
-            .iter()
-            .find(|figure| figure.about().id == self.id)
-            .and_then(|figure| figure.configure(&[], self.quick).ok())
-            .unwrap_or_default();
+        let defaults = self.defaults();
         let mut command = format!("cargo xtask figures {}", self.id);
         let changed = |(name, value): &(&String, &Json)| defaults.get(*name) != Some(value);
         for (name, value) in self.parameters.iter().filter(changed) {
@@ -158,15 +158,58 @@ impl Record {
         self.claims.iter().filter(|c| c.verdict == verdict).count()
     }
 
-    /// Made, and no claim fails.
+    /// Made, some claim decided where all could be, and none fails.
     pub(super) fn good(&self) -> bool {
-        self.error.is_none() && self.count(Verdict::Fail) == 0
+        self.error.is_none() && self.count(Verdict::Fail) == 0 && !self.is_undecided()
+    }
+
+    /// Whether it shows nothing: at the figure's own parameters and full counts, no claim was decided.
+    pub(super) fn is_undecided(&self) -> bool {
+        let decided = self.count(Verdict::Pass) + self.count(Verdict::Fail) > 0;
+        self.error.is_none() && !decided && !self.quick && self.parameters == self.defaults()
+    }
+
+    /// The figure's own parameters; none if there is no figure of this id.
+    fn defaults(&self) -> Map<String, Json> {
+        let figures = fewbits_experiments::all();
+        let own = figures.iter().find(|figure| figure.about().id == self.id);
+        own.and_then(|figure| figure.configure(&[], self.quick).ok())
+            .map(|run| run.parameters)
+            .unwrap_or_default()
     }
 
     /// The record of one figure.
+    ///
+    /// # Errors
+    /// If it cannot be read, is another figure's, or names files that are not this figure's own in this folder.
     pub(super) fn read_one(folder: &Path, id: &str) -> std::io::Result<Self> {
         let text = std::fs::read_to_string(folder.join(format!("{id}.json")))?;
-        Ok(serde_json::from_str(&text)?)
+        let record: Self = serde_json::from_str(&text)?;
+        let own = |name: &String| {
+            let one = Path::new(name).components().count() == 1 && !name.contains(['/', '\\']);
+            let rest = name.strip_prefix(id);
+            one && rest.is_some_and(|rest| {
+                rest.starts_with(['.', '-']) && [".csv", ".svg"].iter().any(|end| rest.ends_with(end))
+            })
+        };
+        if record.id != id || !record.files.iter().all(own) {
+            return Err(std::io::Error::other(format!("{id}.json is no record of figure {id}")));
+        }
+        Ok(record)
+    }
+
+    /// The first of its files that is absent from the folder or not as it was written.
+    pub(super) fn damaged(&self, folder: &Path) -> Option<&String> {
+        let whole = |(name, sum): (&String, &String)| {
+            std::fs::read(folder.join(name)).is_ok_and(|content| check_sum(&content) == *sum)
+        };
+        let unsealed = self.files.get(self.sums.len()..).and_then(<[String]>::first);
+        self.files
+            .iter()
+            .zip(&self.sums)
+            .find(|file| !whole(*file))
+            .map(|(name, _)| name)
+            .or(unsealed)
     }
 
     /// The records in a directory, by id. What cannot be read as one is left out.
@@ -182,6 +225,13 @@ impl Record {
         }
         Ok(records)
     }
+}
+
+/// A hash of a file's content, which tells whether it is still what was written.
+pub(super) fn check_sum(content: &[u8]) -> String {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(content);
+    format!("{:016x}", hasher.finish())
 }
 
 /// A number with enough digits to read and no more.

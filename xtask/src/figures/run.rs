@@ -1,4 +1,4 @@
-//! One run: figures side by side, longest first, with the gallery and the summary up to date all the time.
+//! One run: figures side by side, longest first; gallery and summary at its end, and all the time where they are served.
 
 use super::produce::{Maker, STOP};
 use super::progress::{Progress, Running};
@@ -16,6 +16,9 @@ use std::time::{Duration, Instant};
 
 /// How often the progress is asked whether it has something to say.
 const TICK: Duration = Duration::from_millis(500);
+
+/// Set when all figures are made, and the gallery alone is served.
+static MADE: AtomicBool = AtomicBool::new(false);
 
 /// A run while it goes on.
 struct Run<'a> {
@@ -52,7 +55,9 @@ fn stop_on_signals(note: &'static str) {
         if STOP.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprint!("{note}");
+        if !MADE.load(Ordering::Relaxed) {
+            eprint!("{note}");
+        }
     });
 }
 
@@ -103,7 +108,7 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options, ranks: &Rank
         finished: Mutex::new(finished),
     };
     let server = options.serve.then(|| serve::Server::start(out.path())).transpose()?;
-    run.write("In progress: this page shows what is finished.")?;
+    run.write_progress()?;
 
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -118,8 +123,9 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options, ranks: &Rank
     });
     run.progress.clear();
     let ending = run.close(jobs.len())?;
+    MADE.store(true, Ordering::Relaxed);
     if let Some(server) = server {
-        server.wait();
+        server.wait(&STOP);
     }
     Ok(ending)
 }
@@ -129,7 +135,7 @@ impl Run<'_> {
         self.finished.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes one figure and writes its files, the gallery and the summary.
+    /// Makes one figure and writes its files.
     fn make(&self, planned: &Planned<'_>) {
         if STOP.load(Ordering::Relaxed) {
             return;
@@ -152,7 +158,7 @@ impl Run<'_> {
         finished.records.insert(planned.place, record);
         drop(finished);
         // The end of the run says so if the page cannot be written.
-        let _ = self.write("In progress: this page shows what is finished.");
+        let _ = self.write_progress();
     }
 
     /// Runs figures on all threads of all ranks. Figures of one world follow one another, from the place of the longest.
@@ -196,6 +202,14 @@ impl Run<'_> {
                 }
             });
         });
+    }
+
+    /// Writes gallery and summary as they stand, where somebody looks at them.
+    fn write_progress(&self) -> Result<(), Error> {
+        match self.options.serve {
+            true => self.write("In progress: this page shows what is finished."),
+            false => Ok(()),
+        }
     }
 
     /// Writes gallery and summary as they stand.

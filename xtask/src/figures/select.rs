@@ -2,14 +2,13 @@
 
 use super::Options;
 use crate::Error;
-use fewbits_experiments::{AnyFigure, all};
+use fewbits_experiments::{AnyFigure, Run, all};
 use globset::Glob;
-use serde_json::{Map, Value as Json};
 
 /// A figure and its parameters.
 pub(super) struct Job {
     pub(super) figure: &'static dyn AnyFigure,
-    pub(super) parameters: Map<String, Json>,
+    pub(super) run: Run<'static>,
 }
 
 /// The figures that match any of the patterns, in the registry's order; all if there is no pattern.
@@ -105,8 +104,8 @@ pub(super) fn configure(figures: &[&'static dyn AnyFigure], options: &Options) -
         .iter()
         .map(|&figure| {
             let own: Vec<_> = settings.iter().filter(|(name, _)| has(figure, name)).cloned().collect();
-            let parameters = figure.configure(&own, options.quick).map_err(Error::Setting)?;
-            Ok(Job { figure, parameters })
+            let run = figure.configure(&own, options.quick).map_err(Error::Setting)?;
+            Ok(Job { figure, run })
         })
         .collect()
 }

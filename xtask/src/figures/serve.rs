@@ -2,8 +2,13 @@
 
 use crate::Error;
 use std::path::{Component, Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use std::time::Duration;
 use tiny_http::{Header, Method, Request, Response, StatusCode};
+
+/// Time between two looks whether the user has ended it.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// A server of one directory on the loopback interface.
 pub(super) struct Server {
@@ -36,9 +41,11 @@ impl Server {
         Ok(Self { thread })
     }
 
-    /// Serves until the process is ended.
-    pub(super) fn wait(self) {
-        let _ = self.thread.join();
+    /// Serves until `stop` is set, by Ctrl-C, or the server ends.
+    pub(super) fn wait(self, stop: &AtomicBool) {
+        while !stop.load(Ordering::Relaxed) && !self.thread.is_finished() {
+            std::thread::park_timeout(LOOK);
+        }
     }
 }
 

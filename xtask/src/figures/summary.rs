@@ -33,6 +33,9 @@ pub(super) fn text(records: &[Record], folder: &Path, elapsed: Duration) -> Stri
                 writeln!(page, "FAIL {} {}: {} (measured {measured}, expected {expected})", r.id, c.id, c.statement);
         }
     }
+    for r in records.iter().filter(|r| r.is_undecided()) {
+        let _ = writeln!(page, "FAIL {}: none of its {} claims was decided", r.id, r.claims.len());
+    }
     let total = |verdict| records.iter().map(|r| r.count(verdict)).sum::<usize>();
     let broken = records.iter().filter(|r| r.error.is_some()).count();
     let broken = if broken > 0 {
@@ -64,7 +67,7 @@ pub(super) fn json(records: &[Record], folder: &Path, elapsed: Duration) -> Stri
         let failing: Vec<_> = r.claims.iter().filter(|c| c.verdict == Verdict::Fail).collect();
         json!({
             "id": r.id, "rows": r.rows, "pass": r.count(Verdict::Pass), "fail": r.count(Verdict::Fail),
-            "skipped": r.count(Verdict::Skipped), "wall_time_s": r.wall_time_s, "error": r.error, "failing": failing,
+            "skipped": r.count(Verdict::Skipped), "undecided": r.is_undecided(), "wall_time_s": r.wall_time_s, "error": r.error, "failing": failing,
         })
     };
     let figures: Vec<_> = records.iter().map(figure).collect();

@@ -1,9 +1,10 @@
 //! Files: each is written under a temporary name and then renamed, so that none is ever half-written.
 
-use super::record::Record;
-use super::{Ending, draw, gallery, print, summary};
+use super::record::{Record, check_sum};
+use super::{Ending, gallery, print, summary};
 use crate::Error;
 use fewbits_experiments::{Outcome, Table};
+use fewbits_plot::{Axis, Layer, Panel, Plot, Scale, Shape};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -94,10 +95,14 @@ impl Made {
             self.files.push((name, csv));
         }
         if plots {
-            self.files
-                .push((format!("{id}.svg"), draw::to_svg(&id, &outcome.plot)?));
+            if let Some(title) = blank(&outcome.plot) {
+                return Err(Error::Blank { title });
+            }
+            let svg = fewbits_plot::to_svg(&outcome.plot.clone().typeset())?;
+            self.files.push((format!("{id}.svg"), svg));
         }
-        self.record.files = self.files.iter().map(|(name, _)| name.clone()).collect();
+        let named = |(name, text): &(String, String)| (name.clone(), check_sum(text.as_bytes()));
+        (self.record.files, self.record.sums) = self.files.iter().map(named).unzip();
         Ok(())
     }
 
@@ -120,6 +125,23 @@ impl Made {
                 self.record.failed(error.to_string())
             }
         }
+    }
+}
+
+/// The title of a panel in which nothing would be seen, if there is one or no panel at all.
+fn blank(plot: &Plot) -> Option<String> {
+    let shows = |axis: &Axis, value: f64| value.is_finite() && (axis.scale == Scale::Linear || value > 0.0);
+    let is_seen = |panel: &Panel, layer: &Layer| match &layer.shape {
+        Shape::Line { points, .. } | Shape::Points { points, .. } | Shape::Bars { points, .. } => {
+            points.iter().any(|(x, y)| shows(&panel.x, *x) && shows(&panel.y, *y))
+        }
+        Shape::Heat { values, .. } => values.iter().flatten().any(|value| value.is_finite()),
+        _ => !layer.is_empty(),
+    };
+    let is_blank = |panel: &&Panel| !panel.layers.iter().any(|layer| is_seen(panel, layer));
+    match plot.panels.iter().find(is_blank) {
+        Some(panel) => Some(panel.title.clone()),
+        None => plot.panels.is_empty().then(String::new),
     }
 }
 
@@ -174,5 +196,22 @@ impl Summary<'_> {
         } else {
             Ending::Failed
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panel_in_which_nothing_is_seen_is_named() {
+        let panel =
+            |title: &str, y: f64| Panel::semilog(title, "x", "y").with(Layer::line("", vec![(0.0, y), (1.0, y)]));
+        assert_eq!(blank(&Plot::grid(2, vec![panel("a", 1.0), panel("b", 2.0)])), None);
+        for lost in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(blank(&Plot::grid(2, vec![panel("a", 1.0), panel("b", lost)])).as_deref(), Some("b"));
+        }
+        assert_eq!(blank(&Plot::of(Panel::linear("none", "x", "y"))).as_deref(), Some("none"));
+        assert_eq!(blank(&Plot::grid(1, Vec::new())).as_deref(), Some(""));
     }
 }

@@ -297,13 +297,13 @@ fn weights_under(score: &[f64], nodes: &Nodes) -> Vec<f64> {
 }
 
 /// `(sum w, sum w x)`.
-pub(crate) fn moments(w: &[f64], x: &[f64]) -> (f64, f64) {
+pub fn moments(w: &[f64], x: &[f64]) -> (f64, f64) {
     w.iter()
         .zip(x)
         .fold((0.0, 0.0), |(m0, m1), (w, x)| (m0 + w, m1 + w * x))
 }
 
 /// `sum w (x - estimate)^2`.
-pub(crate) fn squared_error(w: &[f64], x: &[f64], estimate: f64) -> f64 {
+pub fn squared_error(w: &[f64], x: &[f64], estimate: f64) -> f64 {
     w.iter().zip(x).map(|(w, x)| w * (x - estimate) * (x - estimate)).sum()
 }

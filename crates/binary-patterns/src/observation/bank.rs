@@ -145,7 +145,8 @@ impl Bank {
     }
 
     /// All thresholds, with the noise of their sensors.
-    pub(crate) fn thresholds(&self) -> Vec<Threshold> {
+    #[doc(hidden)]
+    pub fn thresholds(&self) -> Vec<Threshold> {
         let sensors = self.groups.iter().map(|g| &g.sensor);
         sensors
             .flat_map(|s| Threshold::of(s.quantizer().breakpoints(), s.noise_deviation()))
@@ -207,7 +208,8 @@ fn descend(tables: &[CountTable], levels: &mut [Vec<f64>], index: usize, visit: 
 }
 
 /// `rows[k][i] = C(m, k) P1(x_i)^k P0(x_i)^(m-k)`.
-pub(crate) struct CountTable {
+pub struct CountTable {
+    /// One row per count, one entry per node.
     pub rows: Vec<Vec<f64>>,
 }
 
@@ -215,6 +217,7 @@ pub(crate) struct CountTable {
 const LOG_COUNT: usize = 60;
 
 impl CountTable {
+    /// The table of `count` sensors whose bits have the probabilities `p` at the nodes.
     pub fn from_probabilities(p: &[[f64; 2]], count: usize) -> Self {
         // Row `k`: the probability that `k` of the sensors report 1.
         let log_choose = binomial::log_row(count);

@@ -33,11 +33,20 @@ impl TryFrom<Kind> for Source {
     }
 }
 
+/// Distribution of a [`Source`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub(crate) enum Kind {
-    Uniform { half_width: f64 },
-    Gaussian { deviation: f64 },
+pub enum Kind {
+    /// Uniform on `[-half_width, half_width]`.
+    Uniform {
+        /// Half of its width.
+        half_width: f64,
+    },
+    /// Zero-mean Gaussian.
+    Gaussian {
+        /// Its standard deviation.
+        deviation: f64,
+    },
 }
 
 /// Returns a number above zero whose square does not underflow or overflow; otherwise an error.
@@ -69,7 +78,8 @@ impl Source {
         })
     }
 
-    pub(crate) fn kind(&self) -> Kind {
+    #[doc(hidden)]
+    pub fn kind(&self) -> Kind {
         self.kind
     }
 
@@ -149,12 +159,14 @@ impl Source {
     }
 
     /// The same over the whole support, for noise so large that the bits are uncertain everywhere.
-    pub(crate) fn nodes(&self, width: f64, rule: &Rule) -> Nodes {
+    #[doc(hidden)]
+    pub fn nodes(&self, width: f64, rule: &Rule) -> Nodes {
         self.nodes_between(-self.reach(), self.reach(), width, rule)
     }
 
     /// An error if the noise is too small for an even grid of nodes.
-    pub(crate) fn resolvable(&self, noise_deviation: f64) -> Result<f64, Error> {
+    #[doc(hidden)]
+    pub fn resolvable(&self, noise_deviation: f64) -> Result<f64, Error> {
         let noise_deviation = positive("noise_deviation", noise_deviation)?;
         let least = FINEST * self.reach();
         if noise_deviation >= least {

@@ -143,7 +143,11 @@ impl CellGrid {
     }
 }
 
-pub(crate) fn bits_in_range(bits: usize) -> Result<usize, Error> {
+/// Accepts a number of bits for which patterns can be enumerated.
+///
+/// # Errors
+/// If `bits` is zero or more than 16.
+pub fn bits_in_range(bits: usize) -> Result<usize, Error> {
     if (1..=MAX_BITS).contains(&bits) {
         Ok(bits)
     } else {

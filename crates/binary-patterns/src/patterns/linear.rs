@@ -117,14 +117,14 @@ pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
 }
 
 /// Sensors of equal noise with the patterns of these masks.
-pub(crate) fn sensors_of(masks: &[Mask], grid: &CellGrid, noise_deviation: f64) -> Result<Vec<PatternSensor>, Error> {
+pub fn sensors_of(masks: &[Mask], grid: &CellGrid, noise_deviation: f64) -> Result<Vec<PatternSensor>, Error> {
     let bits = grid_bits(grid)?;
     let sensor = |mask: &Mask| PatternSensor::with_deviation(linear_pattern(*mask, bits)?.on(grid)?, noise_deviation);
     masks.iter().map(sensor).collect()
 }
 
 /// Number of bits of the grid's cell index; an error if its number of cells is not a power of two.
-pub(crate) fn grid_bits(grid: &CellGrid) -> Result<usize, Error> {
+pub fn grid_bits(grid: &CellGrid) -> Result<usize, Error> {
     match grid.bits() {
         Some(bits) => bits_in_range(bits),
         None => refuse("grid", format!("{} cells", grid.cells()), "a power of two of cells"),

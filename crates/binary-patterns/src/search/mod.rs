@@ -4,8 +4,6 @@
 //! |---|---|
 //! | best set of linear patterns, for small `B` and `N` | [`LinearSearch::best`], which tries all sets |
 //! | the same with the Gray basis fixed (strategy 1) | [`LinearSearch::with_forced`] |
-//! | sets for more sensors than can be searched (strategy 2) | [`tile`](crate::published::tile) |
-//! | ranking by equation 5.13 (strategy 3, poor) | [`by_information`](crate::published::by_information) |
 //! | large `B` or `N`, any patterns, unequal sensors | [`Descent`] |
 //! | thresholds that are not edges of a grid | [`free_breakpoints`] |
 

@@ -1,12 +1,12 @@
 //! Every entry of the fixture file, computed by independent programs, against the library.
 
 use crate::entry::{Entry, check};
+use fewbits_baselines::binary_patterns::by_information;
+use fewbits_baselines::binary_patterns::{
+    AdaptiveErrors, AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound,
+};
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
-};
-use fewbits_binary_patterns::published::by_information;
-use fewbits_binary_patterns::published::{
-    AdaptiveErrors, AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound,
 };
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet, free_breakpoints};
 use fewbits_binary_patterns::{

@@ -7,9 +7,7 @@
 //!
 //! | estimator | item |
 //! |---|---|
-//! | joint Gaussian belief with exact moments after each observation (default; measured as accurate as the next) | [`joint`] |
-//! | particles over the withheld measurements, the rest Gaussian; exact as their number grows | [`imputing`](crate::published::imputing) |
-//! | silence ignored (the paper's CFoMD) | [`fuse_received`](crate::published::fuse_received) |
+//! | joint Gaussian belief with exact moments after each observation; measured as accurate as particles over the withheld measurements | [`joint`] |
 
 pub mod joint;
 
@@ -28,7 +26,7 @@ use nalgebra::SVector;
 /// not; a sent one is first rounded to its format.
 ///
 /// Its silence is a likelihood of the state only if the sensor's estimate is known, as for [`Censoring`](crate::scheme::Censoring). The
-/// fusion centre does not know it and carries it in its belief: [`joint`], [`imputing`](crate::published::imputing).
+/// fusion centre does not know it and carries it in its belief: [`joint`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalSensor<S, const D: usize, const M: usize> {
     sensing: S,
@@ -84,7 +82,11 @@ impl<S: LinearSensing<D, M>, const D: usize, const M: usize> LocalSensor<S, D, M
 }
 
 /// Rules and gains of all sensors' own filters in one step.
-pub(crate) fn advance<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
+///
+/// # Errors
+/// If an innovation covariance is not positive definite.
+#[doc(hidden)]
+pub fn advance<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
     recursions: &mut [OwnRecursion<D>],
     network: &Network<S, D, M>,
     dynamics: &impl LinearDynamics<D>,
@@ -98,7 +100,11 @@ pub(crate) fn advance<S: Sensing<D, M> + Clone + PartialEq, const D: usize, cons
 }
 
 /// Checks that there is one observation per sensor and that all values are finite.
-pub(crate) fn check<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
+///
+/// # Errors
+/// If there is not, or one is not.
+#[doc(hidden)]
+pub fn check<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
     network: &Network<S, D, M>,
     observations: &[Observation<SVector<f64, M>>],
 ) -> Result<(), Error> {

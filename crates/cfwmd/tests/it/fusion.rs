@@ -1,8 +1,8 @@
 //! Fusion with feedback: the Gaussian, the particle and the Rao-Blackwellised centre against each other and exact limits.
 
+use fewbits_baselines::cfwmd::fuse_received;
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::published::fuse_received;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;

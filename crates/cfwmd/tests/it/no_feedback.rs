@@ -1,9 +1,9 @@
 //! Fusion without feedback.
 
+use fewbits_baselines::cfwmd::{ImputedBelief, fuse_received, imputing};
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{JointBelief, LocalSensor, joint};
-use fewbits_cfwmd::published::{ImputedBelief, fuse_received, imputing};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Sensing};
 use fewbits_filters::kalman;

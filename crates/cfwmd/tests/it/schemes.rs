@@ -1,8 +1,8 @@
 //! Every scheme obeys the laws of `Scheme`.
 
+use fewbits_baselines::cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::LocalSensor;
-use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::scheme::{Censoring, CovarianceFeedback};
 use fewbits_cfwmd::threshold::Budget;

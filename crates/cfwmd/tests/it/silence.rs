@@ -1,9 +1,9 @@
 //! Moments after silence against brute force.
 
 use crate::Silence;
+use fewbits_baselines::cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::censored::{Censored, MissingReports};
 use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::threshold::threshold;
 use fewbits_core::laws::factor::{is_a_number, sweep_is_scalar};

@@ -1,10 +1,10 @@
 //! Wild arguments: every constructor and step returns numbers or an error.
 
+use fewbits_baselines::cfwmd::fuse_received;
+use fewbits_baselines::cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::censored::{Censored, MissingReports};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{JointBelief, joint};
-use fewbits_cfwmd::published::fuse_received;
-use fewbits_cfwmd::published::trigger::{StochasticTrigger, Triggered};
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme};

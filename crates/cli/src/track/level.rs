@@ -274,7 +274,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         let first = first_cell(&instants, instant.time);
         sheet.write(std::iter::once(first).chain(estimates).chain(last))?;
     }
-    sheet.flush()?;
+    sheet.finish()?;
     let (summary, picture) = run.finish(options)?;
     if let Some(path) = &options.plot {
         picture.save(path)?;

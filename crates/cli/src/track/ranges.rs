@@ -185,7 +185,7 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
         let last = [Cell::Whole(ranges as i64), Cell::Text(events.to_owned())];
         sheet.write(std::iter::once(first).chain(cells.map(Cell::Number)).chain(last))?;
     }
-    sheet.flush()?;
+    sheet.finish()?;
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
     summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
     if summary.rows == 0 {

@@ -3,6 +3,7 @@
 use super::rows::Instants;
 use crate::error::Error;
 use crate::output::Cell;
+use crate::say::say;
 
 /// Deviations to either side of a mean that hold 95 % of a normal law.
 pub(super) const BAND: f64 = 1.96;
@@ -24,10 +25,9 @@ pub(super) fn first_name(instants: &Instants) -> &'static str {
 /// Prints a summary: as JSON or as lines.
 pub(super) fn summarise(summary: &impl serde::Serialize, lines: &[String], json: bool) -> Result<(), Error> {
     if json {
-        serde_json::to_writer(std::io::stderr(), summary)?;
-        eprintln!();
+        say!("{}", serde_json::to_string(summary)?);
     } else {
-        lines.iter().for_each(|line| eprintln!("{line}"));
+        lines.iter().for_each(|line| say!("{line}"));
     }
     Ok(())
 }

@@ -4,6 +4,7 @@ use crate::arguments::{TableOptions, TrackOptions};
 use crate::clock;
 use crate::error::Error;
 use crate::input::Table;
+use crate::say::say;
 use fewbits_record::TimeBase;
 use std::collections::VecDeque;
 
@@ -146,7 +147,7 @@ impl Instants {
         if self.first.is_none() && self.has_time() {
             let first = tick as f64 * self.tick;
             if let Some((_, parts)) = PARTS_OF_A_SECOND.iter().find(|(above, _)| first.abs() > *above) {
-                eprintln!("{}: times are taken as {parts:e} parts of a second", self.file());
+                say!("{}: times are taken as {parts:e} parts of a second", self.file());
                 self.tick /= parts;
             }
         }

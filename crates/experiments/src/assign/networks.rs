@@ -196,10 +196,6 @@ impl Figure for Networks {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
-        claims.keyed("alg", "linear assignment", rows, |r| r.alg);
-        claims.keyed("min", "least of all", rows, |r| r.min);
-        claims.keyed("ii", "assignment II", rows, |r| r.ii);
-        claims.keyed("avg", "mean of all", rows, |r| r.avg);
         let what = "exchanges end on average within 0.5 % of the minimum";
         claims.all("exchange", what, rows, |r| r.swap.value / r.min.value - 1.0 <= 5e-3);
         let what = "for the centre decoder the linear assignment is on average within 2.5 % of the minimum";

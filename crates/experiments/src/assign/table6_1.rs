@@ -100,8 +100,6 @@ impl Figure for Table {
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let all = &rows.assignments;
-        claims.keyed("approx", "approximate error, assignment", all, |r| r.approx);
-        claims.keyed("center", "error of the cell's centre, assignment", all, |r| r.center);
         let what =
             "error of the posterior mean, a fifth below that of the cell's centre (erratum assign-2), assignment";
         claims.keyed("mmse", what, all, |r| r.mmse);

@@ -2,8 +2,8 @@
 
 use super::{ERROR, SNR, Scene, descent_from, each, sweep, swept};
 use crate::prelude::*;
+use fewbits_baselines::binary_patterns::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
 use fewbits_binary_patterns::bounds::ConditionalMean;
-use fewbits_binary_patterns::published::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Feedback;
@@ -115,11 +115,6 @@ impl Figure for Feedback {
         claims.all("decoder", what, rows, |r| r.aqml_mmse <= r.aqml_mle);
         let what = "nothing is below the unquantized estimate";
         claims.all("floor", what, rows, |r| r.clairvoyant <= r.lbqp_best.min(r.aq_posterior_mean));
-        claims.keyed("three-bits", "patterns of three bits", rows, |r| r.lbqp_b3);
-        claims.keyed("best", "patterns of the best resolution", rows, |r| r.lbqp_best);
-        claims.keyed("aq-ml", "AQ-ML", rows, |r| r.aqml_mle);
-        claims.keyed("multi-threshold", "relaxed multi-threshold bound", rows, |r| r.ribeiro_relaxed);
-        claims.keyed("bits", "bits of the best resolution", rows, |r| r.bits as f64);
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {

@@ -1,6 +1,6 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
-use super::{SNR, Scene, crossing, each, sweep, swept};
+use super::{Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
@@ -20,17 +20,17 @@ rows! {
     }
 
     struct Row by "{snr_db} dB" {
-        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
-        mse_opt: f64 => "Least error over the 28 bases.",
+        snr_db: f64 ["dB"] as x("signal-to-noise ratio / dB") => "Signal-to-noise ratio.",
+        mse_opt: f64 as line("best basis") => "Least error over the 28 bases.",
         masks: String => "The best basis.",
-        mse_gray: f64 => "Error of the Gray basis.",
-        mse_natural: f64 => "Error of the natural basis.",
-        dr_print: f64 => "Equation 5.12 as printed, R = 3.",
-        dr_per_n: f64 => "The same with the noise of the average.",
-        vt: f64 => "Optimal-weight van Trees bound of the best basis.",
-        mse_unconstrained: f64 => "Least error over all triples of masks.",
+        mse_gray: f64 as line("Gray") => "Error of the Gray basis.",
+        mse_natural: f64 as line("natural") => "Error of the natural basis.",
+        dr_print: f64 as dashed("D(R), printed") => "Equation 5.12 as printed, R = 3.",
+        dr_per_n: f64 as dashed("D(R), three observations") => "The same with the noise of the average.",
+        vt: f64 as dashed("van Trees bound, best basis") => "Optimal-weight van Trees bound of the best basis.",
+        mse_unconstrained: f64 as line("any three masks") => "Least error over all triples of masks.",
         masks_unconstrained: String => "The best triple.",
-        mse_signs: f64 => "Error of three sign bits.",
+        mse_signs: f64 as line("three signs") => "Error of three sign bits.",
     }
 
     struct Crossing by "{pair}" {
@@ -42,7 +42,7 @@ rows! {
 impl Figure for GaussianSource {
     figure!(Parameters => Rows, "binary-fig5-9", "Gaussian source, three sensors of three bits", "Movaghati, thesis, figure 5.9",
         "The best basis against Gray and natural patterns, the printed distortion-rate function of one observation and the \
-         correct one of three. The printed one is no bound: three identical sign bits fall below it at low ratios.");
+         correct one of three. The printed one is no bound: three identical sign bits fall below it at low ratios."; semilog("mean squared error"));
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
@@ -97,26 +97,5 @@ impl Figure for GaussianSource {
         claims.all("gray-above", what, errors, |r| (r.masks == "3 4 6") == (r.snr_db > from));
         let what = "and never better than the best";
         claims.all("gray-no-better", what, errors, |r| r.mse_gray >= r.mse_opt * (1.0 - 1e-9));
-        claims.keyed("signs", "three sign bits", errors, |r| r.mse_signs);
-        claims.keyed("print", "where the print allows no less than", errors, |r| r.dr_print);
-        claims.keyed("corrected", "and the correct bound is", errors, |r| r.dr_per_n);
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let bound = |value: fn(&Row) -> f64| points(&rows.errors, |r| (r.snr_db, value(r)));
-        let errors: [Curve<'_, Row, f64>; 5] = [
-            ("best basis", |r| r.mse_opt),
-            ("any three masks", |r| r.mse_unconstrained),
-            ("Gray", |r| r.mse_gray),
-            ("natural", |r| r.mse_natural),
-            ("three signs", |r| r.mse_signs),
-        ];
-        Plot::of(
-            Panel::semilog("Three sensors, Gaussian source of variance 0.1", SNR, "mean squared error")
-                .with_lines(&rows.errors, |r| r.snr_db, &errors)
-                .with(Layer::dashed("D(R), printed", bound(|r| r.dr_print)).coloured(6))
-                .with(Layer::dashed("D(R), three observations", bound(|r| r.dr_per_n)).coloured(7))
-                .with(Layer::dashed("van Trees bound, best basis", bound(|r| r.vt)).coloured(5)),
-        )
     }
 }

@@ -1,8 +1,8 @@
 //! `binary-fig5-7`: optimal linear patterns against the signal-to-noise ratio, shortcuts, and Luo's scheme.
 
-use super::{ERROR, SNR, Scene, crossing, descent_from, each, sweep, swept};
+use super::{ERROR, Scene, crossing, descent_from, each, sweep, swept};
 use crate::prelude::*;
-use fewbits_binary_patterns::published::{Luo, by_information, tile};
+use fewbits_baselines::binary_patterns::{Luo, by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Optimum;
@@ -23,17 +23,17 @@ rows! {
     }
 
     struct Row {
-        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
-        sensors: usize => "Number of sensors N.",
-        mse_opt: f64 ["V^2"] => "Least error over sets of full rank.",
+        snr_db: f64 ["dB"] as x("signal-to-noise ratio / dB") => "Signal-to-noise ratio.",
+        sensors: usize as panel("{} sensors") => "Number of sensors N.",
+        mse_opt: f64 ["V^2"] as line("best of full rank") => "Least error over sets of full rank.",
         masks: String => "The best set.",
-        mse_unconstrained: f64 ["V^2"] => "Least error over all sets.",
+        mse_unconstrained: f64 ["V^2"] as line("best of any rank") => "Least error over all sets.",
         masks_unconstrained: String => "The best of all sets.",
-        mse_strategy1: f64 ["V^2"] => "Least error with the Gray basis forced (strategy 1).",
-        mse_strategy13: f64 ["V^2"] => "Gray basis filled up by equation 5.13.",
+        mse_strategy1: f64 ["V^2"] as line("Gray basis forced") => "Least error with the Gray basis forced (strategy 1).",
+        mse_strategy13: f64 ["V^2"] as line("Gray, filled by eq. 5.13") => "Gray basis filled up by equation 5.13.",
         mse_strategy3: f64 ["V^2"] => "All masks by equation 5.13.",
-        luo_soft: Option<f64> ["V^2"] => "Luo's bits, linear fusion; few sensors leave a bit without any.",
-        luo_mmse: Option<f64> ["V^2"] => "Luo's bits, posterior mean.",
+        luo_soft: Option<f64> ["V^2"] as line("Luo, linear") => "Luo's bits, linear fusion; few sensors leave a bit without any.",
+        luo_mmse: Option<f64> ["V^2"] as line("Luo, posterior mean") => "Luo's bits, posterior mean.",
         luo_majority: Option<f64> ["V^2"] => "Luo's bits, majority.",
     }
 
@@ -99,7 +99,7 @@ impl Figure for Optimum {
     figure!(Parameters => Rows, "binary-fig5-7", "Best linear patterns, three bits", "Movaghati, thesis, figure 5.7",
         "Exact optimum over all sets of linear patterns, without the rank constraint, with the Gray basis forced (strategy 1), \
          filled up by the printed Cramer-Rao formula (strategies 1 and 3), and Luo's allocation. With more sensors than bits the \
-         error is not monotone: some noise helps, as dither does.");
+         error is not monotone: some noise helps, as dither does."; semilog(ERROR));
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
@@ -172,22 +172,5 @@ impl Figure for Optimum {
         claims.below("limit-below", "eight sensors tend to it from below", limit, 0.25 * 0.25 / 12.0);
         let what = "strategy 2 for sixteen sensors at 18.2 dB: tiles lose against a descent";
         claims.keyed("tiling", what, &rows.tiling, |r| r.mse);
-    }
-
-    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let curves: [Curve<'_, Row, Option<f64>>; 6] = [
-            ("best of full rank", |r| Some(r.mse_opt)),
-            ("best of any rank", |r| Some(r.mse_unconstrained)),
-            ("Gray basis forced", |r| Some(r.mse_strategy1)),
-            ("Gray, filled by eq. 5.13", |r| Some(r.mse_strategy13)),
-            ("Luo, linear", |r| r.luo_soft),
-            ("Luo, posterior mean", |r| r.luo_mmse),
-        ];
-        let panel = |&sensors: &usize| {
-            let own = select(&rows.errors, move |r| r.sensors == sensors);
-            let title = format!("{sensors} sensors, {} bits", p.bits);
-            Panel::semilog(title, SNR, ERROR).with_lines(own, |r| r.snr_db, &curves)
-        };
-        Plot::grid(2, p.sensors.iter().map(panel).collect())
     }
 }

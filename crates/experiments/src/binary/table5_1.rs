@@ -117,8 +117,6 @@ impl Figure for Table {
         let here = claims.at_defaults();
         let at = |set: &str| rows.sets.iter().find(|r| r.set == set);
         let (best, decoded) = (at("best, posterior mean"), at("best, discrete MAP"));
-        claims.keyed("mmse", "error of the posterior mean", &rows.sets, |r| r.mse_mmse);
-        claims.keyed("dmap", "error of the discrete decoder", &rows.sets, |r| r.mse_dmap);
         let what = "place among 0..2701 under the posterior mean (erratum binary-11)";
         claims.keyed("rank", what, &rows.sets, |r| r.rank.map(|rank| rank as f64));
         let what = "place under the discrete decoder: the table fits a search with that decoder (erratum binary-19)";

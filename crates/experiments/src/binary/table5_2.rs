@@ -141,7 +141,6 @@ impl Figure for Table {
         here.near("not-linear", "one of the printed patterns is not linear (erratum binary-12)", linear, 2.0, 0.0);
         let rank = at("printed").and_then(|r| Some(r.rank? as f64));
         here.near("rank", "708 of the 840 labelings are better", rank, 708.0, 0.0);
-        claims.keyed("count", "number of sets", &rows.sizes, |r| r.count);
         let what = "from 5 to 52 dB, under five decoders, Gray is better: nothing makes the print optimal";
         let decoders = |r: &OverGray| [r.mmse, r.dmap, r.dmap_print, r.dmap_exact, r.cmap];
         let ratios = rows.over_gray.iter().flat_map(decoders);

@@ -65,6 +65,7 @@ pub(super) fn as_printed(claims: &mut Claims, rows: &[Rates], world: &str) {
     for (name, of) in columns {
         let what = format!("rate with {name} feedback as printed ({world})");
         let own = rows.iter().filter(|r| r.setting == world);
+        claims.shown(&format!("unmet-{name}"));
         claims.references(&format!("printed-{name}"), &what, own, |r| (format!("l = {}", r.l), of(r).value));
     }
 }

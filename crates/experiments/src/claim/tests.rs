@@ -111,3 +111,44 @@ fn references_are_found_by_key_and_fail_where_the_row_is_absent_or_off() {
         Verdict::Fail
     );
 }
+
+rows! {
+    struct Design by "{method}" {
+        method: &'static str => "Method.",
+        mse: f64 => "Squared error.",
+    }
+
+    struct Unkeyed {
+        mse: f64 => "Squared error.",
+    }
+}
+
+/// What a figure with these tables is found to claim of its references `mse`.
+fn compared<T: crate::schema::Field>(tables: &T, own: impl FnOnce(&Claims)) -> Vec<Verdict> {
+    let claims = Claims::about("mi-table4-3", true, true);
+    own(&claims);
+    claims.compare(&Table::of(tables).unwrap());
+    let made = claims.made();
+    let of = |claim: &Claim| claim.id == "mse/lloyd-x" || claim.id == "mse-references";
+    made.iter()
+        .filter(|claim| of(claim))
+        .map(|claim| claim.verdict)
+        .collect()
+}
+
+#[test]
+fn a_column_with_references_is_compared_without_a_word() {
+    let rows = |method, mse| vec![Design { method, mse }];
+    assert_eq!(compared(&rows("lloyd-x", 0.130_486_15), |_| ()), [Verdict::Pass]);
+    assert_eq!(compared(&rows("lloyd-x", 0.130_487), |_| ()), [Verdict::Fail]);
+    assert_eq!(compared(&rows("lloyd-z", 0.130_486_15), |_| ()), [Verdict::Fail]);
+    // Said by the figure itself, it is said once.
+    let own = |c: &Claims| c.references("mse", "", [0.2], |v| ("lloyd-x".to_owned(), v));
+    assert_eq!(compared(&rows("lloyd-x", 0.130_486_15), own), [Verdict::Fail]);
+}
+
+#[test]
+fn references_that_nothing_is_compared_with_fail() {
+    assert_eq!(compared(&vec![Unkeyed { mse: 0.130_486_15 }], |_| ()), [Verdict::Fail]);
+    assert!(compared(&vec![Unkeyed { mse: 0.130_486_15 }], |c| c.shown("mse")).is_empty());
+}

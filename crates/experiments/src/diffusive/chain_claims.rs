@@ -17,12 +17,6 @@ fn at<'a>(rows: &'a Rows, scheme: &str, range: f64, step: usize) -> Option<&'a C
     rows.curves.iter().find(same)
 }
 
-fn references(rows: &Rows, claims: &mut Claims) {
-    claims.keyed("reach", "share that reaches the threshold", &rows.summary, |r| r.reach);
-    claims.keyed("nodes_median", "median nodes to the threshold", &rows.summary, |r| r.nodes_median);
-    claims.keyed("final_err_median", "median error at the end", &rows.summary, |r| r.final_err_median);
-}
-
 fn calibrated(rows: &Rows, claims: &mut Claims, key: &str) {
     let full = claims.at_full_trials();
     let nees = find(rows, key).and_then(|s| s.nees_median);
@@ -58,7 +52,6 @@ pub(super) fn fig3(rows: &Rows, claims: &mut Claims) {
 /// Determinant, example A.
 pub(super) fn fig4(rows: &Rows, claims: &mut Claims) {
     let (full, paper) = (claims.at_full_trials(), claims.at_defaults().at_full_trials());
-    references(rows, claims);
     for scheme in ["exact", "gmm-4", "gaussian known rate", "gaussian-9"] {
         let [wide, narrow] = [15, 10].map(|range| nodes(rows, &format!("{scheme} {range}")));
         let what = format!("15 m of range need fewer nodes than 10 m: {scheme}");
@@ -97,7 +90,6 @@ pub(super) fn fig7(rows: &Rows, claims: &mut Claims) {
 /// Determinant, example B.
 pub(super) fn fig8(rows: &Rows, claims: &mut Claims) {
     let full = claims.at_full_trials();
-    references(rows, claims);
     let median = |key: &str| nodes(rows, &format!("{key} 15"));
     let lpg = "lpg-2x5 known rate";
     let what = "the paper's single search with polynomial Gaussians, 7 nodes, is between the deciles of ours";
@@ -127,7 +119,6 @@ pub(super) fn fig8(rows: &Rows, claims: &mut Claims) {
 /// Both examples in wind.
 pub(super) fn wind(rows: &Rows, claims: &mut Claims) {
     let full = claims.at_full_trials();
-    references(rows, claims);
     let reach = |key: &str| find(rows, key).map(|s| s.reach.value);
     for (rule, id) in [
         ("covariance 15", "covariance-first"),

@@ -137,9 +137,6 @@ impl Figure for Envelope {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        claims.keyed("coverage", "coverage of the 90 per cent band", rows.coverage.iter(), |c| c.coverage);
-        claims.keyed("radius", "true radius", rows.coverage.iter(), |c| c.radius);
-        claims.keyed("width", "median width of the band", rows.coverage.iter(), |c| c.width_median);
         claims.all("ordered", "quantiles are ordered", &rows.band, |b| b.r05 <= b.r50 && b.r50 <= b.r95);
         claims.all("probabilities", "exceedances are probabilities", &rows.exceedance, |e| {
             (0.0..=1.0 + 1e-9).contains(&e.p_exceed)

@@ -2,7 +2,7 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
-use fewbits_dymbo::published::iterated;
+use fewbits_baselines::dymbo::iterated;
 use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain};
 
 parameters! {
@@ -92,8 +92,6 @@ impl Figure for WordLength {
         }
         let first = rows.words.iter().filter(|r| Some(&r.plant) == p.plants.first());
         claims.references("information", "information of a word of bits", first, |r| (r.bits.to_string(), r.c));
-        claims.keyed("loss", "exact loss at a, gamma, bits", &rows.words, |r| r.loss);
-        claims.keyed("mse", "exact error at a, gamma, bits", &rows.words, |r| r.exact_mse);
         let longer = rows.words.iter().filter(|r| r.bits > 1);
         let what = "from two bits on the prediction is exact to 0.03 %";
         here.all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4);

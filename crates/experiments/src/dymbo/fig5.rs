@@ -1,12 +1,11 @@
 //! Convergence from the first message: simulated, exact and predicted.
 
-use super::common::{Plant, each, plants};
+use super::common::{Plant, each};
 use crate::prelude::*;
 use fewbits_core::Sign;
 use fewbits_dymbo::chain::first_message_transient;
-use fewbits_dymbo::{DymboFilter, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value};
+use fewbits_dymbo::{DymboFilter, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance};
 use fewbits_filters::kalman;
-use std::f64::consts::FRAC_2_PI;
 
 parameters! {
     pub struct Parameters {
@@ -185,9 +184,6 @@ impl Figure for Convergence {
                 format!("gamma = {gamma}: simulated error over n >= 30 is the predicted steady variance within 2 %");
             here.near(format!("steady-{gamma}"), what, late.mean(), 1.0, 0.02);
         }
-        claims.keyed("exact", "exact sign-bit error at a, gamma, n", rows, |r| r.dymbo_exact);
-        claims.keyed("kalman", "Kalman variance at a, gamma, n", rows, |r| r.kf_pred);
-        claims.keyed("informed", "error when the prior is used at a, gamma, n", rows, |r| r.informed_mse);
 
         let curves = || rows.chunks(p.steps + 1);
         // The Kalman filter settles on its own variance, the sign-bit filter on its own exact error.
@@ -214,7 +210,6 @@ impl Figure for Convergence {
             let what = format!("the ratio of {of} at its peak, a, gamma");
             claims.references(&format!("peak-{id}"), &what, curves(), |c| (c[0].plant.to_string(), peak(c)));
         }
-        starts(claims);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
@@ -244,34 +239,4 @@ impl Figure for Convergence {
         }
         Plot::grid(p.gamma.len().min(2), panels)
     }
-}
-
-/// What the start is worth, from closed forms.
-fn starts(claims: &mut Claims) {
-    let paper = plants([(0.9, 0.5), (0.9, 0.05)]);
-    for (who, c) in [("sign-bit", FRAC_2_PI), ("Kalman", 1.0)] {
-        let steps = |plant: &Plant, start: f64| {
-            let model = plant.model().ok()?;
-            let limit = model.steady_state(c).ok()?.filtered_variance;
-            let next = |m: &f64| Some(filtered_variance(model.dynamics().predict_variance(*m), 1.0, c));
-            let path = std::iter::successors(Some(start), next).take(100);
-            Some(path.take_while(|m| *m > 1.05 * limit).count() as f64)
-        };
-        let cases = paper.iter().flat_map(|plant| [(plant, 1e2), (plant, 1e4)]);
-        let what = format!("steps of the {who} filter from a prior variance alone, at a, gamma, variance");
-        claims.references(&format!("cold-{who}"), &what, cases, |(plant, start)| {
-            (format!("{plant} {start}"), steps(plant, start))
-        });
-    }
-    let value = |plant: &Plant| {
-        let scheme = RoundedSample::new(1.0, 1.0).ok()?;
-        first_message_value(&scheme, &plant.stationary().ok()?).ok()
-    };
-    let what = "mean variance after first message and prior together, at a, gamma (erratum dymbo-13)";
-    claims.references("e13", what, &paper, |p| (p.to_string(), value(p).map(|v| v.expected_variance)));
-    let what = "entropy of the first message in bits, at a, gamma";
-    claims.references("entropy", what, &paper, |p| (p.to_string(), value(p).map(|v| v.entropy_bits)));
-    let prior = paper.last().and_then(|plant| plant.stationary().ok());
-    let what = "at gamma = 0.05 the prior alone is better than the first message alone, 13/12 (erratum dymbo-13)";
-    claims.below("message-worse-than-prior", what, prior.map(|prior| prior.covariance()[0]), 13.0 / 12.0);
 }

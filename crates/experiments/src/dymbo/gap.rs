@@ -2,9 +2,10 @@
 
 use super::common::{Plant, plants};
 use crate::prelude::*;
+use fewbits_baselines::dymbo::gap::{Twin, exact_filter};
+use fewbits_baselines::dymbo::tree;
 use fewbits_dymbo::chain::{self, MessageLaw};
-use fewbits_dymbo::gap::{Twin, exact_filter};
-use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain, tree};
+use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain};
 
 parameters! {
     pub struct Parameters {
@@ -136,9 +137,7 @@ impl Figure for GapToExact {
         let here = claims.at_defaults();
         let what = "minimum error and excess add up to the error chain's, at every step";
         claims.all("adds-up", what, &rows.tree, |r| (r.mmse + r.excess - r.chain_mse).abs() <= 1e-12);
-        claims.keyed("tree", "minimum error after a first message, at a, gamma, bits", &rows.tree, |r| r.mmse);
         let of = |bits: usize| rows.steady.iter().filter(move |r| r.bits == bits);
-        claims.keyed("excess", "steady excess over the exact posterior mean, at a, gamma", of(1), |r| r.excess);
         let what = "the same in percent of the minimum error, at a, gamma";
         claims.keyed("percent", what, of(1), |r| r.excess.scaled(100.0 / r.mmse));
         let what =
@@ -147,7 +146,6 @@ impl Figure for GapToExact {
             let most = if r.plant.a < 1.0 { 0.033 } else { 0.088 };
             100.0 * r.excess.value / r.mmse <= most
         });
-        claims.keyed("kurtosis", "kurtosis of the error, at a, gamma", of(1), |r| r.kurtosis);
         let what = "percent that the best constant gain would save, at a, gamma";
         claims.keyed("tuned", what, of(1), |r| r.tuned_mse.map(|tuned| 100.0 * (1.0 - tuned / r.exact_mse)));
         let what = "exact error over computed variance in the steady state, at a, gamma";

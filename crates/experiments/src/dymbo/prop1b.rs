@@ -1,9 +1,9 @@
 //! How normal the posterior of one bit is.
 
 use crate::prelude::*;
+use fewbits_baselines::dymbo::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_core::Sign;
 use fewbits_core::factor::{Factor, InCell};
-use fewbits_dymbo::published::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_numerics::normal::log_pdf_with;
 
 parameters! {
@@ -74,7 +74,6 @@ impl Figure for PosteriorShape {
         let rows = &rows.distances;
         let what = "the posterior becomes normal as the noise grows";
         here.decreasing("converges", what, rows.iter().map(|r| r.distance));
-        claims.keyed("distance", "largest difference at sigma", rows, |r| r.distance);
         let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
         here.near("cubic", "twice the noise, an eighth of the difference (erratum dymbo-11)", ratio, 8.0, 0.01);
         let constant = rows.last().map(|r| r.cubed);

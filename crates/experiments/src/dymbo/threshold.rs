@@ -105,7 +105,6 @@ impl Figure for ThresholdPlace {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
-        claims.keyed("mse", "mean squared error at a, gamma, rule", rows, |r| r.mse);
         let what = "relative excess over the prediction rule at a, gamma, rule (erratum dymbo-1)";
         claims.keyed("excess", what, rows, |r| r.excess);
         let right = rows.iter().filter(|r| r.rule == "prediction");

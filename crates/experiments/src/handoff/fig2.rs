@@ -1,7 +1,7 @@
 //! Figure 2: small losses add up to more than their sum.
 
 use crate::prelude::*;
-use fewbits_mixture_codec::divergence::kl_centred_normals;
+use fewbits_baselines::mixture_codec::divergence::kl_centred_normals;
 
 parameters! {
     pub struct Parameters {
@@ -13,12 +13,12 @@ parameters! {
 
 rows! {
     pub struct Row by "r{ratio}-t{t}" {
-        ratio: f64 => "Ratio of successive standard deviations.",
-        t: u32 => "Time.",
+        ratio: f64 as panel("ratio {}") => "Ratio of successive standard deviations.",
+        t: u32 as x("time t") => "Time.",
         kl_step: f64 ["nat"] => "KL from one density of the sequence to the next.",
-        kl_total: f64 ["nat"] => "KL from the first density to that of this time.",
-        kl_total_reverse: f64 ["nat"] => "KL the other way round.",
-        sum_of_steps: f64 ["nat"] => "Sum of the steps' KLs.",
+        kl_total: f64 ["nat"] as line("from the first density") => "KL from the first density to that of this time.",
+        kl_total_reverse: f64 ["nat"] as dashed("to the first density") => "KL the other way round.",
+        sum_of_steps: f64 ["nat"] as points("sum of the steps") => "Sum of the steps' KLs.",
     }
 }
 
@@ -31,7 +31,7 @@ fn at(rows: &[Row], ratio: f64, t: u32) -> Option<&Row> {
 impl Figure for Fig2 {
     figure!(Parameters => Vec<Row>, "handoff-fig2", "Small losses add up to more than their sum", "compressed particle filter, Section 4, Figure 2",
         "A Gaussian that is narrowed a little at every step. Each step loses under 0.001 nat at ratio 0.97, ten steps \
-         lose over 0.1: the error grows with the square of time, not in proportion.");
+         lose over 0.1: the error grows with the square of time, not in proportion."; semilog("KL / nat"));
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -54,8 +54,6 @@ impl Figure for Fig2 {
 
     fn claims(&self, p: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        claims.keyed("kl-total", "KL from the first", rows, |r| r.kl_total);
-        claims.keyed("kl-reverse", "KL to the first", rows, |r| r.kl_total_reverse);
         let what = "at ratio 0.97 a step loses less than 0.001 nat";
         here.below("step", what, at(rows, 0.97, 1).map(|r| r.kl_step), 1e-3);
         here.above("ten-steps", "and ten steps more than 0.1 nat", at(rows, 0.97, 10).map(|r| r.kl_total), 0.1);
@@ -65,29 +63,10 @@ impl Figure for Fig2 {
         here.above("printed-ratio", what, at(rows, 0.96, 1).map(|r| r.kl_step), 1e-3);
         let what = "the other way round even 0.97 stays below 0.1 nat after ten steps";
         here.below("reverse", what, at(rows, 0.97, 10).map(|r| r.kl_total_reverse), 0.1);
-        let both = |ratio: f64| {
-            let (step, total) = (kl_centred_normals(1.0, ratio).ok()?, kl_centred_normals(1.0, ratio.powi(10)).ok()?);
-            Some(step < 1e-3 && total > 0.1)
-        };
-        let what = "both printed statements hold between the ratios 0.96919 and 0.97179 and nowhere near them";
-        let ends = [(0.9691, false), (0.9692, true), (0.9717, true), (0.9719, false)];
-        claims.all("window", what, ends, |(ratio, holds)| both(ratio) == Some(holds));
         for ratio in p.ratio.iter().filter(|r| **r < 1.0) {
             let gaps = select(rows, |r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
             let what = "the ratio of the whole to the sum of its parts grows with time";
             claims.increasing(format!("gap-r{ratio}"), what, gaps);
         }
-    }
-
-    fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
-        let panel = |ratio: &f64| {
-            let of = || rows.iter().filter(|r| r.ratio == *ratio && r.t > 0);
-            Panel::semilog(format!("ratio {ratio}"), "time t", "KL / nat")
-                .with(Layer::line("from the first density", points(of(), |r| (r.t.into(), r.kl_total))))
-                .with(Layer::dashed("to the first density", points(of(), |r| (r.t.into(), r.kl_total_reverse))))
-                .with(Layer::points("sum of the steps", points(of(), |r| (r.t.into(), r.sum_of_steps))))
-                .with(Layer::level("0.1 nat", [1.0, p.steps.into()], 0.1))
-        };
-        Plot::grid(2, p.ratio.iter().map(panel).collect())
     }
 }

@@ -87,8 +87,6 @@ impl Figure for Fig3 {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        claims.keyed("l1", "L1", &rows.l1, |d| d.l1);
-        claims.keyed("probability", "probability", &rows.l1, |d| d.probability);
         let gap = rows.l1("expected").zip(rows.l1("prior")).map(|(e, p)| e - 2.0 * p);
         claims.at_most("twice", "the expected L1 is at most twice the prior's", gap, 0.0);
         here.below("nothing", "the other answer leaves nothing of it", rows.l1("y0"), 1e-8);

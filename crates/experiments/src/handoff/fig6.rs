@@ -3,7 +3,7 @@
 use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, median, paper_cut, prior, world};
 use super::world::Walk;
 use crate::prelude::*;
-use fewbits_handoff::published::{Amplification, Bounds, bounds};
+use fewbits_baselines::handoff::{Amplification, Bounds, bounds};
 use fewbits_mixture_codec::divergence::Divergence;
 use fewbits_mixture_codec::plug_in::plug_in;
 use std::f64::consts::LN_10;

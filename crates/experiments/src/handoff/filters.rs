@@ -2,10 +2,10 @@
 
 use super::world::{Point, Reading, START, Walk, World};
 use crate::prelude::*;
+use fewbits_baselines::mixture_codec::PaperReductions;
 use fewbits_core::Likelihood;
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles, SampleSize, systematic};
 use fewbits_handoff::{HandoffFilter, Whole, trimmed};
-use fewbits_mixture_codec::published::PaperReductions;
 use fewbits_mixture_codec::{Reduction, cut};
 
 /// Particles of a filter.

@@ -17,14 +17,14 @@ parameters! {
 
 rows! {
     pub struct Row by "{method}-m{components}" {
-        method: &'static str => "Method.",
-        components: usize => "The most components.",
-        kl: Measured ["nat"] => "KL from the estimate to the mixture, by quadrature.",
+        method: &'static str as key => "Method.",
+        components: usize as x("components M") => "The most components.",
+        kl: Measured ["nat"] as points => "KL from the estimate to the mixture, by quadrature.",
     }
 }
 
-/// The methods by their names in the table and in the picture.
-const METHODS: [(&str, &str, Method); 14] = {
+/// The methods by their names.
+const METHODS: [(&str, Method); 14] = {
     use Criterion::{Kl, L1, LogDeterminant, Ml};
     use Method::{Plain, Williams};
     const fn greedy(split: Split, criterion: Criterion) -> Method {
@@ -47,20 +47,20 @@ const METHODS: [(&str, &str, Method); 14] = {
         criterion: Kl,
     };
     [
-        ("kd ml", "KD-tree, ML", greedy(Split::KD, Ml)),
-        ("kd l1", "KD-tree, L1", greedy(Split::KD, L1)),
-        ("kd kl", "KD-tree, KL", greedy(Split::KD, Kl)),
-        ("kd kl optimal", "KD-tree, KL, optimal", Plain(OPTIMAL)),
-        ("kd closed form", "KD-tree, closed form", greedy(counting(SplitAxis::Widest), LogDeterminant)),
-        ("principal kl", "principal axes, KL", greedy(Split::PRINCIPAL, Kl)),
-        ("principal closed form", "principal axes, closed form", greedy(Split::PRINCIPAL, LogDeterminant)),
-        ("alternating kl", "alternating axes, KL", greedy(counting(SplitAxis::Alternating), Kl)),
-        ("runnalls", "Runnalls", merging(MergeCost::Runnalls)),
-        ("salmond", "Salmond", merging(MergeCost::Salmond)),
-        ("williams from 30", "Williams from 30", Williams),
-        ("pipeline 0", "cut, Runnalls", pipeline(0)),
-        ("pipeline 15", "cut, Runnalls, 15 EM", pipeline(15)),
-        ("pipeline 40", "cut, Runnalls, 40 EM", pipeline(40)),
+        ("kd ml", greedy(Split::KD, Ml)),
+        ("kd l1", greedy(Split::KD, L1)),
+        ("kd kl", greedy(Split::KD, Kl)),
+        ("kd kl optimal", Plain(OPTIMAL)),
+        ("kd closed form", greedy(counting(SplitAxis::Widest), LogDeterminant)),
+        ("principal kl", greedy(Split::PRINCIPAL, Kl)),
+        ("principal closed form", greedy(Split::PRINCIPAL, LogDeterminant)),
+        ("alternating kl", greedy(counting(SplitAxis::Alternating), Kl)),
+        ("runnalls", merging(MergeCost::Runnalls)),
+        ("salmond", merging(MergeCost::Salmond)),
+        ("williams from 30", Williams),
+        ("pipeline 0", pipeline(0)),
+        ("pipeline 15", pipeline(15)),
+        ("pipeline 40", pipeline(40)),
     ]
 };
 
@@ -87,12 +87,12 @@ pub struct Reductions;
 impl Figure for Reductions {
     figure!(Parameters => Vec<Row>, "handoff-reduction", "What a reduction loses", "our own comparison",
         "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
-         2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.");
+         2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does."; loglog("KL / nat"));
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let all = over_beliefs(context, "handoff-reduction", p.trials, |estimate, _| {
             let truth = Truth::new(estimate);
-            let cell = |((name, _, method), m): (&(&'static str, _, Method), &usize)| {
+            let cell = |((name, method), m): (&(&'static str, Method), &usize)| {
                 let kl = truth.kl(&method.reduce(estimate, *m)?);
                 Ok(((*name, *m), [kl / TIMES.len() as f64]))
             };
@@ -119,13 +119,5 @@ impl Figure for Reductions {
             }
         }
         paper.decreasing("more", "more components lose less", p.components.iter().map(|m| kl("pipeline 15", *m)));
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let layers = METHODS.iter().enumerate().map(|(i, (method, words, _))| {
-            let of = select(rows, |r| r.method == *method);
-            Layer::measured(*words, of, |r| (r.components as f64, r.kl)).coloured(i)
-        });
-        Plot::of(Panel::loglog("KL of the reduced mixture", "components M", "KL / nat").with_all(layers))
     }
 }

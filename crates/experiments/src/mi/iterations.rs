@@ -3,7 +3,8 @@
 
 use super::common::{MI, MSE, lloyd_system, outer, over_bsc, scene};
 use crate::prelude::*;
-use fewbits_quantizer_design::{System, published};
+use fewbits_baselines::quantizer_design as baselines;
+use fewbits_quantizer_design::System;
 use std::f64::consts::LN_2;
 
 parameters! {
@@ -93,10 +94,8 @@ pub static FIGURE42: Iterations = Iterations {
     crossovers: None,
     axis: INFORMATION,
     columns: &[(|r| r.mi_x_z1_bits, "sensor 1"), (|r| r.mi_x_z1z2_bits, "both sensors")],
-    judge: |p, rows, claims, here| {
+    judge: |_, rows, claims, here| {
         information_rises(rows, claims);
-        claims.keyed("mi_x_z1_nats", "information of sensor 1", rows.clean(p), |r| r.mi_x_z1_nats);
-        claims.keyed("mi_x_z1z2_nats", "information of both", rows.clean(p), |r| r.mi_x_z1z2_nats);
         // The prior has variance one, so that its entropy is ln(2 pi e) / 2.
         let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E).ln();
         let objective = rows.chain.last().map(|r| r.mi_x_z1z2_nats - entropy);
@@ -111,10 +110,7 @@ pub static FIGURE43: Iterations = Iterations {
     crossovers: None,
     axis: ERROR,
     columns: &[(|r| r.mse, "both sensors")],
-    judge: |p, rows, claims, here| {
-        error_falls(rows, here);
-        claims.keyed("mse", "squared error", rows.clean(p), |r| r.mse);
-    },
+    judge: |_, rows, _, here| error_falls(rows, here),
 };
 
 pub static FIGURE44: Iterations = Iterations {
@@ -149,14 +145,6 @@ pub static FIGURE45: Iterations = Iterations {
         here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse);
     },
 };
-
-impl Rows {
-    /// The chain's steps on a clean channel, where there is no other.
-    fn clean(&self, p: &Parameters) -> impl Iterator<Item = &Step> {
-        let clean = p.crossovers() == [0.0];
-        select(&self.chain, move |_| clean)
-    }
-}
 
 /// Neighbouring rows of one channel.
 fn neighbours(rows: &[Step]) -> impl Iterator<Item = (&Step, &Step)> {
@@ -210,14 +198,14 @@ impl Figure for Iterations {
             for k in 1..=2 * steps {
                 let sensor = usize::from(k > steps);
                 let quantizer = match sensor {
-                    0 => published::alternating_step(&first_alone(&chain)?, 0, MI)?,
-                    _ => published::alternating_step(&chain, sensor, MI)?,
+                    0 => baselines::alternating_step(&first_alone(&chain)?, 0, MI)?,
+                    _ => baselines::alternating_step(&chain, sensor, MI)?,
                 };
                 chain = chain.with_quantizer(sensor, quantizer)?;
                 let row = step(crossover, [k, sensor + 1, k - sensor * steps], &chain)?;
                 rows.chain.push(row);
                 let sensor = (k - 1) % 2;
-                cyclic = cyclic.with_quantizer(sensor, published::alternating_step(&cyclic, sensor, MI)?)?;
+                cyclic = cyclic.with_quantizer(sensor, baselines::alternating_step(&cyclic, sensor, MI)?)?;
                 let row = step(crossover, [k, sensor + 1, k.div_ceil(2)], &cyclic)?;
                 rows.cyclic.push(row);
             }

@@ -137,8 +137,6 @@ impl Figure for Table43 {
         let find = |method: &str| first(designs, |d| d.method == method);
         let mse = |method: &str| find(method).map(|d| d.values.mse);
         claims.keyed("mse", "squared error, by counts of identical sensors (erratum mi-4)", designs, |d| d.values.mse);
-        claims.keyed("t", "outer breakpoint", designs, |d| d.t);
-        claims.keyed("mi_nats", "information", designs, |d| d.values.mi_nats);
         let what = "printed errors are exact at the printed breakpoints to 1.6 % (erratum mi-8)";
         claims.keyed("printed", what, designs, |d| d.values.mse);
         let what =

@@ -2,9 +2,9 @@
 
 use super::common::MI;
 use crate::prelude::*;
+use fewbits_baselines::quantizer_design::{self as baselines, Separation};
 use fewbits_numerics::normal;
 use fewbits_quantizer_design::decoder::NeymanPearson;
-use fewbits_quantizer_design::published::{self, Separation};
 use fewbits_quantizer_design::{
     Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior, Quantizer, System, design,
 };
@@ -113,7 +113,7 @@ impl Figure for Table44 {
             let all = System::identical(scene(signal, p.sensors)?, start.clone())?;
             let one = System::identical(scene(signal, 1)?, start.clone())?;
             let joint = |system, criterion| Ok::<_, Error>(design::joint(system, criterion, &newton)?.quantizers());
-            let separated = |d| Ok::<_, Error>(published::separate(d, signal, 1.0, &start, &ideal, &newton)?.0);
+            let separated = |d| Ok::<_, Error>(baselines::separate(d, signal, 1.0, &start, &ideal, &newton)?.0);
             let best = joint(&all, PE)?.remove(0);
             let common = [
                 ("mi-joint", joint(&all, MI)?.remove(0)),
@@ -137,7 +137,7 @@ impl Figure for Table44 {
             grid.extend(best.breakpoints());
             grid.sort_by(f64::total_cmp);
             grid.dedup_by(|a, b| *a - *b < 1e-9);
-            let alone = published::best_contiguous(&minimum, 0, PE, &grid)?.1;
+            let alone = baselines::best_contiguous(&minimum, 0, PE, &grid)?.1;
             rows.checks.push(Check {
                 signal,
                 unquantized_pe: normal::cdf(-0.5 * signal * (p.sensors as f64).sqrt()),
@@ -155,11 +155,7 @@ impl Figure for Table44 {
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let designs = &rows.designs;
-        claims.keyed("pe", "error probability", designs, |d| d.pe);
-        claims.keyed("t", "offset", designs, |d| d.t);
         claims.keyed("printed", "printed errors are within about 10 % of the exact ones", designs, |d| d.pe);
-        claims.keyed("equivocation", "ln 2 minus the information", designs, |d| d.equivocation_nats);
-        claims.keyed("unquantized_pe", "error from samples", &rows.checks, |c| c.unquantized_pe);
         let pe = |signal, method| first(designs, |d| d.signal == signal && d.method == method).map(|d| d.pe);
         for &signal in &p.signals {
             let what = "least error < Matusita < mutual information < J-divergence (erratum mi-11)";

@@ -80,8 +80,6 @@ impl Figure for Table45 {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        claims.keyed("mse", "squared error", rows, |r| r.pair.mse);
-        claims.keyed("outer2", "outer breakpoint", rows, |r| r.pair.outer2);
         claims.keyed("printed", "printed error, natural words, three digits", rows, |r| r.pair.mse);
         let at = |crossover: f64, labelling: &str, design: &str| {
             first(rows, |r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
@@ -184,7 +182,6 @@ impl Figure for Mismatch {
     fn claims(&self, p: &Parameters, tables: &Mismatches, claims: &mut Claims) {
         let here = claims.at_defaults();
         claims.keyed("at-printed", "printed design at 0.05", &tables.printed, |r| r.mse);
-        claims.keyed("mse", "words, designed for, met", &tables.rows, |r| r.mse);
         let natural = select(&tables.printed, |r| r.labelling == "natural");
         let what = "the printed 0.497 is natural words' value at the printed breakpoints to 0.3 %";
         claims.references("printed", what, natural, |r| (format!("{} 0 0.05", r.labelling), r.mse));

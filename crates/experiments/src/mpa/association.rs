@@ -1,11 +1,11 @@
 //! `mpa-fig3-7`, `mpa-table3-da`: two targets on a line, two measurements in unknown order.
 
 use crate::prelude::*;
-use fewbits_filters::Resampling;
-use fewbits_numerics::kernels::{self, log_sum_exp};
-use fewbits_pf_mpa::association::{
+use fewbits_baselines::pf_mpa::association::{
     AssociationRule, Hypotheses, PRINTED_GAIN, PairTracker, separation, sigmoid, tanh_rule,
 };
+use fewbits_filters::Resampling;
+use fewbits_numerics::kernels::{self, log_sum_exp};
 use rand::seq::SliceRandom;
 
 /// Variance of a step.

@@ -13,14 +13,14 @@ parameters! {
 
 rows! {
     pub struct Row by "{snr_db}dB-L{levels}" {
-        snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
-        levels: usize => "Levels of the quantizer.",
-        quantized: Measured => "Bound for levels, mean over the steps.",
-        unquantized: Measured => "Bound for the ranges themselves.",
-        grid: Measured => "Grid of 25 nodes an axis.",
+        snr_db: f64 ["dB"] as x("SNR / dB") => "Ratio of the powers of range and noise.",
+        levels: usize as panel("{} levels") => "Levels of the quantizer.",
+        quantized: Measured as line("bound") => "Bound for levels, mean over the steps.",
+        unquantized: Measured as dashed("bound of ranges") => "Bound for the ranges themselves.",
+        grid: Measured as points("grid, mean") => "Grid of 25 nodes an axis.",
         message_passing: Measured => "Gaussian message passing.",
         unquantized_filter: Measured => "Extended Kalman filter of the ranges.",
-        grid_median: f64 => "Medians of the three.",
+        grid_median: f64 as points("grid, median") => "Medians of the three.",
         message_passing_median: f64 => "Median.",
         unquantized_filter_median: f64 => "Median.",
     }
@@ -39,7 +39,7 @@ type Sums = Vec<[Matrix4<f64>; 2]>;
 impl Figure for Bounds {
     figure!(Parameters => Vec<Row>, "mpa-crlb", "Bounds for quantized ranges", "",
         "Posterior Cramer-Rao bounds over free trajectories, accelerations known, with the references of the grid filter; \
-         and what is reached. At 50 dB the bound is far below: information sits at the edges of the cells.");
+         and what is reached. At 50 dB the bound is far below: information sits at the edges of the cells."; semilog(super::scores::MSE));
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let target = Target::printed()?;
@@ -117,18 +117,5 @@ impl Figure for Bounds {
         }
         let loose = first(t, |r| r.snr_db == 50.0 && r.levels == 4);
         full.above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0);
-    }
-
-    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
-        let panel = |levels: usize| {
-            let here = || select(t, move |r| r.levels == levels);
-            let of = |value: fn(&Row) -> f64| points(here(), |r| (r.snr_db, value(r)));
-            Panel::semilog(format!("{levels} levels"), "SNR / dB", super::scores::MSE)
-                .with(Layer::line("bound", of(|r| r.quantized.value)).coloured(0))
-                .with(Layer::points("grid, median", of(|r| r.grid_median)).coloured(1))
-                .with(Layer::measured("grid, mean", here(), |r| (r.snr_db, r.grid)).coloured(2))
-                .with(Layer::dashed("bound of ranges", of(|r| r.unquantized.value)).coloured(3))
-        };
-        Plot::grid(3, LEVELS.map(panel).to_vec())
     }
 }

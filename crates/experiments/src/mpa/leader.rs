@@ -3,9 +3,9 @@
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
+use fewbits_baselines::pf_mpa::MessagePassing;
 use fewbits_core::NumberFormat;
 use fewbits_pf_mpa::leader::{LeaderMessage, elect, nearest};
-use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{Reports, Target, Tracker};
 
 parameters! {

@@ -1,9 +1,9 @@
 //! The canonical scenario, and every tracker on it.
 
 use crate::prelude::*;
+use fewbits_baselines::pf_mpa::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_core::Observed;
 use fewbits_filters::ParticleFilter;
-use fewbits_pf_mpa::published::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_pf_mpa::{
     Encoder, GridFilter, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, QuantizedRange, RangeNoise,
     RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,

@@ -25,7 +25,9 @@ fn fig1(particles: u64, trials: u64) -> [[Measured; 3]; 2] {
         .unwrap();
     let settings = [("particles", particles), ("trials", trials)].map(|(name, n)| (name.to_owned(), n.to_string()));
     let outcome = figure
-        .produce(&figure.configure(&settings, false).unwrap(), &Context::new(1))
+        .configure(&settings, false)
+        .unwrap()
+        .outcome(&Context::new(1))
         .unwrap();
     let summary = outcome.tables.iter().find(|table| table.name == "summary").unwrap();
     let number = |scheme: &str, name: &str| {

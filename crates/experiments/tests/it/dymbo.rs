@@ -1,11 +1,12 @@
 //! Sign bits over bad links, and about vectors.
 
 use super::{assert_agrees, assert_agrees_if_known, exact, trials};
+use fewbits_baselines::dymbo::gap::{SmoothedGap, Twin, exact_filter};
 use fewbits_core::factor::InCell;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
-use fewbits_dymbo::gap::{SmoothedGap, Twin, exact_filter};
 use fewbits_dymbo::{
-    CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, SignFilter, chain, steady,
+    CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, SignFilter, chain,
+    filtered_variance, first_message_value, steady,
 };
 use fewbits_experiments::Measured;
 use fewbits_filters::{CloudWorkspace, GaussianCloud, RaoBlackwellised, scalar_fixed_lag_variance, steady_state};
@@ -13,7 +14,7 @@ use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
 use rand::RngExt;
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI};
 
 fn plant(gamma: f64) -> ScalarPlant {
     ScalarPlant::with_noise_ratio(0.9, gamma).unwrap()
@@ -138,9 +139,39 @@ fn escapes(plant: &ScalarPlant, stream: Stream) -> bool {
 fn one_bit_cannot_hold_an_unstable_plant() {
     let wild = ScalarPlant::new_unstable(1.2, 0.5, 1.0).unwrap();
     let runs = trials("unstable", 20_000, |it| Ok(f64::from(escapes(&wild, it.stream))));
-    assert_agrees("dymbo-threshold/escaped/1.2 0.5", runs.into_iter().collect::<Measured>());
+    assert_agrees("dymbo-escape/escaped/1.2 0.5", runs.into_iter().collect::<Measured>());
     let steady = wild.steady_state(DymboFilter::new(wild).information()).unwrap();
-    assert_agrees("dymbo-threshold/riccati/1.2 0.5", exact(steady.filtered_variance));
+    assert_agrees("dymbo-escape/riccati/1.2 0.5", exact(steady.filtered_variance));
+}
+
+/// Steps to within 5 % of the steady variance, from a prior variance alone.
+#[test]
+fn a_cold_start_takes_longer_than_the_kalman_filters() {
+    for (gamma, start) in [(0.5, 1e2), (0.5, 1e4), (0.05, 1e2), (0.05, 1e4)] {
+        let plant = plant(gamma);
+        for (who, c) in [("sign-bit", FRAC_2_PI), ("Kalman", 1.0)] {
+            let limit = plant.steady_state(c).unwrap().filtered_variance;
+            let next = |m: &f64| Some(filtered_variance(plant.dynamics().predict_variance(*m), 1.0, c));
+            let steps = std::iter::successors(Some(start), next).take_while(|m| *m > 1.05 * limit);
+            assert_agrees(&format!("dymbo-start/cold-{who}/0.9 {gamma} {start}"), exact(steps.count() as f64));
+        }
+    }
+}
+
+/// What the first message is worth beside the prior. At gamma = 0.05 the prior alone is better than the message alone, which leaves 13/12
+/// (erratum dymbo-13).
+#[test]
+fn first_message_and_prior_together_are_better_than_either() {
+    let scheme = RoundedSample::new(1.0, 1.0).unwrap();
+    for gamma in [0.5, 0.05] {
+        let plant = plant(gamma);
+        let prior = Gaussian::scalar(0.0, plant.dynamics().stationary_variance().unwrap()).unwrap();
+        let value = first_message_value(&scheme, &prior).unwrap();
+        assert_agrees(&format!("dymbo-start/e13/0.9 {gamma}"), exact(value.expected_variance));
+        assert_agrees(&format!("dymbo-start/entropy/0.9 {gamma}"), exact(value.entropy_bits));
+        assert!(value.expected_variance < prior.covariance()[0].min(13.0 / 12.0));
+        assert_eq!(prior.covariance()[0] < 13.0 / 12.0, gamma == 0.05);
+    }
 }
 
 /// Several one-bit sensors a slot: two in turn are worth one unquantized sensor, but for 0.14 %; in turn is never worse than at

@@ -1,6 +1,6 @@
 //! Tests whether the model still holds, from the observations that the receiver has.
 //!
-//! If the model is right, three sequences per sensor have mean 0 and variance 1, given the past and the earlier reports of the same
+//! If the model is right, three sequences per sensor have mean 0 and variance 1, given the past and the other reports of the same
 //! instant:
 //!
 //! | sequence | what changes its mean |
@@ -9,17 +9,21 @@
 //! | residual: correction by the observation, divided by its deviation | a biased sensor, a wrong initial state |
 //! | product of successive residuals of one sensor | process noise too small (residuals repeat) or too large (they alternate), lost track |
 //!
+//! "The other reports" are those that are used, so that one wrong sensor does not condemn the others, and the order of reports decides
+//! nothing. The centre's own test takes the reports one after the other by the sensors' numbers: only then are its terms independent.
+//!
 //! A bit whose threshold is the prediction has no surprise, since both outcomes have probability 1/2. Wrong noise then shows in the
 //! product. Each sequence is tested by a two-sided cumulative sum. Silence has no residual; it is tested by [presence](super::presence).
 
 use crate::Error;
 use fewbits_numerics::error::within;
+use fewbits_numerics::normal::cdf;
 use serde::{Deserialize, Serialize};
 
 /// Constant subtracted at each step of a cumulative sum. This value detects shifts of half a deviation fastest.
 const DRIFT: f64 = 0.25;
 /// Terms are limited to this absolute value, so that one outlier raises no alarm.
-const CLIP: f64 = 3.0;
+pub(super) const CLIP: f64 = 3.0;
 /// Differences of probabilities, or deviations of their logarithms, that are treated as zero.
 const EQUAL: f64 = 1e-3;
 /// Number of sequences per sensor.
@@ -30,6 +34,10 @@ pub(super) const SEQUENCES: usize = 3;
 pub(super) struct Residual {
     pub surprise: f64,
     pub residual: f64,
+    /// Probability of an observation that is at most as likely as this one.
+    pub tail: f64,
+    /// How far `ln p` of the observation is below that of the likeliest one, in nats.
+    pub depth: f64,
 }
 
 impl Residual {
@@ -48,6 +56,8 @@ impl Residual {
         (size.is_finite() && correction != 0.0).then_some(Self {
             surprise,
             residual: size.copysign(correction),
+            tail: if share < other { share } else { 1.0 },
+            depth: (other / share).ln().max(0.0),
         })
     }
 
@@ -69,16 +79,34 @@ impl Residual {
         } else {
             0.0
         };
-        (residual.is_finite() && surprise.is_finite()).then_some(Self { surprise, residual })
+        let highest = words.iter().map(|w| w.0).fold(f64::NEG_INFINITY, f64::max);
+        let own = *shares.get(at)?;
+        let tail = shares.iter().filter(|share| **share <= own * (1.0 + EQUAL)).sum();
+        let depth = highest - log;
+        (residual.is_finite() && surprise.is_finite()).then_some(Self {
+            surprise,
+            residual,
+            tail,
+            depth,
+        })
     }
 
     /// Residual of a value, from `ln` of its density, the variance of the innovation, and the sign of the correction.
     pub fn of_value(log_density: f64, variance: f64, correction: f64) -> Option<Self> {
         // -2 ln N(innovation; 0, S) = innovation^2 / S + ln(2 pi S); rounding may leave a negative rest.
         let nis = (-2.0 * log_density - (std::f64::consts::TAU * variance).ln()).max(0.0);
-        let residual = nis.sqrt().copysign(correction);
-        let surprise = (nis - 1.0) * std::f64::consts::FRAC_1_SQRT_2;
-        (residual.is_finite() && surprise.is_finite()).then_some(Self { surprise, residual })
+        Self::of_normal(nis.sqrt().copysign(correction))
+    }
+
+    /// Residual of a variable that is standard normal if the model is right. `None` if it is not finite.
+    pub fn of_normal(residual: f64) -> Option<Self> {
+        let nis = residual * residual;
+        nis.is_finite().then(|| Self {
+            surprise: (nis - 1.0) * std::f64::consts::FRAC_1_SQRT_2,
+            residual,
+            tail: 2.0 * cdf(-residual.abs()),
+            depth: 0.5 * nis,
+        })
     }
 }
 
@@ -93,7 +121,7 @@ pub(super) struct Cusum {
 }
 
 impl Cusum {
-    /// Adds a term of mean 0 and variance 1. Returns which of the two sums exceeds `limit`, if any; both are then reset to zero.
+    /// Adds a term of mean 0 and variance 1. Returns which of the two sums exceeds `limit`, if any. A sum never grows above the limit.
     pub fn add(&mut self, term: f64, limit: f64) -> Option<Direction> {
         let term = term.clamp(-CLIP, CLIP);
         self.up = (self.up + term - DRIFT).max(0.0);
@@ -105,7 +133,7 @@ impl Cusum {
         } else {
             return None;
         };
-        *self = Self::default();
+        (self.up, self.down) = (self.up.min(limit), self.down.min(limit));
         Some(direction)
     }
 }
@@ -165,6 +193,12 @@ impl Default for FalseAlarms {
 }
 
 impl FalseAlarms {
+    /// A report is rejected if the probability of reports that are at most as likely is below this: a tenth of the rate of false alarms of
+    /// a sensor.
+    pub fn gate(&self) -> f64 {
+        0.1 * self.sensor
+    }
+
     pub(super) fn check(&self) -> Result<(), Error> {
         within("sensor", self.sensor, 1e-9, 0.1)?;
         within("centre", self.centre, 1e-9, 0.1)?;
@@ -177,6 +211,8 @@ impl FalseAlarms {
 pub(super) struct Limits {
     pub sensor: f64,
     pub centre: f64,
+    /// Probability below which a report is rejected.
+    pub gate: f64,
 }
 
 impl Limits {
@@ -184,6 +220,7 @@ impl Limits {
         Self {
             sensor: limit(rates.sensor / SEQUENCES as f64),
             centre: limit(rates.centre / SEQUENCES as f64),
+            gate: rates.gate(),
         }
     }
 }
@@ -211,11 +248,28 @@ impl Monitor {
                 alarm = Some(meaning);
             }
         }
-        if alarm.is_some() {
-            *self = Self::default();
-        }
         alarm
     }
+
+    /// The largest sum that speaks for a contradiction. At half the rate of `DRIFT` a sum is the log likelihood ratio of a shift.
+    pub fn contradiction(&self) -> f64 {
+        let [surprise, residual, product] = &self.sums;
+        surprise.up.max(residual.up).max(residual.down).max(product.up)
+    }
+}
+
+/// What a centre does with the results of its tests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Health {
+    /// No report is tested. All are used, except those that cannot be. For comparisons of likelihoods, and models that are known to be right.
+    Off,
+    /// Reports are tested and events are returned. All reports are used, except those that cannot be.
+    Report,
+    /// Reports that are too unlikely given the prediction and the others' are not used ([`FalseAlarms::gate`]); sensors that contradict the
+    /// others again and again are excluded.
+    #[default]
+    Exclude,
 }
 
 #[cfg(test)]

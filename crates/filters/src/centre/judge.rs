@@ -1,84 +1,165 @@
 //! Updates of presence, health and process noise after the observations of one instant.
 
-use super::health::{self, Alarm, Residual, SEQUENCES};
-use super::{Event, FusionCentre, Member};
+use super::gate::Fate;
+use super::health::{self, Alarm, CLIP, Health, Residual, SEQUENCES};
+use super::{Event, FusionCentre};
 use crate::Error;
 use crate::contract::StateFilter;
-use fewbits_core::Evidence;
 use rand::Rng;
 
 /// An excluded sensor is used again after this many observations without an alarm.
 const READMISSION: u32 = 100;
+/// A sensor is excluded if no other is suspect: the sums of all others are below this share of the limit.
+const SUSPECT: f64 = 0.5;
+/// A dispute ends when the sums have fallen below this share of the limit, after so many observations without another contradiction.
+const SETTLED: f64 = 0.25;
+const CALM: u32 = 20;
+/// Or its reports of late are less likely than any other sensor's by this much, in nats.
+const DECISIVE: f64 = 15.0;
+/// Share of the past that counts for that, at each report.
+const MEMORY: f64 = 0.98;
+/// Largest depth of a single report that counts, in nats.
+const DEEPEST: f64 = 1e3;
+/// Mean depth of the reports of a right model: half a squared standard normal variable.
+const USUAL_DEPTH: f64 = 0.5;
+
+/// What one slot shows about its sensor.
+pub(super) struct Watched {
+    pub seat: usize,
+    pub fate: Fate,
+    /// The residual of a report given the prediction and all other reports that are used.
+    pub apart: Option<Residual>,
+    pub shown: Shown,
+}
+
+/// What came in a slot.
+pub(super) enum Shown {
+    /// Nothing, and the probability of that if the sensor works.
+    Silence(f64),
+    /// A report, and its residual given the prediction and the reports of sensors of smaller numbers. A report that is lost was sent too.
+    Report(Option<Residual>),
+}
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Updates presence, health and learnt process noise from what each slot showed.
-    pub(super) fn judge(&mut self, rng: &mut dyn Rng, watched: &[(usize, Watched)]) -> Result<Vec<Event>, Error> {
-        // 1. Each sensor: its presence, its own test, exclusion and readmission. At most half of the sensors are excluded.
+    pub(super) fn judge(&mut self, rng: &mut dyn Rng, watched: &[Watched]) -> Result<Vec<Event>, Error> {
+        // 1. Each sensor: its presence and its own test.
         let mut events = Vec::new();
         let mut pooled = [(0.0, 0_u32); SEQUENCES];
-        let (mut products, mut together) = (0.0, 0.0);
-        let allowed = self.members.len() / 2;
-        let mut excluded = self.members.iter().filter(|m| m.state.excluded).count();
-        for (seat, watched) in watched {
-            let Member { number, state, .. } = &mut self.members[*seat];
-            match watched {
-                Watched::Nothing => {}
-                Watched::Silence(silence) => {
+        let (mut products, mut together, mut is_any_used, mut is_any_rejected) = (0.0, 0.0, false, false);
+        let mut alarmed = Vec::new();
+        for Watched {
+            seat,
+            fate,
+            apart,
+            shown,
+        } in watched
+        {
+            let member = &mut self.members[*seat];
+            let (number, state) = (member.number, &mut member.state);
+            let in_order = match shown {
+                Shown::Silence(silence) => {
                     let (ratio, dead) = state.presence.silent(*silence, &self.failures);
                     together += ratio;
                     if dead {
-                        events.push(Event::Dead(*number));
+                        events.push(Event::Dead(number));
                     }
+                    continue;
                 }
-                Watched::Bit(..) | Watched::Report(_) => {
-                    let (ratio, alive) = state.presence.heard();
-                    together += ratio;
-                    if alive {
-                        events.push(Event::Alive(*number));
-                    }
-                    let Some(found) = watched.residual() else { continue };
-                    let product = state.last_residual.map(|last| last * found.residual);
-                    state.last_residual = Some(found.residual);
-                    let terms = [Some(found.surprise), Some(found.residual), product];
-                    let alarm = state.monitor.add(terms, self.limits.sensor) == Some(Alarm::Contradiction);
-                    state.quiet = if alarm { 0 } else { state.quiet.saturating_add(1) };
-                    if state.excluded {
-                        if state.quiet >= READMISSION {
-                            state.excluded = false;
-                            excluded -= 1;
-                            events.push(Event::Readmitted(*number));
-                        }
-                        continue;
-                    }
-                    if alarm && excluded < allowed {
-                        state.excluded = true;
-                        excluded += 1;
-                        self.monitor = health::Monitor::default();
-                        events.push(Event::Excluded(*number));
-                        continue;
-                    }
-                    // The centre's own test leaves out residuals: in a lost track those of different sensors have different signs.
-                    // Surprises and products do not.
-                    for (sum, term) in pooled.iter_mut().zip([terms[0], None, terms[2]]) {
-                        if let Some(term) = term {
-                            *sum = (sum.0 + term, sum.1 + 1);
-                        }
-                    }
-                    products += product.unwrap_or(0.0).clamp(-3.0, 3.0);
+                Shown::Report(in_order) => in_order,
+            };
+            let (ratio, alive) = state.presence.report_arrived();
+            together += ratio;
+            if alive {
+                events.push(Event::Alive(number));
+            }
+            if *fate == Fate::Rejected {
+                state.rejected += 1;
+                state.astray = state.astray.saturating_add(1);
+                events.push(Event::Rejected(number));
+                is_any_rejected = true;
+            } else if *fate != Fate::Excluded {
+                state.astray = 0;
+                is_any_used = true;
+            }
+            if self.health == Health::Off || (apart.is_none() && *fate != Fate::Rejected) {
+                continue;
+            }
+            let product = |last: &mut Option<f64>, residual: f64| {
+                let product = last.map(|last| last * residual);
+                *last = Some(residual);
+                product
+            };
+            // A report that is impossible has no residual, but it is a surprise.
+            let terms = match apart {
+                Some(found) => {
+                    let product = product(&mut state.last_residual, found.residual);
+                    [Some(found.surprise), Some(found.residual), product]
+                }
+                None => [Some(CLIP), None, None],
+            };
+            let depth = apart.map_or(DEEPEST, |found| found.depth.min(DEEPEST));
+            state.depth = MEMORY * state.depth + depth - USUAL_DEPTH;
+            let is_alarm = state.monitor.add(terms, self.limits.sensor) == Some(Alarm::Contradiction);
+            // A report that is too unlikely beside another begins a dispute at once.
+            let is_contested =
+                matches!(fate, Fate::Contested(_)) && apart.is_some_and(|one| one.tail < self.limits.gate);
+            state.quiet = if is_alarm || is_contested {
+                0
+            } else {
+                state.quiet.saturating_add(1)
+            };
+            if is_contested && !std::mem::replace(&mut state.disputed, true) {
+                events.push(Event::Disputed(number));
+            }
+            if *fate == Fate::Excluded || state.excluded {
+                if state.excluded && state.quiet >= READMISSION {
+                    state.excluded = false;
+                    events.push(Event::Readmitted(number));
+                }
+                continue;
+            }
+            let is_calm = state.quiet >= CALM && state.monitor.contradiction() < SETTLED * self.limits.sensor;
+            if state.disputed && is_calm {
+                state.disputed = false;
+            }
+            if is_alarm {
+                alarmed.push(*seat);
+            }
+            // The centre's own test leaves out residuals: in a lost track those of different sensors have different signs.
+            // Surprises and products do not.
+            let Some(found) = in_order.or(*apart) else { continue };
+            let product = product(&mut state.last_in_order, found.residual);
+            for (sum, term) in pooled.iter_mut().zip([Some(found.surprise), None, product]) {
+                if let Some(term) = term {
+                    *sum = (sum.0 + term, sum.1 + 1);
                 }
             }
+            products += product.unwrap_or(0.0).clamp(-CLIP, CLIP);
         }
-        // 2. A common failure: the evidence of all sensors together.
+        match (is_any_used, is_any_rejected) {
+            (true, _) => self.astray = 0,
+            (false, true) => self.astray = self.astray.saturating_add(1),
+            (false, false) => {}
+        }
+        // 2. Exclusion: at most half of the sensors.
+        for seat in alarmed {
+            self.exclude(seat, &mut events);
+        }
+        // 3. A common failure: the evidence of all sensors together.
         let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
         self.outage.weigh(together, sensors);
-        // 3. Process noise: larger if residuals repeat, smaller if they alternate.
+        // 4. Process noise: larger if residuals repeat, smaller if they alternate.
         if let Some(learning) = &self.learning {
             let [low, high] = learning.range;
             self.noise_scale = (self.noise_scale * (learning.gain * products).exp()).clamp(low, high);
         }
-        // 4. The centre's own test, with terms pooled over the sensors. A lost track restarts from the prior, if one is set.
+        // 5. The centre's own test, with terms pooled over the sensors. A lost track restarts from the prior, if one is set.
         let terms = pooled.map(|(sum, count)| (count > 0).then(|| sum / f64::from(count).sqrt()));
         let alarm = self.monitor.add(terms, self.limits.centre);
+        if alarm.is_some() {
+            self.monitor = health::Monitor::default();
+        }
         if alarm == Some(Alarm::Overstatement) {
             events.push(Event::NoiseOverstated);
         }
@@ -87,34 +168,65 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             if let Some(prior) = self.acquisition {
                 self.belief = self.filter.restart(rng, &prior, &self.belief)?;
                 self.history.clear();
-                for member in self.members.iter_mut() {
-                    member.state.last_residual = None;
-                    member.state.monitor = health::Monitor::default();
-                }
+                self.members.iter_mut().for_each(|member| member.state.forget_tests());
                 events.push(Event::Reacquired);
             }
         }
         Ok(events)
     }
-}
 
-/// What one slot shows about its sensor.
-pub(super) enum Watched {
-    Nothing,
-    Silence(f64),
-    /// A bit of a sensor that is never silent, and the probability that it arrives.
-    Bit(Evidence, f64),
-    Report(Option<Residual>),
-}
-
-impl Watched {
-    /// The residual of a report; `None` if it has none. For a bit it is computed here, after the update, since no belief of the
-    /// instant depends on it.
-    fn residual(&self) -> Option<Residual> {
-        match self {
-            Self::Bit(bit, arrives) => Residual::of_bit(bit.log_likelihood.exp() / arrives, bit.correction),
-            Self::Report(residual) => *residual,
-            Self::Nothing | Self::Silence(_) => None,
+    /// Decides about a sensor whose test raised an alarm. It is excluded if it alone is suspect, or by far the most. If another is about as
+    /// suspect, both are in dispute: their reports contradict each other, and nothing says which is wrong.
+    fn exclude(&mut self, seat: usize, events: &mut Vec<Event>) {
+        let own = self.members[seat].state;
+        let excluded = self.members.iter().filter(|member| member.state.excluded).count();
+        if own.excluded || self.health == Health::Off {
+            return;
+        }
+        let suspicion = |state: &super::state::MemberState| state.monitor.contradiction() / self.limits.sensor;
+        let others = || {
+            let all = self.members.iter().enumerate();
+            all.filter(|(other, member)| *other != seat && !member.state.excluded && !member.state.presence.named_dead)
+        };
+        let is_alone = others().all(|(_, member)| suspicion(&member.state) < SUSPECT);
+        let deepest = others()
+            .map(|(_, member)| member.state.depth)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let is_deepest = own.depth - deepest > DECISIVE;
+        let number = self.members[seat].number;
+        if is_alone || is_deepest {
+            if excluded < self.members.len() / 2 && others().count() > 0 {
+                if self.health == Health::Exclude {
+                    // The others were judged against it.
+                    self.members.iter_mut().for_each(|member| {
+                        let astray = member.state.astray;
+                        member.state.forget_tests();
+                        member.state.astray = astray;
+                    });
+                    self.members[seat].state.excluded = true;
+                } else {
+                    self.members[seat].state.monitor = health::Monitor::default();
+                }
+                self.monitor = health::Monitor::default();
+                events.push(Event::Excluded(number));
+            }
+            return;
+        }
+        // If another is by far the worst, it is the one to be excluded, in its own time.
+        let rivals: Vec<usize> = others()
+            .filter(|(_, member)| {
+                suspicion(&member.state) >= SUSPECT && (member.state.depth - own.depth).abs() <= DECISIVE
+            })
+            .map(|(other, _)| other)
+            .collect();
+        if rivals.is_empty() || deepest - own.depth > DECISIVE {
+            return;
+        }
+        for seat in rivals.into_iter().chain([seat]) {
+            let member = &mut self.members[seat];
+            if !std::mem::replace(&mut member.state.disputed, true) {
+                events.push(Event::Disputed(member.number));
+            }
         }
     }
 }

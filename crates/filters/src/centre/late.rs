@@ -1,56 +1,113 @@
 //! Reports that arrive late.
 
+use super::gate::{Fate, Verdict};
+use super::one_wrong::OneIsWrong;
+use super::reading::{Content, Reading};
 use super::state::{Checkpoint, StoredSlot};
 use super::{FusionCentre, Slot};
 use crate::Error;
 use crate::contract::StateFilter;
-use fewbits_core::{Likelihood, ScaledNoise};
+use fewbits_core::{Belief, Gaussian, Likelihood, Observation, ScaledNoise};
 use fewbits_numerics::error::finite;
 use rand::Rng;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Includes observations of an earlier `time`: restores the belief before that time and repeats all later updates. Returns
-    /// whether it did. Reports older than the window are dropped and counted. Presence and health are not updated again.
+    /// whether it did. Reports older than the window are dropped and counted, and so are copies of reports that were received before. A
+    /// report that is impossible, or too unlikely given the prediction to its time, is not used. Presence and health are not updated again.
     ///
     /// # Errors
-    /// As [`receive`](Self::receive).
+    /// As [`receive`](Self::receive). The centre is then unchanged.
     pub fn late(&mut self, rng: &mut dyn Rng, time: f64, slots: &[Slot]) -> Result<bool, Error> {
         finite("time", time)?;
         let Some(from) = self.history.iter().rposition(|checkpoint| checkpoint.time <= time) else {
             self.dropped += slots.len() as u64;
             return Ok(false);
         };
+        let (readings, copied) = self.read(slots)?;
+        let is_copy = |reading: &Reading<'_, D>| {
+            let same_time = self.history[from..].iter().filter(|checkpoint| checkpoint.time == time);
+            let mut stored = same_time.flat_map(|checkpoint| &checkpoint.slots);
+            reading.content != Content::Nothing && stored.any(|one| one.is_copied_by(reading.slot))
+        };
+        let (copies, readings): (Vec<_>, Vec<_>) = readings.into_iter().partition(is_copy);
+        let copied: Vec<usize> = copied.into_iter().chain(copies.iter().map(|one| one.seat)).collect();
+        if readings.is_empty() {
+            copied.iter().for_each(|seat| self.members[*seat].state.copies += 1);
+            return Ok(false);
+        }
         // Insert the late slots among the stored instants, in the order of time.
         let mut replayed = self.history[from..].to_vec();
-        let stored: Vec<StoredSlot> = slots.iter().map(|slot| self.stored(slot)).collect::<Result<_, _>>()?;
         let at = replayed.partition_point(|checkpoint| checkpoint.time <= time);
         let late = Checkpoint {
             time,
             belief: replayed[0].belief.clone(),
-            slots: stored,
+            slots: Vec::new(),
         };
         replayed.insert(at, late);
         // Repeat prediction and update at each of these instants.
         let (mut belief, mut now) = (replayed[0].belief.clone(), replayed[0].time);
-        for checkpoint in &mut replayed {
+        let mut rejected = Vec::new();
+        for (k, checkpoint) in replayed.iter_mut().enumerate() {
             self.moved(rng, &mut belief, checkpoint.time - now)?;
             now = checkpoint.time;
             checkpoint.belief = belief.clone();
-            let mut likelihoods: Vec<Box<dyn Likelihood<D>>> = Vec::new();
-            for slot in checkpoint.slots.iter().filter(|slot| slot.used) {
-                // A sensor may have left in the meantime.
-                if let Ok(member) = self.member(slot.sensor) {
-                    likelihoods.push(member.sensor.likelihood(&slot.slot(), slot.working)?);
-                }
+            if k == at {
+                let moments = Gaussian::from_trusted_parts(belief.mean(), belief.covariance());
+                let verdicts = self.gate(&moments, &readings);
+                let judged = readings.iter().zip(&verdicts);
+                checkpoint.slots = judged
+                    .clone()
+                    .map(|(reading, verdict)| self.stored(reading, verdict))
+                    .collect();
+                rejected.extend(
+                    judged
+                        .filter(|(_, one)| one.fate == Fate::Rejected)
+                        .map(|(reading, _)| reading.seat),
+                );
             }
-            let likelihoods: Vec<&dyn Likelihood<D>> = likelihoods.iter().map(|one| &**one).collect();
-            self.filter.update(rng, &mut belief, &likelihoods)?;
+            self.replay(rng, &mut belief, &mut checkpoint.slots)?;
         }
         self.moved(rng, &mut belief, self.now - now)?;
         self.history.truncate(from);
         self.history.extend(replayed);
         self.belief = belief;
+        copied.iter().for_each(|seat| self.members[*seat].state.copies += 1);
+        rejected.iter().for_each(|seat| self.members[*seat].state.rejected += 1);
         Ok(true)
+    }
+
+    /// Updates a belief with the stored slots of one instant that were used. If they are impossible now, none of their reports is used.
+    fn replay(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, slots: &mut [StoredSlot]) -> Result<(), Error> {
+        let (mut reports, mut contested, mut missing) = (Vec::new(), Vec::new(), Vec::new());
+        for slot in slots.iter() {
+            // A sensor may have left in the meantime.
+            let Ok(member) = self.member(slot.sensor) else { continue };
+            if !slot.used && slot.log_wrong.is_none() {
+                continue;
+            }
+            let plain = slot.slot();
+            let likelihood = member.sensor.likelihood(&plain, slot.working)?;
+            match (slot.log_wrong, plain.observation == Observation::Nothing) {
+                (Some(log_wrong), _) => contested.push((likelihood, log_wrong)),
+                (None, true) if likelihood.as_constant() == Some(f64::NEG_INFINITY) => {}
+                (None, true) => missing.push(likelihood),
+                (None, false) => reports.push(likelihood),
+            }
+        }
+        let parts: Vec<_> = contested.iter().map(|(one, log_wrong)| (&**one, *log_wrong)).collect();
+        let wrong = (!parts.is_empty()).then(|| OneIsWrong::new(parts));
+        let wrong = wrong.iter().map(|one| one as &dyn Likelihood<D>);
+        let missing = || missing.iter().map(|one| &**one);
+        let all: Vec<&dyn Likelihood<D>> = reports.iter().map(|one| &**one).chain(wrong).chain(missing()).collect();
+        match self.filter.update(rng, belief, &all) {
+            Err(Error::Impossible) => {
+                slots.iter_mut().for_each(StoredSlot::drop_report);
+                self.filter.update(rng, belief, &missing().collect::<Vec<_>>())?;
+            }
+            other => drop(other?),
+        }
+        Ok(())
     }
 
     /// Predicts a belief over `seconds`.
@@ -63,18 +120,24 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(())
     }
 
-    fn stored(&self, slot: &Slot) -> Result<StoredSlot, Error> {
-        let state = &self.member(slot.sensor)?.state;
-        Ok(StoredSlot::new(slot, state.presence.working, !state.excluded))
+    pub(super) fn stored(&self, reading: &Reading<'_, D>, verdict: &Verdict) -> StoredSlot {
+        let working = match reading.content {
+            Content::Nothing => self.members[reading.seat].state.presence.working,
+            Content::Lost | Content::Report => 1.0,
+        };
+        let log_wrong = match verdict.fate {
+            Fate::Contested(log_wrong) => Some(log_wrong),
+            _ => None,
+        };
+        StoredSlot::new(reading.slot, working, verdict.fate == Fate::Used, log_wrong)
     }
 
     /// Stores the belief before an instant and its slots, and drops those older than the window.
-    pub(super) fn remember(&mut self, before: F::Belief, slots: &[Slot]) {
-        let stored = slots.iter().filter_map(|slot| self.stored(slot).ok()).collect();
+    pub(super) fn remember(&mut self, before: F::Belief, slots: Vec<StoredSlot>) {
         self.history.push(Checkpoint {
             time: self.now,
             belief: before,
-            slots: stored,
+            slots,
         });
         // The last belief before the window is kept, for reports from the beginning of the window.
         let oldest = self.now - self.window;

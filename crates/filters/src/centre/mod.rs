@@ -24,17 +24,20 @@
 //!
 //! Not in this module: radio, addresses, frames; the scheme of any single paper.
 
+mod gate;
 mod health;
 mod judge;
 mod late;
 mod learning;
+mod one_wrong;
 mod presence;
+mod reading;
 mod receive;
 mod remote;
 mod slot;
 mod state;
 
-pub use health::FalseAlarms;
+pub use health::{FalseAlarms, Health};
 pub use learning::NoiseLearning;
 pub use presence::Failures;
 pub use remote::{RemoteSensor, Reporting};
@@ -63,8 +66,9 @@ struct Member<const D: usize> {
 /// ```text
 /// advance(t):  belief = predict(over(t - now), noise scale);  the failure probability of every sensor grows
 /// feedback(i): bits for sensor i, from the present belief
-/// receive:     likelihoods of all slots of one instant, each with the probability that its sensor works
-///              presence, residuals and their tests, from the belief before;  belief = update(likelihoods)
+/// receive:     likelihoods of all slots of one instant; a silent sensor works with the probability found so far, one that reports works
+///              test each report given the prediction and all others; reject those that are too unlikely
+///              belief = update(likelihoods);  presence, residuals and their tests
 /// late(t):     go back to the last belief before t;  repeat all later updates, the late slots included, in the order of time
 /// ```
 /// A call that fails leaves the centre unchanged.
@@ -80,6 +84,9 @@ pub struct FusionCentre<const D: usize, F: StateFilter<D>> {
     monitor: health::Monitor,
     history: Vec<Checkpoint<F::Belief>>,
     dropped: u64,
+    /// Number of instants in a row of which no report was used.
+    astray: u32,
+    health: Health,
     failures: Failures,
     limits: health::Limits,
     learning: Option<NoiseLearning>,
@@ -110,6 +117,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             monitor: health::Monitor::default(),
             history: Vec::new(),
             dropped: 0,
+            astray: 0,
+            health: Health::default(),
             failures: Failures::default(),
             limits: health::Limits::new(&FalseAlarms::default()),
             learning: None,
@@ -137,6 +146,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             limits: health::Limits::new(&false_alarms),
             ..self
         })
+    }
+
+    /// The same centre with another use of its tests.
+    #[must_use]
+    pub fn with_health(self, health: Health) -> Self {
+        Self { health, ..self }
     }
 
     /// The same centre, learning the scale of the process noise.
@@ -262,6 +277,30 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// If there is no such sensor.
     pub fn is_excluded(&self, number: u32) -> Result<bool, Error> {
         Ok(self.member(number)?.state.excluded)
+    }
+
+    /// Whether a sensor contradicts another, and nothing decides which of the two is wrong.
+    ///
+    /// # Errors
+    /// If there is no such sensor.
+    pub fn is_disputed(&self, number: u32) -> Result<bool, Error> {
+        Ok(self.member(number)?.state.disputed)
+    }
+
+    /// Number of reports of a sensor that were not used because they were impossible or too unlikely.
+    ///
+    /// # Errors
+    /// If there is no such sensor.
+    pub fn rejected(&self, number: u32) -> Result<u64, Error> {
+        Ok(self.member(number)?.state.rejected)
+    }
+
+    /// Number of copies of a sensor's reports that were dropped.
+    ///
+    /// # Errors
+    /// If there is no such sensor.
+    pub fn copies(&self, number: u32) -> Result<u64, Error> {
+        Ok(self.member(number)?.state.copies)
     }
 
     /// Index of a sensor, or the index at which to insert it. Slots are mostly in order, so `guess` is tried first.

@@ -96,7 +96,7 @@ impl Presence {
 
     /// Updates after a report arrived. Returns `ln` of the likelihood ratio of a common failure against none, and whether the sensor had
     /// been declared dead.
-    pub fn heard(&mut self) -> (f64, bool) {
+    pub fn report_arrived(&mut self) -> (f64, bool) {
         let ratio = self.struck.max(f64::MIN_POSITIVE) / self.alone.max(f64::MIN_POSITIVE);
         let ratio = if ratio == 1.0 { 0.0 } else { ratio.ln() };
         let news = self.named_dead;
@@ -115,6 +115,11 @@ const SETTLED: f64 = 0.999;
 #[serde(transparent)]
 pub(super) struct Outage(#[serde(with = "fewbits_numerics::stored")] f64);
 
+/// `working`, if a common failure has this probability. Rounding must not leave it above one.
+fn mixed(common: f64, sensor: &Presence) -> f64 {
+    ((1.0 - common) * sensor.alone + common * sensor.struck).min(1.0)
+}
+
 impl Outage {
     pub fn advance<'a>(&mut self, seconds: f64, failures: &Failures, sensors: impl Iterator<Item = &'a mut Presence>) {
         let survives = (-failures.rate * seconds).exp();
@@ -126,7 +131,7 @@ impl Outage {
                 sensor.struck = (self.0 * survives * sensor.struck + new * (1.0 - TAKEN) * sensor.alone) / total;
             }
             sensor.alone *= survives;
-            sensor.working = (1.0 - total) * sensor.alone + total * sensor.struck;
+            sensor.working = mixed(total, sensor);
         }
         self.0 = total;
     }
@@ -139,7 +144,7 @@ impl Outage {
         // A certain common failure becomes part of each sensor's own probability, and the next one can be found.
         let settled = self.0 > SETTLED;
         for sensor in sensors {
-            sensor.working = (1.0 - self.0) * sensor.alone + self.0 * sensor.struck;
+            sensor.working = mixed(self.0, sensor);
             if settled {
                 sensor.alone = sensor.working;
             }

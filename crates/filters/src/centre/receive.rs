@@ -1,188 +1,263 @@
 //! The update at one instant: the new belief, and what each slot shows about its sensor.
 
-use super::health::Residual;
-use super::judge::Watched;
-use super::{FusionCentre, Member, Received, Slot};
+use super::gate::{Fate, Verdict};
+use super::health::Health;
+use super::judge::{Shown, Watched};
+use super::one_wrong::OneIsWrong;
+use super::reading::{Content, Reading};
+use super::state::{MemberState, StoredSlot};
+use super::{Event, FusionCentre, Received, Slot};
 use crate::Error;
 use crate::contract::{Info, StateFilter};
-use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
+use fewbits_core::{Gaussian, Likelihood};
 use rand::Rng;
 
-/// Reports of at most this many bits are treated as words; the residual then sums over all possible words.
-const WORD_BITS: usize = 4;
-
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// Updates with the observations of the present instant.
+    /// Updates with the observations of the present instant. Their order does not matter. An equal second report of a sensor is dropped.
+    /// A report that is impossible, or too unlikely given the prediction and all other reports ([`Health`]), is not used, and costs no other
+    /// report; an [event](Event) names it.
+    ///
+    /// The log likelihood is that of the reports that were used. It is `-inf` if a report is impossible and none is rejected for being
+    /// unlikely (`Health::Off` and `Health::Report`).
     ///
     /// # Errors
-    /// If a sensor is unknown or bits do not decode; [`Error::Impossible`] if the observations have probability zero
-    /// together. The caller may then drop them or start again.
+    /// If a sensor is unknown, or feedback does not decode.
     pub fn receive(&mut self, rng: &mut dyn Rng, slots: &[Slot]) -> Result<Received, Error> {
-        let predicted = self.estimate();
-        // A report is tested given those before it; otherwise sensors that share the error of the prediction would be treated as
-        // independent. Silence is tested given the prediction alone; otherwise, after several sensors died together, the silence of each
-        // would confirm that of the others.
-        let mut given = predicted;
-        let mut posterior = self.filter.of_moments(&predicted).map(|_| Posterior::default());
-        let mut used = Vec::new();
-        let mut watched = Vec::with_capacity(slots.len());
-        let mut next_seat = 0;
-        for slot in slots {
-            let seat = self.seated(slot.sensor, next_seat)?;
-            next_seat = seat + 1;
-            let member = &self.members[seat];
-            let (working, is_used) = (member.state.presence.working, !member.state.excluded);
-            let likelihood = || member.sensor.likelihood(slot, working);
-            let Observation::Received(bits) = &slot.observation else {
-                let missing = likelihood()?;
-                watched.push((seat, member.silence(slot, &*missing, &predicted)?));
-                match &mut posterior {
-                    Some(posterior) if is_used => posterior.missing(&*missing, &given)?,
-                    None if is_used => used.push(missing),
-                    _ => {}
-                }
-                continue;
-            };
-            let report = if posterior.is_none() { Some(likelihood()?) } else { None };
-            let condition = |belief: &mut Gaussian<D>| match &report {
-                Some(report) => report.condition(belief),
-                None => member.sensor.condition(slot, working, belief),
-            };
-            let is_bit = bits.bits() == 1 && member.always_speaks;
-            let before = (!is_bit).then_some(given);
-            let conditioned = if is_used {
-                condition(&mut given)
-            } else {
-                condition(&mut given.clone())
-            };
-            let evidence = match conditioned {
-                Ok(evidence) => Some(evidence),
-                Err(error) if posterior.is_some() && is_used => return Err(error),
-                // An observation that cannot update the belief may still have a probability.
-                Err(_) => member.evidence(slot, working, &given)?,
-            };
-            let report_says = match (evidence, before) {
-                (None, _) => Watched::Report(None),
-                (Some(evidence), None) => Watched::Bit(evidence, member.arrival * working),
-                (Some(evidence), Some(before)) => Watched::Report(member.residual(slot, bits, &before, evidence)?),
-            };
-            watched.push((seat, report_says));
-            if !is_used {
-                continue;
-            }
-            match &mut posterior {
-                Some(Posterior {
-                    apart: Some(apart),
-                    log_likelihood,
-                }) => *log_likelihood += condition(apart)?.log_likelihood,
-                Some(posterior) => posterior.log_likelihood += evidence.map_or(0.0, |one| one.log_likelihood),
-                None => {}
-            }
-            used.extend(report);
-        }
-        // All slots were read: form the posterior, either from the moments above or by the filter's joint update.
+        let mut predicted = self.estimate();
+        let (readings, copied) = self.read(slots)?;
+        let mut events: Vec<Event> = copied
+            .iter()
+            .map(|seat| Event::Copied(self.members[*seat].number))
+            .collect();
+        let mut verdicts = self.gate(&predicted, &readings);
         let mut belief = self.belief.clone();
-        let mut info = Info::default();
-        if let Some(Posterior { apart, log_likelihood }) = posterior {
-            info.log_likelihood = log_likelihood;
-            belief = self.filter.of_moments(&apart.unwrap_or(given)).unwrap_or(belief);
-        } else {
-            let used: Vec<&dyn Likelihood<D>> = used.iter().map(|one| &**one).collect();
-            info = self.filter.update(rng, &mut belief, &used)?;
-        }
-        let before = (self.window > 0.0).then(|| self.belief.clone());
-        self.belief = belief;
-        if let Some(before) = before {
-            self.remember(before, slots);
-        }
-        let events = self.judge(rng, &watched)?;
-        Ok(Received { info, events })
-    }
-}
-
-/// The posterior of a filter of moments while the observations are processed one by one.
-#[derive(Default)]
-struct Posterior<const D: usize> {
-    /// Moments given reports and silence. `None` until the first silence; until then they equal the moments given the reports.
-    apart: Option<Gaussian<D>>,
-    log_likelihood: f64,
-}
-
-impl<const D: usize> Posterior<D> {
-    /// Updates with a silence or a loss.
-    fn missing(&mut self, missing: &dyn Likelihood<D>, given: &Gaussian<D>) -> Result<(), Error> {
-        // A constant likelihood changes no moments.
-        if let Some(log) = missing.as_constant().filter(|log| log.is_finite()) {
-            self.log_likelihood += log;
-            return Ok(());
-        }
-        self.log_likelihood += missing.condition(self.apart.get_or_insert(*given))?.log_likelihood;
-        Ok(())
-    }
-}
-
-impl<const D: usize> Member<D> {
-    /// Log likelihood and correction of the observation in this slot; `None` if its probability is zero.
-    fn evidence(&self, slot: &Slot, working: f64, belief: &Gaussian<D>) -> Result<Option<Evidence>, Error> {
-        match self.sensor.evidence(slot, working, belief) {
-            Ok(found) => Ok(Some(found)),
-            Err(Error::Impossible) => Ok(None),
-            Err(error) => Err(error),
-        }
-    }
-
-    /// Probability that a working sensor is silent, given the belief before the slot.
-    fn silence(&self, slot: &Slot, likelihood: &dyn Likelihood<D>, predicted: &Gaussian<D>) -> Result<Watched, Error> {
-        if slot.observation == Observation::Lost {
-            return Ok(Watched::Nothing);
-        }
-        // `likelihood` holds for a sensor that works with the present probability. Unless that is one, it is formed again.
-        let found = match likelihood.as_constant() {
-            Some(log) if self.state.presence.working == 1.0 => log.exp(),
-            _ => self
-                .evidence(slot, 1.0, predicted)?
-                .map_or(0.0, |one| one.log_likelihood.exp()),
-        };
-        Ok(Watched::Silence(found.min(1.0)))
-    }
-
-    /// The residual of a report; `None` if it has none.
-    fn residual(
-        &self,
-        slot: &Slot,
-        bits: &BitString,
-        predicted: &Gaussian<D>,
-        received: Evidence,
-    ) -> Result<Option<Residual>, Error> {
-        let place = |found: Evidence| (found.log_likelihood, found.correction);
-        let working = self.state.presence.working;
-        if let Some(variance) = self.sensor.value_variance(predicted) {
-            // The likelihood includes the probability that the value arrives; only the value itself is tested.
-            let log_density = received.log_likelihood - (self.arrival * working).ln();
-            return Ok(Residual::of_value(log_density, variance, received.correction));
-        }
-        if bits.bits() == 0 || bits.bits() > WORD_BITS {
-            return Ok(None);
-        }
-        let mut words = Vec::with_capacity(1 << bits.bits());
-        let (mut at, mut alternative) = (0, slot.clone());
-        for word in 0..1_u8 << bits.bits() {
-            // A bit string begins at the highest bit of its first byte.
-            let other = BitString::from_bytes(vec![word << (8 - bits.bits())], bits.bits())?;
-            if other == *bits {
-                at = words.len();
-                words.push(place(received));
-                continue;
+        let mut reopened = false;
+        if self.health == Health::Exclude
+            && let Some((wide, again)) = self.reopened(&predicted, &readings, &verdicts)
+        {
+            let start = self.acquisition.unwrap_or(wide);
+            belief = self.filter.restart(rng, &start, &self.belief)?;
+            (predicted, verdicts, reopened) = (wide, again, true);
+            if self.acquisition.is_some() {
+                predicted = start;
+                verdicts = self.gate(&predicted, &readings);
             }
-            // Words that the scheme never sends are left out.
-            alternative.observation = Observation::Received(other);
-            words.extend(
-                self.evidence(&alternative, working, predicted)
-                    .ok()
-                    .flatten()
-                    .map(place),
-            );
         }
-        Ok(Residual::of_word(&words, at))
+        let before = (self.window > 0.0).then(|| belief.clone());
+        let in_order = self.take_in_order(&predicted, &readings, &mut verdicts)?;
+        let mut info = self.update_belief(rng, &mut belief, &readings, &mut verdicts, &in_order)?;
+        let sent = readings.iter().filter(|reading| reading.content != Content::Nothing);
+        info.log_likelihood += sent
+            .map(|reading| self.members[reading.seat].state.presence.working)
+            .map(|working| working.max(f64::MIN_POSITIVE).ln())
+            .sum::<f64>();
+        let is_rejected = |verdict: &Verdict| verdict.fate == Fate::Rejected;
+        if self.health != Health::Exclude && verdicts.iter().any(is_rejected) {
+            info.log_likelihood = f64::NEG_INFINITY;
+        }
+        // From here on the centre changes. Only the restart of a lost track can fail; then everything is put back.
+        let earlier: (Vec<MemberState>, _, _, _, _) = (
+            self.members.iter().map(|member| member.state).collect(),
+            self.outage,
+            self.monitor,
+            self.noise_scale,
+            self.astray,
+        );
+        let earlier_history = self.acquisition.map(|_| self.history.clone());
+        let earlier_belief = std::mem::replace(&mut self.belief, belief);
+        if let Some(before) = before {
+            let stored = readings
+                .iter()
+                .zip(&verdicts)
+                .map(|(reading, verdict)| self.stored(reading, verdict));
+            let stored: Vec<StoredSlot> = stored.collect();
+            if reopened {
+                self.history.clear();
+            }
+            self.remember(before, stored);
+        }
+        copied.iter().for_each(|seat| self.members[*seat].state.copies += 1);
+        if reopened {
+            self.members.iter_mut().for_each(|member| member.state.forget_tests());
+            self.monitor = Default::default();
+            events.push(if self.acquisition.is_some() {
+                Event::Reacquired
+            } else {
+                Event::Reopened
+            });
+        }
+        let watched: Vec<Watched> = readings
+            .iter()
+            .zip(&verdicts)
+            .zip(in_order.shown)
+            .map(|((reading, verdict), shown)| Watched {
+                seat: reading.seat,
+                fate: verdict.fate,
+                apart: verdict.tested.residual,
+                shown,
+            })
+            .collect();
+        match self.judge(rng, &watched) {
+            Ok(found) => {
+                events.extend(found);
+                Ok(Received { info, events })
+            }
+            Err(error) => {
+                let (states, outage, monitor, noise_scale, astray) = earlier;
+                self.members
+                    .iter_mut()
+                    .zip(states)
+                    .for_each(|(member, state)| member.state = state);
+                (self.outage, self.monitor, self.noise_scale, self.astray) = (outage, monitor, noise_scale, astray);
+                self.belief = earlier_belief;
+                self.history = earlier_history.unwrap_or_default();
+                Err(error)
+            }
+        }
     }
+
+    /// Conditions the moments on the reports that are used, one after the other, and tests each given those before it. A report that cannot
+    /// update them is rejected. Silence is tested given the prediction alone; otherwise, after several sensors died together, the silence
+    /// of each would confirm that of the others.
+    fn take_in_order(
+        &self,
+        predicted: &Gaussian<D>,
+        readings: &[Reading<'_, D>],
+        verdicts: &mut [Verdict],
+    ) -> Result<InOrder<D>, Error> {
+        let is_by_moments = self.filter.of_moments(predicted).is_some();
+        let mut found = InOrder {
+            given: *predicted,
+            log_likelihood: 0.0,
+            shown: Vec::with_capacity(readings.len()),
+        };
+        for (reading, verdict) in readings.iter().zip(verdicts) {
+            let member = &self.members[reading.seat];
+            let shown = match (reading.content, reading.known()) {
+                (Content::Nothing, _) => Shown::Silence(member.silence(reading, predicted)?),
+                (_, Some(known)) if verdict.fate == Fate::Used => {
+                    let before = found.given;
+                    let taken = known.condition(&mut found.given);
+                    match taken {
+                        Ok(one) if one.log_likelihood > f64::NEG_INFINITY && found.given.is_finite() => {
+                            found.log_likelihood += one.log_likelihood;
+                            let is_tested = self.health != Health::Off && reading.content == Content::Report;
+                            Shown::Report(
+                                is_tested
+                                    .then(|| member.judged(reading, &before, one).residual)
+                                    .flatten(),
+                            )
+                        }
+                        failed => {
+                            found.given = before;
+                            // Other filters may use what moments cannot.
+                            let is_hopeless = !matches!(failed, Err(Error::Argument(_) | Error::Unresolved { .. }));
+                            if is_by_moments || is_hopeless {
+                                verdict.fate = Fate::Rejected;
+                            }
+                            Shown::Report(None)
+                        }
+                    }
+                }
+                _ => Shown::Report(None),
+            };
+            found.shown.push(shown);
+        }
+        Ok(found)
+    }
+
+    /// Updates the belief with all readings that are used: reports first, then those that are contested, then silences.
+    fn update_belief(
+        &mut self,
+        rng: &mut dyn Rng,
+        belief: &mut F::Belief,
+        readings: &[Reading<'_, D>],
+        verdicts: &mut [Verdict],
+        in_order: &InOrder<D>,
+    ) -> Result<Info, Error> {
+        let contested = contested(readings, verdicts);
+        let missing = readings
+            .iter()
+            .zip(&*verdicts)
+            .filter(|(reading, verdict)| reading.content == Content::Nothing && verdict.fate == Fate::Used);
+        // An impossible silence shows that the sensor failed, and nothing about the state.
+        let missing = missing
+            .filter_map(|(reading, _)| reading.known())
+            .filter(|known| known.as_constant() != Some(f64::NEG_INFINITY));
+        let rest: Vec<&dyn Likelihood<D>> = contested
+            .iter()
+            .map(|one| one as &dyn Likelihood<D>)
+            .chain(missing)
+            .collect();
+        if self.filter.of_moments(&in_order.given).is_some() {
+            let (mut moments, mut log_likelihood) = (in_order.given, in_order.log_likelihood);
+            for one in rest {
+                // A constant likelihood changes no moments.
+                log_likelihood += match one.as_constant() {
+                    Some(log) => log,
+                    None => one.condition(&mut moments).map_or(0.0, |found| found.log_likelihood),
+                };
+            }
+            if let Some(next) = self.filter.of_moments(&moments) {
+                *belief = next;
+            }
+            return Ok(Info::new(log_likelihood));
+        }
+        let is_used = |i: &usize| verdicts[*i].fate == Fate::Used && readings[*i].content != Content::Nothing;
+        let mut reports: Vec<usize> = (0..readings.len()).filter(is_used).collect();
+        let all = |reports: &[usize]| {
+            let reports = reports.iter().filter_map(|i| readings[*i].known());
+            reports.chain(rest.iter().copied()).collect::<Vec<_>>()
+        };
+        match self.filter.update(rng, belief, &all(&reports)) {
+            Err(Error::Impossible) => {}
+            other => return other,
+        }
+        // Together they are impossible. Those that fit best are kept, as many as are possible together.
+        reports.sort_by(|one, other| {
+            verdicts[*one]
+                .tested
+                .depth()
+                .total_cmp(&verdicts[*other].tested.depth())
+        });
+        let mut kept: Vec<usize> = Vec::new();
+        for i in reports {
+            kept.push(i);
+            let likelihoods: Vec<_> = kept.iter().filter_map(|i| readings[*i].known()).collect();
+            match self.filter.update(rng, &mut belief.clone(), &likelihoods) {
+                Err(Error::Impossible) => {
+                    kept.pop();
+                    verdicts[i].fate = Fate::Rejected;
+                }
+                other => drop(other?),
+            }
+        }
+        match self.filter.update(rng, belief, &all(&kept)) {
+            Err(Error::Impossible) => {
+                let likelihoods: Vec<_> = kept.iter().filter_map(|i| readings[*i].known()).collect();
+                self.filter.update(rng, belief, &likelihoods)
+            }
+            other => other,
+        }
+    }
+}
+
+/// The moments after the reports of an instant, taken one after the other.
+struct InOrder<const D: usize> {
+    given: Gaussian<D>,
+    log_likelihood: f64,
+    shown: Vec<Shown>,
+}
+
+/// The likelihood of all reports that contradict each other.
+fn contested<'a, const D: usize>(readings: &'a [Reading<'_, D>], verdicts: &[Verdict]) -> Option<OneIsWrong<'a, D>> {
+    let parts = readings
+        .iter()
+        .zip(verdicts)
+        .filter_map(|(reading, verdict)| match verdict.fate {
+            Fate::Contested(log_wrong) => Some((reading.known()?, log_wrong)),
+            _ => None,
+        });
+    let parts: Vec<_> = parts.collect();
+    (!parts.is_empty()).then(|| OneIsWrong::new(parts))
 }

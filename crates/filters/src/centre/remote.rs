@@ -7,7 +7,7 @@ use fewbits_core::{
 };
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::linalg::congruence;
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 /// What a receiver needs to know of a sensor. Object-safe, so that sensors of different kinds can be in one list.
 ///
@@ -19,7 +19,8 @@ pub trait RemoteSensor<const D: usize>: Send + Sync {
     /// If the feedback of this belief does not fit its format, or if sensing model and scheme state different noise.
     fn feedback(&self, predicted: &Gaussian<D>) -> Result<BitString, Error>;
 
-    /// The likelihood of the observation in a slot. `working` is the probability that the sensor works; a dead sensor is silent.
+    /// The likelihood of the observation in a slot. `working` is the probability that the sensor works; a dead sensor is silent. A report
+    /// proves that its sensor worked, so the centre asks for that of a report with `working = 1`.
     ///
     /// # Errors
     /// If the feedback does not decode, `working` is outside `[0, 1]`, or the scheme does not accept the report.
@@ -47,6 +48,16 @@ pub trait RemoteSensor<const D: usize>: Send + Sync {
 
     /// Probability that a report that was sent arrives.
     fn arrival(&self) -> f64;
+
+    /// Whether these bits are a report of the scheme. Bits that are none were sent, but say nothing; they are no word of the sensor.
+    fn decodes(&self, _report: &BitString) -> bool {
+        true
+    }
+
+    /// First coordinate of the noise-free measurement of `state`, if it is known. A centre needs it to test reports by a belief of points.
+    fn measured(&self, _state: &SVector<f64, D>) -> Option<f64> {
+        None
+    }
 }
 
 /// A sensor that reports by a [`Scheme`]: its sensing model, its scheme, its link, and the rule for its feedback.
@@ -179,6 +190,14 @@ where
 
     fn arrival(&self) -> f64 {
         self.link.arrival()
+    }
+
+    fn decodes(&self, report: &BitString) -> bool {
+        C::Report::from_bits(&self.scheme.report_format(), report).is_ok()
+    }
+
+    fn measured(&self, state: &SVector<f64, D>) -> Option<f64> {
+        self.sensing.mean(state).iter().next().copied()
     }
 }
 

@@ -42,6 +42,15 @@ pub enum Event {
     Lost,
     /// Observations are likelier than predicted, or residuals alternate: a stated noise is too large.
     NoiseOverstated,
+    /// The report of this sensor was not used at this instant: it is impossible, or too unlikely given the prediction and the others'
+    /// reports.
+    Rejected(u32),
+    /// This sensor contradicts another, and nothing decides which of them is wrong. The belief covers what either says.
+    Disputed(u32),
+    /// A second, equal report of this sensor at the same instant was dropped.
+    Copied(u32),
+    /// Most reports did not agree with the prediction, but with each other, or again and again. The belief was replaced by a wider one.
+    Reopened,
     /// The belief was replaced by the prior of [`FusionCentre::reacquire_from`](super::FusionCentre::reacquire_from).
     Reacquired,
 }

@@ -12,19 +12,32 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The version of the stored form.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// State of one sensor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MemberState {
     pub presence: Presence,
     pub monitor: Monitor,
     #[serde(default, with = "fewbits_numerics::stored")]
     pub last_residual: Option<f64>,
+    /// The same, given only the reports of sensors with smaller numbers at its instant.
+    #[serde(default, with = "fewbits_numerics::stored")]
+    pub last_in_order: Option<f64>,
     pub excluded: bool,
+    /// Whether it contradicts another sensor, and nothing decides which of the two is wrong.
+    pub disputed: bool,
     /// Number of observations since the last alarm.
     pub quiet: u32,
+    /// How far below the likeliest its reports were of late, in nats; older reports count less and less.
+    #[serde(with = "fewbits_numerics::stored")]
+    pub depth: f64,
+    /// Number of reports that were rejected, in all and since the last that was not.
+    pub rejected: u64,
+    pub astray: u32,
+    /// Number of copies of reports that were dropped.
+    pub copies: u64,
 }
 
 impl MemberState {
@@ -33,9 +46,22 @@ impl MemberState {
             presence: Presence::new(),
             monitor: Monitor::default(),
             last_residual: None,
+            last_in_order: None,
             excluded: false,
+            disputed: false,
             quiet: 0,
+            depth: 0.0,
+            rejected: 0,
+            astray: 0,
+            copies: 0,
         }
+    }
+
+    /// Forgets what was found against a prediction or a set of sensors that is no longer in use.
+    pub fn forget_tests(&mut self) {
+        self.monitor = Monitor::default();
+        (self.last_residual, self.last_in_order) = (None, None);
+        (self.disputed, self.depth, self.astray) = (false, 0.0, 0);
     }
 }
 
@@ -59,17 +85,33 @@ pub(super) struct StoredSlot {
     #[serde(with = "fewbits_numerics::stored")]
     pub working: f64,
     pub used: bool,
+    /// `ln p` of a wrong report, if this one contradicts others of its instant and one of them is taken to be wrong.
+    #[serde(default, with = "fewbits_numerics::stored")]
+    pub log_wrong: Option<f64>,
 }
 
 impl StoredSlot {
-    pub fn new(slot: &Slot, working: f64, used: bool) -> Self {
+    pub fn new(slot: &Slot, working: f64, used: bool, log_wrong: Option<f64>) -> Self {
         Self {
             sensor: slot.sensor,
             feedback: slot.feedback.clone(),
             observation: slot.observation.clone(),
             working,
             used,
+            log_wrong,
         }
+    }
+
+    /// A report is not used from now on.
+    pub fn drop_report(&mut self) {
+        if self.observation != Observation::Nothing {
+            (self.used, self.log_wrong) = (false, None);
+        }
+    }
+
+    /// Whether this is a report that says the same as `slot`.
+    pub fn is_copied_by(&self, slot: &Slot) -> bool {
+        self.sensor == slot.sensor && self.feedback == slot.feedback && self.observation == slot.observation
     }
 
     pub fn slot(&self) -> Slot {
@@ -95,6 +137,7 @@ pub struct CentreState<B> {
     monitor: Monitor,
     history: Vec<Checkpoint<B>>,
     dropped: u64,
+    astray: u32,
 }
 
 impl<B: Serialize> CentreState<B> {
@@ -142,12 +185,13 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             members: self
                 .members
                 .iter()
-                .map(|member| (member.number, member.state.clone()))
+                .map(|member| (member.number, member.state))
                 .collect(),
             outage: self.outage,
             monitor: self.monitor,
             history: self.history.clone(),
             dropped: self.dropped,
+            astray: self.astray,
         }
     }
 
@@ -176,6 +220,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.monitor = state.monitor;
         self.history = state.history;
         self.dropped = state.dropped;
+        self.astray = state.astray;
         Ok(())
     }
 }

@@ -3,6 +3,7 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
+mod centre;
 mod contract;
 mod failure;
 mod imm;

@@ -1,8 +1,7 @@
-//! Hand-overs against the Kalman filter, bounds against exact discrete chains, bad input.
+//! Hand-overs against the Kalman filter, bad input.
 
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod chains;
 mod filter;
 mod wild;

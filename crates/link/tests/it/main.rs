@@ -5,6 +5,7 @@ mod attacks;
 mod followed;
 #[cfg(feature = "live")]
 mod live;
+mod restarts;
 mod stops;
 mod transports;
 mod world;

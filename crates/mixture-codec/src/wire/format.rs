@@ -41,7 +41,7 @@ impl<const D: usize> WireFormat<D> {
         })
     }
 
-    /// A format with means within `40 unit` of the origin and one resolution.
+    /// A format with means within `20 unit` of the origin and one resolution.
     ///
     /// # Errors
     /// As [`WireFormat::new`].

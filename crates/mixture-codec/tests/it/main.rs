@@ -3,7 +3,6 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod bounds;
 #[path = "../../../densities/tests/it/common.rs"]
 mod common;
 mod fixtures;

@@ -1,9 +1,9 @@
 //! No tracker allocates in a step once its workspace is filled.
 
 use allocation_counter::measure;
+use fewbits_baselines::pf_mpa::MessagePassing;
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::published::MessagePassing;
 use fewbits_pf_mpa::{
     Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports,
     Target, Tracker,

@@ -1,10 +1,10 @@
 //! Bad input is a typed error, extreme input an answer.
 
+use fewbits_baselines::pf_mpa::{MessagePassing, ProductSampler};
 use fewbits_core::{Error, Gaussian, Observed};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::published::{MessagePassing, ProductSampler};
 use fewbits_pf_mpa::{
     AccelerationChain, BiasedRangeSensor, Encoder, GridFilter, GridWorkspace, GuidedGaussian, Linearised, Network,
     POSITION, QuantizedRange, RangeNoise, RangeReference, RangeSensor, RaoBlackwellGuided, Reports, Target, Tracker,

@@ -1,10 +1,10 @@
 //! Products of mixtures: enumeration against quadrature, samplers against enumeration.
 
 use crate::common::{lobe, random_mixture};
+use fewbits_baselines::pf_mpa::ProductSampler;
 use fewbits_densities::{Component, Mixture};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::product::exact;
-use fewbits_pf_mpa::published::ProductSampler;
 use nalgebra::{Matrix1, SVector, Vector1};
 
 fn line(means: &[f64], variance: f64, weights: &[f64]) -> Mixture<1> {

@@ -1,11 +1,11 @@
 //! Wild arguments: ranges, references, associations and trackers answer numbers or errors, and a failed step keeps the belief.
 
+use fewbits_baselines::pf_mpa::association::{AssociationRule, separation, update};
+use fewbits_baselines::pf_mpa::{MessagePassing, RingBias, kernel_error};
 use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::wild;
-use fewbits_pf_mpa::association::{AssociationRule, separation, update};
 use fewbits_pf_mpa::leader::{LeaderMessage, elect};
-use fewbits_pf_mpa::published::{MessagePassing, RingBias, kernel_error};
 use fewbits_pf_mpa::{
     AccelerationChain, Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeFactor,
     RangeNoise, RangeReference, RangeSensor, RaoBlackwellGuided, Reports, Target, Tracker, level_information,

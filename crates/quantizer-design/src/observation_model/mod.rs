@@ -231,7 +231,8 @@ impl ObservationModel {
     }
 
     /// Whether two sensors have the same noise.
-    pub(crate) fn interchangeable(&self, m: usize, n: usize) -> bool {
+    #[doc(hidden)]
+    pub fn interchangeable(&self, m: usize, n: usize) -> bool {
         self.noise.loadings[m] == self.noise.loadings[n] && self.noise.residuals[m] == self.noise.residuals[n]
     }
 }

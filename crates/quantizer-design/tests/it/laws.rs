@@ -1,8 +1,8 @@
 //! Laws that hold for every system of quantizers.
 
+use fewbits_baselines::quantizer_design::{self as baselines, Separation};
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::design;
-use fewbits_quantizer_design::published::{self, Separation};
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::{
     Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, ObservationModel, Prior, Quantizer, System,
@@ -227,7 +227,7 @@ proptest! {
         let system = System::ideal(model, vec![q([-0.7, 0.9]), q([-0.5, 0.4])]).unwrap();
         let criterion = [MI, MSE, Criterion::BayesError][kind];
         let grid: Vec<f64> = (-4..=5).map(|i| f64::from(i) * 0.55).collect();
-        let (best, value) = published::best_contiguous(&system, 1, criterion, &grid).unwrap();
+        let (best, value) = baselines::best_contiguous(&system, 1, criterion, &grid).unwrap();
         let mut brute = f64::NEG_INFINITY;
         for i in 0..grid.len() {
             for j in i + 1..grid.len() {
@@ -346,22 +346,22 @@ fn impossible_requests_are_named() {
         .unwrap();
     let grid = [-1.0, 0.0, 1.0];
     assert!(
-        published::best_contiguous(&noisy, 0, MI, &grid)
+        baselines::best_contiguous(&noisy, 0, MI, &grid)
             .unwrap_err()
             .to_string()
             .contains("ideal")
     );
-    assert!(published::best_contiguous(&ideal, 0, MI, &grid[..2]).is_err());
-    assert!(published::best_contiguous(&ideal, 2, MI, &grid).is_err());
+    assert!(baselines::best_contiguous(&ideal, 0, MI, &grid[..2]).is_err());
+    assert!(baselines::best_contiguous(&ideal, 2, MI, &grid).is_err());
     let counted = System::identical(model.clone(), q.clone()).unwrap();
     assert!(
-        published::best_contiguous(&counted, 0, MI, &grid)
+        baselines::best_contiguous(&counted, 0, MI, &grid)
             .unwrap_err()
             .to_string()
             .contains("single sensor")
     );
     assert!(design::greedy(&counted, &[0], MI, &Newton::default()).is_err());
-    assert!(published::alternating_step(&counted, 0, MI).is_err());
+    assert!(baselines::alternating_step(&counted, 0, MI).is_err());
     let many = System::ideal(ObservationModel::gaussian_with_deviations(1.0, &[1.0; 11]).unwrap(), vec![q.clone(); 11])
         .unwrap();
     assert!(matches!(many.value(MI), Err(Error::TooLarge { .. })));
@@ -369,7 +369,7 @@ fn impossible_requests_are_named() {
         .unwrap();
     assert!(matches!(crowd.value(MI), Err(Error::TooLarge { .. })));
     let separate = |signal, sd| {
-        published::separate(Separation::Matusita, signal, sd, &q, &Channel::ideal(4).unwrap(), &Newton::default())
+        baselines::separate(Separation::Matusita, signal, sd, &q, &Channel::ideal(4).unwrap(), &Newton::default())
     };
     assert!(separate(0.0, 1.0).is_err() && separate(1.0, 0.0).is_err() && separate(f64::NAN, 1.0).is_err());
     // Four words over a poor channel: a cell is squeezed out, and the error says so or does not converge.

@@ -1,7 +1,7 @@
 //! Every entry of the fixture file, computed by independent programs, within its tolerance.
 
+use fewbits_baselines::quantizer_design::{self as baselines, Separation};
 use fewbits_quantizer_design::design::{self, Design};
-use fewbits_quantizer_design::published::{self, Separation};
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::table::JointTable;
 use fewbits_quantizer_design::{
@@ -394,7 +394,7 @@ fn detection(entry: &Entry) {
     let about = |t: f64| Quantizer::new(vec![theta / 2.0 - t, theta / 2.0, theta / 2.0 + t]).unwrap();
     let ideal = Channel::ideal(4).unwrap();
     let separated = |d| {
-        published::separate(d, theta, 1.0, &about(1.0), &ideal, &newton)
+        baselines::separate(d, theta, 1.0, &about(1.0), &ideal, &newton)
             .unwrap()
             .0
     };
@@ -515,7 +515,7 @@ fn bsc_matrix(entry: &Entry) {
 fn collapsed(entry: &Entry) {
     let model = ObservationModel::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
     let eps = number(&entry.inputs["eps"]);
-    let best = published::assign_words(&model, 2, eps, 2..=4, criterion(&entry.id), published::Words::Shared)
+    let best = baselines::assign_words(&model, 2, eps, 2..=4, criterion(&entry.id), baselines::Words::Shared)
         .unwrap()
         .remove(0);
     assert_eq!(best.words, vec![words(&entry.inputs["words"]); 2], "{}", entry.id);
@@ -550,9 +550,9 @@ fn alternating_series(entry: &Entry) {
                 let first = both.groups()[0].clone();
                 let alone = both.model().subset(&[0]).unwrap();
                 let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
-                published::alternating_step(&System::new(alone, vec![group]).unwrap(), 0, MI).unwrap()
+                baselines::alternating_step(&System::new(alone, vec![group]).unwrap(), 0, MI).unwrap()
             } else {
-                published::alternating_step(&both, 1, MI).unwrap()
+                baselines::alternating_step(&both, 1, MI).unwrap()
             };
             both = both.with_quantizer(stage - 1, quantizer).unwrap();
         }
@@ -575,7 +575,7 @@ fn alternating_step(entry: &Entry) {
     let model = ObservationModel::gaussian_with_deviations(1.0, &[number(&entry.inputs["sigma"])]).unwrap();
     let start = Quantizer::new(numbers(&entry.inputs["start"])).unwrap();
     let system = System::ideal(model, vec![start]).unwrap();
-    let step = published::alternating_step(&system, 0, MI).unwrap();
+    let step = baselines::alternating_step(&system, 0, MI).unwrap();
     all_close(entry, "breakpoints", step.breakpoints(), &numbers(&entry.value));
     // The spec quotes 137 steps until the breakpoints are within 1e-8 of the limit, where Newton takes 7.
     let limit = design::joint(&system, MI, &Newton::default()).unwrap();
@@ -590,7 +590,7 @@ fn alternating_step(entry: &Entry) {
     let (mut current, mut steps) = (system, 0);
     while far(&current) {
         current = current
-            .with_quantizer(0, published::alternating_step(&current, 0, MI).unwrap())
+            .with_quantizer(0, baselines::alternating_step(&current, 0, MI).unwrap())
             .unwrap();
         steps += 1;
     }
@@ -605,9 +605,9 @@ fn bifurcation(entry: &Entry) {
     };
     let criterion = criterion(&entry.id);
     let found = if entry.id.contains("rho") {
-        published::symmetry_breaking(0.2, 0.8, criterion, |rho| signs(1.0, rho))
+        baselines::symmetry_breaking(0.2, 0.8, criterion, |rho| signs(1.0, rho))
     } else {
-        published::symmetry_breaking(0.3, 1.0, criterion, |sd| signs(sd, 0.0))
+        baselines::symmetry_breaking(0.3, 1.0, criterion, |sd| signs(sd, 0.0))
     };
     close(entry, "parameter", found.unwrap(), number(&entry.value));
 }

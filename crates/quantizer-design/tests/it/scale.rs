@@ -1,9 +1,9 @@
 //! Nothing depends on the unit: the design of a scaled model is the scaled design.
 
+use fewbits_baselines::quantizer_design::{self as baselines, Alternating, Separation, Words};
 use fewbits_core::Link;
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::design::{self, Design, Scope};
-use fewbits_quantizer_design::published::{self, Alternating, Separation, Words};
 use fewbits_quantizer_design::{
     AllowedCells, BitBudget, Certificate, Channel, Criterion, JointTable, Newton, Noise, ObservationModel, Prior,
     Quantizer, Request, System, lloyd_max,
@@ -104,7 +104,7 @@ fn searches_know_no_unit() {
     for scale in SCALES {
         assert!((folded(scale) / one - 1.0).abs() < 1e-11, "{scale}");
     }
-    let words = |s: f64| published::assign_words(&equal_pair(0.0, s), 2, 0.1, 3..=4, MSE, Words::Shared).unwrap();
+    let words = |s: f64| baselines::assign_words(&equal_pair(0.0, s), 2, 0.1, 3..=4, MSE, Words::Shared).unwrap();
     let one = words(1.0);
     for scale in SCALES {
         let other = words(scale);
@@ -123,14 +123,14 @@ fn alternating_steps_and_programmes_know_no_unit() {
     };
     for criterion in [MI, MSE] {
         let start = |s: f64| System::lloyd_max(pair(0.3, s), 4).unwrap();
-        let one = published::alternate(&start(1.0), 0, criterion, &rule).unwrap();
+        let one = baselines::alternate(&start(1.0), 0, criterion, &rule).unwrap();
         let grid = |s: f64| (-20..=20).map(|i| 0.21 * s * f64::from(i)).collect::<Vec<_>>();
-        let (best, _) = published::best_contiguous(&start(1.0), 0, criterion, &grid(1.0)).unwrap();
+        let (best, _) = baselines::best_contiguous(&start(1.0), 0, criterion, &grid(1.0)).unwrap();
         for scale in SCALES {
-            let other = published::alternate(&start(scale), 0, criterion, &rule).unwrap();
+            let other = baselines::alternate(&start(scale), 0, criterion, &rule).unwrap();
             assert_eq!(one.iterations, other.iterations);
             assert!((other.value / size(criterion, scale) - one.value).abs() < 1e-11);
-            let (scaled, _) = published::best_contiguous(&start(scale), 0, criterion, &grid(scale)).unwrap();
+            let (scaled, _) = baselines::best_contiguous(&start(scale), 0, criterion, &grid(scale)).unwrap();
             for (a, b) in best.breakpoints().iter().zip(scaled.breakpoints()) {
                 assert!((a * scale - b).abs() < 1e-9 * scale);
             }
@@ -156,7 +156,7 @@ fn detection_knows_no_unit() {
     }
     let ideal = Channel::ideal(4).unwrap();
     for distance in [Separation::Matusita, Separation::Bhattacharyya, Separation::JDivergence] {
-        let run = |s: f64| published::separate(distance, 2.0 * s, s, &about(s), &ideal, &Newton::default()).unwrap();
+        let run = |s: f64| baselines::separate(distance, 2.0 * s, s, &about(s), &ideal, &Newton::default()).unwrap();
         let (one, reached) = run(1.0);
         for scale in SCALES {
             let (other, far) = run(scale);
@@ -184,7 +184,7 @@ fn strong_signals_have_designs_too() {
         let decided = design::joint(&start, Criterion::BayesError, &Newton::default()).unwrap();
         let ideal = Channel::ideal(4).unwrap();
         let (q, _) =
-            published::separate(Separation::Matusita, signal, 1.0, &about, &ideal, &Newton::default()).unwrap();
+            baselines::separate(Separation::Matusita, signal, 1.0, &about, &ideal, &Newton::default()).unwrap();
         let matusita = start.with_quantizer(0, q).unwrap();
         let equivocation = |s: &System| JointTable::new(s).unwrap().equivocation().unwrap();
         assert!(equivocation(&informed.system) <= equivocation(&matusita) * (1.0 + 1e-9));

@@ -1,8 +1,8 @@
 //! The fusion centre of `fewbits-filters` in slots, under dynamics of one slot.
 
 use fewbits_core::{ArgumentError, Evolution, Gaussian, GaussianDynamics, Link, MeasurementNoise, Scheme, Sensing};
-use fewbits_filters::centre::{FusionCentre, Reporting};
 use fewbits_filters::MomentFilter;
+use fewbits_filters::centre::{FusionCentre, Reporting};
 use fewbits_link::FusionReceiver;
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::BoxError;

@@ -1,0 +1,36 @@
+//! Comparisons of the publications: silence ignored, a random trigger, and withheld measurements imputed.
+
+pub mod imputing;
+pub mod trigger;
+
+pub use imputing::ImputedBelief;
+
+use fewbits_cfwmd::Error;
+use fewbits_cfwmd::network::{FusionInfo, Network};
+use fewbits_core::{Gaussian, LinearSensing, Observation};
+use fewbits_filters::kalman;
+use fewbits_numerics::error::entries;
+use nalgebra::SVector;
+
+/// The baseline that ignores silence (the paper's CFoMD; all-send and random censoring use it too): a Kalman filter on the received
+/// values.
+///
+/// # Errors
+/// If there is not one observation per sensor, or a value is not finite.
+pub fn fuse_received<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
+    network: &Network<S, D, M>,
+    predicted: &Gaussian<D>,
+    observations: &[Observation<SVector<f64, M>>],
+) -> Result<(Gaussian<D>, FusionInfo), Error> {
+    entries("observations", observations.len(), network.sensors().len())?;
+    let (mut belief, mut info) = (*predicted, FusionInfo::default());
+    for (sensor, observation) in network.sensors().iter().zip(observations) {
+        if let Observation::Received(value) = observation {
+            let (next, update) = kalman::update(sensor, &belief, value)?;
+            belief = next;
+            info.log_likelihood += update.log_likelihood;
+            info.received += 1;
+        }
+    }
+    Ok((belief, info))
+}

@@ -1,0 +1,26 @@
+//! Comparisons that no filter needs.
+//!
+//! | comparison | module |
+//! |---|---|
+//! | the posterior of one bit beside the normal density of its moments (Proposition 1b) | [`skew_normal`] |
+//! | successive bits about one sample beside one word | [`iterated`] |
+//! | the exact moments after a first message, by enumeration of all reports | [`tree`] |
+//! | a filter beside the exact posterior of the same bits | [`gap`] |
+
+pub mod gap;
+pub mod iterated;
+pub mod skew_normal;
+pub mod tree;
+
+use fewbits_core::Gaussian;
+use fewbits_dymbo::{Error, ScalarPlant};
+
+/// The largest variance of the state within `steps` slots without any message, from `start` on.
+fn widest_variance(plant: &ScalarPlant, start: f64, steps: usize) -> Result<f64, Error> {
+    let start = Gaussian::scalar(0.0, start)?;
+    let beliefs = std::iter::successors(Some(start), |belief| Some(plant.predict(belief)));
+    Ok(beliefs
+        .take(steps + 1)
+        .map(|belief| belief.covariance()[0])
+        .fold(0.0, f64::max))
+}

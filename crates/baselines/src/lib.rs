@@ -1,0 +1,24 @@
+//! Printed variants of the papers' algorithms, and other people's algorithms, with which figures and tests compare.
+//!
+//! Nothing here is what a user needs: the crates below have the recommended algorithms. The crate is not published and promises
+//! nothing of its names.
+//!
+//! | module | compares |
+//! |---|---|
+//! | [`binary_patterns`] | other ways to send one bit per sensor, and substitutes for a search |
+//! | [`cfwmd`] | silence ignored, a random trigger, and withheld measurements imputed |
+//! | [`dymbo`] | how normal the posterior of one bit is; successive bits of one sample |
+//! | [`handoff`] | bounds of the error after several hand-overs |
+//! | [`mixture_codec`] | the paper's reductions |
+//! | [`pf_mpa`] | particle message passing, as published and with its errata corrected |
+//! | [`quantizer_design`] | algorithms of the publications for one sensor, and every assignment of words |
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod binary_patterns;
+pub mod cfwmd;
+pub mod dymbo;
+pub mod handoff;
+pub mod mixture_codec;
+pub mod pf_mpa;
+pub mod quantizer_design;

@@ -1,0 +1,22 @@
+//! Algorithms of the publications, for reproducing their tables, and searches with which a request is compared. To design
+//! quantizers, use [`Request`](fewbits_quantizer_design::Request).
+//!
+//! | item | source |
+//! |---|---|
+//! | [`alternate`], [`alternating_step`] | Algorithm 7: one sensor, with its stop rule corrected |
+//! | [`best_contiguous`] | the best intervals of one sensor on a grid, by dynamic programming |
+//! | [`separate`], [`Separation`] | quantizers with the largest distance between two hypotheses (Poor and Thomas) |
+//! | [`assign_words`] | Table 4.5 for every assignment of words |
+//! | [`symmetry_breaking`] | the noise at which equal quantizers stop being an optimum |
+
+mod alternating;
+mod dynamic_programme;
+mod index_assignment;
+mod separation;
+mod symmetry;
+
+pub use alternating::{Alternated, Alternating, alternate, alternating_step};
+pub use dynamic_programme::best_contiguous;
+pub use index_assignment::{Words, WordsDesign, assign_words};
+pub use separation::{Separation, separate};
+pub use symmetry::symmetry_breaking;

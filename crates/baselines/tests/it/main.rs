@@ -1,0 +1,9 @@
+//! Bounds against exact discrete chains and laws, wild arguments.
+
+// Helpers fail loudly, as tests do.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod chains;
+#[path = "../../../densities/tests/it/common.rs"]
+mod common;
+mod divergences;

@@ -1,0 +1,35 @@
+//! Opening of recordings.
+
+use crate::error::Error;
+use crate::files::is_regular;
+use fewbits_record::Playback;
+use std::fs::File;
+use std::io::{Cursor, Read, Seek};
+use std::path::Path;
+
+/// A source with random access.
+pub(crate) trait ReadSeek: Read + Seek {}
+
+impl<T: Read + Seek> ReadSeek for T {}
+
+/// Opens a file or standard input for reading from front to end. Returns its name for messages too.
+pub(crate) fn stream(file: &str) -> Result<(Box<dyn Read + Send>, &str), Error> {
+    Ok(match file {
+        "-" => (Box::new(std::io::stdin()), "standard input"),
+        file => (Box::new(File::open(file).map_err(Error::io(file, "open"))?), file),
+    })
+}
+
+/// Opens a recording with random access. A pipe has none: its bytes are kept in memory.
+pub(crate) fn open(path: &Path) -> Result<Playback<Box<dyn ReadSeek>>, Error> {
+    let name = path.display().to_string();
+    let source: Box<dyn ReadSeek> = if is_regular(&name) {
+        Box::new(File::open(path).map_err(Error::io(&name, "open"))?)
+    } else {
+        let (mut stream, file) = stream(&name)?;
+        let mut bytes = Vec::new();
+        stream.read_to_end(&mut bytes).map_err(Error::io(file, "read"))?;
+        Box::new(Cursor::new(bytes))
+    };
+    Playback::new(source).map_err(Error::recording(&name))
+}

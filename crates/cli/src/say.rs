@@ -1,0 +1,67 @@
+//! Messages on standard error, and text for terminals.
+//!
+//! Names of columns and files are the text of others. Control characters in them would move the cursor, change colours or hide lines, so
+//! they are written as `\u{1b}`. A standard error that is closed or full is no reason to stop.
+
+use std::borrow::Cow;
+use std::fmt::{self, Write as _};
+use std::io::Write as _;
+
+/// Whether a character would control a terminal, or reorder the text around it.
+fn is_control(character: char) -> bool {
+    character.is_control() || matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+fn escaped(text: &str, is_kept: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if text
+        .chars()
+        .all(|character| !is_control(character) || is_kept(character))
+    {
+        return Cow::Borrowed(text);
+    }
+    let mut plain = String::with_capacity(text.len() + 16);
+    for character in text.chars() {
+        if !is_control(character) || is_kept(character) {
+            plain.push(character);
+        } else {
+            // Writing to a string cannot fail.
+            let _ = write!(plain, "\\u{{{:x}}}", character as u32);
+        }
+    }
+    Cow::Owned(plain)
+}
+
+/// The text without control characters other than line ends and tabs.
+pub(crate) fn plain(text: &str) -> Cow<'_, str> {
+    escaped(text, |character| matches!(character, '\n' | '\t'))
+}
+
+/// A name without any control character, as it may stand within a line.
+pub(crate) fn name(text: &str) -> Cow<'_, str> {
+    escaped(text, |_| false)
+}
+
+/// Writes a message and a line end to standard error.
+pub(crate) fn line(message: fmt::Arguments<'_>) {
+    let text = format!("{message}\n");
+    // Nobody can be told that nobody can be told.
+    let _ = std::io::stderr().lock().write_all(plain(&text).as_bytes());
+}
+
+/// As `eprintln!`, but without panic and without control characters.
+macro_rules! say {
+    ($($part:tt)*) => { $crate::say::line(format_args!($($part)*)) };
+}
+pub(crate) use say;
+
+#[cfg(test)]
+mod tests {
+    use super::{name, plain};
+
+    #[test]
+    fn control_characters_are_written_out() {
+        assert_eq!(plain("a\tb\n"), "a\tb\n");
+        assert_eq!(plain("\u{1b}[2J\u{9b}31m\u{202e}x\r"), "\\u{1b}[2J\\u{9b}31m\\u{202e}x\\u{d}");
+        assert_eq!(name("a\nb °F"), "a\\u{a}b °F");
+    }
+}

@@ -1,0 +1,219 @@
+//! Where a task writes: a file or standard output.
+//!
+//! A file is written beside its final place and takes its name when it is finished. A task that is refused, fails or is ended by a signal
+//! therefore leaves an earlier file as it was, and no part of a new one.
+//!
+//! Rows of a live source (a pipe, a socket, a serial line) cannot be read again, so they are kept: they are written to the file itself,
+//! or, if there is an earlier file, beside it under a name that ends in `.partial`, which is kept if the task fails.
+
+use crate::error::Error;
+use crate::interrupt;
+use crate::say::say;
+use std::fs::{File, OpenOptions};
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Name of standard output in messages.
+pub(crate) const STANDARD_OUTPUT: &str = "standard output";
+/// Longest part of a name that is repeated in the name of its unfinished file, in bytes. File systems allow 255.
+const MAX_NAME: usize = 200;
+
+/// Whether the task's source is live; set once from the arguments.
+static IS_LIVE: AtomicBool = AtomicBool::new(false);
+
+/// States that rows cannot be read again.
+pub(crate) fn set_live(is_live: bool) {
+    IS_LIVE.store(is_live, Ordering::Relaxed);
+}
+
+/// Whether rows cannot be read again.
+pub(crate) fn is_live() -> bool {
+    IS_LIVE.load(Ordering::Relaxed)
+}
+
+/// How an output reaches its final place.
+enum Place {
+    /// It is there already: standard output, a pipe, a device.
+    Direct,
+    /// A new file of a live source. It is removed if nothing was written.
+    New { path: PathBuf, is_empty: bool },
+    /// A file beside the final one.
+    Beside {
+        temporary: PathBuf,
+        path: PathBuf,
+        is_kept: bool,
+        is_empty: bool,
+    },
+}
+
+/// An output.
+pub(crate) struct Target {
+    /// `None` for standard output.
+    file: Option<File>,
+    place: Place,
+    name: String,
+}
+
+impl Target {
+    /// Opens a file, or standard output.
+    pub(crate) fn open(path: Option<&Path>) -> Result<Self, Error> {
+        let Some(path) = path else {
+            return Ok(Self {
+                file: None,
+                place: Place::Direct,
+                name: STANDARD_OUTPUT.to_owned(),
+            });
+        };
+        let name = path.display().to_string();
+        let failed = Error::io(&name, "create");
+        // A link stays a link: the file that it names is replaced.
+        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let earlier = std::fs::metadata(&path).ok();
+        let (file, place) = match earlier {
+            // A pipe or a device is written to as it is; a folder is refused.
+            Some(found) if !found.is_file() => {
+                (OpenOptions::new().write(true).open(&path).map_err(&failed)?, Place::Direct)
+            }
+            None if is_live() => {
+                let file = OpenOptions::new()
+                    .write(true)
+                    .create_new(true)
+                    .open(&path)
+                    .map_err(&failed)?;
+                (file, Place::New { path, is_empty: true })
+            }
+            earlier => {
+                // What may not be written to is not replaced either.
+                if earlier.is_some() {
+                    OpenOptions::new().write(true).open(&path).map_err(&failed)?;
+                }
+                let (file, temporary) = beside(&path, &name)?;
+                if let Some(earlier) = earlier {
+                    file.set_permissions(earlier.permissions()).map_err(&failed)?;
+                }
+                let is_kept = is_live();
+                if !is_kept {
+                    interrupt::remember(&temporary);
+                }
+                let is_empty = true;
+                (
+                    file,
+                    Place::Beside {
+                        temporary,
+                        path,
+                        is_kept,
+                        is_empty,
+                    },
+                )
+            }
+        };
+        Ok(Self {
+            file: Some(file),
+            place,
+            name,
+        })
+    }
+
+    /// As [`open`](Self::open), but refuses to write binary data to a terminal.
+    pub(crate) fn open_binary(path: Option<&Path>) -> Result<Self, Error> {
+        if path.is_none() && std::io::stdout().is_terminal() {
+            return Err(Error::Terminal);
+        }
+        Self::open(path)
+    }
+
+    /// The name in messages.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Writes out everything and gives a file its final name.
+    pub(crate) fn finish(mut self) -> Result<(), Error> {
+        self.flush().map_err(Error::io(&self.name, "write"))?;
+        let place = std::mem::replace(&mut self.place, Place::Direct);
+        if let Place::Beside { temporary, path, .. } = &place {
+            // Without this, a power loss after the renaming could leave an empty file in place of the earlier one.
+            let done = match &self.file {
+                Some(file) => file.sync_all(),
+                None => Ok(()),
+            };
+            let done = done.and_then(|()| std::fs::rename(temporary, path));
+            interrupt::forget(temporary);
+            if let Err(error) = done {
+                self.place = place;
+                return Err(Error::io(&self.name, "write")(error));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Creates a new file in the folder of `path`.
+fn beside(path: &Path, name: &str) -> Result<(File, PathBuf), Error> {
+    let whole = path
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let mut end = whole.len().min(MAX_NAME);
+    while !whole.is_char_boundary(end) {
+        end -= 1;
+    }
+    let kept = &whole[..end];
+    let process = std::process::id();
+    let mut failure = None;
+    for attempt in 0..1000 {
+        let temporary = match is_live() {
+            true => format!("{kept}.{process}-{attempt}.partial"),
+            false => format!(".{kept}.{process}-{attempt}.fewbits-new"),
+        };
+        let temporary = path.with_file_name(temporary);
+        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
+            Ok(file) => return Ok((file, temporary)),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => failure = Some(error),
+            Err(error) => return Err(Error::io(name, "create a file beside it for")(error)),
+        }
+    }
+    let failure = failure.unwrap_or_else(|| std::io::ErrorKind::AlreadyExists.into());
+    Err(Error::io(name, "create a file beside it for")(failure))
+}
+
+impl Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = match &mut self.file {
+            Some(file) => file.write(bytes)?,
+            None => std::io::stdout().lock().write(bytes)?,
+        };
+        if let Place::New { is_empty, .. } | Place::Beside { is_empty, .. } = &mut self.place {
+            *is_empty &= written == 0;
+        }
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match &mut self.file {
+            Some(file) => file.flush(),
+            None => std::io::stdout().lock().flush(),
+        }
+    }
+}
+
+/// The task has failed: what was written is removed, or kept if it cannot be read again.
+impl Drop for Target {
+    fn drop(&mut self) {
+        match &self.place {
+            Place::New { path, is_empty: true } => drop(std::fs::remove_file(path)),
+            Place::Beside {
+                temporary,
+                is_kept: true,
+                is_empty: false,
+                ..
+            } => say!("{}: unchanged; the rows so far are in {}", self.name, temporary.display()),
+            Place::Beside { temporary, .. } => {
+                drop(std::fs::remove_file(temporary));
+                interrupt::forget(temporary);
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! The gain of each level for a sample, for fixed other sensors and a fixed decoder.
+//!
+//! For fixed scores of the decoder every criterion is linear in the sensor's decisions. The best level for a sample `y`
+//! is then the one with the largest of a few functions `D_z(y)`. The alternating algorithm uses this.
+
+use crate::criterion::{Criterion, LOG_FLOOR, Scored};
+use crate::error::{Error, refuse};
+use crate::law::{Active, log_likelihoods};
+use crate::moments::{Table, moments};
+use crate::observation_model::ObservationModel;
+use crate::problem::Problem;
+use crate::system::{SensorGroup, System};
+use fewbits_quantizers::Channel;
+
+/// Stands for the logarithm of probability zero. It is finite, so that a weight of zero removes it.
+const LOG_IMPOSSIBLE: f64 = -1e12;
+
+/// The group if it is a single sensor.
+///
+/// # Errors
+/// If there is no such group, or it has several sensors.
+pub fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Error> {
+    let entry = system.group(group)?;
+    match entry.sensors().len() {
+        1 => Ok(entry),
+        n => refuse("group", format!("{n} sensors"), "a group of a single sensor"),
+    }
+}
+
+/// The gains of all levels of one sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelGains {
+    /// The gain of each level at each node, relative to the density of the sample there.
+    pub gains: Vec<Vec<f64>>,
+    /// Mean of the sample at each node.
+    pub means: Vec<f64>,
+    /// Standard deviation of the sample at each node.
+    pub deviation: f64,
+}
+
+impl LevelGains {
+    /// The gains of the single sensor in `group` under the decoder for the present cells.
+    ///
+    /// # Errors
+    /// If the group is not a single sensor, there are too many outcomes, or the criterion does not fit the prior.
+    pub fn new(system: &System, group: usize, criterion: Criterion) -> Result<Self, Error> {
+        let entry = single_sensor(system, group)?;
+        system.check_outcomes()?;
+        Scored::new(criterion, system.model())?;
+        let (model, own) = (system.model(), Active::new(system, group)?);
+        // Joint report probabilities of the other groups.
+        let nodes = model.nodes();
+        let mut others = Table::new(vec![1.0; nodes], nodes);
+        for index in (0..system.groups().len()).filter(|index| *index != group) {
+            let other = Active::new(system, index)?;
+            others = others.outer(&other.reports(other.breakpoints()).0);
+        }
+        let (channel, values) = (entry.channel(), model.values.len());
+        let (outputs, inner) = (channel.outputs(), system.groups()[group + 1..].iter().map(|g| g.outcomes() as usize));
+        let inner: usize = inner.product();
+        // Log likelihoods, and the index of an outcome in their table.
+        let (logs, is_by_group) = if model.is_discrete() {
+            // If hypotheses are far apart, the probability of a wrong symbol underflows, but its logarithm is needed.
+            (log_likelihoods(system)?, true)
+        } else {
+            let symbols = Table::new(own.symbols(own.breakpoints()), nodes);
+            let likelihood = moments(&[&others, &symbols], &model.given);
+            (likelihood.iter().map(|q| q.max(LOG_FLOOR).ln()).collect(), false)
+        };
+        let gains = level_gains(model, criterion, &others, channel, |at| {
+            let (other, symbol) = (at / outputs, at % outputs);
+            let by_group = (other / inner * outputs + symbol) * inner + other % inner;
+            let outcome = if is_by_group { by_group } else { at };
+            &logs[outcome * values..(outcome + 1) * values]
+        });
+        Ok(Self {
+            gains: (0..gains.rows()).map(|z| gains.row(z).to_vec()).collect(),
+            means: own.means,
+            deviation: own.deviation,
+        })
+    }
+}
+
+/// The contribution to the criterion of every interval between two of the edges `-inf, candidates, inf` of the single sensor in
+/// `group`, ideal channel: entry `a * edges + b` for the interval from edge `a` to edge `b`. Second, the part of the criterion that does
+/// not depend on the sensor.
+///
+/// # Errors
+/// If there are too many outcomes or the criterion does not fit the prior.
+pub fn interval_values(
+    system: &System,
+    group: usize,
+    criterion: Criterion,
+    candidates: &[f64],
+) -> Result<(Vec<f64>, f64), Error> {
+    let problem = Problem::new(system, criterion, &[group])?;
+    Ok((problem.cell_values(candidates), problem.constant()))
+}
+
+/// `lambda_z(node) = sum_k w_k P(node | x_k) sum_t' P(t' | node) sum_t C[t, z] score(t', t, x_k)`, levels by nodes.
+///
+/// `others` holds the joint report probabilities of the other sensors, one row per report. The score is `ln p(t', t | x) / p(t', t)`, or
+/// minus the squared error of the posterior mean, or minus one for a wrong decision. It is computed from `log_likelihood(i)` of the outcome
+/// `i = other * outputs + symbol`, one number per value of the unknown. Probabilities may underflow; their logarithms must not.
+fn level_gains<'a>(
+    model: &ObservationModel,
+    criterion: Criterion,
+    others: &Table,
+    channel: &Channel,
+    log_likelihood: impl Fn(usize) -> &'a [f64],
+) -> Table {
+    let (nodes, values) = (model.nodes(), model.values.len());
+    let mut per_symbol = vec![0.0; channel.outputs() * nodes];
+    let mut score = vec![0.0; values];
+    for at in 0..others.rows() * channel.outputs() {
+        let (other, symbol) = (at / channel.outputs(), at % channel.outputs());
+        scores(model, criterion, log_likelihood(at), &mut score);
+        let reports = others.row(other);
+        let out = &mut per_symbol[symbol * nodes..(symbol + 1) * nodes];
+        for ((feature, w), s) in model.given.iter().zip(&model.weights).zip(&score) {
+            let factor = w * s;
+            for (i, p) in feature.weights.iter().enumerate() {
+                out[feature.start + i] += factor * p * reports[feature.start + i];
+            }
+        }
+    }
+    // The gain of a level is the mean gain of the symbols into which the channel turns it.
+    let mut gains = vec![0.0; channel.inputs() * nodes];
+    for (z, row) in gains.chunks_exact_mut(nodes).enumerate() {
+        for (t, symbol) in per_symbol.chunks_exact(nodes).enumerate() {
+            let c = channel.probability(t, z);
+            if c != 0.0 {
+                row.iter_mut().zip(symbol).for_each(|(r, s)| *r += c * s);
+            }
+        }
+    }
+    Table::new(gains, nodes)
+}
+
+/// Score of the decoder for one outcome, for each value of the unknown.
+fn scores(model: &ObservationModel, criterion: Criterion, log_likelihood: &[f64], out: &mut [f64]) {
+    // Relative to the most likely value, so that the largest number is 1.
+    let largest = log_likelihood.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        // An outcome that has probability zero for all values.
+        out.fill(0.0);
+        return;
+    }
+    let relative = |l: &f64| (l - largest).exp();
+    let total: f64 = model
+        .weights
+        .iter()
+        .zip(log_likelihood)
+        .map(|(w, l)| w * relative(l))
+        .sum();
+    match criterion {
+        Criterion::MutualInformation => {
+            let log_total = largest + total.max(LOG_FLOOR).ln();
+            for (o, l) in out.iter_mut().zip(log_likelihood) {
+                *o = (l - log_total).max(LOG_IMPOSSIBLE);
+            }
+        }
+        Criterion::MeanSquaredError => {
+            let terms = model.weights.iter().zip(&model.values).zip(log_likelihood);
+            let moment: f64 = terms.map(|((w, x), l)| w * (x - model.mean) * relative(l)).sum();
+            let mean = model.mean + if total > 0.0 { moment / total } else { 0.0 };
+            for (o, x) in out.iter_mut().zip(&model.values) {
+                *o = -(x - mean) * (x - mean);
+            }
+        }
+        Criterion::BayesError => {
+            let joint = |k: usize| model.weights[k].ln() + log_likelihood[k];
+            let best = (1..out.len()).fold(0, |best, k| if joint(k) > joint(best) { k } else { best });
+            for (k, o) in out.iter_mut().enumerate() {
+                *o = if k == best { 0.0 } else { -1.0 };
+            }
+        }
+    }
+}

@@ -1,0 +1,372 @@
+//! Detection of a dialect from the first lines of a table.
+
+use crate::dialect::{Delimiter, Dialect};
+use crate::error::{Error, Place};
+use crate::lines::{Row, Split};
+use crate::{known, missing, number, time};
+use std::io::BufRead;
+
+/// Largest number of lines and of bytes that are examined.
+const MAX_LINES: usize = 1000;
+const MAX_BYTES: usize = 1 << 18;
+
+/// The first lines of a text.
+pub(crate) struct Head {
+    /// Bytes that were read.
+    pub(crate) bytes: Vec<u8>,
+    /// The whole lines among them, with their numbers.
+    pub(crate) lines: Vec<(u64, String)>,
+    /// The last byte of lines.
+    pub(crate) end: u8,
+}
+
+impl Head {
+    /// Reads what is there: all of a file's beginning, but of a live source no more than it takes to see rows.
+    pub(crate) fn read(reader: &mut dyn BufRead) -> Result<Self, Error> {
+        let (mut bytes, mut ended) = (Vec::new(), false);
+        while !ended && bytes.len() < MAX_BYTES && !is_enough(&bytes) {
+            let chunk = reader.fill_buf()?;
+            let count = chunk.len().min(MAX_BYTES);
+            ended = count == 0;
+            bytes.extend_from_slice(&chunk[..count]);
+            reader.consume(count);
+        }
+        let end = if bytes.contains(&b'\n') || !bytes.contains(&b'\r') {
+            b'\n'
+        } else {
+            b'\r'
+        };
+        let mut pieces: Vec<&[u8]> = bytes.split(|c| *c == end).take(MAX_LINES + 1).collect();
+        // The last one may be cut, or is the nothing behind the last end.
+        if !ended || pieces.last().is_some_and(|piece| piece.is_empty()) {
+            pieces.pop();
+        }
+        let text = |line: &[u8]| String::from_utf8_lossy(line).trim_end_matches(['\r', '\n']).to_owned();
+        let lines = (1..).zip(pieces.iter().map(|line| text(line))).collect();
+        Ok(Self { bytes, lines, end })
+    }
+}
+
+/// Whether bytes hold lines enough: a dozen, or a first row behind the line of names.
+fn is_enough(bytes: &[u8]) -> bool {
+    let lines: Vec<&[u8]> = bytes
+        .split_inclusive(|c| *c == b'\n')
+        .filter(|line| line.ends_with(b"\n"))
+        .collect();
+    if lines.len() >= 12 {
+        return true;
+    }
+    let is_data =
+        |line: &&[u8]| line.iter().any(u8::is_ascii_digit) && !line.starts_with(b"#") && !line.starts_with(b"\"#");
+    let needed = if lines.first().is_some_and(|line| known::needs_more(line)) {
+        6
+    } else {
+        2
+    };
+    lines.len() >= needed && lines.last().is_some_and(is_data)
+}
+
+/// What a cell looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Look {
+    Missing,
+    Number,
+    Time,
+    Text,
+}
+
+fn look(cell: &str, decimal_comma: bool) -> Look {
+    let syntax = number::Syntax {
+        decimal: if decimal_comma { b',' } else { b'.' },
+        thousands: None,
+    };
+    if missing::is_usual(cell, true) {
+        Look::Missing
+    } else if number::parse(cell.as_bytes(), syntax).is_ok() {
+        Look::Number
+    } else if time::looks_like_time(cell) {
+        Look::Time
+    } else {
+        Look::Text
+    }
+}
+
+fn cells(line: &str, split: Split) -> Vec<String> {
+    let mut row = Row {
+        text: line.as_bytes().to_vec(),
+        ..Row::default()
+    };
+    split.split(&mut row);
+    row.texts()
+}
+
+/// The most frequent number of cells, how many lines have it, and whether the line of names may.
+fn modal(lines: &[&str], split: Split) -> (usize, usize) {
+    let mut counts = std::collections::BTreeMap::new();
+    // The end of the head is data; the beginning may be anything.
+    for line in &lines[lines.len() / 2..] {
+        *counts.entry(cells(line, split).len()).or_insert(0_usize) += 1;
+    }
+    counts.into_iter().max_by_key(|(_, lines)| *lines).unwrap_or((1, 0))
+}
+
+/// The delimiter of lines: the first that splits nearly all of the later ones into equally many cells, at least two.
+fn delimiter(lines: &[&str], quote: u8) -> Delimiter {
+    let candidates = [
+        Delimiter::Byte(b'\t'),
+        Delimiter::Byte(b';'),
+        Delimiter::Byte(b'|'),
+        Delimiter::Byte(b','),
+    ];
+    let later = lines.len() - lines.len() / 2;
+    let score = |delimiter: Delimiter| {
+        let (count, found) = modal(lines, Split { delimiter, quote });
+        (count >= 2).then_some(found)
+    };
+    let consistent = candidates
+        .iter()
+        .copied()
+        .find(|delimiter| score(*delimiter).is_some_and(|found| 10 * found >= 8 * later));
+    if let Some(found) = consistent {
+        return found;
+    }
+    let most = candidates
+        .iter()
+        .copied()
+        .filter_map(|delimiter| score(delimiter).map(|found| (found, delimiter)));
+    let best = most
+        .filter(|(found, _)| 2 * found >= later)
+        .max_by_key(|(found, _)| *found);
+    if let Some((_, found)) = best {
+        return found;
+    }
+    // Columns that are aligned by spaces: every line must have as many words, the first too, so that a date alone is no pair of columns.
+    let spaces = Split {
+        delimiter: Delimiter::Spaces,
+        quote,
+    };
+    let counts: Vec<usize> = lines
+        .iter()
+        .map(|line| cells(line, spaces).len())
+        .filter(|count| *count > 0)
+        .collect();
+    let (count, found) = modal(lines, spaces);
+    if count >= 2 && 10 * found >= 8 * later && counts.first() == Some(&count) {
+        return Delimiter::Spaces;
+    }
+    Delimiter::Byte(b',')
+}
+
+/// What the first lines say beyond the dialect.
+#[derive(Debug, Default)]
+pub(crate) struct Layout {
+    /// Line number and cells of the names.
+    pub(crate) names: Option<(u64, Vec<String>)>,
+    /// Cells of the row of units.
+    pub(crate) units: Vec<String>,
+    /// The first line that may be data.
+    pub(crate) first_line: u64,
+}
+
+/// Fills what is not said, and finds the line of names.
+pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error> {
+    known::recognise(head, dialect);
+    let mark = dialect.comment.get_or_insert_with(|| "#".to_owned()).clone();
+    let is_comment = |line: &str| !mark.is_empty() && line.starts_with(mark.as_str());
+    let mut lines: Vec<(u64, &str)> = head
+        .lines
+        .iter()
+        .map(|(number, line)| (*number, line.as_str()))
+        .collect();
+    if let Some((_, first)) = lines.first()
+        && let Some(delimiter) = first.trim().strip_prefix("sep=")
+    {
+        dialect.delimiter.get_or_insert(delimiter.to_owned());
+        dialect.skip.get_or_insert(1);
+    }
+    let comments: Vec<(u64, &str)> = lines.iter().filter(|(_, line)| is_comment(line)).copied().collect();
+    lines.retain(|(_, line)| !is_comment(line));
+    // Lines that are skipped count without comments.
+    if let Some(skip) = dialect.skip {
+        lines.drain(..lines.len().min(usize::try_from(skip).unwrap_or(usize::MAX)));
+    }
+    let filled: Vec<&str> = lines
+        .iter()
+        .map(|(_, line)| *line)
+        .filter(|line| !line.trim().is_empty())
+        .collect();
+    if dialect.quote.is_none() {
+        let is_single = filled.first().is_some_and(|line| {
+            line.len() > 1
+                && line
+                    .split([',', ';', '\t'])
+                    .all(|cell| cell.starts_with('\'') && cell.ends_with('\'') && cell.len() > 1)
+        });
+        dialect.quote = Some(if is_single { '\'' } else { '"' });
+    }
+    let quote = dialect.quote.map_or(b'"', |mark| mark as u32 as u8);
+    let delimiter = match &dialect.delimiter {
+        Some(text) => Delimiter::parse(text)?,
+        None => delimiter(&filled, quote),
+    };
+    dialect.delimiter = Some(delimiter.shown());
+    let split = Split { delimiter, quote };
+    let count = modal(&filled, split).0;
+    let rows: Vec<(u64, Vec<String>)> = lines
+        .iter()
+        .map(|(number, line)| (*number, cells(line, split)))
+        .filter(|(_, cells)| cells.len() > 1 || cells.iter().any(|cell| !cell.is_empty()))
+        .collect();
+    if dialect.decimal.is_none() {
+        let is_comma = delimiter != Delimiter::Byte(b',') && has_decimal_commas(&rows);
+        dialect.decimal = Some(if is_comma { ',' } else { '.' });
+    }
+    let lines_before = |number: u64| lines.iter().filter(|(line, _)| *line < number).count() as u64;
+    layout(&rows, &comments, count, split, dialect, &lines_before)
+}
+
+/// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.
+fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {
+    let (mut certain, mut points) = (false, false);
+    for cell in rows.iter().flat_map(|(_, cells)| cells) {
+        let size = cell.trim_start_matches(['-', '+']);
+        let is_number = size.bytes().all(|c| c.is_ascii_digit() || matches!(c, b',' | b'.')) && !size.is_empty();
+        match (size.split_once(','), is_number) {
+            (Some((whole, places)), true) if !whole.contains(',') && !size.contains('.') => {
+                certain |= !places.contains(',') && places.len() != 3 && !places.is_empty();
+            }
+            (None, true) => points |= size.split('.').count() == 2,
+            _ => {}
+        }
+    }
+    certain && !points
+}
+
+/// Finds the line of names: the last one before the data that has no number, units not counted.
+fn layout(
+    rows: &[(u64, Vec<String>)],
+    comments: &[(u64, &str)],
+    count: usize,
+    split: Split,
+    dialect: &mut Dialect,
+    lines_before: &dyn Fn(u64) -> u64,
+) -> Result<Layout, Error> {
+    let Some((first_number, first)) = rows.first() else {
+        // Comments alone, or nothing.
+        dialect.skip.get_or_insert(0);
+        return Ok(Layout::default());
+    };
+    let comma = dialect.decimal == Some(',');
+    let looks: Vec<Vec<Look>> = rows
+        .iter()
+        .map(|(_, cells)| cells.iter().map(|cell| look(cell, comma)).collect())
+        .collect();
+    // Columns of numbers or times in most of the later rows.
+    let later = &looks[looks.len() / 2..];
+    let is_measured = |column: usize| {
+        let (mut yes, mut no) = (0, 0);
+        for look in later.iter().filter_map(|row| row.get(column)) {
+            match look {
+                Look::Number | Look::Time => yes += 1,
+                Look::Text => no += 1,
+                Look::Missing => {}
+            }
+        }
+        yes > no
+    };
+    let measured: Vec<usize> = (0..count).filter(|column| is_measured(*column)).collect();
+    let is_data = |row: &Vec<Look>| {
+        row.len() >= count
+            && measured.iter().all(|column| row[*column] != Look::Text)
+            && row.iter().any(|look| matches!(look, Look::Number | Look::Time))
+    };
+    let has_header_said = dialect.no_header == Some(false) || dialect.skip.is_some();
+    if dialect.no_header == Some(true) {
+        dialect.skip.get_or_insert(0);
+        return Ok(Layout {
+            first_line: *first_number,
+            ..Layout::default()
+        });
+    }
+    if has_header_said {
+        return Ok(from_header(rows, 0, dialect));
+    }
+    let data = looks.iter().position(is_data);
+    match data {
+        // Names may stand in the last comment before the data.
+        Some(0) => {
+            let named = comments
+                .iter()
+                .rev()
+                .find(|(number, _)| number < first_number)
+                .map(|(number, line)| {
+                    let mark = dialect.comment.as_deref().unwrap_or("#");
+                    (*number, cells(line.trim_start_matches(mark).trim(), split))
+                });
+            if let Some((number, names)) = named
+                && names.len() == first.len()
+                && names.iter().all(|name| look(name, comma) == Look::Text)
+            {
+                dialect.skip.get_or_insert(0);
+                return Ok(Layout {
+                    names: Some((number, names)),
+                    units: Vec::new(),
+                    first_line: *first_number,
+                });
+            }
+            Err(Error::Line {
+                place: Place {
+                    line: *first_number,
+                    row: 0,
+                },
+                problem: "there is no line of names: the first line is a row of numbers".to_owned(),
+                mend: "say --no-header if it is a row, or --skip 0 if these are the names",
+            })
+        }
+        Some(data) => {
+            let mut header = data - 1;
+            if dialect.units_row.is_none() && dialect.skip_after_names.is_none() {
+                let is_units = header > 0
+                    && rows[header - 1].1.len() == rows[header].1.len()
+                    && looks[header - 1]
+                        .iter()
+                        .all(|look| !matches!(look, Look::Number | Look::Time))
+                    && known::are_units(&rows[header].1);
+                dialect.units_row = Some(is_units);
+                header -= usize::from(is_units);
+            } else {
+                let behind =
+                    usize::from(dialect.units_row == Some(true)) + dialect.skip_after_names.unwrap_or(0) as usize;
+                header = header.saturating_sub(behind);
+            }
+            // A title or settings above the names are skipped; a short line above the data is no line of names.
+            while header > 0 && rows[header].1.len() < count && rows[header - 1].1.len() >= count {
+                header -= 1;
+            }
+            dialect.skip = Some(lines_before(rows[header].0));
+            Ok(from_header(rows, header, dialect))
+        }
+        None => {
+            dialect.skip = Some(0);
+            Ok(from_header(rows, 0, dialect))
+        }
+    }
+}
+
+fn from_header(rows: &[(u64, Vec<String>)], header: usize, dialect: &mut Dialect) -> Layout {
+    let mut next = header + 1;
+    let mut units = Vec::new();
+    if *dialect.units_row.get_or_insert(false) {
+        units = rows.get(next).map(|(_, cells)| cells.clone()).unwrap_or_default();
+        next += 1;
+    }
+    next += usize::try_from(*dialect.skip_after_names.get_or_insert(0)).unwrap_or(0);
+    dialect.no_header.get_or_insert(false);
+    let (number, names) = rows[header].clone();
+    let last = rows[(next - 1).min(rows.len() - 1)].0;
+    Layout {
+        names: Some((number, names)),
+        units,
+        first_line: rows.get(next).map_or(last + 1, |(number, _)| *number),
+    }
+}

@@ -1,0 +1,139 @@
+//! Lines of JSON objects as rows: `{"Time": "...", "SI7021": {"Temperature": 20.0}}` has the columns `Time` and `SI7021.Temperature`.
+//! Numbers keep their digits: they are read as text, as those of other tables.
+
+use crate::error::{Error, Place};
+
+/// Largest depth of objects and lists.
+const MAX_DEPTH: usize = 16;
+
+/// The keys and the text of all scalars of an object, in their order. `null` is an empty text.
+pub(crate) fn flattened(line: &str, number: u64) -> Result<Vec<(String, String)>, Error> {
+    let mut reader = Reader {
+        text: line.as_bytes(),
+        at: 0,
+    };
+    let mut pairs = Vec::new();
+    let refused = |at: usize| Error::Line {
+        place: Place { line: number, row: 0 },
+        problem: format!("byte {} is not as in a line of JSON", at + 1),
+        mend: "one object stands on each line (jq -c '.[]' makes lines of a list); leave the line out with --skip-bad",
+    };
+    let done = reader.value("", 0, &mut pairs).is_some() && reader.peek().is_none();
+    if done { Ok(pairs) } else { Err(refused(reader.at)) }
+}
+
+struct Reader<'a> {
+    text: &'a [u8],
+    at: usize,
+}
+
+impl Reader<'_> {
+    fn peek(&mut self) -> Option<u8> {
+        while self.text.get(self.at).is_some_and(u8::is_ascii_whitespace) {
+            self.at += 1;
+        }
+        self.text.get(self.at).copied()
+    }
+
+    fn take(&mut self, expected: u8) -> Option<()> {
+        (self.peek()? == expected).then(|| self.at += 1)
+    }
+
+    fn value(&mut self, key: &str, depth: usize, pairs: &mut Vec<(String, String)>) -> Option<()> {
+        match self.peek()? {
+            _ if depth > MAX_DEPTH => None,
+            b'{' => self.members(b'}', key, depth, pairs),
+            // A row is an object.
+            _ if depth == 0 => None,
+            b'[' => self.members(b']', key, depth, pairs),
+            b'"' => {
+                let text = self.string()?;
+                pairs.push((key.to_owned(), text));
+                Some(())
+            }
+            _ => {
+                let from = self.at;
+                while self.text.get(self.at).is_some_and(|c| !b",]} \t".contains(c)) {
+                    self.at += 1;
+                }
+                let word = std::str::from_utf8(&self.text[from..self.at]).ok()?;
+                let word = match word {
+                    "null" => "",
+                    "true" | "false" | "NaN" | "Infinity" | "-Infinity" => word,
+                    _ if word.parse::<f64>().is_ok() => word,
+                    _ => return None,
+                };
+                pairs.push((key.to_owned(), word.to_owned()));
+                Some(())
+            }
+        }
+    }
+
+    /// Members of an object, or of a list, whose keys are their numbers from 0.
+    fn members(&mut self, end: u8, key: &str, depth: usize, pairs: &mut Vec<(String, String)>) -> Option<()> {
+        self.at += 1;
+        if self.peek()? == end {
+            self.at += 1;
+            return Some(());
+        }
+        for index in 0.. {
+            let own = if end == b'}' {
+                let name = self.peek().filter(|c| *c == b'"').and_then(|_| self.string())?;
+                self.take(b':')?;
+                name
+            } else {
+                index.to_string()
+            };
+            let path = if key.is_empty() { own } else { format!("{key}.{own}") };
+            self.value(&path, depth + 1, pairs)?;
+            match self.peek()? {
+                b',' => self.at += 1,
+                c if c == end => {
+                    self.at += 1;
+                    return Some(());
+                }
+                _ => return None,
+            }
+        }
+        None
+    }
+
+    fn string(&mut self) -> Option<String> {
+        self.at += 1;
+        let mut bytes = Vec::new();
+        loop {
+            let c = *self.text.get(self.at)?;
+            self.at += 1;
+            match c {
+                b'"' => return String::from_utf8(bytes).ok(),
+                b'\\' => {
+                    let escaped = *self.text.get(self.at)?;
+                    self.at += 1;
+                    match escaped {
+                        b'n' => bytes.push(b'\n'),
+                        b't' => bytes.push(b'\t'),
+                        b'r' => bytes.push(b'\r'),
+                        b'b' => bytes.push(8),
+                        b'f' => bytes.push(12),
+                        b'u' => {
+                            let mut units = vec![self.unit()?];
+                            if (0xd800..0xdc00).contains(&units[0]) && self.text[self.at..].starts_with(b"\\u") {
+                                self.at += 2;
+                                units.push(self.unit()?);
+                            }
+                            bytes.extend_from_slice(String::from_utf16(&units).ok()?.as_bytes());
+                        }
+                        other => bytes.push(other),
+                    }
+                }
+                c => bytes.push(c),
+            }
+        }
+    }
+
+    fn unit(&mut self) -> Option<u16> {
+        let digits = std::str::from_utf8(self.text.get(self.at..self.at + 4)?).ok()?;
+        self.at += 4;
+        u16::from_str_radix(digits, 16).ok()
+    }
+}

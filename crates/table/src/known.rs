@@ -1,0 +1,137 @@
+//! Formats of loggers that are known by their first lines, and words for units.
+
+use crate::detect::Head;
+use crate::dialect::Dialect;
+
+/// Whether a first line announces a format whose data begin later.
+pub(crate) fn needs_more(line: &[u8]) -> bool {
+    [
+        &b"\"TOA5\""[..],
+        b"TOA5",
+        b"\"TOACI1\"",
+        b"LOCATION,",
+        b"#group",
+        b"#datatype",
+        b"\"Plot Title",
+    ]
+    .iter()
+    .any(|begin| line.starts_with(begin))
+}
+
+/// Sets what is known of a format and not said.
+pub(crate) fn recognise(head: &Head, dialect: &mut Dialect) {
+    let Some((_, first)) = head.lines.first() else { return };
+    let first = first.trim_start_matches('\u{feff}');
+    let bare = first.trim_start_matches('"');
+    let mut set = |format: &str, skip: Option<u64>, units_row: bool, skip_after_names: u64, delimiter: &str| {
+        if dialect.skip.is_some() || dialect.no_header.is_some() {
+            return;
+        }
+        dialect.format.get_or_insert(format.to_owned());
+        dialect.delimiter.get_or_insert(delimiter.to_owned());
+        dialect.skip = skip;
+        dialect.units_row.get_or_insert(units_row);
+        dialect.skip_after_names.get_or_insert(skip_after_names);
+    };
+    if bare.starts_with("TOA5") {
+        // Campbell Scientific: station, names, units, kinds of processing.
+        set("TOA5", Some(1), true, 1, ",");
+    } else if bare.starts_with("TOACI1") {
+        set("TOACI1", Some(1), false, 0, ",");
+    } else if bare.starts_with("Plot Title:") {
+        // Onset HOBOware: a title, then names.
+        set("HOBO", Some(1), false, 0, ",");
+        dialect.time_format.get_or_insert("mdy".to_owned());
+        dialect.comment.get_or_insert(String::new());
+    } else if first.starts_with("LOCATION,") {
+        // EnergyPlus weather: eight lines or fewer, then rows without names.
+        let data = head.lines.iter().position(|(_, line)| line.starts_with("DATA PERIODS"));
+        if let Some(data) = data.filter(|_| dialect.skip.is_none() && dialect.no_header.is_none()) {
+            dialect.format.get_or_insert("EPW".to_owned());
+            dialect.delimiter.get_or_insert(",".to_owned());
+            dialect.skip = Some(data as u64 + 1);
+            dialect.no_header = Some(true);
+        }
+    } else if first.starts_with("#group") || first.starts_with("#datatype") {
+        set("InfluxDB annotated CSV", Some(0), false, 0, ",");
+        dialect.comment.get_or_insert("#".to_owned());
+    } else if first.starts_with('#') {
+        // Tab-separated tables of the USGS: comments, names, and a line of widths and kinds, as `5s 15s 20d`.
+        let mut rows = head.lines.iter().filter(|(_, line)| !line.starts_with('#'));
+        let (names, widths) = (rows.next(), rows.next());
+        let is_width = |cell: &str| {
+            let (number, kind) = cell.split_at(cell.len().saturating_sub(1));
+            matches!(kind, "s" | "n" | "d") && number.parse::<u32>().is_ok()
+        };
+        if let (Some((_, names)), Some((_, widths))) = (names, widths)
+            && names.contains('\t')
+            && widths.split('\t').all(is_width)
+        {
+            set("RDB", Some(0), false, 1, "tab");
+        }
+    }
+}
+
+/// Names of the columns of an EPW file, as far as they are usual.
+pub(crate) const EPW: [&str; 35] = [
+    "year",
+    "month",
+    "day",
+    "hour",
+    "minute",
+    "uncertainty",
+    "dry_bulb",
+    "dew_point",
+    "humidity",
+    "pressure",
+    "extraterrestrial_horizontal",
+    "extraterrestrial_normal",
+    "infrared",
+    "global_horizontal",
+    "direct_normal",
+    "diffuse_horizontal",
+    "global_illuminance",
+    "direct_illuminance",
+    "diffuse_illuminance",
+    "zenith_luminance",
+    "wind_direction",
+    "wind_speed",
+    "total_sky_cover",
+    "opaque_sky_cover",
+    "visibility",
+    "ceiling",
+    "weather_observed",
+    "weather_codes",
+    "precipitable_water",
+    "aerosol_depth",
+    "snow_depth",
+    "days_since_snow",
+    "albedo",
+    "rain_depth",
+    "rain_quantity",
+];
+
+/// Words that stand for units in a row of their own.
+const UNITS: &str = "ts rn smp volt volts v mv uv kv amp amps a ma ua w mw kw wh kwh mwh hz khz mhz s sec secs second seconds ms us ns \
+    min mins minute minutes h hr hour hours day days m mm cm km um nm ft in inch inches m/s km/h mph kn knots m3 l ml l/s l/min m3/h \
+    kg g mg ug t lb pa hpa kpa mpa bar mbar mb psi atm mmhg inhg c k f degc degf deg degrees °c °f °k ℃ ℉ celsius kelvin fahrenheit % \
+    percent rh %rh ppm ppb ppt lux lx w/m2 w/m^2 j kj mj n nm db dba dbm ohm ohms kohm mohm s/m us/cm ms/cm ph ntu mg/l ug/m3 µg/m³ \
+    µg/m3 rad rpm g0 count counts # unitless none unit utc local va var m^3 m² m³ w/m² µs µm µa mm/h umol/m2/s";
+
+/// Whether the cells of a row are units: every one that is not empty is a unit's word or stands in brackets, and there is one.
+pub(crate) fn are_units(cells: &[String]) -> bool {
+    let is_unit = |cell: &str| {
+        let lower = cell.trim().to_lowercase();
+        let lower = lower.replace("deg ", "deg");
+        let in_brackets =
+            (lower.starts_with('(') && lower.ends_with(')')) || (lower.starts_with('[') && lower.ends_with(']'));
+        let is_date_pattern = lower.contains("yyyy") || lower.contains("hh:mm");
+        lower.is_empty()
+            || in_brackets
+            || is_date_pattern
+            || UNITS.split_ascii_whitespace().any(|unit| unit == lower)
+            || lower.parse::<f64>().is_ok()
+    };
+    let is_word = |cell: &String| !cell.trim().is_empty() && cell.parse::<f64>().is_err();
+    cells.iter().any(is_word) && cells.iter().all(|cell| is_unit(cell))
+}

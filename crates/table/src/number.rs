@@ -1,0 +1,273 @@
+//! Numbers as loggers write them. What a double cannot hold is refused, never rounded in silence.
+
+/// How numbers are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Syntax {
+    pub(crate) decimal: u8,
+    pub(crate) thousands: Option<u8>,
+}
+
+impl Default for Syntax {
+    fn default() -> Self {
+        Self {
+            decimal: b'.',
+            thousands: None,
+        }
+    }
+}
+
+/// A number of a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Number {
+    /// A double, and the decimals that were written.
+    Double(f64, u8),
+    /// A whole number of 64 bits that is no double.
+    Whole(i64),
+}
+
+/// Why a cell is not a number that can be kept: the problem and what would mend it.
+pub(crate) type Problem = (&'static str, &'static str);
+
+pub(crate) const NO_NUMBER: &str = "is not a number";
+const TOO_LARGE: Problem =
+    ("is beyond the largest double", "mend the cell, or name it with --missing to make it a gap");
+const TOO_SMALL: Problem = ("is below the smallest double", "write 0, or name it with --missing to make it a gap");
+const TOO_LONG: Problem = (
+    "is a whole number that neither a double nor 64 bits hold",
+    "split the column, or leave it out with --without",
+);
+
+/// Powers of ten that are exact doubles.
+const TENS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
+    1e21, 1e22,
+];
+
+/// Parses a trimmed cell that is not empty.
+#[inline]
+pub(crate) fn parse(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
+    let (negative, digits) = match text {
+        [b'-', rest @ ..] => (true, rest),
+        [b'+', rest @ ..] => (false, rest),
+        _ => (false, text),
+    };
+    let (mut mantissa, mut i, mut decimals, mut after) = (0_u64, 0, 0_u8, false);
+    // Up to 19 digits fit 64 bits, and numbers below 2^53 over a power of ten below 10^22 are one correctly rounded division.
+    while i < digits.len() && i < 20 {
+        let c = digits[i];
+        if c.is_ascii_digit() {
+            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(c - b'0'));
+            decimals += u8::from(after);
+        } else if c == syntax.decimal && !after {
+            after = true;
+        } else {
+            break;
+        }
+        i += 1;
+    }
+    let has_digit = i > usize::from(after);
+    if i == digits.len() && has_digit && mantissa <= 1 << 53 && i - usize::from(after) <= 16 {
+        let size = mantissa as f64 / TENS[usize::from(decimals)];
+        return Ok(Number::Double(if negative { -size } else { size }, decimals));
+    }
+    slowly(text, syntax)
+}
+
+/// Everything that is not a short plain number.
+#[cold]
+fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
+    let text = std::str::from_utf8(text).map_err(|_| no_number(text))?;
+    let mut plain: String = text.replace('\u{2212}', "-");
+    if let Some(rest) = plain.strip_prefix(['+', '-']).filter(|rest| rest.starts_with(' ')) {
+        // A sign apart, as `+ 0.081`.
+        plain = format!("{}{}", &plain[..1], rest.trim_start());
+    }
+    if let Some(mark) = syntax.thousands {
+        plain =
+            grouped(&plain, char::from(mark), char::from(syntax.decimal)).ok_or_else(|| no_number(text.as_bytes()))?;
+    }
+    if syntax.decimal != b'.' {
+        if plain.contains('.') {
+            return Err(no_number(text.as_bytes()));
+        }
+        plain = plain.replacen(char::from(syntax.decimal), ".", 1);
+    }
+    if let Some(special) = special(&plain) {
+        return Ok(Number::Double(special, 0));
+    }
+    let value: f64 = plain.parse().map_err(|_| no_number(text.as_bytes()))?;
+    let size = plain.trim_start_matches(['-', '+']);
+    let begins_with_word = size.starts_with(|c: char| c.is_ascii_alphabetic());
+    if value.is_infinite() && !begins_with_word {
+        return Err(TOO_LARGE);
+    }
+    if value == 0.0
+        && size
+            .split(['e', 'E'])
+            .next()
+            .is_some_and(|digits| digits.contains(|c| matches!(c, '1'..='9')))
+    {
+        return Err(TOO_SMALL);
+    }
+    let (whole, places) = size.split_once('.').unwrap_or((size, ""));
+    if size.contains(['e', 'E']) || begins_with_word || places.bytes().any(|c| c != b'0') {
+        return Ok(Number::Double(value, u8::try_from(places.len()).unwrap_or(u8::MAX)));
+    }
+    // A whole number: it must be this double, or fit 64 bits.
+    let negative = plain.starts_with('-');
+    let exact: Option<i128> = whole.parse().ok().map(|size: i128| if negative { -size } else { size });
+    match exact {
+        // The cast of a double beyond 128 bits saturates, and is then no whole number that was parsed.
+        Some(exact) if value as i128 == exact => {
+            Ok(Number::Double(value, u8::try_from(places.len()).unwrap_or(u8::MAX)))
+        }
+        Some(exact) => i64::try_from(exact).map(Number::Whole).map_err(|_| TOO_LONG),
+        None => Err(TOO_LONG),
+    }
+}
+
+/// Not-a-number and infinities as runtimes of several systems write them.
+fn special(text: &str) -> Option<f64> {
+    Some(match text.to_ascii_lowercase().as_str() {
+        "nan(ind)" | "1.#qnan" | "1.#ind" | "nan(snan)" | "1.#snan" => f64::NAN,
+        "-nan(ind)" | "-1.#ind" | "-1.#qnan" | "-nan(snan)" => -f64::NAN,
+        "1.#inf" | "+1.#inf" => f64::INFINITY,
+        "-1.#inf" => f64::NEG_INFINITY,
+        _ => return None,
+    })
+}
+
+/// The number without the marks between groups of three digits; `None` if a group has another length.
+fn grouped(text: &str, mark: char, decimal: char) -> Option<String> {
+    if !text.contains(mark) {
+        return Some(text.to_owned());
+    }
+    let (whole, rest) = text.split_once(decimal).unwrap_or((text, ""));
+    let (sign, digits) = whole.split_at(usize::from(whole.starts_with(['-', '+'])));
+    let groups: Vec<&str> = digits.split(mark).collect();
+    let whole_groups = groups.iter().skip(1).all(|group| group.len() == 3) && (1..=3).contains(&groups[0].len());
+    if !whole_groups || rest.contains(mark) {
+        return None;
+    }
+    let decimal = if rest.is_empty() {
+        String::new()
+    } else {
+        format!("{decimal}{rest}")
+    };
+    Some(format!("{sign}{}{decimal}", groups.concat()))
+}
+
+/// The problem with a cell that is no number, with the option that its look suggests.
+fn no_number(text: &[u8]) -> Problem {
+    (NO_NUMBER, hint(&String::from_utf8_lossy(text)))
+}
+
+/// The option that the look of a cell suggests.
+pub(crate) fn hint(text: &str) -> &'static str {
+    let digits = text.bytes().filter(u8::is_ascii_digit).count();
+    let commas = text.bytes().filter(|c| *c == b',').count();
+    let points = text.bytes().filter(|c| *c == b'.').count();
+    let plain = text.bytes().all(|c| c.is_ascii_digit() || b"+-.,' eE".contains(&c));
+    if text.contains('\0') {
+        "the cell has NUL bytes, as after a loss of power: leave such lines out with --skip-bad 1 or more"
+    } else if digits == 0 {
+        "make it a gap with --missing, leave such lines out with --skip-bad, or the column with --without"
+    } else if plain && commas == 1 && points == 0 {
+        "if it has a decimal comma, say --decimal , (and --delimiter ';' or tab)"
+    } else if plain && (commas > 1 || (commas == 1 && points == 1)) {
+        if text.rfind(',') > text.rfind('.') {
+            "say --decimal , --thousands ."
+        } else {
+            "say --thousands ,"
+        }
+    } else if plain && (points > 2 || text.contains('\'') && !text.starts_with('\'')) {
+        "say --thousands and the mark between groups"
+    } else if text.ends_with('%') || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
+        "if a unit stands behind the number, say --strip-units"
+    } else if text.starts_with("0x") || text.starts_with("0X") {
+        "hexadecimal numbers are not read: convert the column, or leave it out with --without"
+    } else {
+        "mend the cell, name it with --missing, leave such lines out with --skip-bad, or the column with --without"
+    }
+}
+
+/// The number in front of a unit, as `19.75` of `19.75 °C`.
+pub(crate) fn without_unit(text: &str) -> Option<(&str, &str)> {
+    let end = text.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let (number, unit) = text.split_at(end);
+    (!unit.is_empty()).then(|| (number.trim_end(), unit.trim()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(text: &str) -> Option<f64> {
+        match parse(text.as_bytes(), Syntax::default()) {
+            Ok(Number::Double(value, _)) => Some(value),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn numbers_have_the_bits_of_the_standard_library() {
+        for text in [
+            "0",
+            "-0",
+            "-0.0",
+            "+3",
+            "19.750",
+            ".5",
+            "5.",
+            "9007199254740992",
+            "0.1",
+            "0.30000000000000004",
+            "1e-310",
+            "5e-324",
+            "1.7976931348623157e308",
+            "123456789.123456789",
+            "-12345678901234.5",
+            "6.02214076e23",
+        ] {
+            let expected: f64 = text.parse().unwrap_or(f64::NAN);
+            assert_eq!(value(text).map(f64::to_bits), Some(expected.to_bits()), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_a_double_cannot_hold_is_refused_or_whole() {
+        let of = |text: &str| parse(text.as_bytes(), Syntax::default());
+        assert_eq!(of("9007199254740993.0"), Ok(Number::Whole(9_007_199_254_740_993)));
+        assert_eq!(of("-9007199254740993"), Ok(Number::Whole(-9_007_199_254_740_993)));
+        assert_eq!(of("1152921504606846976"), Ok(Number::Double(1_152_921_504_606_846_976.0, 0)));
+        for (text, problem) in [
+            ("1e400", TOO_LARGE),
+            ("-1e400", TOO_LARGE),
+            ("1e-400", TOO_SMALL),
+            ("99999999999999999999", TOO_LONG),
+        ] {
+            assert_eq!(of(text), Err(problem), "{text}");
+        }
+        for text in ["", "-", ".", "26..5", "1.2.3", "0x10", "1e", "twelve"] {
+            assert!(of(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn commas_groups_and_signs() {
+        let of = |text: &str, decimal, thousands| match parse(text.as_bytes(), Syntax { decimal, thousands }) {
+            Ok(Number::Double(value, _)) => Some(value),
+            _ => None,
+        };
+        assert_eq!(of("19,75", b',', None), Some(19.75));
+        assert_eq!(of("1.299,99", b',', Some(b'.')), Some(1299.99));
+        assert_eq!(of("1,721,992,142.283", b'.', Some(b',')), Some(1_721_992_142.283));
+        assert_eq!(of("-1 234.5", b'.', Some(b' ')), Some(-1234.5));
+        assert_eq!(of("1,72", b'.', Some(b',')), None);
+        assert_eq!(of("19.75", b',', None), None);
+        assert_eq!(value("\u{2212}3.5"), Some(-3.5));
+        assert_eq!(value("+ 0.081"), Some(0.081));
+        assert_eq!(value("-1.#INF"), Some(f64::NEG_INFINITY));
+        assert!(value("-nan(ind)").is_some_and(f64::is_nan));
+    }
+}

@@ -1,0 +1,392 @@
+//! Opening a table: from bytes to rows with a known dialect.
+
+use crate::column::Column;
+use crate::detect::{self, Head, Layout};
+use crate::dialect::{Delimiter, Dialect};
+use crate::error::{Error, Place};
+use crate::lines::{Line, Lines, Row, Split};
+use crate::profile::Profile;
+use crate::table::Table;
+use crate::{json, known, names, number, source};
+use std::io::{BufRead, Cursor, Read};
+
+/// Rows of a text.
+pub(crate) struct Rows {
+    lines: Lines,
+    split: Split,
+    comment: Vec<u8>,
+    /// Whether a comment with as many cells as a row is refused, because it may be one.
+    doubts_comments: bool,
+    /// Keys of objects, if lines are JSON, and whether others are ignored.
+    keys: Option<Vec<String>>,
+    header: Vec<String>,
+    /// Cells of the lines before the data.
+    preamble: Vec<Vec<String>>,
+}
+
+impl Rows {
+    /// No rows of text, for tables of another source.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn none() -> Self {
+        Self {
+            lines: Lines::new(Box::new(Cursor::new(Vec::new())), b'\n'),
+            split: Split {
+                delimiter: Delimiter::Byte(b','),
+                quote: b'"',
+            },
+            comment: Vec::new(),
+            doubts_comments: false,
+            keys: None,
+            header: Vec::new(),
+            preamble: Vec::new(),
+        }
+    }
+
+    /// Number of the last line.
+    pub(crate) fn line(&self) -> u64 {
+        self.lines.line()
+    }
+
+    /// Reads the next row. `None` after the last.
+    pub(crate) fn next(&mut self, row: &mut Row) -> Result<Option<()>, Error> {
+        loop {
+            let Some(found) = self.lines.next(&mut row.text)? else {
+                return Ok(None);
+            };
+            if let Some(keys) = &self.keys {
+                return json_row(keys, row, &found);
+            }
+            if !self.comment.is_empty() && row.text.starts_with(&self.comment) {
+                self.check_comment(row, &found)?;
+                continue;
+            }
+            self.split.complete(&mut self.lines, row, &found)?;
+            return Ok(Some(()));
+        }
+    }
+
+    fn check_comment(&self, row: &mut Row, found: &Line) -> Result<(), Error> {
+        if self.doubts_comments
+            && self.header.len() > 1
+            && !self.split.split(row)
+            && row.cells.len() == self.header.len()
+        {
+            let (Line::Text(line) | Line::TooLong(line)) = *found;
+            return Err(Error::Line {
+                place: Place { line, row: 0 },
+                problem: "a comment with as many cells as a row".to_owned(),
+                mend: "say --comment '#' if it is one, or --comment '' if it is a row",
+            });
+        }
+        Ok(())
+    }
+
+    pub(crate) fn is_header_again(&self, row: &Row) -> bool {
+        self.header.len() == row.cells.len()
+            && self.header.len() > 1
+            && self
+                .header
+                .iter()
+                .enumerate()
+                .all(|(i, name)| row.cell(i) == name.as_bytes())
+    }
+
+    /// Whether a row is one of the lines before the data, as in files that were joined.
+    pub(crate) fn is_preamble(&self, row: &Row) -> bool {
+        !row.cells.is_empty() && !row.is_blank() && self.preamble.contains(&row.texts())
+    }
+
+    /// Refuses a row that has not a cell for each column. Empty cells behind the last are tolerated.
+    pub(crate) fn check_length(&self, row: &Row, columns: usize, dialect: &Dialect) -> Result<(), Error> {
+        let count = row.cells.len();
+        let is_good = count == columns
+            || (count > columns && (columns..count).all(|i| row.cell(i).is_empty()))
+            || (count < columns && dialect.short_rows)
+            || (columns == 1 && count == 0);
+        if is_good {
+            return Ok(());
+        }
+        let s = if count == 1 { "" } else { "s" };
+        Err(Error::Line {
+            place: Place { line: row.line, row: 0 },
+            problem: format!("{count} cell{s} instead of {columns}"),
+            mend: if count < columns {
+                "mend the row, leave such rows out with --skip-bad, take what they lack as gaps with --short-rows, or say what separates \
+                 cells with --delimiter"
+            } else {
+                "mend the row, leave such rows out with --skip-bad, or say what separates cells with --delimiter"
+            },
+        })
+    }
+}
+
+/// A row of an object: a cell for each key.
+fn json_row(keys: &[String], row: &mut Row, found: &Line) -> Result<Option<()>, Error> {
+    let Line::Text(line) = *found else {
+        let (Line::Text(line) | Line::TooLong(line)) = *found;
+        return Err(Error::Line {
+            place: Place { line, row: 0 },
+            problem: "too long".to_owned(),
+            mend: "one object stands on each line",
+        });
+    };
+    row.line = line;
+    let text = String::from_utf8_lossy(&row.text).into_owned();
+    row.cells = vec![(0, 0); keys.len()];
+    if text.trim().is_empty() {
+        row.cells.clear();
+        return Ok(Some(()));
+    }
+    let pairs = json::flattened(&text, line)?;
+    row.text.clear();
+    for (key, value) in pairs {
+        let Some(column) = keys.iter().position(|known| *known == key) else {
+            if value.is_empty() {
+                continue;
+            }
+            return Err(Error::Line {
+                place: Place { line, row: 0 },
+                problem: format!("the key `{}` is in none of the first lines", crate::error::printable(&key)),
+                mend: "put a line with all keys first, or leave such lines out with --skip-bad",
+            });
+        };
+        let from = row.text.len();
+        row.text.extend_from_slice(value.trim().as_bytes());
+        row.cells[column] = (from as u32, row.text.len() as u32);
+    }
+    Ok(Some(()))
+}
+
+impl Table {
+    /// Opens a table of text: CSV and its relatives, or lines of JSON; plain, or packed if the features `gzip` and `zstd` are on. What
+    /// `said` leaves open is detected from the first lines. All columns are selected; [`set_time`](Self::set_time) or
+    /// [`find_time`](Self::find_time) takes the time out of them.
+    ///
+    /// # Errors
+    /// If the source cannot be read, is no table of text, has no line of names, or `said` has settings that do not go together.
+    pub fn open(source: impl Read + Send + 'static, said: &Dialect) -> Result<Self, Error> {
+        let mut dialect = said.clone().checked()?;
+        let (mut reader, encoding) = source::text(Box::new(source), said.encoding.as_deref())?;
+        dialect.encoding = dialect.encoding.or(encoding);
+        let head = Head::read(&mut *reader)?;
+        let first = head.bytes.iter().copied().find(|c| !c.is_ascii_whitespace());
+        let is_object = first == Some(b'{') && said.delimiter.is_none();
+        if first == Some(b'[') && head.bytes.contains(&b'{') {
+            return Err(Error::Format {
+                what: "JSON, a list",
+                mend: "make lines of its objects: jq -c '.[]' FILE | fewbits ... -",
+            });
+        }
+        let (rows, columns) = if is_object {
+            of_json(&head, reader, &mut dialect)?
+        } else {
+            of_text(&head, reader, &mut dialect, said)?
+        };
+        let profiles = first_profiles(&head, &rows, &columns, &dialect);
+        Self::new(rows, dialect, columns, profiles)
+    }
+}
+
+fn lines_of(head: &Head, reader: Box<dyn BufRead + Send>) -> Lines {
+    Lines::new(Box::new(Cursor::new(head.bytes.clone()).chain(reader)), head.end)
+}
+
+fn of_json(head: &Head, reader: Box<dyn BufRead + Send>, dialect: &mut Dialect) -> Result<(Rows, Vec<Column>), Error> {
+    let mut keys: Vec<String> = Vec::new();
+    for (number, line) in head.lines.iter().filter(|(_, line)| !line.trim().is_empty()) {
+        let pairs = match json::flattened(line, *number) {
+            Ok(pairs) => pairs,
+            Err(_) if *number > 1 => continue,
+            Err(_) => {
+                return Err(Error::Format {
+                    what: "JSON that is not one object a line",
+                    mend: "make lines of its objects: jq -c . FILE | fewbits ... -",
+                });
+            }
+        };
+        for (key, _) in pairs {
+            if !keys.contains(&key) {
+                keys.push(key);
+            }
+        }
+    }
+    dialect.format = Some("JSON lines".to_owned());
+    dialect.decimal = Some('.');
+    let columns = named(&keys, &[]);
+    let rows = Rows {
+        lines: lines_of(head, reader),
+        split: Split {
+            delimiter: Delimiter::Byte(b','),
+            quote: b'"',
+        },
+        comment: Vec::new(),
+        doubts_comments: false,
+        keys: Some(keys),
+        header: Vec::new(),
+        preamble: Vec::new(),
+    };
+    Ok((rows, columns))
+}
+
+fn of_text(
+    head: &Head,
+    reader: Box<dyn BufRead + Send>,
+    dialect: &mut Dialect,
+    said: &Dialect,
+) -> Result<(Rows, Vec<Column>), Error> {
+    if head.lines.iter().all(|(_, line)| line.trim().is_empty()) {
+        return Err(Error::Empty);
+    }
+    let Layout {
+        names,
+        units,
+        first_line,
+    } = detect::detect(head, dialect)?;
+    let delimiter = Delimiter::parse(dialect.delimiter.as_deref().unwrap_or(","))?;
+    let split = Split {
+        delimiter,
+        quote: dialect.quote.map_or(b'"', |mark| mark as u32 as u8),
+    };
+    let comment = dialect.comment.clone().unwrap_or_default();
+    let mut rows = Rows {
+        lines: lines_of(head, reader),
+        split,
+        doubts_comments: said.comment.is_none() && dialect.format.is_none(),
+        comment: comment.into_bytes(),
+        keys: None,
+        header: Vec::new(),
+        preamble: Vec::new(),
+    };
+    // Lines before the data, as their cells.
+    let mut row = Row::default();
+    while rows.lines.line() + 1 < first_line {
+        let Some(found) = rows.lines.next(&mut row.text)? else {
+            break;
+        };
+        if split.complete(&mut rows.lines, &mut row, &found).is_ok() {
+            rows.preamble.push(row.texts());
+        }
+    }
+    let width = || {
+        let widths = head
+            .lines
+            .iter()
+            .filter(|(number, _)| *number >= first_line)
+            .map(|(_, line)| {
+                let mut row = Row {
+                    text: line.as_bytes().to_vec(),
+                    ..Row::default()
+                };
+                split.split(&mut row);
+                (0..row.cells.len())
+                    .rev()
+                    .find(|i| !row.cell(*i).is_empty())
+                    .map_or(0, |last| last + 1)
+            });
+        widths.collect::<Vec<usize>>()
+    };
+    let own_names = match names {
+        Some((_, mut names)) => {
+            // Behind the last name, cells may be empty in all rows.
+            let widths = width();
+            while names.last().is_some_and(String::is_empty)
+                && names.len() > 1
+                && widths.iter().all(|width| *width < names.len())
+            {
+                names.pop();
+            }
+            names
+        }
+        None if dialect.no_header == Some(true) => {
+            let mut widths = width();
+            widths.sort_unstable();
+            let width = widths.get(widths.len() / 2).copied().unwrap_or(0);
+            let is_epw = dialect.format.as_deref() == Some("EPW");
+            (0..width)
+                .map(|i| {
+                    if is_epw {
+                        known::EPW.get(i).copied().unwrap_or("").to_owned()
+                    } else {
+                        String::new()
+                    }
+                })
+                .collect()
+        }
+        None => Vec::new(),
+    };
+    if own_names.is_empty() {
+        return Err(Error::Empty);
+    }
+    if dialect.encoding.is_none() && own_names.iter().any(|name| name.contains('\u{fffd}')) {
+        return Err(Error::Line {
+            place: Place {
+                line: first_line.saturating_sub(1).max(1),
+                row: 0,
+            },
+            problem: "the names are not text in UTF-8".to_owned(),
+            mend: "say how they are written, as --encoding latin1",
+        });
+    }
+    rows.header.clone_from(&own_names);
+    let columns = named(&own_names, &units);
+    Ok((rows, columns))
+}
+
+fn named(own_names: &[String], units: &[String]) -> Vec<Column> {
+    let names = names::distinct(own_names);
+    let column = |(i, name): (usize, String)| Column {
+        name,
+        own_name: own_names[i].clone(),
+        unit: units
+            .get(i)
+            .map(|unit| unit.trim_matches(['(', ')', '[', ']']).to_owned())
+            .unwrap_or_default(),
+        kind: crate::Kind::Number,
+    };
+    names.into_iter().enumerate().map(column).collect()
+}
+
+/// Profiles of the columns over the whole lines of the head.
+fn first_profiles(head: &Head, rows: &Rows, columns: &[Column], dialect: &Dialect) -> Vec<Profile> {
+    let mut profiles = vec![Profile::default(); columns.len()];
+    let byte = |mark: char| mark as u32 as u8;
+    let syntax = number::Syntax {
+        decimal: dialect.decimal.map_or(b'.', byte),
+        thousands: dialect.thousands.map(byte),
+    };
+    let gaps: Vec<_> = columns
+        .iter()
+        .map(|column| dialect.missing_of(&column.name, &column.own_name))
+        .collect();
+    let from = rows.lines.line();
+    let whole = head.lines.iter().filter(|(number, _)| *number > from);
+    let text = whole
+        .flat_map(|(_, line)| line.bytes().chain([head.end]))
+        .collect::<Vec<u8>>();
+    let mut first = Rows {
+        lines: Lines::new(Box::new(Cursor::new(text)), head.end),
+        split: rows.split,
+        comment: rows.comment.clone(),
+        doubts_comments: false,
+        keys: rows.keys.clone(),
+        header: rows.header.clone(),
+        preamble: Vec::new(),
+    };
+    let mut row = Row::default();
+    loop {
+        match first.next(&mut row) {
+            Ok(None) => break,
+            Ok(Some(())) if row.cells.len() >= columns.len() && !first.is_header_again(&row) => {
+                let place = Place {
+                    line: from + row.line,
+                    row: 0,
+                };
+                for (i, profile) in profiles.iter_mut().enumerate() {
+                    profile.add(row.cell_text(i), place, syntax, &gaps[i], dialect.strip_units);
+                }
+            }
+            _ => {}
+        }
+    }
+    profiles
+}
