@@ -4,8 +4,7 @@
 use crate::references::{agree, numbers};
 use fewbits::densities::{Component, Mixture};
 use fewbits::monte_carlo::{Moments, Stream};
-use fewbits::pf_mpa::product;
-use fewbits_baselines::pf_mpa::{LabelChain, ProductSampler, RingBias, kernel_error, ratio_second_moments};
+use fewbits_baselines::pf_mpa::{LabelChain, ProductSampler, RingBias, kernel_error, product, ratio_second_moments};
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
 
 /// Erratum `mpa-3`.

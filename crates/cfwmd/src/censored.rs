@@ -7,10 +7,9 @@ use fewbits_core::columns::{lengths_agree, state_at};
 use fewbits_core::factor::{Constant, InCell, Partition, Product, Repeated, Scalar, Value, add_mapped};
 use fewbits_core::number::Levels;
 use fewbits_core::{Cell, Columns, Factor, Gaussian, Link, Tilted};
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
-use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::{ArgumentError, kernels};
 use nalgebra::{Cholesky, SMatrix, SVector};
 
 /// The two ways in which a report can be missing.

@@ -3,7 +3,7 @@
 use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
-use fewbits_numerics::{newton, normal, stored};
+use fewbits_numerics::{newton, normal};
 use serde::{Deserialize, Serialize};
 
 /// How many reports the network may send: `messages` per step on average, from `sensors` sensors (the paper's `l` of `N`).
@@ -15,7 +15,22 @@ pub struct Budget {
     sensors: usize,
 }
 
-stored! { Budget as Numbers { #[serde(with = "fewbits_numerics::stored")] messages: f64, sensors: usize } => Budget::new(messages, sensors), Error }
+/// The stored form of [`Budget`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    #[serde(with = "fewbits_numerics::stored")]
+    messages: f64,
+    sensors: usize,
+}
+
+impl TryFrom<Numbers> for Budget {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        Budget::new(parts.messages, parts.sensors)
+    }
+}
 
 impl Budget {
     /// A budget of `messages` in `(0, sensors]`.

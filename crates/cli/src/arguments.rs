@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::design_options::DesignOptions;
+pub(crate) use crate::table_options::{BoundOptions, DialectOptions, ManyOptions, TableOptions};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -14,6 +15,8 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand)]
 pub(crate) enum Task {
+    /// Show how a table is understood: dialect, columns, kinds, units, times, gaps, ranges and suspicious cells.
+    Look(LookOptions),
     /// Show the bits per sample of a table at several error bounds, the quantization steps of its columns, and the bits of its times.
     Plan(PlanOptions),
     /// Pack a table (CSV) into a recording.
@@ -44,35 +47,16 @@ pub(crate) enum Task {
     Generate(GenerateOptions),
 }
 
-/// Reading of a table.
-#[derive(Args, Clone)]
-pub(crate) struct TableOptions {
-    /// CSV file with a line of names first; `-` for standard input.
-    pub(crate) file: String,
-    /// Largest error of restored times: `exact` or as `±10ms`. Default: rows are numbered.
-    #[arg(long, value_name = "exact|±10ms", allow_hyphen_values = true)]
-    pub(crate) time: Option<String>,
-    /// Column of times: seconds, or UTC as 2026-01-31T12:00:00.5Z. Default: the first column if `--time` is given.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) time_column: Option<String>,
-    /// Columns of values, separated by commas; a name with commas in double quotes. Default: all.
-    #[arg(long, value_name = "NAMES")]
-    pub(crate) columns: Vec<String>,
-    /// Character between cells.
-    #[arg(long, default_value_t = ',', value_name = "CHARACTER")]
-    pub(crate) delimiter: char,
-}
-
-/// Error bounds of the columns.
-#[derive(Args, Clone)]
-pub(crate) struct BoundOptions {
-    /// Bounds as `column=bound,...`, `*` for all others: `±0.1`, `1%` of the range, `decimals:3`, `lossless`; a circle as `±2@360`.
-    /// A bound without a column stands first. Numbers have a point. Columns without a bound are lossless.
-    #[arg(long, value_name = "BOUNDS", allow_hyphen_values = true, default_value = "")]
-    pub(crate) bound: String,
-    /// Number of rows per block. A damaged block loses its rows only.
-    #[arg(long, default_value_t = fewbits_record::ROWS_PER_BLOCK, value_name = "ROWS")]
-    pub(crate) rows_per_block: usize,
+#[derive(Args)]
+pub(crate) struct LookOptions {
+    #[command(flatten)]
+    pub(crate) table: TableOptions,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print only the dialect, as TOML for `--dialect`.
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) toml: bool,
 }
 
 #[derive(Args)]
@@ -90,13 +74,15 @@ pub(crate) struct PlanOptions {
     pub(crate) plot: Option<PathBuf>,
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct PackOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
     #[command(flatten)]
+    pub(crate) many: ManyOptions,
+    #[command(flatten)]
     pub(crate) bounds: BoundOptions,
-    /// File of the recording. Default: standard output.
+    /// File of the recording, or folder of the recordings of several files. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// Encode about ten times as fast, with 1.03 to 1.09 times the bits. Columns are then not predicted from each other.
@@ -152,12 +138,14 @@ pub(crate) struct InfoOptions {
     pub(crate) json: bool,
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct VerifyOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
-    /// The recording that was made of the table.
+    /// The recording that was made of the table. Behind several tables: the folder of their recordings.
     pub(crate) packed: PathBuf,
+    #[command(flatten)]
+    pub(crate) many: ManyOptions,
     /// Print JSON instead of text.
     #[arg(long)]
     pub(crate) json: bool,
@@ -266,10 +254,12 @@ pub(crate) enum Model {
     Ranges,
 }
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct TrackOptions {
     #[command(flatten)]
     pub(crate) table: TableOptions,
+    #[command(flatten)]
+    pub(crate) many: ManyOptions,
     /// Dynamics model of the state.
     #[arg(long, value_enum, default_value = "walk")]
     pub(crate) model: Model,
@@ -292,14 +282,23 @@ pub(crate) struct TrackOptions {
     /// of that on.
     #[arg(long, default_value = "", value_name = "DEVIATION")]
     pub(crate) noise: String,
-    /// Standard deviation of the level from its forecast after a time, as `0.5/1h`. Default: estimated from the first 200 rows. The
-    /// process noise is adapted during the run in either case.
+    /// Standard deviation of the level from its forecast after a time, as `0.5/1h`. Default: estimated from the first 200 rows.
     #[arg(long, value_name = "SIZE/TIME")]
     pub(crate) change: Option<String>,
     /// Mean and standard deviation of the level before the first row, as `20±5`. Default: estimated from the first 200 rows.
     #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
     pub(crate) prior: Option<String>,
-    /// Subtract from each sensor its mean difference from the median of all sensors over this many first rows. Default: no correction.
+    /// Whether the change is adapted during the run. Default: off if `--change` states it, otherwise on.
+    #[arg(long, value_enum, value_name = "on|off")]
+    pub(crate) learning: Option<Switch>,
+    /// With `--model velocity` and `acceleration`: mean and standard deviation of the slope per second before the first row, as `0±3`.
+    /// Default: 0, and ten times the change.
+    #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
+    pub(crate) slope: Option<String>,
+    /// The level is an angle with this period, as 360: values that differ by whole periods are equal.
+    #[arg(long, value_name = "PERIOD")]
+    pub(crate) period: Option<f64>,
+    /// Subtract from each sensor its offset, found from this many first rows. The median of all offsets is zero. Default: no correction.
     #[arg(long, value_name = "ROWS")]
     pub(crate) align: Option<usize>,
     /// With `--model ranges`: CSV file of the anchors with columns name, x, y.
@@ -324,6 +323,13 @@ pub(crate) struct TrackOptions {
     /// File of the estimates. Default: standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+}
+
+/// On or off.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Switch {
+    On,
+    Off,
 }
 
 /// Kind of the output.

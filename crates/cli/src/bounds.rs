@@ -6,6 +6,12 @@ use fewbits_record::Column;
 
 pub(crate) use fewbits_recipes::bounds::{Spec, shown, summary};
 
+/// The bound of columns that keep every bit.
+pub(crate) const LOSSLESS: Spec = Spec {
+    bound: fewbits_record::Bound::Lossless,
+    period: None,
+};
+
 /// Values of an option per column.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PerColumn<T>(bounds::PerColumn<T>);

@@ -1,45 +1,62 @@
 //! `fewbits design`: quantizers of few bits for one unknown that several sensors measure.
 
 use crate::Ending;
-use crate::arguments::TableOptions;
+use crate::arguments::{DialectOptions, TableOptions};
 use crate::design_options::{Criterion, DesignOptions, Form};
 use crate::error::Error;
 use crate::input::Table;
-use crate::numbers::mean_and_deviation;
 use crate::output;
 use crate::plot::{Layer, Picture};
 use crate::say::say;
-use fewbits_core::Link;
-
 use fewbits_quantizer_design::solve::Rounded;
-use fewbits_quantizer_design::{
-    Adc, AllowedCells, BitBudget, Noise, ObservationModel, Prior, Progress, Request, Solution,
-};
+use fewbits_quantizer_design::{AllowedCells, Prior, Progress, Solution};
+use fewbits_recipes::{self as recipe, design};
 use fewbits_record::TimeBase;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
 use std::time::Duration;
 
-const PRIOR: &str =
-    "`20±4`, `uniform:0..40`, or `discrete:0,10` (values, each with `@` and its probability, or with equal ones)";
-const BITS: &str = "`3`, one number per sensor as `3,1`, or `total:8`";
-const ADC: &str = "bits and range, as `12:0..40`";
-const PROBABILITY: &str = "one probability for all sensors, or one per sensor";
+/// The option of a setting.
+fn option(error: recipe::Error) -> Error {
+    let names = [
+        ("prior", "--prior"),
+        ("bits", "--bits"),
+        ("adc", "--adc"),
+        ("loss", "--loss"),
+        ("flips", "--flips"),
+        ("erasures", "--erasures"),
+    ];
+    match error {
+        recipe::Error::Setting {
+            setting,
+            value,
+            expected,
+        } => {
+            let name = names.iter().find(|(known, _)| *known == setting);
+            Error::option(name.map_or(setting, |(_, name)| name), &value, expected)
+        }
+        recipe::Error::Refused { what, source } => Error::Refused { what, source },
+        error => Error::refused("the design")(error),
+    }
+}
 
 /// Reads the sample of the unknown.
 fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     let mut table = Table::open(&TableOptions {
         file: file.to_owned(),
-        time: None,
-        time_column: None,
         columns: options.column.iter().cloned().collect(),
-        delimiter: options.delimiter,
+        dialect: DialectOptions {
+            delimiter: options.delimiter.clone(),
+            ..DialectOptions::default()
+        },
+        ..TableOptions::default()
     })?;
     if table.names.len() != 1 {
         let names = table.names.join(", ");
         let problem = format!("columns {names}: name the one of the sample with --column");
         return Err(Error::content(table.file(), problem));
     }
+    table.require_numbers()?;
     let mut values = Vec::new();
     while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
         values.extend(cells.into_iter().flatten().filter(|value| value.is_finite()));
@@ -47,7 +64,7 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     if values.is_empty() {
         return Err(Error::empty(table.file(), "numbers in the column of the sample"));
     }
-    let prior = Prior::sample(&values).map_err(Error::refused("the sample cannot be a prior"))?;
+    let prior = design::prior_of(&values).map_err(option)?;
     if let Some(fit) = prior.sample_fit() {
         say!(
             "sample of {}: mean {:.6} ({:.2e}), deviation {:.6} ({:.2e}; standard errors)",
@@ -61,93 +78,26 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
     Ok(prior)
 }
 
-/// Parses an interval: two numbers with `..` between them.
-fn interval(option: &'static str, whole: &str, text: &str, expected: &'static str) -> Result<(f64, f64), Error> {
-    let ends = text
-        .split_once("..")
-        .and_then(|(low, high)| Some((low.trim().parse().ok()?, high.trim().parse().ok()?)));
-    ends.ok_or_else(|| Error::option(option, whole, expected))
-}
-
-fn prior(text: &str) -> Result<Prior, Error> {
-    let refused = || Error::option("--prior", text, PRIOR);
-    let prior = if let Some(ends) = text.strip_prefix("uniform:") {
-        let (low, high) = interval("--prior", text, ends, PRIOR)?;
-        Prior::uniform(low, high)
-    } else if let Some(values) = text.strip_prefix("discrete:") {
-        let count = values.split(',').count() as f64;
-        let parse = |part: &str| {
-            let (value, probability) = part.split_once('@').unwrap_or((part, ""));
-            let probability = match probability {
-                "" => 1.0 / count,
-                text => text.trim().parse().ok()?,
-            };
-            Some((value.trim().parse::<f64>().ok()?, probability))
-        };
-        let pairs: Option<Vec<(f64, f64)>> = values.split(',').map(parse).collect();
-        let (values, probabilities) = pairs.ok_or_else(refused)?.into_iter().unzip();
-        Prior::discrete(values, probabilities)
-    } else if text.contains('±') || text.contains("+-") {
-        let (mean, deviation) = mean_and_deviation("--prior", text)?;
-        Prior::normal(mean, deviation)
-    } else {
-        return Err(refused());
-    };
-    prior.map_err(Error::refused("--prior"))
-}
-
-fn bits(text: &str) -> Result<BitBudget, Error> {
-    let refused = || Error::option("--bits", text, BITS);
-    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| refused());
-    Ok(match text.strip_prefix("total:") {
-        Some(total) => BitBudget::Total(number(total)?),
-        None if text.contains(',') => BitBudget::PerSensor(text.split(',').map(number).collect::<Result<_, _>>()?),
-        None => BitBudget::Each(number(text)?),
-    })
-}
-
-/// The model of each sensor's link.
-fn links(options: &DesignOptions) -> Result<Vec<Link>, Error> {
-    let sensors = options.noise.len();
-    let of = |option: &'static str, all: &[f64], sensor: usize| match all {
-        [] => Ok(0.0),
-        [one] => Ok(*one),
-        all if all.len() == sensors => Ok(all[sensor]),
-        all => Err(Error::option(option, &format!("{} numbers", all.len()), PROBABILITY)),
-    };
-    let link = |sensor: usize| {
-        let (loss, flips) = (of("--loss", &options.loss, sensor)?, of("--flips", &options.flips, sensor)?);
-        let erasures = of("--erasures", &options.erasures, sensor)?;
-        let link = Link::new(loss, flips).and_then(|link| link.with_erasure(erasures));
-        link.map_err(Error::refused("--loss, --flips and --erasures make no link"))
-    };
-    (0..sensors).map(link).collect()
-}
-
-fn adc(text: &str) -> Result<Adc, Error> {
-    let refused = || Error::option("--adc", text, ADC);
-    let (bits, range) = text.split_once(':').ok_or_else(refused)?;
-    let (low, high) = interval("--adc", text, range, ADC)?;
-    Adc::new(bits.trim().parse().map_err(|_| refused())?, low..=high).map_err(Error::refused("--adc"))
-}
-
 /// Searches for the design, with a progress bar on a terminal.
-fn solve(options: &DesignOptions, model: ObservationModel) -> Result<Solution, Error> {
-    let failed = Error::refused("no design");
-    let link = Link::PERFECT;
-    let bits = bits(&options.bits)?;
-    let mut request = match options.criterion {
-        Criterion::Decision => Request::detection(model, bits, link).map_err(&failed)?,
-        Criterion::Error => Request::estimation(model, bits, link),
-        Criterion::Information => Request::estimation(model, bits, link).by_information(),
+fn solve(options: &DesignOptions, prior: Prior) -> Result<Solution, Error> {
+    let links = design::links(options.noise.len(), &options.loss, &options.flips, &options.erasures);
+    let task = design::Task {
+        prior,
+        deviations: options.noise.clone(),
+        correlation: options.correlation,
+        bits: design::bits(&options.bits).map_err(option)?,
+        links: links.map_err(option)?,
+        criterion: match options.criterion {
+            Criterion::Error => design::Criterion::Error,
+            Criterion::Information => design::Criterion::Information,
+            Criterion::Decision => design::Criterion::Decision,
+        },
+        cells: match options.folded {
+            true => AllowedCells::Any,
+            false => AllowedCells::Intervals,
+        },
+        time_limit: options.time_limit,
     };
-    request = request.with_links(links(options)?).map_err(&failed)?;
-    if options.folded {
-        request = request.with_cells(AllowedCells::Any);
-    }
-    if let Some(limit) = options.time_limit {
-        request = request.with_time_limit(limit);
-    }
     // The bar hides itself if standard error is not a terminal.
     let bar = ProgressBar::new(1);
     let style = ProgressStyle::with_template("{bar:30} {msg} {elapsed}");
@@ -158,7 +108,7 @@ fn solve(options: &DesignOptions, model: ObservationModel) -> Result<Solution, E
         bar.set_position(progress.done as u64);
         bar.set_message(format!("{:?}", progress.stage));
     };
-    let solutions = request.with_progress(&mut show).run().map_err(&failed)?;
+    let solutions = task.search(&mut show).map_err(option)?;
     bar.finish_and_clear();
     if solutions.is_cut_short {
         say!("--time-limit ended the search: this is the best design so far");
@@ -170,7 +120,7 @@ fn solve(options: &DesignOptions, model: ObservationModel) -> Result<Solution, E
 pub(crate) fn run(options: &DesignOptions) -> Result<Ending, Error> {
     let prior = match (&options.file, &options.prior) {
         (Some(file), _) => sample(options, file)?,
-        (None, Some(text)) => prior(text)?,
+        (None, Some(text)) => design::prior(text).map_err(option)?,
         (None, None) => {
             return Err(Error::Needed {
                 option: "a FILE or --prior",
@@ -178,15 +128,8 @@ pub(crate) fn run(options: &DesignOptions) -> Result<Ending, Error> {
             });
         }
     };
-    let noise = if options.correlation == 0.0 {
-        Noise::independent_with_deviations(&options.noise)
-    } else {
-        Noise::equicorrelated_with_deviations(&options.noise, options.correlation)
-    };
-    let model = ObservationModel::new(prior, noise.map_err(Error::refused("--noise and --correlation"))?);
-    let model = model.map_err(Error::refused("prior and noise do not go together"))?;
-    let adc = options.adc.as_deref().map(adc).transpose()?;
-    let solution = solve(options, model)?;
+    let adc = options.adc.as_deref().map(design::adc).transpose().map_err(option)?;
+    let solution = solve(options, prior)?;
     let rounded = adc
         .map(|adc| solution.rounded(&vec![adc; solution.sensors().len()]))
         .transpose()

@@ -33,9 +33,9 @@ pub(crate) struct DesignOptions {
     /// Column of the sample. Default: the only one.
     #[arg(long, value_name = "NAME")]
     pub(crate) column: Option<String>,
-    /// Character between cells.
-    #[arg(long, default_value_t = ',', value_name = "CHARACTER")]
-    pub(crate) delimiter: char,
+    /// What separates cells of the sample's table: a character, `tab` or `spaces`. Default: detected.
+    #[arg(long, value_name = "MARK")]
+    pub(crate) delimiter: Option<String>,
     /// Prior of the unknown: `20±4` (normal), `uniform:0..40`, `discrete:0,10` or `discrete:0@0.9,10@0.1`.
     #[arg(long, value_name = "PRIOR", allow_hyphen_values = true)]
     pub(crate) prior: Option<String>,

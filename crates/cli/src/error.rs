@@ -61,15 +61,12 @@ pub(crate) enum Error {
         column: String,
         existing: String,
     },
-    /// A cell is not a number.
-    #[error("{file}: row {row}, column `{column}`: `{cell}` {problem}: {mend}")]
-    Cell {
+    /// A table was refused by what reads it.
+    #[error("{file}")]
+    Refusal {
         file: String,
-        row: u64,
-        column: String,
-        cell: String,
-        problem: &'static str,
-        mend: &'static str,
+        #[source]
+        source: fewbits_table::Error,
     },
     /// The value of an option could not be parsed.
     #[error("{option}: `{value}` is not understood: expected {expected}")]
@@ -99,6 +96,13 @@ pub(crate) enum Error {
     /// An output is an input, or another output.
     #[error("{output}: this is the same file as {other}: name another output")]
     SameFile { output: String, other: String },
+    /// Two of several files would be written to the same place.
+    #[error("{output}: both {first} and {second} would be written there: give them other names, or pack them in turn")]
+    SameOutput {
+        output: String,
+        first: String,
+        second: String,
+    },
     /// A recipe was refused.
     #[error("{file}")]
     Recipe {
@@ -180,6 +184,14 @@ impl Error {
                 file: file.clone(),
                 source,
             },
+        }
+    }
+
+    pub(crate) fn of_table(file: &str) -> impl Fn(fewbits_table::Error) -> Self + use<> {
+        let file = file.to_owned();
+        move |source| Self::Refusal {
+            file: file.clone(),
+            source,
         }
     }
 

@@ -5,7 +5,7 @@
 
 use crate::arguments::{ReceiveOptions, TableOptions, Task, TrackOptions};
 use crate::error::Error;
-use crate::target;
+use crate::{many, target};
 use fewbits_recipes::names;
 use std::fs::{File, Metadata};
 use std::path::{Path, PathBuf};
@@ -23,8 +23,8 @@ struct Files {
 }
 
 /// What distinguishes a file from all others.
-#[derive(Debug, PartialEq, Eq)]
-enum Identity {
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) enum Identity {
     #[cfg(unix)]
     Number(u64, u64),
     #[cfg(not(unix))]
@@ -38,13 +38,14 @@ fn number(found: &Metadata) -> Option<Identity> {
     found.is_file().then(|| Identity::Number(found.dev(), found.ino()))
 }
 
+/// The identity of a file that exists; `None` for pipes and devices.
 #[cfg(unix)]
-fn identity(path: &Path) -> Option<Identity> {
+pub(crate) fn identity(path: &Path) -> Option<Identity> {
     number(&std::fs::metadata(path).ok()?)
 }
 
 #[cfg(not(unix))]
-fn identity(path: &Path) -> Option<Identity> {
+pub(crate) fn identity(path: &Path) -> Option<Identity> {
     std::fs::metadata(path).ok().filter(Metadata::is_file)?;
     path.canonicalize().ok().map(Identity::Path)
 }
@@ -68,6 +69,18 @@ fn standard(is_input: bool) -> Option<Identity> {
 #[cfg(not(unix))]
 fn standard(_is_input: bool) -> Option<Identity> {
     None
+}
+
+/// Whether an open file is the one that stands at `path` now.
+#[cfg(unix)]
+pub(crate) fn is_at(file: &File, path: &Path) -> bool {
+    file.metadata().is_ok_and(|found| number(&found) == identity(path))
+}
+
+/// Whether an open file is the one that stands at `path` now. Here an open file cannot be replaced.
+#[cfg(not(unix))]
+pub(crate) fn is_at(_file: &File, _path: &Path) -> bool {
+    true
 }
 
 /// Whether a file can be read twice: neither standard input nor a pipe nor a device.
@@ -106,6 +119,7 @@ impl Files {
 
     fn of(task: &Task) -> Self {
         match task {
+            Task::Look(options) => Self::reading(&options.table.file).writing([&None]),
             Task::Plan(options) => Self::reading(&options.table.file).writing([&None, &options.plot]),
             Task::Pack(options) => Self::reading(&options.table.file).writing([&options.output]),
             Task::Unpack(options) => Self::reading(&options.file).writing([&options.output]),
@@ -203,6 +217,7 @@ fn table(task: &mut Task) -> Option<&mut TableOptions> {
         Task::Plan(options) => Some(&mut options.table),
         Task::Pack(options) => Some(&mut options.table),
         Task::Verify(options) => Some(&mut options.table),
+        Task::Look(options) => Some(&mut options.table),
         Task::Bench(options) => Some(&mut options.table),
         Task::Track(TrackOptions { table, .. }) => Some(table),
         Task::Send(options) => Some(&mut options.table),
@@ -217,6 +232,10 @@ pub(crate) fn prepare(task: &mut Task) -> Result<(), Error> {
     }
     if let Task::Cat(options) = task {
         split(&mut options.columns, "--columns")?;
+    }
+    // Several files are compared when their names are known.
+    if many::are_several(task) {
+        return Ok(());
     }
     let files = Files::of(task);
     files.check()?;

@@ -1,10 +1,12 @@
-//! Tables: CSV from a file or standard input, Parquet from a file, row by row.
+//! Tables of the crate `table` for the tasks: files and standard input, times as ticks, cells as doubles.
 
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
-use crate::numbers::widened;
+use crate::files::is_regular;
+use crate::say::say;
 use fewbits_record::{TimeBase, TimeFormat};
+use fewbits_table::{Batch, Kind, Scale, Time, names};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
 use std::io::{IsTerminal, Read, Seek};
@@ -15,96 +17,25 @@ pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
 /// A column of cells for each name.
 pub(crate) type Cells = Vec<Vec<Option<f64>>>;
 
-/// Cells that mean a missing sample.
-const GAPS: [&str; 8] = ["", "NA", "N/A", "n/a", "null", "NULL", "None", "?"];
-/// Names of a first column that is taken as time.
-const TIME_NAMES: [&str; 6] = ["time", "timestamp", "datetime", "date", "seconds", "t"];
-/// Integers up to this size are exact doubles.
-const MAX_WHOLE: u64 = 1 << 53;
-
-/// Source of a table.
-enum Source {
-    Csv(Box<csv::Reader<Box<dyn Read + Send>>>),
-    #[cfg(feature = "parquet")]
-    Parquet(Box<crate::parquet::Rows>),
-}
-
-/// The first bytes of a Parquet file.
+/// Rows of a file that are read at once. Of anything else, one: a live row waits for no other.
+const ROWS: usize = 512;
+/// The first bytes of a Parquet file, and of a recording.
 const PARQUET: [u8; 4] = *b"PAR1";
-
-/// Whether a file is a Parquet file. The position is set back to the beginning.
-fn is_parquet(file: &mut File) -> std::io::Result<bool> {
-    let mut first = Vec::new();
-    // A pipe cannot be rewound, and Parquet needs random access.
-    if !file.metadata()?.is_file() {
-        return Ok(false);
-    }
-    file.by_ref().take(PARQUET.len() as u64).read_to_end(&mut first)?;
-    file.rewind()?;
-    Ok(first == PARQUET)
-}
-
-impl Source {
-    /// The table and the names of its columns.
-    fn open(options: &TableOptions, file: &str) -> Result<(Self, Vec<String>), Error> {
-        let source: Box<dyn Read + Send> = if options.file == "-" {
-            Box::new(std::io::stdin())
-        } else {
-            let mut opened = File::open(file).map_err(Error::io(file, "open"))?;
-            if is_parquet(&mut opened).map_err(Error::io(file, "read"))? {
-                #[cfg(feature = "parquet")]
-                {
-                    let mut rows = crate::parquet::Rows::open(opened, file)?;
-                    let names = std::mem::take(&mut rows.names);
-                    return Ok((Self::Parquet(Box::new(rows)), names));
-                }
-                #[cfg(not(feature = "parquet"))]
-                return Err(Error::NoParquet { file: file.to_owned() });
-            }
-            let bar = progress(opened.metadata().ok().map(|data| data.len()));
-            Box::new(bar.wrap_read(opened))
-        };
-        let delimiter = options.delimiter;
-        let delimiter = u8::try_from(delimiter)
-            .map_err(|_| Error::option("--delimiter", &delimiter.to_string(), "one character of ASCII"))?;
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(delimiter)
-            .trim(csv::Trim::All)
-            .from_reader(source);
-        let names = reader
-            .headers()
-            .map_err(Error::table(file))?
-            .iter()
-            .map(str::to_owned)
-            .collect();
-        Ok((Self::Csv(Box::new(reader)), names))
-    }
-
-    /// Reads the next row. Returns whether there was one.
-    fn read(&mut self, record: &mut csv::StringRecord, file: &str) -> Result<bool, Error> {
-        match self {
-            Self::Csv(reader) => reader.read_record(record).map_err(Error::table(file)),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(rows) => rows.read(record),
-        }
-    }
-}
+const RECORDING: [u8; 4] = *b"\x8bfew";
 
 /// An open table.
 pub(crate) struct Table {
     file: String,
-    source: Source,
-    record: csv::StringRecord,
-    /// Indices of the column of times and of the columns of values.
-    time_column: Option<usize>,
-    columns: Vec<usize>,
-    /// Index of the column of sensor names.
-    label_column: Option<usize>,
+    table: fewbits_table::Table,
+    batch: Batch,
+    /// The next row of the batch.
+    next: usize,
+    limit: usize,
+    is_long: bool,
+    /// Whether what was left out has been said.
+    is_told: bool,
+    row: u64,
     pub(crate) names: Vec<String>,
-    all_names: Vec<String>,
-    rows: u64,
-    /// Whether the first row was read ahead.
-    peeked: bool,
 }
 
 /// Results of reading a whole table once.
@@ -113,6 +44,8 @@ pub(crate) struct Survey {
     pub(crate) ends: Vec<Option<(f64, f64)>>,
     /// Largest number of decimals of a time.
     pub(crate) decimals: u8,
+    /// Whether there are no rows.
+    is_empty: bool,
 }
 
 /// A progress bar that counts bytes; visible only on a terminal.
@@ -126,46 +59,113 @@ pub(crate) fn progress(bytes: Option<u64>) -> ProgressBar {
     }
 }
 
-/// Index of a column.
-fn position(names: &[String], name: &str, file: &str) -> Result<usize, Error> {
-    let found = names.iter().position(|known| known == name);
-    found.ok_or_else(|| Error::no_column(file, name, names))
+/// The table of a file or of standard input, all columns selected and without a time.
+fn opened(options: &TableOptions, file: &str) -> Result<fewbits_table::Table, Error> {
+    let said = options.dialect.said()?;
+    // The time is chosen later: some tasks have none.
+    let said = fewbits_table::Dialect {
+        time_column: Vec::new(),
+        ..said
+    };
+    if options.file == "-" {
+        return fewbits_table::Table::open(std::io::stdin(), &said).map_err(Error::of_table(file));
+    }
+    let mut source = File::open(file).map_err(Error::io(file, "open"))?;
+    if source.metadata().map_err(Error::io(file, "read"))?.is_file() {
+        let mut first = Vec::new();
+        let begin = source
+            .by_ref()
+            .take(4)
+            .read_to_end(&mut first)
+            .and_then(|_| source.rewind());
+        begin.map_err(Error::io(file, "read"))?;
+        if first == PARQUET {
+            #[cfg(feature = "parquet")]
+            return fewbits_table::Table::open_parquet(source, &said).map_err(Error::of_table(file));
+            #[cfg(not(feature = "parquet"))]
+            return Err(Error::NoParquet { file: file.to_owned() });
+        }
+        if first == RECORDING {
+            return Err(Error::content(file, "this is a recording, not a table: fewbits unpack makes a table of it"));
+        }
+    }
+    let bar = progress(source.metadata().ok().map(|data| data.len()));
+    fewbits_table::Table::open(bar.wrap_read(source), &said).map_err(Error::of_table(file))
+}
+
+/// The name of the table in messages.
+fn name_of(options: &TableOptions) -> &str {
+    match options.file.as_str() {
+        "-" => "standard input",
+        name => name,
+    }
+}
+
+/// A table with the time and the columns that the options choose.
+fn chosen(options: &TableOptions) -> Result<fewbits_table::Table, Error> {
+    let file = name_of(options);
+    let mut table = opened(options, file)?;
+    let failed = Error::of_table(file);
+    let stored = options.dialect.said()?.time_column;
+    match (&options.time_column, &options.time) {
+        (Some(list), _) => table.set_time(&time_columns(&table, list)).map_err(&failed)?,
+        (None, Some(_)) if !stored.is_empty() => table.set_time(&stored).map_err(&failed)?,
+        (None, Some(_)) => {
+            if !table.find_time().map_err(&failed)? {
+                let first = table.columns().first().map(|column| column.name.clone());
+                table
+                    .set_time(&first.into_iter().collect::<Vec<_>>())
+                    .map_err(&failed)?;
+            }
+        }
+        (None, None) => {}
+    }
+    if let Some(text) = &options.time {
+        table.allow_inexact_times(clock::tolerance(text)?);
+    }
+    if !options.columns.is_empty() {
+        table.select(&options.columns).map_err(&failed)?;
+    }
+    table.leave_out(&options.without()).map_err(&failed)?;
+    Ok(table)
+}
+
+/// The names of columns of the time: one that exists, or a list.
+fn time_columns(table: &fewbits_table::Table, list: &str) -> Vec<String> {
+    match table.position(list) {
+        Ok(_) => vec![list.to_owned()],
+        Err(_) => names::split(list),
+    }
 }
 
 impl Table {
-    /// Opens the table and reads the names.
+    /// Opens the table and reads the names. A file whose columns are not all plain numbers is read once to learn what they are.
     pub(crate) fn open(options: &TableOptions) -> Result<Self, Error> {
-        let file = match options.file.as_str() {
-            "-" => "standard input",
-            name => name,
-        };
-        let (source, names) = Source::open(options, file)?;
-        if names.is_empty() {
-            return Err(Error::empty(file, "columns"));
+        let mut table = chosen(options)?;
+        let is_file = is_regular(&options.file);
+        if is_file && !table.is_plain() {
+            let survey = chosen(options)?.survey().map_err(Error::of_table(name_of(options)))?;
+            table.use_survey(&survey);
         }
-        let position = |name: &String| position(&names, name, file);
-        let time_column = match (&options.time_column, &options.time) {
-            (Some(name), _) => Some(position(name)?),
-            (None, Some(_)) => Some(0),
-            (None, None) => None,
+        let mut open = Self {
+            names: Vec::new(),
+            file: name_of(options).to_owned(),
+            table,
+            batch: Batch::default(),
+            next: 0,
+            limit: if is_file { ROWS } else { 1 },
+            is_long: false,
+            is_told: false,
+            row: 0,
         };
-        let columns: Vec<usize> = if options.columns.is_empty() {
-            (0..names.len()).filter(|i| Some(*i) != time_column).collect()
-        } else {
-            options.columns.iter().map(position).collect::<Result<_, _>>()?
-        };
-        Ok(Self {
-            names: columns.iter().map(|i| names[*i].clone()).collect(),
-            all_names: names,
-            file: file.to_owned(),
-            source,
-            record: csv::StringRecord::new(),
-            time_column,
-            columns,
-            label_column: None,
-            rows: 0,
-            peeked: false,
-        })
+        open.rename();
+        Ok(open)
+    }
+
+    /// Takes the names of the selected columns.
+    fn rename(&mut self) {
+        let columns = self.table.columns();
+        self.names = self.table.selected().iter().map(|i| columns[*i].name.clone()).collect();
     }
 
     /// The name of the table in messages.
@@ -175,84 +175,205 @@ impl Table {
 
     /// Number of the last row read, counted from 1 after the line of names.
     pub(crate) fn row(&self) -> u64 {
-        self.rows
+        self.row
     }
 
-    /// Uses a first column whose name says that it is a time as the column of times, unless the user named one.
-    pub(crate) fn find_time(&mut self) {
-        let first = self.all_names[0].to_lowercase();
-        if self.time_column.is_none() && TIME_NAMES.contains(&first.as_str()) {
-            self.time_column = Some(0);
-            self.without(0);
+    /// Uses the columns whose cells or names say that they are times, unless the user named some.
+    pub(crate) fn find_time(&mut self, nanoseconds: u64) -> Result<(), Error> {
+        if self.table.time().is_none() {
+            self.table.find_certain_time().map_err(Error::of_table(&self.file))?;
+            self.table.allow_inexact_times(nanoseconds);
+            self.rename();
         }
+        Ok(())
     }
 
-    /// Takes these columns of values and this column of times, by their indices among all columns.
-    pub(crate) fn choose(&mut self, time: Option<usize>, columns: Vec<usize>) {
-        self.names = columns.iter().map(|i| self.all_names[*i].clone()).collect();
-        (self.time_column, self.columns) = (time, columns);
+    /// Takes these columns of values, by their indices among all columns, and the time from the columns of this list, from where the table
+    /// has it, or from a column that is left over.
+    pub(crate) fn choose(
+        &mut self,
+        list: Option<&str>,
+        left_over: Option<usize>,
+        columns: &[usize],
+        base: TimeBase,
+    ) -> Result<(), Error> {
+        let failed = Error::of_table(&self.file);
+        let all: Vec<String> = self.table.columns().iter().map(|column| column.name.clone()).collect();
+        if let TimeBase::Clock {
+            decimals, tolerance, ..
+        } = base
+        {
+            let is_free = |table: &fewbits_table::Table| {
+                table
+                    .time()
+                    .is_some_and(|(found, _)| !found.iter().any(|column| columns.contains(column)))
+            };
+            if let Some(list) = list {
+                let names = time_columns(&self.table, list);
+                self.table.set_time(&names).map_err(&failed)?;
+            } else if !(self.table.find_time().map_err(&failed)? && is_free(&self.table)) {
+                let name: Vec<&String> = left_over.iter().map(|i| &all[*i]).collect();
+                self.table.set_time(&name).map_err(&failed)?;
+            }
+            let tick = 10_u64.pow(u32::from(clock::NANOSECONDS.saturating_sub(decimals)));
+            self.table.allow_inexact_times(tolerance.saturating_mul(tick));
+        }
+        let names: Vec<&String> = columns.iter().map(|i| &all[*i]).collect();
+        self.table.select(&names).map_err(&failed)?;
+        self.rename();
+        Ok(())
     }
 
     /// Reads a column as names instead of numbers: [`Table::label`].
     pub(crate) fn with_labels(mut self, name: &str) -> Result<Self, Error> {
-        let column = position(&self.all_names, name, &self.file)?;
-        self.label_column = Some(column);
-        self.without(column);
+        self.table.set_label(name).map_err(Error::of_table(&self.file))?;
+        self.is_long = true;
+        self.rename();
         Ok(self)
-    }
-
-    /// Excludes a column from the columns of numbers.
-    fn without(&mut self, column: usize) {
-        self.columns.retain(|other| *other != column);
-        self.names = self.columns.iter().map(|i| self.all_names[*i].clone()).collect();
     }
 
     /// The name in the last row read.
     pub(crate) fn label(&self) -> &str {
-        let column = self.label_column.and_then(|column| self.record.get(column));
-        column.unwrap_or_default()
+        self.table.label()
     }
 
-    fn read_record(&mut self) -> Result<bool, Error> {
-        if std::mem::take(&mut self.peeked) {
+    /// What the column at an index of `names` holds.
+    pub(crate) fn kind(&self, index: usize) -> Kind {
+        let column = self
+            .table
+            .selected()
+            .get(index)
+            .and_then(|column| self.table.columns().get(*column));
+        column.map_or(Kind::Number, |column| column.kind)
+    }
+
+    /// The unit of the column at an index of `names`, or the list of its words.
+    pub(crate) fn unit(&self, index: usize) -> String {
+        let Some(column) = self.table.selected().get(index) else {
+            return String::new();
+        };
+        match self.kind(index) {
+            Kind::Words => crate::words::unit(self.table.words(*column)),
+            Kind::Time => "s since 1970".to_owned(),
+            _ => self.table.columns()[*column].unit.clone(),
+        }
+    }
+
+    /// Refuses columns of words, for tasks that compute with cells.
+    pub(crate) fn require_numbers(&self) -> Result<(), Error> {
+        match (0..self.names.len()).find(|i| matches!(self.kind(*i), Kind::Words | Kind::Text)) {
+            None => Ok(()),
+            Some(i) => {
+                let problem = format!(
+                    "column `{}` holds words, and numbers are expected: choose columns with --columns, or name gaps with --missing",
+                    crate::say::name(&self.names[i])
+                );
+                Err(Error::content(&self.file, problem))
+            }
+        }
+    }
+
+    /// Whether there is no further row.
+    pub(crate) fn is_at_end(&mut self) -> Result<bool, Error> {
+        self.fill().map(|more| !more)
+    }
+
+    /// States the words of the columns of a recording, so that cells are the numbers that it has for them.
+    pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) {
+        let selected = self.table.selected().to_vec();
+        for (column, recorded) in selected.into_iter().zip(columns) {
+            if let Some(words) = crate::words::of(recorded.unit()) {
+                self.table.fix_words(column, words);
+            }
+        }
+    }
+
+    /// Loads rows if all were given out. Returns whether there are any.
+    fn fill(&mut self) -> Result<bool, Error> {
+        if self.next < self.batch.rows {
             return Ok(true);
         }
-        let more = self.source.read(&mut self.record, &self.file)?;
-        self.rows += u64::from(more);
-        Ok(more)
+        self.next = 0;
+        let limit = if self.is_long { 1 } else { self.limit };
+        let count = self
+            .table
+            .read(&mut self.batch, limit)
+            .map_err(Error::of_table(&self.file))?;
+        if count == 0 && !std::mem::replace(&mut self.is_told, true) {
+            self.tell();
+        }
+        Ok(count > 0)
     }
 
-    fn cell_error(&self, column: usize, (problem, mend): (&'static str, &'static str)) -> Error {
-        Error::Cell {
-            file: self.file.clone(),
-            row: self.rows,
-            column: self.all_names[column].clone(),
-            cell: self.record.get(column).unwrap_or_default().to_owned(),
-            problem,
-            mend,
+    /// Says what was left out.
+    fn tell(&self) {
+        let skipped = self.table.skipped();
+        if skipped.bad > 0 {
+            say!("{}: {} lines were left out", self.file, skipped.bad);
+            skipped.faults.iter().for_each(|fault| say!("  {fault}"));
+            if skipped.bad > skipped.faults.len() as u64 {
+                say!("  and {} more", skipped.bad - skipped.faults.len() as u64);
+            }
         }
+        if skipped.repeated > 0 {
+            say!(
+                "{}: {} lines that repeat the names or the lines around them were left out",
+                self.file,
+                skipped.repeated
+            );
+        }
+    }
+
+    fn time_error(&self, time: Time, (problem, mend): clock::Problem) -> Error {
+        let scale = self.table.time().map_or(Scale::Seconds, |(_, scale)| scale);
+        let column = self
+            .table
+            .time()
+            .map(|(columns, _)| self.table.columns()[columns[0]].name.clone());
+        Error::of_table(&self.file)(fewbits_table::Error::Cell {
+            place: self.batch.places[self.next],
+            column: column.unwrap_or_default(),
+            cell: time.shown(scale, time.decimals()),
+            problem,
+            mend: mend.to_owned(),
+        })
     }
 
     /// The time base for the times of the table, from its first row.
     pub(crate) fn time_base(&mut self, options: &TableOptions, survey: Option<&Survey>) -> Result<TimeBase, Error> {
-        let Some(column) = self.time_column else {
+        let Some((_, scale)) = self.table.time() else {
             return Ok(TimeBase::Numbered);
         };
-        if !self.read_record()? {
-            return Err(Error::empty(&self.file, "rows"));
-        }
-        self.peeked = true;
-        let first = self.record.get(column).unwrap_or_default();
-        let Some(format) = clock::format_of(first) else {
-            return Err(self.cell_error(column, clock::NO_TIME));
+        let format = match scale {
+            Scale::Utc => TimeFormat::Utc,
+            Scale::Local => TimeFormat::Local,
+            _ => TimeFormat::Seconds,
         };
         let nanoseconds = clock::tolerance(options.time.as_deref().unwrap_or("exact"))?;
+        let first = match survey {
+            Some(survey) if survey.is_empty => None,
+            _ => self.fill()?.then(|| self.batch.times.first().copied()).flatten(),
+        };
         let decimals = match (format, survey) {
             // Exact times: a tick is as fine as the finest time of the table.
             (TimeFormat::Seconds, Some(survey)) if nanoseconds == 0 => survey.decimals,
-            // Times in milliseconds or microseconds since 1970 are too large for nanoseconds.
-            (TimeFormat::Seconds, _) if first.parse::<f64>().is_ok_and(|first| first.abs() > 4e9) => 0,
+            // Units that timestamps of other programs have.
+            (_, Some(survey)) if nanoseconds == 0 => survey.decimals.next_multiple_of(3),
             _ => clock::NANOSECONDS,
+        };
+        // Ticks of 64 bits: the first time tells how fine they can be.
+        let fits = |decimals: &u8| {
+            first.is_none_or(|first| {
+                first
+                    .ticks(*decimals)
+                    .is_some_and(|(tick, _)| tick.abs() < i64::MAX / 4)
+            })
+        };
+        let is_exact = nanoseconds == 0 && survey.is_some();
+        let decimals = if is_exact {
+            decimals.min(18)
+        } else {
+            (0..=decimals).rev().find(fits).unwrap_or(0)
         };
         let scale = 10_u64.pow(u32::from(clock::NANOSECONDS.saturating_sub(decimals)));
         Ok(TimeBase::Clock {
@@ -265,22 +386,54 @@ impl Table {
 
     /// The next row; `None` after the last.
     pub(crate) fn next(&mut self, time: TimeBase) -> Result<Option<Row>, Error> {
-        if !self.read_record()? {
+        if !self.fill()? {
             return Ok(None);
         }
-        let tick = match self.time_column {
-            Some(column) => {
-                let text = self.record.get(column).unwrap_or_default();
-                Some(clock::tick(text, time).map_err(|problem| self.cell_error(column, problem))?)
-            }
-            None => None,
+        let row = self.next;
+        self.row = self.batch.places[row].row;
+        let tick = match (self.batch.times.get(row), time) {
+            (
+                Some(found),
+                TimeBase::Clock {
+                    decimals, tolerance, ..
+                },
+            ) => match found.ticks(decimals) {
+                None => return Err(self.time_error(*found, clock::TOO_LARGE)),
+                Some((_, false)) if tolerance == 0 => return Err(self.time_error(*found, clock::TOO_FINE)),
+                Some((tick, _)) => Some(tick),
+            },
+            _ => None,
         };
-        let cells = self
-            .columns
-            .iter()
-            .map(|column| self.cell(*column))
-            .collect::<Result<_, _>>()?;
+        let mut cells = Vec::with_capacity(self.batch.columns.len());
+        for (i, column) in self.batch.columns.iter().enumerate() {
+            if matches!(column, fewbits_table::Cells::Times(_)) && self.batch.times.is_empty() {
+                return Err(self.cell_error(i, String::new()));
+            }
+            cells.push(column.number(row).map_err(|cell| self.cell_error(i, cell))?);
+        }
+        self.next += 1;
         Ok(Some((tick, cells)))
+    }
+
+    fn cell_error(&self, index: usize, cell: String) -> Error {
+        let (problem, mend) = match self.kind(index) {
+            Kind::Time if self.batch.times.is_empty() => (
+                "is a time",
+                "if this is the time of the row, add --time exact; otherwise leave the column out with --without",
+            ),
+            Kind::Time => ("is a time, and its seconds are no double", "leave the column out with --without"),
+            _ => (
+                "is a whole number of more than 53 bits, which no double holds",
+                "split the column, or leave it out with --without",
+            ),
+        };
+        Error::of_table(&self.file)(fewbits_table::Error::Cell {
+            place: self.batch.places[self.next],
+            column: self.names[index].clone(),
+            cell,
+            problem,
+            mend: mend.to_owned(),
+        })
     }
 
     /// The next rows, at least one and at most `limit`: their ticks (or numbers), and a column of cells for each name.
@@ -300,53 +453,35 @@ impl Table {
         Ok((ticks, columns))
     }
 
-    fn cell(&self, column: usize) -> Result<Option<f64>, Error> {
-        let text = self.record.get(column).unwrap_or_default();
-        if GAPS.contains(&text) {
-            return Ok(None);
-        }
-        let Ok(value) = text.parse::<f64>() else {
-            let mend = if self.all_names.len() == 1 && text.contains([';', '\t', '|']) {
-                "name what separates cells with --delimiter"
-            } else if clock::format_of(text).is_some() {
-                "if this is the time of the row, add --time exact"
-            } else {
-                "mend the cell, leave it empty for a gap, or choose columns with --columns"
-            };
-            return Err(self.cell_error(column, ("is not a number", mend)));
-        };
-        let size = text.trim_start_matches(['-', '+']);
-        // Whole numbers of at most 15 digits are below 2^53, so they are exact doubles.
-        if size.len() > 15
-            && size.bytes().all(|byte| byte.is_ascii_digit())
-            && !size.parse::<u64>().is_ok_and(|whole| whole <= MAX_WHOLE)
-        {
-            return Err(self.cell_error(
-                column,
-                ("is a whole number of more than 53 bits", "split the column, or leave it out with --columns"),
-            ));
-        }
-        Ok(Some(value))
-    }
-
     /// Reads the whole table once.
     pub(crate) fn survey(options: &TableOptions) -> Result<Survey, Error> {
-        let mut table = Self::open(options)?;
-        let mut survey = Survey {
-            ends: vec![None; table.columns.len()],
-            decimals: 0,
-        };
-        while table.read_record()? {
-            for (i, column) in table.columns.iter().enumerate() {
-                if let Some(value) = table.cell(*column)?.filter(|value| value.is_finite()) {
-                    survey.ends[i] = widened(survey.ends[i], value);
-                }
-            }
-            if let Some(column) = table.time_column {
-                let text = table.record.get(column).unwrap_or_default();
-                survey.decimals = survey.decimals.max(clock::decimals_of(text).unwrap_or(0).min(18));
-            }
-        }
-        Ok(survey)
+        let table = chosen(options)?;
+        let selected = table.selected().to_vec();
+        let survey = table.survey().map_err(Error::of_table(name_of(options)))?;
+        Ok(Survey {
+            ends: selected.iter().map(|i| survey.columns[*i].range).collect(),
+            decimals: survey.times.decimals,
+            is_empty: survey.rows == 0,
+        })
     }
+}
+
+/// What `fewbits look` shows: columns with their kinds, the dialect, what times are measured from, and counts over all rows.
+pub(crate) fn look(
+    options: &TableOptions,
+) -> Result<(Vec<fewbits_table::Column>, fewbits_table::Dialect, Option<Scale>, fewbits_table::Survey), Error> {
+    let failed = Error::of_table(name_of(options));
+    let mut table = chosen(options)?;
+    if table.time().is_none() {
+        table.find_certain_time().map_err(&failed)?;
+    }
+    let (columns, dialect) = (table.columns().to_vec(), table.dialect().clone());
+    let scale = table.time().map(|(_, scale)| scale);
+    let survey = table.survey().map_err(&failed)?;
+    let with_kind = |(mut column, profile): (fewbits_table::Column, &fewbits_table::Profile)| {
+        column.kind = survey.kind(&column, profile);
+        column
+    };
+    let columns = columns.into_iter().zip(&survey.columns).map(with_kind).collect();
+    Ok((columns, dialect, scale, survey))
 }

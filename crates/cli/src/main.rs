@@ -18,6 +18,9 @@ mod input;
 mod interrupt;
 mod link;
 mod live;
+mod look;
+mod manifest;
+mod many;
 mod node;
 mod numbers;
 mod output;
@@ -34,10 +37,12 @@ mod say;
 mod send;
 mod sensor;
 mod serial;
+mod table_options;
 mod target;
 mod track;
 mod unpack;
 mod verify;
+mod words;
 
 use arguments::{Cli, Task};
 use clap::Parser;
@@ -52,6 +57,8 @@ pub(crate) enum Ending {
     Good,
     /// An error bound is violated, or a part could not be read.
     Failed,
+    /// Some of several files were refused, and each was named.
+    Refused,
 }
 
 impl Ending {
@@ -64,7 +71,12 @@ impl Ending {
 
 fn run(mut task: Task) -> Result<Ending, Error> {
     files::prepare(&mut task)?;
+    let are_several = many::are_several(&task);
     match task {
+        Task::Pack(options) if are_several => many::pack(&options),
+        Task::Track(options) if are_several => many::track(&options),
+        Task::Verify(options) if are_several => many::verify(&options),
+        Task::Look(options) => look::run(&options),
         Task::Plan(options) => plan::run(&options),
         Task::Pack(options) => pack::run(&options),
         Task::Unpack(options) => unpack::run(&options.whole()),
@@ -86,6 +98,7 @@ fn main() -> ExitCode {
     match run(Cli::parse().task) {
         Ok(Ending::Good) => ExitCode::SUCCESS,
         Ok(Ending::Failed) => ExitCode::FAILURE,
+        Ok(Ending::Refused) => ExitCode::from(2),
         // The reader of the output has closed the pipe: not an error.
         Err(error) if error.is_closed_pipe() => ExitCode::SUCCESS,
         Err(error) => {

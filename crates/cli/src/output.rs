@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::target::Target;
+use crate::words;
 use crate::{clock, say};
 use fewbits_record::{Schema, TimeBase};
 use std::io::{BufWriter, IsTerminal, Write};
@@ -18,11 +19,19 @@ pub(crate) fn text(path: Option<&Path>, text: &str) -> Result<(), Error> {
 
 /// Writes text for people to standard output.
 pub(crate) fn print(text: &str) -> Result<(), Error> {
+    if say::is_collected(text) {
+        return Ok(());
+    }
     self::text(None, &say::plain(text))
 }
 
 /// Writes one JSON value and a line end to standard output.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
+    // Of several files each has a line.
+    if say::is_collecting() {
+        say::is_collected(&serde_json::to_string(value)?);
+        return Ok(());
+    }
     text(None, &(serde_json::to_string_pretty(value)? + "\n"))
 }
 
@@ -157,6 +166,8 @@ pub(crate) enum Writer {
         sheet: Sheet,
         time: TimeBase,
         is_json: bool,
+        /// Words of the columns that have any.
+        words: Vec<Option<Vec<String>>>,
     },
     #[cfg(feature = "parquet")]
     Parquet(Box<crate::parquet::Sink>),
@@ -178,22 +189,37 @@ impl Writer {
             TimeBase::Numbered => is_json.then_some("row"),
             _ => Some("time"),
         };
+        let unit = |name: &String| schema.position(name).ok().map(|i| schema.columns()[i].unit());
+        let words = names.iter().map(|name| unit(name).and_then(words::of)).collect();
         let names = first.into_iter().map(str::to_owned).chain(names.iter().cloned());
         Ok(Self::Sheet {
             sheet: Sheet::new(path, shape, names.collect())?,
             time: schema.time(),
             is_json,
+            words,
         })
     }
 
     pub(crate) fn write(&mut self, tick: i64, values: &[Option<f64>]) -> Result<(), Error> {
         match self {
-            Self::Sheet { sheet, time, is_json } => {
+            Self::Sheet {
+                sheet,
+                time,
+                is_json,
+                words,
+            } => {
                 let first = match *time {
                     TimeBase::Numbered => is_json.then_some(Cell::Whole(tick)),
                     time => Some(Cell::Text(clock::shown(tick, time))),
                 };
-                let cells = values.iter().map(|value| Cell::Number(*value));
+                let cell = |(value, words): (&Option<f64>, &Option<Vec<String>>)| match (value, words) {
+                    (Some(index), Some(words)) if index.fract() == 0.0 && *index >= 0.0 => {
+                        let word = words.get(*index as usize).cloned();
+                        word.map_or(Cell::Number(*value), Cell::Text)
+                    }
+                    _ => Cell::Number(*value),
+                };
+                let cells = values.iter().zip(words.iter()).map(cell);
                 sheet.write(first.into_iter().chain(cells))
             }
             #[cfg(feature = "parquet")]

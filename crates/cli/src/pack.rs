@@ -10,11 +10,16 @@ use crate::say::say;
 use crate::target::{self, Target};
 use crate::{Ending, bounds};
 use fewbits_recipes::bounds::exact;
-use fewbits_record::{Bound, Effort, Playback, Recorder, Schema, TimeBase};
+use fewbits_record::{Bound, Column, Effort, Playback, Recorder, Schema, TimeBase};
+use fewbits_table::Kind;
 use serde::Serialize;
+use std::fs::File;
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
+
+/// Largest number of columns of a recording.
+const MAX_COLUMNS: usize = 4096;
 
 /// Summary of what was packed.
 #[derive(Serialize)]
@@ -31,7 +36,20 @@ struct Done {
 /// be read once only (a pipe) is read once.
 pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Table, Schema), Error> {
     let mut open = Table::open(table)?;
-    let specs = bounds::parse(&options.bound, &open.names, open.file())?;
+    if open.names.len() > MAX_COLUMNS {
+        let problem = format!(
+            "{} columns, and a recording has at most {MAX_COLUMNS}: pack some of them into each of several files with --columns",
+            open.names.len()
+        );
+        return Err(Error::content(open.file(), problem));
+    }
+    let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
+    for (i, spec) in specs.iter_mut().enumerate() {
+        // Between two words there is nothing.
+        if matches!(open.kind(i), Kind::Words | Kind::Boolean) {
+            *spec = bounds::LOSSLESS;
+        }
+    }
     let needs_range = specs.iter().any(|spec| matches!(spec.bound, Bound::ShareOfRange(_)));
     let has_time = table.time.is_some() || table.time_column.is_some();
     let survey: Option<Survey> = if is_regular(&table.file) && (needs_range || has_time) {
@@ -41,14 +59,40 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     };
     let unknown = vec![None; specs.len()];
     let ends = survey.as_ref().map_or(&unknown, |survey| &survey.ends);
-    let columns = bounds::columns(&open.names, &specs, ends, open.file())?;
+    let ends: Vec<_> = ends
+        .iter()
+        .zip(&specs)
+        .map(|(ends, spec)| ends.filter(|_| spec.bound != Bound::Lossless))
+        .collect();
+    let columns = bounds::columns(&open.names, &specs, &ends, open.file())?;
+    let columns: Result<Vec<_>, _> = columns
+        .into_iter()
+        .enumerate()
+        .map(|(i, column)| with_unit(&open, i, column))
+        .collect();
+    let columns = columns?;
     let time = open.time_base(table, survey.as_ref())?;
     let schema = Schema::new(columns, time).and_then(|schema| schema.with_rows_per_block(options.rows_per_block));
     let schema = schema.map_err(Error::recording(open.file()))?;
+    open.use_words(&schema.columns().iter().collect::<Vec<_>>());
     if needs_range && is_regular(&table.file) {
         warn_of_few(table, &schema)?;
     }
     Ok((open, schema))
+}
+
+/// The column with its unit, or with its words.
+fn with_unit(table: &Table, index: usize, column: Column) -> Result<Column, Error> {
+    let unit = table.unit(index);
+    if table.kind(index) == Kind::Words && unit.is_empty() {
+        let problem = format!(
+            "column `{}` has words, which must be known before the first row and together have 1024 bytes at most: give a file, not a \
+             pipe, or leave the column out with --without",
+            crate::say::name(column.name())
+        );
+        return Err(Error::content(table.file(), problem));
+    }
+    column.with_unit(unit).map_err(Error::recording(table.file()))
 }
 
 /// Warns if a bound is a share of a range that few cells make.
@@ -98,8 +142,9 @@ impl<W: Write> RowSink for Recording<W> {
             None => self.recorder.push_next(cells),
         };
         pushed.map_err(Error::recording(&self.file))?;
+        // Behind a block at most this row waits.
         self.waiting = if self.recorder.bytes() > before {
-            0
+            1
         } else {
             self.waiting + 1
         };
@@ -161,19 +206,16 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
     })
 }
 
-/// Continues a recording. A table that is refused leaves the recording as it was.
+/// Continues a recording. Of a file, the rows go into a copy, which then replaces the recording: a table that is refused, a kill and a full
+/// disk leave the recording as it was.
 fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, Option<Error>), Error> {
     let file = path.display().to_string();
     let schema = Playback::open(path).map_err(Error::recording(&file))?.schema().clone();
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {
-        let table = Table::open(&table_options)?;
-        if !schema
-            .columns()
-            .iter()
-            .map(fewbits_record::Column::name)
-            .eq(table.names.iter())
-        {
+        let mut table = Table::open(&table_options)?;
+        table.use_words(&schema.columns().iter().collect::<Vec<_>>());
+        if !schema.columns().iter().map(Column::name).eq(table.names.iter()) {
             let names = table.names.join(", ");
             let problem = format!("columns {names}: {file} has other columns, choose and order them with --columns");
             return Err(Error::content(table.file(), problem));
@@ -181,16 +223,32 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
         Ok(table)
     };
     let table = open()?;
-    if is_regular(&options.table.file) {
-        TableRows::new(open()?, schema.time()).check()?;
+    // A live table is appended as it comes: its rows cannot be read again.
+    if target::is_live() {
+        let recorder = Recorder::resume(path).map_err(Error::recording(&file))?;
+        return appended(table, recorder.with_effort(effort), options, &file);
     }
-    let recorder = Recorder::resume(path)
-        .map_err(Error::recording(&file))?
-        .with_effort(effort);
+    TableRows::new(open()?, schema.time()).check()?;
+    // Of two commands that append to one recording the second is refused, instead of losing the rows of the first.
+    let lock = target::lock(path)?;
+    let copy = Target::copy_of(path)?;
+    let recorder = Recorder::resume(copy.unfinished()).map_err(Error::recording(&file))?;
+    let done = appended(table, recorder.with_effort(effort), options, &file)?;
+    copy.finish()?;
+    drop(lock);
+    Ok(done)
+}
+
+fn appended(
+    table: Table,
+    recorder: Recorder<File>,
+    options: &PackOptions,
+    file: &str,
+) -> Result<(Done, Option<Error>), Error> {
     // The old index was removed and counts as written anew.
-    let before = recorder.bytes();
-    let (mut sink, rows, error) = fill(table, recorder, options, &file)?;
-    let bytes = size_of(&mut sink).map_err(Error::recording(&file))?;
+    let (schema, before) = (recorder.schema().clone(), recorder.bytes());
+    let (mut sink, rows, error) = fill(table, recorder, options, file)?;
+    let bytes = size_of(&mut sink).map_err(Error::recording(file))?;
     Ok((Done::of(rows, bytes.saturating_sub(before), &schema), error))
 }
 
@@ -236,7 +294,7 @@ impl Done {
     fn of(rows: u64, bytes: u64, schema: &Schema) -> Self {
         let columns = schema.columns();
         let samples = (rows * columns.len() as u64).max(1);
-        let bound = |column: &fewbits_record::Column| {
+        let bound = |column: &Column| {
             let bound = bounds::shown(column.bound(), column.period());
             (column.name().to_owned(), bound)
         };
@@ -250,7 +308,7 @@ impl Done {
     }
 }
 
-fn size_of(file: &mut std::fs::File) -> Result<u64, fewbits_record::Error> {
+fn size_of(file: &mut File) -> Result<u64, fewbits_record::Error> {
     let size = file.metadata().map(|data| data.len());
     size.map_err(|source| fewbits_record::Error::Io { action: "read", source })
 }

@@ -1,15 +1,14 @@
-//! Reading and writing of Parquet through Arrow record batches.
+//! Writing of Parquet through Arrow record batches.
 
 use crate::clock;
 use crate::error::Error;
 use crate::target::Target;
 use arrow_array::cast::AsArray;
-use arrow_array::{Array, ArrayRef, RecordBatch};
-use arrow_schema::Field;
-use fewbits_record::arrow::{cells, ticks};
+use arrow_array::types::Int64Type;
+use arrow_array::{ArrayRef, Float64Array, RecordBatch};
+use arrow_schema::{DataType, Field};
 use fewbits_record::{Block, Schema, TimeBase, TimeFormat};
 use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 use std::fs::File;
@@ -18,13 +17,6 @@ use std::sync::Arc;
 
 /// Number of rows per batch.
 const ROWS: usize = 1 << 14;
-/// Time base in which timestamps are converted to text.
-const NANOSECONDS: TimeBase = TimeBase::Clock {
-    decimals: 9,
-    tolerance: 0,
-    format: TimeFormat::Utc,
-};
-
 fn refused<E: std::error::Error + Send + Sync + 'static>(file: &str) -> impl Fn(E) -> Error + use<E> {
     let file = file.to_owned();
     move |source| Error::Parquet {
@@ -33,87 +25,52 @@ fn refused<E: std::error::Error + Send + Sync + 'static>(file: &str) -> impl Fn(
     }
 }
 
-/// Rows of a Parquet file as text, like those of a CSV file.
-pub(crate) struct Rows {
-    reader: ParquetRecordBatchReader,
-    /// Names of the columns.
-    pub(crate) names: Vec<String>,
-    /// Cells of the present batch, by column, and the index of its next row.
-    cells: Vec<Vec<String>>,
-    row: usize,
-    file: String,
-}
-
-impl Rows {
-    pub(crate) fn open(opened: File, file: &str) -> Result<Self, Error> {
-        let builder = ParquetRecordBatchReaderBuilder::try_new(opened).map_err(refused(file))?;
-        let names = builder
-            .schema()
-            .fields()
-            .iter()
-            .map(|field| field.name().clone())
-            .collect();
-        Ok(Self {
-            reader: builder.with_batch_size(ROWS).build().map_err(refused(file))?,
-            names,
-            cells: Vec::new(),
-            row: 0,
-            file: file.to_owned(),
-        })
-    }
-
-    /// Reads the next row into `record`. Returns whether there was one.
-    pub(crate) fn read(&mut self, record: &mut csv::StringRecord) -> Result<bool, Error> {
-        while self.cells.first().is_none_or(|cells| self.row >= cells.len()) {
-            let Some(batch) = self.reader.next() else {
-                return Ok(false);
-            };
-            let batch = batch.map_err(refused(&self.file))?;
-            self.cells = texts(&batch);
-            self.row = 0;
-        }
-        record.clear();
-        self.cells.iter().for_each(|cells| record.push_field(&cells[self.row]));
-        self.row += 1;
-        Ok(true)
-    }
-}
-
-/// The cells of a batch as text. A cell of a type other than number, time or text contains the name of its type, and is refused when it is
-/// used.
-fn texts(batch: &RecordBatch) -> Vec<Vec<String>> {
-    let column = |(field, array): (&Arc<Field>, &ArrayRef)| -> Vec<String> {
-        let name = field.name();
-        if let Some(texts) = array.as_string_opt::<i32>() {
-            return texts.iter().map(|text| text.unwrap_or_default().to_owned()).collect();
-        }
-        // Ticks of seconds have their number of decimals in the metadata.
-        let decimals = field
-            .metadata()
-            .get("decimals")
-            .and_then(|decimals| decimals.parse().ok());
-        let time = decimals.map_or(NANOSECONDS, |decimals| TimeBase::Clock {
-            decimals,
-            tolerance: 0,
+/// Whether ticks are seconds with decimals, which other programs read as doubles.
+fn is_seconds(time: TimeBase) -> bool {
+    matches!(
+        time,
+        TimeBase::Clock {
             format: TimeFormat::Seconds,
-        });
-        let cells = match decimals {
-            None => cells(name, array).ok(),
-            Some(_) => None,
-        };
-        if let Some(cells) = cells {
-            return cells
-                .into_iter()
-                .map(|cell| cell.map_or(String::new(), |value| format!("{value:?}")))
-                .collect();
+            ..
         }
-        match ticks(name, array, decimals.unwrap_or(clock::NANOSECONDS)) {
-            Ok(ticks) => ticks.into_iter().map(|tick| clock::shown(tick, time)).collect(),
-            Err(error) => vec![error.to_string(); array.len()],
-        }
-    };
-    let fields = batch.schema();
-    fields.fields().iter().zip(batch.columns()).map(column).collect()
+    )
+}
+
+/// The fields of a recording, times in seconds as doubles.
+fn fields_with_seconds(schema: &Schema) -> arrow_schema::Schema {
+    let own = schema.to_arrow();
+    if !is_seconds(schema.time()) {
+        return own;
+    }
+    let time = Arc::new(Field::new("time", DataType::Float64, false));
+    arrow_schema::Schema::new(
+        std::iter::once(time)
+            .chain(own.fields().iter().skip(1).cloned())
+            .collect::<Vec<_>>(),
+    )
+}
+
+/// A batch whose ticks of seconds are the doubles next to them.
+fn with_seconds(batch: RecordBatch, time: TimeBase) -> Result<RecordBatch, arrow_schema::ArrowError> {
+    if !is_seconds(time) {
+        return Ok(batch);
+    }
+    let ticks = batch.column(0).as_primitive::<Int64Type>();
+    // The text of a tick is exact, and its double the nearest.
+    let seconds = ticks
+        .values()
+        .iter()
+        .map(|tick| clock::shown(*tick, time).parse().unwrap_or(f64::NAN));
+    let seconds: ArrayRef = Arc::new(Float64Array::from_iter_values(seconds));
+    let columns: Vec<ArrayRef> = std::iter::once(seconds)
+        .chain(batch.columns().iter().skip(1).cloned())
+        .collect();
+    let own = batch.schema();
+    let field = Arc::new(Field::new("time", DataType::Float64, false));
+    let fields: Vec<_> = std::iter::once(field)
+        .chain(own.fields().iter().skip(1).cloned())
+        .collect();
+    RecordBatch::try_new(Arc::new(arrow_schema::Schema::new(fields)), columns)
 }
 
 /// Rows of a recording as Parquet.
@@ -137,7 +94,8 @@ impl Sink {
             .and_then(|columns| Schema::new(columns, schema.time()))
             .map_err(Error::recording(&file))?;
         let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-        let writer = ArrowWriter::try_new(target, schema.to_arrow().into(), Some(properties));
+        let fields = fields_with_seconds(&schema);
+        let writer = ArrowWriter::try_new(target, fields.into(), Some(properties));
         let mut sink = Self {
             writer: writer.map_err(refused(&file))?,
             block: Block::default(),
@@ -172,6 +130,7 @@ impl Sink {
             .block
             .to_record_batch(&self.schema)
             .map_err(Error::recording(&self.file))?;
+        let batch = with_seconds(batch, self.schema.time()).map_err(refused(&self.file))?;
         self.clear();
         self.writer.write(&batch).map_err(refused(&self.file))
     }

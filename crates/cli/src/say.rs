@@ -4,6 +4,7 @@
 //! they are written as `\u{1b}`. A standard error that is closed or full is no reason to stop.
 
 use std::borrow::Cow;
+use std::cell::RefCell;
 use std::fmt::{self, Write as _};
 use std::io::Write as _;
 
@@ -41,9 +42,40 @@ pub(crate) fn name(text: &str) -> Cow<'_, str> {
     escaped(text, |_| false)
 }
 
+thread_local! {
+    /// Messages of a task among several, which become one line.
+    static COLLECTED: RefCell<Option<Vec<String>>> = const { RefCell::new(None) };
+}
+
+/// Runs a task whose messages and texts are not written but returned.
+pub(crate) fn collect<T>(task: impl FnOnce() -> T) -> (T, Vec<String>) {
+    COLLECTED.set(Some(Vec::new()));
+    let result = task();
+    (result, COLLECTED.take().unwrap_or_default())
+}
+
+/// Whether texts are not to be written.
+pub(crate) fn is_collecting() -> bool {
+    COLLECTED.with_borrow(Option::is_some)
+}
+
+/// Takes a text if it is not to be written.
+pub(crate) fn is_collected(text: &str) -> bool {
+    COLLECTED.with_borrow_mut(|collected| match collected {
+        Some(lines) => {
+            lines.extend(text.lines().map(|line| name(line).into_owned()));
+            true
+        }
+        None => false,
+    })
+}
+
 /// Writes a message and a line end to standard error.
 pub(crate) fn line(message: fmt::Arguments<'_>) {
     let text = format!("{message}\n");
+    if is_collected(&text) {
+        return;
+    }
     // Nobody can be told that nobody can be told.
     let _ = std::io::stderr().lock().write_all(plain(&text).as_bytes());
 }

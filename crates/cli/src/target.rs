@@ -7,9 +7,9 @@
 //! or, if there is an earlier file, beside it under a name that ends in `.partial`, which is kept if the task fails.
 
 use crate::error::Error;
-use crate::interrupt;
 use crate::say::say;
-use std::fs::{File, OpenOptions};
+use crate::{files, interrupt};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +18,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) const STANDARD_OUTPUT: &str = "standard output";
 /// Longest part of a name that is repeated in the name of its unfinished file, in bytes. File systems allow 255.
 const MAX_NAME: usize = 200;
+
+/// End of the name of an unfinished file.
+const UNFINISHED: &str = ".fewbits-new";
 
 /// Whether the task's source is live; set once from the arguments.
 static IS_LIVE: AtomicBool = AtomicBool::new(false);
@@ -123,6 +126,28 @@ impl Target {
         Self::open(path)
     }
 
+    /// A copy of a file, which replaces the file when it is finished.
+    pub(crate) fn copy_of(path: &Path) -> Result<Self, Error> {
+        let mut copy = Self::open(Some(path))?;
+        let failed = Error::io(&copy.name, "copy");
+        let mut source = File::open(path).map_err(&failed)?;
+        std::io::copy(&mut source, &mut copy).map_err(&failed)?;
+        // The recorder that continues the copy locks it itself. Nobody else writes here: the caller holds the lock of the file.
+        if let Some(file) = &copy.file {
+            let _ = file.unlock();
+        }
+        Ok(copy)
+    }
+
+    /// Where the file stands until it is finished.
+    pub(crate) fn unfinished(&self) -> &Path {
+        match &self.place {
+            Place::Beside { temporary, .. } => temporary,
+            Place::New { path, .. } => path,
+            Place::Direct => Path::new(&self.name),
+        }
+    }
+
     /// The name in messages.
     pub(crate) fn name(&self) -> &str {
         &self.name
@@ -149,6 +174,28 @@ impl Target {
     }
 }
 
+/// Locks a file that is to be replaced, as long as the result lives.
+///
+/// # Errors
+/// If another command holds the lock.
+pub(crate) fn lock(path: &Path) -> Result<File, Error> {
+    let name = path.display().to_string();
+    loop {
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(path)
+            .map_err(Error::io(&name, "open"))?;
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(Error::content(&name, "another command writes to it: try again when it has ended"));
+        }
+        // Between opening and locking another command may have replaced the file: the lock is then that of the old one.
+        if files::is_at(&file, path) {
+            return Ok(file);
+        }
+    }
+}
+
 /// Creates a new file in the folder of `path`.
 fn beside(path: &Path, name: &str) -> Result<(File, PathBuf), Error> {
     let whole = path
@@ -159,23 +206,51 @@ fn beside(path: &Path, name: &str) -> Result<(File, PathBuf), Error> {
     while !whole.is_char_boundary(end) {
         end -= 1;
     }
-    let kept = &whole[..end];
+    let kept = format!(".{}.", &whole[..end]);
     let process = std::process::id();
     let mut failure = None;
     for attempt in 0..1000 {
         let temporary = match is_live() {
-            true => format!("{kept}.{process}-{attempt}.partial"),
-            false => format!(".{kept}.{process}-{attempt}.fewbits-new"),
+            true => format!("{}{process}-{attempt}.partial", &kept[1..]),
+            false => format!("{kept}{process}-{attempt}{UNFINISHED}"),
         };
         let temporary = path.with_file_name(temporary);
         match OpenOptions::new().write(true).create_new(true).open(&temporary) {
-            Ok(file) => return Ok((file, temporary)),
+            // Another process may have taken it for an abandoned one before it was locked.
+            Ok(file) if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !temporary.exists() => {}
+            Ok(file) => {
+                remove_abandoned(&temporary, &kept);
+                return Ok((file, temporary));
+            }
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => failure = Some(error),
             Err(error) => return Err(Error::io(name, "create a file beside it for")(error)),
         }
     }
     let failure = failure.unwrap_or_else(|| std::io::ErrorKind::AlreadyExists.into());
     Err(Error::io(name, "create a file beside it for")(failure))
+}
+
+/// Removes unfinished files for the same output whose writers were killed: a writer that lives holds the lock of its file.
+fn remove_abandoned(own: &Path, kept: &str) {
+    let folder = own.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let Ok(entries) = std::fs::read_dir(folder.unwrap_or(Path::new("."))) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let is_other = name
+            .to_str()
+            .is_some_and(|name| name.starts_with(kept) && name.ends_with(UNFINISHED));
+        if !is_other || own.file_name() == Some(&name) {
+            continue;
+        }
+        let path = entry.path();
+        if let Ok(file) = File::open(&path)
+            && file.try_lock().is_ok()
+        {
+            let _ = std::fs::remove_file(&path);
+        }
+    }
 }
 
 impl Write for Target {

@@ -42,13 +42,10 @@ struct ShownColumn<'a> {
 /// Names by which a column of times is known.
 const TIME_NAMES: [&str; 6] = ["time", "timestamp", "datetime", "date", "seconds", "t"];
 
-/// Index of the column of times among all names of a table: the named one, or the likeliest of those that the recording has not.
-fn time_column(options: &TableOptions, all: &[String], schema: &Schema, file: &str) -> Result<Option<usize>, Error> {
+/// Index among all names of a table of the likeliest column of times of those that the recording has not.
+fn time_column(all: &[String], schema: &Schema) -> Option<usize> {
     if schema.time() == TimeBase::Numbered {
-        return Ok(None);
-    }
-    if let Some(name) = &options.time_column {
-        return names::position(all, name).map(Some).map_err(Error::recipe(file));
+        return None;
     }
     // A name that stands once more in the table than in the recording is left over too.
     let of_recording = |name: &str| schema.columns().iter().filter(|column| column.name() == name).count();
@@ -58,13 +55,13 @@ fn time_column(options: &TableOptions, all: &[String], schema: &Schema, file: &s
         .collect();
     let is_time = |i: &&usize| TIME_NAMES.contains(&all[**i].to_lowercase().as_str());
     let likeliest = left_over.iter().find(is_time).or(left_over.first());
-    Ok(likeliest.copied())
+    likeliest.copied()
 }
 
 /// Chooses the columns of the table that the recording has, by name. Returns the index in the recording of each.
 fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result<Vec<usize>, Error> {
     let (all, file) = (table.names.clone(), table.file().to_owned());
-    let time = time_column(options, &all, schema, &file)?;
+    let time = time_column(&all, schema);
     let (mut columns, mut matches) = (Vec::new(), Vec::new());
     for (index, column) in schema.columns().iter().enumerate() {
         let name = column.name();
@@ -83,7 +80,9 @@ fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result
         let problem = format!("--columns: the recording has no column `{name}`, there are {}", names::shown(&names));
         return Err(Error::content(&file, problem));
     }
-    table.choose(time, columns);
+    table.choose(options.time_column.as_deref(), time, &columns, schema.time())?;
+    let recorded: Vec<&fewbits_record::Column> = matches.iter().map(|index| &schema.columns()[*index]).collect();
+    table.use_words(&recorded);
     Ok(matches)
 }
 

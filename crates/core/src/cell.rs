@@ -68,7 +68,7 @@ impl Cell {
     }
 }
 
-/// The serialised form. An infinite end is left out, since JSON has no infinity.
+/// The stored form. An infinite end is the text `inf` or `-inf` in JSON; where it was left out it is read too.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Ends {
@@ -80,10 +80,9 @@ struct Ends {
 
 impl From<Cell> for Ends {
     fn from(cell: Cell) -> Self {
-        let end = |x: f64| x.is_finite().then_some(x);
         Self {
-            lower: end(cell.lower),
-            upper: end(cell.upper),
+            lower: Some(cell.lower),
+            upper: Some(cell.upper),
         }
     }
 }

@@ -5,7 +5,6 @@ use crate::columns::{Columns, ColumnsMut, change_each, lengths_agree};
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
-use fewbits_numerics::stored;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -171,12 +170,24 @@ impl Gaussian<1> {
     }
 }
 
-stored! { #[serde(rename = "Gaussian")] [const D: usize] Gaussian as Moments {
+/// The stored form of [`Gaussian`].
+#[derive(Deserialize)]
+#[serde(rename = "Gaussian")]
+#[serde(deny_unknown_fields)]
+struct Moments<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
     mean: SVector<f64, D>,
     #[serde(with = "fewbits_numerics::stored")]
     covariance: SMatrix<f64, D, D>,
-} => Gaussian::new(mean, covariance), ArgumentError }
+}
+
+impl<const D: usize> TryFrom<Moments<D>> for Gaussian<D> {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Moments<D>) -> Result<Self, ArgumentError> {
+        Gaussian::new(parts.mean, parts.covariance)
+    }
+}
 
 impl<const D: usize> Belief<D> for Gaussian<D> {
     fn mean(&self) -> SVector<f64, D> {

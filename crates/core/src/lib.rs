@@ -8,7 +8,7 @@
 //! |---|---|
 //! | how the state moves | [`Dynamics`], [`GaussianDynamics`], [`LinearDynamics`]; in continuous time: [`Evolution`] |
 //! | how it is measured | [`Sensing`], [`LinearSensing`]; of which coordinates: [`OnAxes`] |
-//! | what is sent, encoded in bits | [`Message`], [`bits`], [`NumberFormat`] |
+//! | what is sent, encoded in bits | [`Message`], [`bits`], [`NumberFormat`], [`RoundedGaussian`] |
 //! | how a sensor makes its reports, and their likelihoods | [`Scheme`]; what runs on the sensor: [`SensorNode`] |
 //! | what the receiver observes, and the channel | [`Observation`], [`Link`] |
 //! | `p(observation | noise-free measurement)` | [`Factor`] and its kinds |
@@ -78,7 +78,7 @@ pub use gaussian::{FactoredGaussian, Gaussian};
 pub use likelihood::{Evidence, Likelihood, LinearScalar};
 pub use measurement_noise::MeasurementNoise;
 pub use message::Message;
-pub use number::NumberFormat;
+pub use number::{NumberFormat, RoundedGaussian};
 pub use observation::{Link, Observation};
 pub use observed::Observed;
 pub use on_axes::OnAxes;

@@ -5,7 +5,7 @@ use crate::cell::Cell;
 use crate::gaussian::Gaussian;
 use crate::message::Message;
 use fewbits_numerics::error::{ArgumentError, finite, within};
-use fewbits_numerics::stored;
+use fewbits_numerics::linalg::triangular_factor;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +34,24 @@ pub struct Levels {
     bits: u32,
 }
 
-stored! { Levels as Numbers { #[serde(with = "fewbits_numerics::stored")] lower: f64, #[serde(with = "fewbits_numerics::stored")] upper: f64, bits: u32 } => Levels::new(lower, upper, bits), ArgumentError }
+/// The stored form of [`Levels`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    #[serde(with = "fewbits_numerics::stored")]
+    lower: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    upper: f64,
+    bits: u32,
+}
+
+impl TryFrom<Numbers> for Levels {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        Levels::new(parts.lower, parts.upper, parts.bits)
+    }
+}
 
 impl Levels {
     /// The levels from `lower` to `upper` (measurement units), `bits` of 1 to 32.
@@ -192,7 +209,9 @@ impl<const M: usize> Message for SVector<f64, M> {
     }
 }
 
-/// The mean, and the lower triangle of the covariance row by row: `D + D (D + 1)/2` numbers.
+/// The mean, and the lower triangle of the covariance row by row: `D + D (D + 1)/2` numbers. In [`NumberFormat::Double`] every Gaussian
+/// arrives as it is. In a shorter format the entries must be numbers of the format and together a covariance; [`RoundedGaussian`]
+/// rounds any Gaussian.
 impl<const D: usize> Message for Gaussian<D> {
     type Format = NumberFormat;
 
@@ -215,11 +234,68 @@ impl<const D: usize> Message for Gaussian<D> {
     }
 }
 
+/// A Gaussian as it arrives in a number format: mean and lower triangular factor of the covariance, `D + D (D + 1)/2` numbers. A product
+/// of factors is positive semidefinite however they were rounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RoundedGaussian<const D: usize> {
+    mean: SVector<f64, D>,
+    lower: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> RoundedGaussian<D> {
+    /// The belief as it arrives in the given format.
+    ///
+    /// # Errors
+    /// If a number is not finite or exceeds the format.
+    pub fn new(belief: &Gaussian<D>, format: &NumberFormat) -> Result<Self, ArgumentError> {
+        let mut rounded = Self {
+            mean: *belief.mean(),
+            lower: triangular_factor(belief.covariance()),
+        };
+        for x in rounded.mean.iter_mut() {
+            *x = format.rounded(*x)?;
+        }
+        for at in Self::triangle() {
+            rounded.lower[at] = format.rounded(rounded.lower[at])?;
+        }
+        Ok(rounded)
+    }
+
+    /// The belief that sender and receiver hold afterwards.
+    pub fn belief(&self) -> Gaussian<D> {
+        Gaussian::from_trusted_parts(self.mean, self.lower * self.lower.transpose())
+    }
+
+    /// Row and column of each entry of the lower triangle.
+    fn triangle() -> impl Iterator<Item = (usize, usize)> {
+        (0..D).flat_map(|i| (0..=i).map(move |j| (i, j)))
+    }
+}
+
+impl<const D: usize> Message for RoundedGaussian<D> {
+    type Format = NumberFormat;
+
+    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+        self.mean.encode(format, writer)?;
+        Self::triangle().try_for_each(|at| format.write(self.lower[at], writer))
+    }
+
+    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let (mean, mut lower) = (SVector::decode(format, reader)?, SMatrix::zeros());
+        for at in Self::triangle() {
+            lower[at] = format.read(reader)?;
+        }
+        Ok(Self { mean, lower })
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Levels, NumberFormat};
-    use crate::laws::message::round_trip;
-    use nalgebra::Vector2;
+    use super::{Levels, NumberFormat, RoundedGaussian};
+    use crate::gaussian::Gaussian;
+    use crate::laws::message::{decoding_is_total, round_trip};
+    use crate::message::Message;
+    use nalgebra::{Matrix4, Vector2, Vector4};
 
     #[test]
     fn what_a_format_holds_comes_back_to_the_last_bit() {
@@ -242,5 +318,29 @@ mod tests {
         assert!(Levels::new(0.0, 1.0, 0).is_err() && Levels::new(0.0, 1.0, 64).is_err());
         assert!(Levels::new(1.0, 1.0, 4).is_err() && Levels::new(-1e308, 1e308, 4).is_err());
         assert!(serde_json::from_str::<Levels>(r#"{"lower":1,"upper":0,"bits":4}"#).is_err());
+    }
+
+    #[test]
+    fn a_rounded_gaussian_is_fourteen_numbers_and_stays_a_covariance() {
+        let root = Matrix4::from_fn(|i, j| (i * 4 + j) as f64 * 0.1 - 0.5);
+        for scale in [1e-4, 1.0, 1e4] {
+            // Rank two, so that rounding the covariance itself would lose definiteness.
+            let mut thin = root * scale;
+            thin.column_mut(2).fill(0.0);
+            thin.column_mut(3).fill(0.0);
+            let belief = Gaussian::new(Vector4::repeat(scale / 3.0), thin * thin.transpose()).unwrap();
+            let sent = RoundedGaussian::new(&belief, &NumberFormat::Single).unwrap();
+            assert_eq!(round_trip(&sent, &NumberFormat::Single), Ok(448));
+            let arrived = sent.belief();
+            assert!(Gaussian::new(*arrived.mean(), *arrived.covariance()).is_ok());
+            assert!((arrived.covariance() - belief.covariance()).amax() < 1e-5 * scale * scale);
+        }
+        let bits = RoundedGaussian::new(&Gaussian::known(Vector4::zeros()).unwrap(), &NumberFormat::Double).unwrap();
+        let bits = bits.to_bits(&NumberFormat::Double).unwrap();
+        assert!(
+            (0..bits.bits())
+                .step_by(7)
+                .all(|i| decoding_is_total::<RoundedGaussian<4>>(&bits.clone().with_flipped(i), &NumberFormat::Double))
+        );
     }
 }

@@ -4,7 +4,6 @@ use crate::bits::BitString;
 use crate::error::Error;
 use crate::message::Message;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::stored;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
@@ -81,8 +80,25 @@ pub struct Link {
     crossover: f64,
 }
 
-stored! { Link as Numbers { #[serde(with = "fewbits_numerics::stored")] loss: f64, #[serde(default, with = "fewbits_numerics::stored")] erasure: f64, #[serde(with = "fewbits_numerics::stored")] crossover: f64 } =>
-Link::new(loss, crossover)?.with_erasure(erasure), ArgumentError }
+/// The stored form of [`Link`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    #[serde(with = "fewbits_numerics::stored")]
+    loss: f64,
+    #[serde(default, with = "fewbits_numerics::stored")]
+    erasure: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    crossover: f64,
+}
+
+impl TryFrom<Numbers> for Link {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        Link::new(parts.loss, parts.crossover)?.with_erasure(parts.erasure)
+    }
+}
 
 impl Link {
     /// A link that delivers every report as it was sent.
@@ -195,6 +211,22 @@ impl Link {
     pub fn word_probability(&self, sent: u64, received: u64, bits: u32) -> f64 {
         let different = (sent ^ received).count_ones().min(bits);
         self.crossover.powi(different as i32) * (1.0 - self.crossover).powi((bits - different) as i32)
+    }
+
+    /// `p(word arrives as received | cell i)` of a sensor that sends one word of `bits` bits for each cell: one entry per word of `sent`.
+    ///
+    /// # Errors
+    /// [`Error::Impossible`] if nothing arrives over this link.
+    pub fn received_given_words(
+        &self,
+        sent: impl Iterator<Item = u64>,
+        received: u64,
+        bits: u32,
+    ) -> Result<Vec<f64>, Error> {
+        let arrives = self.of_received()?;
+        Ok(sent
+            .map(|word| arrives * self.word_probability(word, received, bits))
+            .collect())
     }
 
     /// Sends a report through the link at random: it is lost, or each of its bits may be inverted. Bits that do not decode to a report

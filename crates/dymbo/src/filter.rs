@@ -201,7 +201,7 @@ impl ScalarFilter for DymboFilter {
         };
         let p = predicted.covariance()[0];
         // With the threshold at the prediction both bits have probability 1/2, for any crossover.
-        let log_likelihood = -LN_2 + self.link.arrival().ln();
+        let log_likelihood = -LN_2 + self.link.of_received()?.ln();
         let report = Report {
             correction: bit.value() * self.gain(p),
             variance: filtered_variance(p, self.plant.measurement_variance(), self.information()),

@@ -7,9 +7,8 @@ use fewbits_core::rand::Rng;
 use fewbits_core::{
     BitReader, BitWriter, Cell, CodecError, Deterministic, Factor, Gaussian, Link, Message, Observation, Scheme,
 };
-use fewbits_numerics::error::{ArgumentError, finite, positive, within};
+use fewbits_numerics::error::{ArgumentError, finite, positive, refuse, within};
 use fewbits_numerics::normal;
-use fewbits_numerics::stored;
 use nalgebra::Vector1;
 use serde::{Deserialize, Serialize};
 
@@ -51,23 +50,36 @@ impl Message for Multiple {
 /// A sensor that reports its sample rounded to a multiple of the resolution `tau`, halves away from zero, in a word of fixed
 /// length. Multiples beyond the word saturate, so the outermost cells are unbounded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers", into = "Numbers")]
+#[serde(try_from = "Numbers")]
 pub struct RoundedSample {
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     resolution: f64,
     bits: u32,
 }
 
-stored! { RoundedSample as Numbers |scheme| {
+/// The stored form of [`RoundedSample`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64 = scheme.noise_variance,
+    noise_variance: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    resolution: f64 = scheme.resolution,
-    bits: u32 = scheme.bits,
-} => RoundedSample::new(noise_variance, resolution)?.with_bits(bits), Error }
+    resolution: f64,
+    bits: u32,
+}
+
+impl TryFrom<Numbers> for RoundedSample {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        RoundedSample::new(parts.noise_variance, parts.resolution)?.with_bits(parts.bits)
+    }
+}
 
 /// Largest word length whose cells are enumerated. A link that inverts bits needs the likelihood of every cell.
-const LONGEST_NOISY: u32 = 12;
+const MAX_NOISY_BITS: u32 = 12;
 
 impl RoundedSample {
     /// A sensor with measurement variance `sigma^2 > 0`, resolution `tau > 0` in measurement units and words of 16 bits.
@@ -195,21 +207,19 @@ impl Scheme<1> for RoundedSample {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };
-        let (cell, arrives) = (self.cell(*multiple)?, link.of_received()?);
+        let cell = self.cell(*multiple)?;
         if link.crossover() == 0.0 {
-            return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());
+            return Ok(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into());
         }
-        if self.bits > LONGEST_NOISY {
-            let expected = "words of at most 12 bits over a link that inverts bits";
-            return Err(ArgumentError::new("bits", self.bits, expected).into());
+        if self.bits > MAX_NOISY_BITS {
+            return refuse("bits", self.bits, "words of at most 12 bits over a link that inverts bits");
         }
         let (least, most) = self.range();
         let edges = (least..most).map(|k| self.resolution * (k as f64 + 0.5)).collect();
         // Two's complement of `bits` bits, as the words travel.
-        let mask = (1_u64 << self.bits) - 1;
-        let word = |k: i64| k as u64 & mask;
-        let sent = |k: i64| arrives * link.word_probability(word(k), word(multiple.0), self.bits);
-        Ok(Partition::new(edges, (least..=most).map(sent).collect(), self.noise_variance)?.into())
+        let word = |k: i64| k as u64 & ((1 << self.bits) - 1);
+        let given = link.received_given_words((least..=most).map(word), word(multiple.0), self.bits)?;
+        Ok(Partition::new(edges, given, self.noise_variance)?.into())
     }
 }
 
@@ -225,7 +235,7 @@ pub struct FirstMessageValue {
 /// Cells are counted out to this many standard deviations of the sample; the rest has probability below 1e-32.
 const REACH: f64 = 12.0;
 /// Limit on the number of cells that are summed.
-const MOST_CELLS: f64 = 1e6;
+const MAX_CELLS: f64 = 1e6;
 
 /// Averages [`RoundedSample::belief_with_prior`] over all messages that the prior can cause.
 ///
@@ -234,7 +244,7 @@ const MOST_CELLS: f64 = 1e6;
 pub fn first_message_value(scheme: &RoundedSample, prior: &Gaussian<1>) -> Result<FirstMessageValue, Error> {
     let (r, tau) = (scheme.noise_variance, scheme.resolution);
     let reach = REACH * (prior.covariance()[0] + r).sqrt() + tau;
-    if reach / tau > MOST_CELLS {
+    if reach / tau > MAX_CELLS {
         return Err(ArgumentError::new("resolution", tau, "at most a million cells within the prior").into());
     }
     let mean = prior.mean()[0];

@@ -8,7 +8,6 @@ use fewbits_core::{
     Observation, Scheme,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
-use fewbits_numerics::stored;
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
 use nalgebra::{Matrix1, Vector1, Vector2};
 use serde::{Deserialize, Serialize};
@@ -77,11 +76,31 @@ pub struct InnovationWord {
     quantizer: &'static LloydMax,
 }
 
-stored! { InnovationWord as Numbers |word| {
+/// The stored form of [`InnovationWord`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64 = word.noise_variance,
-    bits: u32 = word.bits,
-} => InnovationWord::new(noise_variance, bits as usize), Error }
+    noise_variance: f64,
+    bits: u32,
+}
+
+impl From<InnovationWord> for Numbers {
+    fn from(word: InnovationWord) -> Self {
+        Self {
+            noise_variance: word.noise_variance,
+            bits: word.bits,
+        }
+    }
+}
+
+impl TryFrom<Numbers> for InnovationWord {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        InnovationWord::new(parts.noise_variance, parts.bits as usize)
+    }
+}
 
 impl InnovationWord {
     /// A sensor with measurement variance `sigma^2 > 0` and words of 1 to 8 bits.
@@ -187,14 +206,13 @@ impl Scheme<1> for InnovationWord {
         let Observation::Received(word) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };
-        let arrives = link.of_received()?;
         if link.crossover() == 0.0 {
             let cell = self.cell(*word, prediction)?;
-            return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());
+            return Ok(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into());
         }
         let received = self.index(*word)? as u64;
-        let sent = (0..=edges.len() as u64).map(|i| arrives * link.word_probability(i, received, self.bits));
-        Ok(Partition::new(edges, sent.collect(), self.noise_variance)?.into())
+        let given = link.received_given_words(0..=edges.len() as u64, received, self.bits)?;
+        Ok(Partition::new(edges, given, self.noise_variance)?.into())
     }
 }
 

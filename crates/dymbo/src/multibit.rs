@@ -4,7 +4,6 @@ use crate::filter::{Report, ScalarFilter, StepInfo, without_report};
 use crate::plant::{filtered_variance, innovation_gain};
 use crate::{CellIndex, Error, InnovationWord, Prediction, ScalarPlant};
 use fewbits_core::{Gaussian, Link, Observation};
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// The filter for sensors that report `m` bits of the normalised innovation.
@@ -31,11 +30,32 @@ pub struct MultibitFilter {
     information: f64,
 }
 
-stored! { MultibitFilter as Numbers |filter| {
-    plant: ScalarPlant = filter.plant,
-    bits: u32 = filter.scheme.bits(),
-    link: Link = filter.link,
-} => Ok(MultibitFilter::new(plant, bits as usize)?.with_link(link)), Error }
+/// The stored form of [`MultibitFilter`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    plant: ScalarPlant,
+    bits: u32,
+    link: Link,
+}
+
+impl From<MultibitFilter> for Numbers {
+    fn from(filter: MultibitFilter) -> Self {
+        Self {
+            plant: filter.plant,
+            bits: filter.scheme.bits(),
+            link: filter.link,
+        }
+    }
+}
+
+impl TryFrom<Numbers> for MultibitFilter {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        Ok(MultibitFilter::new(parts.plant, parts.bits as usize)?.with_link(parts.link))
+    }
+}
 
 impl MultibitFilter {
     /// The filter for words of 1 to 8 bits over a perfect link. With one bit it equals [`DymboFilter`](crate::DymboFilter).

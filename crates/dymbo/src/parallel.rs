@@ -14,7 +14,6 @@ use fewbits_numerics::binomial::log_row;
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::normal::{self, SQRT_2_OVER_PI};
 use fewbits_numerics::quadrature::gauss_legendre;
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 
@@ -32,7 +31,7 @@ pub enum CountFusion {
 }
 
 /// Largest number of sensors.
-pub const MOST_SENSORS: usize = 1000;
+pub const MAX_SENSORS: usize = 1000;
 
 /// The filter for `K` sensors that answer the same threshold at once.
 ///
@@ -40,7 +39,7 @@ pub const MOST_SENSORS: usize = 1000;
 /// `D = 1 + (K-1)(2/pi) asin rho`, `G = sqrt(2/pi) (P/s)/D`; over a link of crossover `eps` each `sqrt(2/pi)` shrinks by
 /// `1 - 2 eps`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers", into = "Numbers")]
+#[serde(try_from = "Numbers")]
 pub struct ParallelFilter {
     plant: ScalarPlant,
     sensors: usize,
@@ -48,12 +47,23 @@ pub struct ParallelFilter {
     link: Link,
 }
 
-stored! { ParallelFilter as Numbers |filter| {
-    plant: ScalarPlant = filter.plant,
-    sensors: usize = filter.sensors,
-    fusion: CountFusion = filter.fusion,
-    link: Link = filter.link,
-} => Ok(ParallelFilter::new(plant, sensors, fusion)?.with_link(link)), Error }
+/// The stored form of [`ParallelFilter`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    plant: ScalarPlant,
+    sensors: usize,
+    fusion: CountFusion,
+    link: Link,
+}
+
+impl TryFrom<Numbers> for ParallelFilter {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        Ok(ParallelFilter::new(parts.plant, parts.sensors, parts.fusion)?.with_link(parts.link))
+    }
+}
 
 impl ParallelFilter {
     /// The filter for 1 to 1000 sensors over perfect links.
@@ -61,7 +71,7 @@ impl ParallelFilter {
     /// # Errors
     /// If `sensors` is outside `1..=1000`.
     pub fn new(plant: ScalarPlant, sensors: usize, fusion: CountFusion) -> Result<Self, Error> {
-        within("sensors", sensors as f64, 1.0, MOST_SENSORS as f64)?;
+        within("sensors", sensors as f64, 1.0, MAX_SENSORS as f64)?;
         Ok(Self {
             plant,
             sensors,
@@ -150,14 +160,11 @@ impl ParallelFilter {
             let expected = format!("{}, one per sensor", self.sensors);
             return Err(ArgumentError::new("observations", observations.len(), expected).into());
         }
-        let predicted = *predicted;
         let (mean, p) = (predicted.mean()[0], predicted.covariance()[0]);
         let received = || observations.iter().filter_map(Observation::received);
         let bits = received().count();
         // A missing bit tells nothing about the state, but the probability of its loss enters the likelihood.
-        let missing = observations
-            .iter()
-            .filter(|observation| observation.received().is_none());
+        let missing = observations.iter().filter(|o| o.received().is_none());
         let missing: f64 = missing.map(|observation| self.link.delivery(observation).ln()).sum();
         let factor = |bit: &Sign| InCell::sign(*bit, mean, self.plant.measurement_variance(), &self.link);
         if bits > 0 {
@@ -166,7 +173,7 @@ impl ParallelFilter {
         let (correction, variance, log_evidence) = match self.fusion {
             CountFusion::Linear => {
                 let (gain, variance) = self.linear(p, bits);
-                let (mut belief, mut log_evidence) = (predicted, 0.0);
+                let (mut belief, mut log_evidence) = (*predicted, 0.0);
                 for bit in received() {
                     let tilted = factor(bit)?.tilted(&belief)?;
                     log_evidence += tilted.log_evidence;
@@ -176,23 +183,20 @@ impl ParallelFilter {
             }
             CountFusion::Exact => {
                 let bits = received().map(|bit| factor(bit).map(Scalar::from));
-                let posterior = bits.collect::<Result<Product, _>>()?.tilted(&predicted)?;
+                let posterior = bits.collect::<Result<Product, _>>()?.tilted(predicted)?;
                 (posterior.mean[0] - mean, posterior.covariance[0], posterior.log_evidence)
             }
         };
         let r = self.plant.measurement_variance();
+        let gained = (p - variance) / p * ((p + r) / p);
         let report = Report {
             correction,
             variance,
-            information: if p > 0.0 {
-                (p - variance) / p * ((p + r) / p)
-            } else {
-                0.0
-            },
+            information: if p > 0.0 { gained } else { 0.0 },
             log_likelihood: log_evidence + missing,
             bits: bits as u32,
         };
-        report.correct(&predicted)
+        report.correct(predicted)
     }
 }
 
@@ -203,12 +207,9 @@ const REACH: f64 = 9.0;
 fn count_moments(k: usize, p: f64, r: f64, link: &Link) -> Vec<(f64, f64)> {
     let (deviation, sigma) = (p.sqrt(), r.sqrt());
     let (floor, share) = (link.crossover(), 1.0 - 2.0 * link.crossover());
-    let log_bit = |z: f64| {
-        if floor == 0.0 {
-            normal::log_cdf(z)
-        } else {
-            (floor + share * normal::cdf(z)).ln()
-        }
+    let log_bit = |z: f64| match floor {
+        0.0 => normal::log_cdf(z),
+        _ => (floor + share * normal::cdf(z)).ln(),
     };
     // Where |e| exceeds 9 noise deviations all bits agree, and only the prior varies: wide panels suffice there. Within, the narrowest
     // feature is the posterior, about sqrt(r/k) wide.

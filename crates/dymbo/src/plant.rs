@@ -4,7 +4,6 @@ use crate::Error;
 use fewbits_core::Gaussian;
 use fewbits_filters::{ScalarSteadyState, scalar_steady_state};
 use fewbits_models::{Ar1, LinearSensor};
-use fewbits_numerics::stored;
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -21,14 +20,35 @@ pub struct ScalarPlant {
     sensor: LinearSensor<1, 1>,
 }
 
-stored! { ScalarPlant as Numbers |plant| {
+/// The stored form of [`ScalarPlant`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
     #[serde(with = "fewbits_numerics::stored")]
-    coefficient: f64 = plant.coefficient(),
+    coefficient: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    process_variance: f64 = plant.process_variance(),
+    process_variance: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    measurement_variance: f64 = plant.measurement_variance(),
-} => ScalarPlant::new(coefficient, process_variance, measurement_variance), Error }
+    measurement_variance: f64,
+}
+
+impl From<ScalarPlant> for Numbers {
+    fn from(plant: ScalarPlant) -> Self {
+        Self {
+            coefficient: plant.coefficient(),
+            process_variance: plant.process_variance(),
+            measurement_variance: plant.measurement_variance(),
+        }
+    }
+}
+
+impl TryFrom<Numbers> for ScalarPlant {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        ScalarPlant::new(parts.coefficient, parts.process_variance, parts.measurement_variance)
+    }
+}
 
 impl ScalarPlant {
     /// The plant with coefficient `a` in `[-1, 1]`, process variance `sigma_u^2 >= 0` and measurement variance

@@ -6,7 +6,6 @@ use fewbits_core::rand::Rng;
 use fewbits_core::{Deterministic, Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;
-use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
@@ -33,7 +32,21 @@ pub struct SignBit {
     noise_variance: f64,
 }
 
-stored! { SignBit as Numbers { #[serde(with = "fewbits_numerics::stored")] noise_variance: f64 } => SignBit::new(noise_variance), Error }
+/// The stored form of [`SignBit`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    #[serde(with = "fewbits_numerics::stored")]
+    noise_variance: f64,
+}
+
+impl TryFrom<Numbers> for SignBit {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        SignBit::new(parts.noise_variance)
+    }
+}
 
 impl SignBit {
     /// A sensor with measurement variance `sigma^2 > 0`.

@@ -266,7 +266,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
     ) -> Result<SteadyState<D>, Error> {
         // Only covariances matter: they depend on neither the bits nor the mean.
         let mut filtered = SMatrix::<f64, D, D>::identity();
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let predicted = self.predict(&Gaussian::from_trusted_parts(SVector::zeros(), filtered));
             let next = slot(&predicted)?;
             let settled = (next - filtered).amax() <= SETTLED * next.amax();
@@ -280,14 +280,14 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         }
         Err(Error::NotConverged {
             what: "the covariance recursion",
-            steps: MOST_STEPS,
+            steps: MAX_STEPS,
             unit: "iterations",
         })
     }
 }
 
 /// Limit on the steps of the covariance recursion.
-const MOST_STEPS: usize = 100_000;
+const MAX_STEPS: usize = 100_000;
 /// Relative change of the covariance below which the recursion has converged.
 const SETTLED: f64 = 1e-15;
 

@@ -102,14 +102,15 @@ impl<'a> Picture<'a> {
                     (key, _) => format!("{}, {key}", name(&columns[i])),
                 };
                 let colour = if keys.len() > 1 { place } else { order };
-                layers.extend(self.layer(label, i, &own).map(|layer| layer.coloured(colour)));
+                let drawn = self.layer(label, i, &own);
+                layers.extend(drawn.into_iter().map(|layer| layer.coloured(colour)));
             }
         }
         layers
     }
 
-    /// The column `i` of rows as a layer; nothing where it has no value.
-    fn layer(&self, label: String, i: usize, rows: &[&[Value]]) -> Option<Layer> {
+    /// The column `i` of rows as layers; none where it has no value.
+    fn layer(&self, label: String, i: usize, rows: &[&[Value]]) -> Vec<Layer> {
         let columns = &self.table.columns;
         let error = columns
             .get(i + 1)
@@ -120,12 +121,16 @@ impl<'a> Picture<'a> {
             Some(((self.place(x)?, number(&row[i])?), error))
         };
         let (points, errors): (Vec<_>, Vec<_>) = rows.iter().filter_map(mark).unzip();
-        let layer = match columns[i].role {
-            Role::Line => Layer::line(label, points),
-            Role::Dashed => Layer::dashed(label, points),
-            _ => Layer::points(label, points).with_errors(errors),
+        let layers = match columns[i].role {
+            Role::Line => vec![Layer::line(label, points)],
+            Role::Dashed => vec![Layer::dashed(label, points)],
+            Role::Curve => vec![
+                Layer::line("", points.clone()),
+                Layer::points(label, points).with_errors(errors),
+            ],
+            _ => vec![Layer::points(label, points).with_errors(errors)],
         };
-        (!layer.is_empty()).then_some(layer)
+        layers.into_iter().filter(|layer| !layer.is_empty()).collect()
     }
 
     fn place(&self, x: &Value) -> Option<f64> {

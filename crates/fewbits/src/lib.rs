@@ -19,6 +19,8 @@
 //! | `pf_mpa` | `pf-mpa` | tracking from quantized ranges |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `record` | `record` | files and frames of many columns within guaranteed errors |
+//! | `table` | `table` | tables of strangers: dialects, times, gaps and kinds of columns |
+//! | `recipes` | `recipes` | what a person does with a table: bounds, plan, pack, verify, as functions |
 //! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh`, `link-live` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh, with a page |
 //! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
 //! | `network`, `protocol` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
@@ -64,10 +66,14 @@ pub use fewbits_protocol as protocol;
 pub use fewbits_quantizer_design as quantizer_design;
 #[cfg(feature = "quantizers")]
 pub use fewbits_quantizers as quantizers;
+#[cfg(feature = "recipes")]
+pub use fewbits_recipes as recipes;
 #[cfg(feature = "record")]
 pub use fewbits_record as record;
 #[cfg(feature = "sensor-assignment")]
 pub use fewbits_sensor_assignment as sensor_assignment;
+#[cfg(feature = "table")]
+pub use fewbits_table as table;
 #[cfg(any(feature = "diffusive", feature = "network"))]
 pub use fewbits_topology as topology;
 

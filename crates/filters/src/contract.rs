@@ -38,6 +38,22 @@ impl Info {
     }
 }
 
+/// A belief as weighted points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points<const D: usize> {
+    /// `states[d][i]` is coordinate `d` of point `i`.
+    pub states: [Vec<f64>; D],
+    /// Logarithm of the weight of each point, up to a common constant; `-inf` for a weight of zero.
+    pub log_weights: Vec<f64>,
+}
+
+impl<const D: usize> Points<D> {
+    /// The coordinates as columns.
+    pub fn columns(&self) -> fewbits_core::Columns<'_, D> {
+        self.states.each_ref().map(Vec::as_slice)
+    }
+}
+
 /// A filter for a receiver. Both updates work in place; one that fails leaves the belief unchanged.
 pub trait StateFilter<const D: usize> {
     /// Representation of the belief.
@@ -83,6 +99,12 @@ pub trait StateFilter<const D: usize> {
     /// the other. `None` for other filters. A centre conditions on the observations in any case, to test each given those before it; with
     /// this function it need not do so twice.
     fn of_moments(&self, _: &Gaussian<D>) -> Option<Self::Belief> {
+        None
+    }
+
+    /// The points of the belief, if it consists of points whose weights are all that an update changes. A centre then tests reports by the
+    /// filter's own law, not by that of a Gaussian of its moments.
+    fn points(&self, _: &Self::Belief) -> Option<Points<D>> {
         None
     }
 

@@ -31,6 +31,8 @@ pub struct GuidedFilter<const D: usize> {
     bootstrap: BootstrapFilter<D>,
     /// `N(f, Q)` of each particle since the last `predict`.
     moves: Vec<Gaussian<D>>,
+    /// The belief that it left. The moves belong to no other, for instance one that was restored or taken from an earlier time.
+    predicted: Option<Particles<D>>,
 }
 
 impl<const D: usize> GuidedFilter<D> {
@@ -42,6 +44,7 @@ impl<const D: usize> GuidedFilter<D> {
         Ok(Self {
             bootstrap: BootstrapFilter::new(filter, count)?,
             moves: Vec::new(),
+            predicted: None,
         })
     }
 }
@@ -79,6 +82,10 @@ fn propose<const D: usize>(
 impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
     type Belief = Particles<D>;
 
+    fn points(&self, belief: &Particles<D>) -> Option<crate::Points<D>> {
+        self.bootstrap.points(belief)
+    }
+
     fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
         self.moves.clear();
         self.bootstrap.start(rng, prior)
@@ -97,6 +104,7 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
         self.moves
             .extend((0..belief.len()).map(|i| dynamics.predict(&known(i), 1.0)));
         dynamics.propagate_columns(rng, belief.columns_mut());
+        self.predicted = Some(belief.clone());
         Ok(())
     }
 
@@ -110,7 +118,8 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
         let mut ratios = vec![0.0; belief.len()];
         // Particles predicted in this step are drawn again from a proposal that depends on the observations. The ratio of the
         // target to the proposal is part of their weights.
-        if self.moves.len() == belief.len() && !observed.is_empty() {
+        let are_own = self.moves.len() == belief.len() && self.predicted.as_ref() == Some(&*belief);
+        if are_own && !observed.is_empty() {
             let mut columns = next.columns_mut();
             for (i, (moved, ratio)) in self.moves.iter().zip(&mut ratios).enumerate() {
                 let own = state_at(&columns, i);

@@ -5,7 +5,6 @@ use fewbits_core::columns::change_each;
 use fewbits_core::{Belief, ColumnsMut, Factor, Gaussian, GaussianDynamics, Observed, Sensing};
 use fewbits_densities::Categorical;
 use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities, within};
-use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -40,11 +39,23 @@ pub struct ImmBelief<const D: usize> {
     modes: Vec<Gaussian<D>>,
 }
 
-stored! { #[serde(rename = "ImmBelief")] [const D: usize] ImmBelief as Stored {
+/// The stored form of [`ImmBelief`].
+#[derive(Deserialize)]
+#[serde(rename = "ImmBelief")]
+#[serde(deny_unknown_fields)]
+struct Stored<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
     probabilities: Vec<f64>,
     modes: Vec<Gaussian<D>>,
-} => ImmBelief::new(probabilities, modes), ArgumentError }
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for ImmBelief<D> {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Stored<D>) -> Result<Self, ArgumentError> {
+        ImmBelief::new(parts.probabilities, parts.modes)
+    }
+}
 
 impl<const D: usize> ImmBelief<D> {
     /// A belief with a probability and a Gaussian for each model.

@@ -33,6 +33,7 @@
 //!
 //! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
 
+pub mod calibration;
 pub mod centre;
 pub mod contract;
 pub mod cramer_rao;
@@ -49,7 +50,7 @@ pub mod smoother;
 mod steady_state;
 mod switching;
 
-pub use contract::{Info, MomentFilter, StateFilter};
+pub use contract::{Info, MomentFilter, Points, StateFilter};
 pub use fewbits_core::Error;
 pub use fewbits_core::{Evidence, LinearScalar, assumed_density};
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};

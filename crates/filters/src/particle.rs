@@ -187,6 +187,13 @@ impl<const D: usize> BootstrapFilter<D> {
 impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
     type Belief = Particles<D>;
 
+    fn points(&self, belief: &Particles<D>) -> Option<crate::Points<D>> {
+        Some(crate::Points {
+            states: belief.columns().map(<[f64]>::to_vec),
+            log_weights: belief.log_weights().to_vec(),
+        })
+    }
+
     fn start(&mut self, mut rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
         Particles::from_belief(&mut rng, prior, self.count)
     }

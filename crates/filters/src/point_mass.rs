@@ -166,7 +166,7 @@ impl PointMassFilter {
         Ok(predicted)
     }
 
-    /// As [`predict`](Self::predict), into an existing density, without allocation. Mass that leaves the grid is lost; the rest is
+    /// As [`predict`](Self::predict), into an existing density. Mass that leaves the grid is lost; the rest is
     /// normalised.
     ///
     /// # Errors
@@ -304,6 +304,13 @@ impl StateFilter<1> for PointMasses {
         observed: &[&dyn Likelihood<1>],
     ) -> Result<Info, Error> {
         Ok(Info::new(belief.update(observed)?))
+    }
+
+    fn points(&self, belief: &PointMass) -> Option<crate::Points<1>> {
+        Some(crate::Points {
+            states: [belief.grid().nodes().collect()],
+            log_weights: belief.density().iter().map(|p| p.ln()).collect(),
+        })
     }
 }
 

@@ -4,7 +4,6 @@ use crate::{Error, LinearGaussian};
 use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::error::{finite, non_negative, refuse};
 use fewbits_numerics::kernels::{StandardNormals, vectorised};
-use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -18,12 +17,32 @@ pub struct Ar1 {
     noise_covariance: Matrix1<f64>,
 }
 
-stored! { Ar1 as Parameters |model| {
+/// The stored form of [`Ar1`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {
     #[serde(with = "fewbits_numerics::stored")]
-    coefficient: f64 = model.coefficient(),
+    coefficient: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64 = model.noise_variance(),
-} => Ar1::new_unstable(coefficient, noise_variance), Error }
+    noise_variance: f64,
+}
+
+impl From<Ar1> for Parameters {
+    fn from(model: Ar1) -> Self {
+        Self {
+            coefficient: model.coefficient(),
+            noise_variance: model.noise_variance(),
+        }
+    }
+}
+
+impl TryFrom<Parameters> for Ar1 {
+    type Error = Error;
+
+    fn try_from(parts: Parameters) -> Result<Self, Error> {
+        Ar1::new_unstable(parts.coefficient, parts.noise_variance)
+    }
+}
 
 impl Ar1 {
     /// The model with coefficient `a` in `[-1, 1]` and noise variance `q >= 0` (state units squared).

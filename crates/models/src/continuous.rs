@@ -14,7 +14,6 @@ use crate::Error;
 use fewbits_core::{Belief, Dynamics, Evolution, Gaussian, GaussianDynamics};
 use fewbits_numerics::error::{ArgumentError, all_finite, finite, non_negative, positive};
 use fewbits_numerics::linalg::{congruence, semidefinite_factor, symmetrised};
-use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -23,21 +22,36 @@ use serde::{Deserialize, Serialize};
 ///
 /// Time is in seconds. The spectral density of the noise is in state units squared per second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Parameters<D>", into = "Parameters<D>")]
+#[serde(try_from = "Parameters<D>")]
 pub struct ContinuousLinear<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     drift: SMatrix<f64, D, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     offset: SVector<f64, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     density: SMatrix<f64, D, D>,
 }
 
-stored! { #[serde(rename = "ContinuousLinear")] [const D: usize] ContinuousLinear as Parameters |model| {
+/// The stored form of [`ContinuousLinear`].
+#[derive(Deserialize)]
+#[serde(rename = "ContinuousLinear")]
+#[serde(deny_unknown_fields)]
+struct Parameters<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
-    drift: SMatrix<f64, D, D> = model.drift,
+    drift: SMatrix<f64, D, D>,
     #[serde(with = "fewbits_numerics::stored")]
-    offset: SVector<f64, D> = model.offset,
+    offset: SVector<f64, D>,
     #[serde(with = "fewbits_numerics::stored")]
-    density: SMatrix<f64, D, D> = model.density,
-} => ContinuousLinear::new(drift, offset, density), Error }
+    density: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> TryFrom<Parameters<D>> for ContinuousLinear<D> {
+    type Error = Error;
+
+    fn try_from(parts: Parameters<D>) -> Result<Self, Error> {
+        ContinuousLinear::new(parts.drift, parts.offset, parts.density)
+    }
+}
 
 impl<const D: usize> ContinuousLinear<D> {
     /// The model with drift `A` (per second), offset `b` (state per second) and noise density `Q_c` (state squared per second).
@@ -164,7 +178,8 @@ impl<const D: usize> ContinuousLinear<D> {
         let norm = (0..D).map(|j| self.drift.column(j).abs().sum()).fold(0.0, f64::max) * seconds;
         finite("seconds", norm)?;
         let doublings = if norm > 0.5 {
-            (2.0 * norm).log2().ceil() as u32
+            // Not of `2 norm`, which may overflow.
+            (norm.log2() + 1.0).ceil() as u32
         } else {
             0
         };

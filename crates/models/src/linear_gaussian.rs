@@ -6,7 +6,6 @@ use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::error::{all_finite, non_negative, refuse};
 use fewbits_numerics::kernels::{StandardNormals, vectorised};
 use fewbits_numerics::linalg::semidefinite_factor;
-use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -26,14 +25,36 @@ pub struct LinearGaussian<const D: usize, const U: usize> {
     noise_covariance: SMatrix<f64, D, D>,
 }
 
-stored! { #[serde(rename = "LinearGaussian")] [const D: usize, const U: usize] LinearGaussian as Parameters |model| {
+/// The stored form of [`LinearGaussian`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "LinearGaussian")]
+#[serde(deny_unknown_fields)]
+struct Parameters<const D: usize, const U: usize> {
     #[serde(with = "fewbits_numerics::stored")]
-    transition: SMatrix<f64, D, D> = model.transition,
+    transition: SMatrix<f64, D, D>,
     #[serde(with = "fewbits_numerics::stored")]
-    gain: SMatrix<f64, D, U> = model.gain,
+    gain: SMatrix<f64, D, U>,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variances: SVector<f64, U> = model.noise_variances,
-} => LinearGaussian::new(transition, gain, noise_variances), Error }
+    noise_variances: SVector<f64, U>,
+}
+
+impl<const D: usize, const U: usize> From<LinearGaussian<D, U>> for Parameters<D, U> {
+    fn from(model: LinearGaussian<D, U>) -> Self {
+        Self {
+            transition: model.transition,
+            gain: model.gain,
+            noise_variances: model.noise_variances,
+        }
+    }
+}
+
+impl<const D: usize, const U: usize> TryFrom<Parameters<D, U>> for LinearGaussian<D, U> {
+    type Error = Error;
+
+    fn try_from(parts: Parameters<D, U>) -> Result<Self, Error> {
+        LinearGaussian::new(parts.transition, parts.gain, parts.noise_variances)
+    }
+}
 
 impl<const D: usize, const U: usize> LinearGaussian<D, U> {
     /// The model with transition `F` (D x D), noise gain `G` (D x U) and noise variances `q` (U).

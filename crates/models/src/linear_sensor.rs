@@ -5,7 +5,6 @@ use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, LinearSensing, Sensing};
 use fewbits_numerics::error::{all_finite, positive};
 use fewbits_numerics::linalg::definite_factor;
-use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -20,12 +19,33 @@ pub struct LinearSensor<const D: usize, const M: usize> {
     noise_factor: SMatrix<f64, M, M>,
 }
 
-stored! { #[serde(rename = "LinearSensor")] [const D: usize, const M: usize] LinearSensor as Parameters |sensor| {
+/// The stored form of [`LinearSensor`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "LinearSensor")]
+#[serde(deny_unknown_fields)]
+struct Parameters<const D: usize, const M: usize> {
     #[serde(with = "fewbits_numerics::stored")]
-    matrix: SMatrix<f64, M, D> = sensor.matrix,
+    matrix: SMatrix<f64, M, D>,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_covariance: SMatrix<f64, M, M> = sensor.noise_covariance,
-} => LinearSensor::new(matrix, noise_covariance), Error }
+    noise_covariance: SMatrix<f64, M, M>,
+}
+
+impl<const D: usize, const M: usize> From<LinearSensor<D, M>> for Parameters<D, M> {
+    fn from(sensor: LinearSensor<D, M>) -> Self {
+        Self {
+            matrix: sensor.matrix,
+            noise_covariance: sensor.noise_covariance,
+        }
+    }
+}
+
+impl<const D: usize, const M: usize> TryFrom<Parameters<D, M>> for LinearSensor<D, M> {
+    type Error = Error;
+
+    fn try_from(parts: Parameters<D, M>) -> Result<Self, Error> {
+        LinearSensor::new(parts.matrix, parts.noise_covariance)
+    }
+}
 
 /// One scalar measurement: `z = h'x + w`, `w ~ N(0, r)`.
 pub type ScalarSensor<const D: usize> = LinearSensor<D, 1>;

@@ -5,7 +5,6 @@ use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, Sensing};
 use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::kernels::vectorised;
-use fewbits_numerics::stored;
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -26,19 +25,51 @@ pub struct ReceivedPower<const D: usize> {
     noise_covariance: Matrix1<f64>,
 }
 
-stored! { #[serde(rename = "ReceivedPower")] [const D: usize] ReceivedPower as Parameters |sensor| {
+/// The stored form of [`ReceivedPower`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "ReceivedPower")]
+#[serde(deny_unknown_fields)]
+struct Parameters<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
-    position: Vector2<f64> = sensor.position,
-    axes: [usize; 2] = sensor.axes,
+    position: Vector2<f64>,
+    axes: [usize; 2],
     #[serde(with = "fewbits_numerics::stored")]
-    power: f64 = sensor.power,
+    power: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    attenuation: f64 = sensor.attenuation,
+    attenuation: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    exponent: f64 = sensor.exponent,
+    exponent: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64 = sensor.noise_variance(),
-} => ReceivedPower::new(position, axes, power, attenuation, exponent, noise_variance), Error }
+    noise_variance: f64,
+}
+
+impl<const D: usize> From<ReceivedPower<D>> for Parameters<D> {
+    fn from(sensor: ReceivedPower<D>) -> Self {
+        Self {
+            position: sensor.position,
+            axes: sensor.axes,
+            power: sensor.power,
+            attenuation: sensor.attenuation,
+            exponent: sensor.exponent,
+            noise_variance: sensor.noise_variance(),
+        }
+    }
+}
+
+impl<const D: usize> TryFrom<Parameters<D>> for ReceivedPower<D> {
+    type Error = Error;
+
+    fn try_from(parts: Parameters<D>) -> Result<Self, Error> {
+        ReceivedPower::new(
+            parts.position,
+            parts.axes,
+            parts.power,
+            parts.attenuation,
+            parts.exponent,
+            parts.noise_variance,
+        )
+    }
+}
 
 impl<const D: usize> ReceivedPower<D> {
     /// The sensor at `position` that senses the source at `(x[axes[0]], x[axes[1]])`.

@@ -8,7 +8,7 @@
 //! | [`factored`] | a covariance factored once, for densities and draws |
 //! | [`linalg`], [`tridiagonal`], [`eigen`] | square roots of singular covariances, tridiagonal systems, eigenvalues |
 //! | [`roots`], [`newton`] | roots inside a bracket, without and with a derivative |
-//! | [`golden`] | the maximum of a function with one peak |
+//! | [`bisect`], [`golden`] | the place where a condition changes; the maximum of a function with one peak |
 //! | [`binomial`], [`LogSum`] | binomial coefficients, sums of exponentials that arrive one by one |
 //! | [`stored!`] | serde forms for types whose constructors check their arguments |
 //! | [`wild`] | extreme numbers for tests: NaN, infinities, the ends of the range |
@@ -57,4 +57,4 @@ pub use linear_algebra::{eigen, factored, linalg, tridiagonal};
 #[cfg(feature = "std")]
 pub use log_sum::LogSum;
 #[cfg(feature = "std")]
-pub use solvers::{golden, newton, roots};
+pub use solvers::{bisect, golden, newton, roots};

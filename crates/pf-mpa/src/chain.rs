@@ -2,24 +2,34 @@
 
 use crate::Error;
 use fewbits_numerics::error::{non_negative, probabilities};
-use fewbits_numerics::stored;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 /// The acceleration of one axis: an independent Markov chain on `(0, +g, -g)`, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredChain", into = "StoredChain")]
+#[serde(try_from = "StoredChain")]
 pub struct AccelerationChain {
     magnitude: f64,
     initial: [f64; 3],
     transition: [[f64; 3]; 3],
 }
 
-stored! { AccelerationChain as StoredChain |chain| {
-    magnitude: f64 = chain.magnitude,
-    initial: [f64; 3] = chain.initial,
-    transition: [[f64; 3]; 3] = chain.transition,
-} => AccelerationChain::new(magnitude, initial, transition), Error }
+/// The stored form of [`AccelerationChain`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredChain {
+    magnitude: f64,
+    initial: [f64; 3],
+    transition: [[f64; 3]; 3],
+}
+
+impl TryFrom<StoredChain> for AccelerationChain {
+    type Error = Error;
+
+    fn try_from(parts: StoredChain) -> Result<Self, Error> {
+        AccelerationChain::new(parts.magnitude, parts.initial, parts.transition)
+    }
+}
 
 impl AccelerationChain {
     /// A chain with accelerations `0`, `+magnitude`, `-magnitude` (length per time squared). `initial` has the probabilities of the first

@@ -9,7 +9,6 @@ use fewbits_core::{Gaussian, Likelihood};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
-use fewbits_numerics::stored;
 use nalgebra::{Matrix2, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -18,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// The proposal's covariance divided by that of Gaussian message passing.
 const INFLATION: f64 = 1.5;
 /// Below this effective sample size the draws do not determine a covariance.
-const LEAST: f64 = 2.5;
+const MIN_EFFECTIVE_SIZE: f64 = 2.5;
 
 /// A Gaussian particle filter whose proposal depends on the observations.
 ///
@@ -33,7 +32,20 @@ pub struct GuidedGaussian {
     draws: usize,
 }
 
-stored! { GuidedGaussian as Stored { draws: usize } => GuidedGaussian::new(draws), Error }
+/// The stored form of [`GuidedGaussian`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    draws: usize,
+}
+
+impl TryFrom<Stored> for GuidedGaussian {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        GuidedGaussian::new(parts.draws)
+    }
+}
 
 /// Buffers that are reused from step to step.
 #[derive(Debug, Clone, Default)]
@@ -86,7 +98,7 @@ impl GuidedGaussian {
         kernels::exp_minus(logs, peak, weights);
         let total = kernels::sum(weights);
         let size = total * total / kernels::dot(weights, weights);
-        if size.is_nan() || size < LEAST {
+        if size.is_nan() || size < MIN_EFFECTIVE_SIZE {
             return Ok(None);
         }
         // Weighted moments. The factor ESS / (ESS - 1) removes the bias of the covariance.

@@ -48,7 +48,6 @@
 #[doc(hidden)]
 pub mod engine {
     pub use crate::chain::draw;
-    pub use crate::leader::lower_factor;
 }
 
 mod bound;
@@ -59,7 +58,6 @@ mod grid;
 mod guided;
 pub mod leader;
 mod linearised;
-pub mod product;
 mod quantized;
 mod rao_blackwell;
 mod recording;

@@ -236,23 +236,14 @@ impl Scheme<1> for QuantizedRange {
             Observation::Received(symbol) => *symbol,
             missing => return Ok(RangeFactor::constant(link.delivery(missing), self.noise)?),
         };
-        let arrives = link.of_received()?;
         if link.crossover() == 0.0 {
-            return Ok(self.cell_factor(symbol.0, reference, arrives)?);
+            return Ok(self.cell_factor(symbol.0, reference, link.of_received()?)?);
         }
         reference.check()?;
-        let (levels, word) = (self.levels(), |symbol: usize| self.labelling.word(symbol).map(u64::from));
-        let Some(received) = word(symbol.0) else {
-            let expected = format!("a symbol below {}", self.labelling.symbols());
-            return Err(ArgumentError::new("symbol", symbol.0, expected).into());
-        };
         // Inverted bits: the mixture over all levels, each with the probability that its word became the received one.
-        let given = |level: usize| {
-            let sent = word(level).unwrap_or(received);
-            arrives * link.word_probability(sent, received, self.bits())
-        };
+        let (levels, given) = (self.levels(), self.labelling.given_levels(symbol, link)?);
         let edges = (0..=levels).map(|q| reference.edge(q, levels)).collect();
-        Ok(RangeFactor::levels(edges, (0..levels).map(given).collect(), self.noise))
+        Ok(RangeFactor::levels(edges, given, self.noise))
     }
 }
 

@@ -11,7 +11,6 @@ use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
-use fewbits_numerics::stored;
 use nalgebra::{Cholesky, Matrix2, SMatrix, Vector2, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -32,7 +31,20 @@ pub struct RaoBlackwellGuided {
     particles: usize,
 }
 
-stored! { RaoBlackwellGuided as Stored { particles: usize } => RaoBlackwellGuided::new(particles), Error }
+/// The stored form of [`RaoBlackwellGuided`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    particles: usize,
+}
+
+impl TryFrom<Stored> for RaoBlackwellGuided {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        RaoBlackwellGuided::new(parts.particles)
+    }
+}
 
 impl RaoBlackwellGuided {
     /// A filter with this many particles.

@@ -6,7 +6,6 @@ use fewbits_core::{Columns, ColumnsMut, OnAxes, Sensing};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{all_finite, finite, non_negative};
 use fewbits_numerics::kernels::vectorised;
-use fewbits_numerics::stored;
 use nalgebra::{Matrix1, RowVector2, RowVector4, Vector1, Vector2, Vector4};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -14,16 +13,27 @@ use serde::{Deserialize, Serialize};
 
 /// Noise of a range: variance `s0^2 + (d / c)^2` at distance `d`. The papers use `s0 = 0`: a constant signal-to-noise ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "Stored")]
 pub struct RangeNoise {
     constant: f64,
     relative: f64,
 }
 
-stored! { RangeNoise as Stored |noise| {
-    constant: f64 = noise.constant,
-    relative: f64 = noise.relative,
-} => RangeNoise::new(constant, relative), Error }
+/// The stored form of [`RangeNoise`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    constant: f64,
+    relative: f64,
+}
+
+impl TryFrom<Stored> for RangeNoise {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        RangeNoise::new(parts.constant, parts.relative)
+    }
+}
 
 impl RangeNoise {
     /// Standard deviation `constant` (length) at distance 0. The other part grows as `relative` = `1 / c` times the distance.
@@ -98,10 +108,22 @@ pub struct RangeSensor {
     noise: RangeNoise,
 }
 
-stored! { #[serde(rename = "RangeSensor")] RangeSensor as Place {
+/// The stored form of [`RangeSensor`].
+#[derive(Deserialize)]
+#[serde(rename = "RangeSensor")]
+#[serde(deny_unknown_fields)]
+struct Place {
     position: Vector2<f64>,
     noise: RangeNoise,
-} => RangeSensor::new(position, noise), Error }
+}
+
+impl TryFrom<Place> for RangeSensor {
+    type Error = Error;
+
+    fn try_from(parts: Place) -> Result<Self, Error> {
+        RangeSensor::new(parts.position, parts.noise)
+    }
+}
 
 impl RangeSensor {
     /// A sensor at `position`.

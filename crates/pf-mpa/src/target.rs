@@ -7,7 +7,6 @@ use fewbits_densities::Particles;
 use fewbits_filters::Imm;
 use fewbits_models::{AffineGaussian, LinearGaussian};
 use fewbits_numerics::error::{non_negative, positive};
-use fewbits_numerics::stored;
 use nalgebra::{Matrix4, Matrix4x2, SVector, Vector2, Vector4, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -16,18 +15,29 @@ use serde::{Deserialize, Serialize};
 /// The target: state `[x, y, vx, vy]`, `X_k = F X_{k-1} + G a_k + G u_k`. On each axis `F = [[1, ts], [0, 1]]` and
 /// `G = [ts^2/2, ts]'`; `u ~ N(0, q)`, and `a` follows an [`AccelerationChain`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredTarget", into = "StoredTarget")]
+#[serde(try_from = "StoredTarget")]
 pub struct Target {
     interval: f64,
     noise_variance: f64,
     chain: AccelerationChain,
 }
 
-stored! { Target as StoredTarget |target| {
-    interval: f64 = target.interval,
-    noise_variance: f64 = target.noise_variance,
-    chain: AccelerationChain = target.chain,
-} => Target::new(interval, noise_variance, chain), Error }
+/// The stored form of [`Target`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredTarget {
+    interval: f64,
+    noise_variance: f64,
+    chain: AccelerationChain,
+}
+
+impl TryFrom<StoredTarget> for Target {
+    type Error = Error;
+
+    fn try_from(parts: StoredTarget) -> Result<Self, Error> {
+        Target::new(parts.interval, parts.noise_variance, parts.chain)
+    }
+}
 
 impl Target {
     /// A target observed every `interval`, with white accelerations of variance `noise_variance` per axis.

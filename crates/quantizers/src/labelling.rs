@@ -1,9 +1,8 @@
 //! The binary word of each level, and the message that carries it.
 
 use crate::error::{Error, refuse};
-use fewbits_core::Message;
 use fewbits_core::bits::{BitReader, BitWriter, CodecError};
-use fewbits_numerics::stored;
+use fewbits_core::{Link, Message};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of bits of a word.
@@ -24,10 +23,30 @@ pub struct Labelling {
     symbols: Vec<u32>,
 }
 
-stored! { Labelling as Stored |labelling| {
-    bits: u32 = labelling.bits,
-    words: Vec<u32> = labelling.words[..labelling.levels].to_vec(),
-} => Labelling::with_words(bits, words), Error }
+/// The stored form of [`Labelling`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    bits: u32,
+    words: Vec<u32>,
+}
+
+impl From<Labelling> for Stored {
+    fn from(labelling: Labelling) -> Self {
+        Self {
+            bits: labelling.bits,
+            words: labelling.words[..labelling.levels].to_vec(),
+        }
+    }
+}
+
+impl TryFrom<Stored> for Labelling {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        Labelling::with_words(parts.bits, parts.words)
+    }
+}
 
 impl Labelling {
     /// Level `z` is sent as the number `z` in `ceil(log2 levels)` bits.
@@ -118,6 +137,18 @@ impl Labelling {
     /// Symbol of a received word; bits above the word length are ignored.
     pub fn symbol(&self, word: u32) -> usize {
         self.symbols[word as usize & (self.symbols.len() - 1)] as usize
+    }
+
+    /// `p(symbol arrives | level i)` over `link`, one entry per level.
+    ///
+    /// # Errors
+    /// If there is no such symbol; [`Impossible`](fewbits_core::Error::Impossible) if nothing arrives over the link.
+    pub fn given_levels(&self, symbol: Symbol, link: &Link) -> Result<Vec<f64>, fewbits_core::Error> {
+        let Some(received) = self.word(symbol.0) else {
+            return refuse("symbol", symbol.0, format!("a symbol below {}", self.symbols()));
+        };
+        let sent = self.words[..self.levels].iter().copied().map(u64::from);
+        link.received_given_words(sent, received.into(), self.bits)
     }
 }
 

@@ -6,7 +6,6 @@ use crate::error::{Error, refuse};
 use fewbits_core::Cell;
 use fewbits_core::factor::{Constant, Partition, Scalar};
 use fewbits_numerics::error::{all_finite, entries, finite, positive};
-use fewbits_numerics::stored;
 use fewbits_numerics::{ArgumentError, normal};
 use serde::{Deserialize, Serialize};
 
@@ -30,10 +29,30 @@ pub struct Quantizer {
     pub(crate) levels: usize,
 }
 
-stored! { Quantizer as Stored |quantizer| {
-    breakpoints: Vec<f64> = quantizer.breakpoints,
-    labels: Vec<usize> = quantizer.labels,
-} => Quantizer::with_labels(breakpoints, labels), Error }
+/// The stored form of [`Quantizer`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    breakpoints: Vec<f64>,
+    labels: Vec<usize>,
+}
+
+impl From<Quantizer> for Stored {
+    fn from(quantizer: Quantizer) -> Self {
+        Self {
+            breakpoints: quantizer.breakpoints,
+            labels: quantizer.labels,
+        }
+    }
+}
+
+impl TryFrom<Stored> for Quantizer {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        Quantizer::with_labels(parts.breakpoints, parts.labels)
+    }
+}
 
 /// Checks that breakpoints are finite and strictly increasing.
 ///

@@ -9,7 +9,6 @@ use fewbits_core::nalgebra::{SMatrix, SVector};
 use fewbits_core::rand::Rng;
 use fewbits_core::{Deterministic, Link, MeasurementNoise, Observation, Scheme};
 use fewbits_numerics::error::positive;
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// A sensor that reports the level of its scalar sample in every slot, as a [`Scheme`](fewbits_core::Scheme) that every filter accepts.
@@ -30,18 +29,29 @@ use serde::{Deserialize, Serialize};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "Stored")]
 pub struct QuantizingSensor {
     quantizer: Quantizer,
     labelling: Labelling,
     noise_variance: f64,
 }
 
-stored! { QuantizingSensor as Stored |sensor| {
-    quantizer: Quantizer = sensor.quantizer,
-    labelling: Labelling = sensor.labelling,
-    noise_variance: f64 = sensor.noise_variance,
-} => QuantizingSensor::with_variance(quantizer, labelling, noise_variance), Error }
+/// The stored form of [`QuantizingSensor`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    quantizer: Quantizer,
+    labelling: Labelling,
+    noise_variance: f64,
+}
+
+impl TryFrom<Stored> for QuantizingSensor {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        QuantizingSensor::with_variance(parts.quantizer, parts.labelling, parts.noise_variance)
+    }
+}
 
 impl QuantizingSensor {
     /// A sensor with this quantizer and these words, whose samples have noise of variance `noise_variance`.
@@ -112,17 +122,7 @@ impl Scheme<1> for QuantizingSensor {
             Observation::Received(symbol) => *symbol,
             missing => return Ok(Constant::of_delivery(missing, link).into()),
         };
-        let arrival = link.of_received()?;
-        let word = |symbol: usize| self.labelling.word(symbol).map(u64::from);
-        let Some(received) = word(symbol.0) else {
-            return refuse("symbol", symbol.0, format!("a number below {}", self.labelling.symbols()));
-        };
-        // p(word received | level) = arrival c^d (1 - c)^(bits - d), `d` the bits in which the words differ.
-        let given_level = |level: usize| {
-            // A level below `levels` always has a word.
-            let sent = word(level).unwrap_or(received);
-            arrival * link.word_probability(sent, received, self.labelling.bits())
-        };
-        Ok(self.quantizer.factor_of(self.noise_variance, given_level)?)
+        let given = self.labelling.given_levels(symbol, link)?;
+        Ok(self.quantizer.factor_of(self.noise_variance, |level| given[level])?)
     }
 }

@@ -56,6 +56,25 @@ pub enum Error {
         #[source]
         source: fewbits_record::Error,
     },
+    /// The text of a setting is not in its language.
+    #[error("{setting}: `{value}` is not understood: expected {expected}")]
+    Setting {
+        /// The setting.
+        setting: &'static str,
+        /// Its text.
+        value: String,
+        /// What it should look like.
+        expected: &'static str,
+    },
+    /// Settings were refused, or do not go together.
+    #[error("{what}")]
+    Refused {
+        /// The settings.
+        what: &'static str,
+        /// Why.
+        #[source]
+        source: Failure,
+    },
     /// The recorder or the reader of a recording failed.
     #[error(transparent)]
     Record(#[from] fewbits_record::Error),

@@ -41,11 +41,13 @@
 //! | bits that a table would need | [`plan`] |
 //! | rows into a recording | [`pack`] |
 //! | a recording against its table | [`verify`] |
+//! | quantizers for an unknown that several sensors measure | [`design`] |
 //!
 //! Not here: files, printing and options (`fewbits-cli`), the format (`fewbits-record`), how values are predicted and coded
 //! (`fewbits-adaptive`).
 
 pub mod bounds;
+pub mod design;
 mod error;
 pub mod names;
 pub mod pack;

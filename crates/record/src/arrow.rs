@@ -5,7 +5,7 @@
 //! | time base | field of time |
 //! |---|---|
 //! | numbered | `row`: 64-bit integers |
-//! | UTC with 0, 3, 6 or 9 decimals | `time`: timestamps in UTC of that unit |
+//! | UTC or local, with 0, 3, 6 or 9 decimals | `time`: timestamps of that unit, in UTC or without a zone |
 //! | any other | `time`: 64-bit integers, ticks; metadata `decimals` |
 
 use crate::block::{Block, Cells};
@@ -33,7 +33,7 @@ fn unit_of(time: TimeBase) -> Option<TimeUnit> {
     match time {
         TimeBase::Clock {
             decimals,
-            format: TimeFormat::Utc,
+            format: TimeFormat::Utc | TimeFormat::Local,
             ..
         } => match decimals {
             0 => Some(TimeUnit::Second),
@@ -44,6 +44,18 @@ fn unit_of(time: TimeBase) -> Option<TimeUnit> {
         },
         _ => None,
     }
+}
+
+/// The zone of timestamps; `None` for local times.
+fn zone_of(time: TimeBase) -> Option<Arc<str>> {
+    let is_utc = matches!(
+        time,
+        TimeBase::Clock {
+            format: TimeFormat::Utc,
+            ..
+        }
+    );
+    is_utc.then(|| "UTC".into())
 }
 
 fn decimals_of(unit: TimeUnit) -> u8 {
@@ -59,7 +71,7 @@ impl Schema {
     /// The fields of batches of this recording. Units, and the decimals of ticks, are in the metadata.
     pub fn to_arrow(&self) -> arrow_schema::Schema {
         let time = match (self.time, unit_of(self.time)) {
-            (_, Some(unit)) => Field::new("time", DataType::Timestamp(unit, Some("UTC".into())), false),
+            (_, Some(unit)) => Field::new("time", DataType::Timestamp(unit, zone_of(self.time)), false),
             (TimeBase::Clock { decimals, .. }, None) => {
                 let decimals = HashMap::from([("decimals".to_owned(), decimals.to_string())]);
                 Field::new("time", DataType::Int64, false).with_metadata(decimals)
@@ -91,10 +103,10 @@ impl Block {
         }
         let ticks = || self.ticks.iter().copied();
         let time: ArrayRef = match unit_of(schema.time) {
-            Some(TimeUnit::Second) => stamps::<TimestampSecondType>(ticks()),
-            Some(TimeUnit::Millisecond) => stamps::<TimestampMillisecondType>(ticks()),
-            Some(TimeUnit::Microsecond) => stamps::<TimestampMicrosecondType>(ticks()),
-            Some(TimeUnit::Nanosecond) => stamps::<TimestampNanosecondType>(ticks()),
+            Some(TimeUnit::Second) => stamps::<TimestampSecondType>(ticks(), zone_of(schema.time)),
+            Some(TimeUnit::Millisecond) => stamps::<TimestampMillisecondType>(ticks(), zone_of(schema.time)),
+            Some(TimeUnit::Microsecond) => stamps::<TimestampMicrosecondType>(ticks(), zone_of(schema.time)),
+            Some(TimeUnit::Nanosecond) => stamps::<TimestampNanosecondType>(ticks(), zone_of(schema.time)),
             None => Arc::new(Int64Array::from_iter_values(ticks())),
         };
         let asked = (0..self.columns.len()).filter(|i| self.columns[*i].len() == self.rows());
@@ -108,22 +120,11 @@ impl Block {
     }
 }
 
-fn stamps<T: ArrowPrimitiveType<Native = i64>>(ticks: impl Iterator<Item = i64>) -> ArrayRef
+fn stamps<T>(ticks: impl Iterator<Item = i64>, zone: Option<Arc<str>>) -> ArrayRef
 where
-    PrimitiveArray<T>: From<Vec<i64>> + TimeZoned,
+    T: arrow_array::types::ArrowTimestampType,
 {
-    Arc::new(PrimitiveArray::<T>::from(ticks.collect::<Vec<i64>>()).in_utc())
-}
-
-/// A timestamp array with a time zone.
-trait TimeZoned {
-    fn in_utc(self) -> Self;
-}
-
-impl<T: arrow_array::types::ArrowTimestampType> TimeZoned for PrimitiveArray<T> {
-    fn in_utc(self) -> Self {
-        self.with_timezone("UTC")
-    }
+    Arc::new(PrimitiveArray::<T>::from_iter_values(ticks).with_timezone_opt(zone))
 }
 
 /// The cells of an array of numbers, `None` for nulls.

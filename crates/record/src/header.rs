@@ -113,6 +113,7 @@ impl Header {
                 body.push(match format {
                     TimeFormat::Seconds => 1,
                     TimeFormat::Utc => 2,
+                    TimeFormat::Local => 3,
                 });
                 body.push(decimals);
                 push_varint(&mut body, tolerance);
@@ -172,6 +173,7 @@ impl Header {
             0 => None,
             1 => Some(TimeFormat::Seconds),
             2 => Some(TimeFormat::Utc),
+            3 => Some(TimeFormat::Local),
             _ => return Err(damaged(Damage::Content("time base"))),
         };
         let time = match format {

@@ -160,6 +160,8 @@ pub enum TimeFormat {
     Seconds,
     /// Coordinated universal time since 1970, as in RFC 3339.
     Utc,
+    /// Time since 1970 on a clock whose zone is not known, as in RFC 3339 without an offset.
+    Local,
 }
 
 /// How rows are related to time.

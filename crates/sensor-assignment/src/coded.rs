@@ -7,7 +7,6 @@ use fewbits_binary_patterns::{
 use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of sensors: there are `2^N` cells.
@@ -34,10 +33,30 @@ pub struct CodedSensors {
     pub(crate) probability: Vec<Vec<[Vec<f64>; 2]>>,
 }
 
-stored! { CodedSensors as StoredSensors |sensors| {
-    half_width: f64 = sensors.half_width,
-    noise_deviations: Vec<f64> = sensors.noise_deviations,
-} => CodedSensors::with_deviations(half_width, &noise_deviations), Error }
+/// The stored form of [`CodedSensors`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredSensors {
+    half_width: f64,
+    noise_deviations: Vec<f64>,
+}
+
+impl From<CodedSensors> for StoredSensors {
+    fn from(sensors: CodedSensors) -> Self {
+        Self {
+            half_width: sensors.half_width,
+            noise_deviations: sensors.noise_deviations,
+        }
+    }
+}
+
+impl TryFrom<StoredSensors> for CodedSensors {
+    type Error = Error;
+
+    fn try_from(parts: StoredSensors) -> Result<Self, Error> {
+        CodedSensors::with_deviations(parts.half_width, &parts.noise_deviations)
+    }
+}
 
 impl CodedSensors {
     /// The sensors from the half width of the uniform source and each sensor's noise VARIANCE.

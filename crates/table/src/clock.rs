@@ -3,10 +3,16 @@
 use crate::column::{Column, Kind};
 use crate::dialect::Dialect;
 use crate::error::Error;
-use crate::time::{self, Clock, Order, Problem, Scale, Syntax, Unit};
+use crate::guess;
+use crate::time::{Scale, Unit};
+use crate::written::{self, Clock, Order, Problem, Syntax};
 
 /// Names of a column that is taken as time, if no column has dates.
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 18] = [
+    "second",
+    "sec",
+    "zeitstempel",
+    "when",
     "time",
     "timestamp",
     "datetime",
@@ -35,7 +41,7 @@ fn is_time_name(name: &str) -> bool {
 }
 
 /// The columns that give the time by their kinds and names; `None` if none does for certain.
-pub(crate) fn guess(columns: &[Column], dialect: &Dialect) -> Option<Vec<usize>> {
+pub(crate) fn guess(columns: &[Column], dialect: &Dialect, is_certain: bool) -> Option<Vec<usize>> {
     let named = |name: &str| columns.iter().position(|column| column.own_name.to_lowercase() == name);
     if dialect.format.as_deref() == Some("EPW") {
         return Some((0..5).collect());
@@ -58,9 +64,13 @@ pub(crate) fn guess(columns: &[Column], dialect: &Dialect) -> Option<Vec<usize>>
         }
     }
     let exact = NAMES.iter().find_map(|name| named(name));
-    exact
-        .or_else(|| columns.iter().position(|column| is_time_name(&column.own_name)))
-        .map(|column| vec![column])
+    let like = || {
+        columns
+            .iter()
+            .position(|column| is_time_name(&column.own_name))
+            .filter(|_| !is_certain)
+    };
+    exact.or_else(like).map(|column| vec![column])
 }
 
 /// Meanings of columns of numbers that give a date together.
@@ -88,7 +98,7 @@ fn offset_in(name: &str) -> Option<String> {
         .chars()
         .take_while(|c| c.is_ascii_digit() || "+-:".contains(*c))
         .collect();
-    time::offset(&text).map(|_| text)
+    written::offset(&text).map(|_| text)
 }
 
 /// How times of these columns are written, by what is said and by a sample of their cells (joined by a space).
@@ -118,11 +128,11 @@ pub(crate) fn clock(
                 let expected = "`dmy`, `mdy`, `ymd`, the unit of numbers `s`, `ms`, `us` or `ns`, or a format as '%d.%m.%Y %H:%M:%S'";
                 return Err(Ok(Error::option("--time-format", other, expected)));
             }
-            None => written(&cells)?,
+            None => majority(&cells)?,
         }
     };
     let has_offset = match &syntax {
-        Syntax::Date(order) => cells.iter().any(|cell| time::has_offset(cell, *order)),
+        Syntax::Date(order) => cells.iter().any(|cell| guess::has_offset(cell, *order)),
         Syntax::Format(format) => ["%z", "%:z", "%Q", "%s", "%c"].iter().any(|part| format.contains(part)),
         _ => false,
     };
@@ -155,7 +165,7 @@ pub(crate) fn clock(
         let text = ["s", "ms", "us", "ns"][usize::from(unit.decimals() / 3)];
         dialect.time_format = Some(text.to_owned());
     }
-    let zone = zone_text.as_deref().and_then(time::zone);
+    let zone = zone_text.as_deref().and_then(written::zone);
     Ok(Clock {
         syntax,
         zone,
@@ -166,17 +176,19 @@ pub(crate) fn clock(
 }
 
 /// How most of the cells are written: a garbled one must not decide.
-fn written(cells: &[&str]) -> Result<Syntax, Result<Error, (usize, Problem)>> {
+fn majority(cells: &[&str]) -> Result<Syntax, Result<Error, (usize, Problem)>> {
     if cells.is_empty() {
         return Ok(Syntax::Number(Unit::Seconds));
     }
-    let found = time::detect(cells).or_else(|| {
+    let found = guess::detect(cells).or_else(|| {
         let good: Vec<&str> = cells
             .iter()
             .copied()
-            .filter(|cell| time::detect(&[cell]).is_some())
+            .filter(|cell| guess::detect(&[cell]).is_some())
             .collect();
-        (2 * good.len() > cells.len()).then(|| time::detect(&good)).flatten()
+        (2 * good.len() >= cells.len() && !good.is_empty())
+            .then(|| guess::detect(&good))
+            .flatten()
     });
     match found {
         Some(Ok(syntax)) => Ok(syntax),
@@ -184,9 +196,9 @@ fn written(cells: &[&str]) -> Result<Syntax, Result<Error, (usize, Problem)>> {
         None => {
             let first = cells
                 .iter()
-                .position(|cell| time::detect(&[cell]).is_none())
+                .position(|cell| guess::detect(&[cell]).is_none())
                 .unwrap_or(0);
-            Err(Err((first, time::NO_TIME)))
+            Err(Err((first, written::NO_TIME)))
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
-use crate::lines::{Row, Split};
-use crate::{known, missing, number, time};
+use crate::lines::{MAX_ROW_LINES, Row, Split};
+use crate::{guess, known, missing, number};
 use std::io::BufRead;
 
 /// Largest number of lines and of bytes that are examined.
@@ -41,8 +41,13 @@ impl Head {
         if !ended || pieces.last().is_some_and(|piece| piece.is_empty()) {
             pieces.pop();
         }
-        let text = |line: &[u8]| String::from_utf8_lossy(line).trim_end_matches(['\r', '\n']).to_owned();
-        let lines = (1..).zip(pieces.iter().map(|line| text(line))).collect();
+        // Ends of lines of several systems in one file: as `Lines` splits them.
+        let parts = pieces.iter().flat_map(|line| {
+            let trimmed = line.len() - line.iter().rev().take_while(|c| matches!(c, b'\r' | b'\n')).count();
+            line[..trimmed].split(|c| *c == b'\r')
+        });
+        let text = |line: &[u8]| String::from_utf8_lossy(line).into_owned();
+        let lines = (1..).zip(parts.map(text)).collect();
         Ok(Self { bytes, lines, end })
     }
 }
@@ -84,7 +89,7 @@ fn look(cell: &str, decimal_comma: bool) -> Look {
         Look::Missing
     } else if number::parse(cell.as_bytes(), syntax).is_ok() {
         Look::Number
-    } else if time::looks_like_time(cell) {
+    } else if guess::looks_like_time(cell) {
         Look::Time
     } else {
         Look::Text
@@ -190,6 +195,8 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
     if let Some(skip) = dialect.skip {
         lines.drain(..lines.len().min(usize::try_from(skip).unwrap_or(usize::MAX)));
     }
+    let joined = joined(&lines);
+    let lines: Vec<(u64, &str)> = joined.iter().map(|(number, line)| (*number, line.as_str())).collect();
     let filled: Vec<&str> = lines
         .iter()
         .map(|(_, line)| *line)
@@ -223,6 +230,32 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
     }
     let lines_before = |number: u64| lines.iter().filter(|(line, _)| *line < number).count() as u64;
     layout(&rows, &comments, count, split, dialect, &lines_before)
+}
+
+/// Lines with those that follow within an open quote.
+fn joined(lines: &[(u64, &str)]) -> Vec<(u64, String)> {
+    let quotes = |line: &str| line.bytes().filter(|c| *c == b'"').count();
+    let (mut rows, mut at) = (Vec::new(), 0);
+    while at < lines.len() {
+        let (number, first) = lines[at];
+        let mut count = quotes(first);
+        let limit = lines.len().min(at + 1 + MAX_ROW_LINES);
+        let end = (at + 1..limit).find(|end| {
+            let is_closed = count % 2 == 0;
+            count += quotes(lines[*end].1);
+            is_closed
+        });
+        // A quote that never closes is a mark like others.
+        let end = if quotes(first) % 2 == 0 {
+            at + 1
+        } else {
+            end.or((count % 2 == 0).then_some(limit)).unwrap_or(at + 1)
+        };
+        let text: Vec<&str> = lines[at..end].iter().map(|(_, line)| *line).collect();
+        rows.push((number, text.join("\n")));
+        at = end;
+    }
+    rows
 }
 
 /// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.
@@ -288,41 +321,41 @@ fn layout(
             ..Layout::default()
         });
     }
+    // Names may stand in the last comment before the data.
+    let in_comment = || {
+        let (number, line) = comments.iter().rev().find(|(number, _)| number < first_number)?;
+        let mark = dialect.comment.as_deref().unwrap_or("#");
+        let names = cells(line.trim_start_matches(mark).trim(), split);
+        let are_names = names.len() == first.len() && names.iter().all(|name| look(name, comma) == Look::Text);
+        are_names.then_some((*number, names))
+    };
+    let in_comment = if looks.first().is_some_and(is_data) {
+        in_comment()
+    } else {
+        None
+    };
+    if let Some(names) = in_comment {
+        dialect.skip.get_or_insert(0);
+        dialect.no_header.get_or_insert(false);
+        return Ok(Layout {
+            names: Some(names),
+            units: Vec::new(),
+            first_line: *first_number,
+        });
+    }
     if has_header_said {
         return Ok(from_header(rows, 0, dialect));
     }
     let data = looks.iter().position(is_data);
     match data {
-        // Names may stand in the last comment before the data.
-        Some(0) => {
-            let named = comments
-                .iter()
-                .rev()
-                .find(|(number, _)| number < first_number)
-                .map(|(number, line)| {
-                    let mark = dialect.comment.as_deref().unwrap_or("#");
-                    (*number, cells(line.trim_start_matches(mark).trim(), split))
-                });
-            if let Some((number, names)) = named
-                && names.len() == first.len()
-                && names.iter().all(|name| look(name, comma) == Look::Text)
-            {
-                dialect.skip.get_or_insert(0);
-                return Ok(Layout {
-                    names: Some((number, names)),
-                    units: Vec::new(),
-                    first_line: *first_number,
-                });
-            }
-            Err(Error::Line {
-                place: Place {
-                    line: *first_number,
-                    row: 0,
-                },
-                problem: "there is no line of names: the first line is a row of numbers".to_owned(),
-                mend: "say --no-header if it is a row, or --skip 0 if these are the names",
-            })
-        }
+        Some(0) => Err(Error::Line {
+            place: Place {
+                line: *first_number,
+                row: 0,
+            },
+            problem: "there is no line of names: the first line is a row of numbers".to_owned(),
+            mend: "say --no-header if it is a row, or --skip 0 if these are the names",
+        }),
         Some(data) => {
             let mut header = data - 1;
             if dialect.units_row.is_none() && dialect.skip_after_names.is_none() {

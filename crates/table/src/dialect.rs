@@ -187,7 +187,7 @@ impl Dialect {
             return Err(Error::option("--encoding", label, "a label such as `utf-8`, `latin1` or `utf-16le`"));
         }
         if let Some(zone) = &self.time_zone
-            && crate::time::zone(zone).is_none()
+            && crate::written::zone(zone).is_none()
         {
             return Err(Error::option("--time-zone", zone, "a name, as Europe/Berlin, or an offset, as +01:00"));
         }

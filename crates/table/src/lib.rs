@@ -46,6 +46,7 @@ mod column;
 mod detect;
 mod dialect;
 mod error;
+mod guess;
 mod json;
 mod known;
 mod lines;
@@ -56,13 +57,17 @@ mod open;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod profile;
+mod read;
 mod source;
+mod survey;
 mod table;
 mod time;
+mod written;
 
 pub use column::{Batch, Cells, Column, Kind, MAX_WORDS};
 pub use dialect::Dialect;
 pub use error::{Error, Place, printable};
 pub use profile::{Profile, Sentinel};
-pub use table::{Skipped, Survey, Table, Times};
+pub use survey::{Survey, Times};
+pub use table::{Skipped, Table};
 pub use time::{DECIMALS, Scale, Time, Unit};

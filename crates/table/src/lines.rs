@@ -11,7 +11,7 @@ use std::io::{BufRead, Read};
 /// Largest length of a line, and of a row with quoted line ends, in bytes.
 pub(crate) const MAX_LINE: usize = 1 << 20;
 /// Largest number of lines of a row.
-const MAX_ROW_LINES: usize = 64;
+pub(crate) const MAX_ROW_LINES: usize = 64;
 
 /// Lines of a text.
 pub(crate) struct Lines {
@@ -242,6 +242,7 @@ impl Split {
 
     /// Splits a line that was read into `row.text`, with further lines if a quote is open at its end.
     pub(crate) fn complete(&self, lines: &mut Lines, row: &mut Row, found: &Line) -> Result<(), Error> {
+        row.cells.clear();
         match found {
             Line::TooLong(line) => return Err(too_long(*line)),
             Line::Text(line) => row.line = *line,
@@ -270,6 +271,8 @@ impl Split {
             }
         }
         lines.put_back(taken);
+        row.text.clear();
+        row.cells.clear();
         Err(Error::Line {
             place: Place { line: row.line, row: 0 },
             problem: "a quote does not close".to_owned(),

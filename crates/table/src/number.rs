@@ -191,6 +191,21 @@ pub(crate) fn hint(text: &str) -> &'static str {
     }
 }
 
+/// Whether a text is likely a number of another spelling, with groups, a decimal comma or a unit.
+pub(crate) fn looks_like_number(text: &str) -> bool {
+    let size = text.trim_start_matches(['-', '+', '\'', '\u{2212}']);
+    if !size.starts_with(|c: char| c.is_ascii_digit()) {
+        return false;
+    }
+    let is_plain = size.bytes().all(|c| c.is_ascii_digit() || b".,' ".contains(&c));
+    let has_unit = without_unit(size).is_some_and(|(number, unit)| {
+        let is_spaced = size.as_bytes().get(number.len()) == Some(&b' ');
+        number.parse::<f64>().is_ok()
+            && (unit.starts_with(['%', '°', 'µ']) || (is_spaced && unit.len() <= 6 && !unit.contains(' ')))
+    });
+    is_plain || has_unit
+}
+
 /// The number in front of a unit, as `19.75` of `19.75 °C`.
 pub(crate) fn without_unit(text: &str) -> Option<(&str, &str)> {
     let end = text.rfind(|c: char| c.is_ascii_digit())? + 1;

@@ -6,7 +6,9 @@ use crate::dialect::Dialect;
 use crate::error::{Error, Place, printable};
 use crate::names;
 use crate::profile::Profile;
-use crate::table::{Meaning, Survey, Table, push_cell};
+use crate::read::{Meaning, push_cell};
+use crate::survey::Survey;
+use crate::table::Table;
 use crate::time::{Scale, Time};
 use ::parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use ::parquet::file::reader::ChunkReader;
@@ -230,6 +232,7 @@ impl Table {
                         strips: self.dialect.strip_units,
                         clock: self.clocks[*column].as_ref(),
                         kind: self.columns[*column].kind,
+                        is_fixed: self.is_fixed[*column],
                     };
                     push_cell(into, rows.text(*column).trim(), &meaning, &mut self.words[*column])
                 }

@@ -2,9 +2,9 @@
 
 use crate::column::{Kind, MAX_WORDS};
 use crate::error::Place;
+use crate::guess;
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
-use crate::time;
 use std::collections::BTreeMap;
 
 /// Number of cells that are kept to find out how times are written.
@@ -25,6 +25,8 @@ pub struct Profile {
     booleans: u64,
     times: u64,
     texts: u64,
+    /// Texts that look like numbers of another spelling.
+    faults: u64,
     /// Gaps by their spelling.
     pub missing: BTreeMap<String, u64>,
     /// Words and how often each occurs, up to [`MAX_WORDS`] and one more.
@@ -170,9 +172,11 @@ impl Profile {
             // A gap among numbers, a word among words.
             self.gap(cell);
             return;
-        } else if time::looks_like_time(cell) {
+        } else if guess::looks_like_time(cell) {
             self.times += 1;
             return;
+        } else if number::looks_like_number(cell) {
+            self.faults += 1;
         } else {
             self.texts += 1;
         }
@@ -236,7 +240,7 @@ impl Profile {
 
     /// The kind of the column.
     pub fn kind(&self) -> Kind {
-        let numbers = self.numbers + self.integers;
+        let numbers = self.numbers + self.integers + self.faults;
         let words = self.texts + self.booleans;
         if numbers >= words.max(self.times).max(1) {
             // Few words among numbers are faults, not words of an enumeration.
@@ -259,6 +263,23 @@ impl Profile {
         }
     }
 
+    /// The words of a column of words, in the order of their letters; the usual words for a gap among numbers are words here.
+    pub(crate) fn all_words(&self, gaps: &Spellings) -> Vec<String> {
+        let usual = self
+            .missing
+            .keys()
+            .filter(|word| !missing::is_usual(word, false) && !gaps.has_text(word));
+        let mut words: Vec<String> = self.words.keys().chain(usual).cloned().collect();
+        words.sort_unstable();
+        words.truncate(MAX_WORDS);
+        words
+    }
+
+    /// Number of cells that are no gaps.
+    pub fn values(&self) -> u64 {
+        self.numbers + self.integers + self.booleans + self.times + self.texts + self.faults
+    }
+
     /// Number of gaps.
     pub fn gaps(&self) -> u64 {
         self.missing.values().sum()
@@ -267,8 +288,8 @@ impl Profile {
     /// Cells that are neither gaps nor of the column's kind.
     pub fn suspicious(&self) -> u64 {
         match self.kind() {
-            Kind::Number | Kind::Integer => self.texts + self.booleans + self.times,
-            Kind::Time => self.texts + self.booleans + self.numbers + self.integers,
+            Kind::Number | Kind::Integer => self.faults + self.texts + self.booleans + self.times,
+            Kind::Time => self.faults + self.texts + self.booleans + self.numbers + self.integers,
             _ => 0,
         }
     }

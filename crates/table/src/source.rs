@@ -88,6 +88,7 @@ fn text_within(
         decoder: encoding.new_decoder_without_bom_handling(),
         raw: Vec::new(),
         ended: false,
+        finished: false,
     };
     Ok((Box::new(BufReader::with_capacity(CHUNK, decoded)), Some(encoding.name().to_ascii_lowercase())))
 }
@@ -98,6 +99,7 @@ struct Decoded {
     decoder: Decoder,
     raw: Vec<u8>,
     ended: bool,
+    finished: bool,
 }
 
 impl Read for Decoded {
@@ -107,6 +109,9 @@ impl Read for Decoded {
             return Ok(0);
         }
         loop {
+            if self.finished {
+                return Ok(0);
+            }
             if self.raw.is_empty() && !self.ended {
                 let mut chunk = vec![0; CHUNK.min(target.len())];
                 let count = self.source.read(&mut chunk)?;
@@ -116,7 +121,8 @@ impl Read for Decoded {
             }
             let (result, used, written, _) = self.decoder.decode_to_utf8(&self.raw, target, self.ended);
             self.raw.drain(..used);
-            if written > 0 || (self.ended && self.raw.is_empty() && result == CoderResult::InputEmpty) {
+            self.finished = self.ended && self.raw.is_empty() && result == CoderResult::InputEmpty;
+            if written > 0 {
                 return Ok(written);
             }
         }

@@ -1,19 +1,18 @@
-//! Reading a table: rows of text become cells of columns.
+//! A table: its columns, which of them are read, and which give the time.
 
 use crate::clock;
-use crate::column::{Batch, Cells, Column, Kind, MAX_WORDS};
+use crate::column::{Column, Kind};
 use crate::dialect::Dialect;
 use crate::error::{Error, Place, listed, printable};
 use crate::lines::Row;
-use crate::missing::{self, Spellings};
+use crate::missing::Spellings;
 use crate::names;
-use crate::number::{self, Number};
+use crate::number;
 use crate::open::Rows;
-use crate::profile::{Profile, boolean};
-use crate::time::{Clock, Scale, Time};
-
-/// Largest number of lines that were left out and whose faults are kept.
-const MAX_FAULTS: usize = 10;
+use crate::profile::Profile;
+use crate::survey::Survey;
+use crate::time::Scale;
+use crate::written::Clock;
 
 /// A table that is read from front to end.
 pub struct Table {
@@ -28,15 +27,17 @@ pub struct Table {
     pub(crate) profiles: Vec<Profile>,
     /// Words of each column, by their indices, and the clocks of columns of times.
     pub(crate) words: Vec<Vec<String>>,
+    /// Whether no further words may come.
+    pub(crate) is_fixed: Vec<bool>,
     pub(crate) clocks: Vec<Option<Clock>>,
     pub(crate) selected: Vec<usize>,
     pub(crate) time: Option<(Vec<usize>, Clock)>,
     pub(crate) label: Option<usize>,
-    row: Row,
+    pub(crate) row: Row,
     pub(crate) count: u64,
     pub(crate) skipped: Skipped,
     /// An error that came behind rows that were handed out first.
-    late_error: Option<Error>,
+    pub(crate) late_error: Option<Error>,
 }
 
 /// Lines that were left out.
@@ -77,6 +78,7 @@ impl Table {
             dialect,
             syntax,
             words: vec![Vec::new(); count],
+            is_fixed: vec![false; count],
             clocks: vec![None; count],
             selected: (0..count).collect(),
             time: None,
@@ -95,6 +97,9 @@ impl Table {
         }
         let kinds: Vec<Kind> = table.profiles.iter().map(Profile::kind).collect();
         table.set_kinds(&kinds);
+        let profiles = std::mem::take(&mut table.profiles);
+        table.set_words(&profiles);
+        table.profiles = profiles;
         table.set_said_time()?;
         Ok(table)
     }
@@ -155,6 +160,7 @@ impl Table {
 
     /// Uses what a [`survey`](Self::survey) of the same table found: the kinds of columns over all rows.
     pub fn use_survey(&mut self, survey: &Survey) {
+        self.set_words(&survey.columns);
         #[cfg(feature = "parquet")]
         if self.arrow.is_some() {
             self.set_arrow_kinds(&survey.columns);
@@ -162,6 +168,27 @@ impl Table {
         }
         let kinds: Vec<Kind> = survey.columns.iter().map(Profile::kind).collect();
         self.set_kinds(&kinds);
+    }
+
+    fn set_words(&mut self, profiles: &[Profile]) {
+        for (i, profile) in profiles.iter().enumerate().take(self.words.len()) {
+            if profile.kind() == Kind::Words {
+                self.words[i] = profile.all_words(&self.gaps[i]);
+            }
+        }
+    }
+
+    /// States the words of a column: its cells are indices into this list, and other words are refused.
+    pub fn fix_words(&mut self, column: usize, words: Vec<String>) {
+        if let (Some(known), Some(is_fixed), Some(kind)) = (
+            self.words.get_mut(column),
+            self.is_fixed.get_mut(column),
+            self.columns.get_mut(column).map(|column| &mut column.kind),
+        ) {
+            *known = words;
+            *is_fixed = true;
+            *kind = Kind::Words;
+        }
     }
 
     /// How the table is written, completed by what was detected.
@@ -244,7 +271,19 @@ impl Table {
     /// # Errors
     /// If the cells are no times, or may have the day or the month first.
     pub fn find_time(&mut self) -> Result<bool, Error> {
-        match clock::guess(&self.columns, &self.dialect) {
+        self.find(false)
+    }
+
+    /// As [`find_time`](Self::find_time), but a column of numbers is the time only if its whole name says so: `time`, not `idle_time`.
+    ///
+    /// # Errors
+    /// As [`find_time`](Self::find_time).
+    pub fn find_certain_time(&mut self) -> Result<bool, Error> {
+        self.find(true)
+    }
+
+    fn find(&mut self, is_certain: bool) -> Result<bool, Error> {
+        match clock::guess(&self.columns, &self.dialect, is_certain) {
             Some(columns) => self.set_time_columns(columns).map(|()| true),
             None => Ok(false),
         }
@@ -260,7 +299,7 @@ impl Table {
                 .time_zone
                 .as_deref()
                 .filter(|_| scale == Scale::Local)
-                .and_then(crate::time::zone);
+                .and_then(crate::written::zone);
             let scale = if zone.is_some() { Scale::Utc } else { scale };
             self.dialect.time_column = vec![self.columns[*column].name.clone()];
             self.selected.retain(|other| other != column);
@@ -311,12 +350,20 @@ impl Table {
             .map(|(columns, clock)| (columns.as_slice(), clock.scale))
     }
 
-    /// Lets times be off a little: leap seconds become the next second, and decimals beyond the 18th are cut.
-    pub fn allow_inexact_times(&mut self) {
+    /// Lets times be off by so much: decimals beyond the 18th are cut if it is not 0, and a leap second becomes the next second if it is a
+    /// second or more.
+    pub fn allow_inexact_times(&mut self, nanoseconds: u64) {
         if let Some((_, clock)) = &mut self.time {
-            clock.takes_leap_seconds = true;
-            clock.cuts = true;
+            clock.takes_leap_seconds = nanoseconds >= 1_000_000_000;
+            clock.cuts = nanoseconds > 0;
         }
+    }
+
+    /// Whether the first lines have numbers in every selected column, and nothing else: then nothing is learned by a
+    /// [`survey`](Self::survey) of their kinds.
+    pub fn is_plain(&self) -> bool {
+        let mut selected = self.selected.iter();
+        selected.all(|i| self.columns[*i].kind == Kind::Number && self.profiles[*i].numbers > 0)
     }
 
     /// Keeps the text of a column for [`label`](Self::label), as the names of what rows report; it is then no column of values.
@@ -337,361 +384,5 @@ impl Table {
             return &rows.label;
         }
         self.label.map_or("", |column| self.row.cell_text(column))
-    }
-
-    /// Reads at most `limit` rows into `batch`. Returns how many there were; 0 after the last. Of a live source, a call with a limit of 1
-    /// waits for no more than one row.
-    ///
-    /// # Errors
-    /// If a line or a cell cannot be read and no more may be left out. Rows before it are handed out first. After an error in one line,
-    /// reading goes on behind it.
-    pub fn read(&mut self, batch: &mut Batch, limit: usize) -> Result<usize, Error> {
-        batch.reset(self.selected.iter().map(|i| self.columns[*i].kind));
-        if let Some(error) = self.late_error.take() {
-            return Err(error);
-        }
-        while batch.rows < limit {
-            let outcome = match self.next_into(batch) {
-                Ok(false) => break,
-                other => other,
-            };
-            if let Err(error) = outcome {
-                batch.cut();
-                let error = self.placed(error);
-                if error.place().is_none() || self.is_repeated() {
-                    if error.place().is_some() {
-                        self.skipped.repeated += 1;
-                        continue;
-                    }
-                    return Err(error);
-                }
-                if self.skipped.bad < self.dialect.skip_bad {
-                    self.skip(&error);
-                } else if batch.rows > 0 {
-                    self.late_error = Some(error);
-                    break;
-                } else {
-                    return Err(error);
-                }
-            }
-        }
-        Ok(batch.rows)
-    }
-
-    /// Reads the next row into `batch`. Returns whether there was one.
-    fn next_into(&mut self, batch: &mut Batch) -> Result<bool, Error> {
-        #[cfg(feature = "parquet")]
-        if self.arrow.is_some() {
-            return self.next_arrow(batch);
-        }
-        if !self.next_row()? {
-            return Ok(false);
-        }
-        self.push(batch).map(|()| true)
-    }
-
-    fn skip(&mut self, error: &Error) {
-        self.skipped.bad += 1;
-        if self.skipped.faults.len() < MAX_FAULTS {
-            self.skipped.faults.push(error.to_string());
-        }
-    }
-
-    fn is_repeated(&self) -> bool {
-        self.rows.is_preamble(&self.row)
-    }
-
-    /// An error of a line with the number of its row.
-    fn placed(&self, mut error: Error) -> Error {
-        if let Error::Line { place, problem, mend } = &mut error {
-            place.row = self.count;
-            if self.row.text.contains(&0) {
-                "NUL bytes, as after a loss of power".clone_into(problem);
-                *mend = "leave such lines out with --skip-bad";
-            }
-        }
-        error
-    }
-
-    /// Reads the next row that is not blank into `self.row`.
-    fn next_row(&mut self) -> Result<bool, Error> {
-        loop {
-            self.row.text.clear();
-            self.row.cells.clear();
-            let found = self.rows.next(&mut self.row);
-            if !matches!(found, Ok(None)) {
-                self.count += 1;
-            }
-            if found?.is_none() {
-                return Ok(false);
-            }
-            if self.row.is_blank()
-                && (self.row.cells.len() <= 1 || self.time.is_some())
-                && (self.columns.len() > 1 || self.time.is_some())
-            {
-                self.count -= 1;
-                self.skipped.blank += u64::from(self.row.cells.len() > 1);
-                continue;
-            }
-            if self.rows.is_header_again(&self.row) {
-                self.count -= 1;
-                self.skipped.repeated += 1;
-                continue;
-            }
-            return Ok(true);
-        }
-    }
-
-    fn place(&self) -> Place {
-        Place {
-            line: self.row.line,
-            row: self.count,
-        }
-    }
-
-    fn push(&mut self, batch: &mut Batch) -> Result<(), Error> {
-        self.rows.check_length(&self.row, self.columns.len(), &self.dialect)?;
-        if let Some((columns, clock)) = &self.time {
-            let time = match columns.as_slice() {
-                [column] => match self.row.cell_text(*column) {
-                    "" => {
-                        Err(("is no time: the cell is empty", "mend the row, or leave such rows out with --skip-bad"))
-                    }
-                    text => clock.parse(text),
-                },
-                several => clock.of_parts(&several.iter().map(|i| self.row.cell_text(*i)).collect::<Vec<_>>()),
-            };
-            let time = time.map_err(|(problem, mend)| {
-                let text = columns
-                    .iter()
-                    .map(|i| self.row.cell_text(*i))
-                    .collect::<Vec<_>>()
-                    .join(" ");
-                self.refused(columns[0], &text, problem, mend.to_owned())
-            })?;
-            batch.times.push(time);
-        }
-        for (i, column) in self.selected.iter().enumerate() {
-            let cell = self.row.cell(*column);
-            if let Cells::Numbers(numbers) = &mut batch.columns[i] {
-                // The usual cases, without a copy.
-                if cell.is_empty() {
-                    numbers.push(None);
-                    continue;
-                }
-                if let Ok(Number::Double(value, _)) = number::parse(cell, self.syntax) {
-                    let gaps = &self.gaps[*column];
-                    numbers.push(Some(value).filter(|_| !gaps.has_numbers() || !gaps.has_number(value)));
-                    continue;
-                }
-            }
-            let pushed = push_cell(
-                &mut batch.columns[i],
-                self.row.cell_text(*column),
-                &Meaning {
-                    syntax: self.syntax,
-                    gaps: &self.gaps[*column],
-                    strips: self.dialect.strip_units,
-                    clock: self.clocks[*column].as_ref(),
-                    kind: self.columns[*column].kind,
-                },
-                &mut self.words[*column],
-            );
-            if let Err((problem, mend)) = pushed {
-                return Err(self.cell_refused(*column, problem, mend));
-            }
-        }
-        batch.places.push(self.place());
-        batch.rows += 1;
-        Ok(())
-    }
-
-    fn refused(&self, column: usize, cell: &str, problem: &'static str, mend: String) -> Error {
-        Error::Cell {
-            place: self.place(),
-            column: printable(&self.columns[column].name),
-            cell: printable(cell),
-            problem,
-            mend,
-        }
-    }
-
-    fn cell_refused(&self, column: usize, problem: &'static str, mend: &'static str) -> Error {
-        let cell = self.row.cell_text(column);
-        let is_one_column =
-            self.columns.len() == 1 && cell.contains([';', '\t', '|', ' ']) && problem == number::NO_NUMBER;
-        let mend = if is_one_column {
-            "name what separates cells with --delimiter"
-        } else if problem == number::NO_NUMBER && crate::time::looks_like_time(cell) && self.time.is_none() {
-            "if this is the time of the row, add --time exact"
-        } else {
-            mend
-        };
-        self.refused(column, cell, problem, mend.to_owned())
-    }
-
-    /// Reads all that is left and counts: kinds, ranges, gaps and times.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read), but cells of values are counted, not refused.
-    pub fn survey(mut self) -> Result<Survey, Error> {
-        #[cfg(feature = "parquet")]
-        if self.arrow.is_some() {
-            return self.survey_arrow();
-        }
-        let mut survey = Survey {
-            columns: vec![Profile::default(); self.columns.len()],
-            ..Survey::default()
-        };
-        let mut batch = Batch::default();
-        self.selected.clear();
-        loop {
-            match self.read(&mut batch, 1) {
-                Ok(0) => break,
-                Ok(_) => {}
-                Err(error) => return Err(error),
-            }
-            survey.rows += 1;
-            let place = self.place();
-            for (i, profile) in survey.columns.iter_mut().enumerate() {
-                profile.add(self.row.cell_text(i), place, self.syntax, &self.gaps[i], self.dialect.strip_units);
-            }
-            if let Some(time) = batch.times.first() {
-                survey.times.add(*time);
-            }
-        }
-        survey.skipped = self.skipped;
-        Ok(survey)
-    }
-}
-
-/// Counts over all rows of a table.
-#[derive(Debug, Clone, Default)]
-#[non_exhaustive]
-pub struct Survey {
-    /// Number of rows.
-    pub rows: u64,
-    /// Counts of each column.
-    pub columns: Vec<Profile>,
-    /// Counts of the times.
-    pub times: Times,
-    /// Lines that were left out.
-    pub skipped: Skipped,
-}
-
-/// Counts over the times of rows.
-#[derive(Debug, Clone, Default)]
-#[non_exhaustive]
-pub struct Times {
-    /// Decimals of a second that the finest one needs.
-    pub decimals: u8,
-    /// The first and the last in the order of rows.
-    pub ends: Option<(Time, Time)>,
-    /// Rows that are before the row above.
-    pub backward: u64,
-    /// Rows at the time of the row above.
-    pub repeated: u64,
-    /// The smallest and the largest step forward, in seconds.
-    pub steps: Option<(f64, f64)>,
-}
-
-impl Times {
-    pub(crate) fn add(&mut self, time: Time) {
-        self.decimals = self.decimals.max(time.decimals());
-        let Some((first, last)) = self.ends else {
-            self.ends = Some((time, time));
-            return;
-        };
-        self.ends = Some((first, time));
-        let step = time.seconds_since(last);
-        if time == last {
-            self.repeated += 1;
-        } else if step < 0.0 {
-            self.backward += 1;
-        } else {
-            let (low, high) = self.steps.unwrap_or((step, step));
-            self.steps = Some((low.min(step), high.max(step)));
-        }
-    }
-}
-
-/// What is known of the cells of a column.
-pub(crate) struct Meaning<'a> {
-    pub(crate) syntax: number::Syntax,
-    pub(crate) gaps: &'a Spellings,
-    pub(crate) strips: bool,
-    pub(crate) clock: Option<&'a Clock>,
-    pub(crate) kind: Kind,
-}
-
-/// Adds a cell to the cells of its column.
-pub(crate) fn push_cell(
-    cells: &mut Cells,
-    text: &str,
-    meaning: &Meaning<'_>,
-    words: &mut Vec<String>,
-) -> Result<(), number::Problem> {
-    let is_numeric = matches!(meaning.kind, Kind::Number | Kind::Integer | Kind::Boolean);
-    let is_gap = missing::is_usual(text, is_numeric) || (!meaning.gaps.is_empty() && meaning.gaps.has_text(text));
-    match cells {
-        Cells::Numbers(numbers) => numbers.push(if is_gap { None } else { number(text, meaning)? }),
-        Cells::Integers(integers) => integers.push(if is_gap { None } else { integer(text, meaning.syntax)? }),
-        Cells::Booleans(booleans) => booleans.push(match (is_gap, boolean(text)) {
-            (true, _) => None,
-            (_, Some(yes)) => Some(yes),
-            _ => {
-                return Err((
-                    "is not true or false",
-                    "mend the cell, name it with --missing, or leave the column out with --without",
-                ));
-            }
-        }),
-        Cells::Times(times) => times.push(match (is_gap, meaning.clock) {
-            (true, _) => None,
-            (_, Some(clock)) => Some(clock.parse(text)?),
-            _ => return Err(crate::time::AMBIGUOUS),
-        }),
-        Cells::Words(indices) => {
-            if is_gap {
-                indices.push(None);
-                return Ok(());
-            }
-            let known = words.iter().position(|word| word == text);
-            if known.is_none() && (words.len() == MAX_WORDS || meaning.kind == Kind::Text) {
-                return Err(("is text, and the column has more than 256 texts", "leave the column out with --without"));
-            }
-            indices.push(Some(known.unwrap_or_else(|| {
-                words.push(text.to_owned());
-                words.len() - 1
-            }) as u32));
-        }
-    }
-    Ok(())
-}
-
-fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Problem> {
-    let parsed = number::parse(text.as_bytes(), meaning.syntax);
-    let parsed = match (&parsed, meaning.strips, number::without_unit(text)) {
-        (Err(_), true, Some((number, _))) => number::parse(number.as_bytes(), meaning.syntax),
-        _ => parsed,
-    };
-    match parsed {
-        Ok(Number::Double(value, _)) => Ok(Some(value).filter(|_| !meaning.gaps.has_number(value))),
-        Ok(Number::Whole(_)) => Err((
-            "is a whole number of more than 53 bits among numbers with decimals",
-            "split the column, or leave it out with --without",
-        )),
-        Err(problem) => Err(problem),
-    }
-}
-
-fn integer(text: &str, syntax: number::Syntax) -> Result<Option<i64>, number::Problem> {
-    match number::parse(text.as_bytes(), syntax)? {
-        Number::Whole(whole) => Ok(Some(whole)),
-        Number::Double(value, _) if value.fract() == 0.0 && value.abs() < 9.2e18 => Ok(Some(value as i64)),
-        Number::Double(..) => Err((
-            "is no whole number, as others of the column",
-            "mend the cell, or leave the column out with --without",
-        )),
     }
 }

@@ -6,7 +6,6 @@ use fewbits_core::factor::{Tilted, Value, add_mapped};
 use fewbits_core::{Columns, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
-use fewbits_numerics::stored;
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -23,7 +22,21 @@ pub struct StochasticTrigger {
     precision: f64,
 }
 
-stored! { StochasticTrigger as Numbers { #[serde(with = "fewbits_numerics::stored")] precision: f64 } => StochasticTrigger::new(precision), Error }
+/// The stored form of [`StochasticTrigger`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    #[serde(with = "fewbits_numerics::stored")]
+    precision: f64,
+}
+
+impl TryFrom<Numbers> for StochasticTrigger {
+    type Error = Error;
+
+    fn try_from(parts: Numbers) -> Result<Self, Error> {
+        StochasticTrigger::new(parts.precision)
+    }
+}
 
 impl StochasticTrigger {
     /// The trigger with precision `Y > 0` (inverse measurement units squared).

@@ -11,13 +11,13 @@ use fewbits_numerics::normal::{interval, truncated_moments};
 use std::f64::consts::FRAC_2_PI;
 
 /// Largest number of bits about one sample; the number of words doubles with each bit.
-const MOST_BITS: usize = 16;
+const MAX_BITS: usize = 16;
 
 fn check_bits(bits: usize) -> Result<(), Error> {
-    if (1..=MOST_BITS).contains(&bits) {
+    if (1..=MAX_BITS).contains(&bits) {
         Ok(())
     } else {
-        Err(ArgumentError::new("bits", bits, format!("a word length from 1 to {MOST_BITS}")).into())
+        Err(ArgumentError::new("bits", bits, format!("a word length from 1 to {MAX_BITS}")).into())
     }
 }
 

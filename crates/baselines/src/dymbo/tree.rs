@@ -28,7 +28,7 @@ impl TreeLevel {
 }
 
 /// Largest length of the bit strings.
-const DEEPEST: usize = 16;
+const MAX_DEPTH: usize = 16;
 /// Half width of the grid in standard deviations of the state.
 const REACH: f64 = 9.5;
 /// Grid spacing as a share of the smaller noise deviation.
@@ -41,8 +41,8 @@ const SPACING: f64 = 0.35;
 /// If `depth` is outside `1..=16`, the resolution is not positive, or the process noise is zero.
 pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) -> Result<Vec<TreeLevel>, Error> {
     let tau = positive("resolution", resolution)?;
-    if !(1..=DEEPEST).contains(&depth) {
-        return Err(ArgumentError::new("depth", depth, format!("a depth from 1 to {DEEPEST}")).into());
+    if !(1..=MAX_DEPTH).contains(&depth) {
+        return Err(ArgumentError::new("depth", depth, format!("a depth from 1 to {MAX_DEPTH}")).into());
     }
     let sigma = plant.measurement_variance().sqrt();
     let filter = DymboFilter::new(*plant);

@@ -1,10 +1,10 @@
 //! Exact convergence of Gibbs sweeps over the labels of a product of mixtures.
 
+use crate::pf_mpa::product;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
 use fewbits_pf_mpa::Error;
-use fewbits_pf_mpa::product;
 use nalgebra::DMatrix;
 
 /// The Markov chain of label choices of a product of mixtures under systematic Gibbs sweeps, as a transition matrix.
@@ -18,7 +18,7 @@ pub struct LabelChain {
 }
 
 /// Largest number of label choices.
-const MOST: usize = 1000;
+const MAX_LABELS: usize = 1000;
 
 impl LabelChain {
     /// The chain of the product of `factors`. The first labels are drawn by the components' weights.
@@ -30,13 +30,13 @@ impl LabelChain {
         let sizes: Vec<usize> = factors.iter().map(|f| f.len()).collect();
         let count = sizes
             .iter()
-            .try_fold(1_usize, |n, s| n.checked_mul(*s).filter(|n| *n <= MOST));
+            .try_fold(1_usize, |n, s| n.checked_mul(*s).filter(|n| *n <= MAX_LABELS));
         let positive = factors.iter().all(|f| f.components().iter().all(|c| c.weight() > 0.0));
         let (Some(count), true) = (count, positive) else {
             return refuse(
                 "factors",
                 format!("{sizes:?} components"),
-                format!("positive weights, at most {MOST} choices"),
+                format!("positive weights, at most {MAX_LABELS} choices"),
             );
         };
         let exact = product::exact(factors)?.belief;

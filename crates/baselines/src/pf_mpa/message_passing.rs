@@ -6,10 +6,10 @@ use fewbits_core::Gaussian;
 use fewbits_core::columns::set_state;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
+use fewbits_numerics::linalg::triangular_factor;
 use fewbits_pf_mpa::Error;
 use fewbits_pf_mpa::Velocity;
 use fewbits_pf_mpa::engine::draw;
-use fewbits_pf_mpa::engine::lower_factor;
 use fewbits_pf_mpa::{GaussianTracker, Ranged, Step, StepInfo};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use rand::{Rng, RngExt};
@@ -115,7 +115,7 @@ impl MessagePassing {
             messages,
             ..
         } = workspace;
-        let root = lower_factor(belief.covariance());
+        let root = triangular_factor(belief.covariance());
         for i in 0..n {
             let z = Vector4::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
             let state = belief.mean() + root * z;
@@ -326,7 +326,7 @@ impl GaussianTracker for MessagePassing {
         let factor = kernel_of(&position, 1.0)?.0.cholesky().ok_or(Error::Impossible)?;
         let slope = factor.solve(&cross.transpose()).transpose();
         let left = (own - slope * cross.transpose()) * lambda;
-        let kernel = lower_factor(&((left + left.transpose()) * 0.5));
+        let kernel = triangular_factor(&((left + left.transpose()) * 0.5));
         let mut sum = Vector4::zeros();
         for i in 0..n {
             let place = Vector2::new(drawn.points[0][i], drawn.points[1][i]);

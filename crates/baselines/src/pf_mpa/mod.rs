@@ -5,6 +5,7 @@
 //! |---|---|
 //! | Algorithm 6 | [`MessagePassing`] |
 //! | its messages, their kernels and weights | [`Ring`], [`RingWeight`], [`DynamicsWeight`], [`KernelRule`], [`RingBias`] |
+//! | products of mixtures by enumeration | [`product`] |
 //! | draws from products of messages; convergence of Gibbs sweeps over their labels | [`ProductSampler`]; [`LabelChain`] |
 //! | two targets, measurements in unknown order | [`association`] |
 //! | factor graphs, sum-product over finite alphabets | [`graph`] |
@@ -14,6 +15,7 @@ pub mod graph;
 mod labels;
 mod message;
 mod message_passing;
+pub mod product;
 mod product_sampler;
 mod ring;
 

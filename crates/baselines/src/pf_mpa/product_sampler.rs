@@ -1,6 +1,7 @@
 //! Draws from the product of several messages.
 
 use crate::pf_mpa::message::KernelMessage;
+use crate::pf_mpa::product;
 use fewbits_core::ColumnsMut;
 use fewbits_core::columns::set_state;
 use fewbits_densities::{Mixture, Particles};
@@ -8,7 +9,6 @@ use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels::{self, scalar, vectorised};
 use fewbits_pf_mpa::Error;
-use fewbits_pf_mpa::product;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;

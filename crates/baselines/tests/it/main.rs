@@ -7,3 +7,4 @@ mod chains;
 #[path = "../../../densities/tests/it/common.rs"]
 mod common;
 mod divergences;
+mod products;

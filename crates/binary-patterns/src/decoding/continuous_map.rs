@@ -8,7 +8,7 @@ use fewbits_numerics::normal::log_pdf;
 /// Smallest number of points of the scan.
 const POINTS: usize = 4001;
 /// Largest number of points of the scan.
-const MOST_POINTS: usize = 64_001;
+const MAX_POINTS: usize = 64_001;
 /// Number of points per noise standard deviation.
 const PER_NOISE: f64 = 8.0;
 /// Log densities closer than this belong to the same plateau.
@@ -21,7 +21,7 @@ const GOLDEN_STOP: f64 = 1e-10;
 /// A dense scan finds the highest peak; a golden-section search refines it. On a plateau the estimate is its midpoint.
 pub(crate) fn estimates(bank: &Bank, outcomes: usize) -> Vec<f64> {
     let reach = bank.source().reach();
-    let intervals = (PER_NOISE * 2.0 * reach / bank.finest_noise()).min(MOST_POINTS as f64 - 1.0) as usize;
+    let intervals = (PER_NOISE * 2.0 * reach / bank.finest_noise()).min(MAX_POINTS as f64 - 1.0) as usize;
     // An even number of intervals, so that zero and both ends are points of the scan.
     let intervals = intervals.max(POINTS - 1).next_multiple_of(2);
     let points: Vec<f64> = (0..=intervals)

@@ -4,7 +4,6 @@ use crate::observation::source::Nodes;
 use crate::{Bank, Error};
 use fewbits_core::Observation;
 use fewbits_numerics::error::{all_finite, entries};
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of sensors for a table over bit strings.
@@ -12,20 +11,29 @@ const MAX_TABLE_SENSORS: usize = 24;
 
 /// Estimates for every outcome of a bank.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredTable", into = "StoredTable")]
+#[serde(try_from = "StoredTable")]
 pub struct LookupTable {
     pub(crate) bank: Bank,
     pub(crate) estimates: Vec<f64>,
 }
 
-stored! { LookupTable as StoredTable |table| {
-    bank: Bank = table.bank,
-    estimates: Vec<f64> = table.estimates,
-} => {
-    all_finite("estimates", &estimates)?;
-    entries("estimates", estimates.len(), bank.checked_outcomes()?)?;
-    Ok(LookupTable { bank, estimates })
-}, Error }
+/// The stored form of [`LookupTable`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredTable {
+    bank: Bank,
+    estimates: Vec<f64>,
+}
+
+impl TryFrom<StoredTable> for LookupTable {
+    type Error = Error;
+
+    fn try_from(StoredTable { bank, estimates }: StoredTable) -> Result<Self, Error> {
+        all_finite("estimates", &estimates)?;
+        entries("estimates", estimates.len(), bank.checked_outcomes()?)?;
+        Ok(LookupTable { bank, estimates })
+    }
+}
 
 impl LookupTable {
     /// The estimate from one observation per sensor. The sensors always report, so a missing bit carries no information. If one is missing,

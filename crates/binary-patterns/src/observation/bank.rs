@@ -5,7 +5,6 @@ use crate::{BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_numerics::binomial;
 use fewbits_numerics::error::{at_least_one, entries};
 use fewbits_numerics::quadrature::gauss_legendre;
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of outcomes that may be enumerated.
@@ -37,10 +36,30 @@ pub(crate) struct Exchangeable {
     pub count: usize,
 }
 
-stored! { Bank as StoredBank |bank| {
-    source: Source = bank.source,
-    sensors: Vec<PatternSensor> = (0..bank.sensors()).map(|n| bank.sensor(n).clone()).collect(),
-} => Bank::new(source, sensors), Error }
+/// The stored form of [`Bank`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredBank {
+    source: Source,
+    sensors: Vec<PatternSensor>,
+}
+
+impl From<Bank> for StoredBank {
+    fn from(bank: Bank) -> Self {
+        Self {
+            source: bank.source,
+            sensors: (0..bank.sensors()).map(|n| bank.sensor(n).clone()).collect(),
+        }
+    }
+}
+
+impl TryFrom<StoredBank> for Bank {
+    type Error = Error;
+
+    fn try_from(parts: StoredBank) -> Result<Self, Error> {
+        Bank::new(parts.source, parts.sensors)
+    }
+}
 
 impl Bank {
     /// The bank of these sensors. Bits are decoded in the same order.

@@ -6,22 +6,32 @@ use fewbits_core::nalgebra::SVector;
 use fewbits_core::rand::Rng;
 use fewbits_core::{Deterministic, Link, Observation, Scheme};
 use fewbits_numerics::error::positive;
-use fewbits_numerics::stored;
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
 /// A sensor that measures `Y = X + N(0, noise_deviation^2)` and reports the bit of its quantizer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredSensor", into = "StoredSensor")]
+#[serde(try_from = "StoredSensor")]
 pub struct PatternSensor {
     quantizer: BinaryQuantizer,
     noise_deviation: f64,
 }
 
-stored! { PatternSensor as StoredSensor |sensor| {
-    quantizer: BinaryQuantizer = sensor.quantizer,
-    noise_deviation: f64 = sensor.noise_deviation,
-} => PatternSensor::with_deviation(quantizer, noise_deviation), Error }
+/// The stored form of [`PatternSensor`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredSensor {
+    quantizer: BinaryQuantizer,
+    noise_deviation: f64,
+}
+
+impl TryFrom<StoredSensor> for PatternSensor {
+    type Error = Error;
+
+    fn try_from(parts: StoredSensor) -> Result<Self, Error> {
+        PatternSensor::with_deviation(parts.quantizer, parts.noise_deviation)
+    }
+}
 
 impl PatternSensor {
     /// A sensor with the given quantizer and standard deviation (not variance) of its noise.
@@ -90,11 +100,10 @@ impl Scheme<1> for PatternSensor {
             Observation::Received(bit) => *bit,
             missing => return Ok(Constant::of_delivery(missing, link).into()),
         };
-        let arrival = link.of_received()?;
+        let given = link.received_given_words(0..2, u64::from(bit), 1)?;
         let cells = Quantizer::try_from(self.quantizer())?;
         let variance = self.noise_deviation() * self.noise_deviation();
-        let given = |level: usize| arrival * link.word_probability(level as u64, u64::from(bit), 1);
-        Ok(cells.factor_of(variance, given)?)
+        Ok(cells.factor_of(variance, |level| given[level])?)
     }
 }
 

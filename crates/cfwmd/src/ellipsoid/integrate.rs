@@ -1,7 +1,7 @@
 //! Quadrature over the angle `theta` of the leading component, `q_1 = radius sin(theta)`.
 
-use fewbits_numerics::golden;
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::{bisect, golden};
 use std::f64::consts::FRAC_PI_2;
 
 /// Largest mean, in standard deviations, for a fixed rule of 24 nodes; `FAR` for 40 nodes. Beyond `FAR` the quadrature is adaptive.
@@ -52,18 +52,7 @@ pub(super) fn with_one_mode(
     }
     let (mode, peak) = golden::maximum(&f, -FRAC_PI_2, FRAC_PI_2, 1e-12);
     // Bisection for the angle at which the integrand has fallen by exp(-FALL).
-    let end = |outer: f64| {
-        let (mut inside, mut outside) = (mode, outer);
-        for _ in 0..30 {
-            let middle = 0.5 * (inside + outside);
-            if f(middle) > peak - FALL {
-                inside = middle
-            } else {
-                outside = middle
-            }
-        }
-        outside
-    };
+    let end = |outer: f64| bisect::boundary(|theta| f(theta) > peak - FALL, mode, outer, 30).1;
     let bulk = [end(-FRAC_PI_2), mode, end(FRAC_PI_2)];
     adaptive(&bulk, peak, TOLERANCE.max(ROUNDING * peak.abs()), HALVINGS, &f, &mut visit);
 }

@@ -10,7 +10,6 @@ pub use quadrature::EllipsoidMoments;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::non_negative;
 use fewbits_numerics::linalg::definite_factor;
-use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -24,12 +23,33 @@ pub struct Ellipsoid<const M: usize> {
     threshold: f64,
 }
 
-stored! { #[serde(rename = "Ellipsoid")] [const M: usize] Ellipsoid as Numbers |region| {
+/// The stored form of [`Ellipsoid`].
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Ellipsoid")]
+#[serde(deny_unknown_fields)]
+struct Numbers<const M: usize> {
     #[serde(with = "fewbits_numerics::stored")]
-    innovation_covariance: SMatrix<f64, M, M> = region.innovation_covariance,
+    innovation_covariance: SMatrix<f64, M, M>,
     #[serde(with = "fewbits_numerics::stored")]
-    threshold: f64 = region.threshold,
-} => Ellipsoid::new(&innovation_covariance, threshold), ArgumentError }
+    threshold: f64,
+}
+
+impl<const M: usize> From<Ellipsoid<M>> for Numbers<M> {
+    fn from(region: Ellipsoid<M>) -> Self {
+        Self {
+            innovation_covariance: region.innovation_covariance,
+            threshold: region.threshold,
+        }
+    }
+}
+
+impl<const M: usize> TryFrom<Numbers<M>> for Ellipsoid<M> {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers<M>) -> Result<Self, ArgumentError> {
+        Ellipsoid::new(&parts.innovation_covariance, parts.threshold)
+    }
+}
 
 impl<const M: usize> Ellipsoid<M> {
     /// The region for innovation covariance `S` (positive definite) and threshold `eta >= 0`.

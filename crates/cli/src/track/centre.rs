@@ -6,6 +6,7 @@ use crate::arguments::Model;
 use crate::error::Failure;
 use crate::report::Report;
 use fewbits_core::{Gaussian, Link, Observation, SensorNode};
+use fewbits_filters::calibration::{self, Calibration, Level, Number};
 use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, Slot};
 use fewbits_filters::{Error as FilterError, MomentFilter};
 use fewbits_models::ContinuousLinear;
@@ -21,11 +22,6 @@ const ALARMS: FalseAlarms = FalseAlarms {
     sensor: 1e-6,
     centre: 1e-5,
 };
-/// The least sensitive tests.
-const NO_ALARMS: FalseAlarms = FalseAlarms {
-    sensor: 1e-9,
-    centre: 1e-9,
-};
 /// Standard deviation of an unknown slope, in multiples of the change per time.
 const STEEPEST: f64 = 10.0;
 
@@ -38,8 +34,77 @@ pub(super) struct World {
     pub(super) within: f64,
     /// Mean and standard deviation of the level before the first row.
     pub(super) prior: (f64, f64),
+    /// The same of the slope per second, if it is stated.
+    pub(super) slope: Option<(f64, f64)>,
+    /// Period of the level, if it is an angle.
+    pub(super) period: Option<f64>,
+    /// Whether the change is adapted during the run.
+    pub(super) is_learning: bool,
     /// Seconds between rows.
     pub(super) interval: f64,
+}
+
+impl World {
+    /// Mean and covariance of the state before the first row.
+    fn start<const D: usize>(&self, change: f64) -> Result<Gaussian<D>, FilterError> {
+        let per_time = STEEPEST * change;
+        let of = |i: usize| match (i, self.slope) {
+            (0, _) => self.prior,
+            (1, Some(slope)) => slope,
+            _ => (0.0, per_time / self.within.powi(i as i32)),
+        };
+        let mean = SVector::<f64, D>::from_fn(|i, _| of(i).0);
+        let deviations = SVector::<f64, D>::from_fn(|i, _| of(i).1);
+        Ok(Gaussian::new(mean, SMatrix::from_diagonal(&deviations.component_mul(&deviations)))?)
+    }
+
+    /// From known values at time 0, the level after `t` has the variance `q t`, `q t^3 / 3` or `q t^5 / 20` if the level, the slope or the
+    /// curvature is a random walk of density `q`. Here it is `change^2`.
+    fn walk(&self, change: f64) -> Result<ContinuousLinear<1>, FilterError> {
+        let (c, t) = (change * change, self.within);
+        match self.model {
+            Model::Returning => {
+                let variance = self.prior.1 * self.prior.1;
+                // The deviation after `within` seconds, `v (1 - exp(-2 t / tau))`, solved for `tau`.
+                let rate = -0.5 * (-c / variance).ln_1p() / t;
+                ContinuousLinear::ornstein_uhlenbeck(self.prior.0, 1.0 / rate, variance)
+            }
+            _ => ContinuousLinear::random_walk(c / t),
+        }
+    }
+
+    fn velocity(&self, change: f64) -> Result<ContinuousLinear<2>, FilterError> {
+        ContinuousLinear::nearly_constant_velocity(3.0 * change * change / self.within.powi(3))
+    }
+
+    fn acceleration(&self, change: f64) -> Result<ContinuousLinear<3>, FilterError> {
+        ContinuousLinear::nearly_constant_acceleration(20.0 * change * change / self.within.powi(5))
+    }
+
+    /// Change and noise of each sensor, found together from the first values.
+    pub(super) fn calibrate(
+        &self,
+        instants: &[calibration::Instant],
+        change: Number,
+        guess: f64,
+        noises: &[Number],
+    ) -> Result<Calibration, FilterError> {
+        let period = self.period;
+        match self.model {
+            Model::Velocity => {
+                let (world, prior) = (|change| self.velocity(change), &self.start(guess)?);
+                Level { world, prior, period }.calibrate(instants, change, noises)
+            }
+            Model::Acceleration => {
+                let (world, prior) = (|change| self.acceleration(change), &self.start(guess)?);
+                Level { world, prior, period }.calibrate(instants, change, noises)
+            }
+            _ => {
+                let (world, prior) = (|change| self.walk(change), &self.start(guess)?);
+                Level { world, prior, period }.calibrate(instants, change, noises)
+            }
+        }
+    }
 }
 
 /// Model of a sensor.
@@ -60,11 +125,10 @@ pub(super) struct Seat {
 pub(super) struct Step {
     /// Level, slope and curvature, as many as the model has, each with its standard deviation.
     pub(super) estimate: Vec<(f64, f64)>,
-    /// `ln p` of the reports of this instant.
-    pub(super) log_likelihood: f64,
-    /// Number of bits sent, number of reports, and events by sensor.
+    /// Number of bits sent, number of reports, how many of them were not used because they were too unlikely, and events by sensor.
     pub(super) bits: usize,
     pub(super) reports: usize,
+    pub(super) rejected: usize,
     pub(super) events: Vec<(&'static str, Option<usize>)>,
     /// Number of sensors whose reports are used, and factor of the process noise.
     pub(super) used: usize,
@@ -81,6 +145,8 @@ pub(super) trait Estimator {
     fn step(&mut self, instant: &Instant) -> Result<Step, Failure>;
     /// Probability that a sensor works, and whether its reports are used.
     fn health(&self, sensor: usize) -> (f64, bool);
+    /// Number of its reports that were rejected.
+    fn rejected(&self, sensor: usize) -> u64;
 }
 
 /// Purpose of the centre.
@@ -96,28 +162,12 @@ pub(super) enum Use {
 
 /// A centre for the model.
 pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, Failure> {
-    let (c, t) = (world.change * world.change, world.within);
     Ok(match world.model {
-        // From known values at time 0, the level after `t` has the variance `q t`, `q t^3 / 3` or `q t^5 / 20` if the level, the slope or
-        // the curvature is a random walk of density `q`. Here it is `c`.
-        Model::Velocity => {
-            let model = ContinuousLinear::nearly_constant_velocity(3.0 * c / t.powi(3))?;
-            Box::new(Centre::<2>::new(model, world, purpose)?)
-        }
-        Model::Acceleration => {
-            let model = ContinuousLinear::nearly_constant_acceleration(20.0 * c / t.powi(5))?;
-            Box::new(Centre::<3>::new(model, world, purpose)?)
-        }
-        Model::Returning => {
-            let variance = world.prior.1 * world.prior.1;
-            // The deviation after `within` seconds, `v (1 - exp(-2 t / tau))`, solved for `tau`.
-            let rate = -0.5 * (-c / variance).ln_1p() / t;
-            let model = ContinuousLinear::ornstein_uhlenbeck(world.prior.0, 1.0 / rate, variance)?;
-            Box::new(Centre::<1>::new(model, world, purpose)?)
-        }
+        Model::Velocity => Box::new(Centre::<2>::new(world.velocity(world.change)?, world, purpose)?),
+        Model::Acceleration => Box::new(Centre::<3>::new(world.acceleration(world.change)?, world, purpose)?),
         // Ranges have their own tracker.
-        Model::Walk | Model::Ranges => {
-            Box::new(Centre::<1>::new(ContinuousLinear::random_walk(c / t)?, world, purpose)?)
+        Model::Returning | Model::Walk | Model::Ranges => {
+            Box::new(Centre::<1>::new(world.walk(world.change)?, world, purpose)?)
         }
     })
 }
@@ -131,37 +181,28 @@ struct Centre<const D: usize> {
     centre: FusionCentre<D, MomentFilter>,
     members: Vec<Member>,
     purpose: Use,
+    period: Option<f64>,
     rng: Pcg64Mcg,
 }
 
 impl<const D: usize> Centre<D> {
     fn new(model: ContinuousLinear<D>, world: &World, purpose: Use) -> Result<Self, Failure> {
         let mut rng = Pcg64Mcg::seed_from_u64(0);
-        let mut mean = SVector::<f64, D>::zeros();
-        mean[0] = world.prior.0;
-        let per_time = STEEPEST * world.change;
-        let deviations = SVector::<f64, D>::from_fn(|i, _| match i {
-            0 => world.prior.1,
-            i => per_time / world.within.powi(i as i32),
-        });
-        let covariance = SMatrix::from_diagonal(&deviations.component_mul(&deviations));
-        let prior = Gaussian::new(mean, covariance)?;
+        let prior = world.start::<D>(world.change)?;
         let failures = Failures {
             rate: FAILURE / world.interval,
             ..Failures::default()
         };
         let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior)?.with_failures(failures)?;
-        centre = if purpose == Use::Comparison {
-            centre.with_false_alarms(NO_ALARMS)?
-        } else {
-            centre
-                .with_false_alarms(ALARMS)?
-                .learning_noise(NoiseLearning::DEFAULT)?
-        };
+        centre = centre.with_false_alarms(ALARMS)?;
+        if world.is_learning && purpose != Use::Comparison {
+            centre = centre.learning_noise(NoiseLearning::DEFAULT)?;
+        }
         Ok(Self {
             centre,
             members: Vec::new(),
             purpose,
+            period: world.period,
             rng,
         })
     }
@@ -170,8 +211,9 @@ impl<const D: usize> Centre<D> {
         let number = sensor as u32;
         let member = &mut self.members[sensor];
         let feedback = match member.seat.threshold {
-            Some(threshold) => sensors::double(threshold - member.seat.offset)?,
-            None => self.centre.feedback(number)?,
+            // Only bits are told a threshold.
+            Some(threshold) if member.seat.sends == Report::Sign => sensors::double(threshold - member.seat.offset)?,
+            _ => self.centre.feedback(number)?,
         };
         // A measurement that is not finite counts as missing.
         let report = match cell.filter(|cell| cell.is_finite()) {
@@ -180,7 +222,11 @@ impl<const D: usize> Centre<D> {
                 Some(sensors::bits(member.seat.sends, cell)?)
             }
             Some(cell) => {
-                let measurement = Vector1::new(cell - member.seat.offset);
+                // Of angles that differ by whole periods, the one nearest to the prediction.
+                let expected = self.centre.estimate().mean()[0];
+                let cell = cell - member.seat.offset;
+                let cell = expected + calibration::wrapped(cell - expected, self.period);
+                let measurement = Vector1::new(cell);
                 member.node.report(&mut self.rng, &measurement, &feedback)?
             }
         };
@@ -217,31 +263,30 @@ impl<const D: usize> Estimator for Centre<D> {
         let slots: Vec<Slot> = slots.collect::<Result<_, _>>()?;
         let received = slots.iter().filter_map(|slot| slot.observation.received());
         let (bits, reports) = received.fold((0, 0), |(bits, reports), report| (bits + report.bits(), reports + 1));
-        let (events, log_likelihood) = match self.centre.receive(&mut self.rng, &slots) {
-            Ok(received) => {
-                let events = received.events.into_iter().map(|event| match event {
-                    Event::Dead(sensor) => ("dead", Some(sensor as usize)),
-                    Event::Alive(sensor) => ("alive", Some(sensor as usize)),
-                    Event::Excluded(sensor) => ("excluded", Some(sensor as usize)),
-                    Event::Readmitted(sensor) => ("readmitted", Some(sensor as usize)),
-                    Event::Lost => ("lost", None),
-                    Event::NoiseOverstated => ("noise overstated", None),
-                    _ => ("reacquired", None),
-                });
-                (events.collect(), received.info.log_likelihood)
-            }
-            // The reports have probability zero under the model: they are dropped.
-            Err(FilterError::Impossible) => (vec![("impossible", None)], f64::NEG_INFINITY),
-            Err(error) => return Err(error.into()),
-        };
+        let received = self.centre.receive(&mut self.rng, &slots)?;
+        let events = received.events.into_iter().map(|event| match event {
+            Event::Dead(sensor) => ("dead", Some(sensor as usize)),
+            Event::Alive(sensor) => ("alive", Some(sensor as usize)),
+            Event::Excluded(sensor) => ("excluded", Some(sensor as usize)),
+            Event::Readmitted(sensor) => ("readmitted", Some(sensor as usize)),
+            Event::Rejected(sensor) => ("rejected", Some(sensor as usize)),
+            Event::Disputed(sensor) => ("disputed", Some(sensor as usize)),
+            Event::Copied(sensor) => ("copied", Some(sensor as usize)),
+            Event::Reopened => ("reopened", None),
+            Event::Lost => ("lost", None),
+            Event::NoiseOverstated => ("noise overstated", None),
+            _ => ("reacquired", None),
+        });
+        let events: Vec<_> = events.collect();
+        let rejected = events.iter().filter(|(event, _)| *event == "rejected").count();
         let belief = self.centre.estimate();
         Ok(Step {
             estimate: (0..D)
                 .map(|i| (belief.mean()[i], belief.covariance()[(i, i)].sqrt()))
                 .collect(),
-            log_likelihood,
             bits,
             reports,
+            rejected,
             events,
             used: (0..self.members.len()).filter(|sensor| self.health(*sensor).1).count(),
             noise_scale: self.centre.noise_scale(),
@@ -253,5 +298,8 @@ impl<const D: usize> Estimator for Centre<D> {
         let dead = self.centre.is_named_dead(number).unwrap_or(true);
         let excluded = self.centre.is_excluded(number).unwrap_or(true);
         (self.centre.working(number).unwrap_or(0.0), !dead && !excluded)
+    }
+    fn rejected(&self, sensor: usize) -> u64 {
+        self.centre.rejected(sensor as u32).unwrap_or(0)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::centre::{Estimator, Step, Use, centre};
 use super::report::{BAND, first_cell, first_name, summarise};
+use super::rhythm::Rhythm;
 use super::rows::{Instant, Instants};
 use super::settings::Settings;
 use crate::Ending;
@@ -15,6 +16,8 @@ use serde::Serialize;
 #[derive(Serialize)]
 struct Summary {
     rows: u64,
+    /// Rows, or single reports, that say the same again and were dropped.
+    copies: u64,
     reports: usize,
     bits: usize,
     bits_per_report: f64,
@@ -35,6 +38,11 @@ struct SensorSummary {
     name: String,
     reports: usize,
     gaps: usize,
+    /// Reports that were not used because they were too unlikely given the prediction and the others'.
+    rejected: u64,
+    /// Standard deviation of its noise, and offset, as supposed.
+    noise: f64,
+    offset: f64,
     working: f64,
     used: bool,
 }
@@ -92,6 +100,7 @@ impl Run {
             squares: 0.0,
             summary: Summary {
                 rows: 0,
+                copies: 0,
                 reports: 0,
                 bits: 0,
                 bits_per_report: 0.0,
@@ -120,12 +129,15 @@ impl Run {
             let seat = self.settings.seat(sensor, name);
             self.centre.join(seat.clone()).map_err(refused)?;
             if let Some(full) = &mut self.full {
-                full.join(seat).map_err(refused)?;
+                full.join(seat.clone()).map_err(refused)?;
             }
             self.summary.sensors.push(SensorSummary {
                 name: name.clone(),
                 reports: 0,
                 gaps: 0,
+                rejected: 0,
+                noise: seat.noise,
+                offset: seat.offset,
                 working: 1.0,
                 used: true,
             });
@@ -173,6 +185,7 @@ impl Run {
         self.summary.difference_from_full_values = self.full.as_ref().map(|_| (self.squares / rows).sqrt());
         for (number, sensor) in self.summary.sensors.iter_mut().enumerate() {
             (sensor.working, sensor.used) = self.centre.health(number);
+            sensor.rejected = self.centre.rejected(number);
         }
         let points = self.path.points();
         let edge = |sign: f64| {
@@ -245,13 +258,17 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     let columns = parts
         .iter()
         .flat_map(|part| [(*part).to_owned(), format!("{part}_low"), format!("{part}_high")]);
-    let last = ["reports", "bits", "sensors_used", "noise_scale", "events"].map(str::to_owned);
+    let last = ["reports", "rejected", "bits", "sensors_used", "noise_scale", "events"].map(str::to_owned);
     let names = std::iter::once(first_name(&instants).to_owned())
         .chain(columns)
         .chain(last);
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
-    while let Some(instant) = instants.next()? {
+    let mut rhythm = options.by.is_some().then(Rhythm::default);
+    while let Some(mut instant) = instants.next()? {
+        if let Some(rhythm) = &mut rhythm {
+            rhythm.fill(&mut instant);
+        }
         let step = run.step(&instant, &instants.names)?;
         if !options.reports {
             let values = instant
@@ -261,11 +278,17 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
                 .filter(|cell| cell.is_finite());
             values.for_each(|value| run.measured.push((instant.seconds, value)));
         }
-        let estimates = step.estimate.iter().flat_map(|(mean, deviation)| {
+        // An angle is written within its first period.
+        let turns = options
+            .period
+            .map_or(0.0, |period| period * (step.estimate[0].0 / period).floor());
+        let estimates = step.estimate.iter().enumerate().flat_map(|(i, (mean, deviation))| {
+            let mean = &(if i == 0 { mean - turns } else { *mean });
             [*mean, mean - BAND * deviation, mean + BAND * deviation].map(|number| Cell::Number(Some(number)))
         });
         let last = [
             Cell::Whole(step.reports as i64),
+            Cell::Whole(step.rejected as i64),
             Cell::Whole(step.bits as i64),
             Cell::Whole(step.used as i64),
             Cell::Number(Some(step.noise_scale)),
@@ -275,12 +298,35 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         sheet.write(std::iter::once(first).chain(estimates).chain(last))?;
     }
     sheet.finish()?;
+    run.summary.copies = instants.copies;
     let (summary, picture) = run.finish(options)?;
     if let Some(path) = &options.plot {
         picture.save(path)?;
     }
     summarise(&summary, &lines(&summary), options.json)?;
     Ok(Ending::Good)
+}
+
+/// A number in four significant digits.
+fn short(number: f64) -> String {
+    let digits = 3 - number.abs().max(f64::MIN_POSITIVE).log10().floor() as i32;
+    match usize::try_from(digits) {
+        Ok(decimals) if decimals <= 8 => format!("{number:.decimals$}"),
+        _ => format!("{number:.3e}"),
+    }
+}
+
+/// The noise of each sensor.
+fn noises(summary: &Summary) -> String {
+    let one = |sensor: &SensorSummary| format!("{} {}", sensor.name, short(sensor.noise));
+    let all: Vec<String> = summary.sensors.iter().take(PRINTED_EVENTS).map(one).collect();
+    let more = summary.sensors.len() - all.len();
+    let rest = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
+    format!("{}{rest}", all.join(", "))
 }
 
 fn lines(summary: &Summary) -> Vec<String> {
@@ -290,15 +336,24 @@ fn lines(summary: &Summary) -> Vec<String> {
             summary.rows, summary.reports, summary.bits_per_report
         ),
         format!(
-            "supposed: noise {:.4}, change {:.4} in {:.4} s; learnt: {:.3} times that change",
-            summary.noise,
-            summary.change,
-            summary.within,
+            "supposed: noise {}, change {} in {} s; learnt: {:.3} times that change",
+            noises(summary),
+            short(summary.change),
+            short(summary.within),
             summary.noise_scale.sqrt()
         ),
     ];
     if let Some(difference) = summary.difference_from_full_values {
         lines.push(format!("estimates differ by {difference:.4} (root mean square) from those of values in full"));
+    }
+    if summary.copies > 0 {
+        lines.push(format!("{} copies of reports were dropped", summary.copies));
+    }
+    for sensor in summary.sensors.iter().filter(|sensor| sensor.rejected > 0) {
+        lines.push(format!(
+            "{}: {} of {} reports were too unlikely and not used",
+            sensor.name, sensor.rejected, sensor.reports
+        ));
     }
     for sensor in summary.sensors.iter().filter(|sensor| !sensor.used) {
         let why = if sensor.working < 0.5 {

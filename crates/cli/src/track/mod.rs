@@ -6,6 +6,7 @@
 //! | `sensors` | reports as options and tables have them |
 //! | `centre` | the centre of a level |
 //! | `settings` | what options and first rows say |
+//! | `rhythm` | silence in a table of single reports |
 //! | `report` | first cell of a row, summary |
 //! | `level`, `ranges` | the two tasks: a level, a place in the plane |
 
@@ -13,6 +14,7 @@ mod centre;
 mod level;
 mod ranges;
 mod report;
+mod rhythm;
 mod rows;
 mod sensors;
 mod settings;

@@ -39,13 +39,11 @@ struct AnchorSummary {
 }
 
 /// Reads names and places: the first column, and `x` and `y` or the second and third.
-fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
+fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
     let options = |columns: Vec<String>| TableOptions {
         file: file.to_owned(),
-        time: None,
-        time_column: None,
         columns,
-        delimiter,
+        ..TableOptions::default()
     };
     let names = Table::open(&options(Vec::new()))?.names;
     let [name, x, y] = names.as_slice() else {
@@ -53,6 +51,7 @@ fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
         return Err(Error::content(file, problem));
     };
     let mut table = Table::open(&options(vec![x.clone(), y.clone()]))?.with_labels(name)?;
+    table.require_numbers()?;
     let mut anchors: Vec<Anchor> = Vec::new();
     while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
         let (label, row) = (table.label().to_owned(), table.row());
@@ -71,7 +70,7 @@ fn read_anchors(file: &str, delimiter: char) -> Result<Vec<Anchor>, Error> {
 
 /// Runs the task.
 pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) -> Result<Ending, Error> {
-    let anchors = read_anchors(file, options.table.delimiter)?;
+    let anchors = read_anchors(file)?;
     let travel = match sensors::parse(&options.send)? {
         Report::Value | Report::Censored { .. } => Travel::Full,
         Report::Sign => Travel::Bits(1),

@@ -36,6 +36,10 @@ pub(super) struct Instants {
     next_number: i64,
     /// Names of the sensors so far.
     pub(super) names: Vec<String>,
+    /// Number of rows that were dropped because they repeat one of the same time.
+    pub(super) copies: u64,
+    /// Time and cells of the last row.
+    before: Option<(f64, Vec<(usize, Option<f64>)>)>,
     /// Rows that were read ahead.
     ahead: VecDeque<Instant>,
     /// The row after an instant that has several rows.
@@ -53,7 +57,7 @@ impl Instants {
             time: options.table.time.clone(),
             ..table_options.clone()
         })?;
-        table.find_time();
+        table.find_time(2)?;
         if let Some(name) = &options.by {
             table = table.with_labels(name)?;
             if table.names.len() != 1 {
@@ -65,7 +69,11 @@ impl Instants {
         if table.names.is_empty() {
             return Err(Error::empty(table.file(), "columns of values"));
         }
+        table.require_numbers()?;
         let base = table.time_base(&table_options, None)?;
+        if table.is_at_end()? {
+            return Err(Error::empty(table.file(), "rows"));
+        }
         let tick = match base {
             TimeBase::Clock { decimals, .. } => 0.1_f64.powi(i32::from(decimals)),
             _ => 1.0,
@@ -83,6 +91,8 @@ impl Instants {
             first: None,
             last: 0.0,
             next_number: 0,
+            copies: 0,
+            before: None,
             ahead: VecDeque::new(),
             pending: None,
         })
@@ -128,7 +138,14 @@ impl Instants {
         // Rows of one time are one instant, if each row is a report.
         while self.is_long {
             match self.read_row()? {
-                Some(row) if row.seconds == instant.seconds => instant.reports.extend(row.reports),
+                Some(row) if row.seconds == instant.seconds => {
+                    // A message that is delivered twice is one report.
+                    if row.reports.iter().all(|report| instant.reports.contains(report)) {
+                        self.copies += 1;
+                    } else {
+                        instant.reports.extend(row.reports);
+                    }
+                }
                 row => {
                     self.pending = row;
                     break;
@@ -138,7 +155,24 @@ impl Instants {
         Ok(Some(instant))
     }
 
+    /// The next row that is not a copy of the one before.
     fn read_row(&mut self) -> Result<Option<Instant>, Error> {
+        loop {
+            let row = self.read_any_row()?;
+            let is_copy = self.has_time()
+                && row
+                    .as_ref()
+                    .is_some_and(|row| self.before.as_ref() == Some(&(row.seconds, row.reports.clone())));
+            if is_copy {
+                self.copies += 1;
+                continue;
+            }
+            self.before = row.as_ref().map(|row| (row.seconds, row.reports.clone()));
+            return Ok(row);
+        }
+    }
+
+    fn read_any_row(&mut self) -> Result<Option<Instant>, Error> {
         let Some((tick, cells)) = self.table.next(self.base)? else {
             return Ok(None);
         };

@@ -17,7 +17,7 @@ pub(super) fn parse(text: &str) -> Result<Report, Error> {
         "bit" => Ok(Report::Sign),
         _ => {
             let bits = text.strip_prefix("word:").and_then(|bits| bits.parse().ok());
-            bits.filter(|bits| (1..=MAX_BITS).contains(bits))
+            bits.filter(|bits| (2..=MAX_BITS).contains(bits))
                 .map(|bits| Report::Word { bits })
                 .ok_or_else(refused)
         }

@@ -1,19 +1,22 @@
 //! Settings of the level and its sensors, from options and first rows.
 
-use super::centre::{Seat, Use, World, centre};
+use super::centre::{Seat, World};
 use super::rows::{Instant, Instants};
 use super::sensors;
-use crate::arguments::{Model, TrackOptions};
+use crate::arguments::{Model, Switch, TrackOptions};
 use crate::bounds::PerColumn;
 use crate::error::Error;
 use crate::numbers::{above_zero, mean_and_deviation, number};
 use crate::report::Report;
+use fewbits_filters::calibration::{self, Number, median, offsets, wrapped};
 
 /// Number of rows that are examined before the first estimate.
 const FIRST_ROWS: usize = 200;
-/// Steps of the search for change and noise, as logarithms, and its reach.
-const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
-const REACH: f64 = 9.0;
+/// The same of a table of single reports: for each sensor, and at most.
+const FIRST_REPORTS: usize = 200;
+const MOST_FIRST: usize = 2000;
+/// Ratio of the standard deviation of a normal variable to the median of its distance from its mean.
+const DEVIATION_OF_MEDIAN: f64 = 1.4826;
 /// Smallest and largest assumed share of lost reports.
 const LOSS: (f64, f64) = (0.02, 0.5);
 /// Standard deviation of rounding to a step, in steps.
@@ -30,6 +33,9 @@ const NO_VALUES: &str = "it cannot be found from reports of few bits";
 pub(super) struct Settings {
     pub(super) world: World,
     noises: PerColumn<Option<f64>>,
+    /// Noise that was found for each sensor of the first rows.
+    found: Vec<f64>,
+    /// Noise of all other sensors for which none is stated.
     pub(super) noise: f64,
     sends: PerColumn<Report>,
     thresholds: PerColumn<Option<f64>>,
@@ -53,12 +59,6 @@ fn change(text: &str) -> Result<(f64, f64), Error> {
     }
 }
 
-/// The median; 0 without numbers.
-fn median(mut numbers: Vec<f64>) -> f64 {
-    numbers.sort_by(f64::total_cmp);
-    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
-}
-
 /// Finite measurements of one sensor.
 fn values_of(first: &[Instant], sensor: usize) -> Vec<f64> {
     let all = first.iter().flat_map(|instant| &instant.reports);
@@ -67,20 +67,18 @@ fn values_of(first: &[Instant], sensor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Mean difference between each sensor's values and the median of their rows.
-fn offsets(first: &[Instant], sensors: usize) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0_u32); sensors];
-    for instant in first {
-        let cells = || instant.reports.iter().filter_map(|(n, cell)| Some((*n, (*cell)?)));
-        if cells().count() < 2 {
-            continue;
-        }
-        let middle = median(cells().map(|(_, cell)| cell).collect());
-        cells().for_each(|(n, cell)| sums[n] = (sums[n].0 + cell - middle, sums[n].1 + 1));
-    }
-    sums.into_iter()
-        .map(|(sum, count)| sum / f64::from(count.max(1)))
-        .collect()
+/// The first rows as instants of finite values.
+fn values(first: &[Instant], offsets: &[f64]) -> Vec<calibration::Instant> {
+    let offset = |sensor: usize| offsets.get(sensor).copied().unwrap_or(0.0);
+    let of = |instant: &Instant| calibration::Instant {
+        seconds: instant.seconds,
+        values: instant
+            .reports
+            .iter()
+            .filter_map(|(sensor, cell)| Some((*sensor, cell.filter(|cell| cell.is_finite())? - offset(*sensor))))
+            .collect(),
+    };
+    first.iter().map(of).collect()
 }
 
 impl Settings {
@@ -105,16 +103,26 @@ impl Settings {
         let asked_noise = noises.of("*").filter(|_| !options.noise.is_empty());
         // If no first rows are needed, do not wait for them: estimates then follow a pipe without delay.
         let known = asked_change.is_some() && asked_prior.is_some() && asked_noise.is_some() && options.align.is_none();
-        let rows = if known {
+        let mut rows = if known {
             1
         } else {
             FIRST_ROWS.max(options.align.unwrap_or(0))
         };
+        if options.by.is_some() && !known {
+            // Rows are single reports.
+            instants.peek(rows)?;
+            rows = (FIRST_REPORTS * instants.names.len()).clamp(rows, MOST_FIRST.max(rows));
+        }
         let first: Vec<Instant> = instants.peek(rows)?.iter().cloned().collect();
         if first.is_empty() {
             return Err(Error::empty(instants.file(), "rows"));
         }
         let sensors = instants.names.len();
+        if let Some(period) = options.period
+            && !(period > 0.0 && period.is_finite())
+        {
+            return Err(Error::option("--period", &period.to_string(), "a period above 0, as 360"));
+        }
         let gaps = (0..sensors).map(|sensor| {
             let rows = first.iter().flat_map(|instant| &instant.reports);
             let (all, empty) = rows
@@ -128,16 +136,26 @@ impl Settings {
                 change: 0.0,
                 within: 1.0,
                 prior: (0.0, 0.0),
+                slope: options
+                    .slope
+                    .as_deref()
+                    .map(|text| mean_and_deviation("--slope", text))
+                    .transpose()?,
+                period: options.period,
+                is_learning: options
+                    .learning
+                    .map_or(asked_change.is_none(), |learning| learning == Switch::On),
                 interval: median(first.windows(2).map(|pair| pair[1].seconds - pair[0].seconds).collect()),
             },
             noises,
+            found: Vec::new(),
             noise: 0.0,
             sends,
             thresholds,
             losses: gaps.collect(),
-            offsets: options
-                .align
-                .map_or(Vec::new(), |rows| offsets(&first[..rows.min(first.len())], sensors)),
+            offsets: options.align.map_or(Vec::new(), |rows| {
+                offsets(&values(&first[..rows.min(first.len())], &[]), sensors, options.period)
+            }),
         };
         if settings.world.interval <= 0.0 {
             settings.world.interval = 1.0;
@@ -162,14 +180,15 @@ impl Settings {
         settings.noise = asked_noise.unwrap_or(0.0);
         settings.world.prior = asked_prior.unwrap_or((0.0, 0.0));
         if asked_change.is_none() || asked_noise.is_none() || asked_prior.is_none() {
-            settings.fit(&first, sensors)?;
+            settings.fit(&first, &instants.names)?;
         }
         Ok(settings)
     }
 
     /// Estimates what no option states from the first rows: the prior from their spread, change and noise by maximum likelihood of the
     /// unquantized values.
-    fn fit(&mut self, first: &[Instant], sensors: usize) -> Result<(), Error> {
+    fn fit(&mut self, first: &[Instant], names: &[String]) -> Result<(), Error> {
+        let sensors = names.len();
         let shifted = |n: usize| {
             let offset = self.offsets.get(n).copied().unwrap_or(0.0);
             values_of(first, n)
@@ -185,12 +204,19 @@ impl Settings {
                 reason: "the first rows hold no numbers",
             });
         }
-        let count = flat.len() as f64;
-        let mean = flat.iter().sum::<f64>() / count;
-        let spread = (flat.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / count).sqrt();
+        // A wild value moves neither middle nor spread. If most values are equal, the spread is that of all.
+        let period = self.world.period;
+        let from = |middle: f64| flat.iter().map(move |value| wrapped(value - middle, period));
+        let mean = flat[0] + median(from(flat[0]).collect());
+        let robust = DEVIATION_OF_MEDIAN * median(from(mean).map(f64::abs).collect());
+        let spread = if robust > 0.0 {
+            robust
+        } else {
+            (from(mean).map(|off| off * off).sum::<f64>() / flat.len() as f64).sqrt()
+        };
         let differences: Vec<f64> = all
             .iter()
-            .flat_map(|values| values.windows(2).map(|pair| (pair[1] - pair[0]).abs()))
+            .flat_map(|values| values.windows(2).map(|pair| wrapped(pair[1] - pair[0], period).abs()))
             .collect();
         // At a constant level the difference of two values has `sqrt(2)` times the deviation of the noise. Jumps of the level hardly move the
         // median.
@@ -218,7 +244,15 @@ impl Settings {
                 if self.world.model == Model::Returning {
                     mean
                 } else {
-                    all.iter().find_map(|v| v.first().copied()).unwrap_or(mean)
+                    // Of the first few values one may be wild.
+                    let first: Vec<f64> = values(first, &self.offsets)
+                        .iter()
+                        .flat_map(|instant| &instant.values)
+                        .map(|(_, value)| *value)
+                        .take(3)
+                        .collect();
+                    let origin = first.first().copied().unwrap_or(mean);
+                    origin + median(first.iter().map(|value| wrapped(value - origin, period)).collect())
                 },
                 deviation,
             );
@@ -232,53 +266,30 @@ impl Settings {
         if !(fit_change || fit_noise) {
             return Ok(());
         }
-        let at = (self.world.change, self.noise);
-        let mut likelihood = |place: [f64; 2]| {
-            let noise = at.1 * place[1].exp();
-            if noise < floor || place.iter().any(|part| part.abs() > REACH) {
-                return f64::NEG_INFINITY;
-            }
-            self.world.change = at.0 * place[0].exp();
-            self.noise = noise;
-            self.log_likelihood(first, sensors).unwrap_or(f64::NEG_INFINITY)
+        let unknown = |is_unknown: bool, number: f64, least: f64| match is_unknown {
+            true => Number::Unknown { guess: number, least },
+            false => Number::Known(number),
         };
-        // Search along one axis at a time, in logarithms relative to the first guess, with smaller and smaller steps.
-        let (mut best, mut place) = (likelihood([0.0, 0.0]), [0.0, 0.0]);
-        let free = [fit_change, fit_noise];
-        for step in STEPS {
-            loop {
-                let mut is_better = false;
-                for axis in (0..2).filter(|axis| free[*axis]) {
-                    for sign in [-step, step] {
-                        let mut other = place;
-                        other[axis] += sign;
-                        let found = likelihood(other);
-                        if found > best {
-                            (best, place, is_better) = (found, other, true);
-                        }
-                    }
-                }
-                if !is_better {
-                    break;
-                }
-            }
+        let noise = |name: &String| match self.noises.of(name) {
+            Some(stated) => Number::Known(*stated),
+            None => unknown(fit_noise, self.noise, floor),
+        };
+        let noises: Vec<Number> = names.iter().map(noise).collect();
+        let change = unknown(fit_change, self.world.change, 0.0);
+        let instants = values(first, &self.offsets);
+        let found = self
+            .world
+            .calibrate(&instants, change, self.world.change, &noises)
+            .map_err(|source| Error::Refused {
+                what: "change and noise cannot be found",
+                source: source.into(),
+            })?;
+        self.world.change = found.change;
+        if fit_noise {
+            self.noise = median(found.noises.clone());
         }
-        self.world.change = at.0 * place[0].exp();
-        self.noise = at.1 * place[1].exp();
+        self.found = found.noises;
         Ok(())
-    }
-
-    fn log_likelihood(&self, first: &[Instant], sensors: usize) -> Option<f64> {
-        let mut centre = centre(&self.world, Use::Comparison).ok()?;
-        for sensor in 0..sensors {
-            centre
-                .join(self.seat_with(sensor, Report::Value, self.noise, None))
-                .ok()?;
-        }
-        let steps = first
-            .iter()
-            .map(|instant| Some(centre.step(instant).ok()?.log_likelihood));
-        steps.sum()
     }
 
     fn seat_with(&self, sensor: usize, sends: Report, noise: f64, threshold: Option<f64>) -> Seat {
@@ -293,7 +304,8 @@ impl Settings {
 
     /// The model of a sensor.
     pub(super) fn seat(&self, sensor: usize, name: &str) -> Seat {
-        let noise = self.noises.of(name).unwrap_or(self.noise);
+        let found = || self.found.get(sensor).copied().unwrap_or(self.noise);
+        let noise = self.noises.of(name).unwrap_or_else(found);
         self.seat_with(sensor, *self.sends.of(name), noise, *self.thresholds.of(name))
     }
 

@@ -6,11 +6,14 @@ mod design;
 mod fleet;
 mod language;
 mod live;
+mod many;
 mod node;
 mod outputs;
 mod pages;
 mod streams;
+mod tables;
 mod track;
+mod track_faults;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -236,26 +239,14 @@ fn damaged_recording_is_read_around_the_damage() {
 }
 
 #[test]
-fn appended_rows_follow() {
-    let (_kept, folder) = folder();
-    let options = ["pack", "a.csv", "-o", "a.fewb", "--columns", "price,temp"];
-    good(&folder, &[&options[..], &["--bound", "*=±0.01"]].concat(), b"");
-    good(&folder, &[&options[..], &["--append"]].concat(), b"");
-    let unpacked = text(&good(&folder, &["unpack", "a.fewb"], b""));
-    assert_eq!(unpacked.lines().count(), 2001);
-    let message = refused(&folder, &["pack", "a.csv", "-o", "a.fewb", "--append"], b"");
-    assert!(message.contains("--columns"), "{message}");
-}
-
-#[test]
 fn refusals_name_file_row_column_and_mend() {
     let (_kept, folder) = folder();
     std::fs::write(folder.join("bad.csv"), "t,x\n1,2\n2,abc\n").unwrap();
     let message = refused(&folder, &["pack", "bad.csv", "-o", "x"], b"");
     assert_eq!(
         message,
-        "error: bad.csv: row 2, column `x`: `abc` is not a number: mend the cell, leave it empty for a gap, or choose columns with \
-         --columns\n"
+        "error: bad.csv: line 3 (row 2), column `x`: `abc` is not a number: make it a gap with --missing, leave such lines out with \
+         --skip-bad, or the column with --without\n"
     );
     let message = refused(&folder, &["pack", "a.csv", "--bound", "x=1%", "-o", "x"], b"");
     assert_eq!(message, "error: a.csv: no column `x`: there are time, temp, flow, price, direction\n");
@@ -273,11 +264,14 @@ fn refusals_name_file_row_column_and_mend() {
     let message = refused(&folder, &["unpack", "a.csv"], b"");
     assert!(message.contains("a.csv: not a recording"), "{message}");
     let message = refused(&folder, &["pack", "bad.csv", "--time", "exact", "--time-column", "x", "-o", "x"], b"");
-    assert!(message.contains("row 2, column `x`") && message.contains("is not a time"), "{message}");
+    assert!(message.contains("(row 2), column `x`") && message.contains("is not a time"), "{message}");
     let message = refused(&folder, &["pack", "-", "-o", "x"], b"n\n18014398509481985\n");
     assert!(message.contains("more than 53 bits"), "{message}");
     let message = refused(&folder, &["pack", "-", "-o", "x"], b"time,x\n2026-01-31T12:00:00Z,1\n");
-    assert!(message.contains("row 1, column `time`") && message.contains("add --time exact"), "{message}");
+    assert!(
+        message.contains("line 2 (row 1), column `time`") && message.contains("add --time exact"),
+        "{message}"
+    );
 }
 
 #[cfg(not(feature = "parquet"))]
@@ -399,17 +393,4 @@ fn serial_line_is_received() {
     good(&folder, &words, table().as_bytes());
     // The noise is one frame with the first piece of the header, which comes again.
     assert_eq!(first_lines(receiver, 1001).len(), 1001);
-}
-
-#[test]
-fn completions_and_manual_are_generated() {
-    let (_kept, folder) = folder();
-    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        assert!(text(&good(&folder, &["generate", shell], b"")).contains("rows-per-block"));
-    }
-    assert!(text(&good(&folder, &["generate", "man"], b"")).starts_with(".ie"));
-    good(&folder, &["generate", "man", "--folder", "."], b"");
-    for page in ["fewbits.1", "fewbits-track.1", "fewbits-design.1", "fewbits-pack.1"] {
-        assert!(folder.join(page).is_file(), "{page}");
-    }
 }

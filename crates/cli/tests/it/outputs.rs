@@ -266,3 +266,63 @@ fn append_without_time_takes_the_times_of_the_table() {
     ];
     assert!(refused(&folder, &words, b"").contains("have no times"));
 }
+
+/// Commands that append at once: one is refused, or they follow each other. No row is lost, mixed or doubled.
+#[test]
+fn two_appenders_lose_nothing() {
+    let (_kept, folder) = folder();
+    good(&folder, &["pack", "a.csv", "--time", "exact", "-o", "a.fewb"], b"");
+    let mut expected = 1000;
+    for _ in 0..5 {
+        let both = [(); 2].map(|()| crate::start(&folder, &["pack", "a.csv", "--append", "-o", "a.fewb"]));
+        for child in both {
+            let output = child.wait_with_output().unwrap();
+            match output.status.code() {
+                Some(0) => expected += 1000,
+                code => {
+                    assert_eq!(code, Some(2));
+                    assert!(text(&output.stderr).contains("another command writes to it"));
+                }
+            }
+        }
+        let rows = text(&good(&folder, &["cat", "a.fewb", "--columns", "price"], b""));
+        assert_eq!(rows.lines().count(), expected + 1);
+    }
+}
+
+/// Kills at different moments of appending: the recording has all new rows or none, and is whole.
+#[test]
+fn killed_append_leaves_the_recording_or_completes_it() {
+    let (_kept, folder) = folder();
+    good(&folder, &["pack", "a.csv", "--time", "exact", "-o", "a.fewb"], b"");
+    let mut rows = 1000;
+    for wait in [4, 8, 12, 16, 20, 24, 28, 32, 40, 60] {
+        let mut child = crate::start(&folder, &["pack", "a.csv", "--append", "-o", "a.fewb"]);
+        std::thread::sleep(std::time::Duration::from_millis(wait));
+        let _ = child.kill();
+        child.wait().unwrap();
+        let info: serde_json::Value =
+            serde_json::from_slice(&good(&folder, &["info", "a.fewb", "--json"], b"")).unwrap();
+        let found = info["rows"].as_u64().unwrap();
+        assert!(found == rows || found == rows + 1000, "{found} rows after {rows}");
+        rows = found;
+    }
+    good(&folder, &["pack", "a.csv", "--append", "-o", "a.fewb"], b"");
+    let left = files(&folder)
+        .iter()
+        .filter(|(name, _)| name.contains("fewbits-new"))
+        .count();
+    assert_eq!(left, 0);
+}
+
+#[test]
+fn appended_rows_follow() {
+    let (_kept, folder) = folder();
+    let options = ["pack", "a.csv", "-o", "a.fewb", "--columns", "price,temp"];
+    good(&folder, &[&options[..], &["--bound", "*=±0.01"]].concat(), b"");
+    good(&folder, &[&options[..], &["--append"]].concat(), b"");
+    let unpacked = text(&good(&folder, &["unpack", "a.fewb"], b""));
+    assert_eq!(unpacked.lines().count(), 2001);
+    let message = refused(&folder, &["pack", "a.csv", "-o", "a.fewb", "--append"], b"");
+    assert!(message.contains("--columns"), "{message}");
+}

@@ -1,7 +1,7 @@
 //! The listings of the documentation: every `$ fewbits ...` of a `console` block is run, and must print what stands below it.
 //! A line `...` stands for any lines.
 
-use crate::{fewbits, text};
+use crate::{fewbits, folder, good, text};
 use std::path::Path;
 
 /// Commands and what they print.
@@ -56,5 +56,18 @@ fn listings_print_what_the_pages_say() {
             let lines: Vec<&str> = printed.lines().collect();
             assert!(agrees(&expected, &lines), "{page}: {words:?} printed\n{printed}");
         }
+    }
+}
+
+#[test]
+fn completions_and_manual_are_generated() {
+    let (_kept, folder) = folder();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        assert!(text(&good(&folder, &["generate", shell], b"")).contains("rows-per-block"));
+    }
+    assert!(text(&good(&folder, &["generate", "man"], b"")).starts_with(".ie"));
+    good(&folder, &["generate", "man", "--folder", "."], b"");
+    for page in ["fewbits.1", "fewbits-track.1", "fewbits-design.1", "fewbits-pack.1"] {
+        assert!(folder.join(page).is_file(), "{page}");
     }
 }

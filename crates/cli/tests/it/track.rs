@@ -213,10 +213,10 @@ fn refusals_of_track() {
     let here = folder.path();
     for (words, input, part) in [
         (vec!["track", "-"], "time,a\n", "no rows"),
-        (vec!["track", "-"], "", "no columns"),
-        (vec!["track", "-"], "time,a\n1,2\n1,x\n", "row 2, column `a`: `x` is not a number"),
-        (vec!["track", "-"], "time,a\n1,2\n1\n", "row 2: 1 cells instead of 2: mend the row"),
-        (vec!["track", "-"], "time;a\n1;2\n", "name what separates cells with --delimiter"),
+        (vec!["track", "-"], "", "the file is empty"),
+        (vec!["track", "-"], "time,a\n1,2\n1,x\n", "line 3 (row 2), column `a`: `x` is not a number"),
+        (vec!["track", "-"], "time,a\n1,2\n1\n", "line 3 (row 2): 1 cell instead of 2: mend the row"),
+        (vec!["track", "-", "--delimiter", "|"], "time;a\n1;2\n", "holds words, and numbers are expected"),
         (vec!["track", "-"], "time,a\n2,2\n1,3\n", "row 2: time 1 is before"),
         (vec!["track", "-"], "time,a\n1,2\n2,2\n3,2\n", "--noise is needed"),
         (vec!["track", "-", "--send", "b=bit"], "time,a\n1,2\n", "no column `b`: there are a"),

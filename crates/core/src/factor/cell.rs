@@ -10,7 +10,6 @@ use crate::sign::Sign;
 use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::kernels::{self, scalar};
 use fewbits_numerics::normal;
-use fewbits_numerics::stored;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -32,15 +31,37 @@ pub struct InCell {
     log_share: f64,
 }
 
-stored! { InCell as Numbers |factor| {
-    cell: Cell = factor.cell,
+/// The stored form of [`InCell`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    cell: Cell,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64 = factor.variance,
+    noise_variance: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    floor: f64 = factor.floor,
+    floor: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    share: f64 = factor.share,
-} => InCell::new(cell, noise_variance, floor, share), ArgumentError }
+    share: f64,
+}
+
+impl From<InCell> for Numbers {
+    fn from(factor: InCell) -> Self {
+        Self {
+            cell: factor.cell,
+            noise_variance: factor.variance,
+            floor: factor.floor,
+            share: factor.share,
+        }
+    }
+}
+
+impl TryFrom<Numbers> for InCell {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        InCell::new(parts.cell, parts.noise_variance, parts.floor, parts.share)
+    }
+}
 
 impl InCell {
     /// `floor + share P(m + n in cell)` with noise variance `r`.

@@ -3,9 +3,9 @@
 use super::Tilted;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
-use fewbits_numerics::kernels;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::{bisect, kernels};
 
 /// A place where a likelihood changes, such as the edge of a cell, and the distance over which it changes, such as the noise deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,7 @@ const DROP: f64 = 46.0;
 /// Largest number of steps of a search for the mode between two candidates.
 const SEARCH: usize = 80;
 /// Largest number of evaluations of the likelihood.
-const MOST: usize = 200_000;
+const MAX_EVALUATIONS: usize = 200_000;
 /// Panels are split until two quadrature rules agree to this fraction of the integral ...
 const TOLERANCE: f64 = 1e-11;
 /// ... or, if rounding of the likelihood prevents that, until splitting no longer helps and they agree to this fraction.
@@ -183,7 +183,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
     fn by_trapezoid(&mut self, features: &[(f64, f64)]) -> Option<Tilted<1>> {
         const NEAR: f64 = 4.5;
         const REACH: f64 = 9.0;
-        const MOST_NODES: usize = 128;
+        const MAX_NODES: usize = 128;
         const NEGLIGIBLE: f64 = 34.0;
         let finest = features.iter().map(|f| f.1).fold(1.0, f64::min);
         // A likelihood that changes far out, or over less than .3 prior deviations, needs the adaptive rule.
@@ -194,7 +194,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         // Most posteriors lie within `NEAR` prior deviations; nodes beyond are evaluated only if the integrand has not fallen there.
         let near = 4 * (NEAR / (4.0 * step)).ceil() as usize;
         let most = near + 8 * ((REACH - step * near as f64) / (8.0 * step)).ceil() as usize;
-        let (mut nodes, mut logs, mut weights) = ([0.0; MOST_NODES], [0.0; MOST_NODES], [0.0; MOST_NODES]);
+        let (mut nodes, mut logs, mut weights) = ([0.0; MAX_NODES], [0.0; MAX_NODES], [0.0; MAX_NODES]);
         let (nodes, logs) = (nodes.get_mut(..2 * most)?, logs.get_mut(..2 * most)?);
         for (i, t) in nodes.iter_mut().enumerate() {
             *t = step * (i as f64 - most as f64);
@@ -284,15 +284,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
             inside = outside;
             outside = from + step;
         }
-        for _ in 0..4 {
-            let middle = 0.5 * (inside + outside);
-            if self.log(middle) > floor {
-                inside = middle;
-            } else {
-                outside = middle;
-            }
-        }
-        outside
+        bisect::boundary(|t| self.log(t) > floor, inside, outside, 4).1
     }
 
     /// `integral (1, t - mode, (t - mode)^2) exp(log density - peak) dt` between the breaks.
@@ -305,7 +297,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
         // The sum so far only grows, so a panel that is small against it is small against the whole integral.
         let mut whole = [f64::MIN_POSITIVE; 3];
         while let Some((a, b, error_before)) = panels.pop() {
-            if self.evaluations > MOST {
+            if self.evaluations > MAX_EVALUATIONS {
                 return Err(Error::NotConverged {
                     what: "the moments of the posterior",
                     steps: self.evaluations,

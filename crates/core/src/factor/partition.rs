@@ -6,7 +6,6 @@ use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, all_finite, positive};
-use fewbits_numerics::stored;
 use fewbits_numerics::{kernels, normal};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -25,14 +24,35 @@ pub struct Partition {
     variance: f64,
 }
 
-stored! { Partition as Numbers |factor| {
+/// The stored form of [`Partition`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
     #[serde(with = "fewbits_numerics::stored")]
-    edges: Vec<f64> = factor.edges,
+    edges: Vec<f64>,
     #[serde(with = "fewbits_numerics::stored")]
-    given_cell: Vec<f64> = factor.given_cell,
+    given_cell: Vec<f64>,
     #[serde(with = "fewbits_numerics::stored")]
-    noise_variance: f64 = factor.variance,
-} => Partition::new(edges, given_cell, noise_variance), ArgumentError }
+    noise_variance: f64,
+}
+
+impl From<Partition> for Numbers {
+    fn from(factor: Partition) -> Self {
+        Self {
+            edges: factor.edges,
+            given_cell: factor.given_cell,
+            noise_variance: factor.variance,
+        }
+    }
+}
+
+impl TryFrom<Numbers> for Partition {
+    type Error = ArgumentError;
+
+    fn try_from(parts: Numbers) -> Result<Self, ArgumentError> {
+        Partition::new(parts.edges, parts.given_cell, parts.noise_variance)
+    }
+}
 
 impl Partition {
     /// The factor with `edges` (measurement units, strictly increasing) and one probability for each of the
@@ -127,7 +147,7 @@ impl Partition {
 /// Number of means that are processed together.
 const BLOCK: usize = 256;
 /// Probabilities below this have lost digits; the sum is then taken over logarithms.
-const LEAST: f64 = 1e-280;
+const MIN_PROBABILITY: f64 = 1e-280;
 
 /// Adds `p P(lower < m + n < upper)` for every mean.
 fn add_cell(means: &[f64], lower: f64, upper: f64, scale: f64, p: f64, probabilities: &mut [f64]) {
@@ -183,14 +203,14 @@ impl Factor<1> for Partition {
                 || {
                     for (log_weight, p) in log_weights.iter_mut().zip(&*probabilities) {
                         // Where the probability is tiny, the logarithms below replace it.
-                        let p = if *p > LEAST { *p } else { 1.0 };
+                        let p = if *p > MIN_PROBABILITY { *p } else { 1.0 };
                         *log_weight += kernels::scalar::ln(if p < 1.0 { p } else { 1.0 });
                     }
                 },
             );
             for ((log_weight, m), p) in log_weights.iter_mut().zip(means).zip(&*probabilities) {
                 // The whole line has probability one even for a mean of NaN, which must not raise the weight.
-                if *p <= LEAST || p.is_nan() || m.is_nan() {
+                if *p <= MIN_PROBABILITY || p.is_nan() || m.is_nan() {
                     *log_weight += self.log_probability(*m);
                 }
             }

@@ -2,7 +2,6 @@
 
 use crate::Error;
 use fewbits_numerics::error::{finite, positive, refuse};
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Evenly spaced points on a line, the nodes of a trapezoid rule.
@@ -16,24 +15,34 @@ pub struct UniformGrid {
     points: usize,
 }
 
-stored! { #[serde(rename = "Grid")] UniformGrid as Stored {
+/// The stored form of [`UniformGrid`].
+#[derive(Deserialize)]
+#[serde(rename = "Grid")]
+#[serde(deny_unknown_fields)]
+struct Stored {
     #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
     #[serde(with = "fewbits_numerics::stored")]
     spacing: f64,
     points: usize,
-} => {
-    if !(2..=MOST).contains(&points) {
-        return refuse("points", points, format!("2 to {MOST} nodes"));
+}
+
+impl TryFrom<Stored> for UniformGrid {
+    type Error = Error;
+
+    fn try_from(Stored { lower, spacing, points }: Stored) -> Result<Self, Error> {
+        if !(2..=MAX_NODES).contains(&points) {
+            return refuse("points", points, format!("2 to {MAX_NODES} nodes"));
+        }
+        UniformGrid::of_nodes(finite("lower", lower)?, spacing, points)
     }
-    UniformGrid::of_nodes(finite("lower", lower)?, spacing, points)
-}, Error }
+}
 
 /// Largest number of nodes of a grid.
-const MOST: usize = 1_000_000;
+const MAX_NODES: usize = 1_000_000;
 
 /// Largest extent of a grid: squares of distances are still finite.
-pub(super) const WIDEST: f64 = 1e153;
+pub(super) const MAX_WIDTH: f64 = 1e153;
 
 impl UniformGrid {
     /// Returns an error if moments of a density on the nodes could overflow. A density is at most the reciprocal of the spacing.
@@ -44,7 +53,7 @@ impl UniformGrid {
             points,
         };
         let farthest = lower.abs().max(grid.node(points).abs());
-        if !(spacing * points as f64 <= WIDEST && spacing >= f64::MIN_POSITIVE && farthest / spacing <= 1e300) {
+        if !(spacing * points as f64 <= MAX_WIDTH && spacing >= f64::MIN_POSITIVE && farthest / spacing <= 1e300) {
             let expected = "a spacing that keeps the grid below 1e153 and above the rounding of its reciprocal";
             return refuse("spacing", format!("{spacing} from {lower}"), expected);
         }
@@ -61,7 +70,7 @@ impl UniformGrid {
         finite("upper", upper)?;
         positive("spacing", spacing)?;
         let intervals = ((upper - lower) / spacing).ceil();
-        if !(1.0..MOST as f64).contains(&intervals) {
+        if !(1.0..MAX_NODES as f64).contains(&intervals) {
             let expected = "an interval that holds 1 to a million spacings";
             return refuse("grid", format!("[{lower}, {upper}] by {spacing}"), expected);
         }

@@ -6,7 +6,6 @@ use crate::particles::weights::Categorical;
 use fewbits_core::{Belief, ColumnsMut, Density, Likelihood};
 use fewbits_numerics::error::{entries, finite, positive, refuse};
 use fewbits_numerics::normal::log_pdf_with;
-use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -20,11 +19,23 @@ pub struct PointMass {
     density: Vec<f64>,
 }
 
-stored! { #[serde(rename = "PointMass")] PointMass as Stored {
+/// The stored form of [`PointMass`].
+#[derive(Deserialize)]
+#[serde(rename = "PointMass")]
+#[serde(deny_unknown_fields)]
+struct Stored {
     grid: UniformGrid,
     #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
-} => check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density }), Error }
+}
+
+impl TryFrom<Stored> for PointMass {
+    type Error = Error;
+
+    fn try_from(Stored { grid, density }: Stored) -> Result<Self, Error> {
+        check_density(&density, grid.points(), grid.spacing()).map(|()| PointMass { grid, density })
+    }
+}
 
 /// Checks densities at `nodes` nodes of the given volume each: finite, non-negative, integrating to one.
 pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Result<(), Error> {
@@ -165,13 +176,15 @@ impl PointMass {
     /// Replaces the density: `fill` writes one value per node, up to a common factor; the result is normalised.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if all values are zero; the density is then uniform.
+    /// [`Error::Impossible`] if all values are zero. The density is then unchanged.
     pub fn refill(&mut self, fill: impl FnOnce(&mut [f64])) -> Result<(), Error> {
+        let before = self.density.clone();
         fill(&mut self.density);
-        normalise(&mut self.density, self.grid.spacing()).inspect_err(|_| {
-            let uniform = 1.0 / (self.grid.points() as f64 * self.grid.spacing());
-            self.density.fill(uniform);
-        })
+        let done = normalise(&mut self.density, self.grid.spacing());
+        if done.is_err() {
+            self.density = before;
+        }
+        done
     }
 }
 

@@ -15,7 +15,6 @@ use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::normal::LN_SQRT_2PI;
-use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -247,8 +246,28 @@ impl<const D: usize> Density<D> for KernelEstimate<D> {
     crate::own_log_pdf!();
 }
 
-stored! { [const D: usize] KernelEstimate as Stored |estimate| {
+/// The stored form of [`KernelEstimate`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
-    kernel: [[f64; D]; D] = estimate.kernel.into(),
-    particles: Particles<D> = estimate.particles,
-} => KernelEstimate::new(particles, kernel.into()), Error }
+    kernel: [[f64; D]; D],
+    particles: Particles<D>,
+}
+
+impl<const D: usize> From<KernelEstimate<D>> for Stored<D> {
+    fn from(estimate: KernelEstimate<D>) -> Self {
+        Self {
+            kernel: estimate.kernel.into(),
+            particles: estimate.particles,
+        }
+    }
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for KernelEstimate<D> {
+    type Error = Error;
+
+    fn try_from(parts: Stored<D>) -> Result<Self, Error> {
+        KernelEstimate::new(parts.particles, parts.kernel.into())
+    }
+}

@@ -13,7 +13,7 @@ use fewbits_core::{Belief, Columns, ColumnsMut, Density, Gaussian};
 use fewbits_numerics::LogSum;
 use fewbits_numerics::error::{at_least_one, entries, refuse};
 use fewbits_numerics::kernels::{scalar, vectorised};
-use fewbits_numerics::{normal, stored};
+use fewbits_numerics::normal;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -238,23 +238,49 @@ impl Mixture<1> {
     }
 }
 
-stored! { [const D: usize] Mixture as Stored |mixture| {
+/// The stored form of [`Mixture`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
-    weights: Vec<f64> = mixture.components.iter().map(Component::weight).collect(),
+    weights: Vec<f64>,
     #[serde(with = "fewbits_numerics::stored")]
-    means: Vec<[f64; D]> = mixture.components.iter().map(|c| (*c.mean()).into()).collect(),
+    means: Vec<[f64; D]>,
     #[serde(with = "fewbits_numerics::stored")]
-    covariances: Vec<[[f64; D]; D]> = mixture.components.iter().map(|c| (*c.covariance()).into()).collect(),
-} => {
-    entries("means", means.len(), weights.len())?;
-    entries("covariances", covariances.len(), weights.len())?;
-    let parts = weights.iter().zip(means).zip(covariances);
-    let components = parts.map(|((weight, mean), covariance)| Component::new(*weight, mean.into(), covariance.into()));
-    let mut mixture = Mixture::new(components.collect::<Result<_, _>>()?)?;
-    // Weights that already sum to one are kept to the last bit.
-    if (weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 {
-        let kept = mixture.components.iter_mut().zip(weights);
-        kept.for_each(|(component, weight)| component.weight = weight);
+    covariances: Vec<[[f64; D]; D]>,
+}
+
+impl<const D: usize> From<Mixture<D>> for Stored<D> {
+    fn from(mixture: Mixture<D>) -> Self {
+        Self {
+            weights: mixture.components.iter().map(Component::weight).collect(),
+            means: mixture.components.iter().map(|c| (*c.mean()).into()).collect(),
+            covariances: mixture.components.iter().map(|c| (*c.covariance()).into()).collect(),
+        }
     }
-    Ok(mixture)
-}, Error }
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for Mixture<D> {
+    type Error = Error;
+
+    fn try_from(
+        Stored {
+            weights,
+            means,
+            covariances,
+        }: Stored<D>,
+    ) -> Result<Self, Error> {
+        entries("means", means.len(), weights.len())?;
+        entries("covariances", covariances.len(), weights.len())?;
+        let parts = weights.iter().zip(means).zip(covariances);
+        let components =
+            parts.map(|((weight, mean), covariance)| Component::new(*weight, mean.into(), covariance.into()));
+        let mut mixture = Mixture::new(components.collect::<Result<_, _>>()?)?;
+        // Weights that already sum to one are kept to the last bit.
+        if (weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 {
+            let kept = mixture.components.iter_mut().zip(weights);
+            kept.for_each(|(component, weight)| component.weight = weight);
+        }
+        Ok(mixture)
+    }
+}

@@ -5,7 +5,6 @@ use super::weights::Categorical;
 use crate::Error;
 use fewbits_core::columns::{change_each, state_at};
 use fewbits_core::{Belief, ColumnsMut, Gaussian};
-use fewbits_numerics::stored;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -20,11 +19,23 @@ pub struct GaussianCloud<const D: usize> {
     covariance: SMatrix<f64, D, D>,
 }
 
-stored! { #[serde(rename = "GaussianCloud")] [const D: usize] GaussianCloud as Stored {
+/// The stored form of [`GaussianCloud`].
+#[derive(Deserialize)]
+#[serde(rename = "GaussianCloud")]
+#[serde(deny_unknown_fields)]
+struct Stored<const D: usize> {
     means: Particles<D>,
     #[serde(with = "fewbits_numerics::stored")]
     covariance: SMatrix<f64, D, D>,
-} => GaussianCloud::new(means, covariance), Error }
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for GaussianCloud<D> {
+    type Error = Error;
+
+    fn try_from(parts: Stored<D>) -> Result<Self, Error> {
+        GaussianCloud::new(parts.means, parts.covariance)
+    }
+}
 
 impl<const D: usize> GaussianCloud<D> {
     /// Gaussians of one covariance around the given means.

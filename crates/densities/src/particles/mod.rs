@@ -335,14 +335,13 @@ impl<const D: usize> From<Particles<D>> for StoredParticles {
     fn from(belief: Particles<D>) -> Self {
         // Logarithms of equal weights follow from the weights.
         let equal = belief.log_weights.windows(2).all(|pair| pair[0] == pair[1]);
-        let stored = |w: &f64| w.is_finite().then_some(*w);
         Self {
             columns: belief.columns.into(),
             weights: belief.weights,
             log_weights: if equal {
                 Vec::new()
             } else {
-                belief.log_weights.iter().map(stored).collect()
+                belief.log_weights.into_iter().map(Some).collect()
             },
             effective_sample_size: (!equal).then_some(belief.effective_sample_size),
             auxiliary: belief.auxiliary,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Columns, log weights (none for a weight of zero, since JSON has no infinity), and auxiliary rows.
+/// Columns, log weights (of a weight of zero `-inf`, as text in JSON; `null` is read too), and auxiliary rows.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename = "Particles", deny_unknown_fields)]
 pub(super) struct StoredParticles {

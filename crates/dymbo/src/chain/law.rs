@@ -20,7 +20,7 @@ pub struct MessageLaw {
 }
 
 /// Largest number of sensors whose bit strings are enumerated: `2^12 = 4096` strings.
-const LONGEST_SEQUENCE: usize = 12;
+const MAX_SEQUENCE: usize = 12;
 
 const BITS: [Sign; 2] = [Sign::Below, Sign::Above];
 
@@ -89,7 +89,7 @@ impl MessageLaw {
     /// # Errors
     /// If `sensors` is zero or above 12: the number of bit strings doubles with each sensor.
     pub fn sequence(plant: &ScalarPlant, predicted_variance: f64, sensors: usize) -> Result<Self, Error> {
-        within("sensors", sensors as f64, 1.0, LONGEST_SEQUENCE as f64)?;
+        within("sensors", sensors as f64, 1.0, MAX_SEQUENCE as f64)?;
         let (scheme, r) = (SignBit::of(plant), plant.measurement_variance());
         let mut law = Self::empty();
         (law.corrections, law.factors) = (vec![0.0], vec![(0.0, Product::new())]);

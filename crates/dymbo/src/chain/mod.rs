@@ -45,17 +45,17 @@ const WIDTH: f64 = 14.0;
 /// The normal kernel is cut at this many deviations, where it has fallen below rounding.
 const REACH: f64 = 8.6;
 /// Largest number of grid points. A plant with very little process noise would need more and is refused.
-const MOST_POINTS: f64 = 40_000.0;
+const MAX_POINTS: f64 = 40_000.0;
 /// The grid is too narrow if the density at its edge exceeds this share of the peak.
 const EDGE: f64 = 1e-13;
 /// The power iteration has converged if the density changes by less than this mass (times the root of the number of points).
 const SETTLED: f64 = 1e-14;
 /// Limit on the power iterations ...
-const MOST_STEPS: usize = 200_000;
+const MAX_STEPS: usize = 200_000;
 /// ... and on their multiplications; whichever is reached first.
-const MOST_WORK: f64 = 2e10;
+const MAX_WORK: f64 = 2e10;
 /// Limit on the normal kernels of one transition: grid points times messages.
-const MOST_KERNELS: f64 = 2e7;
+const MAX_KERNELS: f64 = 2e7;
 
 /// The density of the prediction error `e` on a uniform grid about zero.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,7 +72,7 @@ impl ErrorChain {
             .min(plant.measurement_variance())
             .sqrt();
         let spacing = SPACING * finest;
-        if 2.0 * half_width / spacing > MOST_POINTS {
+        if 2.0 * half_width / spacing > MAX_POINTS {
             let expected = "enough process noise for a grid of at most 40000 points";
             return Err(ArgumentError::new("process_variance", plant.process_variance(), expected).into());
         }
@@ -205,13 +205,13 @@ impl ErrorChain {
     /// Applies the transition of one law (power iteration) until the density no longer changes.
     fn settle(&mut self, law: &MessageLaw) -> Result<(), Error> {
         let kernels = self.density.len() as f64 * law.corrections().len() as f64;
-        if kernels > MOST_KERNELS {
+        if kernels > MAX_KERNELS {
             let expected = "a plant and messages whose chain has at most 2e7 kernels (points times messages)";
             return Err(ArgumentError::new("law", format!("{kernels} kernels"), expected).into());
         }
         let transition = self.transition(law);
         let weights: usize = transition.iter().map(|(_, weights)| weights.len()).sum();
-        let most_steps = MOST_STEPS.min((MOST_WORK / weights as f64) as usize);
+        let most_steps = MAX_STEPS.min((MAX_WORK / weights as f64) as usize);
         let mut next = vec![0.0; self.density.len()];
         for _ in 0..most_steps {
             next.fill(0.0);

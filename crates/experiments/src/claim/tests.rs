@@ -1,6 +1,7 @@
 //! Every kind of claim holds, fails, and fails about nothing.
 
 use super::*;
+use crate::Table;
 
 fn verdict(make: impl FnOnce(&Claims)) -> Verdict {
     let claims = Claims::about("demo-fig1", true, true);
@@ -121,6 +122,16 @@ rows! {
     struct Unkeyed {
         mse: f64 => "Squared error.",
     }
+
+    struct Tables {
+        others: Vec<Other> => "Other rows with the same column.",
+        designs: Vec<Design> => "Rows that the references name.",
+    }
+
+    struct Other by "{step}" {
+        step: u32 => "Step.",
+        mse: f64 => "Squared error.",
+    }
 }
 
 /// What a figure with these tables is found to claim of its references `mse`.
@@ -142,6 +153,8 @@ fn a_column_with_references_is_compared_without_a_word() {
     assert_eq!(compared(&rows("lloyd-x", 0.130_486_15), |_| ()), [Verdict::Pass]);
     assert_eq!(compared(&rows("lloyd-x", 0.130_487), |_| ()), [Verdict::Fail]);
     assert_eq!(compared(&rows("lloyd-z", 0.130_486_15), |_| ()), [Verdict::Fail]);
+    let (others, designs) = (vec![Other { step: 1, mse: 0.5 }], rows("lloyd-x", 0.130_486_15));
+    assert_eq!(compared(&Tables { others, designs }, |_| ()), [Verdict::Pass]);
     // Said by the figure itself, it is said once.
     let own = |c: &Claims| c.references("mse", "", [0.2], |v| ("lloyd-x".to_owned(), v));
     assert_eq!(compared(&rows("lloyd-x", 0.130_486_15), own), [Verdict::Fail]);

@@ -36,7 +36,7 @@ impl Figure for Bytes {
     figure!(Settings => Vec<Summary>, "diffusive-bytes", "Bytes to the threshold", "",
         "What all messages of a search cost together (120 deployments of example B, numbers in single precision, messages of raw \
          records grow with every node): on a short route the samples themselves, quantised to the noise, are the \
-         cheapest message and lose nothing.");
+         cheapest message and lose nothing."; loglog("error at the end (m, median)"));
 
     fn world(&self) -> Option<&'static str> {
         Some(CHAINS)
@@ -62,15 +62,5 @@ impl Figure for Bytes {
         let nodes = |name: &str| find(name).and_then(|r| r.nodes_median).map(|m| m.value);
         let more = minus(nodes("raw-9-bit"), nodes("raw-64-bit"));
         full.at_most("quantising-is-free", "nine bits a sample need no more nodes than exact samples", more, 0.0);
-    }
-
-    fn plot(&self, _: &Settings, rows: &Vec<Summary>) -> Plot {
-        let mut panel =
-            Panel::loglog("Cost and accuracy", "bytes of all messages (median)", "error at the end (m, median)");
-        for row in rows {
-            let place = row.bytes_median.zip(row.final_err_median).map(|(b, e)| (b.value, e));
-            panel = panel.with(Layer::measured(row.scheme, place, |at| at));
-        }
-        Plot::of(panel)
     }
 }

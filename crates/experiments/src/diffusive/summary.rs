@@ -28,20 +28,20 @@ rows! {
 
     /// How the searches of one scheme ended.
     pub struct Summary by "{scheme} {range}" {
-        pub(super) scheme: &'static str => "What travels, and how nodes are chosen.",
+        pub(super) scheme: &'static str as key => "What travels, and how nodes are chosen.",
         pub(super) range: f64 ["m"] => "Radio range.",
         pub(super) scalars: Option<usize> => "Numbers in one message; none for raw records, which grow.",
         pub(super) reach: Measured => "Share of the searches that reach the threshold.",
         pub(super) nodes_median: Option<Measured> => "Median nodes of those that do.",
         pub(super) nodes_q10: Option<f64> => "Lower decile.",
         pub(super) nodes_q90: Option<f64> => "Upper decile.",
-        pub(super) final_err_median: Option<Measured> ["m"] => "Median distance of estimate and source at the end.",
+        pub(super) final_err_median: Option<Measured> ["m"] as points => "Median distance of estimate and source at the end.",
         pub(super) wrong: Measured => "Share of all searches that end more than a metre off.",
         pub(super) converged_wrong: Measured => "Share of those that report convergence and are more than a metre off.",
         /// Median squared error in units of the covariance at the end, 1.39 if calibrated.
         pub(super) nees_median: Option<f64>,
         pub(super) err_after_3: Option<Measured> ["m"] => "Median distance of estimate and source after three nodes.",
-        pub(super) bytes_median: Option<Measured> ["bytes"] => "Median size of all messages together, over all hops.",
+        pub(super) bytes_median: Option<Measured> ["bytes"] as x("bytes of all messages (median)") => "Median size of all messages together, over all hops.",
     }
 }
 

@@ -4,8 +4,8 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::MessagePassing;
-use fewbits_core::NumberFormat;
-use fewbits_pf_mpa::leader::{LeaderMessage, elect, nearest};
+use fewbits_core::{NumberFormat, RoundedGaussian};
+use fewbits_pf_mpa::leader::{elect, nearest};
 use fewbits_pf_mpa::{Reports, Target, Tracker};
 
 parameters! {
@@ -62,7 +62,7 @@ impl Figure for Leaders {
                     let mean = places.iter().sum::<Vector2<f64>>() / places.len() as f64;
                     let squares = places.iter().map(|p| (p - mean).norm_squared()).sum::<f64>();
                     let spread = squares / (places.len() - 1) as f64;
-                    shared = LeaderMessage::new(&copies[election.leader], &NumberFormat::Single)?.belief();
+                    shared = RoundedGaussian::new(&copies[election.leader], &NumberFormat::Single)?.belief();
                     let is = |yes: bool| f64::from(u8::from(yes));
                     let count = election.claimants.len();
                     let error = (places[election.leader] - truth).norm_squared();

@@ -2,12 +2,15 @@
 
 use super::FusionCentre;
 use super::health::Health;
-use super::reading::{Content, Reading, Tested, conditioned};
+use super::law::Law;
+use super::reading::{Content, Reading, Tested};
 use crate::contract::StateFilter;
 use fewbits_core::Gaussian;
 
 /// Odds, in nats, at which one of two reports that contradict each other counts as the wrong one: one in 10^4.
 const DECISIVE: f64 = 9.2;
+/// The same of the only two sensors that report: only the prediction can decide, and it holds the earlier reports of both.
+const DECISIVE_OF_TWO: f64 = 50.0;
 
 /// Smallest `ln p` of a wrong report.
 const LOWEST: f64 = -1e4;
@@ -43,9 +46,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// ```text
     /// test each report given the prediction and all others;  while one is below the gate:
     ///     the one that fits worst is rejected, and the others are tested again without it
-    ///     if another fits about as badly, and either's absence explains the other, both are contested
+    ///     if another fits about as badly, and without each other they agree with everything else about equally well, both are contested
     /// ```
-    pub(super) fn gate(&self, predicted: &Gaussian<D>, readings: &[Reading<'_, D>]) -> Vec<Verdict> {
+    pub(super) fn gate(&self, law: &Law<D>, predicted: &Gaussian<D>, readings: &[Reading<'_, D>]) -> Vec<Verdict> {
         let state = |reading: &Reading<'_, D>| &self.members[reading.seat].state;
         let first = |reading: &Reading<'_, D>| match (&reading.likelihood, state(reading).excluded) {
             (None, _) => Fate::Rejected,
@@ -65,8 +68,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 .filter(|i| readings[*i].content == Content::Report && verdicts[*i].fate == Fate::Used)
                 .collect();
             let reports: Vec<&Reading<'_, D>> = trusted.iter().map(|i| &readings[*i]).collect();
-            let mut found = Vec::with_capacity(trusted.len());
-            self.test_apart(predicted, &reports, &mut found);
+            let found = self.test_all(law, &reports);
             trusted
                 .iter()
                 .zip(&found)
@@ -75,6 +77,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 break;
             }
             let below = |k: &usize| found[*k].tail() < self.limits.gate;
+            let decisive = if found.len() == 2 { DECISIVE_OF_TWO } else { DECISIVE };
             let Some(worst) = (0..found.len())
                 .filter(below)
                 .max_by(|one, other| found[*one].depth().total_cmp(&found[*other].depth()))
@@ -84,21 +87,23 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let rivals = (0..found.len()).filter(|k| *k != worst && below(k)).filter(|k| {
                 let gap = found[worst].depth() - found[*k].depth();
                 // Both may be infinite.
-                !(gap > DECISIVE)
+                !(gap > decisive)
             });
-            // Two reports are in dispute if each agrees with everything but the other.
+            // A report without that of its rival, given all others.
             let without = |gone: usize, left: usize| {
                 let others: Vec<_> = (0..reports.len())
                     .filter(|k| *k != gone && *k != left)
                     .map(|k| reports[k])
                     .collect();
-                let given = conditioned(predicted, &others);
-                self.members[reports[left].seat].test(reports[left], &given)
+                self.test_given(law, &others, reports[left])
+            };
+            let is_undecided = |k: &usize| {
+                let (one, other) = (without(*k, worst), without(worst, *k));
+                let gap = one.depth() - other.depth();
+                gap.abs() <= decisive && one.tail().max(other.tail()) >= self.limits.gate
             };
             let rival = rivals
-                .filter(|k| {
-                    without(*k, worst).tail() >= self.limits.gate && without(worst, *k).tail() >= self.limits.gate
-                })
+                .filter(is_undecided)
                 .max_by(|one, other| found[*one].depth().total_cmp(&found[*other].depth()));
             if let Some(rival) = rival {
                 for k in [worst, rival] {
@@ -116,10 +121,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             .any(|verdict| matches!(verdict.fate, Fate::Excluded | Fate::Rejected))
         {
             let used: Vec<_> = (0..readings.len()).filter(is_used).map(|i| &readings[i]).collect();
-            let given = conditioned(predicted, &used);
             for (reading, verdict) in readings.iter().zip(&mut verdicts) {
                 if reading.content == Content::Report && matches!(verdict.fate, Fate::Excluded | Fate::Rejected) {
-                    verdict.tested = self.members[reading.seat].test(reading, &given);
+                    verdict.tested = self.test_given(law, &used, reading);
                 }
             }
         }
@@ -181,7 +185,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             if !wide.is_finite() {
                 return None;
             }
-            let again = self.gate(&wide, readings);
+            let again = self.gate(&Law::Moments(wide), &wide, readings);
             let agree = reports(|fate| fate == Fate::Used, &again);
             let fits = readings.iter().zip(&again).all(|(reading, verdict)| {
                 reading.content != Content::Report || verdict.fate != Fate::Used || verdict.tested.tail() > FITS

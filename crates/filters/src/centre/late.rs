@@ -54,7 +54,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             checkpoint.belief = belief.clone();
             if k == at {
                 let moments = Gaussian::from_trusted_parts(belief.mean(), belief.covariance());
-                let verdicts = self.gate(&moments, &readings);
+                let law = self.law(&belief, &moments);
+                let verdicts = self.gate(&law, &moments, &readings);
                 let judged = readings.iter().zip(&verdicts);
                 checkpoint.slots = judged
                     .clone()

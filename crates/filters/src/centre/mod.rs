@@ -28,6 +28,7 @@ mod gate;
 mod health;
 mod judge;
 mod late;
+mod law;
 mod learning;
 mod one_wrong;
 mod presence;

@@ -7,7 +7,7 @@ use crate::contract::StateFilter;
 use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
 
 /// Reports of at most this many bits are treated as words; the residual then sums over all possible words.
-const WORD_BITS: usize = 4;
+pub(super) const WORD_BITS: usize = 4;
 
 /// A slot of a sensor that has joined.
 pub(super) struct Reading<'a, const D: usize> {
@@ -123,6 +123,12 @@ pub(super) fn conditioned<const D: usize>(given: &Gaussian<D>, reports: &[&Readi
     next
 }
 
+/// All words of at most [`WORD_BITS`] bits.
+pub(super) fn words(bits: usize) -> impl Iterator<Item = BitString> {
+    // A bit string begins at the highest bit of its first byte.
+    (0..1_u8 << bits).filter_map(move |word| BitString::from_bytes(vec![word << (8 - bits)], bits).ok())
+}
+
 impl<const D: usize> Member<D> {
     fn reading<'a>(&self, seat: usize, slot: &'a Slot) -> Result<Reading<'a, D>, Error> {
         let content = match &slot.observation {
@@ -220,22 +226,20 @@ impl<const D: usize> Member<D> {
         if bits.bits() == 0 || bits.bits() > WORD_BITS {
             return None;
         }
-        let mut words = Vec::with_capacity(1 << bits.bits());
+        let mut found = Vec::with_capacity(1 << bits.bits());
         let (mut at, mut alternative) = (0, slot.clone());
-        for word in 0..1_u8 << bits.bits() {
-            // A bit string begins at the highest bit of its first byte.
-            let other = BitString::from_bytes(vec![word << (8 - bits.bits())], bits.bits()).ok()?;
+        for other in words(bits.bits()) {
             if other == *bits {
-                at = words.len();
-                words.push(place(received));
+                at = found.len();
+                found.push(place(received));
                 continue;
             }
             // Bits that are no word of the scheme, and words that it never sends, are left out.
             if self.sensor.decodes(&other) {
                 alternative.observation = Observation::Received(other);
-                words.extend(self.evidence(&alternative, predicted).ok().flatten().map(place));
+                found.extend(self.evidence(&alternative, predicted).ok().flatten().map(place));
             }
         }
-        Residual::of_word(&words, at)
+        Residual::of_word(&found, at)
     }
 }

@@ -3,6 +3,7 @@
 use super::gate::{Fate, Verdict};
 use super::health::Health;
 use super::judge::{Shown, Watched};
+use super::law::Law;
 use super::one_wrong::OneIsWrong;
 use super::reading::{Content, Reading};
 use super::state::{MemberState, StoredSlot};
@@ -29,7 +30,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             .iter()
             .map(|seat| Event::Copied(self.members[*seat].number))
             .collect();
-        let mut verdicts = self.gate(&predicted, &readings);
+        let mut law = self.law(&self.belief, &predicted);
+        let mut verdicts = self.gate(&law, &predicted, &readings);
         let mut belief = self.belief.clone();
         let mut reopened = false;
         if self.health == Health::Exclude
@@ -38,13 +40,14 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let start = self.acquisition.unwrap_or(wide);
             belief = self.filter.restart(rng, &start, &self.belief)?;
             (predicted, verdicts, reopened) = (wide, again, true);
+            law = self.law(&belief, &predicted);
             if self.acquisition.is_some() {
                 predicted = start;
-                verdicts = self.gate(&predicted, &readings);
+                verdicts = self.gate(&law, &predicted, &readings);
             }
         }
         let before = (self.window > 0.0).then(|| belief.clone());
-        let in_order = self.take_in_order(&predicted, &readings, &mut verdicts)?;
+        let in_order = self.take_in_order(&law, &predicted, &readings, &mut verdicts)?;
         let mut info = self.update_belief(rng, &mut belief, &readings, &mut verdicts, &in_order)?;
         let sent = readings.iter().filter(|reading| reading.content != Content::Nothing);
         info.log_likelihood += sent
@@ -116,11 +119,20 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
     }
 
+    /// The predictive law of a belief.
+    pub(super) fn law(&self, belief: &F::Belief, moments: &Gaussian<D>) -> Law<D> {
+        match self.filter.points(belief) {
+            Some(points) if self.health != Health::Off => Law::Points(points),
+            _ => Law::Moments(*moments),
+        }
+    }
+
     /// Conditions the moments on the reports that are used, one after the other, and tests each given those before it. A report that cannot
     /// update them is rejected. Silence is tested given the prediction alone; otherwise, after several sensors died together, the silence
     /// of each would confirm that of the others.
     fn take_in_order(
         &self,
+        law: &Law<D>,
         predicted: &Gaussian<D>,
         readings: &[Reading<'_, D>],
         verdicts: &mut [Verdict],
@@ -131,22 +143,42 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             log_likelihood: 0.0,
             shown: Vec::with_capacity(readings.len()),
         };
+        let mut before: Vec<&Reading<'_, D>> = Vec::new();
+        // A report that is the only one was tested given the prediction alone.
+        let mut used = readings
+            .iter()
+            .zip(&*verdicts)
+            .filter(|(reading, verdict)| reading.content != Content::Nothing && verdict.fate == Fate::Used);
+        let is_only = used.next().is_some() && used.next().is_none();
         for (reading, verdict) in readings.iter().zip(verdicts) {
             let member = &self.members[reading.seat];
-            let shown = match (reading.content, reading.known()) {
-                (Content::Nothing, _) => Shown::Silence(member.silence(reading, predicted)?),
-                (_, Some(known)) if verdict.fate == Fate::Used => {
+            let is_tested = self.health != Health::Off && reading.content == Content::Report;
+            let shown = match (law, reading.content, reading.known()) {
+                (Law::Points(points), Content::Nothing, _) => {
+                    Shown::Silence(match member.silence_by_points(reading, points) {
+                        Some(silence) => silence,
+                        None => member.silence(reading, predicted)?,
+                    })
+                }
+                (Law::Moments(_), Content::Nothing, _) => Shown::Silence(member.silence(reading, predicted)?),
+                (Law::Points(_), _, Some(_)) if verdict.fate == Fate::Used => {
+                    let tested = is_tested.then(|| match is_only {
+                        true => verdict.tested,
+                        false => self.test_given(law, &before, reading),
+                    });
+                    before.push(reading);
+                    Shown::Report(tested.and_then(|tested| tested.residual))
+                }
+                (Law::Moments(_), _, Some(known)) if verdict.fate == Fate::Used => {
                     let before = found.given;
-                    let taken = known.condition(&mut found.given);
-                    match taken {
+                    match known.condition(&mut found.given) {
                         Ok(one) if one.log_likelihood > f64::NEG_INFINITY && found.given.is_finite() => {
                             found.log_likelihood += one.log_likelihood;
-                            let is_tested = self.health != Health::Off && reading.content == Content::Report;
-                            Shown::Report(
-                                is_tested
-                                    .then(|| member.judged(reading, &before, one).residual)
-                                    .flatten(),
-                            )
+                            let residual = || match is_only {
+                                true => verdict.tested.residual,
+                                false => member.judged(reading, &before, one).residual,
+                            };
+                            Shown::Report(is_tested.then(residual).flatten())
                         }
                         failed => {
                             found.given = before;

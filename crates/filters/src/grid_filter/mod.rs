@@ -16,7 +16,6 @@ use crate::Error;
 use fewbits_core::{Gaussian, Likelihood, OnAxes};
 use fewbits_numerics::error::{at_least_one, refuse, within};
 use fewbits_numerics::linalg::{congruence, symmetrised};
-use fewbits_numerics::stored;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use region::{Piece, Region};
 use serde::{Deserialize, Serialize};
@@ -64,7 +63,21 @@ pub struct GridFilter {
     reach: f64,
 }
 
-stored! { GridFilter as Stored { nodes: usize, reach: f64 } => GridFilter::with_nodes_and_reach(nodes, reach), Error }
+/// The stored form of [`GridFilter`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    nodes: usize,
+    reach: f64,
+}
+
+impl TryFrom<Stored> for GridFilter {
+    type Error = Error;
+
+    fn try_from(parts: Stored) -> Result<Self, Error> {
+        GridFilter::with_nodes_and_reach(parts.nodes, parts.reach)
+    }
+}
 
 impl Default for GridFilter {
     /// 15 nodes on each axis.

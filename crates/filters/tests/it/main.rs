@@ -3,6 +3,7 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
+mod calibration;
 mod centre;
 mod contract;
 mod failure;
@@ -14,6 +15,7 @@ mod state_noise;
 mod stored;
 mod tangent;
 mod wild;
+mod words;
 
 use fewbits_core::Likelihood;
 use fewbits_filters::{PointMass, PointMassFilter, UniformGrid};

@@ -30,7 +30,7 @@ pub struct QuadratureGrid<const D: usize> {
 }
 
 /// The largest number of nodes that a grid may have.
-const MOST_NODES: f64 = 5e7;
+const MAX_NODES: f64 = 5e7;
 
 impl<const D: usize> QuadratureGrid<D> {
     /// A grid over `[lower, upper]` with steps of at most `step` along each axis.
@@ -45,8 +45,8 @@ impl<const D: usize> QuadratureGrid<D> {
             let width = positive("upper - lower", upper[d] - lower[d])?;
             let intervals = (width / positive("step", step[d])?).ceil().max(1.0);
             nodes *= intervals + 1.0;
-            if nodes > MOST_NODES {
-                return refuse("step", step[d], format!("steps for at most {MOST_NODES} nodes"));
+            if nodes > MAX_NODES {
+                return refuse("step", step[d], format!("steps for at most {MAX_NODES} nodes"));
             }
             counts[d] = intervals as usize + 1;
             steps[d] = width / intervals;

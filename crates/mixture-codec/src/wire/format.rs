@@ -2,17 +2,20 @@
 
 use crate::Error;
 use fewbits_numerics::error::{all_finite, positive, refuse, within};
-use fewbits_numerics::stored;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 /// The format that sender and receiver agree on: range of the means, unit, and resolutions of the quantiser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredFormat<D>", into = "StoredFormat<D>")]
+#[serde(try_from = "StoredFormat<D>")]
 pub struct WireFormat<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     pub(super) centre: SVector<f64, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     pub(super) half_width: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     pub(super) unit: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     pub(super) resolutions: Vec<f64>,
 }
 
@@ -55,13 +58,24 @@ impl<const D: usize> WireFormat<D> {
     }
 }
 
-stored! { [const D: usize] WireFormat as StoredFormat |format| {
+/// The stored form of [`WireFormat`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredFormat<const D: usize> {
     #[serde(with = "fewbits_numerics::stored")]
-    centre: SVector<f64, D> = format.centre,
+    centre: SVector<f64, D>,
     #[serde(with = "fewbits_numerics::stored")]
-    half_width: f64 = format.half_width,
+    half_width: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    unit: f64 = format.unit,
+    unit: f64,
     #[serde(with = "fewbits_numerics::stored")]
-    resolutions: Vec<f64> = format.resolutions,
-} => WireFormat::new(centre, half_width, unit, &resolutions), Error }
+    resolutions: Vec<f64>,
+}
+
+impl<const D: usize> TryFrom<StoredFormat<D>> for WireFormat<D> {
+    type Error = Error;
+
+    fn try_from(parts: StoredFormat<D>) -> Result<Self, Error> {
+        WireFormat::new(parts.centre, parts.half_width, parts.unit, &parts.resolutions)
+    }
+}

@@ -43,7 +43,7 @@ use walk::{Decoder, Quantiser, walk};
 /// Version of the format. Every change of the encoding gets a new number and an entry in the changelog.
 pub const FORMAT: u32 = 1;
 /// Largest number of components of a message.
-pub const MOST_COMPONENTS: usize = 63;
+pub const MAX_COMPONENTS: usize = 63;
 
 /// A quantised mixture as a message. It equals what the receiver decodes, to the last bit.
 ///
@@ -76,7 +76,7 @@ impl<const D: usize> CodedMixture<D> {
     /// deviation is outside the format's range.
     pub fn new(mixture: &Mixture<D>, format: &WireFormat<D>, resolution: usize) -> Result<Self, Error> {
         let kept = mixture.components().iter().filter(|c| c.weight() > 0.0).count();
-        if kept > MOST_COMPONENTS {
+        if kept > MAX_COMPONENTS {
             return refuse("mixture", format!("{kept} components"), "at most 63");
         }
         if resolution >= format.resolutions().len() {
@@ -116,7 +116,7 @@ impl<const D: usize> Message for CodedMixture<D> {
 
     fn decode(format: &WireFormat<D>, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
         // No number takes more than 60 bits.
-        let most = 60 * (MOST_COMPONENTS + 1) * (D * D + D + 2);
+        let most = 60 * (MAX_COMPONENTS + 1) * (D * D + D + 2);
         let mut source = Decoder {
             reader: Reader::new(reader, most)?,
             symbols: Vec::new(),

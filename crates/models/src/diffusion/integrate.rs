@@ -3,7 +3,7 @@
 use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Largest number of times that an interval is halved.
-const DEEPEST: u32 = 40;
+const MAX_DEPTH: u32 = 40;
 
 /// Where `-ln` of an exponential exceeds this, the exponential is zero.
 const UNDERFLOW: f64 = 745.0;
@@ -32,7 +32,7 @@ fn integrate(f: &impl Fn(f64) -> f64, a: f64, b: f64, relative: f64) -> f64 {
     let rule = gauss_legendre::<16>();
     let whole = rule.composite(a, b, 4, f);
     let scale = rule.composite(a, b, 4, |x| f(x).abs());
-    halve(f, a, b, whole, relative * scale.max(f64::MIN_POSITIVE), DEEPEST)
+    halve(f, a, b, whole, relative * scale.max(f64::MIN_POSITIVE), MAX_DEPTH)
 }
 
 fn halve(f: &impl Fn(f64) -> f64, a: f64, b: f64, whole: f64, tolerance: f64, depth: u32) -> f64 {

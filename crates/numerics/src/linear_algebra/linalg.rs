@@ -147,6 +147,28 @@ pub fn semidefinite_factor<const D: usize>(
     Ok(factor)
 }
 
+/// Lower triangular factor of a covariance. The columns of directions without variance are zero.
+///
+/// Unlike [`semidefinite_factor`] it does not pivot, so it is a continuous function of the covariance: a rounding error does not make
+/// draws jump. The argument is not checked.
+pub fn triangular_factor<const D: usize>(covariance: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let mut lower = SMatrix::<f64, D, D>::zeros();
+    for j in 0..D {
+        let own = covariance[(j, j)];
+        let pivot: f64 = own - (0..j).map(|k| lower[(j, k)] * lower[(j, k)]).sum::<f64>();
+        if pivot <= SEMIDEFINITE_TOLERANCE * own {
+            continue;
+        }
+        let root = f64::sqrt(pivot);
+        lower[(j, j)] = root;
+        for i in j + 1..D {
+            let rest = covariance[(i, j)] - (0..j).map(|k| lower[(i, k)] * lower[(j, k)]).sum::<f64>();
+            lower[(i, j)] = rest / root;
+        }
+    }
+    lower
+}
+
 /// Cholesky pivots below this multiple of the variance count as rounding.
 const PIVOT: f64 = 1e-11;
 

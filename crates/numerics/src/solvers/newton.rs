@@ -1,10 +1,10 @@
 //! A root by Newton's method inside a bracket.
 
-/// So many bisections take the middle of the bracket. Newton's method converges long before, unless the root is next to zero.
-const MOST_MIDDLES: usize = 60;
-/// After so many steps the last point is returned. Bisections after the first [`MOST_MIDDLES`] halve the number of doubles in the bracket;
+/// Upper bound of bisections at the middle of the bracket. Newton's method converges long before, unless the root is next to zero.
+const MAX_BISECTIONS: usize = 60;
+/// After so many steps the last point is returned. Bisections after the first [`MAX_BISECTIONS`] halve the number of doubles in the bracket;
 /// 64 of them leave one double.
-const MOST_STEPS: usize = 200;
+const MAX_STEPS: usize = 200;
 
 /// The root of an increasing function between `lower` and `upper`. Newton's method from `start`; a step that would leave the current
 /// bracket is replaced by a bisection, so that the method always converges.
@@ -19,7 +19,7 @@ const MOST_STEPS: usize = 200;
 /// ```
 pub fn increasing(mut f: impl FnMut(f64) -> (f64, f64), lower: f64, upper: f64, start: f64, tolerance: f64) -> f64 {
     let (mut low, mut high, mut x) = (lower, upper, start);
-    for step in 0..MOST_STEPS {
+    for step in 0..MAX_STEPS {
         let (value, slope) = f(x);
         if value < 0.0 {
             low = x;
@@ -29,7 +29,7 @@ pub fn increasing(mut f: impl FnMut(f64) -> (f64, f64), lower: f64, upper: f64, 
         let newton = x - value / slope;
         let next = if newton > low && newton < high {
             newton
-        } else if step < MOST_MIDDLES {
+        } else if step < MAX_BISECTIONS {
             0.5 * low + 0.5 * high
         } else {
             from_rank(((i128::from(rank(low)) + i128::from(rank(high))) / 2) as i64)

@@ -6,7 +6,7 @@ use thiserror::Error;
 /// The bracket is not narrowed below this multiple of its first width. A root at zero would otherwise need bisection through all exponents.
 const FLOOR: f64 = 1e-30;
 /// Evaluations after which the search stops. Bisection to [`FLOOR`] takes 100; this method needs at most three times as many.
-const MOST_EVALUATIONS: usize = 400;
+const MAX_EVALUATIONS: usize = 400;
 
 /// Why no root was found.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -99,7 +99,7 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lower: f64, upper: f64, toleranc
     // Each end is halved before adding: the width of a bracket may exceed the largest number.
     let floor = FLOOR * (0.5 * upper - 0.5 * lower);
     let mut share = 0.5;
-    for _ in 2..MOST_EVALUATIONS {
+    for _ in 2..MAX_EVALUATIONS {
         let x = if share == 0.5 {
             0.5 * a + 0.5 * b
         } else {
@@ -140,7 +140,7 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lower: f64, upper: f64, toleranc
     Err(RootError::NotConverged {
         lower: a.min(b),
         upper: a.max(b),
-        evaluations: MOST_EVALUATIONS,
+        evaluations: MAX_EVALUATIONS,
     })
 }
 

@@ -1,9 +1,9 @@
 //! Wild arguments: every function returns a number, an error, or NaN where an argument is NaN.
 
-use fewbits_numerics::linalg::{definite_factor, semidefinite_factor, solve_semidefinite};
+use fewbits_numerics::linalg::{definite_factor, semidefinite_factor, solve_semidefinite, triangular_factor};
 use fewbits_numerics::normal::{self, truncated_moments};
 use fewbits_numerics::{binomial, eigen, kernels, quadrature::Rule, roots, tridiagonal, wild};
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix3, Vector2};
 use proptest::prelude::*;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::SeedableRng;
@@ -79,6 +79,26 @@ proptest! {
         let rule = Rule::gauss_legendre(n % 20);
         if x[..2].iter().all(|x| x.abs() < 1e150) {
             prop_assert!(rule.sum(x[0], x[1], |t| t).is_finite(), "{:?}", &x[..2]);
+        }
+    }
+}
+
+/// Of full rank and of rank one, in units that differ by ten orders of magnitude; a variance of zero has a column of zeros.
+#[test]
+fn triangular_factors_of_singular_covariances_give_them_back() {
+    let units = [1e-5, 1.0, 1e5];
+    let columns = Matrix3::new(1.0, 0.0, 0.0, 0.5, 2.0, 0.0, -0.7, 0.4, 1.3);
+    for rank in 1..=3 {
+        let root = Matrix3::from_fn(|i, j| if j < rank { units[i] * columns[(i, j)] } else { 0.0 });
+        let covariance = root * root.transpose();
+        let lower = triangular_factor(&covariance);
+        for i in 0..3 {
+            for j in 0..3 {
+                let off = (lower * lower.transpose() - covariance)[(i, j)];
+                assert!(off.abs() <= 1e-11 * units[i] * units[j], "rank {rank}: {off}");
+                assert!(j <= i || lower[(i, j)] == 0.0);
+            }
+            assert!(i < rank || lower.column(i).amax() == 0.0, "rank {rank}: {lower}");
         }
     }
 }

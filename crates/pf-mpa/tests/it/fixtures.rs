@@ -1,12 +1,12 @@
 //! Reference values of another program, every one by its id.
 
 use fewbits_baselines::pf_mpa::association::{self, AssociationRule, tanh_rule};
+use fewbits_baselines::pf_mpa::product;
 use fewbits_baselines::pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
 use fewbits_core::factor::Factor;
 use fewbits_core::{Gaussian, NumberFormat};
 use fewbits_densities::{Bandwidth, BandwidthRule, Component, Mixture};
 use fewbits_pf_mpa::leader::StepBits;
-use fewbits_pf_mpa::product;
 use fewbits_pf_mpa::{
     AccelerationChain, CramerRao, Encoder, GridFilter, GridWorkspace, Linearised, Manoeuvres, Network, Normalisation,
     QuantizedRange, RangeNoise, RangeReference, Reports, Target, Tracker, level_information, position_information,

@@ -4,11 +4,8 @@
 
 mod allocation;
 mod attacks;
-#[path = "../../../densities/tests/it/common.rs"]
-mod common;
 mod fixtures;
 mod grid;
 mod laws;
-mod products;
 mod recording;
 mod wild;

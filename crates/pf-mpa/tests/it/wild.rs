@@ -5,7 +5,7 @@ use fewbits_baselines::pf_mpa::{MessagePassing, RingBias, kernel_error};
 use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::wild;
-use fewbits_pf_mpa::leader::{LeaderMessage, elect};
+use fewbits_pf_mpa::leader::elect;
 use fewbits_pf_mpa::{
     AccelerationChain, Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeFactor,
     RangeNoise, RangeReference, RangeSensor, RaoBlackwellGuided, Reports, Target, Tracker, level_information,
@@ -150,7 +150,7 @@ proptest! {
         step(&MessagePassing::improved(20).unwrap(), &target, &prior, &observed)?;
         step(&RaoBlackwellGuided::new(20).unwrap(), &target, &prior, &observed)?;
         let format = fewbits_core::NumberFormat::Single;
-        if let Ok(handover) = LeaderMessage::new(&prior, &format) {
+        if let Ok(handover) = fewbits_core::RoundedGaussian::new(&prior, &format) {
             prop_assert!(handover.belief().is_finite(), "{:?}", handover);
         }
         let _ = elect(&places, &[places[1], places[2]]);

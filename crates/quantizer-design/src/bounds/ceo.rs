@@ -55,7 +55,7 @@ pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error
         distortion: prior_variance * (-tau).exp(),
         gap: (above - tau).max(0.0),
     };
-    if bound.gap <= LARGEST_GAP {
+    if bound.gap <= MAX_GAP {
         Ok(bound)
     } else {
         Err(Error::NotConverged {
@@ -67,7 +67,7 @@ pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error
 }
 
 /// Largest relative gap of a CEO bound that is returned.
-const LARGEST_GAP: f64 = 1e-6;
+const MAX_GAP: f64 = 1e-6;
 
 /// The least distortion of a CEO problem, with a bound of its numerical error.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,7 +8,6 @@ use crate::system::System;
 use crate::table::{JointTable, Layout};
 use fewbits_core::Observation;
 use fewbits_numerics::error::entries;
-use fewbits_numerics::stored;
 use fewbits_quantizers::Symbol;
 use serde::{Deserialize, Serialize};
 
@@ -51,10 +50,30 @@ pub struct MmseDecoder {
     symbols: Vec<Table>,
 }
 
-stored! { MmseDecoder as StoredDecoder |decoder| {
-    system: System = decoder.system,
-    limit: usize = decoder.limit,
-} => MmseDecoder::new(&system, limit), Error }
+/// The stored form of [`MmseDecoder`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredDecoder {
+    system: System,
+    limit: usize,
+}
+
+impl From<MmseDecoder> for StoredDecoder {
+    fn from(decoder: MmseDecoder) -> Self {
+        Self {
+            system: decoder.system,
+            limit: decoder.limit,
+        }
+    }
+}
+
+impl TryFrom<StoredDecoder> for MmseDecoder {
+    type Error = Error;
+
+    fn try_from(parts: StoredDecoder) -> Result<Self, Error> {
+        MmseDecoder::new(&parts.system, parts.limit)
+    }
+}
 
 impl MmseDecoder {
     /// Computes the posterior of every joint outcome, if there are at most `limit`.

@@ -21,7 +21,6 @@ pub use sample::SampleFit;
 
 use crate::error::{Error, refuse};
 use fewbits_numerics::normal;
-use fewbits_numerics::stored;
 use nodes::PRIOR_STEP;
 use resolution::{NODE_LIMIT, grid, too_fine};
 use serde::{Deserialize, Serialize};
@@ -75,10 +74,30 @@ struct Node {
     factor: f64,
 }
 
-stored! { ObservationModel as StoredModel |model| {
-    prior: Prior = model.prior,
-    noise: Noise = model.noise,
-} => ObservationModel::new(prior, noise), Error }
+/// The stored form of [`ObservationModel`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredModel {
+    prior: Prior,
+    noise: Noise,
+}
+
+impl From<ObservationModel> for StoredModel {
+    fn from(model: ObservationModel) -> Self {
+        Self {
+            prior: model.prior,
+            noise: model.noise,
+        }
+    }
+}
+
+impl TryFrom<StoredModel> for ObservationModel {
+    type Error = Error;
+
+    fn try_from(parts: StoredModel) -> Result<Self, Error> {
+        ObservationModel::new(parts.prior, parts.noise)
+    }
+}
 
 impl ObservationModel {
     /// Discretises a prior and the noise of all sensors on quadrature nodes.

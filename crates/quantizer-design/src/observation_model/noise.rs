@@ -2,7 +2,6 @@
 
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::entries;
-use fewbits_numerics::stored;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -17,10 +16,30 @@ pub struct Noise {
     pub(super) residuals: Vec<f64>,
 }
 
-stored! { Noise as StoredNoise |noise| {
-    loadings: Vec<f64> = noise.loadings,
-    residual_deviations: Vec<f64> = noise.residuals,
-} => Noise::one_factor_with_deviations(&loadings, &residual_deviations), Error }
+/// The stored form of [`Noise`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredNoise {
+    loadings: Vec<f64>,
+    residual_deviations: Vec<f64>,
+}
+
+impl From<Noise> for StoredNoise {
+    fn from(noise: Noise) -> Self {
+        Self {
+            loadings: noise.loadings,
+            residual_deviations: noise.residuals,
+        }
+    }
+}
+
+impl TryFrom<StoredNoise> for Noise {
+    type Error = Error;
+
+    fn try_from(parts: StoredNoise) -> Result<Self, Error> {
+        Noise::one_factor_with_deviations(&parts.loadings, &parts.residual_deviations)
+    }
+}
 
 impl Noise {
     /// Independent noise with the given standard deviations.

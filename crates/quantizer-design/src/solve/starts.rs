@@ -20,7 +20,7 @@ const START_WORK: f64 = 6e8;
 /// Assumed number of rounds of a local search.
 const CLIMB_ROUNDS: f64 = 10.0;
 /// If fewer local searches than this fit into the time limit, rough nodes are used.
-const LEAST_CLIMBS: f64 = 4.0;
+const MIN_CLIMBS: f64 = 4.0;
 /// Number of refinements of the grids, each by a factor of three. Breakpoints are then within 1e-3 of a standard deviation, close enough
 /// for Newton's method.
 const REFINEMENTS: usize = 3;
@@ -76,7 +76,7 @@ impl Search<'_> {
         let largest = |cells: &[usize]| cells.iter().copied().max().unwrap_or(0);
         let mut work = landscape.work(largest(&cells));
         control.enter(Stage::AllSensors, 1);
-        let is_short = control.deadline().is_short_for(LEAST_CLIMBS * CLIMB_ROUNDS * work);
+        let is_short = control.deadline().is_short_for(MIN_CLIMBS * CLIMB_ROUNDS * work);
         control.is_cut_short |= is_short;
         let work_is_large = work > MAX_COARSE_WORK || is_short;
         let mut search = *self;

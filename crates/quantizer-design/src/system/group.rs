@@ -2,24 +2,34 @@
 
 use crate::compositions::count;
 use crate::error::{Error, refuse};
-use fewbits_numerics::stored;
 use fewbits_quantizers::{Channel, Quantizer};
 use serde::{Deserialize, Serialize};
 
 /// Sensors of equal noise that share a quantizer design and a channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredGroup", into = "StoredGroup")]
+#[serde(try_from = "StoredGroup")]
 pub struct SensorGroup {
     pub(super) quantizer: Quantizer,
     pub(super) channel: Channel,
     pub(super) sensors: Vec<usize>,
 }
 
-stored! { SensorGroup as StoredGroup |group| {
-    quantizer: Quantizer = group.quantizer,
-    channel: Channel = group.channel,
-    sensors: Vec<usize> = group.sensors,
-} => SensorGroup::new(quantizer, channel, sensors), Error }
+/// The stored form of [`SensorGroup`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredGroup {
+    quantizer: Quantizer,
+    channel: Channel,
+    sensors: Vec<usize>,
+}
+
+impl TryFrom<StoredGroup> for SensorGroup {
+    type Error = Error;
+
+    fn try_from(parts: StoredGroup) -> Result<Self, Error> {
+        SensorGroup::new(parts.quantizer, parts.channel, parts.sensors)
+    }
+}
 
 impl SensorGroup {
     /// The sensors with the given numbers, each with this quantizer, each behind its own copy of the channel.

@@ -8,7 +8,6 @@ use crate::compositions::count;
 use crate::error::{Error, refuse};
 use crate::observation_model::ObservationModel;
 use fewbits_numerics::error::entries;
-use fewbits_numerics::stored;
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::lloyd_max;
@@ -27,18 +26,29 @@ pub const OUTCOME_LIMIT: u64 = 1 << 20;
 /// # Ok::<(), fewbits_quantizer_design::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredSystem", into = "StoredSystem")]
+#[serde(try_from = "StoredSystem")]
 pub struct System {
     model: ObservationModel,
     groups: Vec<SensorGroup>,
     outcome_limit: u64,
 }
 
-stored! { System as StoredSystem |system| {
-    model: ObservationModel = system.model,
-    groups: Vec<SensorGroup> = system.groups,
-    outcome_limit: u64 = system.outcome_limit,
-} => Ok(System::new(model, groups)?.with_outcome_limit(outcome_limit)), Error }
+/// The stored form of [`System`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredSystem {
+    model: ObservationModel,
+    groups: Vec<SensorGroup>,
+    outcome_limit: u64,
+}
+
+impl TryFrom<StoredSystem> for System {
+    type Error = Error;
+
+    fn try_from(parts: StoredSystem) -> Result<Self, Error> {
+        Ok(System::new(parts.model, parts.groups)?.with_outcome_limit(parts.outcome_limit))
+    }
+}
 
 impl System {
     /// A system of groups.

@@ -3,12 +3,11 @@
 use crate::error::{Error, refuse};
 use crate::quantizer::{Quantizer, cell_of, check_increasing};
 use fewbits_numerics::error::{all_finite, finite, non_negative, positive, probabilities};
-use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// A scalar quantizer of smallest squared error: cells `[b_{i-1}, b_i)` and the centroid of each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Table", into = "Table")]
+#[serde(try_from = "Table")]
 pub struct LloydMax {
     pub(super) breakpoints: Vec<f64>,
     pub(super) centroids: Vec<f64>,
@@ -16,12 +15,36 @@ pub struct LloydMax {
     pub(super) mean_squared_error: f64,
 }
 
-stored! { LloydMax as Table |quantizer| {
-    breakpoints: Vec<f64> = quantizer.breakpoints,
-    centroids: Vec<f64> = quantizer.centroids,
-    probabilities: Vec<f64> = quantizer.probabilities,
-    mean_squared_error: f64 = quantizer.mean_squared_error,
-} => LloydMax { breakpoints, centroids, probabilities, mean_squared_error }.checked(), Error }
+/// The stored form of [`LloydMax`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    breakpoints: Vec<f64>,
+    centroids: Vec<f64>,
+    probabilities: Vec<f64>,
+    mean_squared_error: f64,
+}
+
+impl TryFrom<Table> for LloydMax {
+    type Error = Error;
+
+    fn try_from(
+        Table {
+            breakpoints,
+            centroids,
+            probabilities,
+            mean_squared_error,
+        }: Table,
+    ) -> Result<Self, Error> {
+        LloydMax {
+            breakpoints,
+            centroids,
+            probabilities,
+            mean_squared_error,
+        }
+        .checked()
+    }
+}
 
 impl LloydMax {
     /// Checks that the parts of a stored quantizer are consistent.

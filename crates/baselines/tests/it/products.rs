@@ -2,9 +2,9 @@
 
 use crate::common::{lobe, random_mixture};
 use fewbits_baselines::pf_mpa::ProductSampler;
+use fewbits_baselines::pf_mpa::product::exact;
 use fewbits_densities::{Component, Mixture};
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::product::exact;
 use nalgebra::{Matrix1, SVector, Vector1};
 
 fn line(means: &[f64], variance: f64, weights: &[f64]) -> Mixture<1> {

@@ -4,15 +4,15 @@
 //! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form. This is exact if the labels can
 //! be enumerated; otherwise one draws from the product.
 
-use crate::Error;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::normal::LN_SQRT_2PI;
+use fewbits_pf_mpa::Error;
 use nalgebra::{SMatrix, SVector};
 
 /// Largest number of label choices that [`exact`] enumerates.
-pub const MOST_TERMS: usize = 1_000_000;
+pub const MAX_TERMS: usize = 1_000_000;
 
 /// A normalised product and the logarithm of its normaliser.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,16 +65,16 @@ fn check<const D: usize>(factors: &[&Mixture<D>]) -> Result<SVector<f64, D>, Err
 /// The product of mixtures, with one component for every choice of labels.
 ///
 /// # Errors
-/// If there is no factor, there are more than [`MOST_TERMS`] choices, or every weight underflows
+/// If there is no factor, there are more than [`MAX_TERMS`] choices, or every weight underflows
 /// ([`Error::Impossible`]: the factors have almost no overlap).
 pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<D>, Error> {
     let origin = check(factors)?;
     let terms = factors
         .iter()
-        .try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MOST_TERMS));
+        .try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MAX_TERMS));
     if terms.is_none() {
         let sizes: Vec<usize> = factors.iter().map(|f| f.len()).collect();
-        let expected = format!("at most {MOST_TERMS} choices of labels");
+        let expected = format!("at most {MAX_TERMS} choices of labels");
         return refuse("factors", format!("mixtures of {sizes:?} components"), expected);
     }
     let zero = Information {

@@ -1,0 +1,54 @@
+//! When sensors of a table of single reports would have reported: silence is a row that is not there.
+
+use super::rows::Instant;
+use fewbits_filters::calibration::median;
+
+/// Number of intervals from which the usual one is found, at least and at most.
+const FEWEST: usize = 4;
+const MOST: usize = 32;
+/// A report is missing if it is this many usual intervals since the last.
+const LATE: f64 = 1.5;
+
+/// The usual interval of each sensor.
+#[derive(Debug, Default)]
+pub(super) struct Rhythm {
+    sensors: Vec<Sensor>,
+}
+
+#[derive(Debug, Default, Clone)]
+struct Sensor {
+    /// Time of the last report, and of the last report or missing report.
+    reported: Option<f64>,
+    counted: f64,
+    intervals: Vec<f64>,
+}
+
+impl Rhythm {
+    /// Adds an empty report for each sensor that should have reported before this instant and did not; one at an instant.
+    pub(super) fn fill(&mut self, instant: &mut Instant) {
+        let sensors = instant.reports.iter().map(|(sensor, _)| sensor + 1).max().unwrap_or(0);
+        if self.sensors.len() < sensors {
+            self.sensors.resize(sensors, Sensor::default());
+        }
+        let now = instant.seconds;
+        for (number, sensor) in self.sensors.iter_mut().enumerate() {
+            if instant.reports.iter().any(|(other, _)| *other == number) {
+                let interval = sensor
+                    .reported
+                    .map(|last| now - last)
+                    .filter(|interval| *interval > 0.0);
+                if sensor.intervals.len() < MOST {
+                    sensor.intervals.extend(interval);
+                }
+                (sensor.reported, sensor.counted) = (Some(now), now);
+            } else if sensor.intervals.len() >= FEWEST {
+                let usual = median(sensor.intervals.clone());
+                if now - sensor.counted > LATE * usual {
+                    // Others may report less often: of several missing reports one counts.
+                    sensor.counted += usual * ((now - sensor.counted) / usual).floor();
+                    instant.reports.push((number, None));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Comparison with references: of columns without a word, of other values by name.
+
+use super::{Claims, Expected};
+use crate::measured::Measured;
+use crate::reference;
+use crate::schema::{Table, Value};
+
+impl Claims {
+    /// One claim for each reference `<figure>/<quantity>/<key>`: the row of that key has that value, within the reference's
+    /// tolerance or, where it has a standard error, within four combined standard errors. A reference whose row is absent
+    /// fails. References hold at the paper's setting only.
+    pub fn references<R, V: Cell>(
+        &self,
+        quantity: &str,
+        statement: &str,
+        rows: impl IntoIterator<Item = R>,
+        key_and_value: impl Fn(R) -> (String, V),
+    ) {
+        self.compared.borrow_mut().insert(quantity.to_owned());
+        let rows: Vec<_> = rows.into_iter().map(key_and_value).collect();
+        let known = match reference::group(self.figure, quantity) {
+            Ok(known) if !known.is_empty() => known,
+            Ok(_) => {
+                let empty = "there are references of that name";
+                self.at_least(format!("{quantity}-references"), empty, 0.0, 1.0);
+                return;
+            }
+            Err(error) => {
+                self.decide(format!("{quantity}-references"), error, None, Expected::of("to be read"), |_| false);
+                return;
+            }
+        };
+        let here = self.at_defaults();
+        for (key, known) in known {
+            let found = rows.iter().find(|(name, _)| name == key);
+            let found = found.and_then(|(_, value)| value.measured());
+            let own = found.and_then(|found| found.standard_error).unwrap_or(0.0);
+            let tolerance = known.tolerance + 4.0 * known.standard_error.unwrap_or(0.0).hypot(own);
+            let id = format!("{quantity}/{key}").replace(' ', "-");
+            let statement = format!("{statement}, {key}");
+            let number = found.map(|found| found.value);
+            if self.one_sided {
+                let statement = format!("{statement}: no more than the reference {}", known.value);
+                here.at_most(id, statement, number, known.value + tolerance);
+            } else {
+                here.near(id, statement, number, known.value, tolerance);
+            }
+        }
+    }
+
+    /// As [`Claims::references`], of rows that name their own keys.
+    pub fn keyed<'r, R: Keyed + 'r, V: Cell>(
+        &self,
+        quantity: &str,
+        statement: &str,
+        rows: impl IntoIterator<Item = &'r R>,
+        value: impl Fn(&R) -> V,
+    ) {
+        self.references(quantity, statement, rows, |row| (row.key(), value(row)));
+    }
+
+    /// The references of this quantity stand in a column beside ours, and are not met: nothing is compared with them.
+    pub fn shown(&self, quantity: &str) {
+        self.compared.borrow_mut().insert(quantity.to_owned());
+    }
+
+    /// Compares each column of keyed rows that has references under its own name, unless the figure did so itself. References that
+    /// nothing was compared with fail.
+    pub(crate) fn compare(&self, tables: &[Table]) {
+        let quantities = reference::quantities(self.figure).unwrap_or_default();
+        let open: Vec<&str> = {
+            let compared = self.compared.borrow();
+            quantities
+                .into_iter()
+                .filter(|quantity| !compared.contains(*quantity))
+                .collect()
+        };
+        for quantity in open {
+            let column = |table: &Table| {
+                table
+                    .columns
+                    .iter()
+                    .position(|column| column.name == quantity.replace('-', "_"))
+            };
+            // Of several tables with the column, that whose rows the references name.
+            let known = reference::group(self.figure, quantity).unwrap_or_default();
+            let is_named = |key: &&Option<String>| known.iter().any(|(name, _)| Some(*name) == key.as_deref());
+            let named = |table: &&Table| table.keys.iter().filter(is_named).count();
+            let keyed = |table: &&Table| table.keys.iter().any(Option::is_some) && column(table).is_some();
+            let Some((table, i)) = tables
+                .iter()
+                .rev()
+                .filter(keyed)
+                .max_by_key(named)
+                .and_then(|table| Some((table, column(table)?)))
+            else {
+                let what =
+                    format!("the references `{quantity}` are compared with a column of that name, or by a claim");
+                self.at_defaults()
+                    .at_least(format!("{quantity}-references"), what, 0.0, 1.0);
+                continue;
+            };
+            let number = |value: Option<&Value>| match value {
+                Some(Value::Number(number)) => Some(*number),
+                Some(Value::Integer(count)) => Some(*count as f64),
+                _ => None,
+            };
+            let has_error = table
+                .columns
+                .get(i + 1)
+                .is_some_and(|next| next.name == format!("{}_se", table.columns[i].name));
+            let cells = table.keys.iter().zip(&table.rows).map(|(key, row)| {
+                let error = if has_error { number(row.get(i + 1)) } else { None };
+                (key.clone().unwrap_or_default(), number(row.get(i)).map(|value| Measured::new(value, error)))
+            });
+            let statement = table.columns[i].meaning.trim_end_matches('.');
+            self.references(quantity, statement, cells, |cell| cell);
+        }
+    }
+}
+
+/// A row that is found by a name: what follows the quantity in the keys of its references. `rows!` writes it.
+pub trait Keyed {
+    /// The name.
+    fn key(&self) -> String;
+}
+
+/// What a reference can be compared with: a number, perhaps missing, perhaps with a standard error.
+pub trait Cell {
+    /// The number with its standard error.
+    fn measured(&self) -> Option<Measured>;
+}
+
+impl Cell for f64 {
+    fn measured(&self) -> Option<Measured> {
+        Some(Measured::new(*self, None))
+    }
+}
+
+impl Cell for Measured {
+    fn measured(&self) -> Option<Measured> {
+        Some(*self)
+    }
+}
+
+/// The first number over the second, where both are there.
+pub fn over(first: impl Cell, second: impl Cell) -> Option<f64> {
+    Some(first.measured()?.value / second.measured()?.value)
+}
+
+/// The first number minus the second, where both are there.
+pub fn minus(first: impl Cell, second: impl Cell) -> Option<f64> {
+    Some(first.measured()?.value - second.measured()?.value)
+}
+
+impl<T: Cell> Cell for Option<T> {
+    fn measured(&self) -> Option<Measured> {
+        self.as_ref()?.measured()
+    }
+}

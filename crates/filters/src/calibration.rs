@@ -1,0 +1,352 @@
+//! Noise of each sensor and process noise of a level, found together from a stretch of recorded values.
+//!
+//! ```text
+//! p(all values | process noise, noise of each sensor) by the Kalman filter of the level, which every sensor measures
+//! each value is wild with probability 1/100, and then anywhere between the smallest and the largest value: it hardly moves the filter
+//! maximum: first the process noise and one noise of all sensors, then each number by itself, again and again
+//! ```
+//! The density of a value is proper, wild values included. Numbers that are too small are therefore punished by every value that they make
+//! wild. Offsets of sensors are another question: [`offsets`].
+
+use crate::{Error, assumed_density};
+use fewbits_core::{Evolution, Gaussian};
+use fewbits_numerics::error::{finite, positive, refuse};
+use nalgebra::SMatrix;
+
+/// Assumed share of wild values.
+const WILD: f64 = 0.01;
+/// Instants in a row without a value that agrees with the prediction after which the level is taken to have jumped.
+const JUMP: u32 = 4;
+/// Steps of the search, in `ln`, and its reach about the start.
+const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
+const REACH: f64 = 9.0;
+/// Rounds over the single numbers.
+const ROUNDS: usize = 3;
+/// A sensor with fewer values than this has the noise that all have together.
+const FEWEST: usize = 12;
+
+/// The values of one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instant {
+    /// Time in seconds, not before that of the instant above.
+    pub seconds: f64,
+    /// Index of a sensor, and its value.
+    pub values: Vec<(usize, f64)>,
+}
+
+/// A standard deviation or a factor: known, or to be found from a first guess.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Number {
+    /// It is held fixed.
+    Known(f64),
+    /// It is found.
+    Unknown {
+        /// First guess.
+        guess: f64,
+        /// Smallest number that is considered, for instance because values are rounded.
+        least: f64,
+    },
+}
+
+impl Number {
+    fn check(&self, name: &'static str) -> Result<(), Error> {
+        match self {
+            Self::Known(number) => positive(name, *number)?,
+            Self::Unknown { guess, least } => {
+                finite(name, *least)?;
+                positive(name, *guess)?
+            }
+        };
+        Ok(())
+    }
+
+    fn start(&self) -> f64 {
+        match self {
+            Self::Known(number) => *number,
+            Self::Unknown { guess, least } => guess.max(*least),
+        }
+    }
+
+    /// The number at `ln` this far from the start; `None` if it is out of reach.
+    fn at(&self, shift: f64) -> Option<f64> {
+        match self {
+            Self::Known(number) => Some(*number),
+            Self::Unknown { least, .. } => {
+                let number = self.start() * shift.exp();
+                (shift.abs() <= REACH && number >= *least).then_some(number)
+            }
+        }
+    }
+
+    fn is_unknown(&self) -> bool {
+        matches!(self, Self::Unknown { .. })
+    }
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Calibration {
+    /// The number on which the dynamics depend.
+    pub change: f64,
+    /// Standard deviation of the noise of each sensor.
+    pub noises: Vec<f64>,
+    /// `ln p` of all values.
+    pub log_likelihood: f64,
+}
+
+/// The level and its sensors as far as they are known. The level is coordinate 0 of the state.
+#[derive(Debug, Clone, Copy)]
+pub struct Level<'a, W, const D: usize> {
+    /// Dynamics in continuous time for a size of change, which is found, for instance the deviation of the level after an hour.
+    pub world: W,
+    /// The state at the first instant.
+    pub prior: &'a Gaussian<D>,
+    /// Period of the level, if it is an angle: values that differ by whole periods are equal.
+    pub period: Option<f64>,
+}
+
+/// The difference of two angles, at most half a period in size.
+pub fn wrapped(difference: f64, period: Option<f64>) -> f64 {
+    period.map_or(difference, |period| difference - period * (difference / period).round())
+}
+
+impl<W, E, const D: usize> Level<'_, W, D>
+where
+    W: Fn(f64) -> Result<E, Error>,
+    E: Evolution<D>,
+{
+    /// Finds the unknown numbers by maximum likelihood.
+    ///
+    /// # Errors
+    /// If an instant is before the one above it, names a sensor that `noises` does not have, or holds a value that is not finite; if a number
+    /// or a guess is not positive; if all values are equal.
+    pub fn calibrate(&self, instants: &[Instant], change: Number, noises: &[Number]) -> Result<Calibration, Error> {
+        change.check("change")?;
+        noises.iter().try_for_each(|noise| noise.check("noises"))?;
+        let mut counts = vec![0_usize; noises.len()];
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for instant in instants {
+            finite("seconds", instant.seconds)?;
+        }
+        for (sensor, value) in instants.iter().flat_map(|instant| &instant.values) {
+            finite("values", *value)?;
+            let Some(count) = counts.get_mut(*sensor) else {
+                return refuse("sensor", sensor, format!("below {}, the number of noises", noises.len()));
+            };
+            *count += 1;
+            (low, high) = (low.min(*value), high.max(*value));
+        }
+        if !(high > low) {
+            return refuse("values", "all equal", "values that vary");
+        }
+        let range = self.period.unwrap_or(high - low);
+        if let Some(pair) = instants.windows(2).find(|pair| pair[1].seconds < pair[0].seconds) {
+            return refuse("seconds", pair[1].seconds, format!("{} or later", pair[0].seconds));
+        }
+        let log_likelihood = |change: f64, noises: &[f64]| {
+            let found = self.log_likelihood(instants, range, change, noises);
+            found.unwrap_or(f64::NEG_INFINITY)
+        };
+        let mut found = Search {
+            change,
+            noises,
+            shifts: vec![0.0; noises.len() + 1],
+            best: f64::NEG_INFINITY,
+            log_likelihood,
+        };
+        found.best = found.at(&found.shifts);
+        // One noise of all sensors first, so that few numbers begin near the maximum.
+        let together: Vec<usize> = (1..=noises.len())
+            .filter(|axis| noises[axis - 1].is_unknown())
+            .collect();
+        let own_change: Vec<usize> = change.is_unknown().then_some(0).into_iter().collect();
+        found.improve(&[own_change.clone(), together.clone()], &STEPS);
+        let single: Vec<Vec<usize>> = together
+            .iter()
+            .filter(|axis| counts[**axis - 1] >= FEWEST)
+            .map(|axis| vec![*axis])
+            .chain([own_change])
+            .collect();
+        for _ in 0..ROUNDS {
+            let before = found.best;
+            found.improve(&single, &STEPS[1..]);
+            if found.best - before < 1e-3 {
+                break;
+            }
+        }
+        let number = |number: &Number, shift: f64| number.at(shift).unwrap_or(number.start());
+        Ok(Calibration {
+            change: number(&change, found.shifts[0]),
+            noises: noises
+                .iter()
+                .zip(&found.shifts[1..])
+                .map(|(one, shift)| number(one, *shift))
+                .collect(),
+            log_likelihood: found.best,
+        })
+    }
+
+    fn log_likelihood(&self, instants: &[Instant], range: f64, change: f64, noises: &[f64]) -> Option<f64> {
+        let world = (self.world)(change).ok()?;
+        let (mut belief, mut total, mut astray) = (*self.prior, 0.0, 0);
+        let mut now = instants.first()?.seconds;
+        // Most steps are as long as the one before.
+        let mut step: Option<(f64, E::Step)> = None;
+        for instant in instants {
+            let seconds = instant.seconds - now;
+            now = instant.seconds;
+            if seconds > 0.0 {
+                if step.as_ref().is_none_or(|(length, _)| *length != seconds) {
+                    step = Some((seconds, world.over(seconds).ok()?));
+                }
+                if let Some((_, step)) = &step {
+                    belief = assumed_density::predict(step, &belief);
+                }
+            }
+            let (mut agreeing, mut farthest) = (0.0, 0.0_f64);
+            for (sensor, value) in &instant.values {
+                let (mean, covariance) = (*belief.mean(), *belief.covariance());
+                let variance = covariance[(0, 0)] + noises[*sensor] * noises[*sensor];
+                let innovation = wrapped(value - mean[0], self.period);
+                let density =
+                    (-0.5 * innovation * innovation / variance).exp() / (std::f64::consts::TAU * variance).sqrt();
+                let (right, wild) = ((1.0 - WILD) * density, WILD / range);
+                total += (right + wild).ln();
+                // The moments of the mixture of "it is wild" and "it is not".
+                let weight = right / (right + wild);
+                agreeing += weight;
+                farthest = farthest.max(innovation.abs());
+                let gain = covariance.column(0) / variance;
+                let spread = weight * (variance - (1.0 - weight) * innovation * innovation);
+                let next: SMatrix<f64, D, D> = covariance - gain * gain.transpose() * spread;
+                belief = Gaussian::from_trusted_parts(mean + gain * (weight * innovation), next);
+            }
+            astray = if instant.values.is_empty() || agreeing > 0.5 {
+                0
+            } else {
+                astray + 1
+            };
+            if astray >= JUMP {
+                let mut covariance = *belief.covariance();
+                covariance[(0, 0)] += farthest * farthest;
+                belief = Gaussian::from_trusted_parts(*belief.mean(), covariance);
+                astray = 0;
+            }
+        }
+        (!total.is_nan()).then_some(total)
+    }
+}
+
+/// A search along groups of numbers that move together, in `ln`.
+struct Search<'a, L> {
+    change: Number,
+    noises: &'a [Number],
+    /// Of the change, then of each noise.
+    shifts: Vec<f64>,
+    best: f64,
+    log_likelihood: L,
+}
+
+impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
+    fn at(&self, shifts: &[f64]) -> f64 {
+        let noises: Option<Vec<f64>> = self
+            .noises
+            .iter()
+            .zip(&shifts[1..])
+            .map(|(one, shift)| one.at(*shift))
+            .collect();
+        match (self.change.at(shifts[0]), noises) {
+            (Some(change), Some(noises)) => (self.log_likelihood)(change, &noises),
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Moves along each group, with smaller and smaller steps.
+    fn improve(&mut self, groups: &[Vec<usize>], steps: &[f64]) {
+        for step in steps {
+            loop {
+                let before = self.best;
+                for group in groups.iter().filter(|group| !group.is_empty()) {
+                    for sign in [-step, *step] {
+                        let mut other = self.shifts.clone();
+                        group.iter().for_each(|axis| other[*axis] += sign);
+                        let found = self.at(&other);
+                        if found > self.best {
+                            (self.best, self.shifts) = (found, other);
+                        }
+                    }
+                }
+                if !(self.best > before) {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// The median; of an even number the middle of the two in the middle. 0 without numbers.
+pub fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    match (numbers.len(), numbers.len() / 2) {
+        (0, _) => 0.0,
+        (count, half) if count % 2 == 0 => 0.5 * (numbers[half - 1] + numbers[half]),
+        (_, half) => numbers[half],
+    }
+}
+
+/// Rounds of the search for offsets.
+const ALIGNMENTS: usize = 20;
+/// Values that are farther from the mean than this many of their median distances are left out.
+const FARTHEST: f64 = 6.0;
+
+/// The constant offset of each sensor among `sensors`, from the instants at which several measured. Their median is zero: nothing says what
+/// all have in common. A wild value does not move them. A sensor that never measured together with others has offset zero.
+pub fn offsets(instants: &[Instant], sensors: usize, period: Option<f64>) -> Vec<f64> {
+    let mut found = vec![0.0; sensors];
+    for round in 0..ALIGNMENTS {
+        let mut differences = vec![Vec::new(); sensors];
+        for instant in instants.iter().filter(|instant| instant.values.len() > 1) {
+            let known = || {
+                instant
+                    .values
+                    .iter()
+                    .filter(|(sensor, value)| *sensor < sensors && value.is_finite())
+            };
+            let Some((_, origin)) = known().next() else { continue };
+            let aligned = |(sensor, value): &(usize, f64)| wrapped(value - origin, period) - found[*sensor];
+            let middle = median(known().map(aligned).collect());
+            known().for_each(|one| differences[one.0].push(wrapped(aligned(one) - middle, period)));
+        }
+        let shift = |differences: &Vec<f64>| {
+            let middle = median(differences.clone());
+            let width = FARTHEST * median(differences.iter().map(|one| (one - middle).abs()).collect());
+            let near = || differences.iter().filter(|one| (**one - middle).abs() <= width);
+            near().sum::<f64>() / (near().count() as f64).max(1.0)
+        };
+        let shifts: Vec<f64> = differences.iter().map(shift).collect();
+        found
+            .iter_mut()
+            .zip(&shifts)
+            .for_each(|(offset, shift)| *offset += shift);
+        let common = median(
+            found
+                .iter()
+                .zip(&differences)
+                .filter(|(_, own)| !own.is_empty())
+                .map(|(one, _)| *one)
+                .collect(),
+        );
+        let with_others = differences.iter().map(|own| !own.is_empty());
+        found
+            .iter_mut()
+            .zip(with_others)
+            .for_each(|(offset, moves)| *offset = if moves { *offset - common } else { 0.0 });
+        let largest = shifts.iter().fold(0.0_f64, |most, shift| most.max(shift.abs()));
+        let size = found.iter().fold(0.0_f64, |most, offset| most.max(offset.abs()));
+        if round > 0 && largest <= 1e-6 * size {
+            break;
+        }
+    }
+    found
+}

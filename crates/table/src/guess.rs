@@ -1,0 +1,69 @@
+//! How the times of a column are written, by its cells.
+
+use crate::time::{Scale, Unit};
+use crate::written::{AMBIGUOUS, Clock, Order, Problem, Syntax, date, digits, of_day};
+
+/// How cells of a column are written, if all are times; an ambiguity if the day or the month may stand first.
+pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
+    let clock = |syntax: Syntax, scale| Clock {
+        syntax,
+        zone: None,
+        scale,
+        takes_leap_seconds: true,
+        cuts: true,
+    };
+    let all = |syntax: Syntax| {
+        let utc = clock(syntax.clone(), Scale::Utc);
+        let local = clock(syntax, Scale::Local);
+        !cells.is_empty()
+            && cells
+                .iter()
+                .all(|cell| local.parse(cell).is_ok() || utc.parse(cell).is_ok())
+    };
+    if all(Syntax::Number(Unit::Seconds)) {
+        let largest = cells
+            .iter()
+            .filter_map(|cell| cell.trim().parse::<f64>().ok())
+            .fold(0.0_f64, |m, x| m.max(x.abs()));
+        return Some(Ok(Syntax::Number(Unit::of_epoch(largest).unwrap_or(Unit::Seconds))));
+    }
+    if all(Syntax::OfDay) {
+        return Some(Ok(Syntax::OfDay));
+    }
+    let year_first = cells
+        .iter()
+        .all(|cell| digits(cell.trim(), 5).is_some_and(|(_, count, _)| count == 4));
+    if year_first {
+        return all(Syntax::Date(Order::Ymd)).then_some(Ok(Syntax::Date(Order::Ymd)));
+    }
+    let (dmy, mdy) = (all(Syntax::Date(Order::Dmy)), all(Syntax::Date(Order::Mdy)));
+    let is_dotted = cells
+        .iter()
+        .all(|cell| digits(cell.trim(), 2).is_some_and(|(_, _, rest)| rest.starts_with('.')));
+    let is_worded = cells.iter().all(|cell| {
+        cell.trim()
+            .bytes()
+            .take(7)
+            .any(|c| c.is_ascii_alphabetic() && c != b'T')
+    });
+    match (dmy, mdy) {
+        (true, true) if is_dotted || is_worded => Some(Ok(Syntax::Date(Order::Dmy))),
+        (true, true) => Some(Err(AMBIGUOUS)),
+        (true, false) => Some(Ok(Syntax::Date(Order::Dmy))),
+        (false, true) => Some(Ok(Syntax::Date(Order::Mdy))),
+        (false, false) => all(Syntax::Date(Order::Ymd)).then_some(Ok(Syntax::Date(Order::Ymd))),
+    }
+}
+
+/// Whether a written time has an offset of its own.
+pub(crate) fn has_offset(text: &str, order: Order) -> bool {
+    let rest = date(text.trim(), order).map(|(_, rest)| rest.trim_start_matches([' ', 'T', 't', '_', ',']));
+    rest.and_then(of_day)
+        .is_some_and(|(_, _, _, rest)| !rest.trim().is_empty())
+}
+
+/// Whether a text looks like a time that is no plain number.
+pub(crate) fn looks_like_time(text: &str) -> bool {
+    let text = text.trim();
+    text.starts_with(|c: char| c.is_ascii_digit()) && !matches!(detect(&[text]), None | Some(Ok(Syntax::Number(_))))
+}

@@ -1,0 +1,295 @@
+//! Reading: rows of text become cells of columns.
+
+use crate::column::{Batch, Cells, Kind, MAX_WORDS};
+use crate::error::{Error, Place, printable};
+use crate::guess::looks_like_time;
+use crate::missing::{self, Spellings};
+use crate::number::{self, Number};
+use crate::profile::boolean;
+use crate::table::Table;
+use crate::written::{AMBIGUOUS, Clock};
+
+/// Largest number of lines that were left out and whose faults are kept.
+const MAX_FAULTS: usize = 10;
+
+impl Table {
+    /// Reads at most `limit` rows into `batch`. Returns how many there were; 0 after the last. Of a live source, a call with a limit of 1
+    /// waits for no more than one row.
+    ///
+    /// # Errors
+    /// If a line or a cell cannot be read and no more may be left out. Rows before it are handed out first. After an error in one line,
+    /// reading goes on behind it.
+    pub fn read(&mut self, batch: &mut Batch, limit: usize) -> Result<usize, Error> {
+        batch.reset(self.selected.iter().map(|i| self.columns[*i].kind));
+        if let Some(error) = self.late_error.take() {
+            return Err(error);
+        }
+        while batch.rows < limit {
+            let outcome = match self.next_into(batch) {
+                Ok(false) => break,
+                other => other,
+            };
+            if let Err(error) = outcome {
+                batch.cut();
+                let error = self.placed(error);
+                if error.place().is_none() || self.is_repeated() {
+                    if error.place().is_some() {
+                        self.skipped.repeated += 1;
+                        continue;
+                    }
+                    return Err(error);
+                }
+                if self.skipped.bad < self.dialect.skip_bad {
+                    self.skip(&error);
+                } else if batch.rows > 0 {
+                    self.late_error = Some(error);
+                    break;
+                } else {
+                    return Err(error);
+                }
+            }
+        }
+        Ok(batch.rows)
+    }
+
+    /// Reads the next row into `batch`. Returns whether there was one.
+    fn next_into(&mut self, batch: &mut Batch) -> Result<bool, Error> {
+        #[cfg(feature = "parquet")]
+        if self.arrow.is_some() {
+            return self.next_arrow(batch);
+        }
+        if !self.next_row()? {
+            return Ok(false);
+        }
+        self.push(batch).map(|()| true)
+    }
+
+    fn skip(&mut self, error: &Error) {
+        self.skipped.bad += 1;
+        if self.skipped.faults.len() < MAX_FAULTS {
+            self.skipped.faults.push(error.to_string());
+        }
+    }
+
+    fn is_repeated(&self) -> bool {
+        self.rows.is_preamble(&self.row)
+    }
+
+    /// An error of a line with the number of its row.
+    fn placed(&self, mut error: Error) -> Error {
+        if let Error::Line { place, problem, mend } = &mut error {
+            place.row = self.count;
+            if self.row.text.contains(&0) {
+                "NUL bytes, as after a loss of power".clone_into(problem);
+                *mend = "leave such lines out with --skip-bad";
+            }
+        }
+        error
+    }
+
+    /// Reads the next row that is not blank into `self.row`.
+    fn next_row(&mut self) -> Result<bool, Error> {
+        loop {
+            self.row.text.clear();
+            self.row.cells.clear();
+            let found = self.rows.next(&mut self.row);
+            if !matches!(found, Ok(None)) {
+                self.count += 1;
+            }
+            if found?.is_none() {
+                return Ok(false);
+            }
+            if self.row.is_blank()
+                && (self.row.cells.len() <= 1 || self.time.is_some())
+                && (self.columns.len() > 1 || self.time.is_some())
+            {
+                self.count -= 1;
+                self.skipped.blank += u64::from(self.row.cells.len() > 1);
+                continue;
+            }
+            if self.rows.is_header_again(&self.row) {
+                self.count -= 1;
+                self.skipped.repeated += 1;
+                continue;
+            }
+            return Ok(true);
+        }
+    }
+
+    pub(crate) fn place(&self) -> Place {
+        Place {
+            line: self.row.line,
+            row: self.count,
+        }
+    }
+
+    fn push(&mut self, batch: &mut Batch) -> Result<(), Error> {
+        self.rows.check_length(&self.row, self.columns.len(), &self.dialect)?;
+        if let Some((columns, clock)) = &self.time {
+            let time = match columns.as_slice() {
+                [column] => match self.row.cell_text(*column) {
+                    "" => {
+                        Err(("is no time: the cell is empty", "mend the row, or leave such rows out with --skip-bad"))
+                    }
+                    text => clock.parse(text),
+                },
+                several => clock.of_parts(&several.iter().map(|i| self.row.cell_text(*i)).collect::<Vec<_>>()),
+            };
+            let time = time.map_err(|(problem, mend)| {
+                let text = columns
+                    .iter()
+                    .map(|i| self.row.cell_text(*i))
+                    .collect::<Vec<_>>()
+                    .join(" ");
+                self.refused(columns[0], &text, problem, mend.to_owned())
+            })?;
+            batch.times.push(time);
+        }
+        for (i, column) in self.selected.iter().enumerate() {
+            let cell = self.row.cell(*column);
+            if let Cells::Numbers(numbers) = &mut batch.columns[i] {
+                // The usual cases, without a copy.
+                if cell.is_empty() {
+                    numbers.push(None);
+                    continue;
+                }
+                if let Ok(Number::Double(value, _)) = number::parse(cell, self.syntax) {
+                    let gaps = &self.gaps[*column];
+                    numbers.push(Some(value).filter(|_| !gaps.has_numbers() || !gaps.has_number(value)));
+                    continue;
+                }
+            }
+            let pushed = push_cell(
+                &mut batch.columns[i],
+                self.row.cell_text(*column),
+                &Meaning {
+                    syntax: self.syntax,
+                    gaps: &self.gaps[*column],
+                    strips: self.dialect.strip_units,
+                    clock: self.clocks[*column].as_ref(),
+                    kind: self.columns[*column].kind,
+                    is_fixed: self.is_fixed[*column],
+                },
+                &mut self.words[*column],
+            );
+            if let Err((problem, mend)) = pushed {
+                return Err(self.cell_refused(*column, problem, mend));
+            }
+        }
+        batch.places.push(self.place());
+        batch.rows += 1;
+        Ok(())
+    }
+
+    fn refused(&self, column: usize, cell: &str, problem: &'static str, mend: String) -> Error {
+        Error::Cell {
+            place: self.place(),
+            column: printable(&self.columns[column].name),
+            cell: printable(cell),
+            problem,
+            mend,
+        }
+    }
+
+    fn cell_refused(&self, column: usize, problem: &'static str, mend: &'static str) -> Error {
+        let cell = self.row.cell_text(column);
+        let is_one_column =
+            self.columns.len() == 1 && cell.contains([';', '\t', '|', ' ']) && problem == number::NO_NUMBER;
+        let mend = if is_one_column {
+            "name what separates cells with --delimiter"
+        } else if problem == number::NO_NUMBER && looks_like_time(cell) && self.time.is_none() {
+            "if this is the time of the row, add --time exact"
+        } else {
+            mend
+        };
+        self.refused(column, cell, problem, mend.to_owned())
+    }
+}
+
+/// What is known of the cells of a column.
+pub(crate) struct Meaning<'a> {
+    pub(crate) syntax: number::Syntax,
+    pub(crate) gaps: &'a Spellings,
+    pub(crate) strips: bool,
+    pub(crate) clock: Option<&'a Clock>,
+    pub(crate) kind: Kind,
+    pub(crate) is_fixed: bool,
+}
+
+/// Adds a cell to the cells of its column.
+pub(crate) fn push_cell(
+    cells: &mut Cells,
+    text: &str,
+    meaning: &Meaning<'_>,
+    words: &mut Vec<String>,
+) -> Result<(), number::Problem> {
+    let is_numeric = matches!(meaning.kind, Kind::Number | Kind::Integer | Kind::Boolean);
+    let is_gap = missing::is_usual(text, is_numeric) || (!meaning.gaps.is_empty() && meaning.gaps.has_text(text));
+    match cells {
+        Cells::Numbers(numbers) => numbers.push(if is_gap { None } else { number(text, meaning)? }),
+        Cells::Integers(integers) => integers.push(if is_gap { None } else { integer(text, meaning.syntax)? }),
+        Cells::Booleans(booleans) => booleans.push(match (is_gap, boolean(text)) {
+            (true, _) => None,
+            (_, Some(yes)) => Some(yes),
+            _ => {
+                return Err((
+                    "is not true or false",
+                    "mend the cell, name it with --missing, or leave the column out with --without",
+                ));
+            }
+        }),
+        Cells::Times(times) => times.push(match (is_gap, meaning.clock) {
+            (true, _) => None,
+            (_, Some(clock)) => Some(clock.parse(text)?),
+            _ => return Err(AMBIGUOUS),
+        }),
+        Cells::Words(indices) => {
+            if is_gap {
+                indices.push(None);
+                return Ok(());
+            }
+            let known = words.iter().position(|word| word == text);
+            if known.is_none() && meaning.is_fixed {
+                return Err((
+                    "is none of the words of the column",
+                    "mend the cell, or leave the row out with --skip-bad",
+                ));
+            }
+            if known.is_none() && (words.len() == MAX_WORDS || meaning.kind == Kind::Text) {
+                return Err(("is text, and the column has more than 256 texts", "leave the column out with --without"));
+            }
+            indices.push(Some(known.unwrap_or_else(|| {
+                words.push(text.to_owned());
+                words.len() - 1
+            }) as u32));
+        }
+    }
+    Ok(())
+}
+
+fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Problem> {
+    let parsed = number::parse(text.as_bytes(), meaning.syntax);
+    let parsed = match (&parsed, meaning.strips, number::without_unit(text)) {
+        (Err(_), true, Some((number, _))) => number::parse(number.as_bytes(), meaning.syntax),
+        _ => parsed,
+    };
+    match parsed {
+        Ok(Number::Double(value, _)) => Ok(Some(value).filter(|_| !meaning.gaps.has_number(value))),
+        Ok(Number::Whole(_)) => Err((
+            "is a whole number of more than 53 bits among numbers with decimals",
+            "split the column, or leave it out with --without",
+        )),
+        Err(problem) => Err(problem),
+    }
+}
+
+fn integer(text: &str, syntax: number::Syntax) -> Result<Option<i64>, number::Problem> {
+    match number::parse(text.as_bytes(), syntax)? {
+        Number::Whole(whole) => Ok(Some(whole)),
+        Number::Double(value, _) if value.fract() == 0.0 && value.abs() < 9.2e18 => Ok(Some(value as i64)),
+        Number::Double(..) => Err((
+            "is no whole number, as others of the column",
+            "mend the cell, or leave the column out with --without",
+        )),
+    }
+}
