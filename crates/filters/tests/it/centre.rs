@@ -1,7 +1,7 @@
 //! The fusion centre beside sensors that fall silent and return, send what cannot be, lie, or repeat themselves.
 
 use fewbits_core::{
-    Dynamics, Evolution, FullValue, Gaussian, GaussianDynamics, Likelihood, Link, Message, NumberFormat, Observation,
+    Dynamics, FullValue, Gaussian, GaussianDynamics, Likelihood, Link, Message, NumberFormat, Observation,
 };
 use fewbits_filters::centre::{Event, Failures, FusionCentre, Health, Reporting, Slot};
 use fewbits_filters::{BootstrapFilter, Error, MomentFilter, ParticleFilter, StateFilter};

@@ -175,7 +175,7 @@ fn a_bank_of_equal_filters_is_that_of_one_and_odd_matrices_are_refused() {
         let observed = Observed::new(sensor, Value::new(Vector1::new(z), nalgebra::Matrix1::new(0.1)).unwrap());
         let motion = Evolution::over(&world, 0.7).unwrap();
         for (bank, belief) in [&mut own, &mut same].into_iter().zip(&mut beliefs) {
-            bank.predict(&mut rng, &motion, belief).unwrap();
+            bank.predict(&mut rng, &*motion, belief).unwrap();
             bank.update(&mut rng, belief, &[&observed]).unwrap();
         }
     }
@@ -211,7 +211,7 @@ fn a_bank_over_switching_worlds_weighs_them_by_evidence() {
         belief = filter.step(&mut rng, &*motion, &belief, &[&observed]).unwrap().0;
         for ((one, log), world) in alone.iter_mut().zip(&worlds) {
             let (next, info) =
-                assumed_density::step(&Evolution::over(world, seconds).unwrap(), one, &observed).unwrap();
+                assumed_density::step(&*Evolution::over(world, seconds).unwrap(), one, &observed).unwrap();
             (*one, *log) = (next, *log + info.log_likelihood);
         }
     }

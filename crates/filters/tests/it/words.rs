@@ -2,8 +2,8 @@
 
 use fewbits_core::factor::Partition;
 use fewbits_core::{
-    BitReader, BitString, BitWriter, CodecError, Dynamics, Evolution, Gaussian, Link, MeasurementNoise, Message,
-    Observation, Scheme,
+    BitReader, BitString, BitWriter, CodecError, Dynamics, Gaussian, Link, MeasurementNoise, Message, Observation,
+    Scheme,
 };
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{Event, FusionCentre, Reporting, Slot};
