@@ -3,7 +3,10 @@
 use crate::Error;
 use crate::plant::scalar;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Memoryless, Message, Observation};
+use fewbits_core::rand::Rng;
+use fewbits_core::{
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Factor, Gaussian, Link, Message, Observation, Scheme,
+};
 use fewbits_numerics::error::{ArgumentError, finite, positive, refuse, within};
 use fewbits_numerics::normal;
 use nalgebra::Vector1;
@@ -169,13 +172,16 @@ impl RoundedSample {
     /// # Errors
     /// [`Error::Impossible`] if the message has probability zero under the prior.
     pub fn belief_with_prior(&self, message: Multiple, prior: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
-        let factor = self.meaning_of(&(), &Observation::Received(message), &Link::PERFECT)?;
+        let factor = self.factor(&(), &Observation::Received(message), &Link::PERFECT)?;
         let posterior = factor.tilted(prior)?;
         Ok(scalar(posterior.mean[0], posterior.covariance[0]))
     }
 }
 
-impl Memoryless<1> for RoundedSample {
+impl Deterministic<1> for RoundedSample {}
+
+impl Scheme<1> for RoundedSample {
+    type State = ();
     type Feedback = ();
     type Report = Multiple;
     type Factor = Scalar;
@@ -186,12 +192,18 @@ impl Memoryless<1> for RoundedSample {
         self.bits
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, Error> {
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        (): &(),
+    ) -> Result<Option<Multiple>, Error> {
         Ok(Some(self.round(measurement[0])?))
     }
 
     /// Over a link that inverts bits only words of up to 12 bits are accepted.
-    fn meaning_of(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, Error> {
+    fn factor(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, Error> {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };
