@@ -126,15 +126,13 @@ impl Scheme<1> for SlotScheme {
     type Report = Packet;
     type Factor = SlotFactor;
 
-    fn start(&self) {}
-
     fn feedback_format(&self) {}
 
     fn report_format(&self) {}
 
-    fn encode<R: Rng + ?Sized>(
+    fn encode(
         &self,
-        _: &mut R,
+        _: &mut dyn Rng,
         (): &mut (),
         measurement: &Vector1<f64>,
         (): &(),

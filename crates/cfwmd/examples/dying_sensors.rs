@@ -1,6 +1,6 @@
 //! Ten sensors send only what surprises. Eight of them die; the centre stops believing their silence.
 use fewbits_cfwmd::scheme::CovarianceFeedback;
-use fewbits_core::{Belief, Dynamics, Evolution, Gaussian, Link, NumberFormat, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{Belief, Evolution, Gaussian, Link, NumberFormat, SchemeNode, Sensing, SensorNode};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
 use fewbits_models::{ContinuousLinear, LinearSensor};

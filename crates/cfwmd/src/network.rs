@@ -113,7 +113,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     ///
     /// # Errors
     /// If the numbers of rules or measurements are wrong or a number is not finite.
-    pub fn transmit<R: Rng + ?Sized>(
+    pub fn transmit<R: Rng>(
         &self,
         rng: &mut R,
         rules: &[CensoringRule<M>],

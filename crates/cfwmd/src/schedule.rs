@@ -17,7 +17,7 @@ use rand::Rng;
 ///
 /// # Errors
 /// If `steps` or `runs` is zero, or the network refuses an argument.
-pub fn expected_covariances<const D: usize, const M: usize, S, R: Rng + ?Sized>(
+pub fn expected_covariances<const D: usize, const M: usize, S, R: Rng>(
     rng: &mut R,
     network: &Network<S, D, M>,
     dynamics: &impl LinearDynamics<D>,

@@ -3,7 +3,10 @@
 use crate::Error;
 use crate::censored::{Censored, MissingReports};
 use crate::rule::CensoringRule;
-use fewbits_core::{Gaussian, LinearSensing, Link, MeasurementNoise, Memoryless, NumberFormat, Observation, Sensing};
+use fewbits_core::rand::Rng;
+use fewbits_core::{
+    Deterministic, Gaussian, LinearSensing, Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sensing,
+};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};
 use fewbits_numerics::linalg::symmetrised;
@@ -106,7 +109,26 @@ fn finite_over<const M: usize>(
     Ok(all_finite("prediction", prediction.as_slice())?)
 }
 
-impl<const D: usize, const M: usize, S: Sensing<D, M>> Memoryless<M> for Censoring<S, D, M> {
+impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
+    /// The report of a measurement for the broadcast prediction; `None` is silence.
+    ///
+    /// # Errors
+    /// If the measurement or the prediction is not finite.
+    pub fn report(
+        &self,
+        measurement: &SVector<f64, M>,
+        broadcast: &SVector<f64, D>,
+    ) -> Result<Option<SVector<f64, M>>, Error> {
+        let prediction = self.sensing.mean(broadcast);
+        all_finite("prediction", prediction.as_slice())?;
+        send_if(&self.rule, measurement, &prediction, &self.format)
+    }
+}
+
+impl<const D: usize, const M: usize, S: Sensing<D, M>> Deterministic<M> for Censoring<S, D, M> {}
+
+impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S, D, M> {
+    type State = ();
     /// The predicted state of the fusion centre.
     type Feedback = SVector<f64, D>;
     type Report = SVector<f64, M>;
@@ -120,17 +142,17 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Memoryless<M> for Censori
         self.format
     }
 
-    fn report_of(
+    fn encode(
         &self,
+        _: &mut dyn Rng,
+        (): &mut (),
         measurement: &SVector<f64, M>,
         broadcast: &SVector<f64, D>,
     ) -> Result<Option<SVector<f64, M>>, Error> {
-        let prediction = self.sensing.mean(broadcast);
-        all_finite("prediction", prediction.as_slice())?;
-        send_if(&self.rule, measurement, &prediction, &self.format)
+        self.report(measurement, broadcast)
     }
 
-    fn meaning_of(
+    fn factor(
         &self,
         broadcast: &SVector<f64, D>,
         observation: &Observation<SVector<f64, M>>,
@@ -222,7 +244,10 @@ impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M>
     }
 }
 
-impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for CovarianceFeedback<S, D, M> {
+impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Deterministic<M> for CovarianceFeedback<S, D, M> {}
+
+impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Scheme<M> for CovarianceFeedback<S, D, M> {
+    type State = ();
     /// The prediction of the fusion centre: `D + D (D + 1)/2` numbers.
     type Feedback = Gaussian<D>;
     type Report = SVector<f64, M>;
@@ -236,22 +261,24 @@ impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Memoryless<M> for
         self.format
     }
 
-    fn report_of(
+    fn encode(
         &self,
+        _: &mut dyn Rng,
+        (): &mut (),
         measurement: &SVector<f64, M>,
         broadcast: &Gaussian<D>,
     ) -> Result<Option<SVector<f64, M>>, Error> {
         let sensor = self.under(broadcast)?;
-        sensor.report_of(measurement, broadcast.mean())
+        sensor.report(measurement, broadcast.mean())
     }
 
-    fn meaning_of(
+    fn factor(
         &self,
         broadcast: &Gaussian<D>,
         observation: &Observation<SVector<f64, M>>,
         link: &Link,
     ) -> Result<Censored<M>, Error> {
         let sensor = self.under(broadcast)?;
-        sensor.meaning_of(broadcast.mean(), observation, link)
+        sensor.factor(broadcast.mean(), observation, link)
     }
 }

@@ -3,17 +3,16 @@
 use crate::dynamics::GaussianDynamics;
 use fewbits_numerics::ArgumentError;
 
-/// Dynamics in continuous time: gives the discrete dynamics over any number of seconds, so that samples need not be regular.
+/// Dynamics in continuous time: gives the discrete dynamics over any number of seconds, so that samples need not be regular. Object-safe.
+///
+/// A concrete type may have an inherent `over` that returns the dynamics by their own type, for static use.
 ///
 /// Laws ([`crate::laws::evolution`]): `over(a + b)` has the mean and covariance of `over(a)` followed by `over(b)`; `over(0)` is the
 /// identity.
-pub trait Evolution<const D: usize> {
-    /// Dynamics over a fixed time.
-    type Step: GaussianDynamics<D>;
-
+pub trait Evolution<const D: usize>: Send + Sync {
     /// The dynamics over `seconds`.
     ///
     /// # Errors
     /// If the time is negative or not finite, or so long that a number overflows.
-    fn over(&self, seconds: f64) -> Result<Self::Step, ArgumentError>;
+    fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError>;
 }

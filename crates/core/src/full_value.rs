@@ -6,10 +6,11 @@ use crate::gaussian::Gaussian;
 use crate::measurement_noise::MeasurementNoise;
 use crate::number::NumberFormat;
 use crate::observation::{Link, Observation};
-use crate::scheme::Memoryless;
+use crate::scheme::{Deterministic, Scheme};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive, within};
 use nalgebra::{Matrix1, SVector, Vector1};
+use rand::Rng;
 
 /// A sensor that sends its scalar measurement as a number, by default in 64 bits. A Kalman filter receives such values.
 ///
@@ -74,7 +75,10 @@ impl Factor<1> for SentValue {
     }
 }
 
-impl Memoryless<1> for FullValue {
+impl Deterministic<1> for FullValue {}
+
+impl Scheme<1> for FullValue {
+    type State = ();
     type Feedback = ();
     type Report = f64;
     type Factor = SentValue;
@@ -85,11 +89,11 @@ impl Memoryless<1> for FullValue {
         self.format
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<f64>, Error> {
+    fn encode(&self, _: &mut dyn Rng, (): &mut (), measurement: &Vector1<f64>, (): &()) -> Result<Option<f64>, Error> {
         Ok(Some(self.format.rounded(finite("measurement", measurement[0])?)?))
     }
 
-    fn meaning_of(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {
+    fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {
         let (value, probability) = match observation {
             Observation::Received(value) => {
                 // A value with inverted bits has no useful likelihood.

@@ -40,6 +40,7 @@
 //!
 //! This crate contains no particular model, filter or experiment.
 
+pub mod assumed_density;
 pub mod belief;
 pub mod bits;
 pub mod cell;
@@ -56,6 +57,7 @@ pub mod measurement_noise;
 pub mod message;
 pub mod number;
 pub mod observation;
+pub mod observed;
 pub mod on_axes;
 pub mod scheme;
 pub mod sensing;
@@ -66,20 +68,21 @@ pub use belief::{Belief, Density};
 pub use bits::{BitReader, BitString, BitWriter, CodecError};
 pub use cell::Cell;
 pub use columns::{Columns, ColumnsMut};
-pub use dynamics::{Dynamics, GaussianDynamics, LinearDynamics};
+pub use dynamics::{Dynamics, GaussianDynamics, LinearDynamics, ScaledNoise};
 pub use error::Error;
 pub use evolution::Evolution;
 pub use factor::{Factor, Tilted};
 pub use fewbits_numerics::ArgumentError;
 pub use full_value::{FullValue, SentValue};
 pub use gaussian::{FactoredGaussian, Gaussian};
-pub use likelihood::{Likelihood, Observed};
+pub use likelihood::{Evidence, Likelihood, LinearScalar};
 pub use measurement_noise::MeasurementNoise;
 pub use message::Message;
 pub use number::{NumberFormat, RoundedGaussian};
 pub use observation::{Link, Observation};
+pub use observed::Observed;
 pub use on_axes::OnAxes;
-pub use scheme::{Deterministic, Memoryless, Scheme};
+pub use scheme::{Deterministic, Scheme};
 pub use sensing::{LinearSensing, Sensing};
 pub use sensor_node::{SchemeNode, SensorNode};
 pub use sign::Sign;

@@ -1,18 +1,24 @@
 //! The likelihood of an observation as a function of the state.
 
+use crate::assumed_density;
 use crate::columns::{Columns, lengths_agree, state_at};
-use crate::factor::Factor;
+use crate::error::Error;
+use crate::factor::{Factor, Scalar};
+use crate::gaussian::Gaussian;
+use crate::observed::Observed;
 use crate::sensing::Sensing;
-use nalgebra::SVector;
+use fewbits_numerics::error::refuse;
+use nalgebra::{SMatrix, SVector};
 
-/// `ln p(observed | x)`, as particle and grid filters need it.
+/// The likelihood of an observation, `ln p(observed | x)`: it weighs particles and grids, and updates Gaussians where it can. Object-safe.
 ///
 /// A sensing model and a [`Factor`] together make one ([`Observed`]). A slice is the product of independent observations at one instant.
+/// A likelihood that only weighs implements `log_likelihood` alone: filters of Gaussians refuse it, all others take it.
 ///
 /// Laws ([`crate::laws::likelihood`]): the result is finite or `-inf` for a finite state. If the state has a NaN, it is NaN or at most the
 /// smallest value at any state of numbers. `add_log_likelihoods` adds what `log_likelihood` returns, up to rounding. If lengths differ,
 /// all of `log_weights` becomes NaN ([`crate::columns::lengths_agree`]).
-pub trait Likelihood<const D: usize> {
+pub trait Likelihood<const D: usize>: Send + Sync {
     /// `ln p(observed | state)`.
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64;
 
@@ -24,6 +30,74 @@ pub trait Likelihood<const D: usize> {
             }
         }
     }
+
+    /// Replaces a Gaussian by the one with the moments of the posterior. The sensing model is linearised at its mean.
+    ///
+    /// # Errors
+    /// [`Error::Impossible`] if the observation has probability zero under the belief, which is then unchanged; by default: the
+    /// likelihood only weighs.
+    fn condition(&self, _belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
+        refuse(
+            "likelihood",
+            "one that only weighs",
+            "one that updates Gaussians, or a filter of particles or on a grid",
+        )
+    }
+
+    /// Log likelihood of the observation under a Gaussian, and the correction of the measurement.
+    ///
+    /// # Errors
+    /// As [`condition`](Self::condition).
+    fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error> {
+        self.condition(&mut belief.clone())
+    }
+
+    /// `ln p(observation)`, if it is the same for every state (a loss, a silence without information); otherwise `None`.
+    fn as_constant(&self) -> Option<f64> {
+        None
+    }
+
+    /// Whether the likelihood depends on the coordinate `axis` in a neighbourhood of `state`; by default it may.
+    fn reads(&self, _state: &SVector<f64, D>, _axis: usize) -> bool {
+        true
+    }
+
+    /// The likelihood as a scalar factor of a linear measurement times a constant. Filters that impute measurements need it. `None` if
+    /// the sensor is not linear about `state`, or the factor is of another kind.
+    fn as_linear_scalar(&self, _state: &SVector<f64, D>) -> Option<LinearScalar<D>> {
+        None
+    }
+}
+
+/// Result of one observation, for tests of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// `ln p(observation | past)`.
+    pub log_likelihood: f64,
+    /// Posterior minus prior mean of the first component of the noise-free measurement.
+    pub correction: f64,
+}
+
+impl Evidence {
+    fn new<const M: usize>(log_likelihood: f64, correction: &SVector<f64, M>) -> Self {
+        Self {
+            log_likelihood,
+            correction: correction.iter().next().copied().unwrap_or(0.0),
+        }
+    }
+}
+
+/// The likelihood `exp(log_scale) factor(h x)`, where the factor is that of a measurement `z = h x + w`, `w ~ N(0, r)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearScalar<const D: usize> {
+    /// Direction `h`.
+    pub matrix: SMatrix<f64, 1, D>,
+    /// Noise variance `r`.
+    pub noise_covariance: SMatrix<f64, 1, 1>,
+    /// What was observed of `z`.
+    pub factor: Scalar,
+    /// Logarithm of the constant that multiplies the factor.
+    pub log_scale: f64,
 }
 
 impl<const D: usize, L: Likelihood<D> + ?Sized> Likelihood<D> for &L {
@@ -33,6 +107,26 @@ impl<const D: usize, L: Likelihood<D> + ?Sized> Likelihood<D> for &L {
 
     fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
         (**self).add_log_likelihoods(states, log_weights);
+    }
+
+    fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
+        (**self).condition(belief)
+    }
+
+    fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error> {
+        (**self).evidence(belief)
+    }
+
+    fn as_constant(&self) -> Option<f64> {
+        (**self).as_constant()
+    }
+
+    fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
+        (**self).reads(state, axis)
+    }
+
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>> {
+        (**self).as_linear_scalar(state)
     }
 }
 
@@ -49,6 +143,34 @@ impl<const D: usize, L: Likelihood<D>> Likelihood<D> for [L] {
             }
         }
     }
+
+    /// One after the other; the correction is that of the last.
+    fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
+        let (mut next, mut all) = (
+            *belief,
+            Evidence {
+                log_likelihood: 0.0,
+                correction: 0.0,
+            },
+        );
+        for observed in self {
+            let one = observed.condition(&mut next)?;
+            all = Evidence {
+                log_likelihood: all.log_likelihood + one.log_likelihood,
+                correction: one.correction,
+            };
+        }
+        *belief = next;
+        Ok(all)
+    }
+
+    fn as_constant(&self) -> Option<f64> {
+        self.iter().map(Likelihood::as_constant).sum()
+    }
+
+    fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
+        self.iter().any(|observed| observed.reads(state, axis))
+    }
 }
 
 /// Independent observations at one instant: log likelihoods add.
@@ -60,21 +182,17 @@ impl<const D: usize, L: Likelihood<D>> Likelihood<D> for Vec<L> {
     fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
         self.as_slice().add_log_likelihoods(states, log_weights);
     }
-}
 
-/// A factor composed with a sensing model `h`: `p(observation | x) = p(observation | m = h(x))`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Observed<S, F, const M: usize> {
-    /// The sensing model, `h`.
-    pub sensing: S,
-    /// The likelihood of the observation as a function of `h(x)`.
-    pub factor: F,
-}
+    fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
+        self.as_slice().condition(belief)
+    }
 
-impl<S, F, const M: usize> Observed<S, F, M> {
-    /// The likelihood of `factor` at the noise-free measurement of `sensing`.
-    pub fn new(sensing: S, factor: F) -> Self {
-        Self { sensing, factor }
+    fn as_constant(&self) -> Option<f64> {
+        self.as_slice().as_constant()
+    }
+
+    fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
+        self.as_slice().reads(state, axis)
     }
 }
 
@@ -100,4 +218,47 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
                 .add_log_likelihoods(&means.each_ref().map(|column| &column[..count]), log_weights);
         }
     }
+
+    #[inline]
+    fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
+        let (posterior, info) = assumed_density::update_through(belief, self)?;
+        *belief = posterior;
+        Ok(Evidence::new(info.log_likelihood, &info.correction))
+    }
+
+    fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error> {
+        let (log_likelihood, correction) = assumed_density::evidence_through(belief, self)?;
+        Ok(Evidence::new(log_likelihood, &correction))
+    }
+
+    fn as_constant(&self) -> Option<f64> {
+        match self.factor.as_scalar()? {
+            (Scalar::Constant(factor), log_scale) => Some(factor.probability().ln() + log_scale),
+            _ => None,
+        }
+    }
+
+    fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
+        let jacobian: SMatrix<f64, M, D> = self.sensing.jacobian(state);
+        jacobian.column(axis).iter().any(|x| *x != 0.0)
+    }
+
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>> {
+        let (factor, log_scale) = self.factor.as_scalar().filter(|_| M == 1)?;
+        let jacobian = self.sensing.jacobian(state);
+        let matrix = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
+        let (mean, noise) = (self.sensing.mean(state)[0], self.sensing.noise_covariance_at(state)[(0, 0)]);
+        // An imputed measurement updates the state by `z - h x`, so the sensor must have no offset.
+        let offset = (mean - (matrix * state)[0]).abs();
+        let is_sensor = noise > 0.0 && noise.is_finite() && matrix.iter().all(|x| x.is_finite());
+        (is_sensor && offset <= OFFSET * (mean.abs() + noise.sqrt())).then_some(LinearScalar {
+            matrix,
+            noise_covariance: [[noise]].into(),
+            factor,
+            log_scale,
+        })
+    }
 }
+
+/// Largest `h(x) - h'(x) x`, relative to `h(x)` and the noise deviation, that is treated as rounding of a linear sensor.
+const OFFSET: f64 = 1e-9;

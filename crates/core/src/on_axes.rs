@@ -67,7 +67,7 @@ impl<S: Sensing<K, M>, const D: usize, const K: usize, const M: usize> Sensing<D
         self.sensing.noise_covariance_at(&self.read(state))
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M> {
+    fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, M> {
         self.sensing.sample(rng, &self.read(state))
     }
 

@@ -24,9 +24,11 @@ use rand::Rng;
 /// 3. words that are no report: over a link that inverts bits, either all words of the report's format decode, or `factor` adds the
 ///    probability of those that do not, computed from the code book, to that of `Lost`, or it refuses such a link. Laws 1 and 2
 ///    together check it: `transmit` delivers such words as `Lost`.
-pub trait Scheme<const M: usize> {
+///
+/// A scheme without memory has `type State = ()` and takes `(): &mut ()` in `encode`.
+pub trait Scheme<const M: usize>: Send + Sync {
     /// What the sensor remembers from slot to slot; `()` if it needs no memory.
-    type State;
+    type State: Default + Send + Sync;
     /// What the sensor is told before it measures; `()` if it is told nothing.
     type Feedback: Message;
     /// What the sensor sends.
@@ -34,8 +36,10 @@ pub trait Scheme<const M: usize> {
     /// The likelihood of an observation as a function of the noise-free measurement.
     type Factor: Factor<M>;
 
-    /// The sensor's memory before its first measurement.
-    fn start(&self) -> Self::State;
+    /// The sensor's memory before its first measurement; [`Default`] if not overridden.
+    fn start(&self) -> Self::State {
+        Self::State::default()
+    }
 
     /// The format of the feedback's encoding.
     fn feedback_format(&self) -> <Self::Feedback as Message>::Format;
@@ -47,9 +51,9 @@ pub trait Scheme<const M: usize> {
     ///
     /// # Errors
     /// If the measurement or the feedback is not finite; the state is then unchanged.
-    fn encode<R: Rng + ?Sized>(
+    fn encode(
         &self,
-        rng: &mut R,
+        rng: &mut dyn Rng,
         state: &mut Self::State,
         measurement: &SVector<f64, M>,
         feedback: &Self::Feedback,
@@ -72,79 +76,3 @@ pub trait Scheme<const M: usize> {
 ///
 /// Law ([`crate::laws::scheme::deterministic`]): `encode` draws nothing, and the same input gives the same report.
 pub trait Deterministic<const M: usize>: Scheme<M> {}
-
-/// A [`Scheme`] whose sensor remembers nothing and draws no random numbers.
-///
-/// It defines only the report of a sample (or silence) and the likelihood of an observation. Every such type is also a [`Scheme`] and
-/// [`Deterministic`].
-pub trait Memoryless<const M: usize> {
-    /// [`Scheme::Feedback`].
-    type Feedback: Message;
-    /// [`Scheme::Report`].
-    type Report: Message;
-    /// [`Scheme::Factor`].
-    type Factor: Factor<M>;
-
-    /// [`Scheme::feedback_format`].
-    fn feedback_format(&self) -> <Self::Feedback as Message>::Format;
-
-    /// [`Scheme::report_format`].
-    fn report_format(&self) -> <Self::Report as Message>::Format;
-
-    /// The report of a sample. `None` is silence.
-    ///
-    /// # Errors
-    /// If the sample or the feedback is not finite.
-    fn report_of(&self, sample: &SVector<f64, M>, feedback: &Self::Feedback) -> Result<Option<Self::Report>, Error>;
-
-    /// [`Scheme::factor`].
-    ///
-    /// # Errors
-    /// As [`Scheme::factor`].
-    fn meaning_of(
-        &self,
-        feedback: &Self::Feedback,
-        observation: &Observation<Self::Report>,
-        link: &Link,
-    ) -> Result<Self::Factor, Error>;
-}
-
-impl<S: Memoryless<M>, const M: usize> Scheme<M> for S {
-    type State = ();
-    type Feedback = S::Feedback;
-    type Report = S::Report;
-    type Factor = S::Factor;
-
-    fn start(&self) {}
-
-    fn feedback_format(&self) -> <S::Feedback as Message>::Format {
-        Memoryless::feedback_format(self)
-    }
-
-    fn report_format(&self) -> <S::Report as Message>::Format {
-        Memoryless::report_format(self)
-    }
-
-    #[inline]
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        sample: &SVector<f64, M>,
-        feedback: &S::Feedback,
-    ) -> Result<Option<S::Report>, Error> {
-        self.report_of(sample, feedback)
-    }
-
-    #[inline]
-    fn factor(
-        &self,
-        feedback: &S::Feedback,
-        observation: &Observation<S::Report>,
-        link: &Link,
-    ) -> Result<S::Factor, Error> {
-        self.meaning_of(feedback, observation, link)
-    }
-}
-
-impl<S: Memoryless<M>, const M: usize> Deterministic<M> for S {}

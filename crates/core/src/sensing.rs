@@ -8,7 +8,7 @@ use rand::Rng;
 ///
 /// Laws ([`crate::laws::sensing`]): `jacobian` is the derivative of `mean`, `mean_columns` writes what `mean` returns, and
 /// `sample` has mean `h(x)` and covariance `R(x)`.
-pub trait Sensing<const D: usize, const M: usize> {
+pub trait Sensing<const D: usize, const M: usize>: Send + Sync {
     /// Noise-free measurement `m = h(x)`.
     fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, M>;
 
@@ -19,7 +19,7 @@ pub trait Sensing<const D: usize, const M: usize> {
     fn noise_covariance_at(&self, state: &SVector<f64, D>) -> SMatrix<f64, M, M>;
 
     /// Draws a measurement of `state`.
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M>;
+    fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, M>;
 
     /// Writes the noise-free measurement of every state to `means`. Writes NaN everywhere if lengths differ
     /// ([`crate::columns::measurements_agree`]). Override it if a loop over columns is faster than single calls.

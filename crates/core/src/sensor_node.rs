@@ -13,7 +13,7 @@ use std::convert::Infallible;
 /// model of the state. The trait is object-safe, so that sensors of different kinds can be in one list.
 ///
 /// [`SchemeNode`] implements it for any [`Scheme`].
-pub trait SensorNode<const M: usize> {
+pub trait SensorNode<const M: usize>: Send + Sync {
     /// What the sensor sends in this slot. `None` is silence, which sends zero bits. Only randomised schemes draw from `rng`.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
 //! Three kinds of sensor at one centre in a plane: bits of x, words of y, and full values of x from a sensor that joins late.
-use fewbits_core::{Belief, Dynamics, Evolution, FullValue, Gaussian, Link, OnAxes, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{Belief, Dynamics, FullValue, Gaussian, Link, OnAxes, SchemeNode, Sensing, SensorNode};
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting, Slot};

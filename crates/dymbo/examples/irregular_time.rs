@@ -1,5 +1,5 @@
 //! One bit a sample at irregular times, of a signal about a mean whose variance was stated nine times too small: it is learnt.
-use fewbits_core::{Belief, Dynamics, Evolution, Gaussian, Link, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{Belief, Evolution, Gaussian, Link, SchemeNode, Sensing, SensorNode};
 use fewbits_dymbo::SignBit;
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, NoiseLearning, Reporting, Slot};

@@ -84,7 +84,7 @@ pub trait ScalarFilter {
     ///
     /// # Errors
     /// If the measurement is not finite; as [`ScalarFilter::update`].
-    fn exchange<R: Rng + ?Sized>(
+    fn exchange<R: Rng>(
         &self,
         rng: &mut R,
         belief: &Gaussian<1>,

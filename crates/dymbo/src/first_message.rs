@@ -3,7 +3,10 @@
 use crate::Error;
 use crate::plant::scalar;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Memoryless, Message, Observation};
+use fewbits_core::rand::Rng;
+use fewbits_core::{
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Factor, Gaussian, Link, Message, Observation, Scheme,
+};
 use fewbits_numerics::error::{ArgumentError, finite, positive, refuse, within};
 use fewbits_numerics::normal;
 use nalgebra::Vector1;
@@ -142,13 +145,10 @@ impl RoundedSample {
             return Err(ArgumentError::new("multiple", multiple.0, format!("a number from {least} to {most}")));
         }
         let edge = |offset: f64| self.resolution * (multiple.0 as f64 + offset);
-        let lower = if multiple.0 == least {
-            f64::NEG_INFINITY
-        } else {
-            edge(-0.5)
-        };
-        let upper = if multiple.0 == most { f64::INFINITY } else { edge(0.5) };
-        Cell::new(lower, upper)
+        // The outermost cells are open.
+        let (is_first, is_last) = (multiple.0 == least, multiple.0 == most);
+        let lower = if is_first { -f64::INFINITY } else { edge(-0.5) };
+        Cell::new(lower, if is_last { f64::INFINITY } else { edge(0.5) })
     }
 
     /// The belief about the state after a first message and no other knowledge: `theta_hat(0) = m(0)`, variance `sigma^2 + tau^2/12`.
@@ -169,13 +169,16 @@ impl RoundedSample {
     /// # Errors
     /// [`Error::Impossible`] if the message has probability zero under the prior.
     pub fn belief_with_prior(&self, message: Multiple, prior: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
-        let factor = self.meaning_of(&(), &Observation::Received(message), &Link::PERFECT)?;
+        let factor = self.factor(&(), &Observation::Received(message), &Link::PERFECT)?;
         let posterior = factor.tilted(prior)?;
         Ok(scalar(posterior.mean[0], posterior.covariance[0]))
     }
 }
 
-impl Memoryless<1> for RoundedSample {
+impl Deterministic<1> for RoundedSample {}
+
+impl Scheme<1> for RoundedSample {
+    type State = ();
     type Feedback = ();
     type Report = Multiple;
     type Factor = Scalar;
@@ -186,12 +189,12 @@ impl Memoryless<1> for RoundedSample {
         self.bits
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, Error> {
-        Ok(Some(self.round(measurement[0])?))
+    fn encode(&self, _: &mut dyn Rng, (): &mut (), z: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, Error> {
+        Ok(Some(self.round(z[0])?))
     }
 
     /// Over a link that inverts bits only words of up to 12 bits are accepted.
-    fn meaning_of(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, Error> {
+    fn factor(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, Error> {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::of_delivery(observation, link).into());
         };
@@ -212,7 +215,7 @@ impl Memoryless<1> for RoundedSample {
 }
 
 /// Expected variance after a first message, and the message's entropy.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct FirstMessageValue {
     /// `E var(theta(0) | m(0))`, the mean posterior variance in state units squared.
     pub expected_variance: f64,
@@ -236,10 +239,7 @@ pub fn first_message_value(scheme: &RoundedSample, prior: &Gaussian<1>) -> Resul
         return Err(ArgumentError::new("resolution", tau, "at most a million cells within the prior").into());
     }
     let mean = prior.mean()[0];
-    let mut value = FirstMessageValue {
-        expected_variance: 0.0,
-        entropy_bits: 0.0,
-    };
+    let mut value = FirstMessageValue::default();
     for k in scheme.round(mean - reach)?.0..=scheme.round(mean + reach)?.0 {
         let posterior = InCell::certain(scheme.cell(Multiple(k))?, r)?.tilted(prior)?;
         let probability = posterior.log_evidence.exp();

@@ -2,9 +2,10 @@
 
 use crate::Error;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
+use fewbits_core::rand::Rng;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Memoryless, Message, NumberFormat,
-    Observation,
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
+    Observation, Scheme,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
@@ -168,7 +169,10 @@ impl MeasurementNoise<1> for InnovationWord {
     }
 }
 
-impl Memoryless<1> for InnovationWord {
+impl Deterministic<1> for InnovationWord {}
+
+impl Scheme<1> for InnovationWord {
+    type State = ();
     type Feedback = Prediction;
     type Report = CellIndex;
     type Factor = Scalar;
@@ -182,11 +186,17 @@ impl Memoryless<1> for InnovationWord {
     }
 
     #[inline]
-    fn report_of(&self, measurement: &Vector1<f64>, prediction: &Prediction) -> Result<Option<CellIndex>, Error> {
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        prediction: &Prediction,
+    ) -> Result<Option<CellIndex>, Error> {
         Ok(Some(self.word(measurement[0], prediction)?))
     }
 
-    fn meaning_of(
+    fn factor(
         &self,
         prediction: &Prediction,
         observation: &Observation<CellIndex>,

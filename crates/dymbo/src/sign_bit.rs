@@ -2,7 +2,8 @@
 
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::{Constant, InCell, Scalar};
-use fewbits_core::{Link, MeasurementNoise, Memoryless, NumberFormat, Observation, Sign};
+use fewbits_core::rand::Rng;
+use fewbits_core::{Deterministic, Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;
 use nalgebra::{Matrix1, Vector1};
@@ -77,7 +78,10 @@ impl MeasurementNoise<1> for SignBit {
     }
 }
 
-impl Memoryless<1> for SignBit {
+impl Deterministic<1> for SignBit {}
+
+impl Scheme<1> for SignBit {
+    type State = ();
     type Feedback = f64;
     type Report = Sign;
     type Factor = Scalar;
@@ -89,13 +93,19 @@ impl Memoryless<1> for SignBit {
     fn report_format(&self) {}
 
     #[inline]
-    fn report_of(&self, measurement: &Vector1<f64>, threshold: &f64) -> Result<Option<Sign>, Error> {
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        threshold: &f64,
+    ) -> Result<Option<Sign>, Error> {
         let reached = fewbits_node::sign_bit(measurement[0], *threshold).map_err(ArgumentError::from)?;
         Ok(Some(if reached { Sign::Above } else { Sign::Below }))
     }
 
     #[inline]
-    fn meaning_of(&self, threshold: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, Error> {
+    fn factor(&self, threshold: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, Error> {
         finite("threshold", *threshold)?;
         match observation {
             Observation::Received(bit) => {

@@ -9,7 +9,7 @@
 //! wild. Offsets of sensors are another question: [`offsets`].
 
 use crate::{Error, assumed_density};
-use fewbits_core::{Evolution, Gaussian};
+use fewbits_core::{Evolution, Gaussian, GaussianDynamics};
 use fewbits_numerics::error::{finite, positive, refuse};
 use nalgebra::SMatrix;
 
@@ -193,7 +193,7 @@ where
         let (mut belief, mut total, mut astray) = (*self.prior, 0.0, 0);
         let mut now = instants.first()?.seconds;
         // Most steps are as long as the one before.
-        let mut step: Option<(f64, E::Step)> = None;
+        let mut step: Option<(f64, Box<dyn GaussianDynamics<D> + '_>)> = None;
         for instant in instants {
             let seconds = instant.seconds - now;
             now = instant.seconds;
@@ -202,7 +202,7 @@ where
                     step = Some((seconds, world.over(seconds).ok()?));
                 }
                 if let Some((_, step)) = &step {
-                    belief = assumed_density::predict(step, &belief);
+                    belief = assumed_density::predict(&**step, &belief);
                 }
             }
             let (mut agreeing, mut farthest) = (0.0, 0.0_f64);

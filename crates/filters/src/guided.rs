@@ -1,10 +1,10 @@
 //! A particle filter whose proposal depends on the observations.
 
 use crate::Error;
-use crate::contract::{Info, Move, StateFilter, StateLikelihood, condition_all};
+use crate::contract::{Info, StateFilter, condition_all};
 use crate::particle::{BootstrapFilter, ParticleFilter, weigh};
 use fewbits_core::columns::{set_state, state_at};
-use fewbits_core::{Gaussian, Likelihood};
+use fewbits_core::{Gaussian, GaussianDynamics, Likelihood};
 use fewbits_densities::Particles;
 use fewbits_numerics::linalg::{congruence, semidefinite_factor, solve_semidefinite, symmetrised};
 use nalgebra::{Cholesky, SMatrix, SVector};
@@ -55,7 +55,7 @@ fn propose<const D: usize>(
     rng: &mut dyn Rng,
     own: &SVector<f64, D>,
     moved: &Gaussian<D>,
-    observed: &[&dyn StateLikelihood<D>],
+    observed: &[&dyn Likelihood<D>],
 ) -> Option<(SVector<f64, D>, f64)> {
     let (posterior, _) = condition_all(moved, observed).ok()?;
     // u = back (x' - f) on the range of Q; elsewhere u stays standard normal.
@@ -91,13 +91,19 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
         self.bootstrap.start(rng, prior)
     }
 
-    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Particles<D>) -> Result<(), Error> {
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<D>,
+        belief: &mut Particles<D>,
+    ) -> Result<(), Error> {
         self.bootstrap.resample(rng, belief)?;
         let columns = belief.columns();
         let known = |i| Gaussian::from_trusted_parts(state_at(&columns, i), SMatrix::zeros());
         self.moves.clear();
-        self.moves.extend((0..belief.len()).map(|i| motion.predict(&known(i))));
-        motion.move_columns(rng, belief.columns_mut());
+        self.moves
+            .extend((0..belief.len()).map(|i| dynamics.predict(&known(i), 1.0)));
+        dynamics.propagate_columns(rng, belief.columns_mut());
         self.predicted = Some(belief.clone());
         Ok(())
     }
@@ -106,7 +112,7 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
         &mut self,
         rng: &mut dyn Rng,
         belief: &mut Particles<D>,
-        observed: &[&dyn StateLikelihood<D>],
+        observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
         let mut next = belief.clone();
         let mut ratios = vec![0.0; belief.len()];

@@ -33,7 +33,6 @@
 //!
 //! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
 
-pub mod assumed_density;
 pub mod calibration;
 pub mod centre;
 pub mod contract;
@@ -51,8 +50,9 @@ pub mod smoother;
 mod steady_state;
 mod switching;
 
-pub use contract::{Info, LinearScalar, MomentFilter, Points, StateFilter, StateLikelihood};
+pub use contract::{Info, MomentFilter, Points, StateFilter};
 pub use fewbits_core::Error;
+pub use fewbits_core::{Evidence, LinearScalar, assumed_density};
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
 pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};
 pub use guided::GuidedFilter;

@@ -1,9 +1,9 @@
 //! Filters that differ in the scale of the process noise or in the model, weighted by evidence.
 
-use crate::contract::{Info, Move, StateFilter, StateLikelihood};
+use crate::contract::{Info, StateFilter};
 use crate::imm::{ImmWorkspace, by_rows, evenly, mix, weigh};
 use crate::{Error, ImmBelief};
-use fewbits_core::Gaussian;
+use fewbits_core::{Gaussian, GaussianDynamics, Likelihood, ScaledNoise};
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 use rand::Rng;
 
@@ -24,7 +24,7 @@ use rand::Rng;
 /// filters, which gives a little information.
 ///
 /// ```
-/// use fewbits_core::Gaussian;
+/// use fewbits_core::{Gaussian, GaussianDynamics, Likelihood};
 /// use fewbits_filters::{MomentFilter, NoiseBank, StateFilter};
 /// let mut bank = NoiseBank::new(MomentFilter, vec![0.25, 1.0, 4.0], 1e-3)?;
 /// let belief = bank.start(&mut rand_pcg::Pcg64Mcg::new(1), &Gaussian::scalar(0.0, 1.0)?)?;
@@ -109,21 +109,30 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         Ok(ImmBelief::new(lost.probabilities().to_vec(), self.starts(rng, prior)?)?)
     }
 
-    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut ImmBelief<D>) -> Result<(), Error> {
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<D>,
+        belief: &mut ImmBelief<D>,
+    ) -> Result<(), Error> {
         let Self {
             filters,
             scales,
             transition,
             workspace,
         } = self;
-        let modes = motion.motion.modes();
+        let modes = dynamics.modes();
         if !(modes.is_empty() || modes.len() == scales.len()) {
-            return refuse("motion", format!("{} modes", modes.len()), format!("{}, one for each scale", scales.len()));
+            return refuse(
+                "dynamics",
+                format!("{} modes", modes.len()),
+                format!("{}, one for each scale", scales.len()),
+            );
         }
         mix(belief, transition, workspace, |j, mixed| {
             let mut moved = *mixed;
-            let own = modes.get(j).map_or(motion.motion, |mode| &**mode);
-            filters[j].predict(rng, Move::new(own, motion.noise_scale * scales[j]), &mut moved)?;
+            let own = modes.get(j).copied().unwrap_or_else(|| ScaledNoise::new(dynamics, 1.0));
+            filters[j].predict(rng, &own.times(scales[j]), &mut moved)?;
             Ok(moved)
         })
     }
@@ -132,7 +141,7 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         &mut self,
         rng: &mut dyn Rng,
         belief: &mut ImmBelief<D>,
-        observed: &[&dyn StateLikelihood<D>],
+        observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
         let Self { filters, workspace, .. } = self;
         let log_likelihood = weigh(belief, workspace, |j, mode| {

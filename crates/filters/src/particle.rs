@@ -1,8 +1,8 @@
 //! The bootstrap particle filter.
 
-use crate::contract::{Info, Move, StateFilter, StateLikelihood};
+use crate::contract::{Info, StateFilter};
 use crate::{Error, Resampling, Schedule};
-use fewbits_core::{Columns, Dynamics, Gaussian, Likelihood};
+use fewbits_core::{Columns, Dynamics, Gaussian, GaussianDynamics, Likelihood};
 use fewbits_densities::Particles;
 use fewbits_numerics::error::at_least_one;
 use rand::Rng;
@@ -84,10 +84,10 @@ impl ParticleFilter {
     ///
     /// # Errors
     /// As [`resample`](Self::resample).
-    pub fn predict<const D: usize, R: Rng + ?Sized>(
+    pub fn predict<const D: usize, R: Rng>(
         &self,
         rng: &mut R,
-        dynamics: &impl Dynamics<D>,
+        dynamics: &(impl Dynamics<D> + ?Sized),
         belief: &mut Particles<D>,
         workspace: &mut Workspace<D>,
     ) -> Result<(), Error> {
@@ -112,10 +112,10 @@ impl ParticleFilter {
     ///
     /// # Errors
     /// As [`predict`](Self::predict) and [`update`](Self::update); the belief is then as it was before the step.
-    pub fn step_in_place<const D: usize, R: Rng + ?Sized>(
+    pub fn step_in_place<const D: usize, R: Rng>(
         &self,
         rng: &mut R,
-        dynamics: &impl Dynamics<D>,
+        dynamics: &(impl Dynamics<D> + ?Sized),
         belief: &mut Particles<D>,
         observed: &(impl Likelihood<D> + ?Sized),
         workspace: &mut Workspace<D>,
@@ -198,9 +198,14 @@ impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
         Particles::from_belief(&mut rng, prior, self.count)
     }
 
-    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Particles<D>) -> Result<(), Error> {
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<D>,
+        belief: &mut Particles<D>,
+    ) -> Result<(), Error> {
         self.resample(rng, belief)?;
-        motion.move_columns(rng, belief.columns_mut());
+        dynamics.propagate_columns(rng, belief.columns_mut());
         Ok(())
     }
 
@@ -208,7 +213,7 @@ impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
         &mut self,
         _: &mut dyn Rng,
         belief: &mut Particles<D>,
-        observed: &[&dyn StateLikelihood<D>],
+        observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
         self.filter.update(belief, observed)
     }

@@ -1,7 +1,7 @@
 //! An exact scalar filter on a grid, the reference for approximate filters.
 
 use crate::Error;
-use crate::contract::{Info, Move, StateFilter, StateLikelihood};
+use crate::contract::{Info, StateFilter};
 use fewbits_core::{Gaussian, GaussianDynamics, Likelihood, LinearDynamics};
 use fewbits_densities::{PointMass, UniformGrid};
 use fewbits_numerics::error::ArgumentError;
@@ -64,7 +64,7 @@ impl PointMassFilter {
     /// # Errors
     /// If the noise at some node has a standard deviation below the spacing. For linear dynamics see [`PointMassFilter::linear`].
     pub fn new(dynamics: &impl GaussianDynamics<1>, grid: UniformGrid) -> Result<Self, Error> {
-        let moved = moved(&grid, Move::new(dynamics, 1.0));
+        let moved = moved(&grid, dynamics);
         Self::resolving(grid, &moved)
     }
 
@@ -247,8 +247,8 @@ impl PointMassFilter {
 }
 
 /// Mean and deviation of the next state, from each node.
-fn moved(grid: &UniformGrid, motion: Move<'_, 1>) -> Vec<(f64, f64)> {
-    let from = |y: f64| motion.predict(&Gaussian::from_trusted_parts(Vector1::new(y), Matrix1::zeros()));
+fn moved(grid: &UniformGrid, dynamics: &dyn GaussianDynamics<1>) -> Vec<(f64, f64)> {
+    let from = |y: f64| dynamics.predict(&Gaussian::from_trusted_parts(Vector1::new(y), Matrix1::zeros()), 1.0);
     let moves = grid.nodes().map(from);
     moves
         .map(|next| (next.mean()[0], next.covariance()[0].sqrt()))
@@ -281,8 +281,13 @@ impl StateFilter<1> for PointMasses {
         PointMass::normal(self.grid, prior.mean()[0], prior.covariance()[0])
     }
 
-    fn predict(&mut self, _: &mut dyn Rng, motion: Move<'_, 1>, belief: &mut PointMass) -> Result<(), Error> {
-        let moved = moved(&self.grid, motion);
+    fn predict(
+        &mut self,
+        _: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<1>,
+        belief: &mut PointMass,
+    ) -> Result<(), Error> {
+        let moved = moved(&self.grid, dynamics);
         let kernel = match self.kernel.take().filter(|_| self.moved == moved) {
             Some(kernel) => kernel,
             None => PointMassFilter::resolving(self.grid, &moved)?,
@@ -296,7 +301,7 @@ impl StateFilter<1> for PointMasses {
         &mut self,
         _: &mut dyn Rng,
         belief: &mut PointMass,
-        observed: &[&dyn StateLikelihood<1>],
+        observed: &[&dyn Likelihood<1>],
     ) -> Result<Info, Error> {
         Ok(Info::new(belief.update(observed)?))
     }

@@ -1,11 +1,14 @@
 //! A Rao-Blackwellised particle filter for linear Gaussian states and reports such as bits, cells and silence.
 
-use crate::contract::{Info, LinearScalar, Move, StateFilter, StateLikelihood};
+use crate::contract::{Info, StateFilter};
 use crate::particle::{ParticleFilter, Workspace, weigh};
 use crate::{Error, kalman};
 use fewbits_core::columns::{change_each, count, set_state, state_at};
 use fewbits_core::factor::Scalar;
-use fewbits_core::{Cell, FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observed};
+use fewbits_core::{
+    Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearDynamics, LinearScalar, LinearSensing,
+    Observed,
+};
 use fewbits_densities::GaussianCloud;
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::{LogSum, normal};
@@ -221,10 +224,15 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         GaussianCloud::agreed(prior, self.count)
     }
 
-    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut GaussianCloud<D>) -> Result<(), Error> {
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<D>,
+        belief: &mut GaussianCloud<D>,
+    ) -> Result<(), Error> {
         let shared = Gaussian::from_trusted_parts(belief.means().mean(), *belief.shared_covariance());
-        let moved = motion.predict(&shared);
-        let mean = |state: &SVector<f64, D>| motion.motion.mean(state);
+        let moved = dynamics.predict(&shared, 1.0);
+        let mean = |state: &SVector<f64, D>| dynamics.mean(state);
         self.filter.advance(rng, mean, &moved, belief, &mut self.workspace)
     }
 
@@ -232,7 +240,7 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         &mut self,
         rng: &mut dyn Rng,
         belief: &mut GaussianCloud<D>,
-        observed: &[&dyn StateLikelihood<D>],
+        observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
         let mean = belief.means().mean();
         let mut scalars = Vec::with_capacity(observed.len());

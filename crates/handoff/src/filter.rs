@@ -79,12 +79,12 @@ impl<R> HandoffFilter<R> {
     ///
     /// # Errors
     /// If there is no particle, or the measurement has probability zero for all ([`Error::Impossible`]).
-    pub fn posterior<const D: usize, G: Rng + ?Sized>(
+    pub fn posterior<const D: usize>(
         &self,
-        rng: &mut G,
+        rng: &mut dyn Rng,
         received: &Mixture<D>,
-        dynamics: &impl Dynamics<D>,
-        likelihood: &impl Likelihood<D>,
+        dynamics: &(impl Dynamics<D> + ?Sized),
+        likelihood: &(impl Likelihood<D> + ?Sized),
     ) -> Result<(Particles<D>, f64), Error> {
         let mut particles = received.sample_systematic(rng, self.particles)?;
         dynamics.propagate_columns(rng, particles.columns_mut());
@@ -116,12 +116,12 @@ impl<R> HandoffFilter<R> {
     /// # Errors
     /// As [`posterior`](Self::posterior) and [`estimate`](Self::estimate), or if the reducer returns an error. The received
     /// belief is unchanged.
-    pub fn step<const D: usize, G: Rng + ?Sized>(
+    pub fn step<const D: usize>(
         &self,
-        rng: &mut G,
+        rng: &mut dyn Rng,
         received: &Mixture<D>,
-        dynamics: &impl Dynamics<D>,
-        likelihood: &impl Likelihood<D>,
+        dynamics: &(impl Dynamics<D> + ?Sized),
+        likelihood: &(impl Likelihood<D> + ?Sized),
     ) -> Result<(Handover<D>, HandoffInfo<D>), Error>
     where
         R: Reducer<D>,

@@ -109,15 +109,21 @@ impl Dynamics<1> for Ar1 {
     }
 
     #[inline]
-    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
+    fn propagate(&self, rng: &mut dyn Rng, state: &Vector1<f64>) -> Vector1<f64> {
         let normal: f64 = StandardNormal.sample(rng);
         Vector1::new(self.coefficient() * state[0] + self.noise_variance().sqrt() * normal)
     }
 
-    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, [states]: ColumnsMut<'_, 1>) {
+    fn propagate_columns(&self, rng: &mut dyn Rng, states: ColumnsMut<'_, 1>) {
+        self.propagate_columns_scaled(rng, 1.0, states);
+    }
+}
+
+impl GaussianDynamics<1> for Ar1 {
+    fn propagate_columns_scaled(&self, rng: &mut dyn Rng, noise_scale: f64, [states]: ColumnsMut<'_, 1>) {
         const BLOCK: usize = 128;
         let (mut normals, mut draws) = (StandardNormals::new(rng), [0.0; BLOCK]);
-        let (coefficient, deviation) = (self.coefficient(), self.noise_variance().sqrt());
+        let (coefficient, deviation) = (self.coefficient(), self.noise_variance().sqrt() * noise_scale.sqrt());
         // Draws first, so that the loop over the states has neither calls nor branches.
         for states in states.chunks_mut(BLOCK) {
             normals.fill(&mut draws[..states.len()]);
@@ -131,9 +137,7 @@ impl Dynamics<1> for Ar1 {
             );
         }
     }
-}
 
-impl GaussianDynamics<1> for Ar1 {
     fn jacobian(&self, _: &Vector1<f64>) -> Matrix1<f64> {
         self.transition
     }

@@ -161,9 +161,17 @@ impl ContinuousLinear<4> {
 const TERMS: usize = 18;
 
 impl<const D: usize> Evolution<D> for ContinuousLinear<D> {
-    type Step = AffineGaussian<D>;
+    fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError> {
+        Ok(Box::new(ContinuousLinear::over(self, seconds)?))
+    }
+}
 
-    fn over(&self, seconds: f64) -> Result<AffineGaussian<D>, ArgumentError> {
+impl<const D: usize> ContinuousLinear<D> {
+    /// The dynamics over `seconds`, as [`Evolution::over`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn over(&self, seconds: f64) -> Result<AffineGaussian<D>, ArgumentError> {
         non_negative("seconds", seconds)?;
         let identity = SMatrix::<f64, D, D>::identity();
         // The 1-norm (largest column sum) bounds the powers of `A`.
@@ -261,23 +269,29 @@ impl<const D: usize> Dynamics<D> for AffineGaussian<D> {
         self.transition * state + self.offset
     }
 
-    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, D> {
+    fn propagate(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, D> {
         Gaussian::from_symmetric_parts(self.mean(state), self.noise_covariance).sample(rng)
     }
 
-    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: fewbits_core::ColumnsMut<'_, D>) {
+    fn propagate_columns(&self, rng: &mut dyn Rng, states: fewbits_core::ColumnsMut<'_, D>) {
+        self.propagate_columns_scaled(rng, 1.0, states);
+    }
+}
+
+impl<const D: usize> GaussianDynamics<D> for AffineGaussian<D> {
+    /// One factorisation for all states.
+    fn propagate_columns_scaled(&self, rng: &mut dyn Rng, noise_scale: f64, states: fewbits_core::ColumnsMut<'_, D>) {
         // A covariance that rounding has made indefinite is replaced by its diagonal.
         let factor = semidefinite_factor("noise_covariance", &self.noise_covariance)
-            .unwrap_or_else(|_| SMatrix::from_diagonal(&self.noise_covariance.diagonal().map(|v| v.max(0.0).sqrt())));
+            .unwrap_or_else(|_| SMatrix::from_diagonal(&self.noise_covariance.diagonal().map(|v| v.max(0.0).sqrt())))
+            * noise_scale.sqrt();
         fewbits_core::columns::change_each(states, |state| {
             let normals =
                 SVector::<f64, D>::from_fn(|_, _| rand_distr::Distribution::sample(&rand_distr::StandardNormal, rng));
             self.mean(&state) + factor * normals
         });
     }
-}
 
-impl<const D: usize> GaussianDynamics<D> for AffineGaussian<D> {
     fn jacobian(&self, _: &SVector<f64, D>) -> SMatrix<f64, D, D> {
         self.transition
     }

@@ -165,17 +165,24 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
     }
 
     #[inline]
-    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, D> {
+    fn propagate(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, D> {
         let normals = SVector::<f64, U>::from_fn(|_, _| StandardNormal.sample(rng));
         self.transition * state + self.noise_factor * normals
     }
 
+    fn propagate_columns(&self, rng: &mut dyn Rng, states: ColumnsMut<'_, D>) {
+        self.propagate_columns_scaled(rng, 1.0, states);
+    }
+}
+
+impl<const D: usize, const U: usize> GaussianDynamics<D> for LinearGaussian<D, U> {
     /// Per block of particles: first the normal draws, then one loop per coordinate, which runs in vector registers.
-    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+    fn propagate_columns_scaled(&self, rng: &mut dyn Rng, noise_scale: f64, mut states: ColumnsMut<'_, D>) {
         const BLOCK: usize = 128;
         if !columns_agree(&mut states) {
             return;
         }
+        let noise_factor = self.noise_factor * noise_scale.sqrt();
         let mut normals = StandardNormals::new(rng);
         let mut draws = [[0.0; BLOCK]; U];
         let mut next = [[0.0; BLOCK]; D];
@@ -193,7 +200,7 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
                         // Row d of `F x + G u` for all states of the block; the columns still hold the old states.
                         next.fill(0.0);
                         for (u, draw) in draws.iter().enumerate() {
-                            add_multiple(next, self.noise_factor[(d, u)], &draw[..length]);
+                            add_multiple(next, noise_factor[(d, u)], &draw[..length]);
                         }
                         for (c, column) in states.iter().enumerate() {
                             add_multiple(next, self.transition[(d, c)], &column[start..start + length]);
@@ -206,9 +213,7 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
             }
         }
     }
-}
 
-impl<const D: usize, const U: usize> GaussianDynamics<D> for LinearGaussian<D, U> {
     fn jacobian(&self, _: &SVector<f64, D>) -> SMatrix<f64, D, D> {
         self.transition
     }

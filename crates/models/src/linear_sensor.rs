@@ -129,7 +129,7 @@ impl<const D: usize, const M: usize> Sensing<D, M> for LinearSensor<D, M> {
     }
 
     #[inline]
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M> {
+    fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, M> {
         self.matrix * state + self.noise_factor * SVector::<f64, M>::from_fn(|_, _| StandardNormal.sample(rng))
     }
 

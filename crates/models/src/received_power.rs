@@ -173,7 +173,7 @@ impl<const D: usize> Sensing<D, 1> for ReceivedPower<D> {
         self.noise_covariance
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> Vector1<f64> {
+    fn sample(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> Vector1<f64> {
         let normal: f64 = StandardNormal.sample(rng);
         self.mean(state) + Vector1::new(self.noise_variance().sqrt() * normal)
     }

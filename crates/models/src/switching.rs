@@ -1,7 +1,6 @@
 //! Several linear models in continuous time, of which one holds at a time.
 
 use crate::{AffineGaussian, ContinuousLinear, Error};
-use fewbits_core::Evolution;
 use fewbits_numerics::error::{at_least_one, finite, non_negative, refuse};
 use nalgebra::{DMatrix, SVector, Vector4};
 

@@ -12,7 +12,7 @@ use rand::Rng;
 impl GaussianTracker for GridFilter {
     type Workspace = GridWorkspace<2>;
 
-    fn advance<R: Rng + ?Sized>(
+    fn advance<R: Rng>(
         &self,
         _: &mut R,
         step: Step<'_>,

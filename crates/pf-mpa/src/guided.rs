@@ -68,7 +68,7 @@ impl GuidedGaussian {
     }
 
     /// The belief from weighted draws of the position; `None` if their effective sample size is too small.
-    fn update<R: Rng + ?Sized>(
+    fn update<R: Rng>(
         &self,
         rng: &mut R,
         predicted: &Gaussian<4>,
@@ -138,7 +138,7 @@ fn regressed(predicted: &Gaussian<4>, mean: &Vector2<f64>, covariance: &Matrix2<
 impl GaussianTracker for GuidedGaussian {
     type Workspace = GuidedWorkspace;
 
-    fn advance<R: Rng + ?Sized>(
+    fn advance<R: Rng>(
         &self,
         rng: &mut R,
         step: Step<'_>,

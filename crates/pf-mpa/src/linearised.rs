@@ -135,12 +135,7 @@ fn transferred(predicted: &Gaussian<4>, updated: &Gaussian<4>) -> Gaussian<4> {
 impl GaussianTracker for Linearised {
     type Workspace = ();
 
-    fn advance<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        step: Step<'_>,
-        (): &mut (),
-    ) -> Result<(Gaussian<4>, StepInfo), Error> {
+    fn advance<R: Rng>(&self, _: &mut R, step: Step<'_>, (): &mut ()) -> Result<(Gaussian<4>, StepInfo), Error> {
         self.update(&step.predicted(self.manoeuvres), step.observed)
     }
 }

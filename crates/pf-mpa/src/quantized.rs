@@ -3,9 +3,10 @@
 use crate::Error;
 use crate::factor::RangeFactor;
 use crate::sensor::RangeNoise;
+use fewbits_core::rand::Rng;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Memoryless, Message, NumberFormat,
-    Observation,
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
+    Observation, Scheme,
 };
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{ArgumentError, finite, positive};
@@ -199,7 +200,10 @@ impl MeasurementNoise<1> for QuantizedRange {
     }
 }
 
-impl Memoryless<1> for QuantizedRange {
+impl Deterministic<1> for QuantizedRange {}
+
+impl Scheme<1> for QuantizedRange {
+    type State = ();
     type Feedback = RangeReference;
     type Report = Symbol;
     type Factor = RangeFactor;
@@ -212,11 +216,17 @@ impl Memoryless<1> for QuantizedRange {
         self.labelling.clone()
     }
 
-    fn report_of(&self, measurement: &Vector1<f64>, reference: &RangeReference) -> Result<Option<Symbol>, Error> {
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        reference: &RangeReference,
+    ) -> Result<Option<Symbol>, Error> {
         Ok(Some(self.level(measurement[0], reference)?))
     }
 
-    fn meaning_of(
+    fn factor(
         &self,
         reference: &RangeReference,
         observation: &Observation<Symbol>,

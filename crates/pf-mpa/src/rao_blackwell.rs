@@ -92,7 +92,7 @@ impl Tracker for RaoBlackwellGuided {
     type Belief = VelocityCloud;
     type Workspace = VelocityWorkspace;
 
-    fn start<R: Rng + ?Sized>(&self, rng: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<VelocityCloud, Error> {
+    fn start<R: Rng>(&self, rng: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<VelocityCloud, Error> {
         let covariance = prior.covariance();
         let positions: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into_owned();
         let across: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 2).into_owned();
@@ -117,7 +117,7 @@ impl Tracker for RaoBlackwellGuided {
         Gaussian::from_trusted_parts(*known.mean(), covariance)
     }
 
-    fn step_in_place<R: Rng + ?Sized>(
+    fn step_in_place<R: Rng>(
         &self,
         rng: &mut R,
         target: &Target,
@@ -168,7 +168,7 @@ impl Tracker for RaoBlackwellGuided {
 }
 
 /// Draws a position from `N(mean, spread I)` times the linearised cells. Returns it with its log importance weight.
-fn propose<R: Rng + ?Sized>(rng: &mut R, mean: &Vector2<f64>, spread: f64, observed: &[Ranged]) -> (Vector2<f64>, f64) {
+fn propose<R: Rng>(rng: &mut R, mean: &Vector2<f64>, spread: f64, observed: &[Ranged]) -> (Vector2<f64>, f64) {
     let spread = spread.max(f64::MIN_POSITIVE);
     let mut precision = Matrix2::identity() / spread;
     let mut shift = Vector2::zeros();

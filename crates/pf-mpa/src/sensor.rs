@@ -252,7 +252,7 @@ impl Sensing<2, 1> for RangeSensor {
         Matrix1::new(deviation * deviation)
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, place: &Vector2<f64>) -> Vector1<f64> {
+    fn sample(&self, rng: &mut dyn Rng, place: &Vector2<f64>) -> Vector1<f64> {
         Vector1::new(self.measure(rng, self.distance(place[0], place[1])))
     }
 
@@ -295,7 +295,7 @@ impl Sensing<4, 1> for BiasedRangeSensor {
         Matrix1::new(deviation * deviation)
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector4<f64>) -> Vector1<f64> {
+    fn sample(&self, rng: &mut dyn Rng, state: &Vector4<f64>) -> Vector1<f64> {
         Vector1::new(self.0.measure(rng, self.mean(state)[0]))
     }
 

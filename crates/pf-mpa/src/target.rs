@@ -167,7 +167,7 @@ impl Target {
     }
 
     /// A random track of `steps` states after `start`. The manoeuvres follow the Markov chain.
-    pub fn simulate<R: Rng + ?Sized>(&self, rng: &mut R, start: &Vector4<f64>, steps: usize) -> Vec<Vector4<f64>> {
+    pub fn simulate<R: Rng>(&self, rng: &mut R, start: &Vector4<f64>, steps: usize) -> Vec<Vector4<f64>> {
         let mut state = *start;
         let mut acceleration = Vector2::zeros();
         (0..steps)
@@ -218,7 +218,7 @@ impl WithManoeuvre {
     ///
     /// # Errors
     /// If `count` is zero, or the prior's covariance is not positive semidefinite.
-    pub fn cloud<R: Rng + ?Sized>(rng: &mut R, prior: &Gaussian<4>, count: usize) -> Result<Particles<6>, Error> {
+    pub fn cloud<R: Rng>(rng: &mut R, prior: &Gaussian<4>, count: usize) -> Result<Particles<6>, Error> {
         let states: Particles<4> = Particles::from_belief(rng, prior, count)?;
         let mut next = 0;
         Particles::from_draws(count, || {
@@ -258,7 +258,7 @@ impl Dynamics<6> for WithManoeuvre {
         Vector6::new(moved[0], moved[1], moved[2], moved[3], acceleration[0], acceleration[1])
     }
 
-    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector6<f64>) -> Vector6<f64> {
+    fn propagate(&self, rng: &mut dyn Rng, state: &Vector6<f64>) -> Vector6<f64> {
         let acceleration = Vector2::new(self.next(rng, state[4]), self.next(rng, state[5]));
         let own = Vector4::new(state[0], state[1], state[2], state[3]);
         let moved = self.target.moved(rng, &own, &acceleration);

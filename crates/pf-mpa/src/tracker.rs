@@ -52,7 +52,7 @@ pub trait Tracker {
     ///
     /// # Errors
     /// If the prior cannot be represented.
-    fn start<R: Rng + ?Sized>(&self, rng: &mut R, target: &Target, prior: &Gaussian<4>) -> Result<Self::Belief, Error>;
+    fn start<R: Rng>(&self, rng: &mut R, target: &Target, prior: &Gaussian<4>) -> Result<Self::Belief, Error>;
 
     /// Mean and covariance of a belief: what a leader would broadcast.
     fn estimate(&self, belief: &Self::Belief) -> Gaussian<4>;
@@ -61,7 +61,7 @@ pub trait Tracker {
     ///
     /// # Errors
     /// [`Error::Impossible`] if the observations have probability zero under the belief. The belief is then unchanged.
-    fn step_in_place<R: Rng + ?Sized>(
+    fn step_in_place<R: Rng>(
         &self,
         rng: &mut R,
         target: &Target,
@@ -75,7 +75,7 @@ pub trait Tracker {
     ///
     /// # Errors
     /// As [`step_in_place`](Self::step_in_place).
-    fn step<R: Rng + ?Sized>(
+    fn step<R: Rng>(
         &self,
         rng: &mut R,
         target: &Target,
@@ -127,7 +127,7 @@ pub trait GaussianTracker {
     ///
     /// # Errors
     /// As [`Tracker::step_in_place`].
-    fn advance<R: Rng + ?Sized>(
+    fn advance<R: Rng>(
         &self,
         rng: &mut R,
         step: Step<'_>,
@@ -139,7 +139,7 @@ impl<T: GaussianTracker> Tracker for T {
     type Belief = Gaussian<4>;
     type Workspace = T::Workspace;
 
-    fn start<R: Rng + ?Sized>(&self, _: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<Gaussian<4>, Error> {
+    fn start<R: Rng>(&self, _: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<Gaussian<4>, Error> {
         self.check()?;
         Ok(*prior)
     }
@@ -148,7 +148,7 @@ impl<T: GaussianTracker> Tracker for T {
         *belief
     }
 
-    fn step_in_place<R: Rng + ?Sized>(
+    fn step_in_place<R: Rng>(
         &self,
         rng: &mut R,
         target: &Target,
@@ -224,7 +224,7 @@ impl Network {
     }
 
     /// Draws a range from every sensor to a target at `(x, y)`.
-    pub fn measure<R: Rng + ?Sized>(&self, rng: &mut R, x: f64, y: f64) -> Vec<f64> {
+    pub fn measure<R: Rng>(&self, rng: &mut R, x: f64, y: f64) -> Vec<f64> {
         self.sensors.iter().map(|s| s.measure(rng, s.distance(x, y))).collect()
     }
 

@@ -6,7 +6,8 @@ use crate::quantizer::Quantizer;
 use crate::refuse;
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::{SMatrix, SVector};
-use fewbits_core::{Link, MeasurementNoise, Memoryless, Observation};
+use fewbits_core::rand::Rng;
+use fewbits_core::{Deterministic, Link, MeasurementNoise, Observation, Scheme};
 use fewbits_numerics::error::positive;
 use serde::{Deserialize, Serialize};
 
@@ -92,7 +93,10 @@ impl MeasurementNoise<1> for QuantizingSensor {
     }
 }
 
-impl Memoryless<1> for QuantizingSensor {
+impl Deterministic<1> for QuantizingSensor {}
+
+impl Scheme<1> for QuantizingSensor {
+    type State = ();
     type Feedback = ();
     type Report = Symbol;
     type Factor = Scalar;
@@ -103,16 +107,17 @@ impl Memoryless<1> for QuantizingSensor {
         self.labelling.clone()
     }
 
-    fn report_of(&self, measurement: &SVector<f64, 1>, (): &()) -> Result<Option<Symbol>, fewbits_core::Error> {
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        measurement: &SVector<f64, 1>,
+        (): &(),
+    ) -> Result<Option<Symbol>, fewbits_core::Error> {
         Ok(Some(Symbol(self.quantizer.encode(measurement[0])?)))
     }
 
-    fn meaning_of(
-        &self,
-        (): &(),
-        observation: &Observation<Symbol>,
-        link: &Link,
-    ) -> Result<Scalar, fewbits_core::Error> {
+    fn factor(&self, (): &(), observation: &Observation<Symbol>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
             missing => return Ok(Constant::of_delivery(missing, link).into()),

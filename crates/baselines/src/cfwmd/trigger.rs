@@ -179,8 +179,6 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
     type Report = f64;
     type Factor = Bump;
 
-    fn start(&self) {}
-
     fn feedback_format(&self) -> NumberFormat {
         NumberFormat::Double
     }
@@ -189,9 +187,9 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
         NumberFormat::Double
     }
 
-    fn encode<R: Rng + ?Sized>(
+    fn encode(
         &self,
-        rng: &mut R,
+        rng: &mut dyn Rng,
         (): &mut (),
         measurement: &SVector<f64, 1>,
         broadcast: &SVector<f64, D>,

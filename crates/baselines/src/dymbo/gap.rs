@@ -39,7 +39,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
     ///
     /// # Errors
     /// If the filter has no steady state.
-    pub fn new<R: Rng + ?Sized>(rng: &mut R, filter: F, exact: &'a PointMassFilter) -> Result<Self, Error> {
+    pub fn new<R: Rng>(rng: &mut R, filter: F, exact: &'a PointMassFilter) -> Result<Self, Error> {
         let variance = filter.plant().steady_state(filter.information())?.filtered_variance;
         let belief = Gaussian::scalar(0.0, variance)?;
         let nodes: Vec<f64> = exact.grid().nodes().collect();
@@ -58,7 +58,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
     ///
     /// # Errors
     /// If the exact density leaves its grid.
-    pub fn step<R: Rng + ?Sized>(&mut self, rng: &mut R) -> Result<(), Error> {
+    pub fn step<R: Rng>(&mut self, rng: &mut R) -> Result<(), Error> {
         let (plant, scheme, link) = (self.filter.plant(), self.filter.scheme(), self.filter.link());
         self.state = plant.dynamics().propagate(rng, &self.state);
         let sample = plant.sensor().sample(rng, &self.state);
@@ -98,7 +98,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
     ///
     /// # Errors
     /// As [`Twin::step`].
-    pub fn steady_excess<R: Rng + ?Sized>(&mut self, rng: &mut R, burn: usize, measured: usize) -> Result<f64, Error> {
+    pub fn steady_excess<R: Rng>(&mut self, rng: &mut R, burn: usize, measured: usize) -> Result<f64, Error> {
         (0..burn).try_for_each(|_| self.step(rng))?;
         let mut sum = 0.0;
         for _ in 0..measured {
@@ -113,7 +113,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
     ///
     /// # Errors
     /// As [`Twin::step`].
-    pub fn smoothed<R: Rng + ?Sized>(
+    pub fn smoothed<R: Rng>(
         &mut self,
         rng: &mut R,
         lags: &[usize],

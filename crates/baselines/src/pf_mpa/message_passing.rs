@@ -101,7 +101,7 @@ impl MessagePassing {
     }
 
     /// Forms the prediction's message. Returns its mean, its covariance over all four coordinates, and the kernel's `lambda`.
-    fn predict<R: Rng + ?Sized>(
+    fn predict<R: Rng>(
         &self,
         rng: &mut R,
         &Step { target, k, belief, .. }: &Step<'_>,
@@ -171,7 +171,7 @@ impl MessagePassing {
     }
 
     /// Forms the message of one range. Returns the number of fallbacks; `None` if the range carries no information.
-    fn ring<R: Rng + ?Sized>(
+    fn ring<R: Rng>(
         &self,
         rng: &mut R,
         range: &Ranged,
@@ -272,7 +272,7 @@ impl GaussianTracker for MessagePassing {
         self.checked().map(|_| ())
     }
 
-    fn advance<R: Rng + ?Sized>(
+    fn advance<R: Rng>(
         &self,
         rng: &mut R,
         step: Step<'_>,

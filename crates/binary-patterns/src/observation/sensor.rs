@@ -3,7 +3,8 @@
 use crate::{BinaryQuantizer, Error};
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::SVector;
-use fewbits_core::{Link, Memoryless, Observation};
+use fewbits_core::rand::Rng;
+use fewbits_core::{Deterministic, Link, Observation, Scheme};
 use fewbits_numerics::error::positive;
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
@@ -72,7 +73,10 @@ impl PatternSensor {
 }
 
 /// The report is the bit of the cell that contains the measurement. A missing report carries no information about the measurement.
-impl Memoryless<1> for PatternSensor {
+impl Deterministic<1> for PatternSensor {}
+
+impl Scheme<1> for PatternSensor {
+    type State = ();
     type Feedback = ();
     type Report = bool;
     type Factor = Scalar;
@@ -81,11 +85,17 @@ impl Memoryless<1> for PatternSensor {
 
     fn report_format(&self) {}
 
-    fn report_of(&self, measurement: &SVector<f64, 1>, (): &()) -> Result<Option<bool>, fewbits_core::Error> {
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        measurement: &SVector<f64, 1>,
+        (): &(),
+    ) -> Result<Option<bool>, fewbits_core::Error> {
         Ok(Some(self.quantizer().encode(measurement[0])?))
     }
 
-    fn meaning_of(&self, (): &(), observation: &Observation<bool>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
+    fn factor(&self, (): &(), observation: &Observation<bool>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
         let bit = match observation {
             Observation::Received(bit) => *bit,
             missing => return Ok(Constant::of_delivery(missing, link).into()),

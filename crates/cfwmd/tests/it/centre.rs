@@ -1,7 +1,7 @@
 //! Censoring sensors at a fusion centre: most of them die, and the centre notices.
 
 use fewbits_cfwmd::scheme::CovarianceFeedback;
-use fewbits_core::{Dynamics, Evolution, Gaussian, Link, NumberFormat, Observation, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{Evolution, Gaussian, Link, NumberFormat, Observation, SchemeNode, Sensing, SensorNode};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{Event, FusionCentre, Reporting, Slot};
 use fewbits_models::{ContinuousLinear, LinearSensor};

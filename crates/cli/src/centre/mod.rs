@@ -12,10 +12,9 @@ use crate::place::Place;
 use crate::private::configured;
 use crate::say::say;
 use configuration::{Configuration, Faults, Model, Sensor};
-use fewbits_core::{Gaussian, Link};
+use fewbits_core::{Evolution, Gaussian, Link};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::FusionCentre;
-use fewbits_filters::contract::Evolving;
 use fewbits_link::{FusionReceiver, Output, Peer, Start, Station, Store, Transport, Udp, run_station};
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
@@ -105,7 +104,7 @@ fn with<const D: usize, T: Transport>(
     options: &CentreOptions,
     given: &Configuration,
     open: Option<impl FnOnce() -> Result<T, Error>>,
-    world: Result<impl Evolving<D> + 'static, fewbits_models::Error>,
+    world: Result<impl Evolution<D> + 'static, fewbits_models::Error>,
 ) -> Result<Ending, Error> {
     let file = &options.configuration;
     let mut faults = Faults::default();

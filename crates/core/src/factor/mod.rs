@@ -43,7 +43,7 @@ use nalgebra::{SMatrix, SVector};
 /// 2. `add_log_likelihoods` adds what `log_likelihood` returns, up to rounding. If lengths differ, all of `log_weights` becomes NaN
 ///    ([`crate::columns::lengths_agree`]);
 /// 3. `tilted` agrees with quadrature of `log_likelihood` against the prior.
-pub trait Factor<const M: usize> {
+pub trait Factor<const M: usize>: Send + Sync {
     /// `ln p(observation | h(x) = m)`.
     fn log_likelihood(&self, m: &SVector<f64, M>) -> f64;
 

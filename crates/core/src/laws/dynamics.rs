@@ -11,9 +11,9 @@ use rand::Rng;
 ///
 /// # Errors
 /// If an entry disagrees; the violation names it.
-pub fn draws_have_the_law<const D: usize, R: Rng + ?Sized>(
+pub fn draws_have_the_law<const D: usize>(
     dynamics: &impl GaussianDynamics<D>,
-    rng: &mut R,
+    rng: &mut dyn Rng,
     state: &SVector<f64, D>,
     draws: usize,
 ) -> Result<(), Violation> {

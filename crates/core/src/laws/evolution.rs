@@ -1,7 +1,6 @@
 //! The laws of [`Evolution`].
 
 use super::{Violation, agree, failed};
-use crate::dynamics::{Dynamics as _, GaussianDynamics};
 use crate::evolution::Evolution;
 use nalgebra::SVector;
 
@@ -11,7 +10,7 @@ use nalgebra::SVector;
 /// # Errors
 /// If a step is refused, or the entry that disagrees.
 pub fn stretches_compose<const D: usize>(
-    evolution: &impl Evolution<D>,
+    evolution: &dyn Evolution<D>,
     [a, b]: [f64; 2],
     states: &[SVector<f64, D>],
     tolerance: f64,

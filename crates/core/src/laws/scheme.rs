@@ -87,7 +87,7 @@ pub fn link_delivers_once(link: &Link) -> Result<(), Violation> {
 /// # Errors
 /// If encoding fails, or the frequency found.
 #[allow(clippy::too_many_arguments, reason = "a law names everything that it is about")]
-pub fn honesty<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
+pub fn honesty<const M: usize, S: Scheme<M>, R: Rng>(
     scheme: &S,
     feedback: &S::Feedback,
     link: &Link,
@@ -122,7 +122,7 @@ pub fn honesty<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
 /// # Errors
 /// As [`honesty`].
 #[allow(clippy::too_many_arguments, reason = "a law names everything that it is about")]
-pub fn frequencies<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
+pub fn frequencies<const M: usize, S: Scheme<M>, R: Rng>(
     scheme: &S,
     feedback: &S::Feedback,
     link: &Link,

@@ -31,7 +31,7 @@ pub fn is_consistent<const D: usize, const M: usize>(
 ///
 /// # Errors
 /// If an entry disagrees; the violation names it.
-pub fn draws_have_the_law<const D: usize, const M: usize, R: Rng + ?Sized>(
+pub fn draws_have_the_law<const D: usize, const M: usize, R: Rng>(
     sensing: &impl Sensing<D, M>,
     rng: &mut R,
     state: &SVector<f64, D>,

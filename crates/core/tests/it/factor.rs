@@ -154,7 +154,7 @@ impl Sensing<2, 1> for Line {
     fn noise_covariance_at(&self, _: &Vector2<f64>) -> Matrix1<f64> {
         Matrix1::new(0.49)
     }
-    fn sample<R: Rng + ?Sized>(&self, _: &mut R, x: &Vector2<f64>) -> Vector1<f64> {
+    fn sample(&self, _: &mut dyn Rng, x: &Vector2<f64>) -> Vector1<f64> {
         self.mean(x)
     }
 }

@@ -76,11 +76,11 @@ impl Dynamics<2> for Plane {
         self.stated(TURN * state)
     }
 
-    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector2<f64>) -> Vector2<f64> {
+    fn propagate(&self, rng: &mut dyn Rng, state: &Vector2<f64>) -> Vector2<f64> {
         self.draw(rng, TURN * state)
     }
 
-    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, 2>) {
+    fn propagate_columns(&self, rng: &mut dyn Rng, states: ColumnsMut<'_, 2>) {
         let shift = if self.has(Fault::Sweep) { 0.1 * self.unit } else { 0.0 };
         let [x, y] = states;
         for (x, y) in x.iter_mut().zip(y) {
@@ -123,7 +123,7 @@ impl Sensing<2, 2> for Plane {
         NOISE * self.square()
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector2<f64>) -> Vector2<f64> {
+    fn sample(&self, rng: &mut dyn Rng, state: &Vector2<f64>) -> Vector2<f64> {
         self.draw(rng, TURN * state)
     }
 
@@ -363,15 +363,13 @@ struct Drawn<D, F> {
 impl<R, D, F> Scheme<1> for Drawn<D, F>
 where
     R: Message<Format = ()>,
-    D: Fn(f64) -> R,
-    F: Fn(&Observation<R>, &Link) -> Result<Constant, Error>,
+    D: Fn(f64) -> R + Send + Sync,
+    F: Fn(&Observation<R>, &Link) -> Result<Constant, Error> + Send + Sync,
 {
     type State = ();
     type Feedback = f64;
     type Report = R;
     type Factor = Constant;
-
-    fn start(&self) {}
 
     fn feedback_format(&self) -> NumberFormat {
         NumberFormat::Double
@@ -379,7 +377,7 @@ where
 
     fn report_format(&self) {}
 
-    fn encode<G: Rng + ?Sized>(&self, rng: &mut G, (): &mut (), _: &Vector1<f64>, _: &f64) -> Result<Option<R>, Error> {
+    fn encode(&self, rng: &mut dyn Rng, (): &mut (), _: &Vector1<f64>, _: &f64) -> Result<Option<R>, Error> {
         Ok(Some((self.draw)(rng.random())))
     }
 
@@ -533,7 +531,7 @@ impl Dynamics<2> for Pushed {
         TURN * state
     }
 
-    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector2<f64>) -> Vector2<f64> {
+    fn propagate(&self, rng: &mut dyn Rng, state: &Vector2<f64>) -> Vector2<f64> {
         TURN * state + Vector2::new(0.0, rng.random::<f64>())
     }
 }

@@ -7,4 +7,5 @@ mod codec;
 mod factor;
 mod laws;
 mod moments;
+mod weighing;
 mod wild;

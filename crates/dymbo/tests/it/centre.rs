@@ -1,8 +1,7 @@
 //! Fusion centres of one-bit, three-bit and full sensors: health, learnt noise, late reports, stored states.
 
 use fewbits_core::{
-    Belief, Dynamics, Evolution, FullValue, Gaussian, Link, MeasurementNoise, Observation, OnAxes, SchemeNode, Sensing,
-    SensorNode,
+    Belief, Dynamics, FullValue, Gaussian, Link, MeasurementNoise, Observation, OnAxes, SchemeNode, Sensing, SensorNode,
 };
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, NoiseLearning, RemoteSensor, Reporting, Slot};
@@ -245,7 +244,7 @@ impl Sensing<2, 1> for Range {
         nalgebra::Matrix1::new(self.1)
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, x: &nalgebra::Vector2<f64>) -> Vector1<f64> {
+    fn sample(&self, rng: &mut dyn Rng, x: &nalgebra::Vector2<f64>) -> Vector1<f64> {
         Gaussian::from_symmetric_parts(self.mean(x), nalgebra::Matrix1::new(self.1)).sample(rng)
     }
 }

@@ -90,17 +90,13 @@ pub(super) fn single(estimate: &KernelEstimate<2>) -> Result<Mixture<2>, Error> 
 }
 
 /// A systematic choice of `count` among weighted particles.
-pub(super) fn chosen<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<u32> {
+pub(super) fn chosen<R: Rng>(rng: &mut R, weights: &[f64], count: usize) -> Vec<u32> {
     let ancestors = systematic(weights, count, rng.random());
     ancestors.into_iter().map(|i| i as u32).collect()
 }
 
 /// A plain particle filter: systematic resampling, propagation, weights.
-pub(super) fn plain_step<R: Rng + ?Sized>(
-    rng: &mut R,
-    particles: &mut Particles<2>,
-    reading: &Reading,
-) -> Result<(), Error> {
+pub(super) fn plain_step<R: Rng>(rng: &mut R, particles: &mut Particles<2>, reading: &Reading) -> Result<(), Error> {
     particles.select(&chosen(rng, particles.weights(), particles.len()))?;
     Walk.propagate_columns(rng, particles.columns_mut());
     particles.reweigh(|states, logs| reading.add_log_likelihoods(states, logs))?;

@@ -27,7 +27,7 @@ impl Dynamics<2> for Walk {
         state + Point::new(FRAC_PI_4.sin() / FRAC_PI_4 + 0.5 * DISTURBANCE, 0.5 * DISTURBANCE)
     }
 
-    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Point) -> Point {
+    fn propagate(&self, rng: &mut dyn Rng, state: &Point) -> Point {
         let (sin, cos) = rng.random_range(-FRAC_PI_4..FRAC_PI_4).sin_cos();
         let u: [f64; 2] = [rng.random_range(0.0..DISTURBANCE), rng.random_range(0.0..DISTURBANCE)];
         state + Point::new(cos + u[0], sin + u[1])
@@ -76,12 +76,7 @@ pub struct World {
 impl World {
     /// Draws a world of `steps` steps. The leader is the sensor nearest to the target among those that did not lead just before
     /// and are not too near.
-    pub(super) fn draw<R: Rng + ?Sized>(
-        rng: &mut R,
-        sensors: usize,
-        steps: usize,
-        variance: f64,
-    ) -> Result<Self, Error> {
+    pub(super) fn draw<R: Rng>(rng: &mut R, sensors: usize, steps: usize, variance: f64) -> Result<Self, Error> {
         let length = steps as f64 + 1.0;
         let mut place = || Point::new(rng.random_range(-1.0..length), rng.random_range(-4.0..4.0));
         let places = (0..sensors).map(|_| place()).collect();

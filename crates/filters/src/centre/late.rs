@@ -6,8 +6,8 @@ use super::reading::{Content, Reading};
 use super::state::{Checkpoint, StoredSlot};
 use super::{FusionCentre, Slot};
 use crate::Error;
-use crate::contract::{Move, StateFilter, StateLikelihood};
-use fewbits_core::{Belief, Gaussian, Observation};
+use crate::contract::StateFilter;
+use fewbits_core::{Belief, Gaussian, Likelihood, Observation, ScaledNoise};
 use fewbits_numerics::error::finite;
 use rand::Rng;
 
@@ -98,10 +98,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
         let parts: Vec<_> = contested.iter().map(|(one, log_wrong)| (&**one, *log_wrong)).collect();
         let wrong = (!parts.is_empty()).then(|| OneIsWrong::new(parts));
-        let wrong = wrong.iter().map(|one| one as &dyn StateLikelihood<D>);
+        let wrong = wrong.iter().map(|one| one as &dyn Likelihood<D>);
         let missing = || missing.iter().map(|one| &**one);
-        let all: Vec<&dyn StateLikelihood<D>> =
-            reports.iter().map(|one| &**one).chain(wrong).chain(missing()).collect();
+        let all: Vec<&dyn Likelihood<D>> = reports.iter().map(|one| &**one).chain(wrong).chain(missing()).collect();
         match self.filter.update(rng, belief, &all) {
             Err(Error::Impossible) => {
                 slots.iter_mut().for_each(StoredSlot::drop_report);
@@ -115,9 +114,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Predicts a belief over `seconds`.
     pub(super) fn moved(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, seconds: f64) -> Result<(), Error> {
         if seconds > 0.0 {
-            let motion = self.world.over(seconds)?;
+            let dynamics = self.world.over(seconds)?;
             self.filter
-                .predict(rng, Move::new(&*motion, self.noise_scale), belief)?;
+                .predict(rng, &ScaledNoise::new(&*dynamics, self.noise_scale), belief)?;
         }
         Ok(())
     }

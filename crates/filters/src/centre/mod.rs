@@ -5,7 +5,7 @@
 //! alarm if its model no longer holds ([health](FalseAlarms)), and resumes from a stored [`CentreState`] with the same bits.
 //!
 //! ```
-//! use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, Observation, OnAxes, Message};
+//! use fewbits_core::{Evolution, FullValue, Gaussian, Link, Message, NumberFormat, Observation, OnAxes};
 //! use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
 //! use fewbits_filters::MomentFilter;
 //! use fewbits_models::{ContinuousLinear, LinearSensor};
@@ -46,8 +46,8 @@ pub use slot::{Event, Received, Slot};
 pub use state::CentreState;
 
 use crate::Error;
-use crate::contract::{Evolving, StateFilter};
-use fewbits_core::{ArgumentError, Belief, BitString, Gaussian, Observation};
+use crate::contract::StateFilter;
+use fewbits_core::{ArgumentError, Belief, BitString, Evolution, Gaussian, Observation};
 use fewbits_numerics::error::{finite, non_negative, refuse};
 use rand::Rng;
 use state::{Checkpoint, MemberState};
@@ -74,7 +74,7 @@ struct Member<const D: usize> {
 /// ```
 /// A call that fails leaves the centre unchanged.
 pub struct FusionCentre<const D: usize, F: StateFilter<D>> {
-    world: Box<dyn Evolving<D>>,
+    world: Box<dyn Evolution<D>>,
     filter: F,
     belief: F::Belief,
     now: f64,
@@ -102,7 +102,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// If the filter cannot represent the prior.
     pub fn new(
         rng: &mut dyn Rng,
-        world: impl Evolving<D> + 'static,
+        world: impl Evolution<D> + 'static,
         mut filter: F,
         prior: &Gaussian<D>,
     ) -> Result<Self, Error> {

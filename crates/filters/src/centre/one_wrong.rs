@@ -1,8 +1,7 @@
 //! Reports of which one is wrong, and nothing says which.
 
 use crate::Error;
-use crate::contract::{Evidence, LinearScalar, StateLikelihood};
-use fewbits_core::{Columns, Gaussian, Likelihood};
+use fewbits_core::{Columns, Evidence, Gaussian, Likelihood};
 use nalgebra::{SMatrix, SVector};
 
 /// The likelihood of reports of which one is wrong, each of them with the same probability.
@@ -13,11 +12,11 @@ use nalgebra::{SMatrix, SVector};
 /// A single report is wrong with probability one half.
 pub(super) struct OneIsWrong<'a, const D: usize> {
     /// Each report, and `ln p` of it if it is wrong: the same for every state.
-    parts: Vec<(&'a dyn StateLikelihood<D>, f64)>,
+    parts: Vec<(&'a dyn Likelihood<D>, f64)>,
 }
 
 impl<'a, const D: usize> OneIsWrong<'a, D> {
-    pub fn new(parts: Vec<(&'a dyn StateLikelihood<D>, f64)>) -> Self {
+    pub fn new(parts: Vec<(&'a dyn Likelihood<D>, f64)>) -> Self {
         Self { parts }
     }
 
@@ -62,7 +61,7 @@ impl<const D: usize> Likelihood<D> for OneIsWrong<'_, D> {
         if !fewbits_core::columns::lengths_agree(&states, log_weights) {
             return;
         }
-        let sweep = |part: &dyn StateLikelihood<D>| {
+        let sweep = |part: &dyn Likelihood<D>| {
             let mut logs = vec![0.0; log_weights.len()];
             part.add_log_likelihoods(states, &mut logs);
             logs
@@ -81,9 +80,7 @@ impl<const D: usize> Likelihood<D> for OneIsWrong<'_, D> {
             *log_weight += if is_number { log } else { f64::NAN };
         }
     }
-}
 
-impl<const D: usize> StateLikelihood<D> for OneIsWrong<'_, D> {
     fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
         // The posterior of each hypothesis, and its evidence.
         let mut found: Vec<(Gaussian<D>, f64)> = Vec::new();
@@ -120,19 +117,7 @@ impl<const D: usize> StateLikelihood<D> for OneIsWrong<'_, D> {
         })
     }
 
-    fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error> {
-        self.condition(&mut belief.clone())
-    }
-
-    fn as_constant(&self) -> Option<f64> {
-        None
-    }
-
     fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
         self.parts.iter().any(|(part, _)| part.reads(state, axis))
-    }
-
-    fn as_linear_scalar(&self, _: &SVector<f64, D>) -> Option<LinearScalar<D>> {
-        None
     }
 }

@@ -3,8 +3,8 @@
 use super::health::Residual;
 use super::{FusionCentre, Member, Slot};
 use crate::Error;
-use crate::contract::{Evidence, StateFilter, StateLikelihood};
-use fewbits_core::{BitString, Gaussian, Observation};
+use crate::contract::StateFilter;
+use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
 
 /// Reports of at most this many bits are treated as words; the residual then sums over all possible words.
 pub(super) const WORD_BITS: usize = 4;
@@ -14,7 +14,7 @@ pub(super) struct Reading<'a, const D: usize> {
     pub seat: usize,
     pub slot: &'a Slot,
     /// Of a report under the supposition that its sensor works, which it proves. `None` if the scheme accepts no such report.
-    pub likelihood: Option<Box<dyn StateLikelihood<D>>>,
+    pub likelihood: Option<Box<dyn Likelihood<D>>>,
     pub content: Content,
 }
 
@@ -30,7 +30,7 @@ pub(super) enum Content {
 
 impl<'a, const D: usize> Reading<'a, D> {
     /// The likelihood of a reading that is known to have one.
-    pub fn known(&self) -> Option<&dyn StateLikelihood<D>> {
+    pub fn known(&self) -> Option<&dyn Likelihood<D>> {
         self.likelihood.as_deref()
     }
 }

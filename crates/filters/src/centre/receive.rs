@@ -9,8 +9,8 @@ use super::reading::{Content, Reading};
 use super::state::{MemberState, StoredSlot};
 use super::{Event, FusionCentre, Received, Slot};
 use crate::Error;
-use crate::contract::{Info, StateFilter, StateLikelihood};
-use fewbits_core::Gaussian;
+use crate::contract::{Info, StateFilter};
+use fewbits_core::{Gaussian, Likelihood};
 use rand::Rng;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
@@ -216,9 +216,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let missing = missing
             .filter_map(|(reading, _)| reading.known())
             .filter(|known| known.as_constant() != Some(f64::NEG_INFINITY));
-        let rest: Vec<&dyn StateLikelihood<D>> = contested
+        let rest: Vec<&dyn Likelihood<D>> = contested
             .iter()
-            .map(|one| one as &dyn StateLikelihood<D>)
+            .map(|one| one as &dyn Likelihood<D>)
             .chain(missing)
             .collect();
         if self.filter.of_moments(&in_order.given).is_some() {

@@ -2,8 +2,9 @@
 
 use super::Slot;
 use crate::Error;
-use crate::contract::{Evidence, StateLikelihood};
-use fewbits_core::{BitString, Gaussian, Link, MeasurementNoise, Message, Observation, Observed, Scheme, Sensing};
+use fewbits_core::{
+    BitString, Evidence, Gaussian, Likelihood, Link, MeasurementNoise, Message, Observation, Observed, Scheme, Sensing,
+};
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::linalg::congruence;
 use nalgebra::{SMatrix, SVector};
@@ -11,7 +12,7 @@ use nalgebra::{SMatrix, SVector};
 /// What a receiver needs to know of a sensor. Object-safe, so that sensors of different kinds can be in one list.
 ///
 /// [`Reporting`] makes one from any [`Scheme`] and [`Sensing`].
-pub trait RemoteSensor<const D: usize> {
+pub trait RemoteSensor<const D: usize>: Send + Sync {
     /// The bits that the sensor is told before it measures, from the predicted belief.
     ///
     /// # Errors
@@ -23,12 +24,12 @@ pub trait RemoteSensor<const D: usize> {
     ///
     /// # Errors
     /// If the feedback does not decode, `working` is outside `[0, 1]`, or the scheme does not accept the report.
-    fn likelihood(&self, slot: &Slot, working: f64) -> Result<Box<dyn StateLikelihood<D>>, Error>;
+    fn likelihood(&self, slot: &Slot, working: f64) -> Result<Box<dyn Likelihood<D>>, Error>;
 
     /// Updates a Gaussian by [`likelihood`](Self::likelihood).
     ///
     /// # Errors
-    /// As there, and as [`StateLikelihood::condition`].
+    /// As there, and as [`Likelihood::condition`].
     fn condition(&self, slot: &Slot, working: f64, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
         self.likelihood(slot, working)?.condition(belief)
     }
@@ -36,7 +37,7 @@ pub trait RemoteSensor<const D: usize> {
     /// Log likelihood and correction of [`likelihood`](Self::likelihood) under a Gaussian.
     ///
     /// # Errors
-    /// As there, and as [`StateLikelihood::evidence`].
+    /// As there, and as [`Likelihood::evidence`].
     fn evidence(&self, slot: &Slot, working: f64, belief: &Gaussian<D>) -> Result<Evidence, Error> {
         self.likelihood(slot, working)?.evidence(belief)
     }
@@ -161,14 +162,14 @@ where
     S: Sensing<D, M> + Clone + 'static,
     C: Scheme<M> + MeasurementNoise<M>,
     C::Factor: 'static,
-    A: Fn(&Gaussian<D>, &Gaussian<M>) -> C::Feedback,
+    A: Fn(&Gaussian<D>, &Gaussian<M>) -> C::Feedback + Send + Sync,
 {
     fn feedback(&self, predicted: &Gaussian<D>) -> Result<BitString, Error> {
         let measurement = self.predicted(predicted)?;
         Ok((self.ask)(predicted, &measurement).to_bits(&self.scheme.feedback_format())?)
     }
 
-    fn likelihood(&self, slot: &Slot, working: f64) -> Result<Box<dyn StateLikelihood<D>>, Error> {
+    fn likelihood(&self, slot: &Slot, working: f64) -> Result<Box<dyn Likelihood<D>>, Error> {
         Ok(Box::new(self.observed(slot, working)?))
     }
 

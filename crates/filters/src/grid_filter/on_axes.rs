@@ -2,8 +2,8 @@
 
 use super::{GridFilter, GridWorkspace, check_axes};
 use crate::Error;
-use crate::contract::{Info, Move, StateFilter, StateLikelihood};
-use fewbits_core::{Columns, Gaussian, Likelihood};
+use crate::contract::{Info, StateFilter};
+use fewbits_core::{Columns, Gaussian, GaussianDynamics, Likelihood};
 use fewbits_numerics::error::refuse;
 use nalgebra::SVector;
 use rand::Rng;
@@ -33,7 +33,7 @@ impl<const D: usize, const K: usize> GridOnAxes<D, K> {
 
 /// Likelihoods of a state of `D` as functions of the coordinates `axes`; the other coordinates are those of `state`.
 struct OnPlane<'a, const D: usize, const K: usize> {
-    observed: &'a [&'a dyn StateLikelihood<D>],
+    observed: &'a [&'a dyn Likelihood<D>],
     axes: [usize; K],
     state: SVector<f64, D>,
 }
@@ -74,8 +74,13 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
         Ok(*prior)
     }
 
-    fn predict(&mut self, _: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Gaussian<D>) -> Result<(), Error> {
-        *belief = motion.predict(belief);
+    fn predict(
+        &mut self,
+        _: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<D>,
+        belief: &mut Gaussian<D>,
+    ) -> Result<(), Error> {
+        *belief = dynamics.predict(belief, 1.0);
         Ok(())
     }
 
@@ -84,7 +89,7 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
         &mut self,
         _: &mut dyn Rng,
         belief: &mut Gaussian<D>,
-        observed: &[&dyn StateLikelihood<D>],
+        observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
         if observed.is_empty() {
             return Ok(Info::default());

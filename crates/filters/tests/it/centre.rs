@@ -1,9 +1,10 @@
 //! The fusion centre beside sensors that fall silent and return, send what cannot be, lie, or repeat themselves.
 
-use fewbits_core::{Dynamics, Evolution, FullValue, Gaussian, Link, Message, NumberFormat, Observation};
+use fewbits_core::{
+    Dynamics, FullValue, Gaussian, GaussianDynamics, Likelihood, Link, Message, NumberFormat, Observation,
+};
 use fewbits_filters::centre::{Event, Failures, FusionCentre, Health, Reporting, Slot};
-use fewbits_filters::contract::Move;
-use fewbits_filters::{BootstrapFilter, Error, MomentFilter, ParticleFilter, StateFilter, StateLikelihood};
+use fewbits_filters::{BootstrapFilter, Error, MomentFilter, ParticleFilter, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::Vector1;
@@ -400,15 +401,20 @@ impl StateFilter<1> for OnlyOnce {
         Ok(*prior)
     }
 
-    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, 1>, belief: &mut Gaussian<1>) -> Result<(), Error> {
-        MomentFilter.predict(rng, motion, belief)
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<1>,
+        belief: &mut Gaussian<1>,
+    ) -> Result<(), Error> {
+        MomentFilter.predict(rng, dynamics, belief)
     }
 
     fn update(
         &mut self,
         rng: &mut dyn Rng,
         belief: &mut Gaussian<1>,
-        observed: &[&dyn StateLikelihood<1>],
+        observed: &[&dyn Likelihood<1>],
     ) -> Result<fewbits_filters::Info, Error> {
         MomentFilter.update(rng, belief, observed)
     }
@@ -454,7 +460,7 @@ impl fewbits_core::Sensing<1, 1> for Even {
         nalgebra::Matrix1::new(self.0)
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, x: &Vector1<f64>) -> Vector1<f64> {
+    fn sample(&self, rng: &mut dyn Rng, x: &Vector1<f64>) -> Vector1<f64> {
         let mean = fewbits_core::Sensing::<1, 1>::mean(self, x);
         Vector1::new(mean[0] + self.0.sqrt() * rng.sample::<f64, _>(StandardNormal))
     }

@@ -1,14 +1,14 @@
 //! One scheme, two-sided bits over a link that loses and inverts, through every filter of the contract.
 
 use fewbits_core::factor::{Constant, Partition, Scalar, Value};
+use fewbits_core::rand::Rng;
 use fewbits_core::{
-    Belief, Dynamics, Error as CoreError, Evolution, Gaussian, Link, Memoryless, NumberFormat, Observation, Observed,
-    Scheme, Sensing, Sign, laws,
+    Belief, Deterministic, Dynamics, Error as CoreError, Evolution, Gaussian, Likelihood, Link, NumberFormat,
+    Observation, Observed, Scheme, Sensing, Sign, laws,
 };
-use fewbits_filters::contract::{Evolving, Move};
 use fewbits_filters::{
     BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, ParticleFilter,
-    PointMasses, RaoBlackwellised, StateFilter, StateLikelihood, Switching, UniformGrid, assumed_density,
+    PointMasses, RaoBlackwellised, StateFilter, Switching, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -24,7 +24,10 @@ struct TwoSided {
     reach: f64,
 }
 
-impl Memoryless<1> for TwoSided {
+impl Deterministic<1> for TwoSided {}
+
+impl Scheme<1> for TwoSided {
+    type State = ();
     type Feedback = f64;
     type Report = Sign;
     type Factor = Scalar;
@@ -35,12 +38,18 @@ impl Memoryless<1> for TwoSided {
 
     fn report_format(&self) {}
 
-    fn report_of(&self, measurement: &Vector1<f64>, prediction: &f64) -> Result<Option<Sign>, CoreError> {
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        prediction: &f64,
+    ) -> Result<Option<Sign>, CoreError> {
         let deviation = finite("measurement", measurement[0])? - finite("prediction", *prediction)?;
         Ok(Some(Sign::of(deviation.abs(), self.reach)?))
     }
 
-    fn meaning_of(&self, prediction: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, CoreError> {
+    fn factor(&self, prediction: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, CoreError> {
         let given = |sent| match observation {
             Observation::Received(sign) if *sign == sent => link.arrival() * (1.0 - link.crossover()),
             _ => link.arrival() * link.crossover(),
@@ -93,7 +102,7 @@ fn run<F: StateFilter<1>>(mut filter: F) -> [f64; 3] {
     let mut belief = filter.start(&mut rng, &Gaussian::scalar(0.0, 2.0).unwrap()).unwrap();
     let mut log_likelihood = 0.0;
     for slot in slots() {
-        let slot: Vec<&dyn StateLikelihood<1>> = slot.iter().map(|one| one as _).collect();
+        let slot: Vec<&dyn Likelihood<1>> = slot.iter().map(|one| one as _).collect();
         let (next, info) = filter.step(&mut rng, &dynamics, &belief, &slot).unwrap();
         (belief, log_likelihood) = (next, log_likelihood + info.log_likelihood);
     }
@@ -166,7 +175,7 @@ fn a_bank_of_equal_filters_is_that_of_one_and_odd_matrices_are_refused() {
         let observed = Observed::new(sensor, Value::new(Vector1::new(z), nalgebra::Matrix1::new(0.1)).unwrap());
         let motion = Evolution::over(&world, 0.7).unwrap();
         for (bank, belief) in [&mut own, &mut same].into_iter().zip(&mut beliefs) {
-            bank.predict(&mut rng, Move::new(&motion, 1.0), belief).unwrap();
+            bank.predict(&mut rng, &*motion, belief).unwrap();
             bank.update(&mut rng, belief, &[&observed]).unwrap();
         }
     }
@@ -187,7 +196,7 @@ fn a_bank_of_equal_filters_is_that_of_one_and_odd_matrices_are_refused() {
 #[test]
 fn a_bank_over_switching_worlds_weighs_them_by_evidence() {
     let worlds = [5.0, 0.5].map(|tau| ContinuousLinear::ornstein_uhlenbeck(0.0, tau, 1.0).unwrap());
-    let both = worlds.map(|world| Box::new(world) as Box<dyn Evolving<1>>);
+    let both = worlds.map(|world| Box::new(world) as Box<dyn Evolution<1>>);
     let switching = Switching::new(both.into()).unwrap();
     let mut filter = NoiseBank::new(MomentFilter, vec![1.0; 2], 0.0).unwrap();
     let (mut rng, sensor) = (Stream::new(2).rng(), LinearSensor::direct(0.1).unwrap());
@@ -202,7 +211,7 @@ fn a_bank_over_switching_worlds_weighs_them_by_evidence() {
         belief = filter.step(&mut rng, &*motion, &belief, &[&observed]).unwrap().0;
         for ((one, log), world) in alone.iter_mut().zip(&worlds) {
             let (next, info) =
-                assumed_density::step(&Evolution::over(world, seconds).unwrap(), one, &observed).unwrap();
+                assumed_density::step(&*Evolution::over(world, seconds).unwrap(), one, &observed).unwrap();
             (*one, *log) = (next, *log + info.log_likelihood);
         }
     }

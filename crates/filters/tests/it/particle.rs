@@ -1,10 +1,9 @@
 //! Particle filters against the exact Kalman and grid filters.
 
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
-use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
+use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
-    BootstrapFilter, GuidedFilter, ParticleFilter, Particles, Resampling, Schedule, StateFilter, StateLikelihood,
-    kalman,
+    BootstrapFilter, GuidedFilter, ParticleFilter, Particles, Resampling, Schedule, StateFilter, kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -79,7 +78,7 @@ fn advance<const D: usize>(
     rng: &mut Pcg64Mcg,
     dynamics: &impl fewbits_core::GaussianDynamics<D>,
     belief: &mut Particles<D>,
-    observed: &dyn StateLikelihood<D>,
+    observed: &dyn Likelihood<D>,
 ) -> (f64, f64) {
     let count = belief.len();
     let (next, info) = match kind {
@@ -245,7 +244,7 @@ fn a_guided_filter_pays_where_the_dynamics_are_wide() {
         fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
             Matrix1::new(1e-4)
         }
-        fn sample<R: rand::Rng + ?Sized>(&self, _: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
+        fn sample(&self, _: &mut dyn rand::Rng, state: &Vector1<f64>) -> Vector1<f64> {
             self.mean(state)
         }
     }

@@ -20,7 +20,7 @@ impl Dynamics<1> for Swelling {
         state * 0.5
     }
 
-    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
+    fn propagate(&self, rng: &mut dyn Rng, state: &Vector1<f64>) -> Vector1<f64> {
         self.mean(state)
             .add_scalar(Self::variance(state[0]).sqrt() * rng.sample::<f64, _>(StandardNormal))
     }

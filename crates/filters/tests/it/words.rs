@@ -2,15 +2,15 @@
 
 use fewbits_core::factor::Partition;
 use fewbits_core::{
-    BitReader, BitString, BitWriter, CodecError, Dynamics, Evolution, Gaussian, Link, MeasurementNoise, Memoryless,
-    Message, Observation,
+    BitReader, BitString, BitWriter, CodecError, Dynamics, Gaussian, Link, MeasurementNoise, Message, Observation,
+    Scheme,
 };
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{Event, FusionCentre, Reporting, Slot};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, Vector1};
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 /// The cell below, about or above zero.
@@ -44,7 +44,8 @@ impl MeasurementNoise<1> for ThreeCells {
     }
 }
 
-impl Memoryless<1> for ThreeCells {
+impl Scheme<1> for ThreeCells {
+    type State = ();
     type Feedback = ();
     type Report = Cell;
     type Factor = Partition;
@@ -53,16 +54,17 @@ impl Memoryless<1> for ThreeCells {
 
     fn report_format(&self) {}
 
-    fn report_of(&self, sample: &Vector1<f64>, (): &()) -> Result<Option<Cell>, fewbits_core::Error> {
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        sample: &Vector1<f64>,
+        (): &(),
+    ) -> Result<Option<Cell>, fewbits_core::Error> {
         Ok(Some(Cell(EDGES.iter().filter(|edge| sample[0] >= **edge).count() as u64)))
     }
 
-    fn meaning_of(
-        &self,
-        (): &(),
-        observation: &Observation<Cell>,
-        link: &Link,
-    ) -> Result<Partition, fewbits_core::Error> {
+    fn factor(&self, (): &(), observation: &Observation<Cell>, link: &Link) -> Result<Partition, fewbits_core::Error> {
         let given = match observation {
             Observation::Received(cell) => [0, 1, 2].map(|own| link.arrival() * f64::from(u8::from(own == cell.0))),
             Observation::Nothing => [link.loss(); 3],
@@ -95,7 +97,7 @@ fn a_word_that_does_not_decode_is_no_word_of_the_sensor() {
             let slots: Vec<Slot> = (0..3)
                 .map(|number| {
                     let sample = Vector1::new(truth[0] + rng.sample::<f64, _>(StandardNormal));
-                    let word = ThreeCells.report_of(&sample, &()).unwrap().unwrap();
+                    let word = ThreeCells.encode(&mut rng, &mut (), &sample, &()).unwrap().unwrap();
                     Slot::new(number, BitString::default(), Observation::Received(word.to_bits(&()).unwrap()))
                 })
                 .collect();

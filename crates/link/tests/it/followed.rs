@@ -95,7 +95,7 @@ impl Estimator for Average {
 
 struct Node(Sensor);
 
-pub fn node() -> impl SensorNode<1> + Send {
+pub fn node() -> impl SensorNode<1> {
     Node(Sensor::new(config()))
 }
 

@@ -1,6 +1,6 @@
 //! The laws of `core`, run on every dynamics and every sensing of this crate.
 
-use fewbits_core::{Dynamics, LinearDynamics, Sensing, laws};
+use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics, ScaledNoise, Sensing, laws};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
 use nalgebra::{Matrix2, Matrix2x4, SVector, Vector2, Vector4};
 use rand::SeedableRng;
@@ -15,6 +15,10 @@ fn linear<const D: usize>(dynamics: &impl LinearDynamics<D>, states: &[SVector<f
     for state in states {
         laws::dynamics::jacobian_is_the_derivative(dynamics, state).unwrap();
         laws::dynamics::draws_have_the_law(dynamics, &mut rng, state, DRAWS).unwrap();
+        // Process noise of another scale, in columns and one by one; a scale of a scale is their product.
+        let scaled = ScaledNoise::new(dynamics, 2.5).times(2.5);
+        laws::dynamics::draws_have_the_law(&scaled, &mut Pcg64Mcg::seed_from_u64(8), state, DRAWS).unwrap();
+        assert!((scaled.noise_covariance_at(state) - dynamics.noise_covariance() * 6.25).amax() == 0.0);
     }
 }
 

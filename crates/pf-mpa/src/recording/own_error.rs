@@ -3,9 +3,8 @@
 //! All filters of a bank receive the same likelihood, with the same noise. The rest of a filter's noise is a coordinate of its state.
 
 use super::settings::{BIAS, OFFSET};
-use fewbits_core::Gaussian;
-use fewbits_filters::contract::{Info, Move, StateFilter, StateLikelihood};
-use fewbits_filters::{Error, MomentFilter};
+use fewbits_core::{Gaussian, GaussianDynamics, Likelihood};
+use fewbits_filters::{Error, Info, MomentFilter, StateFilter};
 use rand::Rng;
 
 /// [`MomentFilter`] of a state whose coordinate [`OFFSET`] is the bias plus an error that is drawn anew for each range.
@@ -36,8 +35,13 @@ impl<const D: usize> StateFilter<D> for OwnError {
         Ok(start)
     }
 
-    fn predict(&mut self, rng: &mut dyn Rng, motion: Move<'_, D>, belief: &mut Gaussian<D>) -> Result<(), Error> {
-        MomentFilter.predict(rng, motion, belief)?;
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<D>,
+        belief: &mut Gaussian<D>,
+    ) -> Result<(), Error> {
+        MomentFilter.predict(rng, dynamics, belief)?;
         self.renew(belief);
         Ok(())
     }
@@ -46,7 +50,7 @@ impl<const D: usize> StateFilter<D> for OwnError {
         &mut self,
         _: &mut dyn Rng,
         belief: &mut Gaussian<D>,
-        observed: &[&dyn StateLikelihood<D>],
+        observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
         let (mut next, mut info) = (*belief, Info::default());
         for one in observed {

@@ -2,7 +2,8 @@
 
 use crate::quantized::RangeReference;
 use fewbits_core::factor::Robust;
-use fewbits_core::{Error, Link, MeasurementNoise, Memoryless, Message, Observation};
+use fewbits_core::rand::Rng;
+use fewbits_core::{Deterministic, Error, Link, MeasurementNoise, Message, Observation, Scheme};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix1, Vector1};
 
@@ -32,7 +33,10 @@ impl<C: MeasurementNoise<1>, S> MeasurementNoise<1> for Tolerant<C, S> {
     }
 }
 
-impl<C: Memoryless<1>, S: Fn(&C::Feedback, &C::Report) -> f64> Memoryless<1> for Tolerant<C, S> {
+impl<C: Deterministic<1>, S: Fn(&C::Feedback, &C::Report) -> f64 + Send + Sync> Deterministic<1> for Tolerant<C, S> {}
+
+impl<C: Scheme<1>, S: Fn(&C::Feedback, &C::Report) -> f64 + Send + Sync> Scheme<1> for Tolerant<C, S> {
+    type State = C::State;
     type Feedback = C::Feedback;
     type Report = C::Report;
     type Factor = Robust<C::Factor>;
@@ -45,17 +49,27 @@ impl<C: Memoryless<1>, S: Fn(&C::Feedback, &C::Report) -> f64> Memoryless<1> for
         self.scheme.report_format()
     }
 
-    fn report_of(&self, range: &Vector1<f64>, feedback: &C::Feedback) -> Result<Option<C::Report>, Error> {
-        self.scheme.report_of(range, feedback)
+    fn start(&self) -> C::State {
+        self.scheme.start()
     }
 
-    fn meaning_of(
+    fn encode(
+        &self,
+        rng: &mut dyn Rng,
+        state: &mut C::State,
+        range: &Vector1<f64>,
+        feedback: &C::Feedback,
+    ) -> Result<Option<C::Report>, Error> {
+        self.scheme.encode(rng, state, range, feedback)
+    }
+
+    fn factor(
         &self,
         feedback: &C::Feedback,
         observation: &Observation<C::Report>,
         link: &Link,
     ) -> Result<Self::Factor, Error> {
-        let factor = self.scheme.meaning_of(feedback, observation, link)?;
+        let factor = self.scheme.factor(feedback, observation, link)?;
         let (share, density) = match observation {
             Observation::Received(report) => (self.outliers, (self.stray)(feedback, report)),
             // A missing report is no outlier.

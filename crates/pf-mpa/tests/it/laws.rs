@@ -2,9 +2,10 @@
 
 use fewbits_core::factor::Factor;
 use fewbits_core::laws::{factor, likelihood, message, scheme};
-use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
-use fewbits_filters::contract::Move;
-use fewbits_filters::{BootstrapFilter, MomentFilter, ParticleFilter, StateFilter, StateLikelihood};
+use fewbits_core::{
+    Belief, Dynamics, Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, Scheme, Sensing,
+};
+use fewbits_filters::{BootstrapFilter, MomentFilter, ParticleFilter, StateFilter};
 use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor};
@@ -115,9 +116,7 @@ fn tracking_error<F: StateFilter<4>>(mut filter: F, start: &Gaussian<4>) -> f64 
     let mut squares = 0.0;
     for _ in 0..20 {
         truth = dynamics.propagate(&mut world, &truth);
-        filter
-            .predict(&mut rng, Move::new(&dynamics, 1.0), &mut belief)
-            .unwrap();
+        filter.predict(&mut rng, &dynamics, &mut belief).unwrap();
         let (mean, covariance) = (belief.mean(), belief.covariance());
         let observed = places.map(|place| {
             let sensor = RangeSensor::new(place.into(), noise)
@@ -136,7 +135,7 @@ fn tracking_error<F: StateFilter<4>>(mut filter: F, start: &Gaussian<4>) -> f64 
             let report = scheme.encode(&mut world, &mut (), &sample, &reference).unwrap();
             Observed::new(sensor, scheme.factor(&reference, &report.into(), &Link::PERFECT).unwrap())
         });
-        let observed = observed.each_ref().map(|one| one as &dyn StateLikelihood<4>);
+        let observed = observed.each_ref().map(|one| one as &dyn Likelihood<4>);
         filter.update(&mut rng, &mut belief, &observed).unwrap();
         let error = belief.mean() - truth;
         squares += (error[0] * error[0] + error[2] * error[2]) / 20.0;

@@ -1,6 +1,6 @@
 //! Simulated recordings whose speed, noise, bias, scale, anchors and gaps differ from the tracker's settings.
 
-use fewbits_core::{Dynamics, Evolution};
+use fewbits_core::Dynamics;
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};

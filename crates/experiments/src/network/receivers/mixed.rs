@@ -1,21 +1,19 @@
 //! The fusion centre of `fewbits-filters` in slots, under dynamics of one slot.
 
-use fewbits_core::{Gaussian, GaussianDynamics, Link, MeasurementNoise, Scheme, Sensing};
+use fewbits_core::{ArgumentError, Evolution, Gaussian, GaussianDynamics, Link, MeasurementNoise, Scheme, Sensing};
+use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting};
-use fewbits_filters::contract::{Evolving, Motion};
-use fewbits_filters::{Error, MomentFilter};
 use fewbits_link::FusionReceiver;
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::error::refuse;
 use fewbits_protocol::BoxError;
 
 /// Dynamics of one slot, which is a second for the centre.
 struct Slotwise<G>(G);
 
-impl<const D: usize, G: GaussianDynamics<D> + Clone + 'static> Evolving<D> for Slotwise<G> {
-    fn over(&self, seconds: f64) -> Result<Box<dyn Motion<D>>, Error> {
+impl<const D: usize, G: GaussianDynamics<D> + Clone> Evolution<D> for Slotwise<G> {
+    fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError> {
         if seconds != 1.0 {
-            return refuse("seconds", seconds, "1, the length of a slot");
+            return Err(ArgumentError::new("seconds", seconds, "1, the length of a slot"));
         }
         Ok(Box::new(self.0.clone()))
     }

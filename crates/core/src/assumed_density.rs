@@ -1,8 +1,11 @@
 //! The assumed-density filter: a Gaussian belief, updated by any factor.
 
-use crate::Error;
-use fewbits_core::factor::Tilted;
-use fewbits_core::{Factor, Gaussian, GaussianDynamics, Observed, Sensing};
+use crate::dynamics::GaussianDynamics;
+use crate::error::Error;
+use crate::factor::{Factor, Tilted};
+use crate::gaussian::Gaussian;
+use crate::observed::Observed;
+use crate::sensing::Sensing;
 use fewbits_numerics::linalg::{congruence, congruence_of, solve_semidefinite, times_transposed};
 use nalgebra::{SMatrix, SVector};
 
@@ -19,19 +22,8 @@ pub struct UpdateInfo<const D: usize, const M: usize> {
 }
 
 /// Time update, linearised at the mean `m`: mean `f(m)`, covariance `F P F' + Q` with `F` the Jacobian at `m`.
-pub fn predict<const D: usize>(dynamics: &impl GaussianDynamics<D>, belief: &Gaussian<D>) -> Gaussian<D> {
-    predict_scaled(dynamics, belief, 1.0)
-}
-
-/// [`predict`] with `noise_scale Q` in place of `Q`.
-pub(crate) fn predict_scaled<const D: usize>(
-    dynamics: &impl GaussianDynamics<D>,
-    belief: &Gaussian<D>,
-    noise_scale: f64,
-) -> Gaussian<D> {
-    let jacobian = dynamics.jacobian(belief.mean());
-    let noise = dynamics.noise_covariance_at(belief.mean()) * noise_scale;
-    Gaussian::from_trusted_parts(dynamics.mean(belief.mean()), congruence(&jacobian, belief.covariance()) + noise)
+pub fn predict<const D: usize>(dynamics: &(impl GaussianDynamics<D> + ?Sized), belief: &Gaussian<D>) -> Gaussian<D> {
+    dynamics.predict(belief, 1.0)
 }
 
 /// Measurement update for a linear sensor. The factor gives the posterior of `m = H x`; the posterior of `x` follows by linear regression
@@ -77,7 +69,7 @@ pub fn update_through<const D: usize, const M: usize>(
 /// # Errors
 /// As [`update`].
 pub fn step<const D: usize, const M: usize>(
-    dynamics: &impl GaussianDynamics<D>,
+    dynamics: &(impl GaussianDynamics<D> + ?Sized),
     belief: &Gaussian<D>,
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
