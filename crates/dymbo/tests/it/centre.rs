@@ -465,11 +465,14 @@ fn refused_calls_leave_the_centre_as_it_was() {
     assert!(plane.centre.state() == before);
     // Another sensor's feedback does not decode: that report is rejected, and the others are used.
     let crossed = Slot::new(2, slots[0].feedback.clone(), slots[2].observation.clone());
+    plane.centre.receive(&mut plane.filter_rng, &slots[..1]).unwrap();
+    let alone = plane.centre.estimate();
+    plane.centre.restore(before).unwrap();
     let found = plane
         .centre
         .receive(&mut plane.filter_rng, &[slots[0].clone(), crossed])
         .unwrap();
-    assert!(found.events.contains(&Event::Rejected(2)), "{:?}", found.events);
-    assert!(plane.centre.state() != before);
+    assert_eq!(found.events, [Event::Rejected(2)]);
+    assert_eq!((plane.centre.estimate(), plane.centre.rejected(2).unwrap()), (alone, 1));
     assert!(plane.centre.leave(2) && !plane.centre.leave(2) && plane.centre.feedback(2).is_err());
 }
