@@ -154,7 +154,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         for (i, observation) in observations.iter().enumerate() {
             let mut push = |factor| all.push(Observed::new(self.sensors[i].clone(), factor));
             if let Observation::Received(value) = observation {
-                let single = self.scheme(i, &rules[i])?.received(i, broadcast, value, &self.link)?;
+                let single = self.scheme(i, &rules[i])?.received(broadcast, value, &self.link)?;
                 if !(M == 1 && plain) {
                     push(single);
                 }
@@ -243,10 +243,10 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
             info.received += 1;
             let scheme = self.scheme(i, &rules[i])?;
             if matches!(self.format, NumberFormat::Fixed(_)) {
-                info.log_likelihood += update(&mut belief, i, &scheme.received(i, broadcast, &value, &self.link)?)?;
+                info.log_likelihood += update(&mut belief, i, &scheme.received(broadcast, &value, &self.link)?)?;
             } else {
                 // A received value: a Kalman update, which is the closed form for its factor.
-                scheme.check_value(i, &sensor.mean(broadcast), &value, &self.link)?;
+                scheme.check_value(&sensor.mean(broadcast), &value, &self.link)?;
                 let (next, step) = kalman::update(sensor, &belief, &value)?;
                 belief = next;
                 info.log_likelihood += step.log_likelihood;

@@ -5,7 +5,7 @@ use crate::ellipsoid::Ellipsoid;
 use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics, Sensing};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::LinearSensor;
-use fewbits_numerics::error::{positive, refuse};
+use fewbits_numerics::error::positive;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -92,8 +92,8 @@ impl<const M: usize> CensoringRule<M> {
     /// component, the largest error of the number format.
     ///
     /// # Errors
-    /// If the rule would not have sent it; the error names `sensor`.
-    pub fn check(&self, sensor: usize, innovation: &SVector<f64, M>, rounding: &SVector<f64, M>) -> Result<(), Error> {
+    /// [`Error::Impossible`] if the rule would not have sent it.
+    pub fn check(&self, innovation: &SVector<f64, M>, rounding: &SVector<f64, M>) -> Result<(), Error> {
         let statistic = self.statistic(innovation);
         // By the triangle inequality, rounding moves the root of the statistic by at most the sum over the components.
         let slack: f64 = (0..M)
@@ -104,12 +104,7 @@ impl<const M: usize> CensoringRule<M> {
             })
             .sum();
         if (statistic.sqrt() + slack).powi(2) < self.threshold() * (1.0 - 1e-9) {
-            let value = format!("a value of sensor {sensor} with normalised innovation squared {statistic}");
-            return refuse(
-                "report",
-                value,
-                format!("at least the threshold {}, below which it is silent", self.threshold()),
-            );
+            return Err(Error::Impossible);
         }
         Ok(())
     }

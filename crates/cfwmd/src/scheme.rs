@@ -56,14 +56,13 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         Ok(Censored::missing(&self.rule, &prediction, &noise, link, reports)?)
     }
 
-    /// The factor of a received value. `sensor` is the index that an error names.
+    /// The factor of a received value.
     ///
     /// # Errors
-    /// If a number is not finite, the value violates the rule, or the link may invert bits. Over such a link
-    /// a value needs a checksum; a report that fails it is [`Observation::Lost`].
+    /// [`Error::Impossible`] if the rule would not have sent the value. If a number is not finite, or the link may invert bits: over such a
+    /// link a value needs a checksum; a report that fails it is [`Observation::Lost`].
     pub fn received(
         &self,
-        sensor: usize,
         broadcast: &SVector<f64, D>,
         value: &SVector<f64, M>,
         link: &Link,
@@ -73,20 +72,15 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         if let NumberFormat::Fixed(levels) = &self.format {
             finite_over(link, value, &prediction)?;
             let factor = Censored::level(value[0], levels, &self.rule, prediction[0], noise[(0, 0)], arrival);
-            let innovation = value - prediction;
-            return factor.or_else(|_| {
-                self.rule.check(sensor, &innovation, &SVector::zeros())?;
-                Err(Error::Impossible)
-            });
+            return factor.map_err(|_| Error::Impossible);
         }
-        self.check_value(sensor, &prediction, value, link)?;
+        self.check_value(&prediction, value, link)?;
         Ok(Censored::value(value, &noise, arrival)?)
     }
 
     /// Checks a received value: it is finite, the rule would have sent it against this prediction, and the link inverts no bits.
     pub(crate) fn check_value(
         &self,
-        sensor: usize,
         prediction: &SVector<f64, M>,
         value: &SVector<f64, M>,
         link: &Link,
@@ -94,8 +88,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         finite_over(link, value, prediction)?;
         // Relative rounding error of single precision, half the spacing of its numbers.
         let share = if self.format == NumberFormat::Single { 6e-8 } else { 0.0 };
-        self.rule
-            .check(sensor, &(value - prediction), &value.map(|z| z.abs() * share))
+        self.rule.check(&(value - prediction), &value.map(|z| z.abs() * share))
     }
 }
 
@@ -159,7 +152,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S
         link: &Link,
     ) -> Result<Censored<M>, Error> {
         match observation {
-            Observation::Received(value) => self.received(0, broadcast, value, link),
+            Observation::Received(value) => self.received(broadcast, value, link),
             Observation::Nothing => self.missing(broadcast, link, MissingReports { nothing: 1, lost: 0 }),
             Observation::Lost => self.missing(broadcast, link, MissingReports { nothing: 0, lost: 1 }),
         }

@@ -6,7 +6,7 @@ use crate::factor::{Factor, Tilted};
 use crate::gaussian::Gaussian;
 use crate::observed::Observed;
 use crate::sensing::Sensing;
-use fewbits_numerics::linalg::{congruence, congruence_of, solve_semidefinite, times_transposed};
+use fewbits_numerics::linalg::{congruence, congruence_of, semidefinite_factor, solve_semidefinite, times_transposed};
 use nalgebra::{SMatrix, SVector};
 
 /// Results of an update other than the new belief.
@@ -145,6 +145,7 @@ fn update_at<const D: usize, const M: usize>(
     let gain = solve_semidefinite(prior.covariance(), &cross.transpose())?.transpose();
     let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
     let covariance = congruence(&keep, belief.covariance()) + congruence(&gain, &tilted.covariance);
+    let covariance = with_rounding(covariance, &keep, belief);
     let info = UpdateInfo {
         log_likelihood: tilted.log_evidence,
         correction,
@@ -157,4 +158,51 @@ fn update_at<const D: usize, const M: usize>(
         return Err(Error::unlikely_or_no_number(info.log_likelihood, what));
     }
     Ok((posterior, info))
+}
+
+/// A variance that falls below this share of itself in one update is compared with its rounding.
+const STEEP: f64 = 1e-12;
+/// Rounding of a sum of a few products, relative to the largest.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// The covariance after an update that keeps the part `keep` of `prior`, with the update's rounding added where a variance fell so far that
+/// rounding may exceed the rest.
+///
+/// After a very long time without observation, the variances of position and velocity are so large, and the two so alike, that a double does
+/// not hold what the next reports leave of them. Without this the covariance would become indefinite, and the mean would be trusted beyond
+/// its own digits.
+#[inline]
+pub fn with_rounding<const D: usize>(
+    covariance: SMatrix<f64, D, D>,
+    keep: &SMatrix<f64, D, D>,
+    prior: &Gaussian<D>,
+) -> SMatrix<f64, D, D> {
+    let is_steep = |i: usize| covariance[(i, i)] < STEEP * prior.covariance()[(i, i)];
+    // A single coordinate has nothing to cancel with.
+    if D == 1 || !(0..D).any(is_steep) {
+        return covariance;
+    }
+    rounded(covariance, keep, prior)
+}
+
+#[cold]
+fn rounded<const D: usize>(
+    covariance: SMatrix<f64, D, D>,
+    keep: &SMatrix<f64, D, D>,
+    prior: &Gaussian<D>,
+) -> SMatrix<f64, D, D> {
+    // Of `keep P keep'`, term by term, and of the mean.
+    let products = congruence(&keep.abs(), &prior.covariance().abs()).diagonal() * ROUNDING;
+    let mean = prior.mean() * ROUNDING;
+    let mut rounding = SMatrix::from_diagonal(&(products + mean.component_mul(&mean)));
+    let mut wider = covariance + rounding;
+    // A few times the rounding at most; twenty doublings are for what is no covariance already.
+    for _ in 0..20 {
+        if semidefinite_factor("covariance", &wider).is_ok() {
+            break;
+        }
+        rounding *= 2.0;
+        wider = covariance + rounding;
+    }
+    wider
 }

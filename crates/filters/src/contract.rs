@@ -108,6 +108,12 @@ pub trait StateFilter<const D: usize> {
         None
     }
 
+    /// The belief as a mixture of Gaussians with the logarithms of their weights, up to a common constant, if an update conditions each
+    /// ([`Likelihood::condition`]) and weighs it by its evidence. A centre then tests reports by this law.
+    fn mixture(&self, _: &Self::Belief) -> Option<Vec<(f64, Gaussian<D>)>> {
+        None
+    }
+
     /// One step from a belief to the next: [`predict`](Self::predict), then [`update`](Self::update).
     ///
     /// # Errors

@@ -112,6 +112,18 @@ pub(crate) fn moments<'a, const D: usize>(parts: impl Iterator<Item = (f64, &'a 
     Gaussian::from_trusted_parts(mean, covariance)
 }
 
+/// The models' beliefs may be so far apart that the covariance of all together overflows.
+fn check_moments<const D: usize>(modes: &[Gaussian<D>]) -> Result<(), Error> {
+    let size = |mode: &Gaussian<D>| mode.mean().norm_squared() + mode.covariance().trace();
+    // No distance of two means is larger than twice the larger of their norms.
+    match (4.0 * modes.iter().map(size).sum::<f64>()).is_finite() {
+        true => Ok(()),
+        false => Err(Error::NotANumber {
+            what: "the moments of all models together",
+        }),
+    }
+}
+
 impl<const D: usize> Belief<D> for ImmBelief<D> {
     fn mean(&self) -> SVector<f64, D> {
         *self.moment_matched().mean()
@@ -257,6 +269,7 @@ pub(crate) fn mix<const D: usize>(
         workspace.probabilities.push(c);
         workspace.modes.push(predict(j, &mixed)?);
     }
+    check_moments(&workspace.modes)?;
     std::mem::swap(&mut belief.modes, &mut workspace.modes);
     std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
     Ok(())
@@ -289,6 +302,7 @@ pub(crate) fn weigh<const D: usize>(
     logs.iter_mut().for_each(|log| *log = (*log - peak).exp());
     let total: f64 = logs.iter().sum();
     logs.iter_mut().for_each(|p| *p /= total);
+    check_moments(&workspace.modes)?;
     std::mem::swap(&mut belief.modes, &mut workspace.modes);
     std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
     Ok(peak + total.ln())

@@ -1,6 +1,6 @@
 //! The Kalman filter.
 
-use crate::Error;
+use crate::{Error, assumed_density};
 use fewbits_core::{Gaussian, LinearDynamics, LinearSensing};
 use fewbits_numerics::error::all_finite;
 use fewbits_numerics::linalg::{congruence, congruence_of, times_transposed};
@@ -74,7 +74,8 @@ pub(crate) fn update_by<const D: usize, const M: usize>(
         less_product(belief.covariance(), &gain, &cross)
     } else {
         let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
-        congruence(&keep, belief.covariance()) + congruence(&gain, noise)
+        let joseph = congruence(&keep, belief.covariance()) + congruence(&gain, noise);
+        assumed_density::with_rounding(joseph, &keep, belief)
     };
     // innovation' S^-1 innovation, and with it and det S the density N(innovation; 0, S).
     let squared = innovation.dot(&over(&innovation.transpose(), &lower).transpose());

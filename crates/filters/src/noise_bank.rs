@@ -151,4 +151,13 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         })?;
         Ok(Info::new(log_likelihood))
     }
+
+    fn mixture(&self, belief: &ImmBelief<D>) -> Option<Vec<(f64, Gaussian<D>)>> {
+        // Only filters of moments have the law of their Gaussians.
+        let of = |(j, mode): (usize, &Gaussian<D>)| {
+            self.filters.get(j)?.of_moments(mode)?;
+            Some((belief.probabilities()[j].ln(), *mode))
+        };
+        belief.modes().iter().enumerate().map(of).collect()
+    }
 }

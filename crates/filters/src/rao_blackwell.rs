@@ -252,7 +252,30 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         }
         self.filter.update_all(rng, belief, scalars, &mut self.workspace)
     }
+
+    /// Of more than [`MAX_TESTED`] particles, so many of equal weight.
+    fn mixture(&self, belief: &GaussianCloud<D>) -> Option<Vec<(f64, Gaussian<D>)>> {
+        let (means, logs) = (belief.means(), belief.means().log_weights());
+        let of = |i: usize| Gaussian::from_trusted_parts(state_at(&means.columns(), i), *belief.shared_covariance());
+        if logs.len() <= MAX_TESTED {
+            return Some((0..logs.len()).map(|i| (logs[i], of(i))).collect());
+        }
+        let highest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = logs.iter().map(|log| (log - highest).exp()).collect();
+        let step = weights.iter().sum::<f64>() / MAX_TESTED as f64;
+        let (mut picked, mut sum) = (Vec::with_capacity(MAX_TESTED), 0.0);
+        for (i, weight) in weights.iter().enumerate() {
+            sum += weight;
+            while (picked.len() as f64 + 0.5) * step < sum && picked.len() < MAX_TESTED {
+                picked.push((0.0, of(i)));
+            }
+        }
+        Some(picked)
+    }
 }
+
+/// Largest number of particles by which a centre tests reports.
+const MAX_TESTED: usize = 500;
 
 /// How measurements are drawn for a scalar factor.
 enum Imputation {

@@ -39,6 +39,11 @@ pub trait Transport {
     /// # Errors
     /// If the transport can receive no more.
     fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, Self::Address>>, Error>;
+
+    /// Number of datagrams that arrived and were dropped because too many waited.
+    fn dropped(&self) -> u64 {
+        0
+    }
 }
 
 /// The time in nanoseconds since 1970.

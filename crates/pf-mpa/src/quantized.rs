@@ -59,11 +59,17 @@ impl RangeReference {
     }
 }
 
+/// A reference is rounded to the format as it is encoded, so that one from a belief ([`RangeReference::about`]) can be told. Both halves use
+/// what is decoded.
 impl Message for RangeReference {
     type Format = NumberFormat;
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
-        Vector2::new(self.centre, self.half_width).encode(format, writer)
+        // What has no rounded value is refused below.
+        let rounded = |x: f64| format.rounded(x).unwrap_or(x);
+        Vector2::new(self.centre, self.half_width)
+            .map(rounded)
+            .encode(format, writer)
     }
 
     fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {

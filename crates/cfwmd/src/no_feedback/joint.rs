@@ -160,7 +160,7 @@ impl<const D: usize> JointBelief<D> {
         let rows = self.rows(h, own);
         let spread = symmetrised(&(&rows * rows.transpose()));
         if spread.amax() <= NEGLIGIBLE * covariance.amax() {
-            rule.check(i, &mu, &(value * 6e-8).abs())?;
+            rule.check(&mu, &(value * 6e-8).abs())?;
         } else if rule.threshold() > 0.0 {
             let inside = rule.region().under(&spread)?.moments(&mu);
             let p = inside.map_or(0.0, |inside| inside.log_mass.exp());

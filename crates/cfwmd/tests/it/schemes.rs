@@ -271,12 +271,10 @@ fn ties_are_sent_and_breaches_refused() {
     assert!(CensoringRule::scalar(4.0, 0.0).unwrap().sends(&Vector1::new(0.0)));
     // Rounding of 1e-9 of the statistic is forgiven, and what the format moved.
     let none = Vector1::zeros();
-    assert!(
-        rule.check(0, &Vector1::new(2.0), &none).is_ok() && rule.check(0, &Vector1::new(2.0 - 1e-10), &none).is_ok()
-    );
-    assert!(rule.check(0, &Vector1::new(2.0 - 1e-8), &none).is_err());
-    assert!(rule.check(0, &Vector1::new(1.9), &Vector1::new(0.11)).is_ok());
-    assert!(rule.check(0, &Vector1::new(1.9), &Vector1::new(0.09)).is_err());
+    assert!(rule.check(&Vector1::new(2.0), &none).is_ok() && rule.check(&Vector1::new(2.0 - 1e-10), &none).is_ok());
+    assert!(rule.check(&Vector1::new(2.0 - 1e-8), &none).is_err());
+    assert!(rule.check(&Vector1::new(1.9), &Vector1::new(0.11)).is_ok());
+    assert!(rule.check(&Vector1::new(1.9), &Vector1::new(0.09)).is_err());
     let vector = CensoringRule::new(&Matrix2::new(4.0, 0.0, 0.0, 1.0), 1.0).unwrap();
     assert!(vector.sends(&Vector2::new(2.0, 0.0)) && !vector.sends(&Vector2::new(1.9, 0.1)));
     let scheme = Censoring::new(position(), rule, NumberFormat::Double).unwrap();
@@ -293,7 +291,6 @@ fn ties_are_sent_and_breaches_refused() {
             .factor(&Vector2::new(f64::NAN, 0.0), &far, &Link::PERFECT)
             .is_err()
     );
-    // A network names the sensor.
     let network =
         Network::new(vec![position(); 2], Budget::new(1.0, 2).unwrap().threshold(1).unwrap(), Link::PERFECT).unwrap();
     let belief = Gaussian::new(Vector2::zeros(), Matrix2::identity()).unwrap();
@@ -301,7 +298,7 @@ fn ties_are_sent_and_breaches_refused() {
     let error = network
         .likelihood(&rules, belief.mean(), &[far, Observation::Received(Vector1::new(0.1))])
         .unwrap_err();
-    assert!(error.to_string().contains("of sensor 1"), "{error}");
+    assert_eq!(error, fewbits_cfwmd::Error::Impossible);
     let power = Network::new(vec![field(); 2], 1.0, Link::PERFECT).unwrap();
     let plane = Gaussian::new(Vector4::new(8.0, 1.0, 2.0, 0.0), Matrix4::identity()).unwrap();
     let rule = power.rule_under(0, &plane).unwrap();

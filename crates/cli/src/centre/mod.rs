@@ -213,5 +213,8 @@ fn serve<R: Receiver, T: Transport>(
         }
     })?;
     outcome?;
+    if transport.dropped() > 0 {
+        say!("{} datagrams were dropped: they came faster than they could be read", transport.dropped());
+    }
     log.finish(station, options.json)
 }

@@ -7,11 +7,12 @@ use crate::output::{Shape, Writer};
 use crate::say::say;
 use crate::unpack::{all_columns, write_blocks};
 use crate::{Ending, node, recording, serial};
+use fewbits_link::{Transport, Udp};
 use fewbits_record::BlockReader;
-use std::net::UdpSocket;
+use std::time::Duration;
 
-/// Largest length of a datagram in bytes.
-const MAX_DATAGRAM: usize = 1 << 16;
+/// Wait for a datagram without a time limit, before the next wait.
+const WAIT: Duration = Duration::from_secs(60);
 
 /// Runs `receive`.
 pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
@@ -53,21 +54,32 @@ fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
 }
 
 fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, Error> {
-    let socket = UdpSocket::bind(address).map_err(Error::io(address, "listen"))?;
-    socket
-        .set_read_timeout(options.timeout)
-        .map_err(Error::io(address, "set the timeout"))?;
-    if let Ok(local) = socket.local_addr() {
-        say!("listening at {local}");
+    let mut socket = Udp::bind(address)
+        .map_err(of_socket)
+        .map_err(Error::io(address, "listen"))?;
+    say!("listening at {}", socket.address());
+    let ending = receive_frames(options, address, Senders::Any, || {
+        loop {
+            let arrived = socket.receive(options.timeout.unwrap_or(WAIT)).map_err(of_socket)?;
+            match arrived {
+                Some((_, bytes)) => return Ok(Some(bytes.to_vec())),
+                None if options.timeout.is_some() => return Ok(None),
+                None => {}
+            }
+        }
+    })?;
+    if socket.dropped() > 0 {
+        say!("{} datagrams were dropped: they came faster than their rows could be written", socket.dropped());
     }
-    let mut datagram = vec![0; MAX_DATAGRAM];
-    receive_frames(options, address, Senders::Any, || match socket.recv(&mut datagram) {
-        Ok(length) => Ok(Some(datagram[..length].to_vec())),
-        Err(error) if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => Ok(None),
-        // An answer to nothing that was sent here.
-        Err(error) if error.kind() == std::io::ErrorKind::ConnectionReset => Ok(Some(Vec::new())),
-        Err(error) => Err(error),
-    })
+    Ok(ending)
+}
+
+/// The system's error of a socket.
+fn of_socket(error: fewbits_link::Error) -> std::io::Error {
+    match error {
+        fewbits_link::Error::Socket { source, .. } => source,
+        other => std::io::Error::other(other),
+    }
 }
 
 /// Writes the rows of frames as they arrive, until there are no more. The result is a failure if a table is not whole.

@@ -13,7 +13,8 @@
 //! nothing. The centre's own test takes the reports one after the other by the sensors' numbers: only then are its terms independent.
 //!
 //! A bit whose threshold is the prediction has no surprise, since both outcomes have probability 1/2. Wrong noise then shows in the
-//! product. Each sequence is tested by a two-sided cumulative sum. Silence has no residual; it is tested by [presence](super::presence).
+//! product. Each sequence is tested by a two-sided cumulative sum, the residual by a second one that finds large biases sooner. Silence has no
+//! residual; it is tested by [presence](super::presence).
 
 use crate::Error;
 use fewbits_numerics::error::within;
@@ -22,12 +23,16 @@ use serde::{Deserialize, Serialize};
 
 /// Constant subtracted at each step of a cumulative sum. This value detects shifts of half a deviation fastest.
 const DRIFT: f64 = 0.25;
+/// The same of the second sum of residuals: shifts of two deviations.
+const LARGE_DRIFT: f64 = 1.0;
 /// Terms are limited to this absolute value, so that one outlier raises no alarm.
 pub(super) const CLIP: f64 = 3.0;
 /// Differences of probabilities, or deviations of their logarithms, that are treated as zero.
 const EQUAL: f64 = 1e-3;
 /// Number of sequences per sensor.
 pub(super) const SEQUENCES: usize = 3;
+/// Number of sums per sensor: one for each sequence, and the second one of residuals.
+const SUMS: usize = SEQUENCES + 1;
 
 /// One observation, standardised by its predicted distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,11 +126,11 @@ pub(super) struct Cusum {
 }
 
 impl Cusum {
-    /// Adds a term of mean 0 and variance 1. Returns which of the two sums exceeds `limit`, if any. A sum never grows above the limit.
-    pub fn add(&mut self, term: f64, limit: f64) -> Option<Direction> {
+    /// Adds a term of mean 0 and variance 1. Returns which of the two sums exceeds its limit, if any. A sum never grows above the limit.
+    fn add(&mut self, term: f64, Limit { drift, limit }: Limit) -> Option<Direction> {
         let term = term.clamp(-CLIP, CLIP);
-        self.up = (self.up + term - DRIFT).max(0.0);
-        self.down = (self.down - term - DRIFT).max(0.0);
+        self.up = (self.up + term - drift).max(0.0);
+        self.down = (self.down - term - drift).max(0.0);
         let direction = if self.up > limit {
             Direction::Up
         } else if self.down > limit {
@@ -154,13 +159,20 @@ pub(super) enum Alarm {
     Overstatement,
 }
 
+/// The drift of a cumulative sum, and its limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Limit {
+    drift: f64,
+    limit: f64,
+}
+
 /// The limit at which a two-sided sum of standard normal terms raises one alarm in `1 / rate` steps (Siegmund's approximation:
-/// `(exp(2 k b) - 2 k b - 1) / (2 k^2)` steps on one side, `b` the limit plus 1.166).
-fn limit(rate: f64) -> f64 {
+/// `(exp(2 k b) - 2 k b - 1) / (2 k^2)` steps on one side, `k` the drift, `b` the limit plus 1.166).
+fn limit(rate: f64, drift: f64) -> Limit {
     let steps = 2.0 / rate;
-    let run = |b: f64| ((2.0 * DRIFT * b).exp_m1() - 2.0 * DRIFT * b) / (2.0 * DRIFT * DRIFT);
-    // Each of two sides may raise half of the alarms. The run length grows with `b`; exp(2 k 400) is far above every rate allowed.
-    let (mut low, mut high) = (0.0, 400.0);
+    let run = |b: f64| ((2.0 * drift * b).exp_m1() - 2.0 * drift * b) / (2.0 * drift * drift);
+    // Each of two sides may raise half of the alarms. The run length grows with `b`; exp(200) is far above every rate allowed.
+    let (mut low, mut high) = (0.0, 100.0 / drift);
     for _ in 0..60 {
         let middle: f64 = 0.5 * (low + high);
         if run(middle) < steps {
@@ -169,34 +181,35 @@ fn limit(rate: f64) -> f64 {
             high = middle;
         }
     }
-    (low - 1.166).max(0.5)
+    let limit = (low - 1.166).max(0.5);
+    Limit { drift, limit }
 }
 
 /// Rates of false alarms while sensors and model are right.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FalseAlarms {
-    /// Rate of false alarms of one sensor, per observation.
+    /// Rate at which a sensor is excluded by a false alarm, per observation.
     pub sensor: f64,
     /// Rate of false alarms of the whole centre, per instant.
     pub centre: f64,
 }
 
 impl Default for FalseAlarms {
-    /// One in 10,000 observations of a sensor, one in 1000 instants of the centre.
+    /// One in a million observations of a sensor, one in 1000 instants of the centre.
     fn default() -> Self {
         Self {
-            sensor: 1e-4,
+            sensor: 1e-6,
             centre: 1e-3,
         }
     }
 }
 
 impl FalseAlarms {
-    /// A report is rejected if the probability of reports that are at most as likely is below this: a tenth of the rate of false alarms of
-    /// a sensor.
+    /// A report is rejected if the probability of reports that are at most as likely is below this: ten times the rate of false alarms of
+    /// a sensor, and at most 0.01. The loss of one report costs less than that of a sensor.
     pub fn gate(&self) -> f64 {
-        0.1 * self.sensor
+        (10.0 * self.sensor).min(0.01)
     }
 
     pub(super) fn check(&self) -> Result<(), Error> {
@@ -209,8 +222,8 @@ impl FalseAlarms {
 /// Limits of the cumulative sums.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Limits {
-    pub sensor: f64,
-    pub centre: f64,
+    pub sensor: SumLimits,
+    pub centre: SumLimits,
     /// Probability below which a report is rejected.
     pub gate: f64,
 }
@@ -218,9 +231,26 @@ pub(super) struct Limits {
 impl Limits {
     pub fn new(rates: &FalseAlarms) -> Self {
         Self {
-            sensor: limit(rates.sensor / SEQUENCES as f64),
-            centre: limit(rates.centre / SEQUENCES as f64),
+            sensor: SumLimits::new(rates.sensor / SUMS as f64),
+            // Residuals have no part in it.
+            centre: SumLimits::new(rates.centre / SEQUENCES as f64),
             gate: rates.gate(),
+        }
+    }
+}
+
+/// Limits of the sums of one monitor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SumLimits {
+    small: Limit,
+    large: Limit,
+}
+
+impl SumLimits {
+    fn new(rate: f64) -> Self {
+        Self {
+            small: limit(rate, DRIFT),
+            large: limit(rate, LARGE_DRIFT),
         }
     }
 }
@@ -230,18 +260,26 @@ impl Limits {
 #[serde(deny_unknown_fields)]
 pub(super) struct Monitor {
     sums: [Cusum; SEQUENCES],
+    /// Of residuals, for large shifts.
+    large: Cusum,
 }
 
 impl Monitor {
     /// Adds one term to each sequence that has one: surprise, residual, product.
-    pub fn add(&mut self, terms: [Option<f64>; SEQUENCES], limit: f64) -> Option<Alarm> {
+    pub fn add(&mut self, terms: [Option<f64>; SEQUENCES], limits: &SumLimits) -> Option<Alarm> {
+        let [surprise, residual, product] = &mut self.sums;
+        let sums = [
+            (surprise, terms[0], limits.small, Alarm::Overstatement),
+            (residual, terms[1], limits.small, Alarm::Contradiction),
+            (&mut self.large, terms[1], limits.large, Alarm::Contradiction),
+            (product, terms[2], limits.small, Alarm::Overstatement),
+        ];
         let mut alarm = None;
-        for (i, (sum, term)) in self.sums.iter_mut().zip(terms).enumerate() {
-            let crossed = term.and_then(|term| sum.add(term, limit));
-            let meaning = match crossed {
+        for (sum, term, limit, below) in sums {
+            let meaning = match term.and_then(|term| sum.add(term, limit)) {
                 None => continue,
-                Some(Direction::Down) if i != 1 => Alarm::Overstatement,
-                Some(_) => Alarm::Contradiction,
+                Some(Direction::Down) => below,
+                Some(Direction::Up) => Alarm::Contradiction,
             };
             // A contradiction is the graver conclusion and is kept.
             if alarm != Some(Alarm::Contradiction) {
@@ -251,10 +289,11 @@ impl Monitor {
         alarm
     }
 
-    /// The largest sum that speaks for a contradiction. At half the rate of `DRIFT` a sum is the log likelihood ratio of a shift.
-    pub fn contradiction(&self) -> f64 {
-        let [surprise, residual, product] = &self.sums;
-        surprise.up.max(residual.up).max(residual.down).max(product.up)
+    /// The largest sum that speaks for a contradiction, in parts of its limit.
+    pub fn contradiction(&self, limits: &SumLimits) -> f64 {
+        let ([surprise, residual, product], large) = (&self.sums, &self.large);
+        let small = surprise.up.max(residual.up).max(residual.down).max(product.up) / limits.small.limit;
+        small.max(large.up.max(large.down) / limits.large.limit)
     }
 }
 

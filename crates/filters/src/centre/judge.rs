@@ -100,7 +100,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             };
             let depth = apart.map_or(DEEPEST, |found| found.depth.min(DEEPEST));
             state.depth = MEMORY * state.depth + depth - USUAL_DEPTH;
-            let is_alarm = state.monitor.add(terms, self.limits.sensor) == Some(Alarm::Contradiction);
+            let is_alarm = state.monitor.add(terms, &self.limits.sensor) == Some(Alarm::Contradiction);
             // A report that is too unlikely beside another begins a dispute of both at once.
             let is_contested = matches!(fate, Fate::Contested(_));
             let is_unlikely = is_contested && apart.is_some_and(|one| one.tail < self.limits.gate);
@@ -120,7 +120,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 }
                 continue;
             }
-            let is_calm = state.quiet >= CALM && state.monitor.contradiction() < SETTLED * self.limits.sensor;
+            let is_calm = state.quiet >= CALM && state.monitor.contradiction(&self.limits.sensor) < SETTLED;
             if state.disputed && is_calm {
                 state.disputed = false;
             }
@@ -157,7 +157,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
         // 5. The centre's own test, with terms pooled over the sensors. A lost track restarts from the prior, if one is set.
         let terms = pooled.map(|(sum, count)| (count > 0).then(|| sum / f64::from(count).sqrt()));
-        let alarm = self.monitor.add(terms, self.limits.centre);
+        let alarm = self.monitor.add(terms, &self.limits.centre);
         if alarm.is_some() {
             self.monitor = health::Monitor::default();
         }
@@ -184,7 +184,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         if own.excluded || self.health == Health::Off {
             return;
         }
-        let suspicion = |state: &super::state::MemberState| state.monitor.contradiction() / self.limits.sensor;
+        let suspicion = |state: &super::state::MemberState| state.monitor.contradiction(&self.limits.sensor);
         let others = || {
             let all = self.members.iter().enumerate();
             all.filter(|(other, member)| *other != seat && !member.state.excluded && !member.state.presence.named_dead)

@@ -3,6 +3,7 @@
 use super::gate::{Fate, Verdict};
 use super::one_wrong::OneIsWrong;
 use super::reading::{Content, Reading};
+use super::receive::is_of_reports;
 use super::state::{Checkpoint, StoredSlot};
 use super::{FusionCentre, Slot};
 use crate::Error;
@@ -102,7 +103,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         let missing = || missing.iter().map(|one| &**one);
         let all: Vec<&dyn Likelihood<D>> = reports.iter().map(|one| &**one).chain(wrong).chain(missing()).collect();
         match self.filter.update(rng, belief, &all) {
-            Err(Error::Impossible) => {
+            Err(error) if is_of_reports(&error) => {
                 slots.iter_mut().for_each(StoredSlot::drop_report);
                 self.filter.update(rng, belief, &missing().collect::<Vec<_>>())?;
             }

@@ -1,11 +1,12 @@
-//! The predictive law of reports: from the moments of the belief, or from its points if the filter has any.
+//! The predictive law of reports: from the moments of the belief, or from its points or Gaussians if the filter has any.
 
 use super::health::Residual;
 use super::one_wrong::log_sum;
 use super::reading::{Content, Reading, Tested, WORD_BITS, conditioned, words};
 use super::{FusionCentre, Member};
-use crate::contract::{Points, StateFilter};
-use fewbits_core::{Gaussian, Observation};
+use crate::Error;
+use crate::contract::{Evidence, Points, StateFilter};
+use fewbits_core::{BitString, Gaussian, Observation};
 use fewbits_numerics::normal::{cdf, quantile};
 use nalgebra::SVector;
 
@@ -15,6 +16,8 @@ pub(super) enum Law<const D: usize> {
     Moments(Gaussian<D>),
     /// Weighted points: exact for every sensor.
     Points(Points<D>),
+    /// Gaussians and the logarithms of their weights. Sensing is linearised at the mean of each.
+    Mixture(Vec<(f64, Gaussian<D>)>),
 }
 
 /// Smallest probability of a tail whose residual is still told from others.
@@ -37,6 +40,29 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 };
                 (0..reports.len()).map(of).collect()
             }
+            Law::Mixture(modes) => {
+                let mut found = Vec::with_capacity(reports.len());
+                self.test_apart_by_mixture(modes, reports, &mut found);
+                found
+            }
+        }
+    }
+
+    /// As [`test_apart`](Self::test_apart), by a mixture.
+    fn test_apart_by_mixture(
+        &self,
+        modes: &[(f64, Gaussian<D>)],
+        reports: &[&Reading<'_, D>],
+        found: &mut Vec<Tested>,
+    ) {
+        match reports {
+            [] => {}
+            [one] => found.push(self.members[one.seat].test_by_mixture(one, modes)),
+            _ => {
+                let (left, right) = reports.split_at(reports.len() / 2);
+                self.test_apart_by_mixture(&mixture_given(modes, right), left, found);
+                self.test_apart_by_mixture(&mixture_given(modes, left), right, found);
+            }
         }
     }
 
@@ -49,8 +75,28 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 let weights = weighted(points, others.iter().copied());
                 member.test_by_points(one, points, &weights)
             }
+            Law::Mixture(modes) => member.test_by_mixture(one, &mixture_given(modes, others)),
         }
     }
+}
+
+/// A mixture conditioned on reports. Those that no Gaussian explains are left out.
+fn mixture_given<const D: usize>(modes: &[(f64, Gaussian<D>)], reports: &[&Reading<'_, D>]) -> Vec<(f64, Gaussian<D>)> {
+    let mut modes = modes.to_vec();
+    for known in reports.iter().filter_map(|report| report.known()) {
+        let next = modes.iter().map(|(log, mode)| {
+            let mut next = *mode;
+            match known.condition(&mut next) {
+                Ok(found) if next.is_finite() => (log + found.log_likelihood, next),
+                _ => (f64::NEG_INFINITY, *mode),
+            }
+        });
+        let next: Vec<_> = next.collect();
+        if log_sum(next.iter().map(|(log, _)| *log)).is_finite() {
+            modes = next;
+        }
+    }
+    modes
 }
 
 /// Log weights of the points given reports.
@@ -200,13 +246,117 @@ impl<const D: usize> Member<D> {
         })
     }
 
-    /// Probability that a working sensor is silent.
-    pub(super) fn silence_by_points(&self, reading: &Reading<'_, D>, points: &Points<D>) -> Option<f64> {
+    fn test_by_mixture(&self, reading: &Reading<'_, D>, modes: &[(f64, Gaussian<D>)]) -> Tested {
+        let untested = |is_possible| Tested {
+            is_possible,
+            residual: None,
+        };
+        let Some(known) = reading.known() else {
+            return untested(false);
+        };
+        let found: Option<Vec<(f64, f64)>> = modes.iter().map(|(_, mode)| placed(known.evidence(mode))).collect();
+        // An observation that cannot update a belief may still have a probability.
+        let Some(found) = found else { return untested(true) };
+        let total = log_sum(modes.iter().map(|(log, _)| *log));
+        let joint = modes.iter().zip(&found).map(|((weight, _), (log, _))| weight + log);
+        if !(log_sum(joint) - total).is_finite() {
+            return untested(false);
+        }
+        let weights: Vec<f64> = modes.iter().map(|(log, _)| (log - total).exp()).collect();
+        let residual = match &reading.slot.observation {
+            Observation::Received(bits) if reading.content == Content::Report => {
+                self.residual_by_mixture(reading, bits, modes, &weights, &found)
+            }
+            _ => None,
+        };
+        Tested {
+            is_possible: true,
+            residual,
+        }
+    }
+
+    fn residual_by_mixture(
+        &self,
+        reading: &Reading<'_, D>,
+        received: &BitString,
+        modes: &[(f64, Gaussian<D>)],
+        weights: &[f64],
+        found: &[(f64, f64)],
+    ) -> Option<Residual> {
+        let measured = modes.iter().map(|(_, mode)| self.sensor.measured(mode.mean()));
+        let measured: Vec<f64> = measured.collect::<Option<_>>()?;
+        // `p` of an observation and the correction of the measurement by it.
+        let place = |found: &[(f64, f64)]| {
+            let all = weights.iter().zip(found).zip(&measured);
+            let sums = all.fold((0.0, 0.0, 0.0), |(p, with, mean), ((w, (log, correction)), h)| {
+                let joint = w * log.exp();
+                (p + joint, with + joint * (h + correction), mean + w * h)
+            });
+            (sums.0.ln(), sums.1 / sums.0 - sums.2)
+        };
+        if received.bits() == 1 && self.always_speaks {
+            let (log, correction) = place(found);
+            return Residual::of_bit((log.exp() / self.arrival).min(1.0), correction);
+        }
+        let variances = modes.iter().map(|(_, mode)| self.sensor.value_variance(mode));
+        if let Some(variances) = variances.collect::<Option<Vec<f64>>>() {
+            let logs: Vec<f64> = found.iter().map(|(log, _)| *log).collect();
+            return self.residual_of_value(&variances, weights, &measured, &logs);
+        }
+        if received.bits() == 0 || received.bits() > WORD_BITS {
+            return None;
+        }
+        let (mut all, mut at, mut alternative) = (Vec::new(), 0, reading.slot.clone());
+        for word in words(received.bits()) {
+            let is_received = word == *received;
+            if !self.sensor.decodes(&word) {
+                continue;
+            }
+            alternative.observation = Observation::Received(word);
+            let own: Option<Vec<_>> = modes
+                .iter()
+                .map(|(_, mode)| placed(self.sensor.evidence(&alternative, 1.0, mode)))
+                .collect();
+            let Some(own) = own else { continue };
+            let (log, correction) = place(&own);
+            if is_received {
+                at = all.len();
+            }
+            if log.is_finite() {
+                all.push((log, correction));
+            }
+        }
+        Residual::of_word(&all, at)
+    }
+
+    /// Probability that a working sensor is silent, by points or a mixture.
+    pub(super) fn silence_by(&self, reading: &Reading<'_, D>, law: &Law<D>) -> Option<f64> {
         let likelihood = self.sensor.likelihood(reading.slot, 1.0).ok()?;
-        let mut logs = points.log_weights.clone();
-        likelihood.add_log_likelihoods(points.columns(), &mut logs);
-        let found = log_sum(logs.into_iter()) - log_sum(points.log_weights.iter().copied());
-        Some(found.exp().min(1.0))
+        let (with, without) = match law {
+            Law::Moments(_) => return None,
+            Law::Points(points) => {
+                let mut logs = points.log_weights.clone();
+                likelihood.add_log_likelihoods(points.columns(), &mut logs);
+                (log_sum(logs.into_iter()), log_sum(points.log_weights.iter().copied()))
+            }
+            Law::Mixture(modes) => {
+                let found = modes
+                    .iter()
+                    .map(|(log, mode)| Some(log + placed(likelihood.evidence(mode))?.0));
+                let found: Vec<f64> = found.collect::<Option<_>>()?;
+                (log_sum(found.into_iter()), log_sum(modes.iter().map(|(log, _)| *log)))
+            }
+        };
+        Some((with - without).exp().min(1.0))
+    }
+}
+
+/// `ln p` and the correction; `-inf` for an impossible observation, and `None` for one that cannot update the belief.
+fn placed(found: Result<Evidence, Error>) -> Option<(f64, f64)> {
+    match found {
+        Ok(found) => Some((found.log_likelihood, found.correction)),
+        Err(Error::Impossible) => Some((f64::NEG_INFINITY, 0.0)),
+        Err(_) => None,
     }
 }
 

@@ -22,7 +22,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// unlikely (`Health::Off` and `Health::Report`).
     ///
     /// # Errors
-    /// If a sensor is unknown, or feedback does not decode.
+    /// If a sensor is unknown, or the feedback of a silent sensor does not decode. A report beside such feedback is rejected.
     pub fn receive(&mut self, rng: &mut dyn Rng, slots: &[Slot]) -> Result<Received, Error> {
         let mut predicted = self.estimate();
         let (readings, copied) = self.read(slots)?;
@@ -122,8 +122,9 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// The predictive law of a belief.
     pub(super) fn law(&self, belief: &F::Belief, moments: &Gaussian<D>) -> Law<D> {
         match self.filter.points(belief) {
-            Some(points) if self.health != Health::Off => Law::Points(points),
-            _ => Law::Moments(*moments),
+            _ if self.health == Health::Off => Law::Moments(*moments),
+            Some(points) => Law::Points(points),
+            None => self.filter.mixture(belief).map_or(Law::Moments(*moments), Law::Mixture),
         }
     }
 
@@ -154,14 +155,14 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let member = &self.members[reading.seat];
             let is_tested = self.health != Health::Off && reading.content == Content::Report;
             let shown = match (law, reading.content, reading.known()) {
-                (Law::Points(points), Content::Nothing, _) => {
-                    Shown::Silence(match member.silence_by_points(reading, points) {
+                (Law::Points(_) | Law::Mixture(_), Content::Nothing, _) => {
+                    Shown::Silence(match member.silence_by(reading, law) {
                         Some(silence) => silence,
                         None => member.silence(reading, predicted)?,
                     })
                 }
                 (Law::Moments(_), Content::Nothing, _) => Shown::Silence(member.silence(reading, predicted)?),
-                (Law::Points(_), _, Some(_)) if verdict.fate == Fate::Used => {
+                (Law::Points(_) | Law::Mixture(_), _, Some(_)) if verdict.fate == Fate::Used => {
                     let tested = is_tested.then(|| match is_only {
                         true => verdict.tested,
                         false => self.test_given(law, &before, reading),
@@ -242,10 +243,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             reports.chain(rest.iter().copied()).collect::<Vec<_>>()
         };
         match self.filter.update(rng, belief, &all(&reports)) {
-            Err(Error::Impossible) => {}
+            Err(error) if is_of_reports(&error) => {}
             other => return other,
         }
-        // Together they are impossible. Those that fit best are kept, as many as are possible together.
+        // Together they are impossible, or overflow. Those that fit best are kept, as many as are possible together.
         reports.sort_by(|one, other| {
             verdicts[*one]
                 .tested
@@ -257,7 +258,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             kept.push(i);
             let likelihoods: Vec<_> = kept.iter().filter_map(|i| readings[*i].known()).collect();
             match self.filter.update(rng, &mut belief.clone(), &likelihoods) {
-                Err(Error::Impossible) => {
+                Err(error) if is_of_reports(&error) => {
                     kept.pop();
                     verdicts[i].fate = Fate::Rejected;
                 }
@@ -265,13 +266,18 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             }
         }
         match self.filter.update(rng, belief, &all(&kept)) {
-            Err(Error::Impossible) => {
+            Err(error) if is_of_reports(&error) => {
                 let likelihoods: Vec<_> = kept.iter().filter_map(|i| readings[*i].known()).collect();
                 self.filter.update(rng, belief, &likelihoods)
             }
             other => other,
         }
     }
+}
+
+/// Whether a belief may fail like this because of the reports.
+pub(super) fn is_of_reports(error: &Error) -> bool {
+    matches!(error, Error::Impossible | Error::NotANumber { .. })
 }
 
 /// The moments after the reports of an instant, taken one after the other.

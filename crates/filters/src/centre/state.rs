@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The version of the stored form.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// State of one sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use fewbits_core::{
     Dynamics, FullValue, Gaussian, GaussianDynamics, Likelihood, Link, Message, NumberFormat, Observation,
 };
 use fewbits_filters::centre::{Event, Failures, FusionCentre, Health, Reporting, Slot};
-use fewbits_filters::{BootstrapFilter, Error, MomentFilter, ParticleFilter, StateFilter};
+use fewbits_filters::{BootstrapFilter, Error, MomentFilter, NoiseBank, ParticleFilter, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::Vector1;
@@ -253,26 +253,31 @@ fn honest_sensors_are_seldom_excluded() {
         Fault::DiesAndReturns,
     ];
     faults.extend([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 30.0, 100.0].map(Fault::Offset));
+    let (mut beyond, mut beyond_runs) = (0.0, 0.0);
     for sensors in [3, 5, 10] {
         for fault in &faults {
             let shares = liars(sensors, *fault, runs);
-            println!("{sensors} {fault:?}: {shares:.3?}");
-            assert!((0.9..0.99).contains(&shares.cover), "{sensors} {fault:?}: {shares:?}");
-            // One false alarm in 10^4 observations of each honest sensor, and one run in a hundred; four deviations of a binomial count.
-            let stated = 1e-4 * f64::from((sensors - 1) * STEPS) + 0.01;
+            println!("{sensors} {fault:?}: {shares:.4?}");
+            // Of a few runs the cover has a standard error of .01.
+            let slack = 0.06 / (runs as f64).sqrt();
+            // A sensor that is stuck near the level is the hardest to tell from a right one.
+            let least = if matches!(fault, Fault::Stuck) { 0.92 } else { 0.93 };
+            assert!((least - slack..0.97 + slack).contains(&shares.cover), "{sensors} {fault:?}: {shares:?}");
+            assert!((0.93 - slack..0.97 + slack).contains(&shares.late_cover), "{sensors} {fault:?}: {shares:?}");
+            // The stated rate of false alarms of each honest sensor; four deviations of a binomial count.
+            let stated = 1e-6 * f64::from((sensors - 1) * STEPS) + 0.01;
             let limit = stated + 4.0 * (stated / runs as f64).sqrt();
-            if !matches!(fault, Fault::Offset(size) if *size < 6.0) {
-                assert!(shares.honest <= limit, "{sensors} {fault:?}: {shares:?}");
-            }
-            // Where a false alarm took an honest sensor before, two of three are left, and nothing decides between them.
+            assert!(shares.honest <= limit, "{sensors} {fault:?}: {shares:?}");
             if matches!(fault, Fault::Offset(size) if *size >= 6.0) {
-                assert!(
-                    shares.liar + shares.honest > 0.99 && (0.92..0.98).contains(&shares.late_cover),
-                    "{sensors} {fault:?}: {shares:?}"
-                );
+                assert!(shares.liar > 0.99, "{sensors} {fault:?}: {shares:?}");
+                beyond += shares.honest * runs as f64;
+                beyond_runs += runs as f64;
             }
         }
     }
+    // Of a lie of six deviations and more: one run in a hundred at most, without any slack.
+    println!("beyond six deviations an honest sensor was excluded in {beyond} of {beyond_runs} runs");
+    assert!(beyond <= 0.01 * beyond_runs, "{beyond} of {beyond_runs}");
 }
 
 /// Two sensors, one of them wrong from the beginning: nothing decides which, so the band holds what either says.
@@ -497,4 +502,37 @@ fn an_exact_filter_raises_no_more_false_alarms_than_stated() {
     );
     // Four deviations of Poisson counts.
     assert!(lost <= 12 && excluded <= 5 && rejected <= 2, "{lost} {excluded} {rejected}");
+}
+
+/// Defect: a bank of filters was judged by a Gaussian of its moments. The law of a report is a mixture of a narrow and a wide Gaussian, and a
+/// right model was contradicted by its own tails.
+#[test]
+fn a_bank_raises_no_more_false_alarms_than_stated() {
+    let (mut rng, scales, switching) = (Stream::new(13).rng(), [0.02, 6.0], 0.05);
+    let prior = Gaussian::scalar(0.0, 0.2 / (1.0 - 0.95 * 0.95)).unwrap();
+    let bank = NoiseBank::new(MomentFilter, scales.to_vec(), switching).unwrap();
+    let mut centre = FusionCentre::new(&mut rng, world(), bank, &prior).unwrap();
+    for number in 0..2 {
+        let sensing = LinearSensor::direct(0.01).unwrap();
+        centre
+            .join(number, Reporting::values(sensing, FullValue::new(0.01).unwrap(), Link::PERFECT))
+            .unwrap();
+    }
+    let (mut truth, mut model, mut excluded, mut rejected) = (Vector1::new(0.0), 0, 0, 0);
+    for k in 1..=4000 {
+        if rng.random::<f64>() < switching {
+            model = rng.random_range(0..2);
+        }
+        let step = world().over(1.0).unwrap();
+        let mean = step.mean(&truth);
+        truth = mean + (step.propagate(&mut rng, &truth) - mean) * f64::sqrt(scales[model]);
+        centre.advance(&mut rng, f64::from(k)).unwrap();
+        let sent = [0, 1].map(|n| slot(n, truth[0] + 0.1 * noise(&mut rng)));
+        for event in centre.receive(&mut rng, &sent).unwrap().events {
+            excluded += u32::from(matches!(event, Event::Excluded(_)));
+            rejected += u32::from(matches!(event, Event::Rejected(_)));
+        }
+    }
+    println!("excluded {excluded} (stated .008), rejected {rejected} (stated .08)");
+    assert!(excluded <= 1 && rejected <= 2, "{excluded} {rejected}");
 }

@@ -14,6 +14,7 @@ mod resample;
 mod state_noise;
 mod stored;
 mod tangent;
+mod unchanged;
 mod wild;
 mod words;
 

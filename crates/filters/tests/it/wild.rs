@@ -7,9 +7,9 @@ use fewbits_filters::{
     UniformGrid, Workspace,
 };
 use fewbits_filters::{assumed_density, kalman};
-use fewbits_models::{Ar1, LinearSensor, ReceivedPower};
+use fewbits_models::{Ar1, ContinuousLinear, LinearSensor, ReceivedPower};
 use fewbits_monte_carlo::Stream;
-use nalgebra::{Matrix2, SVector, Vector1, Vector2};
+use nalgebra::{Matrix1x3, Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3};
 use proptest::prelude::*;
 
 fn wild() -> impl Strategy<Value = f64> {
@@ -111,5 +111,32 @@ proptest! {
         {
             prop_assert!(predicted.mean().is_finite() && predicted.variance().is_finite());
         }
+    }
+}
+
+/// Defect: after a gap of a hundred years the covariance of a level with slope and curvature became indefinite, its bands were NaN, and
+/// every later report was refused.
+#[test]
+fn reports_are_used_after_a_gap_of_any_length() {
+    for gap in [1.0, 1e3, 1e6, 3.2e9, 1e12, 1e15] {
+        let world = ContinuousLinear::nearly_constant_acceleration(1e-3).unwrap();
+        let h = Matrix1x3::new(1.0, 0.0, 0.0);
+        let start = Matrix3::from_diagonal(&Vector3::new(1.0, 0.1, 0.01));
+        let mut belief = Gaussian::new(Vector3::new(0.0, 0.3, 0.1), start).unwrap();
+        for k in 0..60 {
+            let seconds = if k == 20 { gap } else { 1.0 };
+            belief = assumed_density::predict(&world.over(seconds).unwrap(), &belief);
+            // The level is 5 throughout.
+            let report = Value::scalar(5.0, 0.25).unwrap();
+            belief = assumed_density::update(&belief, &h, &report).unwrap().0;
+            let variances = belief.covariance().diagonal();
+            assert!(variances.iter().all(|v| *v > 0.0), "gap {gap}, {k}: {variances}");
+            assert!(Gaussian::new(*belief.mean(), *belief.covariance()).is_ok(), "gap {gap}, {k}: {belief:?}");
+            let off = (belief.mean()[0] - 5.0).abs() / variances[0].sqrt();
+            assert!(k < 15 || off < 8.0, "gap {gap}, {k}: {off} deviations off");
+        }
+        let deviations = belief.covariance().diagonal().map(f64::sqrt);
+        assert!(deviations[0] < 0.6 && deviations[1] < 1.0, "gap {gap}: {deviations}");
+        assert!((belief.mean()[0] - 5.0).abs() < 1.0, "gap {gap}: {}", belief.mean());
     }
 }

@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod attacks;
+mod floods;
 mod followed;
 mod live;
+mod pairs;
 mod restarts;
 mod stops;
 mod transports;
