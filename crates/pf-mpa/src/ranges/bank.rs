@@ -9,6 +9,8 @@ use fewbits_numerics::normal;
 /// Probability per range that the speed changes: once in a few minutes. The noise is a property of the radio and changes less often.
 const SPEED_CHANGES: f64 = 0.003;
 const NOISE_CHANGES: f64 = 0.1 * SPEED_CHANGES;
+/// Ranges between two changes: they are rare, so they are computed together.
+const MIXED: u32 = 5;
 /// Probability per range of an anchor that it starts, or ceases, to send ranges that do not depend on the distance.
 const ANCHOR_CHANGES: f64 = 1e-3;
 /// A share of another filter below this does not change a filter.
@@ -104,6 +106,7 @@ pub(super) struct Hypothesis {
     pub(super) agreement: f64,
     /// Per anchor, the decaying sum of scores and that of their variances.
     scores: Vec<(f64, f64)>,
+    ranges: u32,
     /// The next range, by each filter.
     predicted: Vec<Predicted>,
 }
@@ -125,6 +128,7 @@ impl Hypothesis {
             variant,
             agreement: 1.0,
             scores: vec![(0.0, 0.0); anchors],
+            ranges: 0,
             predicted: vec![Predicted::default(); count],
         }
     }
@@ -132,11 +136,15 @@ impl Hypothesis {
     /// Moves all filters on, after speed and noise may have changed.
     pub(super) fn predict(&mut self, known: &Known, step: &Step) {
         let (speeds, noises) = (known.speeds.len(), known.noises.len());
-        for noise in 0..noises {
-            self.mix((0..speeds).map(|speed| speed * noises + noise).collect(), SPEED_CHANGES);
-        }
-        for speed in 0..speeds {
-            self.mix((0..noises).map(|noise| speed * noises + noise).collect(), NOISE_CHANGES);
+        self.ranges += 1;
+        if self.ranges.is_multiple_of(MIXED) {
+            let changes = |a_range: f64| -(f64::from(MIXED) * (-a_range).ln_1p()).exp_m1();
+            for noise in 0..noises {
+                self.mix((0..speeds).map(|speed| speed * noises + noise).collect(), changes(SPEED_CHANGES));
+            }
+            for speed in 0..speeds {
+                self.mix((0..noises).map(|noise| speed * noises + noise).collect(), changes(NOISE_CHANGES));
+            }
         }
         for (i, filter) in self.filters.iter_mut().enumerate() {
             let speed = known.speeds[i / noises];

@@ -60,16 +60,6 @@ impl Step {
 }
 
 impl Normal {
-    /// A law with independent coordinates.
-    pub(super) fn diagonal(mean: Vec<f64>, variances: &[f64], axes: usize) -> Self {
-        let n = mean.len();
-        let mut covariance = vec![0.0; n * n];
-        for (i, variance) in variances.iter().enumerate() {
-            covariance[i * n + i] = *variance;
-        }
-        Self { mean, covariance, axes }
-    }
-
     pub(super) fn bias(&self) -> usize {
         2 * self.axes
     }

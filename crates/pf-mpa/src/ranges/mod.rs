@@ -15,31 +15,32 @@
 
 mod acquisition;
 mod bank;
+mod estimate;
 mod gaussian;
+mod odds;
+mod rows;
+mod search;
 mod settings;
 
+pub use estimate::RangeEstimate;
 pub use settings::{Height, RangeSettings};
 
 use crate::Error;
 use crate::encoder::optimal_loading;
 use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::RangeNoise;
-use acquisition::{Calibration, Collected, hypotheses, is_same};
+use acquisition::hypotheses;
 use bank::{Arrived, Hypothesis};
 use fewbits_core::Gaussian;
 use fewbits_numerics::error::{finite, refuse, within};
-use fewbits_numerics::normal;
-use gaussian::{Normal, Step};
-use nalgebra::{Matrix3, Vector3};
+use gaussian::Step;
+use nalgebra::Vector3;
+use odds::{drop_improbable, merge_same, shares_of};
+use rows::Collected;
+use search::Calibration;
 use settings::Known;
 use std::collections::BTreeMap;
 
-/// A hypothesis is dropped if its probability is less than this share of the best one's.
-const DROPPED: f64 = 1e-5;
-/// Hypotheses of less than this share are no second place.
-const SECOND: f64 = 0.01;
-/// A second place differs by more than this many deviations.
-const APART: f64 = 3.0;
 /// Ranges between two searches for hypotheses that have become the same.
 const COMPARED: usize = 8;
 /// The track is lost if fewer than this share of the latest ranges agree.
@@ -48,8 +49,6 @@ const AGREEMENT: f64 = 0.35;
 const MISFIT: f64 = 4.3;
 /// Added to the variances of bias and scale when the track is lost, as a share of those before the first range.
 const LOST_SHARE: f64 = 0.04;
-/// Deviations to either side of a mean that hold 95 % of a normal law.
-const BAND: f64 = 1.959_963_984_540_054;
 /// Bits of a range that is sent in full.
 const FULL_BITS: usize = 32;
 
@@ -60,41 +59,6 @@ pub enum Travel {
     Full,
     /// As the level of its innovation with this many bits, 1 to 8.
     Bits(u32),
-}
-
-/// The estimate after one range. Lengths are in the unit of the anchors' coordinates.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct RangeEstimate {
-    /// Position. Without an estimated height, the last coordinate is the known one.
-    pub position: Vector3<f64>,
-    /// Covariance of the position, over all places that explain the ranges. Zero for a known height.
-    pub covariance: Matrix3<f64>,
-    /// The bands that hold each coordinate with a probability of 95 %: lower and upper ends. While there are several places, they hold all
-    /// that are probable.
-    pub bands: [(f64, f64); 3],
-    /// Number of places that explain the ranges, each by more than one in a hundred: 1 if the place is clear.
-    pub places: usize,
-    /// Common bias of the ranges.
-    pub bias: f64,
-    /// Error of scale: ranges are `1 + scale` times the distance, plus the bias.
-    pub scale: f64,
-    /// Estimated standard deviation of a range's error: the geometric mean over the bank's filters, weighted by their probabilities.
-    pub noise: f64,
-    /// Estimated standard deviation of the velocity along an axis, per second, averaged in the same way.
-    pub speed: f64,
-    /// Whether this range showed that the track was lost. Acquisition then starts again.
-    pub lost: bool,
-}
-
-impl RangeEstimate {
-    /// Squared error of the position in the plane divided by its covariance, per coordinate. On average 1 if the covariance is right. `None`
-    /// if the covariance is singular.
-    pub fn normalised_error(&self, truth: &Vector3<f64>) -> Option<f64> {
-        let error = (self.position - truth).xy();
-        let covariance = self.covariance.fixed_view::<2, 2>(0, 0).into_owned();
-        Some(0.5 * error.dot(&covariance.cholesky()?.solve(&error)))
-    }
 }
 
 /// A tracker of one target from the ranges of fixed anchors.
@@ -376,50 +340,7 @@ impl RangeTracker {
     }
 
     fn estimate(&self, lost: bool) -> Option<RangeEstimate> {
-        let (axes, noises) = (self.known.axes, self.known.noises.len());
-        let shares = self.shares();
-        let parts: Vec<(f64, Normal)> = shares
-            .iter()
-            .zip(&self.hypotheses)
-            .filter_map(|(share, one)| Some((*share, part(&one.moments()?))))
-            .collect();
-        let all = gaussian::merged(parts.iter().map(|(share, normal)| (*share, normal)))?;
-        let n = all.mean.len();
-        let mut position = Vector3::new(0.0, 0.0, self.known.level);
-        let mut covariance = Matrix3::zeros();
-        let mut bands = [(self.known.level, self.known.level); 3];
-        for i in 0..axes {
-            position[i] = all.mean[i];
-            (0..axes).for_each(|j| covariance[(i, j)] = all.covariance[i * n + j]);
-            let laws: Vec<(f64, f64, f64)> = parts
-                .iter()
-                .map(|(share, one)| (*share, one.mean[i], one.variance(i).sqrt()))
-                .collect();
-            bands[i] = band(&laws);
-        }
-        let best = parts.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let others = parts
-            .iter()
-            .filter(|(share, one)| *share > SECOND && are_apart(one, &best.1, axes))
-            .count();
-        let (mut noise, mut speed) = (0.0, 0.0);
-        for (share, one) in shares.iter().zip(&self.hypotheses) {
-            for (i, weight) in one.weights.iter().enumerate() {
-                noise += share * weight * self.known.noises[i % noises].ln();
-                speed += share * weight * self.known.speeds[i / noises].ln();
-            }
-        }
-        Some(RangeEstimate {
-            position,
-            covariance,
-            bands,
-            places: 1 + others,
-            bias: all.mean[axes],
-            scale: all.mean[axes + 1],
-            noise: noise.exp(),
-            speed: speed.exp(),
-            lost,
-        })
+        estimate::of(&self.known, &self.hypotheses, lost)
     }
 
     /// Starts acquisition again. The estimates of bias and scale are kept, with a larger variance.
@@ -449,97 +370,4 @@ impl RangeTracker {
             self.collected.clear();
         }
     }
-}
-
-/// Position, bias and scale of a law.
-fn part(one: &Normal) -> Normal {
-    let (n, axes) = (one.mean.len(), one.axes);
-    let kept: Vec<usize> = (0..axes).chain([one.bias(), one.scale()]).collect();
-    Normal {
-        mean: kept.iter().map(|i| one.mean[*i]).collect(),
-        covariance: kept
-            .iter()
-            .flat_map(|i| kept.iter().map(move |j| one.covariance[i * n + j]))
-            .collect(),
-        axes,
-    }
-}
-
-fn are_apart(a: &Normal, b: &Normal, axes: usize) -> bool {
-    (0..axes).any(|i| (a.mean[i] - b.mean[i]).abs() > APART * (a.variance(i).sqrt() + b.variance(i).sqrt()))
-}
-
-/// Probabilities of hypotheses.
-fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
-    let best = hypotheses
-        .iter()
-        .map(|one| one.log_weight)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = hypotheses.iter().map(|one| (one.log_weight - best).exp()).collect();
-    let total: f64 = weights.iter().sum();
-    weights.iter().map(|weight| weight / total).collect()
-}
-
-fn drop_improbable(hypotheses: &mut Vec<Hypothesis>) {
-    let best = hypotheses
-        .iter()
-        .map(|one| one.log_weight)
-        .fold(f64::NEG_INFINITY, f64::max);
-    hypotheses.retain(|one| one.log_weight - best > DROPPED.ln());
-    // Only differences matter.
-    hypotheses.iter_mut().for_each(|one| one.log_weight -= best);
-}
-
-/// Of hypotheses about the same place with the same model, keeps the most probable, with the probability of all.
-fn merge_same(hypotheses: &mut Vec<Hypothesis>) {
-    hypotheses.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
-    let mut kept: Vec<(Hypothesis, Option<Normal>)> = Vec::new();
-    for one in hypotheses.drain(..) {
-        let moments = one.moments();
-        let twin = kept.iter_mut().find(|(other, known)| match (&moments, known) {
-            (Some(a), Some(b)) => other.variant == one.variant && is_near(a, b),
-            _ => false,
-        });
-        match twin {
-            Some((other, _)) => other.log_weight += (one.log_weight - other.log_weight).exp().ln_1p(),
-            None => kept.push((one, moments)),
-        }
-    }
-    hypotheses.extend(kept.into_iter().map(|(one, _)| one));
-}
-
-/// Whether two laws say nearly the same of position, bias and scale.
-fn is_near(a: &Normal, b: &Normal) -> bool {
-    let close = |i: usize| (a.mean[i] - b.mean[i]).powi(2) <= 0.1 * a.variance(i).min(b.variance(i));
-    is_same(a, b) && (0..a.axes).chain([a.bias(), a.scale()]).all(close)
-}
-
-/// The interval that holds 95 % of a mixture of `(share, mean, deviation)`, with 2.5 % on either side.
-fn band(laws: &[(f64, f64, f64)]) -> (f64, f64) {
-    let low = laws.iter().map(|(_, mean, deviation)| mean - BAND * deviation);
-    let high = laws.iter().map(|(_, mean, deviation)| mean + BAND * deviation);
-    let (low_most, low_least) = (low.clone().fold(f64::INFINITY, f64::min), low.fold(f64::NEG_INFINITY, f64::max));
-    let (high_least, high_most) = (high.clone().fold(f64::INFINITY, f64::min), high.fold(f64::NEG_INFINITY, f64::max));
-    let below = |x: f64| -> f64 {
-        laws.iter()
-            .map(|(share, mean, deviation)| {
-                let z = (x - mean) / deviation;
-                share * if z.is_nan() { 0.5 } else { normal::cdf(z) }
-            })
-            .sum()
-    };
-    let bisect = |target: f64, mut from: f64, mut to: f64| {
-        if laws.len() > 1 {
-            for _ in 0..40 {
-                let middle = 0.5 * (from + to);
-                if below(middle) < target {
-                    from = middle
-                } else {
-                    to = middle
-                }
-            }
-        }
-        0.5 * (from + to)
-    };
-    (bisect(0.025, low_most, low_least), bisect(0.975, high_least, high_most))
 }

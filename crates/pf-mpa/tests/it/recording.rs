@@ -197,6 +197,16 @@ const UNCALIBRATED: [World; 2] = [
     },
 ];
 
+/// What a user of such radios says.
+fn stated() -> RangeSettings {
+    RangeSettings {
+        noise: Some(1.8),
+        speed: Some(1.0),
+        bias: Some(5.0),
+        ..RangeSettings::default()
+    }
+}
+
 const TRAVELS: [Travel; 3] = [Travel::Full, Travel::Bits(1), Travel::Bits(2)];
 
 /// Scores of the tracker with default settings and of one that is told the speed, for each of [`TRAVELS`], over recordings of each world.
@@ -207,10 +217,10 @@ fn learnt_and_told(worlds: &[World]) -> Vec<[(Score, Score); 3]> {
         let told = RangeSettings {
             speed: Some(world.speed),
             speed_factor: Some(1.0),
-            ..RangeSettings::default()
+            ..stated()
         };
         TRAVELS.map(|travel| {
-            let learnt = score(&recordings, travel, RangeSettings::default());
+            let learnt = score(&recordings, travel, stated());
             let told = score(&recordings, travel, told);
             println!("{travel:?} {world:?}: {:.3}\n    {learnt:.3?}\n    {told:.3?}", learnt.rms / told.rms);
             assert!((0.4..2.5).contains(&(learnt.speed / world.speed)), "{travel:?} {world:?}: {learnt:?}");
@@ -281,7 +291,7 @@ fn a_lost_track_is_flagged_and_found_again() {
                 *range += (moved - place).norm() - (recording.truth[k] - place).norm();
                 recording.truth[k] = moved;
             }
-            let mut tracker = RangeTracker::new(recording.places(), travel, RangeSettings::default()).unwrap();
+            let mut tracker = RangeTracker::new(recording.places(), travel, stated()).unwrap();
             let (mut flagged, mut last) = (None, f64::INFINITY);
             for (k, ((time, anchor, range), truth)) in recording.ranges.iter().zip(&recording.truth).enumerate() {
                 if let Some(found) = tracker.push(*time, anchor, *range).unwrap() {
@@ -306,7 +316,7 @@ fn a_wrong_start_is_flagged_and_mended() {
     for travel in [Travel::Full, Travel::Bits(1), Travel::Bits(2)] {
         for seed in 0..4 {
             let mut recording = WORLDS[1].record(70 + seed);
-            let mut tracker = RangeTracker::new(recording.places(), travel, RangeSettings::default()).unwrap();
+            let mut tracker = RangeTracker::new(recording.places(), travel, stated()).unwrap();
             let (mut first, mut right) = (None, None);
             for (k, truth) in recording.truth.iter().enumerate().take(LENGTH / 4) {
                 let (time, anchor, range) = &mut recording.ranges[k];
@@ -377,7 +387,7 @@ fn a_track_of_two_anchors_is_lost() {
     };
     let recording = world.record(3);
     let anchors = recording.places();
-    let mut tracker = RangeTracker::new(anchors, Travel::Full, RangeSettings::default()).unwrap();
+    let mut tracker = RangeTracker::new(anchors, Travel::Full, stated()).unwrap();
     for (k, (time, anchor, range)) in recording.ranges.iter().enumerate() {
         // One of three anchors drifts away: once it is excluded, two places fit the others.
         let drift = if anchor == "node 0" {
