@@ -106,3 +106,110 @@ fn step<const D: usize>(
     }
     Ok(Gaussian::from_trusted_parts(next, (found + found.transpose()) * 0.5))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use fewbits_core::{ArgumentError, Dynamics};
+    use nalgebra::{DMatrix, DVector, Matrix1, SVector, Vector1};
+    use rand::Rng;
+
+    /// A random walk whose variance grows by .5 a second.
+    struct Walk;
+    struct Stretch(f64);
+
+    impl Dynamics<1> for Stretch {
+        fn mean(&self, state: &SVector<f64, 1>) -> SVector<f64, 1> {
+            *state
+        }
+
+        fn propagate<R: Rng + ?Sized>(&self, _: &mut R, state: &SVector<f64, 1>) -> SVector<f64, 1> {
+            *state
+        }
+    }
+
+    impl GaussianDynamics<1> for Stretch {
+        fn jacobian(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+            Matrix1::new(1.0)
+        }
+
+        fn noise_covariance_at(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+            Matrix1::new(self.0)
+        }
+    }
+
+    impl Evolution<1> for Walk {
+        type Step = Stretch;
+
+        fn over(&self, seconds: f64) -> Result<Stretch, ArgumentError> {
+            Ok(Stretch(0.5 * seconds))
+        }
+    }
+
+    const TIMES: [f64; 5] = [0.0, 1.0, 1.5, 4.0, 4.0];
+    const VALUES: [f64; 5] = [0.3, 1.1, -0.4, 2.0, 1.2];
+
+    fn filtered(scales: [f64; 5]) -> Vec<Filtered<1>> {
+        let (mut mean, mut variance, mut before) = (0.0, 2.0, 0.0);
+        let one = |((seconds, value), noise_scale): ((f64, f64), f64)| {
+            variance += 0.5 * noise_scale * (seconds - before);
+            before = seconds;
+            let gain: f64 = variance / (variance + 0.7);
+            mean += gain * (value - mean);
+            variance *= 1.0 - gain;
+            let belief = Gaussian::new(Vector1::new(mean), Matrix1::new(variance)).unwrap();
+            Filtered {
+                seconds,
+                belief,
+                noise_scale,
+                is_new: false,
+            }
+        };
+        TIMES.into_iter().zip(VALUES).zip(scales).map(one).collect()
+    }
+
+    /// The joint law of all levels given the first `count` values, conditioned at once.
+    fn joint(scales: [f64; 5], count: usize) -> (DVector<f64>, DMatrix<f64>) {
+        let mut own = vec![2.0];
+        for k in 1..5 {
+            own.push(own[k - 1] + 0.5 * scales[k] * (TIMES[k] - TIMES[k - 1]));
+        }
+        let prior = DMatrix::from_fn(5, 5, |i, j| own[i.min(j)]);
+        let h = DMatrix::from_fn(count, 5, |i, j| f64::from(u8::from(i == j)));
+        let spread = &h * &prior * h.transpose() + DMatrix::identity(count, count) * 0.7;
+        let gain = &prior * h.transpose() * spread.try_inverse().unwrap();
+        let mean = &gain * DVector::from_row_slice(&VALUES[..count]);
+        (mean, &prior - &gain * &h * &prior)
+    }
+
+    #[test]
+    fn smoothed_beliefs_are_those_of_the_joint_law() {
+        for scales in [[1.0; 5], [1.0, 1.0, 3.0, 0.2, 1.0]] {
+            let filtered = filtered(scales);
+            let all = smooth(&Walk, &filtered, None).unwrap();
+            let (mean, covariance) = joint(scales, 5);
+            for (k, found) in all.iter().enumerate() {
+                assert!((found.mean()[0] - mean[k]).abs() < 1e-12, "{k}");
+                assert!((found.covariance()[0] - covariance[(k, k)]).abs() < 1e-12, "{k}");
+            }
+            // Up to a second later: the first knows two values, the second three.
+            let lagged = smooth(&Walk, &filtered, Some(1.0)).unwrap();
+            for (k, count) in [2, 3, 3, 5, 5].into_iter().enumerate() {
+                assert!((lagged[k].mean()[0] - joint(scales, count).0[k]).abs() < 1e-12, "{k}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_told_across_a_new_start() {
+        let mut filtered = filtered([1.0; 5]);
+        filtered[3].is_new = true;
+        let all = smooth(&Walk, &filtered, None).unwrap();
+        assert_eq!(all[2], filtered[2].belief);
+        assert!(smooth(&Walk, &filtered, Some(-1.0)).is_err());
+        filtered.swap(0, 4);
+        assert!(smooth(&Walk, &filtered, None).is_err());
+        assert!(smooth(&Walk, &[], None).unwrap().is_empty());
+    }
+}
