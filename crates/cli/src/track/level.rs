@@ -8,7 +8,7 @@ use super::settings::Settings;
 use crate::Ending;
 use crate::arguments::{Model, TrackOptions};
 use crate::error::{Error, Failure};
-use crate::output::{Cell, Shape, Sheet};
+use crate::output::{Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
 use serde::Serialize;
 
