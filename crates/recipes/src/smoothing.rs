@@ -35,7 +35,12 @@ pub fn smooth<const D: usize>(
     filtered: &[Filtered<D>],
     lag: Option<f64>,
 ) -> Result<Vec<Gaussian<D>>, Error> {
-    if let Some(pair) = filtered.windows(2).find(|pair| !(pair[0].seconds <= pair[1].seconds)) {
+    if let Some(pair) = filtered.windows(2).find(|pair| {
+        pair[0]
+            .seconds
+            .partial_cmp(&pair[1].seconds)
+            .is_none_or(|order| order.is_gt())
+    }) {
         return refuse("seconds", pair[1].seconds, format!("{} or later", pair[0].seconds));
     }
     let Some(lag) = lag else {

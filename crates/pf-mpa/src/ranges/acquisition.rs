@@ -78,13 +78,10 @@ pub(super) fn hypotheses(
     for without in std::iter::once(None).chain(singles.map(Some)) {
         let ranges = left(without);
         for start in search.maxima(&ranges) {
-            let Some(best) = search.best(&start, &ranges, without, typical) else {
+            let Some(mut best) = search.best(&start, &ranges, without, typical) else {
                 continue;
             };
-            let best = Found {
-                log_evidence: best.log_evidence + penalty(without, ranges.len()),
-                ..best
-            };
+            best.log_evidence += penalty(without, ranges.len());
             let twin = found
                 .iter_mut()
                 .find(|other| other.without == without && is_same(&other.normal, &best.normal));
