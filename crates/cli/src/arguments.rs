@@ -2,6 +2,7 @@
 
 use crate::design_options::DesignOptions;
 pub(crate) use crate::fleet_options::{CentreOptions, CheckOptions, SensorOptions};
+pub(crate) use crate::ranges_options::RangesOptions;
 pub(crate) use crate::table_options::{BoundOptions, DialectOptions, ManyOptions, TableOptions};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -34,6 +35,8 @@ pub(crate) enum Task {
     Bench(BenchOptions),
     /// Estimate what sensors measure from a table (CSV) of values, of reports of few bits, or of ranges to anchors: estimates with bands.
     Track(TrackOptions),
+    /// Estimate a place from distances to anchors at known places, in the plane or in space: estimates with bands.
+    Ranges(RangesOptions),
     /// Design quantizers of few bits for one unknown that several sensors measure.
     Design(DesignOptions),
     /// Send rows from standard input or a file as frames, to a file, a pipe, UDP or a serial line.
@@ -237,7 +240,7 @@ pub(crate) enum Model {
     Acceleration,
     /// Level: Ornstein-Uhlenbeck process that returns to the mean of `--prior`.
     Returning,
-    /// Position in the plane, from ranges to anchors at known positions.
+    /// Place from ranges to anchors: the task `ranges`, which has more options.
     Ranges,
 }
 
@@ -261,12 +264,27 @@ pub(crate) struct TrackOptions {
     /// Fixed thresholds of bits in the unit of the column, as `column=2.5,*=3`. Default: the prediction.
     #[arg(long, default_value = "", value_name = "THRESHOLDS", allow_hyphen_values = true)]
     pub(crate) threshold: String,
+    /// Column with the threshold of each row's bits, which may change from row to row.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) threshold_column: Option<String>,
+    /// Column with the standard deviation of each row's values. Rows without it have the noise of `--noise`.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) accuracy_column: Option<String>,
+    /// Values are rounded to multiples of this step: a value says that the measurement is within half a step. `found`: the step is found
+    /// where it is coarser than the noise; `no`: values are not rounded. Default: `found`.
+    #[arg(long, value_name = "STEP|found|no")]
+    pub(crate) rounded: Option<String>,
+    /// An empty cell says that the measurement is within this width of the sensor's last value, as from sensors that send on change.
+    #[arg(long, value_name = "WIDTH")]
+    pub(crate) silent_within: Option<String>,
+    /// Detection limits, as `0.25..` or `0.25..40`: a value at or beyond a limit says only that the measurement is beyond it.
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
+    pub(crate) limits: Option<String>,
     /// Each row is one report: the column with the name of its sensor or anchor. Values are in the other column, or that of `--columns`.
     #[arg(long, value_name = "NAME")]
     pub(crate) by: Option<String>,
     /// Standard deviation of the measurement noise in the unit of the column, as `0.3` or `column=0.3,*=0.5`. Default: estimated from the
-    /// first 200 rows. With `--model ranges` the largest that the tracker considers (default 1.8): it estimates the deviation from a quarter
-    /// of that on.
+    /// first 200 rows. With `--model ranges` as in the task `ranges`.
     #[arg(long, default_value = "", value_name = "DEVIATION")]
     pub(crate) noise: String,
     /// Standard deviation of the level from its forecast after a time, as `0.5/1h`. Default: estimated from the first 200 rows.
@@ -282,6 +300,9 @@ pub(crate) struct TrackOptions {
     /// Default: 0, and ten times the change.
     #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
     pub(crate) slope: Option<String>,
+    /// Improve each estimate by the rows after it: by all (`all`), or by those up to a time later (`30s`). Rows are then written at the end.
+    #[arg(long, value_name = "all|LAG")]
+    pub(crate) smooth: Option<String>,
     /// The level is an angle with this period, as 360: values that differ by whole periods are equal.
     #[arg(long, value_name = "PERIOD")]
     pub(crate) period: Option<f64>,
@@ -291,14 +312,13 @@ pub(crate) struct TrackOptions {
     /// With `--model ranges`: CSV file of the anchors with columns name, x, y.
     #[arg(long, value_name = "FILE", required_if_eq("model", "ranges"))]
     pub(crate) anchors: Option<String>,
-    /// With `--model ranges`: standard deviation of the velocity along an axis, in units of length per second; a factor of four off is
-    /// enough.
-    #[arg(long, default_value_t = 1.0, value_name = "SPEED")]
-    pub(crate) speed: f64,
-    /// With `--model ranges`: correlation time of the velocity in seconds.
+    /// With `--model ranges`: as in the task `ranges`.
+    #[arg(long, value_name = "SPEED")]
+    pub(crate) speed: Option<f64>,
+    /// With `--model ranges`: as in the task `ranges`.
     #[arg(long, default_value_t = 6.0, value_name = "SECONDS")]
     pub(crate) persistence: f64,
-    /// With `--model ranges`: probability that a range is an outlier, independent of the distance.
+    /// With `--model ranges`: as in the task `ranges`.
     #[arg(long, default_value_t = 0.02, value_name = "SHARE")]
     pub(crate) outliers: f64,
     /// Draw the estimates into this SVG file.

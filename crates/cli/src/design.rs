@@ -75,6 +75,9 @@ fn sample(options: &DesignOptions, file: &str) -> Result<Prior, Error> {
             fit.deviation_standard_error
         );
     }
+    if let Some((points, _)) = prior.points() {
+        say!("sample of {}: {} different values, taken as points of mass", values.len(), points.len());
+    }
     Ok(prior)
 }
 

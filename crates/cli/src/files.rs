@@ -136,6 +136,11 @@ impl Files {
                 files.reads.extend(options.anchors.iter().map(PathBuf::from));
                 files
             }
+            Task::Ranges(options) => {
+                let mut files = Self::reading(&options.table.file).writing([&options.output, &options.plot]);
+                files.reads.push(PathBuf::from(&options.anchors));
+                files
+            }
             Task::Design(options) => {
                 let mut files = Self::default().writing([&options.output, &options.plot]);
                 files.reads.extend(options.file.iter().map(PathBuf::from));
@@ -220,6 +225,7 @@ fn table(task: &mut Task) -> Option<&mut TableOptions> {
         Task::Look(options) => Some(&mut options.table),
         Task::Bench(options) => Some(&mut options.table),
         Task::Track(TrackOptions { table, .. }) => Some(table),
+        Task::Ranges(options) => Some(&mut options.table),
         Task::Send(options) => Some(&mut options.table),
         _ => None,
     }

@@ -34,6 +34,7 @@ mod place;
 mod plan;
 mod plot;
 mod private;
+mod ranges_options;
 mod recording;
 mod report;
 mod rows;
@@ -80,6 +81,7 @@ fn run(mut task: Task) -> Result<Ending, Error> {
         Task::Pack(options) if are_several => many::pack(&options),
         Task::Track(options) if are_several => many::track(&options),
         Task::Verify(options) if are_several => many::verify(&options),
+        Task::Ranges(options) if are_several => many::ranges(&options),
         Task::Look(options) => look::run(&options),
         Task::Plan(options) => plan::run(&options),
         Task::Pack(options) => pack::run(&options),
@@ -89,6 +91,7 @@ fn run(mut task: Task) -> Result<Ending, Error> {
         Task::Verify(options) => verify::run(&options),
         Task::Bench(options) => bench::run(&options),
         Task::Track(options) => track::run(&options),
+        Task::Ranges(options) => track::ranges(&options),
         Task::Design(options) => design::run(&options),
         Task::Send(options) => send::run(&options),
         Task::Receive(options) => link::receive::run(&options),

@@ -5,7 +5,7 @@
 //! every third file, so that machines share the work.
 
 use crate::Ending;
-use crate::arguments::{ManyOptions, PackOptions, Task, TrackOptions, VerifyOptions};
+use crate::arguments::{ManyOptions, PackOptions, RangesOptions, Task, TrackOptions, VerifyOptions};
 use crate::error::Error;
 use crate::files::{identity, is_regular};
 use crate::manifest::Manifest;
@@ -71,6 +71,7 @@ pub(crate) fn are_several(task: &Task) -> bool {
     match task {
         Task::Pack(options) => of(&options.table.file, &options.many, options.output.as_ref()),
         Task::Track(options) => of(&options.table.file, &options.many, options.output.as_ref()),
+        Task::Ranges(options) => of(&options.table.file, &options.many, options.output.as_ref()),
         Task::Verify(options) => of(&options.table.file, &options.many, Some(&options.packed)),
         _ => false,
     }
@@ -293,6 +294,24 @@ pub(crate) fn track(options: &TrackOptions) -> Result<Ending, Error> {
         one.table.file.clone_from(&job.file);
         one.output = Some(job.output.clone());
         crate::track::run(&one)
+    })
+}
+
+/// Finds the places of several files.
+pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
+    if options.plot.is_some() {
+        return Err(Error::content("--plot", "several files have no picture: do one with --plot"));
+    }
+    let folder = folder(options.output.as_ref())?;
+    let many = &options.many;
+    let extension = if options.json { ".ranges.jsonl" } else { ".ranges.csv" };
+    let names = names(&options.table.file, &many.more);
+    let jobs = jobs(&names, many.shard, folder, extension)?;
+    run_with_manifest(&jobs, many, (&names, folder), "ranges", |job| {
+        let mut one = options.clone();
+        one.table.file.clone_from(&job.file);
+        one.output = Some(job.output.clone());
+        crate::track::ranges(&one)
     })
 }
 

@@ -2,7 +2,7 @@
 //! `plaza ANCHORS.csv RANGES.csv TRUTH.csv`: columns `anchor,x_m,y_m`; `t_s,anchor,range_m`; `t_s,x_m,y_m,...`.
 
 use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use std::error::Error;
 
 fn rows<T: serde::de::DeserializeOwned>(file: Option<&String>) -> Result<Vec<T>, Box<dyn Error>> {
@@ -32,15 +32,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     ranges.sort_by(|a, b| a.0.total_cmp(&b.0));
     println!("RMS error / m   NEES   losses   bits per range   speed / m/s   ranges");
     for travel in std::iter::once(Travel::Full).chain((1..=4).map(Travel::Bits)) {
-        let places = anchors.iter().map(|(name, x, y)| (name.clone(), Vector2::new(*x, *y)));
+        let places = anchors
+            .iter()
+            .map(|(name, x, y)| (name.clone(), Vector3::new(*x, *y, 0.0)));
         let mut tracker = RangeTracker::new(places, travel, RangeSettings::default())?;
-        let mut rng = fewbits_monte_carlo::Stream::new(1).rng();
         let (mut squares, mut nees, mut speed) = (Vec::new(), Vec::new(), 0.0);
         for (time, anchor, range) in &ranges {
-            if let Some(found) = tracker.push(&mut rng, *time, anchor, *range)? {
+            if let Some(found) = tracker.push(*time, anchor, *range)? {
                 let place = place_at(&truth, *time).ok_or("no true positions")?;
-                squares.push((found.position - place).norm_squared());
-                nees.extend(found.normalised_error(&place));
+                squares.push((found.position.xy() - place).norm_squared());
+                nees.extend(found.normalised_error(&place.push(0.0)));
                 speed = found.speed;
             }
         }

@@ -42,7 +42,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: radio, energy and delays (`fewbits-network`); more than two targets; positions in three dimensions.
+//! Not here: radio, energy and delays (`fewbits-network`); more than two targets.
 
 /// Parts of the trackers, for the comparisons in `fewbits-baselines`. No promise is made of them.
 #[doc(hidden)]
@@ -59,8 +59,8 @@ mod guided;
 pub mod leader;
 mod linearised;
 mod quantized;
+mod ranges;
 mod rao_blackwell;
-mod recording;
 mod sensor;
 mod target;
 mod tracker;
@@ -74,8 +74,8 @@ pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
 pub use guided::{GuidedGaussian, GuidedWorkspace};
 pub use linearised::{Linearised, QuantizationNoise, Velocity};
 pub use quantized::{IntervalRule, QuantizedRange, RangeReference};
+pub use ranges::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
 pub use rao_blackwell::{RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
-pub use recording::{RangeEstimate, RangeSettings, RangeTracker, Travel};
 pub use sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
 pub use target::{Manoeuvres, Target, WithManoeuvre};
 pub use tracker::{GaussianTracker, Network, POSITION, Ranged, Reports, Step, StepInfo, Tracker};

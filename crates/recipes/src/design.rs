@@ -71,11 +71,81 @@ impl Task {
             .with_links(self.links.clone())
             .map_err(refused(failed))?
             .with_cells(self.cells);
+        if let Some(start) = self.between_points() {
+            request = request.with_start(start).map_err(refused(failed))?;
+        }
         if let Some(limit) = self.time_limit {
             request = request.with_time_limit(limit);
         }
         request.with_progress(progress).run().map_err(refused(failed))
     }
+}
+
+/// Number of different values up to which a sample is taken to be points of mass, and how often each must occur on average.
+const MOST_POINTS: usize = 16;
+const LEAST_TIMES: usize = 8;
+/// Bits of the longest word whose cells the search improves.
+const LONGEST_WORD: u32 = 6;
+
+/// Breakpoints of a sensor, and the word of each cell.
+type WordedCells = (Vec<f64>, Vec<usize>);
+
+impl Task {
+    /// Cells that part the points of a discrete prior, as a start of the search: where noise is small beside the gaps, the criterion is flat
+    /// between them. `None` for other priors and budgets.
+    fn between_points(&self) -> Option<Vec<WordedCells>> {
+        let (values, probabilities) = self.prior.points()?;
+        let bits = |sensor: usize| match &self.bits {
+            BitBudget::Each(bits) => Some(*bits),
+            BitBudget::PerSensor(bits) => bits.get(sensor).copied(),
+            BitBudget::Total(_) => None,
+        };
+        let mut points: Vec<(f64, f64)> = values.iter().copied().zip(probabilities.iter().copied()).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let cells = |sensor: usize| {
+            let bits = bits(sensor).filter(|bits| (1..=LONGEST_WORD).contains(bits))?;
+            let breakpoints = parted(&points, 1 << bits);
+            // Neighbours differ in one bit.
+            let words = (0..=breakpoints.len()).map(|cell| cell ^ (cell >> 1)).collect();
+            Some((breakpoints, words))
+        };
+        (0..self.deviations.len()).map(cells).collect()
+    }
+}
+
+/// Middles between sorted `(value, weight)`, at most `cells - 1`, with the smallest weighted squares of distances from the means of the cells.
+fn parted(points: &[(f64, f64)], cells: usize) -> Vec<f64> {
+    let n = points.len();
+    let cost = |from: usize, to: usize| {
+        let (weight, sum) = points[from..to]
+            .iter()
+            .fold((0.0, 0.0), |(w, s), (x, p)| (w + p, s + p * x));
+        let mean = if weight > 0.0 { sum / weight } else { 0.0 };
+        points[from..to]
+            .iter()
+            .map(|(x, p)| p * (x - mean) * (x - mean))
+            .sum::<f64>()
+    };
+    // `best[c][to]`: cost of the first `to` points in `c + 1` cells, none of them empty, and where the last cell begins.
+    let mut best: Vec<Vec<(f64, usize)>> = vec![(0..=n).map(|to| (cost(0, to), 0)).collect()];
+    for c in 1..cells.min(n) {
+        let last = &best[c - 1];
+        let least = |to: usize| {
+            let all = (c..to).map(|from| (last[from].0 + cost(from, to), from));
+            all.fold((f64::INFINITY, 0), |least, one| if one.0 < least.0 { one } else { least })
+        };
+        let row = (0..=n).map(least).collect();
+        best.push(row);
+    }
+    let (mut edges, mut to) = (Vec::new(), n);
+    for row in best.iter().skip(1).rev() {
+        to = row[to].1;
+        if to > 0 {
+            edges.push(0.5 * (points[to - 1].0 + points[to].0));
+        }
+    }
+    edges.reverse();
+    edges
 }
 
 fn refused<E: std::error::Error + Send + Sync + 'static>(what: &'static str) -> impl Fn(E) -> Error {
@@ -141,11 +211,33 @@ pub fn prior(text: &str) -> Result<Prior, Error> {
     prior.map_err(refused("prior"))
 }
 
-/// The prior of a sample of the unknown.
+/// The prior of a sample of the unknown. A sample of few different values, each of them often, is that of a discrete unknown: its values are
+/// points of mass with their frequencies. Other samples are smoothed into a density.
 ///
 /// # Errors
 /// If the sample is too small, constant or not finite.
 pub fn prior_of(sample: &[f64]) -> Result<Prior, Error> {
+    let mut sorted = sample.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let mut points: Vec<(f64, usize)> = Vec::new();
+    for value in sorted {
+        match points.last_mut() {
+            Some((known, count)) if *known == value => *count += 1,
+            _ => points.push((value, 1)),
+        }
+        if points.len() > MOST_POINTS {
+            break;
+        }
+    }
+    let are_points = (2..=MOST_POINTS).contains(&points.len()) && sample.len() >= LEAST_TIMES * points.len();
+    if are_points && sample.iter().all(|value| value.is_finite()) {
+        let shares = points
+            .iter()
+            .map(|(_, count)| *count as f64 / sample.len() as f64)
+            .collect();
+        let values = points.iter().map(|(value, _)| *value).collect();
+        return Prior::discrete(values, shares).map_err(refused("the sample cannot be a prior"));
+    }
     Prior::sample(sample).map_err(refused("the sample cannot be a prior"))
 }
 

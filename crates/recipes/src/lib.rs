@@ -42,6 +42,8 @@
 //! | rows into a recording | [`pack`] |
 //! | a recording against its table | [`verify`] |
 //! | quantizers for an unknown that several sensors measure | [`design`] |
+//! | estimates that know what came after them | [`smoothing`] |
+//! | readings that state their own accuracy, rounding and limits | [`stated`] |
 //!
 //! Not here: files, printing and options (`fewbits-cli`), the format (`fewbits-record`), how values are predicted and coded
 //! (`fewbits-adaptive`).
@@ -52,7 +54,9 @@ mod error;
 pub mod names;
 pub mod pack;
 pub mod plan;
+pub mod smoothing;
 pub mod source;
+pub mod stated;
 pub mod survey;
 pub mod verify;
 

@@ -1,15 +1,18 @@
 //! The fusion centre for sensors that all measure the same level.
 
-use super::rows::Instant;
+use super::meaning::Seat;
+use super::rows::{Instant, Said};
 use super::sensors;
 use crate::arguments::Model;
 use crate::error::Failure;
 use crate::report::Report;
-use fewbits_core::{Gaussian, Link, Observation, SensorNode};
+use fewbits_core::{Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode};
 use fewbits_filters::calibration::{self, Calibration, Level, Number};
-use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, Slot};
+use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, Reporting, Slot};
 use fewbits_filters::{Error as FilterError, MomentFilter};
-use fewbits_models::ContinuousLinear;
+use fewbits_models::{ContinuousLinear, LinearSensor};
+use fewbits_recipes::smoothing::{Filtered, smooth};
+use fewbits_recipes::stated::Stating;
 use nalgebra::{SMatrix, SVector, Vector1};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -22,6 +25,8 @@ const ALARMS: FalseAlarms = FalseAlarms {
     sensor: 1e-6,
     centre: 1e-5,
 };
+/// Bits of a value.
+const VALUE_BITS: usize = 64;
 /// Standard deviation of an unknown slope, in multiples of the change per time.
 const STEEPEST: f64 = 10.0;
 
@@ -40,6 +45,8 @@ pub(super) struct World {
     pub(super) period: Option<f64>,
     /// Whether the change is adapted during the run.
     pub(super) is_learning: bool,
+    /// Whether all beliefs are kept, to be smoothed.
+    pub(super) is_smoothed: bool,
     /// Seconds between rows.
     pub(super) interval: f64,
 }
@@ -107,19 +114,6 @@ impl World {
     }
 }
 
-/// Model of a sensor.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Seat {
-    pub(super) sends: Report,
-    /// Standard deviation of its measurement noise.
-    pub(super) noise: f64,
-    pub(super) threshold: Option<f64>,
-    /// Share of its reports that do not arrive.
-    pub(super) loss: f64,
-    /// Offset that is subtracted from its measurements.
-    pub(super) offset: f64,
-}
-
 /// Results of one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Step {
@@ -147,6 +141,8 @@ pub(super) trait Estimator {
     fn health(&self, sensor: usize) -> (f64, bool);
     /// Number of its reports that were rejected.
     fn rejected(&self, sensor: usize) -> u64;
+    /// The estimates of all steps given all reports, or those up to so many seconds later.
+    fn smoothed(&self, lag: Option<f64>) -> Result<Vec<Vec<(f64, f64)>>, Failure>;
 }
 
 /// Purpose of the centre.
@@ -175,6 +171,8 @@ pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, 
 struct Member {
     seat: Seat,
     node: Box<dyn SensorNode<1>>,
+    /// Its last value, less its offset.
+    last: Option<f64>,
 }
 
 struct Centre<const D: usize> {
@@ -183,6 +181,16 @@ struct Centre<const D: usize> {
     purpose: Use,
     period: Option<f64>,
     rng: Pcg64Mcg,
+    world: ContinuousLinear<D>,
+    /// All beliefs, if they are to be smoothed.
+    kept: Option<Vec<Filtered<D>>>,
+}
+
+/// Mean and standard deviation of each coordinate.
+fn moments<const D: usize>(belief: &Gaussian<D>) -> Vec<(f64, f64)> {
+    (0..D)
+        .map(|i| (belief.mean()[i], belief.covariance()[(i, i)].sqrt()))
+        .collect()
 }
 
 impl<const D: usize> Centre<D> {
@@ -204,13 +212,28 @@ impl<const D: usize> Centre<D> {
             purpose,
             period: world.period,
             rng,
+            world: model,
+            kept: world.is_smoothed.then(Vec::new),
         })
     }
 
-    fn slot(&mut self, sensor: usize, cell: Option<f64>) -> Result<Slot, Failure> {
+    fn slot(&mut self, sensor: usize, cell: Option<f64>, said: Said) -> Result<Slot, Failure> {
         let number = sensor as u32;
         let member = &mut self.members[sensor];
-        let feedback = match member.seat.threshold {
+        if member.seat.is_stated() {
+            let expected = self.centre.estimate().mean()[0];
+            let cell = cell.filter(|cell| cell.is_finite()).map(|cell| {
+                let cell = cell - member.seat.offset;
+                expected + calibration::wrapped(cell - expected, self.period)
+            });
+            let reading = member.seat.reading(cell, said, member.last);
+            member.last = cell.or(member.last);
+            let bits = reading
+                .map(|reading| reading.to_bits(&NumberFormat::Double))
+                .transpose()?;
+            return Ok(Slot::new(number, self.centre.feedback(number)?, Observation::from(bits)));
+        }
+        let feedback = match said.threshold.or(member.seat.threshold) {
             // Only bits are told a threshold.
             Some(threshold) if member.seat.sends == Report::Sign => sensors::double(threshold - member.seat.offset)?,
             _ => self.centre.feedback(number)?,
@@ -243,10 +266,19 @@ impl<const D: usize> Estimator for Centre<D> {
         };
         let seat = Seat { sends, ..seat };
         let variance = seat.noise * seat.noise;
-        let remote = sends.remote::<D>(0, variance, Link::lossy(seat.loss)?)?;
-        self.centre.join_boxed(self.members.len() as u32, remote)?;
+        let (number, link) = (self.members.len() as u32, Link::lossy(seat.loss)?);
+        if seat.is_stated() {
+            let usual = seat.usual() * seat.usual();
+            let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(usual)?, [0])?;
+            let nothing = |_: &Gaussian<D>, _: &Gaussian<1>| ();
+            let remote = Reporting::new(sensing, Stating::new(usual)?, link, nothing).sending_values();
+            self.centre.join_boxed(number, Box::new(remote))?;
+        } else {
+            self.centre.join_boxed(number, sends.remote::<D>(0, variance, link)?)?;
+        }
         self.members.push(Member {
             node: sends.node::<D>(0, variance)?,
+            last: None,
             seat,
         });
         Ok(())
@@ -259,10 +291,24 @@ impl<const D: usize> Estimator for Centre<D> {
     fn step(&mut self, instant: &Instant) -> Result<Step, Failure> {
         // First the forecast: sensors compare with it, so the feedback of all slots is made before any report is used.
         self.centre.advance(&mut self.rng, instant.seconds)?;
-        let slots = instant.reports.iter().map(|(sensor, cell)| self.slot(*sensor, *cell));
-        let slots: Vec<Slot> = slots.collect::<Result<_, _>>()?;
-        let received = slots.iter().filter_map(|slot| slot.observation.received());
-        let (bits, reports) = received.fold((0, 0), |(bits, reports), report| (bits + report.bits(), reports + 1));
+        let mut slots = Vec::with_capacity(instant.reports.len());
+        let (mut bits, mut reports) = (0, 0);
+        for (i, (sensor, cell)) in instant.reports.iter().enumerate() {
+            let slot = self.slot(*sensor, *cell, instant.said.get(i).copied().unwrap_or_default())?;
+            if let Some(report) = slot.observation.received() {
+                let is_stated = self.members[*sensor].seat.is_stated();
+                // What a value means beside its number is known without being sent.
+                bits += if !is_stated {
+                    report.bits()
+                } else if cell.is_some() {
+                    VALUE_BITS
+                } else {
+                    0
+                };
+                reports += usize::from(!is_stated || cell.is_some());
+            }
+            slots.push(slot);
+        }
         let received = self.centre.receive(&mut self.rng, &slots)?;
         let events = received.events.into_iter().map(|event| match event {
             Event::Dead(sensor) => ("dead", Some(sensor as usize)),
@@ -280,10 +326,18 @@ impl<const D: usize> Estimator for Centre<D> {
         let events: Vec<_> = events.collect();
         let rejected = events.iter().filter(|(event, _)| *event == "rejected").count();
         let belief = self.centre.estimate();
+        if let Some(kept) = &mut self.kept {
+            kept.push(Filtered {
+                seconds: instant.seconds,
+                belief,
+                noise_scale: self.centre.noise_scale(),
+                is_new: events
+                    .iter()
+                    .any(|(event, _)| matches!(*event, "reopened" | "reacquired")),
+            });
+        }
         Ok(Step {
-            estimate: (0..D)
-                .map(|i| (belief.mean()[i], belief.covariance()[(i, i)].sqrt()))
-                .collect(),
+            estimate: moments(&belief),
             bits,
             reports,
             rejected,
@@ -299,7 +353,13 @@ impl<const D: usize> Estimator for Centre<D> {
         let excluded = self.centre.is_excluded(number).unwrap_or(true);
         (self.centre.working(number).unwrap_or(0.0), !dead && !excluded)
     }
+
     fn rejected(&self, sensor: usize) -> u64 {
         self.centre.rejected(sensor as u32).unwrap_or(0)
+    }
+
+    fn smoothed(&self, lag: Option<f64>) -> Result<Vec<Vec<(f64, f64)>>, Failure> {
+        let beliefs = smooth(&self.world, self.kept.as_deref().unwrap_or_default(), lag)?;
+        Ok(beliefs.iter().map(moments).collect())
     }
 }

@@ -1,14 +1,14 @@
 //! Tracking of a level that sensors measure: estimates with bands, row by row.
 
 use super::centre::{Estimator, Step, Use, centre};
-use super::report::{BAND, first_cell, first_name, summarise};
+use super::report::{BAND, cells, first_cell, first_name, summarise};
 use super::rhythm::Rhythm;
 use super::rows::{Instant, Instants};
 use super::settings::Settings;
 use crate::Ending;
 use crate::arguments::{Model, TrackOptions};
 use crate::error::{Error, Failure};
-use crate::output::{Cell, Shape, Sheet};
+use crate::output::{Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
 use serde::Serialize;
 
@@ -264,7 +264,9 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
         .chain(last);
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
+    let lag = options.smooth.as_deref().map(lag).transpose()?;
     let mut rhythm = options.by.is_some().then(Rhythm::default);
+    let mut waiting = Vec::new();
     while let Some(mut instant) = instants.next()? {
         if let Some(rhythm) = &mut rhythm {
             rhythm.fill(&mut instant);
@@ -278,24 +280,22 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
                 .filter(|cell| cell.is_finite());
             values.for_each(|value| run.measured.push((instant.seconds, value)));
         }
-        // An angle is written within its first period.
-        let turns = options
-            .period
-            .map_or(0.0, |period| period * (step.estimate[0].0 / period).floor());
-        let estimates = step.estimate.iter().enumerate().flat_map(|(i, (mean, deviation))| {
-            let mean = &(if i == 0 { mean - turns } else { *mean });
-            [*mean, mean - BAND * deviation, mean + BAND * deviation].map(|number| Cell::Number(Some(number)))
-        });
-        let last = [
-            Cell::Whole(step.reports as i64),
-            Cell::Whole(step.rejected as i64),
-            Cell::Whole(step.bits as i64),
-            Cell::Whole(step.used as i64),
-            Cell::Number(Some(step.noise_scale)),
-            Cell::Text(text(&step, &instants.names)),
-        ];
-        let first = first_cell(&instants, instant.time);
-        sheet.write(std::iter::once(first).chain(estimates).chain(last))?;
+        let first = first_cell(&instants, instant.time.clone());
+        let events = text(&step, &instants.names);
+        if lag.is_some() {
+            waiting.push((first, step, events));
+        } else {
+            sheet.write(cells(options, first, &step.estimate, &step, events))?;
+        }
+    }
+    if let Some(lag) = lag {
+        let smoothed = run.centre.smoothed(lag).map_err(|source| Error::Refused {
+            what: "the estimates cannot be smoothed",
+            source,
+        })?;
+        for ((first, step, events), estimate) in waiting.into_iter().zip(&smoothed) {
+            sheet.write(cells(options, first, estimate, &step, events))?;
+        }
     }
     sheet.finish()?;
     run.summary.copies = instants.copies;
@@ -305,6 +305,16 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     }
     summarise(&summary, &lines(&summary), options.json)?;
     Ok(Ending::Good)
+}
+
+/// Parses `all`, or a time as `30s`: the time after which rows no longer count.
+fn lag(text: &str) -> Result<Option<f64>, Error> {
+    if text == "all" {
+        return Ok(None);
+    }
+    const EXPECTED: &str = "`all`, or a time, as `30s`";
+    let time = humantime::parse_duration(text).map_err(|_| Error::option("--smooth", text, EXPECTED))?;
+    Ok(Some(time.as_secs_f64()))
 }
 
 /// A number in four significant digits.

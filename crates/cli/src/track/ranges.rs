@@ -1,24 +1,23 @@
-//! Tracking of a position in the plane by distances to anchors.
+//! Tracking of a position by distances to anchors.
 
-use super::report::{BAND, first_cell, first_name, summarise};
+use super::report::{first_cell, first_name, summarise};
 use super::rows::Instants;
 use super::sensors;
 use crate::Ending;
-use crate::arguments::{TableOptions, TrackOptions};
+use crate::arguments::{RangesOptions, TableOptions, TrackOptions};
 use crate::error::Error;
 use crate::input::Table;
+use crate::numbers::{mean_and_deviation, number};
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
 use crate::report::Report;
-use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
+use fewbits_pf_mpa::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
 use fewbits_record::TimeBase;
-use nalgebra::Vector2;
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 /// Name and place of an anchor.
-type Anchor = (String, Vector2<f64>);
+type Anchor = (String, Vector3<f64>);
 
 #[derive(Serialize)]
 struct Summary {
@@ -28,6 +27,8 @@ struct Summary {
     bits_per_range: f64,
     /// Number of rows without an estimate, during acquisition of the position.
     searching: u64,
+    /// Number of rows in which several places explain the ranges.
+    ambiguous: u64,
     losses: usize,
     anchors: Vec<AnchorSummary>,
 }
@@ -36,9 +37,42 @@ struct Summary {
 struct AnchorSummary {
     name: String,
     ranges: usize,
+    /// Probability at the end that its ranges depend on the distance.
+    works: f64,
 }
 
-/// Reads names and places: the first column, and `x` and `y` or the second and third.
+/// The options of `ranges` that those of `track --model ranges` stand for.
+pub(super) fn options(track: &TrackOptions, anchors: &str) -> Result<RangesOptions, Error> {
+    if track.reports {
+        return Err(Error::option("--reports", "--model ranges", "measured ranges, which this command quantizes"));
+    }
+    const EXPECTED: &str = "one standard deviation for all anchors";
+    let noise = (!track.noise.is_empty())
+        .then(|| number("--noise", &track.noise, EXPECTED))
+        .transpose()?;
+    Ok(RangesOptions {
+        table: track.table.clone(),
+        many: track.many.clone(),
+        anchors: anchors.to_owned(),
+        by: track.by.clone(),
+        send: track.send.clone(),
+        noise,
+        speed: track.speed,
+        bias: None,
+        anchor_bias: None,
+        scale: RangeSettings::default().scale,
+        height: None,
+        unknown_clock: false,
+        persistence: track.persistence,
+        outliers: track.outliers,
+        silence: RangeSettings::default().silence,
+        plot: track.plot.clone(),
+        json: track.json,
+        output: track.output.clone(),
+    })
+}
+
+/// Reads names and places: the first column, and the two or three after it.
 fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
     let options = |columns: Vec<String>| TableOptions {
         file: file.to_owned(),
@@ -46,73 +80,106 @@ fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
         ..TableOptions::default()
     };
     let names = Table::open(&options(Vec::new()))?.names;
-    let [name, x, y] = names.as_slice() else {
-        let problem = format!("columns {}: three are expected, name, x and y", names.join(", "));
-        return Err(Error::content(file, problem));
+    let [name, places @ ..] = names.as_slice() else {
+        return Err(Error::empty(file, "columns"));
     };
-    let mut table = Table::open(&options(vec![x.clone(), y.clone()]))?.with_labels(name)?;
+    if !(2..=3).contains(&places.len()) {
+        let problem = format!("columns {}: three or four are expected, name, x, y and perhaps z", names.join(", "));
+        return Err(Error::content(file, problem));
+    }
+    let mut table = Table::open(&options(places.to_vec()))?.with_labels(name)?;
     table.require_numbers()?;
     let mut anchors: Vec<Anchor> = Vec::new();
     while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
         let (label, row) = (table.label().to_owned(), table.row());
-        let problem = match cells.as_slice() {
-            _ if anchors.iter().any(|(known, _)| *known == label) => format!("anchor `{label}` stands here twice"),
-            [Some(x), Some(y)] if x.is_finite() && y.is_finite() => {
-                anchors.push((label, Vector2::new(*x, *y)));
-                continue;
-            }
-            _ => format!("anchor `{label}` has no place: write x and y"),
+        let is_whole = cells.iter().all(|cell| cell.is_some_and(f64::is_finite));
+        let at = |i: usize| cells.get(i).copied().flatten().unwrap_or(0.0);
+        let problem = if anchors.iter().any(|(known, _)| *known == label) {
+            format!("anchor `{label}` stands here twice")
+        } else if is_whole {
+            anchors.push((label, Vector3::new(at(0), at(1), at(2))));
+            continue;
+        } else {
+            format!("anchor `{label}` has no place: write {}", places.join(", "))
         };
         return Err(Error::content(file, format_args!("row {row}: {problem}")));
     }
     Ok(anchors)
 }
 
+fn settings(options: &RangesOptions) -> Result<RangeSettings, Error> {
+    const EXPECTED: &str =
+        "a known height as `0.3`, or one that is estimated from a mean and its standard deviation, as `0.5±0.5`";
+    let height = match options.height.as_deref() {
+        None => Height::Unsaid,
+        Some(text) if text.contains('±') => {
+            let (mean, deviation) = mean_and_deviation("--height", text)?;
+            Height::Estimated { mean, deviation }
+        }
+        Some(text) => Height::Known(number("--height", text, EXPECTED)?),
+    };
+    Ok(RangeSettings {
+        noise: options.noise,
+        speed: options.speed,
+        bias: options.bias,
+        anchor_bias: options.anchor_bias,
+        scale: options.scale,
+        outliers: options.outliers,
+        persistence: options.persistence,
+        silence: options.silence,
+        height,
+        unknown_clock: options.unknown_clock,
+        ..RangeSettings::default()
+    })
+}
+
+/// Names of the columns behind the first.
+fn columns(axes: usize) -> Vec<String> {
+    let axes = &["x", "y", "z"][..axes];
+    let bands = axes
+        .iter()
+        .flat_map(|axis| [format!("{axis}_low"), format!("{axis}_high")]);
+    let rest = ["bias", "scale", "noise", "speed", "places", "ranges", "events"];
+    axes.iter()
+        .map(|axis| (*axis).to_owned())
+        .chain(bands)
+        .chain(rest.map(str::to_owned))
+        .collect()
+}
+
+/// Cells of an estimate, without the last two columns.
+fn cells(found: Option<&RangeEstimate>, axes: usize) -> Vec<Cell> {
+    let Some(found) = found else {
+        return vec![Cell::Number(None); 3 * axes + 5];
+    };
+    let numbers = (0..axes)
+        .map(|i| found.position[i])
+        .chain(found.bands[..axes].iter().flat_map(|(low, high)| [*low, *high]))
+        .chain([found.bias, found.scale, found.noise, found.speed]);
+    let mut cells: Vec<Cell> = numbers.map(|number| Cell::Number(Some(number))).collect();
+    cells.push(Cell::Whole(found.places as i64));
+    cells
+}
+
 /// Runs the task.
-pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) -> Result<Ending, Error> {
+pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<Ending, Error> {
+    let file = &options.anchors;
     let anchors = read_anchors(file)?;
     let travel = match sensors::parse(&options.send)? {
         Report::Value | Report::Censored { .. } => Travel::Full,
         Report::Sign => Travel::Bits(1),
         Report::Word { bits } => Travel::Bits(bits),
     };
-    if options.reports {
-        return Err(Error::option("--reports", "--model ranges", "measured ranges, which this command quantizes"));
-    }
-    let mut settings = RangeSettings {
-        outliers: options.outliers,
-        speed: options.speed,
-        persistence: options.persistence,
-        ..RangeSettings::default()
-    };
-    if !options.noise.is_empty() {
-        const EXPECTED: &str = "one standard deviation for all anchors";
-        let noise = options.noise.parse();
-        settings.noise = noise.map_err(|_| Error::option("--noise", &options.noise, EXPECTED))?;
-    }
-    let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings)
+    let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings(options)?)
         .map_err(Error::refused("the tracker of ranges is refused"))?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
     if let Some(name) = instants.names.iter().find(|name| known(name).is_none()) {
         return Err(unknown(instants.file(), name, file));
     }
-    let mut rng = Pcg64Mcg::seed_from_u64(0);
-    let columns = [
-        first_name(&instants),
-        "x",
-        "y",
-        "x_low",
-        "x_high",
-        "y_low",
-        "y_high",
-        "bias",
-        "scale",
-        "noise",
-        "speed",
-        "ranges",
-        "events",
-    ];
-    let names = columns.map(str::to_owned).to_vec();
+    let axes = tracker.coordinates();
+    let names = std::iter::once(first_name(&instants).to_owned())
+        .chain(columns(axes))
+        .collect();
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names)?;
     let mut summary = Summary {
         rows: 0,
@@ -120,12 +187,14 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
         bits: 0,
         bits_per_range: 0.0,
         searching: 0,
+        ambiguous: 0,
         losses: 0,
         anchors: anchors
             .iter()
             .map(|(name, _)| AnchorSummary {
                 name: name.clone(),
                 ranges: 0,
+                works: 1.0,
             })
             .collect(),
     };
@@ -140,7 +209,7 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
             let Some(anchor) = known(name) else {
                 return Err(unknown(instants.file(), name, file));
             };
-            let pushed = tracker.push(&mut rng, instant.seconds, name, range);
+            let pushed = tracker.push(instant.seconds, name, range);
             let estimate = pushed.map_err(|source| Error::Row {
                 file: instants.file().to_owned(),
                 row: instant.row,
@@ -156,52 +225,66 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
         }
         summary.rows += 1;
         summary.ranges += ranges;
-        let cells: [Option<f64>; 10] = match &found {
+        match &found {
             Some(found) => {
-                let (p, d) = (found.position, [0, 1].map(|i| found.covariance[(i, i)].sqrt()));
-                path.push((p, d));
-                let band = |i: usize, sign: f64| Some(p[i] + sign * BAND * d[i]);
-                [
-                    Some(p[0]),
-                    Some(p[1]),
-                    band(0, -1.0),
-                    band(0, 1.0),
-                    band(1, -1.0),
-                    band(1, 1.0),
-                    Some(found.bias),
-                    Some(found.scale),
-                    Some(found.noise),
-                    Some(found.speed),
-                ]
+                let deviations = [0, 1].map(|i| found.covariance[(i, i)].sqrt());
+                path.push((found.position.xy(), deviations));
+                if found.places > 1 {
+                    summary.ambiguous += 1;
+                    if events.is_empty() {
+                        events = "several places";
+                    }
+                }
             }
             None => {
                 summary.searching += 1;
                 events = "searching";
-                [None; 10]
             }
-        };
+        }
         let first = first_cell(&instants, instant.time);
         let last = [Cell::Whole(ranges as i64), Cell::Text(events.to_owned())];
-        sheet.write(std::iter::once(first).chain(cells.map(Cell::Number)).chain(last))?;
+        sheet.write(std::iter::once(first).chain(cells(found.as_ref(), axes)).chain(last))?;
     }
     sheet.finish()?;
     (summary.bits, summary.losses) = (tracker.bits(), tracker.losses());
     summary.bits_per_range = summary.bits as f64 / (summary.ranges as f64).max(1.0);
+    for anchor in &mut summary.anchors {
+        anchor.works = tracker
+            .works(&anchor.name)
+            .map_err(Error::refused("an anchor is refused"))?;
+    }
     if summary.rows == 0 {
         return Err(Error::empty(instants.file(), "rows"));
     }
     if let Some(file) = &options.plot {
         picture(&anchors, path.points(), &summary).save(file)?;
     }
-    let lines = [
+    summarise(&summary, &lines(&summary, &tracker, options.silence), options.json)?;
+    Ok(Ending::Good)
+}
+
+fn lines(summary: &Summary, tracker: &RangeTracker, silence: f64) -> Vec<String> {
+    let mut lines = vec![
         format!("{} rows, {} ranges of {:.2} bits on average", summary.rows, summary.ranges, summary.bits_per_range),
         format!("{} rows without a place, track lost {} times", summary.searching, summary.losses),
     ];
-    let silent = summary.anchors.iter().filter(|anchor| anchor.ranges == 0);
-    let silent = silent.map(|anchor| format!("no range from anchor {}", anchor.name));
-    let lines: Vec<String> = lines.into_iter().chain(silent).collect();
-    summarise(&summary, &lines, options.json)?;
-    Ok(Ending::Good)
+    if summary.searching == summary.rows {
+        lines.push(format!("a place needs ranges of {} anchors within {silence} s", tracker.needed()));
+    }
+    if summary.ambiguous > 0 {
+        lines.push(format!(
+            "{} rows with several places that explain the ranges: the band holds them",
+            summary.ambiguous
+        ));
+    }
+    for anchor in &summary.anchors {
+        if anchor.ranges == 0 {
+            lines.push(format!("no range from anchor {}", anchor.name));
+        } else if anchor.works < 0.5 {
+            lines.push(format!("anchor {} contradicts the others and is not used", anchor.name));
+        }
+    }
+    lines
 }
 
 fn unknown(table: &str, name: &str, anchors: &str) -> Error {
@@ -218,7 +301,7 @@ fn picture(anchors: &[Anchor], path: &[(Vector2<f64>, [f64; 2])], summary: &Summ
         for axis in 0..2 {
             let mut ends = [(place.x, place.y); 2];
             for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
-                let step = sign * BAND * deviations[axis];
+                let step = sign * super::report::BAND * deviations[axis];
                 *end = if axis == 0 {
                     (end.0 + step, end.1)
                 } else {

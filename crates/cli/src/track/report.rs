@@ -1,6 +1,8 @@
 //! Common output of both tasks: the first cell of a row, bands, a summary.
 
+use super::centre::Step;
 use super::rows::Instants;
+use crate::arguments::TrackOptions;
 use crate::error::Error;
 use crate::output::Cell;
 use crate::say::say;
@@ -30,4 +32,32 @@ pub(super) fn summarise(summary: &impl serde::Serialize, lines: &[String], json:
         lines.iter().for_each(|line| say!("{line}"));
     }
     Ok(())
+}
+
+/// The cells of a row of a level.
+pub(super) fn cells(
+    options: &TrackOptions,
+    first: Cell,
+    estimate: &[(f64, f64)],
+    step: &Step,
+    events: String,
+) -> Vec<Cell> {
+    // An angle is written within its first period.
+    let turns = match (options.period, estimate.first()) {
+        (Some(period), Some((level, _))) => period * (level / period).floor(),
+        _ => 0.0,
+    };
+    let estimates = estimate.iter().enumerate().flat_map(|(i, (mean, deviation))| {
+        let mean = if i == 0 { mean - turns } else { *mean };
+        [mean, mean - BAND * deviation, mean + BAND * deviation].map(|number| Cell::Number(Some(number)))
+    });
+    let last = [
+        Cell::Whole(step.reports as i64),
+        Cell::Whole(step.rejected as i64),
+        Cell::Whole(step.bits as i64),
+        Cell::Whole(step.used as i64),
+        Cell::Number(Some(step.noise_scale)),
+        Cell::Text(events),
+    ];
+    std::iter::once(first).chain(estimates).chain(last).collect()
 }

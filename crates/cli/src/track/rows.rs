@@ -14,6 +14,38 @@ const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)
 /// Index of each sensor, and what it reported; `None` if the cell is empty.
 type Reports = Vec<(usize, Option<f64>)>;
 
+/// Which columns of a table are no sensors.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Kind {
+    /// Names of the sensors, if each row is one report.
+    pub(super) by: Option<String>,
+    /// Standard deviations of the row's values.
+    pub(super) accuracy: Option<String>,
+    /// Thresholds of the row's bits.
+    pub(super) threshold: Option<String>,
+}
+
+impl Kind {
+    pub(super) fn of(options: &TrackOptions) -> Self {
+        Self {
+            by: options.by.clone(),
+            accuracy: options.accuracy_column.clone(),
+            threshold: options.threshold_column.clone(),
+        }
+    }
+
+    fn columns(&self) -> impl Iterator<Item = &String> {
+        self.accuracy.iter().chain(&self.threshold)
+    }
+}
+
+/// What a row says of its own reports.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Said {
+    pub(super) accuracy: Option<f64>,
+    pub(super) threshold: Option<f64>,
+}
+
 /// All reports of one time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Instant {
@@ -25,6 +57,8 @@ pub(super) struct Instant {
     pub(super) row: u64,
     /// Index of each sensor, and what it reported; `None` if the cell is empty.
     pub(super) reports: Vec<(usize, Option<f64>)>,
+    /// What the rows of these reports say of them, as many.
+    pub(super) said: Vec<Said>,
 }
 
 /// A table as instants.
@@ -32,6 +66,8 @@ pub(super) struct Instants {
     table: Table,
     base: TimeBase,
     is_long: bool,
+    /// Places of the columns that are no sensors: accuracy, threshold.
+    own: [Option<usize>; 2],
     /// Seconds of a tick.
     tick: f64,
     first: Option<i64>,
@@ -50,26 +86,45 @@ pub(super) struct Instants {
 }
 
 impl Instants {
-    pub(super) fn open(options: &TrackOptions) -> Result<Self, Error> {
+    pub(super) fn open(options: &TableOptions, kind: &Kind) -> Result<Self, Error> {
+        let mut chosen = options.clone();
+        if !chosen.columns.is_empty() {
+            chosen.columns.extend(kind.columns().cloned());
+        }
         let table_options = TableOptions {
             // Only differences of times matter, so decimals beyond a nanosecond can be dropped.
-            time: options.table.time.clone().or(Some("±2ns".to_owned())),
-            ..options.table.clone()
+            time: options.time.clone().or(Some("±2ns".to_owned())),
+            ..chosen.clone()
         };
-        let mut table = Table::open(&TableOptions {
-            time: options.table.time.clone(),
-            ..table_options.clone()
-        })?;
+        let mut table = Table::open(&chosen)?;
         table.find_time(2)?;
-        if let Some(name) = &options.by {
+        if let Some(name) = &kind.by {
             table = table.with_labels(name)?;
-            if table.names.len() != 1 {
-                let names = table.names.join(", ");
-                let expected = "one column of values is expected beside time and --by, name it with --columns";
-                return Err(Error::content(table.file(), format_args!("columns {names}: {expected}")));
-            }
         }
-        if table.names.is_empty() {
+        let place = |name: &Option<String>| match name {
+            None => Ok(None),
+            Some(name) => match table.names.iter().position(|known| known == name) {
+                Some(place) => Ok(Some(place)),
+                None => {
+                    let problem = format!("no column `{name}`: there are {}", table.names.join(", "));
+                    Err(Error::content(table.file(), problem))
+                }
+            },
+        };
+        let own = [place(&kind.accuracy)?, place(&kind.threshold)?];
+        let sensors: Vec<String> = table
+            .names
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !own.contains(&Some(*i)))
+            .map(|(_, name)| name.clone())
+            .collect();
+        if kind.by.is_some() && sensors.len() != 1 {
+            let names = sensors.join(", ");
+            let expected = "one column of values is expected beside time and --by, name it with --columns";
+            return Err(Error::content(table.file(), format_args!("columns {names}: {expected}")));
+        }
+        if sensors.is_empty() {
             return Err(Error::empty(table.file(), "columns of values"));
         }
         table.require_numbers()?;
@@ -82,12 +137,9 @@ impl Instants {
             _ => 1.0,
         };
         Ok(Self {
-            names: if options.by.is_some() {
-                Vec::new()
-            } else {
-                table.names.clone()
-            },
-            is_long: options.by.is_some(),
+            names: if kind.by.is_some() { Vec::new() } else { sensors },
+            is_long: kind.by.is_some(),
+            own,
             table,
             base,
             tick,
@@ -147,6 +199,7 @@ impl Instants {
                         self.copies += 1;
                     } else {
                         instant.reports.extend(row.reports);
+                        instant.said.extend(row.said);
                     }
                 }
                 row => {
@@ -198,21 +251,33 @@ impl Instants {
             return Err(Error::content(self.file(), problem));
         }
         self.last = seconds;
-        let reports = if self.is_long {
+        let own = self
+            .own
+            .map(|place| cells.get(place?).copied().flatten().filter(|cell| cell.is_finite()));
+        let cells = cells
+            .into_iter()
+            .enumerate()
+            .filter(|(i, _)| !self.own.contains(&Some(*i)));
+        let reports: Reports = if self.is_long {
             let label = self.table.label();
             let known = self.names.iter().position(|name| name == label);
             let sensor = known.unwrap_or_else(|| {
                 self.names.push(label.to_owned());
                 self.names.len() - 1
             });
-            vec![(sensor, cells[0])]
+            cells.map(|(_, cell)| (sensor, cell)).collect()
         } else {
-            cells.into_iter().enumerate().collect()
+            cells.enumerate().map(|(sensor, (_, cell))| (sensor, cell)).collect()
+        };
+        let said = Said {
+            accuracy: own[0],
+            threshold: own[1],
         };
         Ok(Some(Instant {
             seconds,
             time,
             row: self.table.row(),
+            said: vec![said; reports.len()],
             reports,
         }))
     }

@@ -1,6 +1,7 @@
 //! Settings of the level and its sensors, from options and first rows.
 
-use super::centre::{Seat, World};
+use super::centre::World;
+use super::meaning::{Meaning, Seat};
 use super::rows::{Instant, Instants};
 use super::sensors;
 use crate::arguments::{Model, Switch, TrackOptions};
@@ -42,6 +43,29 @@ pub(super) struct Settings {
     /// Per sensor, as far as the first rows go.
     losses: Vec<f64>,
     offsets: Vec<f64>,
+    meaning: Meaning,
+    /// Step of rounding, if it is found from the first rows: of each sensor.
+    steps: Vec<Option<f64>>,
+}
+
+/// A sensor is taken to round if its noise with rounding is at most this many steps; its own noise is then at least this many.
+const COARSE: f64 = 0.75;
+const LEAST_OWN: f64 = 0.05;
+/// Values from which a step of rounding is found, at least.
+const FEWEST_OF_STEP: usize = 50;
+
+/// Parses `0.25..`, `..40` or `0.25..40`.
+fn limits(text: &str) -> Result<(Option<f64>, Option<f64>), Error> {
+    const EXPECTED: &str = "a lower limit, an upper one, or both, as `0.25..`, `..40` or `0.25..40`";
+    let (low, high) = text
+        .split_once("..")
+        .ok_or_else(|| Error::option("--limits", text, EXPECTED))?;
+    let end = |end: &str| {
+        (!end.trim().is_empty())
+            .then(|| number("--limits", end, EXPECTED))
+            .transpose()
+    };
+    Ok((end(low)?, end(high)?))
 }
 
 /// Parses `0.5/1h`. Numbered rows are one second apart.
@@ -130,7 +154,25 @@ impl Settings {
                 .fold((0.0, 0.0), |(all, empty), (_, cell)| (all + 1.0, empty + f64::from(u8::from(cell.is_none()))));
             (empty / f64::max(all, 1.0)).clamp(LOSS.0, LOSS.1)
         });
+        let asked_step = options
+            .rounded
+            .as_deref()
+            .filter(|text| !matches!(*text, "found" | "no"))
+            .map(|text| above_zero("--rounded", text, "a step above 0, `found` or `no`"))
+            .transpose()?;
+        let within = options
+            .silent_within
+            .as_deref()
+            .map(|text| above_zero("--silent-within", text, "a width above 0"))
+            .transpose()?;
         let mut settings = Self {
+            steps: Vec::new(),
+            meaning: Meaning {
+                step: asked_step,
+                silent_within: within,
+                limits: options.limits.as_deref().map_or(Ok((None, None)), limits)?,
+                has_accuracy: options.accuracy_column.is_some(),
+            },
             world: World {
                 model: options.model,
                 change: 0.0,
@@ -142,6 +184,7 @@ impl Settings {
                     .map(|text| mean_and_deviation("--slope", text))
                     .transpose()?,
                 period: options.period,
+                is_smoothed: options.smooth.is_some(),
                 is_learning: options
                     .learning
                     .map_or(asked_change.is_none(), |learning| learning == Switch::On),
@@ -181,6 +224,9 @@ impl Settings {
         settings.world.prior = asked_prior.unwrap_or((0.0, 0.0));
         if asked_change.is_none() || asked_noise.is_none() || asked_prior.is_none() {
             settings.fit(&first, &instants.names)?;
+        }
+        if asked_step.is_none() && options.rounded.as_deref() != Some("no") {
+            settings.find_steps(&first, &instants.names);
         }
         Ok(settings)
     }
@@ -292,6 +338,28 @@ impl Settings {
         Ok(())
     }
 
+    /// Finds which sensors round so coarsely that a value is a cell.
+    fn find_steps(&mut self, first: &[Instant], names: &[String]) {
+        let step_of = |sensor: usize| {
+            let values = values_of(first, sensor);
+            let step = fewbits_adaptive::own_steps(&values).into_iter().reduce(f64::min)?;
+            let noise = self
+                .noises
+                .of(&names[sensor])
+                .unwrap_or_else(|| self.found.get(sensor).copied().unwrap_or(self.noise));
+            (values.len() >= FEWEST_OF_STEP && noise <= COARSE * step).then_some(step)
+        };
+        let steps: Vec<Option<f64>> = (0..names.len()).map(step_of).collect();
+        for (sensor, step) in steps.iter().enumerate() {
+            // What was found includes the rounding; what was stated does not.
+            if let (Some(step), Some(found)) = (step, self.found.get_mut(sensor)) {
+                let own = (*found * *found - ROUNDING * ROUNDING * step * step).max(0.0).sqrt();
+                *found = own.max(LEAST_OWN * step);
+            }
+        }
+        self.steps = steps;
+    }
+
     fn seat_with(&self, sensor: usize, sends: Report, noise: f64, threshold: Option<f64>) -> Seat {
         Seat {
             sends,
@@ -299,6 +367,10 @@ impl Settings {
             threshold,
             loss: self.losses.get(sensor).copied().unwrap_or(LOSS.0),
             offset: self.offsets.get(sensor).copied().unwrap_or(0.0),
+            meaning: Meaning {
+                step: self.meaning.step.or(self.steps.get(sensor).copied().flatten()),
+                ..self.meaning
+            },
         }
     }
 

@@ -11,10 +11,12 @@ mod many;
 mod node;
 mod outputs;
 mod pages;
+mod ranges;
 mod streams;
 mod tables;
 mod track;
 mod track_faults;
+mod track_meanings;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

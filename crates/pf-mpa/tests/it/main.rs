@@ -8,4 +8,5 @@ mod fixtures;
 mod grid;
 mod laws;
 mod recording;
+mod rooms;
 mod wild;

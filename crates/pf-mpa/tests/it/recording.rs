@@ -4,7 +4,7 @@ use fewbits_core::Dynamics;
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
-use nalgebra::{Vector2, Vector4};
+use nalgebra::{Vector2, Vector3, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -36,6 +36,12 @@ struct World {
     anchors: usize,
     /// Seconds without ranges in the middle.
     gap: f64,
+}
+
+impl Recording {
+    fn places(&self) -> impl Iterator<Item = (String, Vector3<f64>)> {
+        self.anchors.iter().map(|(name, place)| (name.clone(), place.push(0.0)))
+    }
 }
 
 impl World {
@@ -98,13 +104,12 @@ fn score(recordings: &[Recording], travel: Travel, settings: RangeSettings) -> S
     let [mut squares, mut bits, mut losses, mut speed, mut noise, mut scale] = [(); 6].map(|()| Moments::default());
     let mut normalised = Vec::new();
     for recording in recordings {
-        let mut rng = Stream::new(1).rng();
-        let mut tracker = RangeTracker::new(recording.anchors.clone(), travel, settings).unwrap();
+        let mut tracker = RangeTracker::new(recording.places(), travel, settings).unwrap();
         let (mut count, mut nees, mut last) = (0, Moments::default(), None);
         for ((time, anchor, range), truth) in recording.ranges.iter().zip(&recording.truth) {
-            if let Some(found) = tracker.push(&mut rng, *time, anchor, *range).unwrap() {
-                squares.add((found.position - truth).norm_squared());
-                nees.add(found.normalised_error(truth).unwrap());
+            if let Some(found) = tracker.push(*time, anchor, *range).unwrap() {
+                squares.add((found.position.xy() - truth).norm_squared());
+                nees.add(found.normalised_error(&truth.push(0.0)).unwrap());
                 count += 1;
                 last = Some(found);
             }
@@ -192,6 +197,16 @@ const UNCALIBRATED: [World; 2] = [
     },
 ];
 
+/// What a user of such radios says.
+fn stated() -> RangeSettings {
+    RangeSettings {
+        noise: Some(1.8),
+        speed: Some(1.0),
+        bias: Some(5.0),
+        ..RangeSettings::default()
+    }
+}
+
 const TRAVELS: [Travel; 3] = [Travel::Full, Travel::Bits(1), Travel::Bits(2)];
 
 /// Scores of the tracker with default settings and of one that is told the speed, for each of [`TRAVELS`], over recordings of each world.
@@ -200,12 +215,12 @@ fn learnt_and_told(worlds: &[World]) -> Vec<[(Score, Score); 3]> {
         let record = |k| world.record(seed as u64 + 100 * k);
         let recordings: Vec<_> = (0..RECORDINGS).map(record).collect();
         let told = RangeSettings {
-            speed: world.speed,
-            speed_factor: 1.0,
-            ..RangeSettings::default()
+            speed: Some(world.speed),
+            speed_factor: Some(1.0),
+            ..stated()
         };
         TRAVELS.map(|travel| {
-            let learnt = score(&recordings, travel, RangeSettings::default());
+            let learnt = score(&recordings, travel, stated());
             let told = score(&recordings, travel, told);
             println!("{travel:?} {world:?}: {:.3}\n    {learnt:.3?}\n    {told:.3?}", learnt.rms / told.rms);
             assert!((0.4..2.5).contains(&(learnt.speed / world.speed)), "{travel:?} {world:?}: {learnt:?}");
@@ -276,16 +291,15 @@ fn a_lost_track_is_flagged_and_found_again() {
                 *range += (moved - place).norm() - (recording.truth[k] - place).norm();
                 recording.truth[k] = moved;
             }
-            let mut rng = Stream::new(1).rng();
-            let mut tracker = RangeTracker::new(recording.anchors.clone(), travel, RangeSettings::default()).unwrap();
+            let mut tracker = RangeTracker::new(recording.places(), travel, stated()).unwrap();
             let (mut flagged, mut last) = (None, f64::INFINITY);
             for (k, ((time, anchor, range), truth)) in recording.ranges.iter().zip(&recording.truth).enumerate() {
-                if let Some(found) = tracker.push(&mut rng, *time, anchor, *range).unwrap() {
-                    let near = (found.position - truth).norm() < 6.0;
+                if let Some(found) = tracker.push(*time, anchor, *range).unwrap() {
+                    let near = (found.position.xy() - truth).norm() < 6.0;
                     if k >= LENGTH / 2 && flagged.is_none() && (found.lost || near) {
                         flagged = Some(k - LENGTH / 2);
                     }
-                    last = (found.position - truth).norm();
+                    last = (found.position.xy() - truth).norm();
                 }
             }
             delays.add(flagged.unwrap_or(LENGTH / 2) as f64);
@@ -302,8 +316,7 @@ fn a_wrong_start_is_flagged_and_mended() {
     for travel in [Travel::Full, Travel::Bits(1), Travel::Bits(2)] {
         for seed in 0..4 {
             let mut recording = WORLDS[1].record(70 + seed);
-            let mut rng = Stream::new(1).rng();
-            let mut tracker = RangeTracker::new(recording.anchors.clone(), travel, RangeSettings::default()).unwrap();
+            let mut tracker = RangeTracker::new(recording.places(), travel, stated()).unwrap();
             let (mut first, mut right) = (None, None);
             for (k, truth) in recording.truth.iter().enumerate().take(LENGTH / 4) {
                 let (time, anchor, range) = &mut recording.ranges[k];
@@ -311,9 +324,9 @@ fn a_wrong_start_is_flagged_and_mended() {
                     let place = recording.anchors.iter().find(|a| a.0 == *anchor).unwrap().1;
                     *range += (truth + Vector2::new(28.0, 28.0) - place).norm() - (truth - place).norm();
                 }
-                if let Some(found) = tracker.push(&mut rng, *time, anchor, *range).unwrap() {
+                if let Some(found) = tracker.push(*time, anchor, *range).unwrap() {
                     let start = *first.get_or_insert(k);
-                    if k > start && (found.lost || (found.position - truth).norm() < 8.0) {
+                    if k > start && (found.lost || (found.position.xy() - truth).norm() < 8.0) {
                         right.get_or_insert(k - start);
                     }
                 }
@@ -329,21 +342,22 @@ fn a_wrong_start_is_flagged_and_mended() {
 fn bad_settings_and_ranges_are_refused() {
     let recording = WORLDS[0].record(1);
     let settings = RangeSettings::default();
-    let new =
-        |anchors: &[(String, Vector2<f64>)], travel, settings| RangeTracker::new(anchors.to_vec(), travel, settings);
+    let new = |anchors: &[(String, Vector2<f64>)], travel, settings| {
+        RangeTracker::new(anchors.iter().map(|(name, place)| (name.clone(), place.push(0.0))), travel, settings)
+    };
     assert!(new(&recording.anchors[..2], Travel::Full, settings).is_err());
     assert!(new(&recording.anchors, Travel::Bits(0), settings).is_err());
     for bad in [
         RangeSettings {
-            speed: f64::NAN,
+            speed: Some(f64::NAN),
             ..settings
         },
         RangeSettings {
-            noise_factor: 0.5,
+            noise_factor: Some(0.5),
             ..settings
         },
         RangeSettings {
-            noise: 1e-200,
+            noise: Some(1e-200),
             ..settings
         },
         RangeSettings {
@@ -354,11 +368,10 @@ fn bad_settings_and_ranges_are_refused() {
         assert!(new(&recording.anchors, Travel::Full, bad).is_err(), "{bad:?}");
     }
     let mut tracker = new(&recording.anchors, Travel::Bits(2), settings).unwrap();
-    let mut rng = Stream::new(1).rng();
-    assert!(tracker.push(&mut rng, 1.0, "nobody", 3.0).is_err());
-    assert!(tracker.push(&mut rng, 1.0, "node 0", f64::NAN).is_err());
-    tracker.push(&mut rng, 1.0, "node 0", 50.0).unwrap();
-    assert!(tracker.push(&mut rng, 0.5, "node 0", 50.0).is_err());
+    assert!(tracker.push(1.0, "nobody", 3.0).is_err());
+    assert!(tracker.push(1.0, "node 0", f64::NAN).is_err());
+    tracker.push(1.0, "node 0", 50.0).unwrap();
+    assert!(tracker.push(0.5, "node 0", 50.0).is_err());
 }
 
 #[test]
@@ -373,9 +386,8 @@ fn a_track_of_two_anchors_is_lost() {
         gap: 0.0,
     };
     let recording = world.record(3);
-    let anchors = recording.anchors.iter().cloned();
-    let mut tracker = RangeTracker::new(anchors, Travel::Full, RangeSettings::default()).unwrap();
-    let mut rng = Stream::new(4).rng();
+    let anchors = recording.places();
+    let mut tracker = RangeTracker::new(anchors, Travel::Full, stated()).unwrap();
     for (k, (time, anchor, range)) in recording.ranges.iter().enumerate() {
         // One of three anchors drifts away: once it is excluded, two places fit the others.
         let drift = if anchor == "node 0" {
@@ -383,7 +395,7 @@ fn a_track_of_two_anchors_is_lost() {
         } else {
             0.0
         };
-        tracker.push(&mut rng, *time, anchor, range + drift).unwrap();
+        tracker.push(*time, anchor, range + drift).unwrap();
         assert!(k >= 300 || tracker.losses() == 0, "{k}");
     }
     assert!(tracker.losses() >= 1);

@@ -259,6 +259,14 @@ impl Prior {
         self.deviation
     }
 
+    /// Values and probabilities of a discrete prior; `None` of others.
+    pub fn points(&self) -> Option<(&[f64], &[f64])> {
+        match &self.shape {
+            Shape::Discrete { values, probabilities } => Some((values, probabilities)),
+            _ => None,
+        }
+    }
+
     /// Whether the unknown is one of finitely many values.
     pub fn is_discrete(&self) -> bool {
         matches!(self.shape, Shape::Discrete { .. })

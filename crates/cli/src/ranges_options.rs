@@ -1,0 +1,65 @@
+//! Options of `fewbits ranges`.
+
+use crate::table_options::{ManyOptions, TableOptions};
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Args, Clone)]
+pub(crate) struct RangesOptions {
+    #[command(flatten)]
+    pub(crate) table: TableOptions,
+    #[command(flatten)]
+    pub(crate) many: ManyOptions,
+    /// Table of the anchors: name, x, y, and z if heights differ, in the unit of the ranges.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) anchors: String,
+    /// Each row is one range: the column with the name of its anchor. Ranges are in the other column, or that of `--columns`.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) by: Option<String>,
+    /// How ranges travel: `value`, `bit`, or `word:2` to `word:4`: the innovation, quantized in so many bits.
+    #[arg(long, default_value = "value", value_name = "WHAT")]
+    pub(crate) send: String,
+    /// Largest standard deviation of a range's error that is considered; it is estimated from a quarter of that on. Default: about a quarter
+    /// of the distance of the anchors from their middle, and estimated from a hundredth of that on.
+    #[arg(long, value_name = "DEVIATION")]
+    pub(crate) noise: Option<f64>,
+    /// Standard deviation of the velocity along an axis, per second; a factor of four off is enough. Default: estimated.
+    #[arg(long, value_name = "SPEED")]
+    pub(crate) speed: Option<f64>,
+    /// Standard deviation of the bias that all ranges share; `0` if there is none. Default: a fifth of the distance of the anchors from their
+    /// middle.
+    #[arg(long, value_name = "DEVIATION")]
+    pub(crate) bias: Option<f64>,
+    /// Standard deviation of the bias of each single anchor beside the common one; `0` if there is none. Default: either none or a few
+    /// percent of the distance of the anchors from their middle, whichever explains the ranges; with `--bias 0` none.
+    #[arg(long, value_name = "DEVIATION")]
+    pub(crate) anchor_bias: Option<f64>,
+    /// Standard deviation of the error of scale; `0` if there is none. Ranges are `1 + scale` times the distance.
+    #[arg(long, default_value_t = 0.1, value_name = "DEVIATION")]
+    pub(crate) scale: f64,
+    /// Height of the target if the anchors have heights: `0.3` if it is known, `0.5±0.5` if it is estimated from there. Default: estimated if
+    /// the anchors have heights.
+    #[arg(long, value_name = "HEIGHT", allow_hyphen_values = true)]
+    pub(crate) height: Option<String>,
+    /// The ranges of one time share an unknown offset: differences of times of arrival, times the speed of propagation.
+    #[arg(long)]
+    pub(crate) unknown_clock: bool,
+    /// Correlation time of the velocity in seconds.
+    #[arg(long, default_value_t = 6.0, value_name = "SECONDS")]
+    pub(crate) persistence: f64,
+    /// Probability that a range is an outlier, independent of the distance.
+    #[arg(long, default_value_t = 0.02, value_name = "SHARE")]
+    pub(crate) outliers: f64,
+    /// Seconds without a range after which the place is searched again.
+    #[arg(long, default_value_t = 30.0, value_name = "SECONDS")]
+    pub(crate) silence: f64,
+    /// Draw the estimates into this SVG file.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) plot: Option<PathBuf>,
+    /// One JSON object per row instead of CSV, and the summary as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// File of the estimates. Default: standard output.
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+}

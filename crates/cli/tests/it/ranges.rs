@@ -1,0 +1,240 @@
+//! `fewbits ranges` on rooms with the faults that real ones have: ghosts, exact ranges, bad anchors, units, heights, unknown clocks.
+
+use crate::{good, refused, text};
+use std::path::Path;
+
+/// A linear congruential generator, and from it numbers that are nearly normal (twelve uniform ones added up).
+struct Numbers(u64);
+
+impl Numbers {
+    fn normal(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            sum += (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
+    }
+}
+
+type Point = [f64; 3];
+
+const RECTANGLE: [Point; 4] = [[0.0, 0.0, 0.0], [12.0, 0.0, 0.0], [12.0, 7.0, 0.0], [0.0, 7.0, 0.0]];
+
+fn distance(a: &Point, b: &Point) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+}
+
+fn anchors(folder: &Path, places: &[Point], unit: f64, has_heights: bool) {
+    let mut table = if has_heights { "anchor,x,y,z\n" } else { "anchor,x,y\n" }.to_owned();
+    for (i, place) in places.iter().enumerate() {
+        table += &format!("n{i},{},{}", place[0] * unit, place[1] * unit);
+        table += &if has_heights {
+            format!(",{}\n", place[2] * unit)
+        } else {
+            "\n".to_owned()
+        };
+    }
+    std::fs::write(folder.join("anchors.csv"), table).unwrap();
+}
+
+/// Ranges of rows: what is read instead of the distance of each anchor. `NaN` is an empty cell.
+fn table(places: usize, rows: usize, mut range: impl FnMut(usize, usize) -> f64) -> String {
+    let names: Vec<String> = (0..places).map(|i| format!("n{i}")).collect();
+    let mut table = format!("time,{}\n", names.join(","));
+    for row in 0..rows {
+        let cells: Vec<String> = (0..places)
+            .map(|i| range(row, i))
+            .map(|r| if r.is_nan() { String::new() } else { r.to_string() })
+            .collect();
+        table += &format!("{},{}\n", row as f64 * 0.2, cells.join(","));
+    }
+    table
+}
+
+fn ranges(folder: &Path, table: &str, options: &[&str]) -> Vec<serde_json::Value> {
+    let words = [&["ranges", "-", "--anchors", "anchors.csv", "--json"], options].concat();
+    let out = text(&good(folder, &words, table.as_bytes()));
+    out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn number(row: &serde_json::Value, name: &str) -> f64 {
+    row[name].as_f64().unwrap_or(f64::NAN)
+}
+
+fn off(row: &serde_json::Value, truth: &Point) -> f64 {
+    (number(row, "x") - truth[0]).hypot(number(row, "y") - truth[1])
+}
+
+fn holds(row: &serde_json::Value, truth: &Point) -> bool {
+    ["x", "y"].iter().zip(truth).all(|(axis, truth)| {
+        (number(row, &format!("{axis}_low"))..=number(row, &format!("{axis}_high"))).contains(truth)
+    })
+}
+
+/// The inverse point in the circle through the anchors has the same ranges up to a factor.
+#[test]
+fn a_rectangle_of_anchors_has_no_ghost() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    for (seed, truth) in [
+        (1, [4.0, 2.5, 0.0]),
+        (2, [10.9, 1.2, 0.0]),
+        (3, [1.1, 6.1, 0.0]),
+        (4, [6.2, 3.9, 0.0]),
+    ] {
+        for options in [&["--noise", "0.12"][..], &[], &["--send", "word:2"]] {
+            let mut numbers = Numbers(seed);
+            let input = table(4, 60, |_, i| distance(&RECTANGLE[i], &truth) + 0.03 * numbers.normal());
+            let rows = ranges(folder.path(), &input, options);
+            let wrong = rows
+                .iter()
+                .filter(|row| row["x"].is_f64() && !holds(row, &truth))
+                .count();
+            let last = rows.last().unwrap();
+            assert!(wrong <= 12 && holds(last, &truth), "{truth:?} {options:?}: {wrong} rows, {last}");
+        }
+    }
+}
+
+#[test]
+fn exact_ranges_give_a_place_in_the_first_row() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let truth = [3.3, 5.2, 0.0];
+    let input = table(4, 5, |_, i| distance(&RECTANGLE[i], &truth));
+    for noise in ["0.2", "0.1", "0.05"] {
+        let rows = ranges(folder.path(), &input, &["--noise", noise, "--bias", "0", "--scale", "0"]);
+        assert!(off(&rows[0], &truth) < 0.05, "{noise}: {}", rows[0]);
+        assert!(rows.iter().all(|row| holds(row, &truth)), "{noise}");
+        let rows = ranges(folder.path(), &input, &["--noise", noise]);
+        assert!(rows.iter().all(|row| row["x"].is_f64() && holds(row, &truth)), "{noise}: {rows:?}");
+    }
+}
+
+/// One anchor of four reads zero, is too long, or jumps, from the first row or later.
+#[test]
+fn one_bad_anchor_is_found_by_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0], [0.0, 3.0, 0.0]];
+    anchors(folder.path(), &places, 1.0, false);
+    let truth = [1.8, 1.1, 0.0];
+    let bad: [fn(f64, usize) -> f64; 3] = [
+        |_, _| 0.0,
+        |range, _| range + 1.8,
+        |range, row| range + 40.0 * ((row % 7) as f64 + 1.0),
+    ];
+    for (kind, bad) in bad.iter().enumerate() {
+        for from in [0, 20] {
+            let mut numbers = Numbers(7 + kind as u64);
+            let input = table(4, 120, |row, i| {
+                let range = distance(&places[i], &truth) + 0.04 * numbers.normal();
+                if i == 2 && row >= from { bad(range, row) } else { range }
+            });
+            let rows = ranges(folder.path(), &input, &["--bias", "0", "--scale", "0"]);
+            let late = &rows[60..];
+            let worst = late.iter().map(|row| off(row, &truth)).fold(0.0, f64::max);
+            assert!(worst < 0.15, "kind {kind} from row {from}: {worst}");
+        }
+    }
+}
+
+#[test]
+fn each_unit_gives_the_same_path() {
+    let mut paths: Vec<Vec<[f64; 2]>> = Vec::new();
+    for unit in [1.0, 100.0, 1000.0, 0.001] {
+        let folder = tempfile::tempdir().unwrap();
+        anchors(folder.path(), &RECTANGLE, unit, false);
+        let mut numbers = Numbers(11);
+        let input = table(4, 80, |row, i| {
+            let at = [3.0 + 0.05 * row as f64, 3.0, 0.0];
+            unit * (distance(&RECTANGLE[i], &at) + 0.1 * numbers.normal())
+        });
+        let (noise, speed) = ((0.4 * unit).to_string(), (0.3 * unit).to_string());
+        for options in [&[][..], &["--noise", &noise, "--speed", &speed]] {
+            let rows = ranges(folder.path(), &input, options);
+            paths.push(
+                rows.iter()
+                    .map(|row| ["x", "y"].map(|axis| number(row, axis) / unit))
+                    .collect(),
+            );
+        }
+    }
+    for (i, path) in paths.iter().enumerate().skip(2) {
+        for (a, b) in path.iter().zip(&paths[i % 2]) {
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-3, "{i}: {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn heights_are_known_or_estimated() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [
+        [6.0, -2.0, 2.0],
+        [2.0, 0.5, 2.4],
+        [0.0, -3.0, 1.1],
+        [4.0, -9.0, 2.1],
+        [7.0, -7.0, 0.4],
+    ];
+    let truth = [4.5, -5.0, 0.3];
+    anchors(folder.path(), &places, 1.0, true);
+    let mut numbers = Numbers(5);
+    let input = table(5, 60, |_, i| distance(&places[i], &truth) + 0.05 * numbers.normal());
+    let known = ranges(folder.path(), &input, &["--height", "0.3", "--bias", "0", "--scale", "0"]);
+    let last = known.last().unwrap();
+    assert!(off(last, &truth) < 0.1 && last["z"].is_null(), "{last}");
+    let estimated = ranges(folder.path(), &input, &["--height", "0.5±0.5", "--bias", "0", "--scale", "0"]);
+    let last = estimated.last().unwrap();
+    assert!(off(last, &truth) < 0.15 && (number(last, "z") - 0.3).abs() < 0.4, "{last}");
+}
+
+#[test]
+fn differences_of_times_of_arrival_need_no_clock() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [
+        [0.0, 0.0, 0.0],
+        [10.0, 1.0, 0.0],
+        [9.0, 8.0, 0.0],
+        [1.0, 9.0, 0.0],
+        [5.0, -3.0, 0.0],
+    ];
+    let truth = [4.2, 3.1, 0.0];
+    anchors(folder.path(), &places, 1.0, false);
+    let (mut numbers, mut clock) = (Numbers(9), 500.0);
+    let input = table(5, 60, |_, i| {
+        if i == 0 {
+            clock += 3.0 * numbers.normal();
+        }
+        clock + distance(&places[i], &truth) + 0.05 * numbers.normal()
+    });
+    let rows = ranges(folder.path(), &input, &["--unknown-clock", "--scale", "0"]);
+    let worst = rows[20..].iter().map(|row| off(row, &truth)).fold(0.0, f64::max);
+    assert!(worst < 0.2, "{worst}: {}", rows[20]);
+}
+
+#[test]
+fn the_earlier_spelling_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    anchors(folder.path(), &RECTANGLE, 1.0, false);
+    let input = table(4, 10, |row, i| distance(&RECTANGLE[i], &[3.0 + 0.1 * row as f64, 4.0, 0.0]));
+    let words = [
+        "track",
+        "-",
+        "--model",
+        "ranges",
+        "--anchors",
+        "anchors.csv",
+        "--noise",
+        "0.1",
+    ];
+    let old = text(&good(folder.path(), &words, input.as_bytes()));
+    let words = ["ranges", "-", "--anchors", "anchors.csv", "--noise", "0.1"];
+    assert_eq!(old, text(&good(folder.path(), &words, input.as_bytes())));
+    let message =
+        refused(folder.path(), &["ranges", "-", "--anchors", "anchors.csv", "--height", "high"], input.as_bytes());
+    assert!(message.contains("--height"), "{message}");
+}

@@ -1,0 +1,125 @@
+//! All places that explain the first ranges.
+//!
+//! ```text
+//! for all ranges, and for all but those of one anchor:
+//!     on a grid of positions p:  ln p(p | ranges); bias and scale are integrated out, since ranges are linear in them
+//!     at each local maximum:     the most probable state by Gauss-Newton steps, for each noise; its covariance and evidence there
+//! keep:  the places whose evidence is not negligible beside the best, each as one hypothesis
+//! ```
+//! Anchors on a circle have a second place, the inverse of the first in that circle: its ranges differ by a factor only. Which of the two it is
+//! is decided by the prior of scale and bias alone, so both are kept while both are probable.
+
+use super::bank::Hypothesis;
+use super::gaussian::Normal;
+use super::rows::Collected;
+use super::search::{Calibration, Found, Search};
+use super::settings::Known;
+
+/// Sets and places that become hypotheses at most, and by how many nats they may be worse than the best.
+const KEPT: usize = 6;
+const WORSE: f64 = 14.0;
+/// Prior probability that the range of an anchor does not depend on the distance beside that of an outlier.
+const BAD_ANCHOR: f64 = 0.01;
+/// Probability that an anchor is good before its first range, and after a first range that was an outlier.
+const GOOD: f64 = 0.99;
+const GOOD_AFTER_OUTLIER: f64 = 0.6;
+/// Two places are the same if they differ by less than this many deviations.
+const SAME: f64 = 1.0;
+
+/// Whether two laws are about the same position.
+pub(super) fn is_same(a: &Normal, b: &Normal) -> bool {
+    (0..a.axes).all(|i| (a.mean[i] - b.mean[i]).powi(2) <= SAME * SAME * a.variance(i).max(b.variance(i)))
+}
+
+/// The hypotheses that explain the latest range of each anchor, the most probable first. None if no place does.
+pub(super) fn hypotheses(
+    known: &Known,
+    anchors: usize,
+    calibration: Calibration,
+    collected: &[Collected],
+) -> Vec<Hypothesis> {
+    let mut calibration = calibration;
+    if let Some(clock) = known.clock {
+        // The middle of the bias: what makes the ranges lengths of the size of the room.
+        let mean = collected.iter().map(|one| one.range).sum::<f64>() / collected.len().max(1) as f64;
+        calibration[0] = (mean, clock * clock);
+    }
+    let search = Search {
+        known,
+        calibration,
+        anchors,
+    };
+    let least = known.axes + 1;
+    let typical = known.speeds[known.speeds.len() / 2];
+    let left = |without: Option<usize>| -> Vec<Collected> {
+        collected
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| Some(*i) != without)
+            .map(|(_, one)| *one)
+            .collect()
+    };
+    // An outlier, or an anchor whose ranges say nothing, is as probable as `bad`, and its range as `1 / stray`.
+    let bad = known.outliers + BAD_ANCHOR;
+    let penalty = |without: Option<usize>, ranges: usize| {
+        ranges as f64 * (1.0 - bad).ln()
+            + if without.is_some() {
+                (bad / known.stray).ln()
+            } else {
+                0.0
+            }
+    };
+    let mut found: Vec<Found> = Vec::new();
+    let singles = if collected.len() > least {
+        0..collected.len()
+    } else {
+        0..0
+    };
+    for without in std::iter::once(None).chain(singles.map(Some)) {
+        let ranges = left(without);
+        for start in search.maxima(&ranges) {
+            let Some(mut best) = search.best(&start, &ranges, without, typical) else {
+                continue;
+            };
+            best.log_evidence += penalty(without, ranges.len());
+            let twin = found
+                .iter_mut()
+                .find(|other| other.without == without && is_same(&other.normal, &best.normal));
+            match twin {
+                Some(twin) if best.log_evidence > twin.log_evidence => *twin = best,
+                Some(_) => {}
+                None => found.push(best),
+            }
+        }
+    }
+    found.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    let Some(best) = found.first().map(|best| best.log_evidence) else {
+        return Vec::new();
+    };
+    found.retain(|one| one.log_evidence > best - WORSE);
+    found.truncate(KEPT);
+    let mut parts: Vec<Found> = Vec::new();
+    for one in found {
+        let ranges = left(one.without);
+        let slices = search.sliced(&one, &ranges, typical);
+        parts.extend(if slices.is_empty() { vec![one] } else { slices });
+    }
+    let mut all = Vec::new();
+    for one in &parts {
+        let ranges = left(one.without);
+        let out = one.without.map(|i| collected[i].anchor);
+        let good: Vec<f64> = (0..anchors)
+            .map(|anchor| if out == Some(anchor) { GOOD_AFTER_OUTLIER } else { GOOD })
+            .collect();
+        for (variant, (own, probability)) in known.anchor_biases.iter().enumerate() {
+            let Some((filters, weights, log_evidence)) = search.bank(one, &ranges, *own) else {
+                continue;
+            };
+            let log_weight = log_evidence + penalty(one.without, ranges.len()) + probability.ln();
+            all.push(Hypothesis::new(log_weight, filters, weights, good.clone(), variant));
+        }
+    }
+    all.retain(Hypothesis::is_finite);
+    all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    all
+}

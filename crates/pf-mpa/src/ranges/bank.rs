@@ -1,0 +1,266 @@
+//! A hypothesis about the target: a bank of filters that differ in speed and noise, and how likely each anchor measures rightly.
+
+use super::gaussian::{Normal, Predicted, Step, merged};
+use super::settings::Known;
+use crate::Error;
+use crate::quantized::RangeReference;
+use fewbits_numerics::normal;
+
+/// Probability per range that the speed changes: once in a few minutes. The noise is a property of the radio and changes less often.
+const SPEED_CHANGES: f64 = 0.003;
+const NOISE_CHANGES: f64 = 0.1 * SPEED_CHANGES;
+/// Ranges between two changes: they are rare, so they are computed together.
+const MIXED: u32 = 5;
+/// Probability per range of an anchor that it starts, or ceases, to send ranges that do not depend on the distance.
+const ANCHOR_CHANGES: f64 = 1e-3;
+/// A share of another filter below this does not change a filter.
+const NEGLIGIBLE: f64 = 1e-12;
+/// Share of a range's score that stays in the sum of an anchor's scores.
+const SCORE_KEPT: f64 = 0.9;
+/// Mean squared error of a normal variable of unit variance given its level: 1, 2, 3, 4 bits.
+const DISTORTION: [f64; 4] = [0.363, 0.119, 0.037, 0.012];
+
+/// What arrived: a range in full, or the level of its innovation.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Arrived {
+    Value(f64),
+    Level {
+        level: usize,
+        levels: usize,
+        reference: RangeReference,
+    },
+}
+
+impl Arrived {
+    /// Density or probability of what arrived if the range does not depend on the distance.
+    fn stray(&self, width: f64) -> f64 {
+        match self {
+            Self::Value(_) => 1.0 / width,
+            Self::Level {
+                level,
+                levels,
+                reference,
+            } => {
+                let inner = (2.0 * reference.half_width / width).min(1.0) / *levels as f64;
+                if *level == 0 || level + 1 == *levels {
+                    0.5 * (1.0 - (*levels - 2) as f64 * inner)
+                } else {
+                    inner
+                }
+            }
+        }
+    }
+
+    /// Density or probability of what arrived for a range of these moments; mean and variance of the noise-free range afterwards; and the
+    /// innovation in its own deviations, with variance one.
+    fn right(&self, predicted: &Predicted, noise: f64) -> Result<(f64, f64, f64, f64), Error> {
+        let total = predicted.variance + noise * noise;
+        let deviation = total.sqrt();
+        let gain = predicted.variance / total;
+        let (density, mean, left, score) = match self {
+            Self::Value(value) => {
+                let score = (value - predicted.mean) / deviation;
+                (normal::pdf(score) / deviation, score, 0.0, score)
+            }
+            Self::Level {
+                level,
+                levels,
+                reference,
+            } => {
+                let cell = reference.nominal_cell(*level, *levels)?;
+                let edge = |edge: f64| (edge - predicted.mean) / deviation;
+                let lower = if *level == 0 {
+                    f64::NEG_INFINITY
+                } else {
+                    edge(cell.lower())
+                };
+                let upper = if level + 1 == *levels {
+                    f64::INFINITY
+                } else {
+                    edge(cell.upper())
+                };
+                let moments = normal::truncated_moments(lower, upper)?;
+                let bits = (levels.ilog2() as usize).clamp(1, DISTORTION.len());
+                let score = moments.mean / (1.0 - DISTORTION[bits - 1]).sqrt();
+                (moments.log_probability.exp(), moments.mean, moments.variance, score)
+            }
+        };
+        let after = predicted.mean + gain * deviation * mean;
+        Ok((density, after, predicted.variance * (1.0 - gain) + predicted.variance * gain * left, score))
+    }
+}
+
+/// One explanation of all ranges so far.
+#[derive(Debug, Clone)]
+pub(super) struct Hypothesis {
+    /// `ln` of its probability, up to a constant of all.
+    pub(super) log_weight: f64,
+    /// Speed by speed, for each the noises.
+    pub(super) filters: Vec<Normal>,
+    pub(super) weights: Vec<f64>,
+    /// Per anchor, the probability that its ranges depend on the distance.
+    pub(super) good: Vec<f64>,
+    /// Which deviation of single anchors' biases it has.
+    pub(super) variant: usize,
+    /// Probability that a range is no outlier, averaged over the latest ranges.
+    pub(super) agreement: f64,
+    /// Per anchor, the decaying sum of scores and that of their variances.
+    scores: Vec<(f64, f64)>,
+    ranges: u32,
+    /// The next range, by each filter.
+    predicted: Vec<Predicted>,
+}
+
+impl Hypothesis {
+    pub(super) fn new(
+        log_weight: f64,
+        filters: Vec<Normal>,
+        weights: Vec<f64>,
+        good: Vec<f64>,
+        variant: usize,
+    ) -> Self {
+        let (anchors, count) = (good.len(), filters.len());
+        Self {
+            log_weight,
+            filters,
+            weights,
+            good,
+            variant,
+            agreement: 1.0,
+            scores: vec![(0.0, 0.0); anchors],
+            ranges: 0,
+            predicted: vec![Predicted::default(); count],
+        }
+    }
+
+    /// Moves all filters on, after speed and noise may have changed.
+    pub(super) fn predict(&mut self, known: &Known, step: &Step) {
+        let (speeds, noises) = (known.speeds.len(), known.noises.len());
+        self.ranges += 1;
+        if self.ranges.is_multiple_of(MIXED) {
+            let changes = |a_range: f64| -(f64::from(MIXED) * (-a_range).ln_1p()).exp_m1();
+            for noise in 0..noises {
+                self.mix((0..speeds).map(|speed| speed * noises + noise).collect(), changes(SPEED_CHANGES));
+            }
+            for speed in 0..speeds {
+                self.mix((0..noises).map(|noise| speed * noises + noise).collect(), changes(NOISE_CHANGES));
+            }
+        }
+        for (i, filter) in self.filters.iter_mut().enumerate() {
+            let speed = known.speeds[i / noises];
+            filter.predict(step, speed * speed);
+        }
+    }
+
+    /// With probability `changes`, a new filter is drawn evenly from `among`.
+    fn mix(&mut self, among: Vec<usize>, changes: f64) {
+        if among.len() < 2 {
+            return;
+        }
+        let all: f64 = among.iter().map(|i| self.weights[*i]).sum();
+        let common = merged(among.iter().map(|i| (self.weights[*i], &self.filters[*i])));
+        let Some(common) = common else { return };
+        let arriving = changes * all / among.len() as f64;
+        for i in among {
+            let staying = (1.0 - changes) * self.weights[i];
+            if arriving > NEGLIGIBLE * staying
+                && let Some(next) = merged([(staying, &self.filters[i]), (arriving, &common)].into_iter())
+            {
+                self.filters[i] = next;
+            }
+            self.weights[i] = staying + arriving;
+        }
+    }
+
+    /// Computes the moments of the next range of an anchor. Returns its mean and variance with noise.
+    pub(super) fn expect(&mut self, known: &Known, place: &[f64; 3], anchor: usize) -> (f64, f64) {
+        let above = place[2] - known.level;
+        let noises = known.noises.len();
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (i, (filter, out)) in self.filters.iter().zip(&mut self.predicted).enumerate() {
+            filter.range(place, above, anchor, out);
+            let noise = known.noises[i % noises];
+            mean += self.weights[i] * out.mean;
+            square += self.weights[i] * (out.variance + noise * noise);
+        }
+        let between: f64 = self
+            .predicted
+            .iter()
+            .zip(&self.weights)
+            .map(|(p, w)| w * (p.mean - mean).powi(2))
+            .sum();
+        (mean, square + between)
+    }
+
+    /// Gives all filters an unknown bias: with it the next range is as expected.
+    pub(super) fn forget_bias(&mut self, known: &Known, deviation: f64, place: &[f64; 3], anchor: usize, range: f64) {
+        let mut out = Predicted::default();
+        for filter in &mut self.filters {
+            filter.range(place, place[2] - known.level, anchor, &mut out);
+            let bias = filter.mean[filter.bias()] + range - out.mean;
+            filter.forget_bias(bias, deviation * deviation);
+        }
+    }
+
+    /// Updates with what arrived from an anchor whose range was [expected](Self::expect).
+    pub(super) fn update(&mut self, known: &Known, anchor: usize, arrived: &Arrived) -> Result<(), Error> {
+        let (noises, stray) = (known.noises.len(), arrived.stray(known.stray));
+        let (good, outliers) = (self.good[anchor], known.outliers);
+        let right_share = good * (1.0 - outliers);
+        let (mut total, mut agreeing, mut score) = (0.0, 0.0, 0.0);
+        let old: f64 = self.weights.iter().sum();
+        for i in 0..self.filters.len() {
+            let predicted = &self.predicted[i];
+            let (density, mean, variance, innovation) = arrived.right(predicted, known.noises[i % noises])?;
+            let right = right_share * density;
+            let evidence = right + (1.0 - right_share) * stray;
+            let share = if evidence > 0.0 { right / evidence } else { 0.0 };
+            // Moments of the noise-free range under "it is no outlier" and "it is one".
+            let off = mean - predicted.mean;
+            let after = predicted.mean + share * off;
+            let spread = share * variance + (1.0 - share) * predicted.variance + share * (1.0 - share) * off * off;
+            let weight = self.weights[i] / old;
+            self.filters[i].condition(predicted, after, spread);
+            score += weight * innovation.clamp(-3.0, 3.0);
+            self.weights[i] = weight * evidence;
+            total += self.weights[i];
+            agreeing += weight * right;
+        }
+        if total <= 0.0 {
+            return Err(Error::Impossible);
+        }
+        self.weights.iter_mut().for_each(|weight| *weight /= total);
+        self.log_weight += total.ln();
+        // The anchor: with `density` the mean over the filters, `agreeing` is `good (1 - outliers) density`.
+        let still_good = (agreeing + good * outliers * stray) / total;
+        self.good[anchor] = ANCHOR_CHANGES + (1.0 - 2.0 * ANCHOR_CHANGES) * still_good.clamp(0.0, 1.0);
+        let rate = 0.5 / self.good.len() as f64;
+        self.agreement += rate * (agreeing / total - self.agreement);
+        let (sum, variance) = &mut self.scores[anchor];
+        *sum = SCORE_KEPT * *sum + score;
+        *variance = SCORE_KEPT * SCORE_KEPT * *variance + 1.0;
+        Ok(())
+    }
+
+    /// How much the scores of all anchors differ from independent ones of mean zero, in standard deviations of the sum of their squares
+    /// (Wilson and Hilferty's approximation).
+    pub(super) fn misfit(&self) -> f64 {
+        let heard = self.scores.iter().filter(|(_, variance)| *variance > 0.0);
+        let (sum, count) =
+            heard.fold((0.0, 0.0), |(sum, count), (score, variance)| (sum + score * score / variance, count + 1.0));
+        if count == 0.0 {
+            return 0.0;
+        }
+        let variance = 2.0 / (9.0 * count);
+        ((sum / count).cbrt() - (1.0 - variance)) / variance.sqrt()
+    }
+
+    /// The filters' common moments.
+    pub(super) fn moments(&self) -> Option<Normal> {
+        merged(self.weights.iter().copied().zip(&self.filters))
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        self.filters.iter().all(Normal::is_finite) && self.log_weight.is_finite()
+    }
+}

@@ -1,0 +1,373 @@
+//! Tracking from single ranges at arbitrary times and from arbitrary anchors, as in recordings and from real radios.
+//!
+//! Real ranges have a bias, an error of scale and outliers, anchors fail, and speed, noise and first position are unknown. [`RangeTracker`]
+//! estimates all of these:
+//!
+//! ```text
+//! state        position and velocity in the plane or in space; bias and scale of all ranges; where they are probable, biases of single anchors
+//! acquisition  the first range of each anchor is sent in full; all places that explain them become hypotheses, with and without one anchor
+//! tracking     each range is sent as the level of its innovation, or in full; with probability `outliers` it is unrelated to the state
+//! anchors      each has a probability that its ranges depend on the distance, since one that contradicts the others does so again
+//! speed, noise a bank of filters in each hypothesis, weighted by evidence; works with 1 bit too
+//! output       the moments, and the bands, of all hypotheses together
+//! lost         if most ranges of all hypotheses are outliers, or levels agree too long; or after `silence` seconds without a range
+//! ```
+
+mod acquisition;
+mod bank;
+mod estimate;
+mod gaussian;
+mod odds;
+mod rows;
+mod search;
+mod settings;
+
+pub use estimate::RangeEstimate;
+pub use settings::{Height, RangeSettings};
+
+use crate::Error;
+use crate::encoder::optimal_loading;
+use crate::quantized::{QuantizedRange, RangeReference};
+use crate::sensor::RangeNoise;
+use acquisition::hypotheses;
+use bank::{Arrived, Hypothesis};
+use fewbits_core::Gaussian;
+use fewbits_numerics::error::{finite, refuse, within};
+use gaussian::Step;
+use nalgebra::Vector3;
+use odds::{drop_improbable, merge_same, shares_of};
+use rows::Collected;
+use search::Calibration;
+use settings::Known;
+use std::collections::BTreeMap;
+
+/// Ranges between two searches for hypotheses that have become the same.
+const COMPARED: usize = 8;
+/// The track is lost if fewer than this share of the latest ranges agree.
+const AGREEMENT: f64 = 0.35;
+/// Or if the misfit of levels is this many deviations: about once in a hundred thousand ranges.
+const MISFIT: f64 = 4.3;
+/// Added to the variances of bias and scale when the track is lost, as a share of those before the first range.
+const LOST_SHARE: f64 = 0.04;
+/// Bits of a range that is sent in full.
+const FULL_BITS: usize = 32;
+
+/// How a range is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Travel {
+    /// As a number of 32 bits.
+    Full,
+    /// As the level of its innovation with this many bits, 1 to 8.
+    Bits(u32),
+}
+
+/// A tracker of one target from the ranges of fixed anchors.
+#[derive(Debug, Clone)]
+pub struct RangeTracker {
+    names: BTreeMap<String, usize>,
+    places: Vec<[f64; 3]>,
+    travel: Travel,
+    known: Known,
+    hypotheses: Vec<Hypothesis>,
+    /// The latest range in full of each anchor.
+    collected: BTreeMap<usize, (f64, f64)>,
+    /// Ranges since acquisition began.
+    tried: usize,
+    calibration: Calibration,
+    last: f64,
+    pushed: usize,
+    bits: usize,
+    losses: usize,
+}
+
+impl RangeTracker {
+    /// A tracker with anchors at known places, by name. Two coordinates: the third is zero.
+    ///
+    /// # Errors
+    /// If there are fewer than three anchors, a place or a setting is not finite or out of range, levels have 0 or more than 8 bits, or ranges
+    /// with an unknown clock travel as levels.
+    pub fn new(
+        anchors: impl IntoIterator<Item = (String, Vector3<f64>)>,
+        travel: Travel,
+        settings: RangeSettings,
+    ) -> Result<Self, Error> {
+        let anchors: BTreeMap<String, Vector3<f64>> = anchors.into_iter().collect();
+        if anchors.len() < 3 {
+            return refuse("anchors", format!("{} anchors", anchors.len()), "at least three, of different names");
+        }
+        if let Travel::Bits(bits) = travel {
+            within("bits", f64::from(bits), 1.0, 8.0)?;
+            if settings.unknown_clock {
+                return refuse("travel", format!("{bits} bits"), "ranges in full, since their clock is unknown");
+            }
+        }
+        let places: Vec<Vector3<f64>> = anchors.values().copied().collect();
+        let known = settings.known(&places)?;
+        Ok(Self {
+            names: anchors
+                .into_keys()
+                .enumerate()
+                .map(|(number, name)| (name, number))
+                .collect(),
+            places: places.iter().map(|place| [place.x, place.y, place.z]).collect(),
+            travel,
+            hypotheses: Vec::new(),
+            collected: BTreeMap::new(),
+            tried: 0,
+            calibration: [(0.0, known.bias * known.bias), (0.0, known.scale * known.scale)],
+            known,
+            last: f64::NEG_INFINITY,
+            pushed: 0,
+            bits: 0,
+            losses: 0,
+        })
+    }
+
+    /// Total bits of all ranges so far.
+    pub fn bits(&self) -> usize {
+        self.bits
+    }
+
+    /// Number of times that the track was lost.
+    pub fn losses(&self) -> usize {
+        self.losses
+    }
+
+    /// Number of estimated coordinates of the position: 2, or 3 with the height.
+    pub fn coordinates(&self) -> usize {
+        self.known.axes
+    }
+
+    /// Number of anchors whose ranges are needed at once before there is a place.
+    pub fn needed(&self) -> usize {
+        (self.known.axes + 2).min(self.places.len())
+    }
+
+    /// The probability that an anchor's ranges depend on its distance. One half or less: it contradicts the others. 1 before a place is found.
+    ///
+    /// # Errors
+    /// If there is no such anchor.
+    pub fn works(&self, anchor: &str) -> Result<f64, Error> {
+        let number = self.number(anchor)?;
+        let shares = self.shares();
+        let sum: f64 = self
+            .hypotheses
+            .iter()
+            .zip(&shares)
+            .map(|(one, share)| share * one.good[number])
+            .sum();
+        Ok(if self.hypotheses.is_empty() { 1.0 } else { sum })
+    }
+
+    fn number(&self, anchor: &str) -> Result<usize, Error> {
+        match self.names.get(anchor) {
+            Some(number) => Ok(*number),
+            None => refuse("anchor", anchor, format!("one of {:?}", self.names.keys().collect::<Vec<_>>())),
+        }
+    }
+
+    /// Processes one range at `time` (seconds, not before the last). `None` during acquisition.
+    ///
+    /// # Errors
+    /// If there is no such anchor, a number is not finite, or `time` is before the last range's.
+    pub fn push(&mut self, time: f64, anchor: &str, range: f64) -> Result<Option<RangeEstimate>, Error> {
+        finite("range", range)?;
+        finite("range in 32 bits", f64::from(range as f32))?;
+        if finite("time", time)? < self.last {
+            return refuse("time", time, format!("{} or later", self.last));
+        }
+        let anchor = self.number(anchor)?;
+        let (is_new, elapsed) = (time > self.last, time - self.last);
+        if elapsed > self.known.silence {
+            self.forget();
+            self.collected.clear();
+        }
+        self.pushed += 1;
+        if self.hypotheses.is_empty() {
+            self.bits += FULL_BITS;
+            self.search(time, is_new, anchor, f64::from(range as f32));
+            self.last = time;
+            return Ok(self.estimate(false));
+        }
+        let mut next = self.hypotheses.clone();
+        let lost = match self.track(&mut next, if is_new { elapsed } else { 0.0 }, is_new, anchor, range) {
+            Ok(()) => self.is_lost(&next),
+            // The range has probability zero under every hypothesis, even as an outlier.
+            Err(Error::Impossible) => true,
+            Err(error) => return Err(error),
+        };
+        self.last = time;
+        self.bits += match self.travel {
+            Travel::Full => FULL_BITS,
+            Travel::Bits(bits) => bits as usize,
+        };
+        if self.travel == Travel::Full {
+            if self.known.clock.is_some() && is_new {
+                self.collected.clear();
+            }
+            self.collected.insert(anchor, (time, f64::from(range as f32)));
+        }
+        if !next.is_empty() {
+            self.hypotheses = next;
+        }
+        let estimate = self.estimate(lost);
+        if lost {
+            self.losses += 1;
+            self.forget();
+        }
+        Ok(estimate)
+    }
+
+    /// Collects a range, and looks for places once there are enough.
+    fn search(&mut self, time: f64, is_new: bool, anchor: usize, range: f64) {
+        let least = self.known.axes + 1;
+        if self.known.clock.is_some() && is_new {
+            // The ranges of one time are complete.
+            if self.collected.len() >= least {
+                self.acquire(self.last);
+            }
+            self.collected.clear();
+            if !self.hypotheses.is_empty() {
+                let mut next = self.hypotheses.clone();
+                if self.track(&mut next, time - self.last, true, anchor, range).is_ok() {
+                    self.hypotheses = next;
+                }
+                return;
+            }
+        }
+        let silence = self.known.silence;
+        self.collected.retain(|_, (then, _)| time - *then <= silence);
+        self.collected.insert(anchor, (time, range));
+        self.tried += 1;
+        // An anchor that never answers is not waited for.
+        let is_enough = self.collected.len() >= self.needed();
+        let has_waited = self.collected.len() >= least && self.tried >= 2 * self.places.len();
+        if is_enough || has_waited && self.known.clock.is_none() {
+            self.acquire(time);
+        }
+    }
+
+    fn acquire(&mut self, time: f64) {
+        let rows: Vec<Collected> = self
+            .collected
+            .iter()
+            .map(|(anchor, (then, range))| Collected {
+                anchor: *anchor,
+                place: self.places[*anchor],
+                range: *range,
+                age: time - then,
+            })
+            .collect();
+        self.hypotheses = hypotheses(&self.known, self.places.len(), self.calibration, &rows);
+        self.tried = 0;
+        let mut found = std::mem::take(&mut self.hypotheses);
+        drop_improbable(&mut found);
+        self.hypotheses = found;
+    }
+
+    /// Moves hypotheses on and updates them with a range.
+    fn track(
+        &self,
+        next: &mut Vec<Hypothesis>,
+        elapsed: f64,
+        is_new: bool,
+        anchor: usize,
+        range: f64,
+    ) -> Result<(), Error> {
+        let (known, place) = (&self.known, &self.places[anchor]);
+        let step = Step::over(elapsed, known.persistence, known.drift);
+        let shares = shares_of(next);
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (one, share) in next.iter_mut().zip(&shares) {
+            one.predict(known, &step);
+            if let Some(clock) = known.clock.filter(|_| is_new) {
+                one.forget_bias(known, clock, place, anchor, range);
+            }
+            let (expected, variance) = one.expect(known, place, anchor);
+            mean += share * expected;
+            square += share * (variance + expected * expected);
+        }
+        let arrived = match self.travel {
+            Travel::Full => Arrived::Value(f64::from(range as f32)),
+            Travel::Bits(bits) => {
+                // All nodes that hear the reports compute the reference themselves, so it is not sent.
+                let levels = 1_usize << bits;
+                let expected = Gaussian::scalar(mean, (square - mean * mean).max(f64::MIN_POSITIVE))?;
+                let reference = RangeReference::about(&expected, optimal_loading(levels)?);
+                let scheme = QuantizedRange::new(levels, RangeNoise::constant(known.noises[0])?)?;
+                let level = scheme.level(range, &reference)?.0;
+                Arrived::Level {
+                    level,
+                    levels,
+                    reference,
+                }
+            }
+        };
+        let mut failed = None;
+        next.retain_mut(|one| match one.update(known, anchor, &arrived) {
+            Ok(()) => one.is_finite(),
+            Err(error) => {
+                failed = Some(error);
+                false
+            }
+        });
+        if next.is_empty() {
+            return Err(failed.unwrap_or(Error::Impossible));
+        }
+        drop_improbable(next);
+        if self.pushed.is_multiple_of(COMPARED) {
+            merge_same(next);
+        }
+        Ok(())
+    }
+
+    fn is_lost(&self, hypotheses: &[Hypothesis]) -> bool {
+        let shares = shares_of(hypotheses);
+        let agreement: f64 = hypotheses
+            .iter()
+            .zip(&shares)
+            .map(|(one, share)| share * one.agreement)
+            .sum();
+        let misfit = match self.travel {
+            Travel::Full => 0.0,
+            Travel::Bits(_) => hypotheses.iter().map(Hypothesis::misfit).fold(f64::INFINITY, f64::min),
+        };
+        agreement < AGREEMENT || misfit > MISFIT
+    }
+
+    fn shares(&self) -> Vec<f64> {
+        shares_of(&self.hypotheses)
+    }
+
+    fn estimate(&self, lost: bool) -> Option<RangeEstimate> {
+        estimate::of(&self.known, &self.hypotheses, lost)
+    }
+
+    /// Starts acquisition again. The estimates of bias and scale are kept, with a larger variance.
+    fn forget(&mut self) {
+        let priors = [self.known.bias, self.known.scale].map(|deviation| deviation * deviation);
+        let best = self
+            .hypotheses
+            .iter()
+            .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
+        if let Some(moments) = best.and_then(Hypothesis::moments) {
+            for ((axis, prior), known) in [moments.bias(), moments.scale()]
+                .into_iter()
+                .zip(priors)
+                .zip(&mut self.calibration)
+            {
+                let (mean, variance) = (moments.mean[axis], moments.variance(axis) + LOST_SHARE * prior);
+                *known = if variance.is_finite() && mean * mean < 9.0 * prior {
+                    (mean, variance.min(prior))
+                } else {
+                    (0.0, prior)
+                };
+            }
+        }
+        self.hypotheses.clear();
+        self.tried = 0;
+        if self.travel != Travel::Full {
+            self.collected.clear();
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Random rooms: whether a place that the tracker is sure of is right, and whether its bands hold what they say.
+
+use fewbits_core::{Dynamics, Evolution};
+use fewbits_models::ContinuousLinear;
+use fewbits_monte_carlo::Stream;
+use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
+use nalgebra::{Vector3, Vector4};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+/// Ranges in each room.
+const LENGTH: usize = 400;
+/// A place is wrong if its normalised squared error is above this for so many ranges in a row.
+const WRONG: f64 = 25.0;
+const LONG: usize = 20;
+
+#[derive(Debug)]
+struct Room {
+    anchors: Vec<(String, Vector3<f64>)>,
+    noise: f64,
+    bias: f64,
+    scale: f64,
+    speed: f64,
+    middle: (f64, f64),
+}
+
+impl Room {
+    fn random(seed: u64) -> Self {
+        let mut rng = Stream::new(seed).named("rooms").rng();
+        let mut even = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+        let (wide, deep) = (even(6.0, 40.0), even(6.0, 40.0));
+        let corner = (even(-100.0, 100.0), even(-100.0, 100.0));
+        let count = even(3.0, 9.0) as usize;
+        let is_rectangle = count == 4 && even(0.0, 1.0) < 0.7;
+        let place = |x: f64, y: f64| Vector3::new(corner.0 + x, corner.1 + y, 0.0);
+        let places: Vec<Vector3<f64>> = if is_rectangle {
+            vec![place(0.0, 0.0), place(wide, 0.0), place(wide, deep), place(0.0, deep)]
+        } else {
+            // Not all on one line.
+            loop {
+                let found: Vec<_> = (0..count).map(|_| place(even(0.0, wide), even(0.0, deep))).collect();
+                let (a, b) = (found[1] - found[0], found[2] - found[0]);
+                if (a.x * b.y - a.y * b.x).abs() > 0.1 * wide * deep {
+                    break found;
+                }
+            }
+        };
+        let noise = 0.02 * 50.0_f64.powf(even(0.0, 1.0));
+        let speed = 0.05 * 30.0_f64.powf(even(0.0, 1.0));
+        let middle = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
+        let spread = (places.iter().map(|p| (p - middle).norm_squared()).sum::<f64>() / places.len() as f64).sqrt();
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        Self {
+            bias: 0.2 * spread * normal(),
+            scale: 0.1 * normal(),
+            anchors: places
+                .into_iter()
+                .enumerate()
+                .map(|(i, place)| (format!("a{i}"), place))
+                .collect(),
+            noise,
+            speed,
+            middle: (corner.0 + 0.5 * wide, corner.1 + 0.5 * deep),
+        }
+    }
+}
+
+/// What a tracker did in one room.
+#[derive(Debug, Default, Clone)]
+struct Outcome {
+    rows: usize,
+    held: usize,
+    longest_wrong: usize,
+    losses: usize,
+    squares: f64,
+    nees: f64,
+    searching: usize,
+    seconds: f64,
+}
+
+fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outcome {
+    let mut rng = Stream::new(seed).named("walk").rng();
+    let model = ContinuousLinear::forgotten_velocity_2d(room.speed, 6.0).unwrap();
+    let mut even = |deviation: f64| deviation * rng.sample::<f64, _>(StandardNormal);
+    let mut state =
+        Vector4::new(room.middle.0 + even(2.0), even(room.speed), room.middle.1 + even(2.0), even(room.speed));
+    let mut tracker = RangeTracker::new(room.anchors.clone(), travel, settings).unwrap();
+    let mut outcome = Outcome::default();
+    let (mut wrong, mut time) = (0, 0.0);
+    for k in 0..LENGTH {
+        let seconds = 0.1 + 0.2 * rng.random::<f64>();
+        time += seconds;
+        state = model.over(seconds).unwrap().propagate(&mut rng, &state);
+        let (name, place) = &room.anchors[k % room.anchors.len()];
+        let truth = Vector3::new(state[0], state[2], 0.0);
+        let range =
+            (1.0 + room.scale) * (truth - place).norm() + room.bias + room.noise * rng.sample::<f64, _>(StandardNormal);
+        let begun = std::time::Instant::now();
+        let found = tracker.push(time, name, range).unwrap();
+        outcome.seconds += begun.elapsed().as_secs_f64();
+        let Some(found) = found else {
+            outcome.searching += 1;
+            continue;
+        };
+        for i in 0..2 {
+            outcome.held += usize::from((found.bands[i].0..=found.bands[i].1).contains(&truth[i]));
+            outcome.rows += 1;
+        }
+        let nees = found.normalised_error(&truth).unwrap();
+        outcome.nees += nees;
+        outcome.squares += (found.position - truth).norm_squared();
+        wrong = if nees > WRONG && !found.lost { wrong + 1 } else { 0 };
+        outcome.longest_wrong = outcome.longest_wrong.max(wrong);
+    }
+    outcome.losses = tracker.losses();
+    outcome
+}
+
+fn measure(rooms: u64, travel: Travel) -> (f64, usize) {
+    let settings = RangeSettings {
+        anchor_bias: Some(0.0),
+        ..RangeSettings::default()
+    };
+    let outcomes: Vec<(Room, Outcome)> = std::thread::scope(|scope| {
+        let half = |odd: u64| {
+            scope.spawn(move || {
+                let one = |seed: u64| {
+                    let room = Room::random(seed);
+                    let outcome = walk(&room, seed, travel, settings);
+                    (room, outcome)
+                };
+                (0..rooms).filter(|seed| seed % 2 == odd).map(one).collect::<Vec<_>>()
+            })
+        };
+        [half(0), half(1)]
+            .into_iter()
+            .flat_map(|run| run.join().unwrap())
+            .collect()
+    });
+    let (rows, held) = outcomes
+        .iter()
+        .fold((0, 0), |(rows, held), (_, one)| (rows + one.rows, held + one.held));
+    let wrong = outcomes.iter().filter(|(_, one)| one.longest_wrong >= LONG).count();
+    for (room, one) in outcomes
+        .iter()
+        .filter(|(_, one)| one.longest_wrong >= LONG || one.held * 100 < one.rows * 75)
+    {
+        println!(
+            "{} anchors, noise {:.3}, bias {:.2}, scale {:.3}, speed {:.2}: wrong for {}, held {:.2}, nees {:.1}, rms {:.2}, losses {}",
+            room.anchors.len(),
+            room.noise,
+            room.bias,
+            room.scale,
+            room.speed,
+            one.longest_wrong,
+            one.held as f64 / one.rows as f64,
+            one.nees / one.rows as f64 * 2.0,
+            (one.squares / one.rows as f64 * 2.0).sqrt(),
+            one.losses
+        );
+    }
+    let share = held as f64 / rows as f64;
+    let sum = |of: fn(&Outcome) -> f64| outcomes.iter().map(|(_, one)| of(one)).sum::<f64>();
+    println!(
+        "{travel:?}: {rooms} rooms: held {share:.4}, wrong in {wrong}, losses {}, searching {}, {:.1} us a range",
+        sum(|one| one.losses as f64),
+        sum(|one| one.searching as f64),
+        1e6 * sum(|one| one.seconds) / (rooms as f64 * LENGTH as f64)
+    );
+    (share, wrong)
+}
+
+const TRAVELS: [Travel; 3] = [Travel::Full, Travel::Bits(1), Travel::Bits(2)];
+
+#[test]
+fn no_confident_place_is_wrong() {
+    for travel in TRAVELS {
+        let (share, wrong) = measure(12, travel);
+        assert!(wrong == 0 && share > 0.9, "{travel:?}: {wrong} rooms, bands hold {share}");
+    }
+}
+
+/// The measurement in full: 400 rooms.
+#[test]
+#[ignore = "minutes"]
+fn four_hundred_rooms() {
+    let rooms = std::env::var("ROOMS")
+        .ok()
+        .and_then(|rooms| rooms.parse().ok())
+        .unwrap_or(400);
+    for travel in TRAVELS {
+        let (share, wrong) = measure(rooms, travel);
+        assert!(wrong == 0, "{travel:?}: {wrong} rooms");
+        assert!((0.93..=0.97).contains(&share), "{travel:?}: bands hold {share}");
+    }
+}

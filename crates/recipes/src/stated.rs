@@ -1,0 +1,195 @@
+//! Readings that each state what they mean: a value with its own accuracy, a value that was rounded, a value beyond a detection limit.
+//!
+//! ```text
+//! value v of deviation s               N(v; m, s^2)
+//! rounded to a step, v                 P(v - step/2 <= m + noise < v + step/2) / step
+//! beyond a limit, or unchanged         P(lower <= m + noise < upper) / width
+//! ```
+//! All are densities of the reading, so that a gate can compare them with the density of a usual value.
+
+use fewbits_core::factor::{Constant, Factor, InCell, Scalar, Tilted, Value};
+use fewbits_core::rand::Rng;
+use fewbits_core::{
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Error, Gaussian, Link, MeasurementNoise, Message,
+    NumberFormat, Observation, Scheme,
+};
+use fewbits_numerics::error::{finite, positive, refuse};
+use nalgebra::{Matrix1, Vector1, Vector3};
+
+/// Numbers beyond these stand for infinite ends.
+const INFINITE: f64 = 1e300;
+
+/// One reading: the measurement lies between two ends, which are equal for a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StatedReading {
+    /// Lower end, perhaps minus infinity.
+    pub lower: f64,
+    /// Upper end, perhaps infinity.
+    pub upper: f64,
+    /// Standard deviation of the measurement's noise, above zero.
+    pub deviation: f64,
+}
+
+impl StatedReading {
+    /// A value whose noise has this standard deviation.
+    pub fn value(value: f64, deviation: f64) -> Self {
+        Self {
+            lower: value,
+            upper: value,
+            deviation,
+        }
+    }
+
+    /// A value that was rounded to multiples of a step.
+    pub fn rounded(value: f64, step: f64, deviation: f64) -> Self {
+        Self {
+            lower: value - 0.5 * step,
+            upper: value + 0.5 * step,
+            deviation,
+        }
+    }
+}
+
+impl Message for StatedReading {
+    type Format = NumberFormat;
+
+    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+        let end = |end: f64| end.clamp(-f64::MAX, f64::MAX);
+        Vector3::new(end(self.lower), end(self.upper), self.deviation).encode(format, writer)
+    }
+
+    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let [lower, upper, deviation] = Vector3::decode(format, reader)?.into();
+        Ok(Self {
+            lower: if lower < -INFINITE { f64::NEG_INFINITY } else { lower },
+            upper: if upper > INFINITE { f64::INFINITY } else { upper },
+            deviation,
+        })
+    }
+}
+
+/// The scheme of a sensor whose readings state their meaning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stating {
+    usual_variance: f64,
+}
+
+impl Stating {
+    /// A sensor whose values usually have an error of this variance, rounding included. Of a reading it is used only to judge whether it is
+    /// wild.
+    ///
+    /// # Errors
+    /// If the variance is not above 0.
+    pub fn new(usual_variance: f64) -> Result<Self, Error> {
+        Ok(Self {
+            usual_variance: positive("usual_variance", usual_variance)?,
+        })
+    }
+}
+
+impl MeasurementNoise<1> for Stating {
+    fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+        Matrix1::new(self.usual_variance)
+    }
+}
+
+/// What a reading says, as a density.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Statement {
+    cell: Option<InCell>,
+    value: Option<Value<1>>,
+    log_factor: f64,
+}
+
+impl Factor<1> for Statement {
+    fn log_likelihood(&self, m: &Vector1<f64>) -> f64 {
+        let cell = self.cell.map_or(0.0, |cell| cell.log_probability(m[0]));
+        self.log_factor + cell + self.value.map_or(0.0, |value| value.log_likelihood(m))
+    }
+
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+        let own = match (self.cell, self.value) {
+            (Some(cell), _) => Factor::tilted(&cell, prior)?,
+            (None, Some(value)) => value.tilted(prior)?,
+            (None, None) => return Tilted::unchanged(prior, self.log_factor),
+        };
+        Ok(Tilted {
+            log_evidence: own.log_evidence + self.log_factor,
+            ..own
+        })
+    }
+
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        let scalar = match (self.cell, self.value) {
+            (Some(cell), _) => Scalar::InCell(cell),
+            (None, Some(value)) => Scalar::Value(value),
+            (None, None) => Constant::ONE.into(),
+        };
+        Some((scalar, self.log_factor))
+    }
+}
+
+impl Deterministic<1> for Stating {}
+
+impl Scheme<1> for Stating {
+    type State = ();
+    type Feedback = ();
+    type Report = StatedReading;
+    type Factor = Statement;
+
+    fn feedback_format(&self) {}
+
+    fn report_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn encode(
+        &self,
+        _: &mut dyn Rng,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        (): &(),
+    ) -> Result<Option<StatedReading>, Error> {
+        let value = finite("measurement", measurement[0])?;
+        Ok(Some(StatedReading::value(value, self.usual_variance.sqrt())))
+    }
+
+    fn factor(&self, (): &(), observation: &Observation<StatedReading>, link: &Link) -> Result<Statement, Error> {
+        let Observation::Received(reading) = observation else {
+            return Ok(Statement {
+                cell: None,
+                value: None,
+                log_factor: link.delivery(observation).ln(),
+            });
+        };
+        let StatedReading {
+            lower,
+            upper,
+            deviation,
+        } = *reading;
+        let variance = positive("deviation", deviation)?.powi(2);
+        let arrival = link.of_received()?.ln();
+        if lower == upper {
+            let value = Value::scalar(finite("reading", lower)?, variance)?;
+            return Ok(Statement {
+                cell: None,
+                value: Some(value),
+                log_factor: arrival,
+            });
+        }
+        if lower.is_nan() || upper.is_nan() || lower > upper {
+            return refuse("reading", format!("from {lower} to {upper}"), "ends in order");
+        }
+        // A half-line has no width: its reading is compared with the highest density of a usual value.
+        let width = if (upper - lower).is_finite() {
+            upper - lower
+        } else {
+            (std::f64::consts::TAU * self.usual_variance).sqrt()
+        };
+        Ok(Statement {
+            cell: Some(InCell::certain(Cell::new(lower, upper)?, variance)?),
+            value: None,
+            log_factor: arrival - width.ln(),
+        })
+    }
+}
