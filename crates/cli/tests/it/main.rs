@@ -11,6 +11,7 @@ mod many;
 mod node;
 mod outputs;
 mod pages;
+mod recordings;
 mod streams;
 mod tables;
 mod track;
