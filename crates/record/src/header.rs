@@ -5,6 +5,7 @@ use crate::codec::{Target, adaptive};
 use crate::header_column::{push_column, shortened};
 use crate::schema::{Schema, TimeBase, TimeFormat, default_rows};
 use crate::time::Grid;
+pub(crate) use crate::wire::VERSION_5;
 use crate::wire::{checksum, push_varint, zigzag};
 use fewbits_block_codec::Start;
 use std::collections::hash_map::RandomState;
@@ -17,7 +18,6 @@ pub(crate) const MAGIC: [u8; 4] = *b"\x8bfew";
 pub(crate) const MAGIC_5: [u8; 4] = *b"b\r\n\x05";
 /// Version of the format.
 pub(crate) const VERSION: u8 = 6;
-pub(crate) const VERSION_5: u8 = 5;
 /// Bytes of a recording's identity.
 pub(crate) const IDENTITY_BYTES: usize = 4;
 

@@ -3,9 +3,8 @@
 use crate::bound::{Bound, TENS};
 use crate::codec::{Target, adaptive};
 use crate::error::{Damage, Error};
-use crate::header::VERSION_5;
 use crate::schema::Column;
-use crate::wire::{Bytes, push_text, push_varint, text};
+use crate::wire::{Bytes, VERSION_5, push_text, push_varint, text};
 use fewbits_block_codec::Start;
 use std::f64::consts::TAU;
 

@@ -76,11 +76,12 @@ mod rolling;
 mod scan;
 mod schema;
 mod specials;
+mod stretches;
 mod time;
 mod waiting;
 mod wire;
 
-pub use aggregate::{Aggregate, Stretch};
+pub use aggregate::Aggregate;
 pub use block::{Block, Cells};
 pub use blocks::{Blocks, Rows};
 pub use bound::{Bound, MAX_DECIMALS, MIN_SHARE, is_within, is_within_on_circle};
@@ -92,6 +93,7 @@ pub use playback::{BlockInfo, Playback, Row};
 pub use recorder::Recorder;
 pub use scan::BlockReader;
 pub use schema::{Column, MAX_CELLS, ROWS_PER_BLOCK, Schema, TimeBase, TimeFormat};
+pub use stretches::Stretch;
 
 /// The programs of `docs/record.md`, which are run as tests.
 #[cfg(doctest)]
