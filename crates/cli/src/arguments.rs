@@ -3,6 +3,7 @@
 use crate::design_options::DesignOptions;
 pub(crate) use crate::fleet_options::{CentreOptions, CheckOptions, SensorOptions};
 pub(crate) use crate::ranges_options::RangesOptions;
+pub(crate) use crate::recording_options::{CatOptions, RepackOptions, UnpackOptions};
 pub(crate) use crate::table_options::{BoundOptions, DialectOptions, ManyOptions, TableOptions};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -23,10 +24,12 @@ pub(crate) enum Task {
     Plan(PlanOptions),
     /// Pack a table (CSV) into a recording.
     Pack(PackOptions),
-    /// Write a whole recording as CSV.
+    /// Write a whole recording, or several as one table in the order of time, as CSV.
     Unpack(UnpackOptions),
-    /// Write some rows or columns of a recording as CSV.
+    /// Write some rows or columns of recordings as CSV, or means, minima and maxima over stretches of time.
     Cat(CatOptions),
+    /// Pack recordings anew under wider bounds, in their place or into another file. Both bounds are added up and stated.
+    Repack(RepackOptions),
     /// Describe a recording: rows, columns, bounds, times and damage.
     Info(InfoOptions),
     /// Check every row of a recording against the table it was made of and the error bounds. Exit code 1 if a bound is violated.
@@ -103,36 +106,6 @@ pub(crate) struct PackOptions {
     /// Print the summary as JSON on standard error.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-#[derive(Args)]
-pub(crate) struct UnpackOptions {
-    /// Recording; `-` for standard input.
-    pub(crate) file: String,
-    /// File of the table. Default: standard output.
-    #[arg(long, short, value_name = "FILE")]
-    pub(crate) output: Option<PathBuf>,
-}
-
-#[derive(Args)]
-pub(crate) struct CatOptions {
-    /// Recording; `-` for standard input.
-    pub(crate) file: String,
-    /// First time or row number. Default: that of the first row.
-    #[arg(long, allow_hyphen_values = true)]
-    pub(crate) from: Option<String>,
-    /// Last time or row number. Default: that of the last row.
-    #[arg(long, allow_hyphen_values = true)]
-    pub(crate) to: Option<String>,
-    /// Columns to write, in this order, separated by commas; a name with commas in double quotes. Default: all.
-    #[arg(long, value_name = "NAMES")]
-    pub(crate) columns: Vec<String>,
-    /// One JSON object per row instead of CSV.
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// File of the table. Default: standard output.
-    #[arg(long, short, value_name = "FILE")]
-    pub(crate) output: Option<PathBuf>,
 }
 
 #[derive(Args)]

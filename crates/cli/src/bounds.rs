@@ -4,7 +4,7 @@ use crate::error::Error;
 use fewbits_recipes::bounds;
 use fewbits_record::Column;
 
-pub(crate) use fewbits_recipes::bounds::{Spec, shown, summary};
+pub(crate) use fewbits_recipes::bounds::{Spec, of_column, shown, summary};
 
 /// The bound of columns that keep every bit.
 pub(crate) const LOSSLESS: Spec = Spec {

@@ -105,6 +105,13 @@ impl Files {
         }
     }
 
+    fn reading_all(files: &[String]) -> Self {
+        Self {
+            reads: files.iter().map(PathBuf::from).collect(),
+            ..Self::default()
+        }
+    }
+
     fn writing<'a>(mut self, paths: impl IntoIterator<Item = &'a Option<PathBuf>>) -> Self {
         let mut paths = paths.into_iter();
         // The first is the output, which is standard output if it is missing.
@@ -122,8 +129,11 @@ impl Files {
             Task::Look(options) => Self::reading(&options.table.file).writing([&None]),
             Task::Plan(options) => Self::reading(&options.table.file).writing([&None, &options.plot]),
             Task::Pack(options) => Self::reading(&options.table.file).writing([&options.output]),
-            Task::Unpack(options) => Self::reading(&options.file).writing([&options.output]),
-            Task::Cat(options) => Self::reading(&options.file).writing([&options.output]),
+            Task::Unpack(options) => Self::reading_all(&options.files).writing([&options.output]),
+            Task::Cat(options) => Self::reading_all(&options.files).writing([&options.output]),
+            // Without an output recordings are replaced.
+            Task::Repack(options) if options.output.is_none() => Self::reading_all(&options.files),
+            Task::Repack(options) => Self::reading_all(&options.files).writing([&options.output]),
             Task::Info(options) => Self::reading(&options.file).writing([&None]),
             Task::Verify(options) => {
                 let mut files = Self::reading(&options.table.file).writing([&None]);
@@ -238,6 +248,16 @@ pub(crate) fn prepare(task: &mut Task) -> Result<(), Error> {
     }
     if let Task::Cat(options) = task {
         split(&mut options.columns, "--columns")?;
+    }
+    if let Some(files) = match task {
+        Task::Cat(options) => Some(&mut options.files),
+        Task::Unpack(options) => Some(&mut options.files),
+        Task::Repack(options) => Some(&mut options.files),
+        _ => None,
+    } {
+        // The given order decides which of two recordings has its columns' order; wildcards are sorted.
+        let names: Vec<&str> = files.iter().map(String::as_str).collect();
+        *files = many::expanded_in_order(&names)?;
     }
     // Several files are compared when their names are known.
     if many::are_several(task) {

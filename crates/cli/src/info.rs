@@ -47,7 +47,7 @@ pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
         .map(|column| ColumnInfo {
             name: column.name().to_owned(),
             unit: column.unit().to_owned(),
-            bound: bounds::shown(column.bound(), column.period()),
+            bound: bounds::of_column(column),
             min: None,
             max: None,
             gaps: 0,

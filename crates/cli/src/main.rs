@@ -36,12 +36,15 @@ mod plot;
 mod private;
 mod ranges_options;
 mod recording;
+mod recording_options;
+mod repack;
 mod report;
 mod rows;
 mod say;
 mod send;
 mod sensor;
 mod serial;
+mod stretches;
 mod table_options;
 mod target;
 mod track;
@@ -87,6 +90,7 @@ fn run(mut task: Task) -> Result<Ending, Error> {
         Task::Pack(options) => pack::run(&options),
         Task::Unpack(options) => unpack::run(&options.whole()),
         Task::Cat(options) => unpack::run(&options),
+        Task::Repack(options) => repack::run(&options),
         Task::Info(options) => info::run(&options),
         Task::Verify(options) => verify::run(&options),
         Task::Bench(options) => bench::run(&options),

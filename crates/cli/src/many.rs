@@ -77,29 +77,34 @@ pub(crate) fn are_several(task: &Task) -> bool {
     }
 }
 
-/// The names of all files, sorted, so that several machines agree on them.
-fn expanded(names: &[&str]) -> Result<Vec<String>, Error> {
-    let mut files = Vec::new();
+/// The names of all files, each once, in the given order; those of a wildcard are sorted.
+pub(crate) fn expanded_in_order(names: &[&str]) -> Result<Vec<String>, Error> {
+    let mut files: Vec<String> = Vec::new();
     for name in names {
-        if !is_pattern(name) {
-            files.push((*name).to_owned());
-            continue;
-        }
-        let paths = glob::glob(name).map_err(|error| Error::content(name, error))?;
-        let before = files.len();
-        // What cannot be read is named when its turn comes.
-        let paths = paths.map(|path| path.unwrap_or_else(|error| error.path().to_owned()));
-        files.extend(
-            paths
+        let mut found = match is_pattern(name) {
+            // What cannot be read is named when its turn comes.
+            true => glob::glob(name)
+                .map_err(|error| Error::content(name, error))?
+                .map(|path| path.unwrap_or_else(|error| error.path().to_owned()))
                 .filter(|path| !path.is_dir())
-                .map(|path| path.to_string_lossy().into_owned()),
-        );
-        if files.len() == before {
+                .map(|path| path.to_string_lossy().into_owned())
+                .collect(),
+            false => vec![(*name).to_owned()],
+        };
+        if found.is_empty() {
             return Err(Error::content(name, "no file has a name like this"));
         }
+        found.sort();
+        found.retain(|file| !files.contains(file));
+        files.extend(found);
     }
+    Ok(files)
+}
+
+/// The names of all files, sorted, so that several machines agree on them.
+fn expanded(names: &[&str]) -> Result<Vec<String>, Error> {
+    let mut files = expanded_in_order(names)?;
     files.sort();
-    files.dedup();
     Ok(files)
 }
 
@@ -157,7 +162,7 @@ fn jobs(names: &[&str], shard: Option<Shard>, folder: &Path, extension: &str) ->
 }
 
 /// The error with its causes in one line.
-fn described(error: &Error) -> String {
+pub(crate) fn described(error: &Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
     while let Some(cause) = source {

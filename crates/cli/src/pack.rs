@@ -295,7 +295,7 @@ impl Done {
         let columns = schema.columns();
         let samples = (rows * columns.len() as u64).max(1);
         let bound = |column: &Column| {
-            let bound = bounds::shown(column.bound(), column.period());
+            let bound = bounds::of_column(column);
             (column.name().to_owned(), bound)
         };
         Self {

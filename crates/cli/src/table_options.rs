@@ -150,11 +150,12 @@ pub(crate) struct ManyOptions {
 /// Error bounds of the columns.
 #[derive(Args, Clone)]
 pub(crate) struct BoundOptions {
-    /// Bounds as `column=bound,...`, `*` for all others: `±0.1`, `1%` of the range, `decimals:3`, `lossless`; a circle as `±2@360`.
+    /// Bounds as `column=bound,...`, `*` for all others: `±0.1`, `1%` of the range, `rel:1%±0.001` (1 % of each
+    /// value, or 0.001 where that is more), `decimals:3`, `lossless`; a circle as `±2@360`.
     /// A bound without a column stands first. Numbers have a point. Columns without a bound are lossless.
     #[arg(long, value_name = "BOUNDS", allow_hyphen_values = true, default_value = "")]
     pub(crate) bound: String,
     /// Number of rows per block. A damaged block loses its rows only.
-    #[arg(long, default_value_t = fewbits_record::ROWS_PER_BLOCK, value_name = "ROWS")]
+    #[arg(long, visible_alias = "independent", default_value_t = fewbits_record::ROWS_PER_BLOCK, value_name = "ROWS")]
     pub(crate) rows_per_block: usize,
 }

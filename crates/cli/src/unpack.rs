@@ -5,17 +5,23 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::output::{Shape, Writer};
 use crate::say::say;
-use crate::{Ending, clock, recording};
-use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase};
+use crate::{Ending, clock, recording, say, stretches, words};
+use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase, merged};
+use std::path::Path;
 
 impl UnpackOptions {
     /// All rows and columns.
     pub(crate) fn whole(self) -> CatOptions {
         CatOptions {
-            file: self.file,
+            files: self.files,
             from: None,
             to: None,
             columns: Vec::new(),
+            every: None,
+            mean: false,
+            min: false,
+            max: false,
+            count: false,
             json: false,
             output: self.output,
         }
@@ -23,11 +29,11 @@ impl UnpackOptions {
 }
 
 /// The selected rows and columns.
-struct Selection {
-    from: i64,
-    to: i64,
+pub(crate) struct Selection {
+    pub(crate) from: i64,
+    pub(crate) to: i64,
     columns: Vec<usize>,
-    names: Vec<String>,
+    pub(crate) names: Vec<String>,
 }
 
 fn end(text: Option<&String>, option: &'static str, time: TimeBase, otherwise: i64) -> Result<i64, Error> {
@@ -39,7 +45,7 @@ fn end(text: Option<&String>, option: &'static str, time: TimeBase, otherwise: i
     clock::tick(text, time).map_err(|_| Error::option(option, text, expected))
 }
 
-fn selection(options: &CatOptions, schema: &Schema) -> Result<Selection, Error> {
+pub(crate) fn selection(options: &CatOptions, schema: &Schema, file: &str) -> Result<Selection, Error> {
     let all = || schema.columns().iter().map(|column| column.name().to_owned()).collect();
     let names: Vec<String> = if options.columns.is_empty() {
         all()
@@ -50,7 +56,7 @@ fn selection(options: &CatOptions, schema: &Schema) -> Result<Selection, Error> 
     Ok(Selection {
         from: end(options.from.as_ref(), "--from", schema.time(), i64::MIN)?,
         to: end(options.to.as_ref(), "--to", schema.time(), i64::MAX)?,
-        columns: columns.map_err(Error::recording(&options.file))?,
+        columns: columns.map_err(Error::recording(file))?,
         names,
     })
 }
@@ -88,22 +94,32 @@ pub(crate) fn write_blocks(
     Ok(ending)
 }
 
+/// What is said of a recording without its end.
+pub(crate) fn warn_of_end(file: &str) {
+    say!("warning: {file}: the end is missing (not finished, or cut off): rows may be missing behind the last");
+}
+
 /// Runs the task.
 pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
+    if let Some(every) = &options.every {
+        return stretches::run(options, every);
+    }
+    let [file] = options.files.as_slice() else {
+        return several(options);
+    };
     let shape = Shape::of(options.json);
     // What is no file is read once, from front to end.
-    if !is_regular(&options.file) {
-        let (source, file) = recording::stream(&options.file)?;
+    if !is_regular(file) {
+        let (source, file) = recording::stream(file)?;
         let blocks = BlockReader::new(source).map_err(Error::recording(file))?;
-        let selection = selection(options, blocks.schema())?;
+        let selection = selection(options, blocks.schema(), file)?;
         let mut writer = Writer::new(options.output.as_deref(), shape, blocks.schema(), &selection.names)?;
         let ticks = (selection.from, selection.to);
         let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, file)?;
         return writer.finish().map(|()| ending);
     }
-    let file = options.file.as_str();
     let mut playback = Playback::open(file).map_err(Error::recording(file))?;
-    let selection = selection(options, playback.schema())?;
+    let selection = selection(options, playback.schema(), file)?;
     let mut writer = Writer::new(options.output.as_deref(), shape, playback.schema(), &selection.names)?;
     let names: Vec<&str> = selection.names.iter().map(String::as_str).collect();
     playback.columns(&names).map_err(Error::recording(file))?;
@@ -113,10 +129,68 @@ pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
     let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, file)?;
     writer.finish()?;
     if !is_finished {
-        say!("warning: {file}: the end is missing (not finished, or cut off): rows may be missing behind the last");
+        warn_of_end(file);
         return Ok(Ending::Failed);
     }
     Ok(ending)
+}
+
+/// Several recordings as one table.
+fn several(options: &CatOptions) -> Result<Ending, Error> {
+    let open = |file: &String| recording::open(Path::new(file));
+    let mut playbacks: Vec<_> = options.files.iter().map(open).collect::<Result<_, Error>>()?;
+    let first = &options.files[0];
+    let schema = playbacks[0].schema().clone();
+    let selection = selection(options, &schema, first)?;
+    let names: Vec<&str> = selection.names.iter().map(String::as_str).collect();
+    let unfinished: Vec<usize> = (0..playbacks.len()).filter(|i| !playbacks[*i].is_finished()).collect();
+    let together = format!("{} recordings", options.files.len());
+    words_agree(&schema, playbacks.iter().map(Playback::schema), &options.files)?;
+    let rows = merged(&mut playbacks, &names, (selection.from, selection.to)).map_err(Error::recording(&together))?;
+    let mut writer = Writer::new(options.output.as_deref(), Shape::of(options.json), &schema, &selection.names)?;
+    let mut ending = Ending::Good;
+    for row in rows {
+        match row {
+            Ok(row) => writer.write(row.tick, &row.values)?,
+            // Of a recording without its end more is said below.
+            Err(error @ fewbits_record::Error::Block { .. }) => {
+                say!("warning: {together}: {error}; the rest is read");
+                ending = Ending::Failed;
+            }
+            Err(error) => return Err(Error::recording(&together)(error)),
+        }
+    }
+    writer.finish()?;
+    for i in unfinished {
+        warn_of_end(&options.files[i]);
+        ending = Ending::Failed;
+    }
+    Ok(ending)
+}
+
+/// Refuses recordings whose words have other numbers: the unit of a column of words lists them.
+pub(crate) fn words_agree<'a>(
+    first: &Schema,
+    all: impl Iterator<Item = &'a Schema>,
+    files: &[String],
+) -> Result<(), Error> {
+    for (schema, file) in all.zip(files) {
+        for column in first.columns() {
+            let unit = |schema: &Schema| {
+                schema
+                    .position(column.name())
+                    .map(|i| schema.columns()[i].unit().to_owned())
+            };
+            if let Ok(unit) = unit(schema)
+                && unit != column.unit()
+                && (words::of(&unit).is_some() || words::of(column.unit()).is_some())
+            {
+                let name = say::name(column.name());
+                return Err(Error::content(file, format!("column `{name}` has other words than in {}", files[0])));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// All columns of a schema.

@@ -4,7 +4,7 @@
 //! bounds := [bound ,] named , ...        a bound without a name applies to all other columns and stands first
 //! named  := column=bound | *=bound       `*`: all other columns; a name with a comma or `=` stands in double quotes
 //! bound  := size [@circumference]
-//! size   := ±number | number% | decimals:digits | lossless
+//! size   := ±number | number% | rel:number%±number | decimals:digits | lossless
 //! ```
 //!
 //! Numbers have a point. A comma ends a part, so that `±2,5` has two bounds without a name and is refused.
@@ -14,8 +14,7 @@ use crate::names::{self, Part};
 use fewbits_record::{Bound, Column};
 
 /// The forms of a bound, for messages.
-pub const EXPECTED: &str =
-    "`±0.1`, `1%`, `decimals:3` or `lossless`, on a circle with `@360` behind it; for one column as `column=bound`";
+pub const EXPECTED: &str = "`±0.1`, `1%`, `rel:1%±0.001`, `decimals:3` or `lossless`, on a circle with `@360` behind it; for one column as `column=bound`";
 
 /// The bound of one column as the text states it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,6 +130,14 @@ pub fn parse_one(text: &str) -> Result<Spec, Error> {
         Bound::Lossless
     } else if let Some(places) = bound.strip_prefix("decimals:") {
         Bound::Decimals(places.trim().parse().map_err(|_| refused(bound))?)
+    } else if let Some(relative) = bound.strip_prefix("rel:") {
+        // Of each value, with a floor: there is no relative bound of zero.
+        let parts = relative.split_once('%').ok_or_else(|| refused(bound))?;
+        let floor = parts.1.trim().strip_prefix('±').or(parts.1.trim().strip_prefix("+-"));
+        Bound::Relative {
+            share: 0.01 * number(parts.0)?,
+            floor: number(floor.ok_or_else(|| refused(bound))?)?,
+        }
     } else if let Some(percent) = bound.strip_suffix('%') {
         let percent = percent
             .strip_prefix('±')
@@ -182,12 +189,38 @@ pub fn columns<S: AsRef<str>>(
     columns.collect()
 }
 
+/// A share in percent, without the digits that rounding adds.
+fn percent(share: f64) -> f64 {
+    (1e12 * share).round() / 1e10
+}
+
+/// The bound of a column in the language of this module. If its samples were restored from a recording, that bound stands behind it:
+/// `±0.5 (and ±0.1 of an earlier recording: ±0.6)`.
+pub fn of_column(column: &Column) -> String {
+    let own = shown(column.bound(), column.period());
+    let earlier = column.earlier_bound();
+    match column.bound() {
+        _ if earlier == 0.0 => own,
+        Bound::Lossless => format!("±{} (of an earlier recording)", exact(earlier)),
+        Bound::Absolute(delta) => {
+            format!("{own} (and ±{} of an earlier recording: ±{})", exact(earlier), exact(rounded(delta + earlier)))
+        }
+        _ => format!("{own} (and ±{} of an earlier recording)", exact(earlier)),
+    }
+}
+
+/// A sum of numbers of few digits, without the digits that rounding adds.
+fn rounded(sum: f64) -> f64 {
+    format!("{sum:.14e}").parse().unwrap_or(sum)
+}
+
 /// A bound in the language of this module.
 pub fn shown(bound: Bound, period: Option<f64>) -> String {
     let bound = match bound {
         Bound::Lossless => "lossless".to_owned(),
         Bound::Absolute(delta) => format!("±{}", exact(delta)),
-        Bound::ShareOfRange(share) => format!("{}%", (1e12 * share).round() / 1e10),
+        Bound::ShareOfRange(share) => format!("{}%", percent(share)),
+        Bound::Relative { share, floor } => format!("rel:{}%±{}", percent(share), exact(floor)),
         Bound::Decimals(places) => format!("decimals:{places}"),
         _ => "?".to_owned(),
     };
@@ -196,7 +229,7 @@ pub fn shown(bound: Bound, period: Option<f64>) -> String {
 
 /// The bounds of all columns in the language of this module: one alone if all are equal, otherwise each with its name.
 pub fn summary(columns: &[Column]) -> String {
-    let of = |column: &Column| shown(column.bound(), column.period());
+    let of = of_column;
     match columns.split_first() {
         Some((first, rest)) if rest.iter().all(|column| of(column) == of(first)) => format!("all {}", of(first)),
         _ => {
@@ -236,6 +269,7 @@ mod tests {
             ("±0.5", ["±0.5", "±0.5", "±0.5"]),
             ("1%,temp=±0.1", ["±0.1", "1%", "1%"]),
             ("temp = +-2@360, *=decimals:3", ["±2@360", "decimals:3", "decimals:3"]),
+            ("rel:1%±0.001,temp=rel: 0.5 % +-2", ["rel:0.5%±2", "rel:1%±0.001", "rel:1%±0.001"]),
             ("\"Temp, °F\"=±0.1,wind=lossless,*=2e-9", ["±2e-9", "lossless", "±0.1"]),
         ] {
             assert_eq!(bounds(text).unwrap(), expected, "{text}");
@@ -266,7 +300,17 @@ mod tests {
         for text in ["temp=±1,temp=±2", "*=±1,*=±2", "±1,*=±2"] {
             assert!(matches!(bounds(text), Err(Error::Twice { .. })), "{text}");
         }
-        for text in ["temp=warm", "temp=", "temp=±0;5", "decimals:x", "±1@", "%"] {
+        for text in [
+            "temp=warm",
+            "temp=",
+            "temp=±0;5",
+            "decimals:x",
+            "±1@",
+            "%",
+            "rel:1%",
+            "rel:±1",
+            "rel:1%2",
+        ] {
             assert!(matches!(bounds(text), Err(Error::Bound { .. })), "{text}");
         }
         assert!(matches!(bounds("\"Temp, °F\""), Err(Error::Quote { .. })));

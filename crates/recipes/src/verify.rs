@@ -197,7 +197,7 @@ impl ColumnVerdict {
     fn new(column: &Column) -> Self {
         Self {
             name: column.name().to_owned(),
-            bound: bounds::shown(column.bound(), column.period()),
+            bound: bounds::of_column(column),
             largest_error: 0.0,
             failed: 0,
             first_failures: Vec::new(),

@@ -1,8 +1,9 @@
 //! The blocks and rows of a recording one after the other, by its index or by a scan.
 
+use crate::aggregate::Aggregate;
 use crate::block::{self, Block};
 use crate::error::{Damage, Error};
-use crate::index::Entry;
+use crate::index::{Entry, Segment};
 use crate::playback::{Index, Playback, Row, entries, read_at};
 use crate::scan::{Found, Kind, Order, Scanner, damage_of, decoded};
 use std::collections::VecDeque;
@@ -30,6 +31,9 @@ impl<R: Read + Seek> Playback<R> {
         Rows::new(self.blocks_between(from, to), chosen, (from, to))
     }
 }
+
+/// Ticks of a block, its rows, and the aggregates of its columns.
+pub(crate) type Known = ((i64, i64), (u64, Vec<Aggregate>));
 
 /// Iterator over [`Block`]s.
 pub struct Blocks<'a, R> {
@@ -79,6 +83,63 @@ fn no_bytes(offset: u64, damage: Damage) -> Error {
 impl<R: Read + Seek> Blocks<'_, R> {
     fn overlaps(&self, ticks: (i64, i64)) -> bool {
         ticks.0 <= self.ticks.1 && ticks.1 >= self.ticks.0
+    }
+
+    /// The ticks of the next block, and its rows and aggregates, if the index has them and they are wanted: the block is passed over.
+    ///
+    /// # Errors
+    /// If reading fails.
+    pub(crate) fn known(&mut self, is_wanted: impl Fn((i64, i64)) -> bool) -> Result<Option<Known>, Error> {
+        if !self.pending.is_empty() || self.scan.is_some() || self.single {
+            return Ok(None);
+        }
+        while self.entries.is_empty() {
+            let Index::Whole(segments) = &self.playback.index else {
+                return Ok(None);
+            };
+            let Some(segment) = segments.get(self.next_segment).copied() else {
+                return Ok(None);
+            };
+            self.next_segment += 1;
+            if segment.rows == 0 || self.overlaps(segment.ticks) {
+                self.enter(&segment)?;
+                if self.scan.is_some() {
+                    return Ok(None);
+                }
+            }
+        }
+        // As in `next`: entries before the ticks asked for are passed over.
+        while let Some((_, entry)) = self.entries.front()
+            && entry.rows > 0
+            && !self.overlaps(entry.ticks)
+        {
+            self.entries.pop_front();
+        }
+        let is_known =
+            |(_, entry): &(u64, Entry)| entry.rows > 0 && entry.aggregates.is_some() && is_wanted(entry.ticks);
+        let known = self.entries.front().is_some_and(is_known);
+        let next = if known { self.entries.pop_front() } else { None };
+        Ok(next.and_then(|(_, entry)| Some((entry.ticks, (entry.rows, entry.aggregates?)))))
+    }
+
+    /// Reads the entries of a segment. If it is damaged, its blocks are searched.
+    fn enter(&mut self, segment: &Segment) -> Result<(), Error> {
+        match entries(&mut self.playback.reader, &self.playback.header, segment)? {
+            Some(found) => {
+                let mut offset = segment.start;
+                for entry in found {
+                    let next = offset.saturating_add(entry.length);
+                    self.entries.push_back((offset, entry));
+                    offset = next;
+                }
+                Ok(())
+            }
+            None => {
+                let stretch = (segment.start, segment.start.saturating_add(segment.blocks));
+                let order = Order::after(self.last_number.filter(|_| self.ticks == (i64::MIN, i64::MAX)));
+                self.start_scan(stretch, order)
+            }
+        }
     }
 
     /// The next block of an indexed segment.
@@ -216,24 +277,8 @@ impl<R: Read + Seek> Iterator for Blocks<'_, R> {
             if segment.rows > 0 && !self.overlaps(segment.ticks) {
                 continue;
             }
-            match entries(&mut self.playback.reader, &self.playback.header, &segment) {
-                Ok(Some(found)) => {
-                    let mut offset = segment.start;
-                    for entry in found {
-                        let next = offset.saturating_add(entry.length);
-                        self.entries.push_back((offset, entry));
-                        offset = next;
-                    }
-                }
-                // Only the segment itself is damaged: scan for its blocks.
-                Ok(None) => {
-                    let stretch = (segment.start, segment.start.saturating_add(segment.blocks));
-                    let order = Order::after(self.last_number.filter(|_| self.ticks == (i64::MIN, i64::MAX)));
-                    if let Err(error) = self.start_scan(stretch, order) {
-                        return Some(Err(error));
-                    }
-                }
-                Err(error) => return Some(Err(error)),
+            if let Err(error) = self.enter(&segment) {
+                return Some(Err(error));
             }
         }
     }

@@ -18,10 +18,20 @@ pub enum Bound {
     ShareOfRange(f64),
     /// Numbers of at most this many decimals (up to 15) are restored exactly, others within half a unit of the last decimal.
     Decimals(u8),
+    /// Restored within this share of each value's size, or within the floor where that is larger: a value `x` within
+    /// `max(share |x|, floor)`.
+    Relative {
+        /// Share of the value's size, from [`MIN_SHARE`] to one half.
+        share: f64,
+        /// Bound of small values, in units of the column.
+        floor: f64,
+    },
 }
 
 /// Largest number of decimals of [`Bound::Decimals`].
 pub const MAX_DECIMALS: u8 = 15;
+/// Smallest share of [`Bound::Relative`].
+pub const MIN_SHARE: f64 = 1e-6;
 
 impl Bound {
     pub(crate) fn checked(self) -> Result<Self, ArgumentError> {
@@ -41,6 +51,15 @@ impl Bound {
             Self::Decimals(places) if places > MAX_DECIMALS => {
                 return Err(ArgumentError::new("bound", places, "at most 15 decimals"));
             }
+            Self::Relative { share, floor } => {
+                if !(MIN_SHARE..=0.5).contains(&share) {
+                    return Err(ArgumentError::new("bound", share, "a share of each value, from 1e-6 to 0.5"));
+                }
+                ArgumentError::positive("floor", floor)?;
+                if !(4.0 * floor / share).is_finite() {
+                    return Err(ArgumentError::new("floor", floor, "a number whose quotient by the share is finite"));
+                }
+            }
             Self::Lossless | Self::Decimals(_) => {}
         }
         Ok(self)
@@ -56,6 +75,8 @@ pub(crate) enum Promise {
     Within(f64),
     /// Numbers of this many decimals exactly, others within half a unit of the last.
     Decimals(u8),
+    /// Within a share of the sample's size, or within the floor.
+    Relative { share: f64, floor: f64 },
 }
 
 /// Powers of ten that doubles represent exactly.
@@ -79,6 +100,10 @@ impl Promise {
                 None => is_within(sample, restored, delta),
                 Some(period) => is_within_on_circle(sample, restored, delta, period),
             },
+            // The product may have been rounded up, which a bound must not be.
+            Self::Relative { share, floor } => {
+                is_within(sample, restored, (share * sample.abs()).next_down().max(floor))
+            }
             Self::Decimals(places) => {
                 let half = 0.5 / TENS.get(usize::from(places)).copied().unwrap_or(1.0);
                 match decimal(sample, places) {

@@ -1,9 +1,11 @@
 //! The header: everything that is needed to decode any block of a recording.
 
+use crate::bound::Bound;
 use crate::codec::{Target, adaptive};
-use crate::header_column::push_column;
+use crate::header_column::{push_column, shortened};
 use crate::schema::{Schema, TimeBase, TimeFormat, default_rows};
 use crate::time::Grid;
+pub(crate) use crate::wire::VERSION_5;
 use crate::wire::{checksum, push_varint, zigzag};
 use fewbits_block_codec::Start;
 use std::collections::hash_map::RandomState;
@@ -16,7 +18,6 @@ pub(crate) const MAGIC: [u8; 4] = *b"\x8bfew";
 pub(crate) const MAGIC_5: [u8; 4] = *b"b\r\n\x05";
 /// Version of the format.
 pub(crate) const VERSION: u8 = 6;
-pub(crate) const VERSION_5: u8 = 5;
 /// Bytes of a recording's identity.
 pub(crate) const IDENTITY_BYTES: usize = 4;
 
@@ -58,7 +59,12 @@ pub(crate) struct Header {
 
 impl Header {
     /// The header of a recording whose first rows are known.
-    pub(crate) fn new(schema: Schema, ticks: &[i64], share_bounds: Vec<f64>) -> Self {
+    pub(crate) fn new(mut schema: Schema, ticks: &[i64], share_bounds: Vec<f64>) -> Self {
+        for column in &mut schema.columns {
+            if let Bound::Absolute(delta) = &mut column.bound {
+                *delta = shortened(*delta);
+            }
+        }
         let grid = match schema.time {
             TimeBase::Numbered => Grid {
                 origin: ticks.first().copied().unwrap_or(0),
@@ -154,7 +160,11 @@ impl Header {
             origin: self.origin,
             step: self.step,
             rows_per_block: self.schema.rows_per_block,
-            tolerance: self.schema.time.tolerance(),
+            tolerance: if self.schema.keeps_ticks {
+                0
+            } else {
+                self.schema.time.tolerance()
+            },
         }
     }
 
@@ -240,7 +250,7 @@ impl Header {
         }
         let columns = self.schema.columns.iter().zip(&self.share_bounds).zip(&self.starts);
         for ((column, share_bound), start) in columns {
-            push_column(&mut body, column, *share_bound, start.as_ref());
+            push_column(&mut body, self.version, column, *share_bound, start.as_ref());
         }
         body
     }

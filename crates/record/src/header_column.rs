@@ -4,28 +4,53 @@ use crate::bound::{Bound, TENS};
 use crate::codec::{Target, adaptive};
 use crate::error::{Damage, Error};
 use crate::schema::Column;
-use crate::wire::{Bytes, push_text, push_varint, text};
+use crate::wire::{Bytes, VERSION_5, push_text, push_varint, text};
 use fewbits_block_codec::Start;
+use std::f64::consts::TAU;
 
 /// Flags beside the kind of a bound: a period follows, a start follows, a unit follows.
 const HAS_PERIOD: u8 = 0x10;
 const HAS_START: u8 = 0x20;
 const HAS_UNIT: u8 = 0x40;
-/// Stored in place of the number of decimals: the double itself follows.
+const HAS_EARLIER: u8 = 0x80;
+/// Stored in place of the number of decimals: the double itself follows; twice pi, the circumference of directions in radians.
 const DOUBLE: u8 = 0xff;
+const TURN: u8 = 0xfe;
+/// Digits below this take at most 6 bytes, the double itself 8.
+const MOST_DIGITS: f64 = (1_u64 << 42) as f64;
+/// Largest share of a bound that is given up for fewer digits.
+const GIVEN_UP: f64 = 1.0 / (1 << 16) as f64;
+
+/// Decimals and digits, if these are exact and short.
+fn digits(number: f64) -> Option<(u8, u64)> {
+    (0_u8..).zip(TENS).find_map(|(decimals, ten)| {
+        let digits = (number * ten).round();
+        (digits < MOST_DIGITS && digits / ten == number).then_some((decimals, digits as u64))
+    })
+}
+
+/// A bound that takes few bytes, at most this one: bounds that were computed, as a hundredth of a range, have many digits.
+pub(crate) fn shortened(bound: f64) -> f64 {
+    if digits(bound).is_some_and(|(_, digits)| digits < 1 << 21) {
+        return bound;
+    }
+    let short = TENS.iter().find_map(|ten| {
+        let digits = (bound * ten).floor();
+        let short = digits / ten;
+        (digits < MOST_DIGITS && short <= bound && short >= bound * (1.0 - GIVEN_UP)).then_some(short)
+    });
+    short.unwrap_or(bound)
+}
 
 /// Appends a non-negative number: decimals and digits if these are exact, otherwise its bits.
-fn push_number(body: &mut Vec<u8>, number: f64) {
-    let digits = (0_u8..).zip(TENS).find_map(|(decimals, ten)| {
-        let digits = (number * ten).round();
-        // Such digits take at most 6 bytes, the double itself 8.
-        (digits < 2f64.powi(42) && digits / ten == number).then_some((decimals, digits as u64))
-    });
-    match digits {
+fn push_number(body: &mut Vec<u8>, number: f64, version: u8) {
+    match digits(number) {
         Some((decimals, digits)) => {
             body.push(decimals);
             push_varint(body, digits);
         }
+        // The header of version 5 is written again to find its length.
+        None if number == TAU && version != VERSION_5 => body.push(TURN),
         None => {
             body.push(DOUBLE);
             body.extend(number.to_le_bytes());
@@ -36,6 +61,7 @@ fn push_number(body: &mut Vec<u8>, number: f64) {
 fn read_number(body: &mut Bytes<'_>) -> Result<f64, Damage> {
     match body.byte()? {
         DOUBLE => Ok(body.f64()?),
+        TURN => Ok(TAU),
         decimals => {
             let ten = TENS
                 .get(usize::from(decimals))
@@ -45,33 +71,42 @@ fn read_number(body: &mut Bytes<'_>) -> Result<f64, Damage> {
     }
 }
 
-pub(crate) fn push_column(body: &mut Vec<u8>, column: &Column, share_bound: f64, start: Option<&Start>) {
+pub(crate) fn push_column(body: &mut Vec<u8>, version: u8, column: &Column, share_bound: f64, start: Option<&Start>) {
     push_text(body, &column.name);
     let flag = |given: bool, flag: u8| if given { flag } else { 0 };
     let flags = flag(column.period.is_some(), HAS_PERIOD)
         | flag(start.is_some(), HAS_START)
-        | flag(!column.unit.is_empty(), HAS_UNIT);
+        | flag(!column.unit.is_empty(), HAS_UNIT)
+        | flag(column.earlier > 0.0, HAS_EARLIER);
     match column.bound {
         Bound::Lossless => body.push(flags),
         Bound::Absolute(delta) => {
             body.push(1 | flags);
-            push_number(body, delta);
+            push_number(body, delta, version);
         }
         Bound::ShareOfRange(share) => {
             body.push(2 | flags);
-            push_number(body, share);
+            push_number(body, share, version);
             body.extend_from_slice(&share_bound.to_be_bytes()[..3]);
         }
         Bound::Decimals(places) => {
             body.push(3 | flags);
             body.push(places);
         }
+        Bound::Relative { share, floor } => {
+            body.push(4 | flags);
+            push_number(body, share, version);
+            push_number(body, floor, version);
+        }
     }
     if !column.unit.is_empty() {
         push_text(body, &column.unit);
     }
     if let Some(period) = column.period {
-        push_number(body, period);
+        push_number(body, period, version);
+    }
+    if column.earlier > 0.0 {
+        push_number(body, column.earlier, version);
     }
     if let Some(start) = start {
         body.extend(start.to_bytes());
@@ -82,7 +117,7 @@ pub(crate) fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<S
     let name = text(body).map_err(Error::header)?;
     let kind = body.byte().map_err(Error::header)?;
     let mut share_bound = 0.0;
-    let bound = match kind & !(HAS_PERIOD | HAS_START | HAS_UNIT) {
+    let bound = match kind & !(HAS_PERIOD | HAS_START | HAS_UNIT | HAS_EARLIER) {
         0 => Bound::Lossless,
         1 => Bound::Absolute(read_number(body).map_err(Error::header)?),
         2 => {
@@ -95,6 +130,10 @@ pub(crate) fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<S
             Bound::ShareOfRange(share)
         }
         3 => Bound::Decimals(body.byte().map_err(Error::header)?),
+        4 => Bound::Relative {
+            share: read_number(body).map_err(Error::header)?,
+            floor: read_number(body).map_err(Error::header)?,
+        },
         _ => return Err(Error::Header(Damage::Content("bound"))),
     };
     let mut column = Column::new(name, bound)?;
@@ -103,6 +142,9 @@ pub(crate) fn read_column(body: &mut Bytes<'_>) -> Result<(Column, f64, Option<S
     }
     if kind & HAS_PERIOD != 0 {
         column = column.with_period(read_number(body).map_err(Error::header)?)?;
+    }
+    if kind & HAS_EARLIER != 0 {
+        column = column.with_earlier_bound(read_number(body).map_err(Error::header)?)?;
     }
     let mut start = None;
     if kind & HAS_START != 0 {

@@ -4,11 +4,20 @@
 //! that many entries. A footer lists the segments; a single segment takes the place of the footer. An entry without rows stands for damaged
 //! bytes that `resume` left in place.
 
+use crate::aggregate::{self, Aggregate};
 use crate::block::Cells;
 use crate::error::Damage;
-use crate::header::Header;
-use crate::ranges::{self, Ends};
+use crate::header::{Header, VERSION_5};
+use crate::ranges::Ends;
 use crate::wire::{Bytes, checked, push_varint, read_checked, unzigzag, zigzag};
+
+/// Least number of rows per block with which the index has aggregates: those of a column take 25 bytes per block, of smaller blocks a larger part.
+const AGGREGATED_ROWS: usize = 4096;
+
+/// Whether the index of a recording has the aggregates of blocks; otherwise it has bounds of their values.
+fn has_aggregates(header: &Header) -> bool {
+    header.version != VERSION_5 && header.schema.rows_per_block >= AGGREGATED_ROWS
+}
 
 /// Number of blocks per segment.
 pub(crate) const BLOCKS_PER_SEGMENT: usize = 1024;
@@ -33,6 +42,8 @@ pub(crate) struct Entry {
     pub(crate) ticks: (i64, i64),
     /// Lower and upper bound of the finite values of each column; `None` if there are none.
     pub(crate) ends: Vec<Ends>,
+    /// Aggregates of each column, if the index has them.
+    pub(crate) aggregates: Option<Vec<Aggregate>>,
 }
 
 impl Entry {
@@ -42,13 +53,12 @@ impl Entry {
             rows: 0,
             ticks: (0, 0),
             ends: vec![None; columns],
+            aggregates: None,
         }
     }
 
     pub(crate) fn of(length: u64, ticks: &[i64], columns: &[Cells]) -> Self {
-        let ends = columns
-            .iter()
-            .map(|cells| cells.iter().fold(None, |ends, cell| ranges::with(ends, *cell)));
+        let aggregates = aggregate::of_columns(columns);
         let ticks = ticks
             .iter()
             .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));
@@ -56,7 +66,8 @@ impl Entry {
             length,
             rows: columns.first().map_or(0, |cells| cells.len() as u64),
             ticks,
-            ends: ends.collect(),
+            ends: aggregates.iter().map(Aggregate::ends).collect(),
+            aggregates: Some(aggregates),
         }
     }
 }
@@ -103,9 +114,15 @@ pub(crate) fn special(check: u32, kind: u8, content: &[u8]) -> Vec<u8> {
 }
 
 /// The longest content of a special record of a recording.
-pub(crate) fn max_content(kind: u8, columns: usize) -> usize {
+pub(crate) fn max_content(kind: u8, header: &Header) -> usize {
+    let columns = header.schema.columns.len();
+    let of_column = if has_aggregates(header) {
+        aggregate::MAX_BYTES
+    } else {
+        1
+    };
     match kind {
-        SEGMENT | ONLY => 16 + 8 * columns + BLOCKS_PER_SEGMENT * (40 + columns),
+        SEGMENT | ONLY => 16 + 8 * columns + BLOCKS_PER_SEGMENT * (40 + of_column * columns),
         FOOTER => MAX_FOOTER,
         _ => 0,
     }
@@ -117,7 +134,7 @@ pub(crate) fn read_special<'a>(header: &Header, bytes: &'a [u8]) -> Result<(u8, 
     if mark != 0 {
         return Err(Damage::NoBlock);
     }
-    let limit = max_content(kind, header.schema.columns.len());
+    let limit = max_content(kind, header);
     let (content, whole) = read_checked(header.check, bytes, 2, 0..=limit)?;
     Ok((kind, content, whole))
 }
@@ -198,8 +215,9 @@ pub(crate) fn push_segment(header: &Header, entries: &[Entry]) -> Vec<u8> {
     let columns = header.schema.columns.len();
     let mut content = Vec::new();
     push_varint(&mut content, entries.len() as u64);
+    let is_aggregated = has_aggregates(header);
     let mut scales = Vec::with_capacity(columns);
-    for column in 0..columns {
+    for column in 0..if is_aggregated { 0 } else { columns } {
         let ends = entries.iter().filter_map(|entry| entry.ends[column]);
         let all = ends.reduce(|(l, h), (low, high)| (l.min(low), h.max(high)));
         // Without values the lower bound is stored above the upper one.
@@ -228,6 +246,8 @@ pub(crate) fn push_segment(header: &Header, entries: &[Entry]) -> Vec<u8> {
             push_varint(&mut content, shape.2 as u64);
         }
         (last, before) = (entry.ticks.1, Some(shape));
+        let aggregates = entry.aggregates.iter().flatten().filter(|_| is_aggregated);
+        aggregates.for_each(|aggregate| aggregate.push(&mut content, entry.rows));
         for (ends, scale) in entry.ends.iter().zip(&scales) {
             let levels = ends.map(|(low, high)| [level_below(low, *scale), level_above(high, *scale)]);
             let [low, high] = levels.unwrap_or(NO_VALUES);
@@ -242,8 +262,9 @@ pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>
     let columns = header.schema.columns.len();
     let mut reader = Bytes(content);
     let count = reader.count(BLOCKS_PER_SEGMENT, "number of blocks")?;
+    let is_aggregated = has_aggregates(header);
     let mut scales = Vec::with_capacity(columns);
-    for _ in 0..columns {
+    for _ in 0..if is_aggregated { 0 } else { columns } {
         scales.push((read_short(&mut reader)?, read_short(&mut reader)?));
     }
     let (mut entries, mut last, mut before) = (Vec::with_capacity(count), header.origin, None);
@@ -266,6 +287,12 @@ pub(crate) fn read_segment(header: &Header, content: &[u8]) -> Result<Vec<Entry>
             let first = last.wrapping_add(shape.1);
             entry.ticks = (first, first.wrapping_add(shape.2));
             (last, before) = (entry.ticks.1, Some(shape));
+            if is_aggregated {
+                let read = |_| Aggregate::read(&mut reader, entry.rows);
+                let aggregates: Vec<Aggregate> = (0..columns).map(read).collect::<Result<_, _>>()?;
+                entry.ends = aggregates.iter().map(Aggregate::ends).collect();
+                entry.aggregates = Some(aggregates);
+            }
             for (ends, scale) in entry.ends.iter_mut().zip(&scales) {
                 let byte = reader.byte()?;
                 let (low, high) = (byte >> 4, byte & 15);
@@ -335,10 +362,12 @@ mod tests {
                 rows: 4,
                 ticks: (-5, 7),
                 ends: vec![Some(*ends), None, Some((0.3, 0.3))],
+                aggregates: None,
             })
             .collect();
         let columns = ["a", "b", "c"].map(|name| Column::new(name, Bound::Lossless).unwrap());
         let schema = Schema::new(columns.to_vec(), TimeBase::Numbered).unwrap();
+        let schema = schema.with_rows_per_block(512).unwrap();
         let header = Header::new(schema, &[3], vec![0.0; 3]);
         let read = read_segment(&header, &push_segment(&header, &entries)).unwrap();
         for (entry, (low, high)) in read.iter().zip(values) {

@@ -43,11 +43,15 @@
 //! | writing | [`Recorder`] |
 //! | reading with random access | [`Playback`] |
 //! | reading from front to end, for example from a pipe | [`BlockReader`] |
+//! | several recordings as one table | [`merged`] |
+//! | a recording under wider bounds | [`Playback::widened`], [`Playback::repack`] |
+//! | minimum, maximum and mean over stretches of time | [`Playback::aggregates`] |
 //! | frames for a link that loses some | [`FrameWriter`], [`HeaderRepeats`], [`FrameReader`] |
 //!
 //! Not here: how values are predicted and coded (`fewbits-block-codec`), text formats and the command line (`fewbits-cli`). The format
 //! is described byte by byte in `docs/record.md`.
 
+mod aggregate;
 mod append;
 #[cfg(feature = "arrow")]
 pub mod arrow;
@@ -61,29 +65,35 @@ mod header;
 mod header_column;
 mod header_read;
 mod index;
+mod merged;
 mod playback;
 mod ranges;
 mod recorder;
 mod related;
+mod repack;
 mod resume;
 mod rolling;
 mod scan;
 mod schema;
 mod specials;
+mod stretches;
 mod time;
 mod waiting;
 mod wire;
 
+pub use aggregate::Aggregate;
 pub use block::{Block, Cells};
 pub use blocks::{Blocks, Rows};
-pub use bound::{Bound, MAX_DECIMALS, is_within, is_within_on_circle};
+pub use bound::{Bound, MAX_DECIMALS, MIN_SHARE, is_within, is_within_on_circle};
 pub use error::{Damage, Error};
 pub use fewbits_block_codec::Effort;
 pub use frames::{FrameReader, FrameWriter, HeaderRepeats, MIN_FRAME_BYTES};
+pub use merged::{Merged, merged};
 pub use playback::{BlockInfo, Playback, Row};
 pub use recorder::Recorder;
 pub use scan::BlockReader;
 pub use schema::{Column, MAX_CELLS, ROWS_PER_BLOCK, Schema, TimeBase, TimeFormat};
+pub use stretches::Stretch;
 
 /// The programs of `docs/record.md`, which are run as tests.
 #[cfg(doctest)]

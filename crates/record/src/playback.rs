@@ -1,5 +1,6 @@
 //! Reading of recordings with random access.
 
+use crate::aggregate::Aggregate;
 use crate::append;
 use crate::block;
 use crate::error::{Damage, Error};
@@ -36,6 +37,8 @@ pub struct BlockInfo {
     /// Lower and upper bound of each column's values (they exceed them by at most a 15th of the column's range in 1024 blocks); `None`
     /// without values.
     pub ends: Vec<Option<(f64, f64)>>,
+    /// Aggregates of each column. The index has them if blocks have 4096 rows or more; then [`ends`](Self::ends) are exact.
+    pub aggregates: Option<Vec<Aggregate>>,
 }
 
 /// Reads a recording by its index, or from front to end if it has none.
@@ -124,6 +127,29 @@ impl<R: Read + Seek> Playback<R> {
         self.index != Index::Missing
     }
 
+    /// Smallest and largest tick, without decoding values; `None` without an index or without rows.
+    ///
+    /// # Errors
+    /// If the only block is damaged.
+    pub fn ticks(&self) -> Result<Option<(i64, i64)>, Error> {
+        let widened = |ends: Option<(i64, i64)>, (first, last): (i64, i64)| {
+            Some(ends.map_or((first, last), |(low, high)| (low.min(first), high.max(last))))
+        };
+        if let Some(content) = &self.single {
+            let block = block::decode_content(&self.header, content, |_| false).map_err(|damage| Error::Block {
+                offset: 0,
+                bytes: self.span.1,
+                damage,
+            })?;
+            return Ok(block.ticks.iter().map(|tick| (*tick, *tick)).fold(None, widened));
+        }
+        let Index::Whole(segments) = &self.index else {
+            return Ok(None);
+        };
+        let filled = segments.iter().filter(|segment| segment.rows > 0);
+        Ok(filled.map(|segment| segment.ticks).fold(None, widened))
+    }
+
     /// Length of the whole recording in bytes.
     pub fn bytes(&self) -> u64 {
         self.span.1
@@ -162,6 +188,7 @@ impl<R: Read + Seek> Playback<R> {
                 rows: entry.rows,
                 ticks: entry.ticks,
                 ends: entry.ends,
+                aggregates: entry.aggregates,
             });
         }
         let Index::Whole(segments) = self.index.clone() else {
@@ -183,6 +210,7 @@ impl<R: Read + Seek> Playback<R> {
                     rows: entry.rows,
                     ticks: entry.ticks,
                     ends: entry.ends,
+                    aggregates: entry.aggregates,
                 });
                 offset = offset.saturating_add(infos.last().map_or(0, |info| info.bytes));
             }

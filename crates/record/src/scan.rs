@@ -151,7 +151,7 @@ impl Scanner {
         let mut reader = Bytes(bytes);
         let limit = if bytes.first() == Some(&0) {
             let [_, kind] = reader.array()?;
-            index::max_content(kind, header.schema.columns.len())
+            index::max_content(kind, header)
         } else {
             block::max_bytes(header)
         };

@@ -20,6 +20,8 @@ pub struct Column {
     pub(crate) period: Option<f64>,
     /// Size of the range that a share refers to, if it is known beforehand.
     pub(crate) range: Option<f64>,
+    /// The bound of the recordings that the samples come from, which adds to the column's own.
+    pub(crate) earlier: f64,
 }
 
 impl Column {
@@ -35,7 +37,27 @@ impl Column {
             bound: bound.checked()?,
             period: None,
             range: None,
+            earlier: 0.0,
         })
+    }
+
+    /// Declares that the samples were restored from a recording within this bound, in units of the column (0: exactly). The distance
+    /// from the original samples is then at most the sum of both bounds, which [`keeps`](Self::keeps) allows.
+    ///
+    /// # Errors
+    /// If it is negative or not finite, or is above 0 while the bound is [`Bound::Decimals`] or [`Bound::Relative`], to which none can be
+    /// added.
+    pub fn with_earlier_bound(self, earlier: f64) -> Result<Self, Error> {
+        if !(earlier >= 0.0 && (2.0 * earlier).is_finite()) {
+            return Err(
+                ArgumentError::new("earlier", earlier, "zero or a positive number whose double is finite").into()
+            );
+        }
+        if earlier > 0.0 && matches!(self.bound, Bound::Decimals(_) | Bound::Relative { .. }) {
+            let expected = "an absolute bound, a share of the range or lossless for a column with an earlier bound";
+            return Err(ArgumentError::new("bound", format!("{:?}", self.bound), expected).into());
+        }
+        Ok(Self { earlier, ..self })
     }
 
     /// Sets the unit of the samples, which is only shown to users.
@@ -53,17 +75,18 @@ impl Column {
     /// and restored values lie in `[0, period)`. No effect on lossless columns.
     ///
     /// # Errors
-    /// If `period` is not positive and finite, exceeds `2^40` times the bound, or the bound is [`Bound::Decimals`].
+    /// If `period` is not positive and finite, exceeds `2^40` times the bound, or the bound is [`Bound::Decimals`] or
+    /// [`Bound::Relative`].
     pub fn with_period(self, period: f64) -> Result<Self, Error> {
         ArgumentError::positive("period", period)?;
-        if let Bound::Decimals(places) = self.bound {
-            let expected = "an absolute bound, a share or lossless for a column on a circle";
-            return Err(ArgumentError::new("bound", format!("decimals:{places}"), expected).into());
+        if let Bound::Decimals(_) | Bound::Relative { .. } = self.bound {
+            let expected = "an absolute bound, a share of the range or lossless for a column on a circle";
+            return Err(ArgumentError::new("bound", format!("{:?}", self.bound), expected).into());
         }
         let smallest = match self.bound {
             Bound::Absolute(delta) => delta,
             Bound::ShareOfRange(share) => share * period,
-            Bound::Lossless | Bound::Decimals(_) => period,
+            Bound::Lossless | Bound::Decimals(_) | Bound::Relative { .. } => period,
         };
         if smallest.is_nan() || period / smallest > MAX_CIRCLE_CELLS {
             return Err(ArgumentError::new("period", period, "at most 2^40 times the bound").into());
@@ -109,6 +132,11 @@ impl Column {
         self.bound
     }
 
+    /// The bound of the recordings that the samples come from ([`with_earlier_bound`](Self::with_earlier_bound)); 0 if there are none.
+    pub fn earlier_bound(&self) -> f64 {
+        self.earlier
+    }
+
     /// Circumference of the circle, if samples are directions.
     pub fn period(&self) -> Option<f64> {
         self.period
@@ -123,8 +151,18 @@ impl Column {
         if sample.to_bits() == restored.to_bits() || !sample.is_finite() || !restored.is_finite() {
             return sample.to_bits() == restored.to_bits();
         }
-        self.promise(share_bound.unwrap_or(0.0))
+        self.whole_promise(share_bound.unwrap_or(0.0))
             .holds(sample, restored, self.period)
+    }
+
+    /// The bound relative to the original samples: with that of the recordings that the samples come from.
+    fn whole_promise(&self, share_bound: f64) -> Promise {
+        match self.promise(share_bound) {
+            promise if self.earlier == 0.0 => promise,
+            // The sum may have been rounded down, and both bounds can be reached.
+            Promise::Within(delta) => Promise::Within((delta + self.earlier).next_up()),
+            _ => Promise::Within(self.earlier),
+        }
     }
 
     /// The bound in a block; `share_bound` is the value of a share there, 0 for lossless.
@@ -133,6 +171,7 @@ impl Column {
             Bound::Lossless => Promise::Exact,
             Bound::Absolute(delta) => Promise::Within(delta),
             Bound::Decimals(places) => Promise::Decimals(places),
+            Bound::Relative { share, floor } => Promise::Relative { share, floor },
             Bound::ShareOfRange(_) if share_bound > 0.0 => Promise::Within(share_bound),
             Bound::ShareOfRange(_) => Promise::Exact,
         }
@@ -199,6 +238,8 @@ pub struct Schema {
     pub(crate) columns: Vec<Column>,
     pub(crate) time: TimeBase,
     pub(crate) rows_per_block: usize,
+    /// Whether a writer moves no tick, although there is a tolerance.
+    pub(crate) keeps_ticks: bool,
 }
 
 /// Default number of rows per block, for tables of few columns: a damaged block loses its rows, and larger ones save hardly a bit.
@@ -246,7 +287,18 @@ impl Schema {
             columns,
             time,
             rows_per_block,
+            keeps_ticks: false,
         })
+    }
+
+    /// Declares that ticks were restored from a recording with this tolerance: a recorder returns them exactly, so that the stated
+    /// tolerance still holds for the original ones.
+    #[must_use]
+    pub fn with_restored_ticks(self) -> Self {
+        Self {
+            keeps_ticks: true,
+            ..self
+        }
     }
 
     /// Sets the number of rows per block; [`ROWS_PER_BLOCK`] stands for the default of this many columns. With small blocks fewer rows are lost with a block, and rows wait less on a link. Each block

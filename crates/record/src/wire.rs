@@ -9,6 +9,9 @@ use std::ops::RangeInclusive;
 /// The checksum of headers, blocks and index: CRC-32 as in zip and PNG.
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
+/// The oldest version of the format that is read.
+pub(crate) const VERSION_5: u8 = 5;
+
 /// Bytes of a checksum.
 pub(crate) const CHECK_BYTES: usize = 4;
 

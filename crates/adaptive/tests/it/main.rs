@@ -5,6 +5,7 @@
 
 mod allocation;
 mod bank;
+#[path = "../../../block-codec/tests/it/common.rs"]
 mod common;
 mod cosets;
 mod damage;

@@ -12,6 +12,7 @@ mod node;
 mod outputs;
 mod pages;
 mod ranges;
+mod recordings;
 mod streams;
 mod tables;
 mod track;

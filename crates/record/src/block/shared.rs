@@ -32,7 +32,7 @@ pub(super) fn indices(
     let (start, target) = (header.start(column, own)?, header.target(column, own));
     let samples: Vec<f64> = cells.iter().flatten().copied().filter(|x| x.is_finite()).collect();
     let indices = adaptive::codec(&target)?.indices_on(&start, &adaptive::prepared(&samples, &target))?;
-    let values = start.values(&indices);
+    let values = adaptive::restored(start.values(&indices), &target);
     let mut pairs = samples.iter().zip(&values);
     let holds = pairs.all(|(sample, value)| target.holds(*sample, *value));
     holds.then_some((indices, values))
@@ -121,7 +121,8 @@ pub(super) fn decode(
 ) -> Result<Cells, Damage> {
     let column = before.len();
     let damaged = Damage::Content("shared code");
-    let (start, codec) = (header.start(column, None), adaptive::codec(&header.target(column, None)));
+    let target = header.target(column, None);
+    let (start, codec) = (header.start(column, None), adaptive::codec(&target));
     let (start, codec) = start.zip(codec).ok_or(damaged)?;
     let has_value = specials::has_value(specials, rows);
     let count = has_value.iter().filter(|has| **has).count();
@@ -134,5 +135,5 @@ pub(super) fn decode(
     if reader.overran() {
         return Err(damaged);
     }
-    Ok(specials::merged(specials, &start.values(&indices)))
+    Ok(specials::merged(specials, &adaptive::restored(start.values(&indices), &target)))
 }

@@ -1,5 +1,6 @@
 //! Blocks of the adaptive codec (`fewbits-block-codec`), for every bound.
 
+use super::relative::Lattice;
 use super::{Context, Target};
 use crate::bound::{Promise, TENS};
 use crate::error::Damage;
@@ -9,7 +10,7 @@ use std::borrow::Cow;
 /// The codec for a bound. For decimals, samples are rounded before and then restored exactly.
 pub(crate) fn codec(target: &Target) -> Option<BlockCodec> {
     let delta = match target.promise {
-        Promise::Exact | Promise::Decimals(_) => return Some(BlockCodec::lossless()),
+        Promise::Exact | Promise::Decimals(_) | Promise::Relative { .. } => return Some(BlockCodec::lossless()),
         Promise::Within(delta) => delta,
     };
     let codec = BlockCodec::new(delta).ok()?;
@@ -35,7 +36,23 @@ fn rounded(sample: f64, places: u8) -> f64 {
 pub(crate) fn prepared<'a>(samples: &'a [f64], target: &Target) -> Cow<'a, [f64]> {
     match target.promise {
         Promise::Decimals(places) => samples.iter().map(|sample| rounded(*sample, places)).collect(),
+        Promise::Relative { share, floor } => {
+            let lattice = Lattice::new(share, floor);
+            samples.iter().map(|sample| lattice.index(*sample) as f64).collect()
+        }
         _ => Cow::Borrowed(samples),
+    }
+}
+
+/// The samples of what the codec has decoded: the inverse of [`prepared`].
+pub(crate) fn restored(values: Vec<f64>, target: &Target) -> Vec<f64> {
+    match target.promise {
+        Promise::Relative { share, floor } => {
+            let lattice = Lattice::new(share, floor);
+            // No writer writes an index that is not whole; one that a forger writes saturates.
+            values.into_iter().map(|index| lattice.value(index as i64)).collect()
+        }
+        _ => values,
     }
 }
 
@@ -69,5 +86,6 @@ pub(super) fn decode(bytes: &[u8], count: usize, context: Context<'_>) -> Result
         Some(start) => codec.decode_from(start, bytes, count, context.others),
         None => codec.decode_with(bytes, count, context.others),
     };
-    values.map_err(|_| Damage::Content("adaptive block"))
+    let values = values.map_err(|_| Damage::Content("adaptive block"))?;
+    Ok(restored(values, context.target))
 }

@@ -12,6 +12,7 @@
 
 pub(crate) mod adaptive;
 mod plain;
+mod relative;
 
 use crate::bound::Promise;
 use crate::error::Damage;

@@ -28,6 +28,8 @@ pub(super) fn constant(samples: &[f64], target: &Target) -> Option<Vec<u8>> {
         Promise::Within(delta) if target.period.is_none() && ends.1 - ends.0 <= 2.0 * delta => {
             ends.0 + 0.5 * (ends.1 - ends.0)
         }
+        // The largest and the smallest allow the same numbers as all others.
+        Promise::Relative { .. } => ends.0 + 0.5 * (ends.1 - ends.0),
         _ => first,
     };
     let short = |kept: usize| {

@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod aggregates;
 mod appending;
 #[cfg(feature = "arrow")]
 mod arrow;
+mod bounds;
 mod common;
 mod damage;
 mod frames;
@@ -12,6 +14,7 @@ mod fuzz;
 mod guarantee;
 mod random;
 mod reading;
+mod repacking;
 mod resuming;
 mod times;
 mod versions;

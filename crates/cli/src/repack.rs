@@ -1,0 +1,129 @@
+//! `fewbits repack`: recordings under wider bounds.
+//!
+//! The new recording is written beside the old one and takes its name when it is complete. A kill, a full disk or a recording that is
+//! damaged leaves the old one as it was.
+
+use crate::arguments::RepackOptions;
+use crate::error::Error;
+use crate::many::described;
+use crate::say::say;
+use crate::target::{self, Target};
+use crate::{Ending, bounds, words};
+use fewbits_record::{Bound, Effort, Playback, Schema, TimeBase};
+use std::io::Write;
+use std::path::Path;
+use std::time::SystemTime;
+
+/// What was done.
+enum Done {
+    Packed {
+        before: u64,
+        after: u64,
+        bounds: String,
+    },
+    /// Nothing was written, for this reason.
+    Kept(&'static str),
+}
+
+/// Whether the last row is older than the age. Times without a zone are taken as UTC, times in seconds as counted from 1970.
+fn is_older(options: &RepackOptions, playback: &Playback<std::fs::File>, file: &str) -> Result<bool, Error> {
+    let Some(age) = options.older_than else { return Ok(true) };
+    let TimeBase::Clock { decimals, .. } = playback.schema().time() else {
+        return Err(Error::content(file, "its rows have no times: leave out --older-than"));
+    };
+    let Some((_, last)) = playback.ticks().map_err(Error::recording(file))? else {
+        return Ok(false);
+    };
+    let now = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .unwrap_or_default();
+    let limit = now.as_secs_f64() - age.as_secs_f64();
+    Ok((last as f64) / 10_f64.powi(decimals.into()) < limit)
+}
+
+/// The bounds that are asked for; those of words stay.
+fn asked(options: &RepackOptions, schema: &Schema, file: &str) -> Result<Vec<Option<Bound>>, Error> {
+    let names: Vec<String> = schema.columns().iter().map(|column| column.name().to_owned()).collect();
+    let specs = bounds::parse(&options.bound, &names, file)?;
+    let pairs = specs.iter().zip(schema.columns());
+    pairs
+        .map(|(spec, column)| {
+            if spec.period.is_some() && spec.period != column.period() {
+                let problem =
+                    format!("column `{}` is on no such circle: leave out `@`", crate::say::name(column.name()));
+                return Err(Error::content(file, problem));
+            }
+            let is_number = words::of(column.unit()).is_none();
+            Ok(Some(spec.bound).filter(|bound| is_number && *bound != Bound::Lossless))
+        })
+        .collect()
+}
+
+/// A sink that counts.
+struct Counted(Target, u64);
+
+impl Write for Counted {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = self.0.write(bytes)?;
+        self.1 += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
+}
+
+fn one(options: &RepackOptions, file: &str) -> Result<Done, Error> {
+    let path = Path::new(file);
+    let output = options.output.as_deref().unwrap_or(path);
+    // A command that appends meanwhile would lose its rows.
+    let lock = options.output.is_none().then(|| target::lock(path)).transpose()?;
+    let failed = Error::recording(file);
+    let mut playback = Playback::open(path).map_err(&failed)?;
+    if !is_older(options, &playback, file)? {
+        return Ok(Done::Kept("its last row is not older"));
+    }
+    let bounds = asked(options, playback.schema(), file)?;
+    let Some(schema) = playback.widened(&bounds).map_err(&failed)? else {
+        return Ok(Done::Kept("no bound would be wider"));
+    };
+    let schema = schema.with_rows_per_block(options.rows_per_block).map_err(&failed)?;
+    let summary = bounds::summary(schema.columns());
+    let before = playback.bytes();
+    let effort = if options.fast { Effort::Fast } else { Effort::Thorough };
+    let sink = Counted(Target::open(Some(output))?, 0);
+    let Counted(sink, after) = playback.repack(schema, sink, effort).map_err(&failed)?;
+    if options.output.is_none() && after >= before {
+        return Ok(Done::Kept("it would not be smaller"));
+    }
+    sink.finish()?;
+    drop(lock);
+    Ok(Done::Packed {
+        before,
+        after,
+        bounds: summary,
+    })
+}
+
+/// Runs the task. A recording that fails does not stop the others.
+pub(crate) fn run(options: &RepackOptions) -> Result<Ending, Error> {
+    if options.output.is_some() && options.files.len() > 1 {
+        return Err(Error::content("--output", "several recordings are replaced in their places: leave it out"));
+    }
+    let mut ending = Ending::Good;
+    for file in &options.files {
+        match one(options, file) {
+            Ok(Done::Packed { before, after, bounds }) => {
+                say!("{file}: {after} bytes, before {before}; bounds: {bounds}");
+            }
+            Ok(Done::Kept(reason)) => say!("{file}: left as it is: {reason}"),
+            Err(error) if options.files.len() == 1 => return Err(error),
+            Err(error) => {
+                say!("{file}: error: {}", described(&error));
+                ending = Ending::Refused;
+            }
+        }
+    }
+    Ok(ending)
+}

@@ -1,0 +1,160 @@
+//! `fewbits cat --every`: means, minima and maxima over stretches of time.
+
+use crate::arguments::CatOptions;
+use crate::error::Error;
+use crate::output::{Cell, Shape, Sheet, is_parquet};
+use crate::say::say;
+use crate::unpack::{selection, warn_of_end};
+use crate::{Ending, clock, recording, words};
+use fewbits_record::{Aggregate, Schema, Stretch, TimeBase};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What is written of each column.
+struct Kind {
+    name: &'static str,
+    cell: fn(&Aggregate) -> Cell,
+}
+
+const KINDS: [Kind; 4] = [
+    Kind {
+        name: "mean",
+        cell: |all| Cell::Number(all.mean()),
+    },
+    Kind {
+        name: "min",
+        cell: |all| Cell::Number(all.ends().map(|ends| ends.0)),
+    },
+    Kind {
+        name: "max",
+        cell: |all| Cell::Number(all.ends().map(|ends| ends.1)),
+    },
+    Kind {
+        name: "count",
+        cell: |all| Cell::Whole(i64::try_from(all.count()).unwrap_or(i64::MAX)),
+    },
+];
+
+/// The length of a stretch in ticks.
+fn length(text: &str, time: TimeBase) -> Result<u64, Error> {
+    let TimeBase::Clock { decimals, .. } = time else {
+        let rows = text.parse::<u64>().ok().filter(|rows| *rows > 0);
+        return rows
+            .ok_or_else(|| Error::option("--every", text, "a number of rows, since this recording has no times"));
+    };
+    let refused = |expected| Error::option("--every", text, expected);
+    let time = humantime::parse_duration(text).map_err(|_| refused("a time, as 1h"))?;
+    let ticks = time
+        .as_nanos()
+        .checked_mul(10_u128.pow(decimals.into()))
+        .filter(|ticks| *ticks > 0);
+    let ticks = ticks.ok_or_else(|| refused("a time above 0"))?;
+    match (ticks % 1_000_000_000, u64::try_from(ticks / 1_000_000_000)) {
+        (0, Ok(ticks)) if i64::try_from(ticks).is_ok() => Ok(ticks),
+        _ => Err(refused("a time that is a whole number of the recording's ticks")),
+    }
+}
+
+/// The columns whose numbers are values: those of words have none.
+fn columns(options: &CatOptions, schema: &Schema, names: Vec<String>) -> Result<Vec<String>, Error> {
+    let is_words = |name: &String| {
+        let unit = schema.position(name).map(|i| schema.columns()[i].unit());
+        unit.is_ok_and(|unit| words::of(unit).is_some())
+    };
+    if !options.columns.is_empty()
+        && let Some(name) = names.iter().find(|name| is_words(name))
+    {
+        return Err(Error::option("--columns", name, "columns of numbers with --every"));
+    }
+    Ok(names.into_iter().filter(|name| !is_words(name)).collect())
+}
+
+/// Runs the task.
+pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
+    let mut ending = Ending::Good;
+    let mut found: BTreeMap<i64, Stretch> = BTreeMap::new();
+    let mut head: Option<(TimeBase, u64, Vec<String>)> = None;
+    for file in &options.files {
+        let mut playback = recording::open(Path::new(file))?;
+        let schema = playback.schema().clone();
+        let selection = selection(options, &schema, file)?;
+        let names = match &head {
+            None => columns(options, &schema, selection.names)?,
+            Some((_, _, names)) => names.clone(),
+        };
+        let every = length(every, schema.time())?;
+        let unit = |time: TimeBase| match time {
+            TimeBase::Clock { decimals, format, .. } => Some((decimals, format)),
+            _ => None,
+        };
+        match &head {
+            Some((time, ..)) if unit(*time) != unit(schema.time()) => {
+                return Err(Error::content(file, format!("has other times than {}", options.files[0])));
+            }
+            Some(_) => {}
+            None => head = Some((schema.time(), every, names.clone())),
+        }
+        let wanted: Vec<&str> = names.iter().map(String::as_str).collect();
+        playback.columns(&wanted).map_err(Error::recording(file))?;
+        if !playback.is_finished() {
+            warn_of_end(file);
+            ending = Ending::Failed;
+        }
+        let damaged = |error: &fewbits_record::Error| {
+            say!("warning: {file}: {error}; the rest is read");
+            ending = Ending::Failed;
+        };
+        let stretches = playback.aggregates(every, (selection.from, selection.to), damaged);
+        for stretch in stretches.map_err(Error::recording(file))? {
+            match found.entry(stretch.tick) {
+                std::collections::btree_map::Entry::Vacant(entry) => {
+                    entry.insert(stretch);
+                }
+                std::collections::btree_map::Entry::Occupied(mut entry) => {
+                    let all = entry.get_mut();
+                    all.rows += stretch.rows;
+                    let pairs = all.columns.iter_mut().zip(&stretch.columns);
+                    pairs.for_each(|(sum, more)| sum.merge(more));
+                }
+            }
+        }
+    }
+    let Some((time, _, names)) = head else {
+        return Ok(ending);
+    };
+    if options.output.as_deref().is_some_and(is_parquet) {
+        return Err(Error::option("--output", "a Parquet file", "a CSV or JSON file with --every"));
+    }
+    let asked = [options.mean, options.min, options.max, options.count];
+    let none = !asked.contains(&true);
+    let kinds: Vec<&Kind> = KINDS
+        .iter()
+        .zip(asked)
+        .filter(|(kind, asked)| *asked || (none && kind.name == "mean"))
+        .map(|(kind, _)| kind)
+        .collect();
+    let first = if time == TimeBase::Numbered { "row" } else { "time" };
+    let of_column = |name: &String| {
+        kinds
+            .iter()
+            .map(|kind| format!("{name} {}", kind.name))
+            .collect::<Vec<_>>()
+    };
+    let heads = std::iter::once(first.to_owned())
+        .chain(names.iter().flat_map(of_column))
+        .collect();
+    let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), heads)?;
+    for stretch in found.values() {
+        let tick = match time {
+            TimeBase::Numbered => Cell::Whole(stretch.tick),
+            time => Cell::Text(clock::shown(stretch.tick, time)),
+        };
+        let cells = stretch
+            .columns
+            .iter()
+            .flat_map(|all| kinds.iter().map(move |kind| (kind.cell)(all)));
+        sheet.write(std::iter::once(tick).chain(cells))?;
+    }
+    sheet.finish()?;
+    Ok(ending)
+}

@@ -1,0 +1,125 @@
+//! Several recordings as one table in the order of time.
+
+use crate::blocks::Rows;
+use crate::error::Error;
+use crate::playback::{Playback, Row};
+use crate::schema::{Column, Schema, TimeBase};
+use fewbits_block_codec::ArgumentError;
+use std::io::{Read, Seek};
+
+/// Rows of one recording.
+struct Source<'a, R> {
+    rows: Rows<'a, R>,
+    /// No row has an earlier tick, if it is known.
+    first: i64,
+    next: Option<Row>,
+}
+
+/// Iterator over the rows of several recordings ([`merged`]).
+pub struct Merged<'a, R> {
+    /// Those that have rows at the present tick, by their place among all.
+    open: Vec<(usize, Source<'a, R>)>,
+    /// Those that begin later, the next one last.
+    later: Vec<(usize, Source<'a, R>)>,
+}
+
+fn names(schema: &Schema) -> Vec<&str> {
+    schema.columns.iter().map(Column::name).collect()
+}
+
+/// What ticks mean, without the tolerance.
+fn unit(time: TimeBase) -> TimeBase {
+    match time {
+        TimeBase::Clock { decimals, format, .. } => TimeBase::Clock {
+            decimals,
+            tolerance: 0,
+            format,
+        },
+        numbered => numbered,
+    }
+}
+
+/// The rows with ticks in `from..=to` of several recordings as one table: at each step the earliest next row, of equal ticks that of the
+/// first recording. Columns are those of the first recording, by their names. A recording is opened when its first tick is reached, so
+/// recordings one after the other take the memory of one block. Damaged bytes give one error per stretch; the iteration continues behind
+/// them. Columns that were requested before are forgotten.
+///
+/// # Errors
+/// If the recordings have different columns, or ticks of different units, or the only block of one is damaged.
+pub fn merged<'a, R: Read + Seek>(
+    playbacks: &'a mut [Playback<R>],
+    wanted: &[&str],
+    (from, to): (i64, i64),
+) -> Result<Merged<'a, R>, Error> {
+    if let Some(first) = playbacks.first().map(|playback| playback.schema().clone()) {
+        let mut sorted = names(&first);
+        sorted.sort_unstable();
+        for (i, playback) in playbacks.iter().enumerate() {
+            let mut others = names(playback.schema());
+            others.sort_unstable();
+            if others != sorted {
+                let found = format!("{} in recording {}", others.join(", "), i + 1);
+                return Err(
+                    ArgumentError::new("columns", found, format!("those of the first: {}", sorted.join(", "))).into()
+                );
+            }
+            if unit(playback.schema().time) != unit(first.time) {
+                let found = format!("{:?} in recording {}", playback.schema().time, i + 1);
+                return Err(ArgumentError::new("time", found, format!("that of the first: {:?}", first.time)).into());
+            }
+        }
+    }
+    let mut later = Vec::with_capacity(playbacks.len());
+    for (i, playback) in playbacks.iter_mut().enumerate() {
+        playback.columns(wanted)?;
+        // Without an index the first tick is not known: such a recording is open from the beginning.
+        let first = playback.ticks()?.map_or(i64::MIN, |ticks| ticks.0.max(from));
+        let rows = playback.range(from, to);
+        later.push((
+            i,
+            Source {
+                rows,
+                first,
+                next: None,
+            },
+        ));
+    }
+    later.sort_by_key(|(i, source)| std::cmp::Reverse((source.first, *i)));
+    Ok(Merged {
+        open: Vec::new(),
+        later,
+    })
+}
+
+impl<R: Read + Seek> Iterator for Merged<'_, R> {
+    type Item = Result<Row, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            // Each open recording has its next row, or is closed.
+            let mut i = 0;
+            while let Some((_, source)) = self.open.get_mut(i) {
+                if source.next.is_some() {
+                    i += 1;
+                    continue;
+                }
+                match source.rows.next() {
+                    Some(Ok(row)) => source.next = Some(row),
+                    Some(Err(error)) => return Some(Err(error)),
+                    None => drop(self.open.remove(i)),
+                }
+            }
+            let key = |(place, source): &(usize, Source<'_, R>)| source.next.as_ref().map(|row| (row.tick, *place));
+            let earliest = self.open.iter().filter_map(key).min();
+            let next = self.later.last().map(|(_, source)| source.first);
+            let is_due = next.is_some_and(|first| earliest.is_none_or(|(tick, _)| first <= tick));
+            if is_due && let Some(source) = self.later.pop() {
+                self.open.push(source);
+                continue;
+            }
+            let (_, place) = earliest?;
+            let source = self.open.iter_mut().find(|(other, _)| *other == place);
+            return source.and_then(|(_, source)| source.next.take()).map(Ok);
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Minimum, maximum, number and mean of the values of stretches of time, by the index where it has them.
+
+use crate::aggregate::Aggregate;
+use crate::block::Block;
+use crate::blocks::Blocks;
+use crate::error::Error;
+use crate::playback::Playback;
+use fewbits_block_codec::ArgumentError;
+use std::collections::BTreeMap;
+use std::io::{Read, Seek};
+
+/// Aggregates of the rows of one stretch of time.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Stretch {
+    /// The first tick of the stretch, a multiple of its length.
+    pub tick: i64,
+    /// Number of rows.
+    pub rows: u64,
+    /// One aggregate per requested column, in the order of the request.
+    pub columns: Vec<Aggregate>,
+}
+
+/// Stretches by number.
+struct Stretches {
+    every: i64,
+    ticks: (i64, i64),
+    chosen: Vec<usize>,
+    found: BTreeMap<i64, Stretch>,
+}
+
+impl Stretches {
+    fn at(&mut self, number: i64) -> &mut Stretch {
+        let Self {
+            every, chosen, found, ..
+        } = self;
+        found.entry(number).or_insert_with(|| Stretch {
+            // The first stretch may begin before the smallest tick.
+            tick: number.saturating_mul(*every),
+            rows: 0,
+            columns: vec![Aggregate::default(); chosen.len()],
+        })
+    }
+
+    /// The number of the stretch that all these ticks belong to, if all are asked for.
+    fn of_all(&self, (first, last): (i64, i64)) -> Option<i64> {
+        let is_inside = self.ticks.0 <= first && last <= self.ticks.1;
+        let number = first.div_euclid(self.every);
+        (is_inside && number == last.div_euclid(self.every)).then_some(number)
+    }
+
+    fn add(&mut self, block: &Block) {
+        let chosen = self.chosen.clone();
+        for (row, tick) in block.ticks.iter().enumerate() {
+            if *tick < self.ticks.0 || *tick > self.ticks.1 {
+                continue;
+            }
+            let stretch = self.at(tick.div_euclid(self.every));
+            stretch.rows += 1;
+            for (aggregate, column) in stretch.columns.iter_mut().zip(&chosen) {
+                if let Some(value) = block.columns[*column][row] {
+                    aggregate.add(value);
+                }
+            }
+        }
+    }
+}
+
+impl<R: Read + Seek> Playback<R> {
+    /// Aggregates of the requested columns over stretches of `every` ticks, which begin at multiples of it, in the order of time. Stretches
+    /// without rows are left out. Only rows with ticks in `from..=to` count. A block that lies in one stretch is not decoded if the index
+    /// has its aggregates ([`BlockInfo::aggregates`](crate::BlockInfo::aggregates)). `damaged` is told each part that cannot be read; the
+    /// rest counts.
+    ///
+    /// # Errors
+    /// If `every` is 0 or above `2^63 - 1`, or reading fails.
+    pub fn aggregates(
+        &mut self,
+        every: u64,
+        (from, to): (i64, i64),
+        mut damaged: impl FnMut(&Error),
+    ) -> Result<Vec<Stretch>, Error> {
+        let length = i64::try_from(every).ok().filter(|every| *every > 0);
+        let length = length.ok_or_else(|| ArgumentError::new("every", every, "1 to 2^63 - 1 ticks"))?;
+        let mut stretches = Stretches {
+            every: length,
+            ticks: (from, to),
+            chosen: self.chosen.clone(),
+            found: BTreeMap::new(),
+        };
+        let tolerance = i64::try_from(self.header.schema.time.tolerance()).unwrap_or(i64::MAX);
+        let mut blocks = Blocks::new(self, (from, to));
+        loop {
+            // The ticks of a reader may differ from those of the index by the tolerance.
+            let wide = |(first, last): (i64, i64)| (first.saturating_sub(tolerance), last.saturating_add(tolerance));
+            while let Some((entry, aggregates)) = blocks.known(|ticks| stretches.of_all(wide(ticks)).is_some())? {
+                let Some(number) = stretches.of_all(wide(entry)) else {
+                    break;
+                };
+                let (rows, chosen) = (aggregates.0, stretches.chosen.clone());
+                let stretch = stretches.at(number);
+                stretch.rows += rows;
+                for (sum, column) in stretch.columns.iter_mut().zip(chosen) {
+                    sum.merge(&aggregates.1[column]);
+                }
+            }
+            match blocks.next() {
+                None => break,
+                Some(Ok(block)) => stretches.add(&block),
+                Some(Err(error @ Error::Block { .. })) => damaged(&error),
+                Some(Err(error)) => return Err(error),
+            }
+        }
+        Ok(stretches.found.into_values().collect())
+    }
+}
