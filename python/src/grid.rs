@@ -103,7 +103,7 @@ impl GridFilter {
             }
             // Relative to the largest, so that no exponential overflows.
             let weights: Vec<f64> = logs.iter().map(|log| (log - largest).exp()).collect();
-            log_likelihood += largest + next.reweight(&weights)?;
+            log_likelihood += largest + next.reweight(&weights)?.ln();
         }
         self.belief = next;
         Ok(log_likelihood)

@@ -36,9 +36,28 @@ pub(crate) struct Recording {
     rows: u64,
     bytes: u64,
     finished: bool,
+    damaged: Damaged,
 }
 
-/// Opens a recording.
+/// What reading does at damaged bytes.
+#[derive(Clone, Copy, PartialEq)]
+enum Damaged {
+    Raise,
+    Skip,
+}
+
+impl Damaged {
+    fn parsed(text: &str) -> Outcome<Self> {
+        match text {
+            "raise" => Ok(Self::Raise),
+            "skip" => Ok(Self::Skip),
+            other => refused("damage", format!("'{other}'"), "'raise' or 'skip'"),
+        }
+    }
+}
+
+/// Opens a recording. With `damage="skip"` what is damaged or missing is left out when rows are read, as in a recording that is still being
+/// written.
 ///
 /// Raises `fewbits.DecodeError` if the file is none.
 ///
@@ -48,15 +67,22 @@ pub(crate) struct Recording {
 /// ...
 /// FileNotFoundError: No such file or directory (os error 2)
 #[pyfunction]
-pub(crate) fn open(py: Python<'_>, path: PathBuf) -> Outcome<Recording> {
+#[pyo3(signature = (path, *, damage="raise"))]
+pub(crate) fn open(py: Python<'_>, path: PathBuf, damage: &str) -> Outcome<Recording> {
+    let damaged = Damaged::parsed(damage)?;
     py.detach(|| {
         let mut playback = opened(&path)?;
-        let rows = playback.index()?.iter().map(|block| block.rows).sum();
+        let rows = match playback.index() {
+            Ok(blocks) => blocks.iter().map(|block| block.rows).sum(),
+            Err(_) if damaged == Damaged::Skip => 0,
+            Err(error) => return Err(error.into()),
+        };
         Ok(Recording {
             schema: playback.schema().clone(),
             rows,
             bytes: playback.bytes(),
             finished: playback.is_finished(),
+            damaged,
             path,
         })
     })
@@ -144,6 +170,7 @@ impl Recording {
             schema: self.schema.clone(),
             chosen,
             ticks: (from, to),
+            damaged: self.damaged,
         })
     }
 
@@ -177,6 +204,7 @@ pub(crate) struct Rows {
     schema: Schema,
     chosen: Vec<usize>,
     ticks: (i64, i64),
+    damaged: Damaged,
 }
 
 #[pymethods]
@@ -230,7 +258,7 @@ impl Rows {
         let names: Vec<&str> = self.chosen.iter().map(|at| schema.columns()[*at].name()).collect();
         playback.columns(&names)?;
         let (sender, receiver) = sync_channel(AHEAD);
-        let none = self.chosen.is_empty();
+        let (none, damaged) = (self.chosen.is_empty(), self.damaged);
         let work = move || {
             for block in playback.blocks_between(from, to) {
                 let batch = block.and_then(|mut block| {
@@ -240,8 +268,11 @@ impl Rows {
                     }
                     block.to_record_batch(&schema)
                 });
+                if batch.is_err() && damaged == Damaged::Skip {
+                    continue;
+                }
                 // Nobody reads on: the stream was dropped.
-                if sender.send(batch.map_err(|error| error.to_string())).is_err() {
+                if sender.send(batch).is_err() {
                     return;
                 }
             }
@@ -271,7 +302,7 @@ impl Blocks {
 /// Record batches that come from another thread.
 struct Batches {
     fields: SchemaRef,
-    receiver: Receiver<Result<RecordBatch, String>>,
+    receiver: Receiver<Result<RecordBatch, fewbits_record::Error>>,
 }
 
 impl Iterator for Batches {
@@ -279,7 +310,7 @@ impl Iterator for Batches {
 
     fn next(&mut self) -> Option<Self::Item> {
         let batch = self.receiver.recv().ok()?;
-        Some(batch.map_err(|error| ArrowError::ExternalError(error.into())))
+        Some(batch.map_err(|error| ArrowError::from_external_error(Box::new(error))))
     }
 }
 
@@ -308,7 +339,7 @@ fn keep_between(block: &mut Block, from: i64, to: i64) {
 /// `start` and `end` are numbers of seconds, row numbers if the recording has no times, or what `numpy.datetime64` takes if its clock is UTC.
 /// Blocks outside are not decoded.
 ///
-/// Raises `fewbits.DecodeError` if the file is no recording or is damaged.
+/// Raises `fewbits.DecodeError` if the file is no recording, or is damaged or not finished; with `damage="skip"` what can be read is returned.
 ///
 /// >>> import polars as pl, fewbits as fb, tempfile, os
 /// >>> path = os.path.join(tempfile.mkdtemp(), "room.fewb")
@@ -316,15 +347,16 @@ fn keep_between(block: &mut Block, from: i64, to: i64) {
 /// >>> fb.read(path, columns=["a"], start=1)
 /// Table(2 rows: row, a)
 #[pyfunction]
-#[pyo3(signature = (path, *, columns=None, start=None, end=None))]
+#[pyo3(signature = (path, *, columns=None, start=None, end=None, damage="raise"))]
 pub(crate) fn read(
     py: Python<'_>,
     path: PathBuf,
     columns: Option<Vec<String>>,
     start: Option<&Bound<'_, PyAny>>,
     end: Option<&Bound<'_, PyAny>>,
+    damage: &str,
 ) -> Outcome<Table> {
-    open(py, path)?.select(columns, start, end)?.read(py)
+    open(py, path, damage)?.select(columns, start, end)?.read(py)
 }
 
 /// A tick of a recording's clock: a number of seconds, or with a UTC clock a text or a NumPy datetime.
@@ -371,7 +403,7 @@ fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBase) -> Outc
     }
 }
 
-/// Writes a recording row by row. After a crash all but the last block can be read.
+/// Writes a recording row by row. After a crash the rows up to the last `sync` can be read, with `damage="skip"`.
 ///
 /// `bounds` has the bound of each column, as in `write`. `decimals` are those of the seconds of times (3: milliseconds); None numbers the
 /// rows instead. With `resume` an existing recording is continued, with its own columns and bounds.

@@ -66,7 +66,7 @@ class Bounded(ArrayBytesCodec):
 
     async def _decode_single(self, chunk_bytes: Buffer, chunk_spec: ArraySpec) -> NDBuffer:
         numbers = decoded(chunk_bytes.to_bytes(), chunk_spec.dtype.to_native_dtype()).reshape(chunk_spec.shape)
-        return chunk_spec.prototype.nd_buffer.from_ndarray_like(numbers)
+        return chunk_spec.prototype.nd_buffer.from_ndarray_like(cast(Any, numbers))
 
 
 register_codec("fewbits", Bounded)
