@@ -83,8 +83,8 @@ impl RangeTracker {
     /// The path over a table of one range a row: its time, the anchor's name in column `by`, the range in metres in column `value`. A range
     /// that is null or NaN is left out.
     ///
-    /// The result has a row per range: position, deviations, covariance of x and y, bias, noise, speed, and whether the track was lost at
-    /// that row; null while there are too few ranges for a position. Each run begins anew.
+    /// The result has a row per range: position, deviations, covariance of x and y, bias, noise and speed, which are null while there are too few
+    /// ranges for a position, and whether the track was lost at that row. Each run begins anew.
     fn run(&self, py: Python<'_>, table: &Bound<'_, PyAny>, time: &str, by: &str, value: &str) -> Outcome<Table> {
         let given = Given::read(table)?;
         let seconds = crate::callbacks::rising(&given.times(time)?)?;
@@ -110,7 +110,10 @@ impl RangeTracker {
         let column = |of: fn(&RangeEstimate) -> f64| -> ArrayRef {
             Arc::new(Float64Array::from_iter(found.iter().map(|one| one.as_ref().map(of))))
         };
-        let lost: Vec<Option<bool>> = found.iter().map(|one| one.as_ref().map(|one| one.lost)).collect();
+        let lost: Vec<bool> = found
+            .iter()
+            .map(|one| one.as_ref().is_some_and(|one| one.lost))
+            .collect();
         Table::new(vec![
             (time.to_owned(), given.taken(time, &rows)?),
             ("x".to_owned(), column(|one| one.position.x)),

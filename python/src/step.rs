@@ -1,9 +1,9 @@
 //! The library's centre of one dimension, built from stored parts, and what its steps find.
 
-use crate::centre::Parts;
 use crate::error::{Outcome, refused};
 use crate::instants::Instant;
 use crate::model::Moves;
+use crate::parts::Parts;
 use crate::seat::{Seat, Sends};
 use crate::table::{Table, doubles};
 use arrow_array::{ArrayRef, Int64Array, StringArray};
