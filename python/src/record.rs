@@ -1,14 +1,14 @@
 //! Recordings: any table into a file within stated bounds, and back.
 
 use crate::error::{Outcome, refused};
-use crate::table::{Cells, Given, Table};
-use arrow_array::RecordBatch;
+use crate::table::{Cells, Given, Table, doubles};
+use arrow_array::{ArrayRef, StringArray};
 use arrow_schema::{DataType, TimeUnit};
 use fewbits_recipes::bounds::{self, Spec};
 use fewbits_recipes::source::{Batch, Columns};
 use fewbits_recipes::{Error as RecipeError, Progress};
 use fewbits_record::arrow::ticks;
-use fewbits_record::{Block, Effort, Playback, Recorder, Schema, TimeBase, TimeFormat};
+use fewbits_record::{Playback, Recorder, Schema, TimeBase, TimeFormat};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
@@ -16,9 +16,10 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Largest number of decimals of seconds.
-const MAX_DECIMALS: u8 = 9;
+pub(crate) const MAX_DECIMALS: u8 = 9;
 
 /// Looks at signals such as Ctrl-C between batches; the first exception is kept for the caller.
 fn watch(stopped: &mut Option<PyErr>) -> impl FnMut(Progress) -> ControlFlow<()> {
@@ -63,7 +64,7 @@ impl Each {
 }
 
 impl Stated {
-    fn of(&self, names: &[String]) -> Result<Vec<Spec>, RecipeError> {
+    pub(crate) fn of(&self, names: &[String]) -> Result<Vec<Spec>, RecipeError> {
         match self {
             Self::Number(bound) => Ok(vec![Each::Number(*bound).parsed()?; names.len()]),
             Self::Text(text) => bounds::parse(text, names),
@@ -129,7 +130,7 @@ impl Taken {
 }
 
 /// The time base and the ticks of a column: timestamps in their own unit, numbers as seconds with as many decimals as they have.
-fn clock(given: &Given, name: &str) -> Outcome<(TimeBase, Vec<i64>)> {
+pub(crate) fn clock(given: &Given, name: &str) -> Outcome<(TimeBase, Vec<i64>)> {
     let base = |decimals, format| TimeBase::Clock {
         decimals,
         format,
@@ -190,11 +191,7 @@ pub(crate) fn write(
     bounds: Stated,
     effort: &str,
 ) -> Outcome<u64> {
-    let effort = match effort {
-        "thorough" => Effort::Thorough,
-        "fast" => Effort::Fast,
-        other => return refused("effort", format!("'{other}'"), "'thorough' or 'fast'"),
-    };
+    let effort = crate::codec::effort(effort)?;
     let taken = Taken::of(&Given::read(table)?, time)?;
     let specs = bounds.of(&taken.names)?;
     let columns = bounds::columns(&taken.names, &specs, &taken.ranges())?;
@@ -218,128 +215,60 @@ pub(crate) fn write(
     })
 }
 
-fn opened(path: &Path) -> Outcome<Playback<BufReader<File>>> {
+pub(crate) fn opened(path: &Path) -> Outcome<Playback<BufReader<File>>> {
     Ok(Playback::new(BufReader::new(File::open(path)?))?)
 }
 
-/// A tick of a recording's clock: a number of seconds, or with a UTC clock a text or a NumPy datetime.
-fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBase) -> Outcome<i64> {
-    let TimeBase::Clock { decimals, format, .. } = time else {
-        return value.extract().or_else(|_| refused(name, value, "the number of a row"));
-    };
-    let scale = 10_f64.powi(decimals.into());
-    if let Ok(seconds) = value.extract::<f64>() {
-        let tick = (seconds * scale).round();
-        return if tick.abs() < i64::MAX as f64 {
-            Ok(tick as i64)
-        } else {
-            refused(name, seconds, "a time within the clock's range")
-        };
-    }
-    if matches!(format, TimeFormat::Utc) {
-        let numpy = value.py().import("numpy")?;
-        let stamp = numpy
-            .call_method1("datetime64", (value, "ns"))?
-            .call_method1("astype", ("int64",))?;
-        let nanoseconds: i64 = stamp.extract()?;
-        return Ok(nanoseconds.div_euclid(10_i64.pow(u32::from(MAX_DECIMALS - decimals))));
-    }
-    refused(name, value, "a number of seconds")
-}
-
-/// Reads a recording, whole or some columns between two times (`start` included, `end` excluded), as a table.
+/// Bits per sample that each column would need, at several bounds.
 ///
-/// `start` and `end` are numbers of seconds, row numbers if the recording has no times, or what `numpy.datetime64` takes if its clock is UTC.
-/// Blocks outside are not decoded.
+/// The result has a row per column and bound: the bound as a share of the column's range and in its unit (0 is lossless), bits per sample.
+///
+/// >>> import numpy as np, polars as pl, fewbits as fb
+/// >>> planned = fb.plan(pl.DataFrame({"t": np.arange(500.0), "temp": np.sin(np.arange(500) / 40)}), time="t")
+/// >>> planned.columns, len(planned)
+/// (['column', 'share', 'bound', 'bits'], 8)
 #[pyfunction]
-#[pyo3(signature = (path, *, columns=None, start=None, end=None))]
-pub(crate) fn read(
-    py: Python<'_>,
-    path: PathBuf,
-    columns: Option<Vec<String>>,
-    start: Option<&Bound<'_, PyAny>>,
-    end: Option<&Bound<'_, PyAny>>,
-) -> Outcome<Table> {
-    let mut playback = opened(&path)?;
-    let schema = playback.schema().clone();
-    let tick = |value: Option<&Bound<'_, PyAny>>, name, without| {
-        value.map_or(Ok(without), |value| tick_of(value, name, schema.time()))
-    };
-    let from = tick(start, "start", i64::MIN)?;
-    let to = match end {
-        None => i64::MAX,
-        Some(end) => match tick_of(end, "end", schema.time())?.checked_sub(1) {
-            Some(last) => last,
-            None => return refused("end", end, "a time above the smallest"),
-        },
-    };
-    if let Some(columns) = &columns {
-        let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-        playback.columns(&names)?;
-    }
-    let batches = py.detach(|| -> Outcome<Vec<RecordBatch>> {
-        let mut batches = Vec::new();
-        for (number, block) in playback.blocks_between(from, to).enumerate() {
-            if number % 16 == 15 {
-                Python::attach(|py| py.check_signals())?;
-            }
-            let mut block = block?;
-            keep_between(&mut block, from, to);
-            batches.push(block.to_record_batch(&schema)?);
-        }
-        Ok(batches)
+#[pyo3(signature = (table, *, time=None))]
+pub(crate) fn plan(py: Python<'_>, table: &Bound<'_, PyAny>, time: Option<&str>) -> Outcome<Table> {
+    let taken = Taken::of(&Given::read(table)?, time)?;
+    let (names, base) = (taken.names.clone(), taken.time);
+    let planned = py.detach(|| {
+        let mut stopped = None;
+        let batch = Batch {
+            ticks: taken.ticks,
+            columns: taken.columns,
+        };
+        let rows = fewbits_record::ROWS_PER_BLOCK;
+        let planned = fewbits_recipes::plan::plan(&names, &batch, base, rows, &mut watch(&mut stopped));
+        heard(planned, stopped)
     })?;
-    let places: Vec<usize> = match &columns {
-        None => (0..=schema.columns().len()).collect(),
-        Some(columns) => {
-            let at = |name: &String| schema.position(name).map(|at| at + 1);
-            let mut places = columns.iter().map(at).collect::<Result<Vec<_>, _>>()?;
-            places.push(0);
-            places.sort_unstable();
-            places
+    let (mut columns, mut shares, mut bounds, mut bits) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for column in planned.columns {
+        let lossless = (0.0, 0.0, column.lossless_bits);
+        for (percent, bound, size) in std::iter::once(lossless).chain(column.bounds) {
+            columns.push(column.name.clone());
+            shares.push(percent / 100.0);
+            bounds.push(bound);
+            bits.push(size);
         }
-    };
-    let fields = std::sync::Arc::new(schema.to_arrow().project(&places)?);
-    Ok(Table::of(arrow_select::concat::concat_batches(&fields, &batches)?))
-}
-
-/// Leaves only the rows whose ticks are in `from..=to`.
-fn keep_between(block: &mut Block, from: i64, to: i64) {
-    if block.ticks.iter().all(|tick| (from..=to).contains(tick)) {
-        return;
     }
-    let kept: Vec<bool> = block.ticks.iter().map(|tick| (from..=to).contains(tick)).collect();
-    let mut rows = kept.iter();
-    block.ticks.retain(|_| rows.next().copied().unwrap_or(false));
-    for cells in &mut block.columns {
-        let mut rows = kept.iter();
-        cells.retain(|_| rows.next().copied().unwrap_or(false));
-    }
-}
-
-/// What a recording holds: rows, bytes, columns with their bounds and units, and whether its end is there.
-#[pyfunction]
-pub(crate) fn info(py: Python<'_>, path: PathBuf) -> Outcome<Bound<'_, PyDict>> {
-    let mut playback = opened(&path)?;
-    let rows: u64 = py.detach(|| playback.index())?.iter().map(|block| block.rows).sum();
-    let found = PyDict::new(py);
-    found.set_item("rows", rows)?;
-    found.set_item("bytes", playback.bytes())?;
-    found.set_item("finished", playback.is_finished())?;
-    let bounds = PyDict::new(py);
-    let units = PyDict::new(py);
-    for column in playback.schema().columns() {
-        bounds.set_item(column.name(), bounds::shown(column.bound(), column.period()))?;
-        units.set_item(column.name(), column.unit())?;
-    }
-    found.set_item("bounds", bounds)?;
-    found.set_item("units", units)?;
-    Ok(found)
+    Table::new(vec![
+        ("column".to_owned(), Arc::new(StringArray::from(columns)) as ArrayRef),
+        ("share".to_owned(), doubles(shares)),
+        ("bound".to_owned(), doubles(bounds)),
+        ("bits".to_owned(), doubles(bits)),
+    ])
 }
 
 /// Compares every cell of a recording with the table that it was made of. Columns are matched by name.
 ///
-/// Returns whether all promises hold, the rows compared, and the failed cells by column.
+/// Returns a dictionary: whether all promises hold (`holds`), the rows compared, and the failed cells and the largest error by column.
+///
+/// >>> import polars as pl, fewbits as fb, tempfile, os
+/// >>> path = os.path.join(tempfile.mkdtemp(), "room.fewb")
+/// >>> _ = fb.write(pl.DataFrame({"temp": [20.11, 20.32]}), path, bounds=0.1)
+/// >>> fb.verify(pl.DataFrame({"temp": [20.11, 20.92]}), path)["failed"]
+/// {'temp': 1}
 #[pyfunction]
 #[pyo3(signature = (table, path, *, time=None))]
 pub(crate) fn verify<'py>(

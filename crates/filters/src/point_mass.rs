@@ -68,6 +68,23 @@ impl PointMassFilter {
         Self::resolving(grid, &moved)
     }
 
+    /// The filter whose transition density from node `i` is normal with mean and standard deviation `moved[i]`: for dynamics that are known
+    /// at the nodes only.
+    ///
+    /// # Errors
+    /// If there is not one pair per node, a mean is not finite, or a deviation is below the spacing of the grid.
+    pub fn from_transitions(grid: UniformGrid, moved: &[(f64, f64)]) -> Result<Self, Error> {
+        if moved.len() != grid.points() {
+            let expected = format!("{}, one per node", grid.points());
+            return Err(ArgumentError::new("moved", format!("{} pairs", moved.len()), expected).into());
+        }
+        if let Some((mean, deviation)) = moved.iter().find(|(mean, s)| !(mean.is_finite() && s.is_finite())) {
+            let expected = "finite means and deviations";
+            return Err(ArgumentError::new("moved", format!("({mean}, {deviation})"), expected).into());
+        }
+        Self::resolving(grid, moved)
+    }
+
     /// The filter whose transition density from node `i` is normal with mean and deviation `moved[i]`.
     fn resolving(grid: UniformGrid, moved: &[(f64, f64)]) -> Result<Self, Error> {
         if let Some((_, deviation)) = moved.iter().find(|(_, s)| s.is_nan() || *s < COARSEST * grid.spacing()) {

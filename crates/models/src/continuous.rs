@@ -74,6 +74,11 @@ impl<const D: usize> ContinuousLinear<D> {
         &self.drift
     }
 
+    /// Offset `b`, in state units per second.
+    pub fn offset(&self) -> &SVector<f64, D> {
+        &self.offset
+    }
+
     /// Noise density `Q_c`, in state units squared per second.
     pub fn density(&self) -> &SMatrix<f64, D, D> {
         &self.density

@@ -5,7 +5,7 @@ mod stored;
 pub(crate) mod weights;
 
 pub use gaussian_cloud::GaussianCloud;
-pub use weights::{Categorical, systematic};
+pub use weights::{Categorical, normalise_log_weights, systematic};
 
 use crate::Error;
 use fewbits_core::columns::state_at;

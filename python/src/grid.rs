@@ -1,0 +1,198 @@
+//! The exact filter of a scalar state on a grid, with the user's dynamics and likelihood as functions of all nodes at once.
+
+use crate::callbacks::{Likelihoods, returned, rising};
+use crate::error::{Outcome, refused};
+use crate::table::{Given, Table, doubles};
+use fewbits_filters::{Error, PointMass, PointMassFilter, UniformGrid};
+use fewbits_numerics::kernels::largest_number;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+
+/// An exact filter of one number, on nodes from `lower` to `upper`, `spacing` apart.
+///
+/// Over `dt` seconds the state at node `x` becomes normal with mean `mean(x, dt)` and deviation `deviation(x, dt)`, both functions of all
+/// nodes at once (a deviation may be one number). `likelihood(x, z)` returns the logarithms of the likelihood of the observation `z` at the
+/// nodes; a dictionary has one such function per column. `start` is mean and deviation before the first observation, or the density at the
+/// nodes, of any sum. The deviation must be at least the distance between nodes.
+///
+/// >>> import numpy as np, fewbits as fb
+/// >>> grid = fb.GridFilter(
+/// ...     lambda x, dt: x, lambda x, dt: 0.5 * np.sqrt(dt), lambda x, z: -0.5 * ((z - x) / 0.4) ** 2,
+/// ...     lower=-10, upper=10, spacing=0.05, start=(0.0, 2.0),
+/// ... )
+/// >>> _ = grid.step(1.5)
+/// >>> bool(abs(grid.mean - 1.5) < 0.1), grid.nodes.shape
+/// (True, (401,))
+#[pyclass(module = "fewbits")]
+pub(crate) struct GridFilter {
+    mean: Py<PyAny>,
+    deviation: Py<PyAny>,
+    likelihoods: Likelihoods,
+    belief: PointMass,
+    /// The kernel of the last step, and its seconds.
+    kernel: Option<(f64, PointMassFilter)>,
+}
+
+#[pymethods]
+impl GridFilter {
+    #[new]
+    #[pyo3(signature = (mean, deviation, likelihood, *, lower, upper, spacing, start))]
+    fn new(
+        mean: &Bound<'_, PyAny>,
+        deviation: &Bound<'_, PyAny>,
+        likelihood: &Bound<'_, PyAny>,
+        lower: f64,
+        upper: f64,
+        spacing: f64,
+        start: &Bound<'_, PyAny>,
+    ) -> Outcome<Self> {
+        for (name, function) in [("mean", mean), ("deviation", deviation)] {
+            if !function.is_callable() {
+                return refused(name, function.get_type().name()?, "a function of the nodes and seconds");
+            }
+        }
+        let grid = UniformGrid::new(lower, upper, spacing)?;
+        let belief = match start.extract::<(f64, f64)>() {
+            Ok((mean, deviation)) => PointMass::normal(grid, mean, deviation * deviation)?,
+            Err(_) => {
+                let density = returned("start", "node", start, grid.points())?;
+                let mut belief = PointMass::new(grid, |_| 0.0)?;
+                let density: Vec<f64> = density.as_array().iter().copied().collect();
+                if let Some(bad) = density.iter().find(|p| !(**p >= 0.0 && p.is_finite())) {
+                    return refused("start", bad, "finite numbers, 0 or above");
+                }
+                belief.reweight(&density)?;
+                belief
+            }
+        };
+        Ok(Self {
+            mean: mean.clone().unbind(),
+            deviation: deviation.clone().unbind(),
+            likelihoods: Likelihoods::parsed(likelihood)?,
+            belief,
+            kernel: None,
+        })
+    }
+
+    /// Prediction over `dt` seconds (none if 0) and update by the observation (none if None or NaN). Returns the log likelihood. With
+    /// likelihoods by name the observation is a dictionary. A step that fails leaves the density as it was.
+    #[pyo3(signature = (observation=None, *, dt=1.0))]
+    fn step(&mut self, py: Python<'_>, observation: Option<Bound<'_, PyAny>>, dt: f64) -> Outcome<f64> {
+        if !(dt >= 0.0 && dt.is_finite()) {
+            return refused("dt", dt, "a finite number, 0 or above");
+        }
+        let mut next = self.belief.clone();
+        if dt > 0.0 {
+            let kernel = match self.kernel.take() {
+                Some((seconds, kernel)) if seconds == dt => kernel,
+                _ => self.moved(py, dt)?,
+            };
+            let predicted = py.detach(|| kernel.predict(&self.belief));
+            self.kernel = Some((dt, kernel));
+            next = predicted?;
+        }
+        let mut log_likelihood = 0.0;
+        for (function, observation) in self.likelihoods.of(observation.as_ref())? {
+            let found = function.bind(py).call1((self.nodes(py), observation))?;
+            let found = returned("likelihood", "node", &found, next.density().len())?;
+            let logs: Vec<f64> = found.as_array().iter().copied().collect();
+            let what = "a log likelihood";
+            let largest = largest_number(&logs).ok_or(Error::NotANumber { what })?;
+            if !largest.is_finite() {
+                return Err(Error::unlikely_or_no_number(largest, what).into());
+            }
+            // Relative to the largest, so that no exponential overflows.
+            let weights: Vec<f64> = logs.iter().map(|log| (log - largest).exp()).collect();
+            log_likelihood += largest + next.reweight(&weights)?.ln();
+        }
+        self.belief = next;
+        Ok(log_likelihood)
+    }
+
+    /// One step per row of a table, its column `time` in seconds or timestamps; null and NaN are missing. The first row is the time of the
+    /// start.
+    ///
+    /// >>> import numpy as np, polars as pl, fewbits as fb
+    /// >>> from math import log
+    /// >>> bit = lambda x, z: np.log(np.where(z > 0, 1, 0) * (x > 1) * 0.98 + 0.01)
+    /// >>> grid = fb.GridFilter(
+    /// ...     lambda x, dt: x, lambda x, dt: 0.5 * np.sqrt(dt), {"alarm": bit}, lower=-10, upper=10, spacing=0.05, start=(0.0, 2.0)
+    /// ... )
+    /// >>> grid.run(pl.DataFrame({"t": [0.0, 1.0, 2.0], "alarm": [1, None, 1]}), time="t").columns
+    /// ['t', 'x0', 'x0_sd', 'log_likelihood']
+    #[pyo3(signature = (table, *, time))]
+    fn run(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>, time: &str) -> Outcome<Table> {
+        let given = Given::read(table)?;
+        let seconds = rising(&given.times(time)?)?;
+        let columns = self.likelihoods.columns(&given, time)?;
+        let (mut means, mut deviations, mut logs) = (Vec::new(), Vec::new(), Vec::new());
+        let mut now = 0.0;
+        for (row, second) in seconds.into_iter().enumerate() {
+            py.check_signals()?;
+            let observation = self.likelihoods.row(py, &columns, row)?;
+            logs.push(self.step(py, Some(observation), dt_of(second, now))?);
+            now = second;
+            means.push(self.belief.mean());
+            deviations.push(self.belief.variance().max(0.0).sqrt());
+        }
+        let rows: Vec<usize> = (0..means.len()).collect();
+        Table::new(vec![
+            (time.to_owned(), given.taken(time, &rows)?),
+            ("x0".to_owned(), doubles(means)),
+            ("x0_sd".to_owned(), doubles(deviations)),
+            ("log_likelihood".to_owned(), doubles(logs)),
+        ])
+    }
+
+    /// The nodes.
+    #[getter]
+    fn nodes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.belief.grid().nodes().collect())
+    }
+
+    /// The density at the nodes: its sum times their distance is one.
+    #[getter]
+    fn density<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.belief.density())
+    }
+
+    /// Mean of the density.
+    #[getter]
+    fn mean(&self) -> f64 {
+        self.belief.mean()
+    }
+
+    /// Its standard deviation.
+    #[getter]
+    fn deviation(&self) -> f64 {
+        self.belief.variance().max(0.0).sqrt()
+    }
+}
+
+/// Differences of times to the nanosecond: steps of equal length then share their kernel.
+fn dt_of(second: f64, before: f64) -> f64 {
+    let dt = second - before;
+    let rounded = (dt * 1e9).round() / 1e9;
+    if rounded > 0.0 { rounded } else { dt }
+}
+
+impl GridFilter {
+    /// The kernel over `dt` seconds.
+    fn moved(&self, py: Python<'_>, dt: f64) -> Outcome<PointMassFilter> {
+        let points = self.belief.density().len();
+        let mean = self.mean.bind(py).call1((self.nodes(py), dt))?;
+        let mean = returned("mean", "node", &mean, points)?;
+        let deviation = self.deviation.bind(py).call1((self.nodes(py), dt))?;
+        let deviations: Vec<f64> = match deviation.extract::<f64>() {
+            Ok(one) => vec![one; points],
+            Err(_) => returned("deviation", "node", &deviation, points)?
+                .as_array()
+                .iter()
+                .copied()
+                .collect(),
+        };
+        let moved: Vec<(f64, f64)> = mean.as_array().iter().copied().zip(deviations).collect();
+        let grid = *self.belief.grid();
+        Ok(py.detach(|| PointMassFilter::from_transitions(grid, &moved))?)
+    }
+}

@@ -1,0 +1,66 @@
+//! A fusion centre as plain data.
+
+use crate::error::{Outcome, refused};
+use crate::model::{Model, with_dimension};
+use crate::seat::Seat;
+use crate::step::Built;
+use crate::table::Origin;
+use fewbits_filters::centre::Health;
+use serde::{Deserialize, Serialize};
+
+/// What is done with the results of the centre's tests.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(crate) enum Tests {
+    Off,
+    Report,
+    Exclude,
+}
+
+impl Tests {
+    pub(crate) fn parsed(text: &str) -> Outcome<Self> {
+        match text {
+            "off" => Ok(Self::Off),
+            "report" => Ok(Self::Report),
+            "exclude" => Ok(Self::Exclude),
+            other => refused("health", format!("'{other}'"), "'off', 'report' or 'exclude'"),
+        }
+    }
+
+    pub(crate) fn health(self) -> Health {
+        match self {
+            Self::Off => Health::Off,
+            Self::Report => Health::Report,
+            Self::Exclude => Health::Exclude,
+        }
+    }
+}
+
+/// Settings, sensors and state: all that a centre is.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct Parts {
+    pub(crate) model: Model,
+    pub(crate) mean: Vec<f64>,
+    /// By columns.
+    pub(crate) covariance: Vec<f64>,
+    pub(crate) learn_noise: bool,
+    pub(crate) tests: Tests,
+    pub(crate) failures: f64,
+    pub(crate) window: f64,
+    pub(crate) seats: Vec<Seat>,
+    pub(crate) origin: Option<Origin>,
+    /// The stored state of the library's centre.
+    pub(crate) state: Option<Vec<u8>>,
+}
+
+impl Parts {
+    /// Refuses what the library's centre would refuse.
+    pub(crate) fn checked(self) -> Outcome<Self> {
+        if let Some(Origin::Seconds(first)) = self.origin
+            && !first.is_finite()
+        {
+            return refused("time", first, "a finite number");
+        }
+        with_dimension!(self.model.coordinates(), D => Built::<D>::new(&self).map(|_| ()))?;
+        Ok(self)
+    }
+}

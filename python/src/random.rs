@@ -1,0 +1,120 @@
+//! Random numbers of the library, and the parts of a particle filter over arrays: weights and resampling.
+
+use crate::array::{numbers, vector};
+use crate::error::{Outcome, refused};
+use fewbits_filters::Resampling;
+use fewbits_monte_carlo::Stream;
+use fewbits_numerics::kernels::StandardNormals;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use rand::RngExt;
+use rand_pcg::Pcg64Mcg;
+
+/// Largest number of numbers of one call.
+const MOST: usize = 1 << 32;
+
+/// The random source of callbacks: the library's normal numbers, some six times as fast as NumPy's and the same on every machine.
+///
+/// >>> import fewbits as fb
+/// >>> rng = fb.Generator(1)
+/// >>> rng.standard_normal(3).shape, bool(((rng.random(5) >= 0) & (rng.random(5) < 1)).all())
+/// ((3,), True)
+#[pyclass(module = "fewbits")]
+pub(crate) struct Generator {
+    normals: StandardNormals,
+    uniforms: Pcg64Mcg,
+}
+
+impl Generator {
+    pub(crate) fn of(seed: u64) -> Self {
+        let mut rng = Stream::new(seed).fast_rng();
+        Self {
+            normals: StandardNormals::new(&mut rng),
+            uniforms: rng,
+        }
+    }
+}
+
+#[pymethods]
+impl Generator {
+    #[new]
+    fn new(seed: u64) -> Self {
+        Self::of(seed)
+    }
+
+    /// `count` independent standard normal numbers.
+    fn standard_normal<'py>(&mut self, py: Python<'py>, count: usize) -> Outcome<Bound<'py, PyArray1<f64>>> {
+        let mut normals = vec![0.0; checked(count)?];
+        self.normals.fill(&mut normals);
+        Ok(PyArray1::from_vec(py, normals))
+    }
+
+    /// `count` independent numbers, uniform in [0, 1).
+    fn random<'py>(&mut self, py: Python<'py>, count: usize) -> Outcome<Bound<'py, PyArray1<f64>>> {
+        let uniforms = (0..checked(count)?).map(|_| self.uniforms.random()).collect();
+        Ok(PyArray1::from_vec(py, uniforms))
+    }
+}
+
+fn checked(count: usize) -> Outcome<usize> {
+    if count <= MOST {
+        return Ok(count);
+    }
+    refused("count", count, format!("at most {MOST}"))
+}
+
+/// Weights that sum to one from logarithms of weights, with the logarithm of their sum and the effective sample size.
+///
+/// Raises `fewbits.ImpossibleError` if all are -inf, `fewbits.Error` if one is NaN.
+///
+/// >>> import numpy as np, fewbits as fb
+/// >>> weights, log_sum, size = fb.normalise(np.log([1.0, 3.0]) - 1000)
+/// >>> weights.round(6), round(size, 6)
+/// (array([0.25, 0.75]), 1.6)
+#[pyfunction]
+pub(crate) fn normalise<'py>(
+    py: Python<'py>,
+    log_weights: &Bound<'py, PyAny>,
+) -> Outcome<(Bound<'py, PyArray1<f64>>, f64, f64)> {
+    let mut logs = vector("log_weights", log_weights)?;
+    let mut weights = vec![0.0; logs.len()];
+    let (log_sum, size) = fewbits_densities::normalise_log_weights(&mut logs, &mut weights)?;
+    Ok((PyArray1::from_vec(py, weights), log_sum, size))
+}
+
+/// Indices of `count` draws (as many as there are weights, if left out) with probabilities in proportion to weights of any sum. `scheme` is
+/// "systematic", "stratified", "residual" or "multinomial". Indices do not decrease.
+///
+/// >>> import fewbits as fb
+/// >>> fb.resample([0.0, 0.5, 0.5, 1.0], seed=1).tolist()
+/// [1, 2, 3, 3]
+#[pyfunction]
+#[pyo3(signature = (weights, *, count=None, scheme="systematic", seed))]
+pub(crate) fn resample<'py>(
+    py: Python<'py>,
+    weights: &Bound<'py, PyAny>,
+    count: Option<usize>,
+    scheme: &str,
+    seed: u64,
+) -> Outcome<Bound<'py, PyArray1<i64>>> {
+    let weights = numbers::<f64>(weights)?;
+    let weights = weights.as_slice().map_err(PyErr::from)?;
+    let scheme = match scheme {
+        "systematic" => Resampling::Systematic,
+        "stratified" => Resampling::Stratified,
+        "residual" => Resampling::Residual,
+        "multinomial" => Resampling::Multinomial,
+        other => {
+            let expected = "'systematic', 'stratified', 'residual' or 'multinomial'";
+            return refused("scheme", format!("'{other}'"), expected);
+        }
+    };
+    let count = count.unwrap_or(weights.len());
+    if u32::try_from(count.max(weights.len())).is_err() {
+        return refused("count", count, "less than 2^32, as the number of weights");
+    }
+    let mut ancestors = vec![0; count];
+    let mut rng = Stream::new(seed).fast_rng();
+    scheme.ancestors(&mut rng, weights, &mut ancestors)?;
+    Ok(PyArray1::from_vec(py, ancestors.into_iter().map(i64::from).collect()))
+}

@@ -1,0 +1,181 @@
+//! Recordings that are written row by row, and the times of their rows.
+
+use crate::error::{Failure, Outcome, refused};
+use crate::record::{MAX_DECIMALS, Stated};
+use crate::table::Given;
+use fewbits_recipes::bounds;
+use fewbits_record::{Schema, TimeBase, TimeFormat};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::PathBuf;
+
+/// Writes a recording row by row. After a crash the rows up to the last `sync` can be read, with `damage="skip"`.
+///
+/// `bounds` has the bound of each column, as in `write`. `decimals` are those of the seconds of times (3: milliseconds); None numbers the
+/// rows instead. With `resume` an existing recording is continued, with its own columns and bounds.
+///
+/// >>> import fewbits as fb, tempfile, os
+/// >>> path = os.path.join(tempfile.mkdtemp(), "live.fewb")
+/// >>> with fb.Recorder(path, {"temp": "±0.1", "door": "lossless"}, decimals=1) as recorder:
+/// ...     recorder.push(0.0, {"temp": 20.14, "door": 1})
+/// ...     recorder.push(0.5, {"temp": 20.21})
+/// >>> fb.read(path)
+/// Table(2 rows: time, temp, door)
+#[pyclass(module = "fewbits")]
+pub(crate) struct Recorder {
+    recorder: Option<fewbits_record::Recorder<File>>,
+}
+
+#[pymethods]
+impl Recorder {
+    #[new]
+    #[pyo3(signature = (path, bounds=None, *, decimals=None, utc=false, effort="thorough", resume=false))]
+    fn new(
+        path: PathBuf,
+        bounds: Option<&Bound<'_, PyDict>>,
+        decimals: Option<u8>,
+        utc: bool,
+        effort: &str,
+        resume: bool,
+    ) -> Outcome<Self> {
+        let effort = crate::codec::effort(effort)?;
+        let recorder = match (bounds, resume) {
+            (None, true) => fewbits_record::Recorder::resume(&path)?,
+            (Some(bounds), false) => {
+                let names: Vec<String> = bounds
+                    .keys()
+                    .iter()
+                    .map(|name| name.extract())
+                    .collect::<PyResult<_>>()?;
+                let stated: Stated = bounds.extract()?;
+                let ranges = vec![None; names.len()];
+                let columns = bounds::columns(&names, &stated.of(&names)?, &ranges)?;
+                let time = match decimals {
+                    None => TimeBase::Numbered,
+                    Some(decimals) if decimals <= MAX_DECIMALS => TimeBase::Clock {
+                        decimals,
+                        format: if utc { TimeFormat::Utc } else { TimeFormat::Seconds },
+                        tolerance: 0,
+                    },
+                    Some(decimals) => return refused("decimals", decimals, format!("0 to {MAX_DECIMALS}, or None")),
+                };
+                fewbits_record::Recorder::create(&path, Schema::new(columns, time)?)?
+            }
+            _ => return refused("bounds", "given with `resume`, or neither is", "one of the two"),
+        };
+        Ok(Self {
+            recorder: Some(recorder.with_effort(effort)),
+        })
+    }
+
+    /// Adds a row: its time (seconds, or what `numpy.datetime64` takes; the number of the row, or None for the next, if rows are numbered)
+    /// and its cells by column. Cells that are None or left out are gaps.
+    fn push(&mut self, time: &Bound<'_, PyAny>, cells: BTreeMap<String, Option<f64>>) -> Outcome<()> {
+        let recorder = self.open()?;
+        let schema = recorder.schema().clone();
+        for name in cells.keys() {
+            schema.position(name)?;
+        }
+        let tick = match (time.is_none(), schema.time()) {
+            (true, TimeBase::Numbered) => recorder.next_tick(),
+            _ => tick_of(time, "time", schema.time())?,
+        };
+        let row: Vec<Option<f64>> = schema
+            .columns()
+            .iter()
+            .map(|one| cells.get(one.name()).copied().flatten())
+            .collect();
+        Ok(recorder.push(tick, &row)?)
+    }
+
+    /// Adds the rows of a table: every column of the recording, and `time` (timestamps, or whole ticks) unless rows are numbered.
+    fn push_table(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>) -> Outcome<()> {
+        let given = Given::read(table)?;
+        let recorder = self.open()?;
+        py.detach(|| {
+            for batch in given.batches() {
+                recorder.push_batch(batch)?;
+                Python::attach(|py| py.check_signals())?;
+            }
+            Ok::<(), Failure>(())
+        })
+    }
+
+    /// Writes the rows so far as a block and waits until the disk has them.
+    fn sync(&mut self, py: Python<'_>) -> Outcome<()> {
+        let recorder = self.open()?;
+        Ok(py.detach(|| recorder.sync())?)
+    }
+
+    /// Writes what is left, and the index. Returns the number of bytes. A second call does nothing.
+    fn close(&mut self, py: Python<'_>) -> Outcome<Option<u64>> {
+        let Some(recorder) = self.recorder.take() else {
+            return Ok(None);
+        };
+        py.detach(|| Ok(Some(recorder.finish()?.metadata()?.len())))
+    }
+
+    fn __enter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*_exception))]
+    fn __exit__(&mut self, py: Python<'_>, _exception: &Bound<'_, pyo3::types::PyTuple>) -> Outcome<()> {
+        self.close(py).map(drop)
+    }
+}
+
+impl Recorder {
+    fn open(&mut self) -> Outcome<&mut fewbits_record::Recorder<File>> {
+        match &mut self.recorder {
+            Some(recorder) => Ok(recorder),
+            None => refused("recorder", "closed", "one that is open: `Recorder(path, resume=True)` continues"),
+        }
+    }
+}
+
+/// A tick of a recording's clock: a number of seconds, or with a UTC clock a text or a NumPy datetime.
+pub(crate) fn tick_of(value: &Bound<'_, PyAny>, name: &'static str, time: TimeBase) -> Outcome<i64> {
+    let TimeBase::Clock { decimals, format, .. } = time else {
+        return value.extract().or_else(|_| refused(name, value, "the number of a row"));
+    };
+    let scale = 10_f64.powi(decimals.into());
+    if let Ok(seconds) = value.extract::<f64>() {
+        let tick = (seconds * scale).round();
+        return if tick.abs() < i64::MAX as f64 {
+            Ok(tick as i64)
+        } else {
+            refused(name, seconds, "a time within the clock's range")
+        };
+    }
+    if matches!(format, TimeFormat::Seconds) {
+        return refused(name, value, "a number of seconds");
+    }
+    let numpy = value.py().import("numpy")?;
+    // An aware datetime is taken to UTC first: NumPy knows no zones.
+    let given = match value.getattr("tzinfo") {
+        Ok(zone) if !zone.is_none() => {
+            let utc = value.py().import("datetime")?.getattr("timezone")?.getattr("utc")?;
+            let plain = value.call_method1("astimezone", (utc,))?;
+            let arguments = PyDict::new(value.py());
+            arguments.set_item("tzinfo", value.py().None())?;
+            plain.call_method("replace", (), Some(&arguments))?
+        }
+        _ => value.clone(),
+    };
+    let stamp = numpy.call_method1("datetime64", (&given, "ns"));
+    let Ok(nanoseconds) = stamp.and_then(|stamp| stamp.call_method1("astype", ("int64",))?.extract::<i64>()) else {
+        return refused(name, value, "seconds since 1970, or a time that numpy.datetime64 takes");
+    };
+    if nanoseconds == i64::MIN {
+        return refused(name, value, "a time");
+    }
+    match MAX_DECIMALS.checked_sub(decimals) {
+        Some(fewer) => Ok(nanoseconds.div_euclid(10_i64.pow(fewer.into()))),
+        None => nanoseconds
+            .checked_mul(10_i64.pow((decimals - MAX_DECIMALS).into()))
+            .map_or_else(|| refused(name, value, "a time within the clock's range"), Ok),
+    }
+}

@@ -1,0 +1,227 @@
+//! The search for a diffusing source: nodes that are asked one after the other.
+
+use crate::array::{matrix, vector};
+use crate::error::{Outcome, refused};
+use crate::table::{Table, doubles};
+use arrow_array::{ArrayRef, Int64Array};
+use fewbits_diffusive::{Error, RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor};
+use fewbits_models::diffusion::{Air, Ground};
+use fewbits_topology::{Deployment, Graph};
+use nalgebra::{Vector2, Vector3};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use std::sync::Arc;
+
+/// A search for a source that releases a substance into open air, by sensors on the ground.
+///
+/// `places` are those of the nodes, (n, 2), in metres; two nodes within `reach` hear each other. Each samples the concentration (kg/m^3) at the
+/// `instants`, seconds after the release began, with noise of deviation `noise`. `diffusivity` is in m^2/s, `wind` in m/s. `rate` is the
+/// release in kg/s: a number if it is known, or lowest and highest. The source lies between the corners of `box`. The search ends when the
+/// determinant of the position's covariance falls below `threshold`, in m^4.
+///
+/// >>> import numpy as np, fewbits as fb
+/// >>> rng = np.random.default_rng(1)
+/// >>> places, instants = rng.uniform(0, 100, (300, 2)), [5.0, 10.0, 15.0, 20.0, 25.0]
+/// >>> search = fb.SourceSearch(
+/// ...     places, reach=15.0, instants=instants, noise=8e-6, diffusivity=40.0, rate=(0.5, 1.5), box=((-20, -20), (120, 120))
+/// ... )
+/// >>> source = np.array([62.0, 50.0])
+/// >>> def samples(node):
+/// ...     clean = search.concentration(places[node], source)
+/// ...     return clean + 8e-6 * rng.standard_normal(5)
+/// >>> found = search.run(samples, start=search.nearest((44, 52)), deviation=50.0)
+/// >>> found.status, bool(np.hypot(*(found.mean - source)) < 1)
+/// ('converged', True)
+#[pyclass(frozen, module = "fewbits")]
+pub(crate) struct SourceSearch {
+    field: SearchField,
+    sensor: SourceSensor,
+    rate: RateModel,
+    search: SearchBox,
+    threshold: f64,
+    most: usize,
+}
+
+/// What a search found.
+#[pyclass(frozen, get_all, module = "fewbits")]
+pub(crate) struct SourceFound {
+    /// "converged", or why the search ended without: "misfit" (the model does not explain the samples: do not use the estimate),
+    /// "outside field", "exhausted", "node limit", "belief miss", "undecodable", "unresolved".
+    status: &'static str,
+    /// Mean of the position, metres.
+    mean: Option<Py<PyArray1<f64>>>,
+    /// Its covariance, (2, 2).
+    covariance: Option<Py<PyArray2<f64>>>,
+    /// Every node that sampled: its number, hops to it, bits of the message to it, and the estimate after its samples.
+    visited: Py<Table>,
+    /// Bits of all messages.
+    bits: usize,
+}
+
+#[pymethods]
+impl SourceSearch {
+    #[new]
+    #[pyo3(signature = (places, *, reach, instants, noise, diffusivity, wind=(0.0, 0.0), rate, r#box, threshold=1e-5, max_nodes=40))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        py: Python<'_>,
+        places: &Bound<'_, PyAny>,
+        reach: f64,
+        instants: &Bound<'_, PyAny>,
+        noise: f64,
+        diffusivity: f64,
+        wind: (f64, f64),
+        rate: &Bound<'_, PyAny>,
+        r#box: ((f64, f64), (f64, f64)),
+        threshold: f64,
+        max_nodes: usize,
+    ) -> Outcome<Self> {
+        let (rows, columns, numbers) = matrix("places", places)?;
+        if columns != 2 {
+            return refused("places", format!("{rows} by {columns}"), "two numbers a node, x and y");
+        }
+        let places = numbers
+            .chunks_exact(2)
+            .map(|place| Vector2::new(place[0], place[1]))
+            .collect();
+        let instants = vector("instants", instants)?;
+        let rate = match (rate.extract::<f64>(), rate.extract::<(f64, f64)>()) {
+            (Ok(known), _) => RateModel::Known(known),
+            (_, Ok((low, high))) => RateModel::Joint(RateRange::new(low, high)?),
+            _ => return refused("rate", crate::array::shown(rate), "a number, or the lowest and the highest"),
+        };
+        let ((left, low), (right, high)) = r#box;
+        let search = SearchBox {
+            lower: [left, low],
+            upper: [right, high],
+        };
+        if [left, low, right, high].iter().any(|x| !x.is_finite()) {
+            return refused("box", format!("{:?}", r#box), "finite corners");
+        }
+        let (field, sensor) = py.detach(|| -> Outcome<_> {
+            let air = Air::new(diffusivity, Vector3::new(wind.0, wind.1, 0.0), Ground::Impermeable)?;
+            let sensor = SourceSensor::new(air, instants, noise)?;
+            let nodes = Deployment::given(places)?;
+            let graph = Graph::within(nodes.positions(), reach)?;
+            Ok((SearchField::new(sensor.clone(), nodes, graph)?, sensor))
+        })?;
+        let made = Self {
+            field,
+            sensor,
+            rate,
+            search,
+            threshold,
+            most: max_nodes,
+        };
+        made.about(0, 1.0)?;
+        Ok(made)
+    }
+
+    /// The node nearest to a place.
+    fn nearest(&self, place: (f64, f64)) -> Outcome<usize> {
+        if !(place.0.is_finite() && place.1.is_finite()) {
+            return refused("place", format!("{place:?}"), "finite numbers");
+        }
+        Ok(self.field.deployment().nearest_to(&Vector2::new(place.0, place.1)))
+    }
+
+    /// The concentrations (kg/m^3) without noise at the instants, at a place, of a source of 1 kg/s, or of `rate`.
+    #[pyo3(signature = (place, source, *, rate=1.0))]
+    fn concentration<'py>(
+        &self,
+        py: Python<'py>,
+        place: &Bound<'py, PyAny>,
+        source: &Bound<'py, PyAny>,
+        rate: f64,
+    ) -> Outcome<Bound<'py, PyArray1<f64>>> {
+        let place = crate::model::sized("place", vector("place", place)?, 2)?;
+        let source = crate::model::sized("source", vector("source", source)?, 2)?;
+        if place.iter().chain(&source).chain([&rate]).any(|x| !x.is_finite()) {
+            return refused("place", "not finite, or the source or the rate is not", "finite numbers");
+        }
+        let (place, source) = (Vector2::new(place[0], place[1]), Vector2::new(source[0], source[1]));
+        let mut means = self.sensor.responses(&place, &source)?;
+        means.iter_mut().for_each(|mean| *mean *= rate);
+        Ok(PyArray1::from_vec(py, means))
+    }
+
+    /// Runs the search from node `start`, where the alarm was raised; the source is `deviation` metres from it, give or take. `samples(node)`
+    /// returns what a node measures, one number per instant.
+    #[pyo3(signature = (samples, *, start, deviation))]
+    fn run(&self, py: Python<'_>, samples: Py<PyAny>, start: usize, deviation: f64) -> Outcome<SourceFound> {
+        let search = self.about(start, deviation)?;
+        let mut raised = None;
+        let outcome = py.detach(|| {
+            search.run(&self.field, start, |node| {
+                let asked = Python::attach(|py| -> Outcome<Vec<f64>> {
+                    py.check_signals()?;
+                    vector("samples", samples.call1(py, (node,))?.bind(py))
+                });
+                asked.map_err(|failure| {
+                    raised = Some(failure);
+                    Error::NotANumber { what: "a sample" }
+                })
+            })
+        });
+        if let Some(failure) = raised {
+            return Err(failure);
+        }
+        let outcome = outcome?;
+        let estimate = outcome.estimate();
+        let mean = estimate.map(|found| PyArray1::from_slice(py, found.mean().as_slice()).unbind());
+        let rows = |found: &fewbits_core::Gaussian<2>| {
+            let c = found.covariance();
+            vec![vec![c[(0, 0)], c[(0, 1)]], vec![c[(1, 0)], c[(1, 1)]]]
+        };
+        let covariance = estimate
+            .map(|found| PyArray2::from_vec2(py, &rows(found)).map(Bound::unbind))
+            .transpose()
+            .map_err(PyErr::from)?;
+        let whole = |of: fn(&fewbits_diffusive::Step) -> usize| -> ArrayRef {
+            Arc::new(Int64Array::from_iter_values(outcome.steps.iter().map(|step| of(step) as i64)))
+        };
+        let number = |of: fn(&fewbits_diffusive::Step) -> f64| doubles(outcome.steps.iter().map(of).collect());
+        let visited = Table::new(vec![
+            ("node".to_owned(), whole(|step| step.node)),
+            ("hops".to_owned(), whole(|step| step.hops)),
+            ("bits".to_owned(), whole(|step| step.bits)),
+            ("x".to_owned(), number(|step| step.estimate.mean()[0])),
+            ("y".to_owned(), number(|step| step.estimate.mean()[1])),
+            ("x_sd".to_owned(), number(|step| step.estimate.covariance()[(0, 0)].sqrt())),
+            ("y_sd".to_owned(), number(|step| step.estimate.covariance()[(1, 1)].sqrt())),
+        ])?;
+        Ok(SourceFound {
+            status: named(outcome.status),
+            mean,
+            covariance,
+            bits: outcome.steps.iter().map(|step| step.bits).sum(),
+            visited: Py::new(py, visited)?,
+        })
+    }
+}
+
+impl SourceSearch {
+    fn about(&self, start: usize, deviation: f64) -> Outcome<Search> {
+        let nodes = self.field.deployment().positions();
+        let Some(place) = nodes.get(start) else {
+            return refused("start", start, format!("0 to {}, a node", nodes.len().saturating_sub(1)));
+        };
+        let mut search = Search::new(place, deviation, self.search, self.rate, self.threshold)?;
+        search.max_nodes = self.most;
+        Ok(search)
+    }
+}
+
+fn named(status: fewbits_diffusive::Status) -> &'static str {
+    use fewbits_diffusive::Status;
+    match status {
+        Status::Converged => "converged",
+        Status::Exhausted => "exhausted",
+        Status::NodeLimit => "node limit",
+        Status::BeliefMiss => "belief miss",
+        Status::Misfit => "misfit",
+        Status::Undecodable => "undecodable",
+        Status::OutsideField => "outside field",
+        _ => "unresolved",
+    }
+}

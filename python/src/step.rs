@@ -1,0 +1,299 @@
+//! The library's centre of one dimension, built from stored parts, and what its steps find.
+
+use crate::error::{Outcome, refused};
+use crate::instants::Instant;
+use crate::model::Moves;
+use crate::parts::Parts;
+use crate::seat::{Seat, Sends};
+use crate::table::{Table, doubles};
+use arrow_array::{ArrayRef, Int64Array, StringArray};
+use fewbits_core::{Gaussian, Observation, SensorNode};
+use fewbits_filters::centre::{CentreState, Event, Failures, FusionCentre, NoiseLearning, Slot};
+use fewbits_filters::smoother::smooth_step;
+use fewbits_filters::{Error, MomentFilter};
+use fewbits_models::LinearGaussian;
+use fewbits_monte_carlo::Stream;
+use nalgebra::{SMatrix, SVector, Vector1};
+use rand_pcg::Pcg64Mcg;
+use std::sync::Arc;
+
+/// A centre with the sensors' halves.
+pub(crate) struct Built<const D: usize> {
+    centre: FusionCentre<D, MomentFilter>,
+    model: Moves<D>,
+    nodes: Vec<Box<dyn SensorNode<1>>>,
+    seats: Vec<Seat>,
+    /// Moments and schemes draw nothing.
+    rng: Pcg64Mcg,
+}
+
+/// What one instant gave.
+pub(crate) struct Row {
+    pub(crate) log_likelihood: f64,
+    pub(crate) bits: i64,
+    pub(crate) events: Vec<String>,
+}
+
+/// A filtered belief, and the prediction that led to it.
+pub(crate) struct Mark<const D: usize> {
+    belief: Gaussian<D>,
+    /// Seconds since the belief before.
+    seconds: f64,
+    noise_scale: f64,
+    /// Whether the belief does not follow from the one before.
+    restarted: bool,
+}
+
+impl<const D: usize> Built<D> {
+    pub(crate) fn new(parts: &Parts) -> Outcome<Self> {
+        let model = parts.model.typed::<D>()?;
+        if (parts.mean.len(), parts.covariance.len()) != (D, D * D) {
+            return refused("mean", "of another length", format!("{D} numbers"));
+        }
+        let covariance = SMatrix::from_column_slice(&parts.covariance);
+        let prior = Gaussian::new(SVector::from_column_slice(&parts.mean), covariance)?;
+        let mut rng = Stream::new(0).fast_rng();
+        let failures = Failures {
+            rate: parts.failures,
+            ..Failures::default()
+        };
+        let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior)?
+            .with_health(parts.tests.health())
+            .with_failures(failures)?
+            .with_window(parts.window)?;
+        if parts.learn_noise {
+            centre = centre.learning_noise(NoiseLearning::DEFAULT)?;
+        }
+        let mut built = Self {
+            centre,
+            model,
+            nodes: Vec::new(),
+            seats: Vec::new(),
+            rng,
+        };
+        for seat in &parts.seats {
+            built.join(seat)?;
+        }
+        if let Some(state) = &parts.state {
+            built.centre.restore(CentreState::from_bytes(state)?)?;
+        }
+        Ok(built)
+    }
+
+    pub(crate) fn join(&mut self, seat: &Seat) -> Outcome<()> {
+        self.centre.join_boxed(self.seats.len() as u32, seat.remote::<D>()?)?;
+        self.nodes.push(seat.node::<D>()?);
+        self.seats.push(seat.clone());
+        Ok(())
+    }
+
+    pub(crate) fn stored(&self) -> Outcome<Vec<u8>> {
+        Ok(self.centre.state().to_bytes()?)
+    }
+
+    pub(crate) fn belief(&self) -> Gaussian<D> {
+        self.centre.estimate()
+    }
+
+    pub(crate) fn time(&self) -> f64 {
+        self.centre.time()
+    }
+
+    pub(crate) fn noise_scale(&self) -> f64 {
+        self.centre.noise_scale()
+    }
+
+    /// Works, dead, excluded, of each sensor.
+    pub(crate) fn sensors(&self) -> Outcome<Vec<(f64, bool, bool)>> {
+        let numbers = 0..self.seats.len() as u32;
+        let of = |number| {
+            let centre = &self.centre;
+            Ok((centre.working(number)?, centre.is_named_dead(number)?, centre.is_excluded(number)?))
+        };
+        numbers.map(of).collect()
+    }
+
+    /// Prediction to the instant, and update with its reports.
+    pub(crate) fn step(&mut self, instant: &Instant) -> Outcome<Row> {
+        if instant.seconds < self.centre.time() {
+            return self.late(instant);
+        }
+        self.centre.advance(&mut self.rng, instant.seconds)?;
+        let mut slots = Vec::with_capacity(instant.samples.len());
+        for (number, sample) in &instant.samples {
+            let feedback = self.centre.feedback(*number as u32)?;
+            let observation = match sample {
+                Some(sample) => {
+                    let measurement = Vector1::new(sample - self.seats[*number].offset);
+                    Observation::from(self.nodes[*number].report(&mut self.rng, &measurement, &feedback)?)
+                }
+                None => Observation::Nothing,
+            };
+            slots.push(Slot::new(*number as u32, feedback, observation));
+        }
+        let bits = bits_of(&slots);
+        match self.centre.receive(&mut self.rng, &slots) {
+            Ok(received) => Ok(Row {
+                log_likelihood: received.info.log_likelihood,
+                bits,
+                events: received.events.iter().map(|event| self.named(event)).collect(),
+            }),
+            Err(Error::Impossible) => Ok(Row {
+                log_likelihood: f64::NEG_INFINITY,
+                bits,
+                events: vec!["impossible".to_owned()],
+            }),
+            Err(other) => Err(other.into()),
+        }
+    }
+
+    /// Values of an earlier time: what other sensors would have sent depends on what they were told then.
+    fn late(&mut self, instant: &Instant) -> Outcome<Row> {
+        let mut slots = Vec::with_capacity(instant.samples.len());
+        for (number, sample) in &instant.samples {
+            let (seat, Some(sample)) = (&self.seats[*number], sample) else {
+                continue;
+            };
+            if seat.send != Sends::Value {
+                let given = format!("{} s before the last, of '{}'", self.centre.time() - instant.seconds, seat.name);
+                return refused(
+                    "time",
+                    given,
+                    "times that do not decrease, or late reports of sensors that send values",
+                );
+            }
+            let feedback = self.centre.feedback(*number as u32)?;
+            let measurement = Vector1::new(sample - seat.offset);
+            let report = self.nodes[*number].report(&mut self.rng, &measurement, &feedback)?;
+            slots.push(Slot::new(*number as u32, feedback, Observation::from(report)));
+        }
+        let used = self.centre.late(&mut self.rng, instant.seconds, &slots)?;
+        Ok(Row {
+            log_likelihood: 0.0,
+            bits: bits_of(&slots),
+            events: vec![if used { "late" } else { "too late" }.to_owned()],
+        })
+    }
+
+    fn named(&self, event: &Event) -> String {
+        let of = |number: &u32, what: &str| match self.seats.get(*number as usize) {
+            Some(seat) => format!("{} {what}", seat.name),
+            None => what.to_owned(),
+        };
+        match event {
+            Event::Dead(number) => of(number, "dead"),
+            Event::Alive(number) => of(number, "alive"),
+            Event::Excluded(number) => of(number, "excluded"),
+            Event::Readmitted(number) => of(number, "readmitted"),
+            Event::Rejected(number) => of(number, "rejected"),
+            Event::Disputed(number) => of(number, "disputed"),
+            Event::Copied(number) => of(number, "copied"),
+            Event::Lost => "lost".to_owned(),
+            Event::NoiseOverstated => "noise overstated".to_owned(),
+            Event::Reopened => "reopened".to_owned(),
+            _ => "reacquired".to_owned(),
+        }
+    }
+
+    /// What smoothing needs of the present belief.
+    pub(crate) fn mark(&self, from: f64, noise_scale: f64, restarted: bool) -> Mark<D> {
+        Mark {
+            belief: self.belief(),
+            seconds: self.time() - from,
+            noise_scale,
+            restarted,
+        }
+    }
+
+    /// Mean and deviation of each coordinate given all rows, by columns. A belief that was restarted says nothing of those before.
+    pub(crate) fn smoothed(&self, trail: &[Mark<D>]) -> Outcome<Vec<Vec<f64>>> {
+        let mut columns = vec![vec![0.0; trail.len()]; 2 * D];
+        let mut next: Option<(Gaussian<D>, &Mark<D>)> = None;
+        for (row, mark) in trail.iter().enumerate().rev() {
+            let belief = match &next {
+                Some((later, step)) if !step.restarted => {
+                    let moved = self.model.lasting(step.seconds)?;
+                    let dynamics = LinearGaussian::with_covariance(
+                        *moved.transition(),
+                        moved.noise_covariance() * step.noise_scale,
+                    )?;
+                    // The step of the smoother has no offset: it is taken off the mean of the later belief.
+                    let later = Gaussian::new(later.mean() - moved.offset(), *later.covariance())?;
+                    smooth_step(&dynamics, &mark.belief, &later)?
+                }
+                _ => mark.belief,
+            };
+            for i in 0..D {
+                columns[2 * i][row] = belief.mean()[i];
+                columns[2 * i + 1][row] = belief.covariance()[(i, i)].sqrt();
+            }
+            next = Some((belief, mark));
+        }
+        Ok(columns)
+    }
+}
+
+fn bits_of(slots: &[Slot]) -> i64 {
+    let received = slots.iter().filter_map(|slot| slot.observation.received());
+    received.map(|bits| bits.bits() as i64).sum()
+}
+
+/// What a run found, by columns.
+pub(crate) struct Rows {
+    states: Vec<Vec<f64>>,
+    log_likelihoods: Vec<f64>,
+    bits: Vec<i64>,
+    events: Vec<String>,
+    restarted: bool,
+    pub(crate) smoothed: Option<Vec<Vec<f64>>>,
+}
+
+impl Rows {
+    pub(crate) fn new<const D: usize>(rows: usize) -> Self {
+        Self {
+            states: vec![Vec::with_capacity(rows); 2 * D],
+            log_likelihoods: Vec::with_capacity(rows),
+            bits: Vec::with_capacity(rows),
+            events: Vec::with_capacity(rows),
+            restarted: false,
+            smoothed: None,
+        }
+    }
+
+    pub(crate) fn push<const D: usize>(&mut self, belief: &Gaussian<D>, row: Row) {
+        for i in 0..D {
+            self.states[2 * i].push(belief.mean()[i]);
+            self.states[2 * i + 1].push(belief.covariance()[(i, i)].sqrt());
+        }
+        self.log_likelihoods.push(row.log_likelihood);
+        self.bits.push(row.bits);
+        self.restarted = row
+            .events
+            .iter()
+            .any(|event| event == "reopened" || event == "reacquired");
+        self.events.push(row.events.join("; "));
+    }
+
+    /// Whether the last belief does not follow from the one before.
+    pub(crate) fn restarted(&self) -> bool {
+        self.restarted
+    }
+
+    pub(crate) fn table(self, time: &str, times: ArrayRef) -> Outcome<Table> {
+        let mut columns: Vec<(String, ArrayRef)> = vec![(time.to_owned(), times)];
+        let named = |columns: &mut Vec<(String, ArrayRef)>, end: &str, states: Vec<Vec<f64>>| {
+            for (i, state) in states.into_iter().enumerate() {
+                let deviation = if i % 2 == 1 { "_sd" } else { "" };
+                columns.push((format!("x{}{end}{deviation}", i / 2), doubles(state)));
+            }
+        };
+        named(&mut columns, "", self.states);
+        columns.push(("log_likelihood".to_owned(), doubles(self.log_likelihoods)));
+        columns.push(("bits".to_owned(), Arc::new(Int64Array::from(self.bits))));
+        columns.push(("events".to_owned(), Arc::new(StringArray::from(self.events))));
+        if let Some(smoothed) = self.smoothed {
+            named(&mut columns, "_smooth", smoothed);
+        }
+        Table::new(columns)
+    }
+}

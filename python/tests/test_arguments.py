@@ -1,0 +1,200 @@
+"""Any arguments: a result, or an exception that says what is expected; never a panic, never the end of the interpreter."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+import fewbits as fb
+
+anything = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(2**70), 2**70),
+    st.floats(),
+    st.text(max_size=5),
+    st.binary(max_size=40),
+    st.lists(st.floats(), max_size=4),
+    st.lists(st.lists(st.floats(-10, 10), min_size=2, max_size=2), max_size=3),
+    st.dictionaries(st.sampled_from(["a", "t", "*"]), st.one_of(st.floats(), st.text(max_size=4)), max_size=2),
+    hnp.arrays(st.sampled_from(["f8", "f4", "i8", "u8", "i2", "?", "U2"]), hnp.array_shapes(min_dims=0, max_dims=3, max_side=4)),
+    st.just(lambda *given: np.zeros(3)),
+    st.builds(lambda: pl.DataFrame({"t": [0.0, 1.0], "a": [1.0, None]})),
+    st.builds(lambda: pa.table({"t": [0, 1], "a": ["x", None]})),
+    st.builds(lambda: pa.table({"t": pa.array([], pa.timestamp("ms", "UTC")), "a": pa.array([], pa.float64())})),
+)
+
+
+def centre():
+    made = fb.FusionCentre(fb.Model.walk(0.1), mean=0.0, deviation=1.0)
+    made.join("a", noise=0.5)
+    return made
+
+
+def filtering():
+    return fb.ParticleFilter(np.zeros((1, 3)), lambda x, dt, rng: None, lambda x, z: np.zeros(3), seed=1)
+
+
+def grid():
+    return fb.GridFilter(lambda x, dt: x, lambda x, dt: 1.0, lambda x, z: -np.abs(x), lower=-2, upper=2, spacing=0.5, start=(0, 1))
+
+
+def search():
+    return fb.SourceSearch(
+        [[0.0, 0.0], [5.0, 0.0]], reach=9.0, instants=[5.0], noise=1e-5, diffusivity=40.0, rate=1.0, box=((-9, -9), (9, 9))
+    )
+
+
+ANCHORS = {"A": (0.0, 0.0), "B": (9.0, 0.0), "C": (0.0, 9.0)}
+CALLS = {
+    "encode": (fb.encode, ["samples"], ["bound", "effort"]),
+    "decode": (fb.decode, ["frame"], ["out"]),
+    "normalise": (fb.normalise, ["log_weights"], []),
+    "resample": (lambda *a, **k: fb.resample(*a, **{"seed": 1, **k}), ["weights"], ["scheme", "seed"]),
+    "plan": (fb.plan, ["table"], ["time"]),
+    "OneBit": (fb.OneBit, [], ["a", "process", "noise", "flips"]),
+    "OneBit.run": (fb.OneBit(a=0.9, process=0.5, noise=1.0).run, ["samples"], ["mean", "variance"]),
+    "OneBit.run_bits": (fb.OneBit(a=0.9, process=0.5, noise=1.0).run_bits, ["bits"], ["mean", "variance"]),
+    "OneBit.step": (fb.OneBit(a=0.9, process=0.5, noise=1.0).step, ["bit"], ["mean", "variance"]),
+    "Model.walk": (fb.Model.walk, ["density"], []),
+    "Model.reverting": (fb.Model.reverting, [], ["mean", "time_constant", "variance"]),
+    "Model.linear": (fb.Model.linear, ["drift", "density"], ["offset"]),
+    "Model.steps": (fb.Model.steps, ["transition", "noise"], ["offset", "interval"]),
+    "Model.simulate": (fb.Model.velocity(0.1).simulate, ["times"], ["start", "seed"]),
+    "FusionCentre": (
+        lambda *a, **k: fb.FusionCentre(fb.Model.walk(0.1), *a, **{"mean": 0.0, **k}),
+        [],
+        ["mean", "deviation", "covariance", "learn_noise", "health", "failures", "window"],
+    ),
+    "FusionCentre.join": (
+        lambda *a, **k: centre().join(*a, **{"noise": 1.0, **k}),
+        ["column"],
+        ["reads", "noise", "send", "loss", "offset", "missing"],
+    ),
+    "FusionCentre.run": (lambda *a, **k: centre().run(*a, **{"time": "t", **k}), ["table"], ["by", "value", "smooth"]),
+    "FusionCentre.step": (lambda *a, **k: centre().step(*a, **k), ["time", "samples"], []),
+    "FusionCentre.from_bytes": (fb.FusionCentre.from_bytes, ["bytes"], []),
+    "ParticleFilter": (lambda *a, **k: fb.ParticleFilter(*a, **{"seed": 1, **k}), ["start", "move", "likelihood"], ["seed", "resample"]),
+    "ParticleFilter.step": (lambda *a, **k: filtering().step(*a, **k), ["observation"], ["dt"]),
+    "ParticleFilter.run": (lambda *a, **k: filtering().run(*a, **k), ["observations"], ["time", "dt"]),
+    "GridFilter": (
+        lambda *a, **k: fb.GridFilter(*a, **{"lower": -1.0, "upper": 1.0, "spacing": 0.5, "start": (0.0, 1.0), **k}),
+        ["mean", "deviation", "likelihood"],
+        ["lower", "upper", "spacing", "start"],
+    ),
+    "GridFilter.step": (lambda *a, **k: grid().step(*a, **k), ["observation"], ["dt"]),
+    "GridFilter.run": (lambda *a, **k: grid().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
+    "RangeTracker": (fb.RangeTracker, ["anchors"], ["send", "noise", "outliers", "silence", "seed"]),
+    "RangeTracker.run": (fb.RangeTracker(ANCHORS).run, ["table", "time", "by", "value"], []),
+    "SourceSearch": (
+        lambda *a, **k: fb.SourceSearch(
+            *a, **{"reach": 9.0, "instants": [5.0], "noise": 1.0, "diffusivity": 1.0, "rate": 1.0, "box": ((0, 0), (1, 1)), **k}
+        ),
+        ["places"],
+        ["reach", "instants", "noise", "diffusivity", "wind", "rate", "box", "threshold", "max_nodes"],
+    ),
+    "SourceSearch.nearest": (search().nearest, ["place"], []),
+    "SourceSearch.concentration": (search().concentration, ["place", "source"], ["rate"]),
+    "SourceSearch.run": (lambda *a, **k: search().run(*a, **{"start": 0, "deviation": 5.0, **k}), ["samples"], ["start", "deviation"]),
+    "Table": (fb.Table, ["columns"], []),
+    "plot": (fb.plot, ["table"], ["x", "y", "band"]),
+    "Generator": (fb.Generator, ["seed"], []),
+    "design": (
+        lambda **k: fb.design(**{"prior": (0.0, 1.0), "noise": [1.0], "bits": [1], "seconds": 0.01, **k}),
+        [],
+        ["prior", "noise", "bits", "loss", "flips", "criterion"],
+    ),
+}
+ACCEPTED = (fb.Error, TypeError, ValueError, KeyError, OverflowError, IndexError, AttributeError, OSError)
+
+
+@pytest.mark.parametrize("name", CALLS)
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@given(data=st.data())
+def test_any_arguments(name, data):
+    function, positional, named = CALLS[name]
+    if name == "design":
+        values = {key: data.draw(anything.filter(lambda x: not (isinstance(x, int) and x > 8)), key) for key in named[:2]}
+    else:
+        values = {key: data.draw(anything, key) for key in named if data.draw(st.booleans(), f"has {key}")}
+    try:
+        function(*(data.draw(anything, key) for key in positional), **values)
+    except ACCEPTED as error:
+        assert "panicked" not in str(error) and "unwrap" not in str(error)
+
+
+@pytest.mark.parametrize("name", ["write", "read", "verify", "open", "scan", "Recorder"])
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@given(data=st.data())
+def test_any_arguments_of_files(name, data, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("any")
+    path = folder / "a.fewb"
+    fb.write(pl.DataFrame({"t": [0.0, 1.0], "a": [1.0, None]}), path, time="t")
+    draw = lambda key: data.draw(anything, key)  # noqa: E731
+    calls = {
+        "write": lambda: fb.write(draw("table"), folder / "b", time=draw("time"), bounds=draw("bounds")),
+        "read": lambda: fb.read(path, columns=draw("columns"), start=draw("start"), end=draw("end")),
+        "verify": lambda: fb.verify(draw("table"), path, time=draw("time")),
+        "open": lambda: fb.open(path).select(draw("columns"), start=draw("start")).read(),
+        "scan": lambda: fb.scan(path).filter(pl.col("time") > draw("limit")).collect(),
+        "Recorder": lambda: recorder(folder / "c", draw),
+    }
+    try:
+        calls[name]()
+    except (*ACCEPTED, pl.exceptions.PolarsError, Warning) as error:
+        assert "panicked" not in str(error)
+
+
+def recorder(path, draw):
+    with fb.Recorder(path, draw("bounds"), decimals=draw("decimals")) as made:
+        made.push(draw("time"), draw("cells"))
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(
+    samples=hnp.arrays("f8", st.integers(0, 60), elements=st.floats(width=64)),
+    bound=st.one_of(st.none(), st.floats(1e-300, 1e300)),
+    effort=st.sampled_from(["thorough", "fast"]),
+)
+def test_any_numbers_return_within_any_bound(samples, bound, effort):
+    back = fb.decode(fb.encode(samples, bound, effort=effort))
+    if bound is None:
+        assert back.tobytes() == samples.tobytes()
+        return
+    finite = np.isfinite(samples)
+    assert back[~finite].tobytes() == samples[~finite].tobytes()
+    with np.errstate(over="ignore"):
+        assert all(math.isclose(a, b, rel_tol=0, abs_tol=bound) for a, b in zip(back[finite], samples[finite], strict=True))
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(
+    samples=st.one_of(
+        hnp.arrays(st.sampled_from(["i8", "i4", "i2", "u4", "u1", "?"]), st.integers(0, 60)),
+        hnp.arrays("f4", st.integers(0, 60), elements=st.floats(width=32)),
+    )
+)
+def test_integers_and_singles_return_to_the_bit(samples):
+    back = fb.decode(fb.encode(samples))
+    assert back.dtype == (np.float32 if samples.dtype == np.float32 else np.int64)
+    assert np.array_equal(back, samples, equal_nan=samples.dtype == np.float32)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(content=st.binary(max_size=200), kind=st.integers(0, 255), rows=st.integers(0, 2**64 - 1))
+def test_any_bytes_decode_or_are_refused(content, kind, rows):
+    """Also with the right checksum, which only a program writes."""
+    import struct
+    import zlib
+
+    frame = b"fb\x01" + bytes([kind]) + struct.pack("<dQ", 0.5, min(rows, 1 << 20)) + content
+    try:
+        fb.decode(frame + struct.pack("<I", zlib.crc32(frame)))
+    except fb.Error as error:
+        assert "panicked" not in str(error)

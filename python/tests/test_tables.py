@@ -1,0 +1,241 @@
+"""Tables of three libraries, both ways: nulls, NaN, infinities, time zones."""
+
+import math
+import pickle
+from datetime import UTC, datetime, timedelta, timezone
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+
+import fewbits as fb
+
+ZONE = "Europe/Berlin"
+STAMPS = [datetime(2026, 3, 29, 0, 59, 59, 500_000, UTC) + timedelta(seconds=k) for k in range(5)]
+CELLS = [1.5, None, math.nan, math.inf, -math.inf]
+
+
+def tables():
+    table = pa.table({"t": pa.array(STAMPS, pa.timestamp("us", ZONE)), "x": pa.array(CELLS, pa.float64(), from_pandas=False)})
+    return {"pyarrow": table, "polars": pl.DataFrame(table), "pandas": table.to_pandas(types_mapper=pd.ArrowDtype)}
+
+
+@pytest.mark.parametrize("library", ["pyarrow", "polars", "pandas"])
+def test_what_is_no_number_and_zones_survive(tmp_path, library):
+    path = tmp_path / "a.fewb"
+    fb.write(tables()[library], path, time="t")
+    back = fb.read(path)
+    for column in (pa.table(back)["x"].to_pylist(), pl.DataFrame(back)["x"].to_list()):
+        assert column[:2] == [1.5, None] and math.isnan(column[2]) and column[3:] == CELLS[3:]
+    assert pa.table(back)["time"].to_pylist() == STAMPS
+    assert pl.DataFrame(back)["time"].to_list() == STAMPS
+    assert list(pd.DataFrame.from_arrow(back)["time"]) == STAMPS
+    assert list(back.to_pandas()["time"]) == STAMPS and str(back.to_pandas()["time"].dtype).endswith("UTC]")
+
+
+@pytest.mark.parametrize("library", ["pyarrow", "polars", "pandas"])
+def test_the_zone_of_a_time_column_stays_in_a_run(library):
+    centre = fb.FusionCentre(fb.Model.walk(0.1), mean=0.0, deviation=1.0)
+    centre.join("x", noise=0.5)
+    result = centre.run(tables()[library], time="t")
+    assert str(pa.table(result).schema.field("t").type) == f"timestamp[us, tz={ZONE}]"
+    # Null, NaN and infinities are missing: the mean stays, the deviation grows.
+    assert np.all(result["x0"][1:] == result["x0"][0]) and np.all(np.diff(result["x0_sd"]) > 0)
+    assert str(result.to_pandas()["t"].dt.tz) == ZONE
+
+
+def long_of(wide: pl.DataFrame) -> pl.DataFrame:
+    return wide.unpivot(index="t", variable_name="who", value_name="what").sort("t", maintain_order=True)
+
+
+def wide() -> pl.DataFrame:
+    rng = np.random.default_rng(3)
+    columns = {name: 20 + rng.standard_normal(200) for name in "abc"}
+    return pl.DataFrame({"t": np.cumsum(rng.uniform(0.1, 2, 200)), **columns})
+
+
+def joined(**options) -> fb.FusionCentre:
+    centre = fb.FusionCentre(fb.Model.velocity(1e-3), mean=[20, 0], deviation=[3, 0.1], **options)
+    centre.join("a", noise=1.0, send="bit")
+    centre.join("b", noise=1.0, send="word:3")
+    centre.join("c", noise=1.0, send="silent:1.0")
+    return centre
+
+
+@pytest.mark.parametrize("names", [pl.String, pl.Categorical])
+def test_long_and_wide_tables_are_the_same(names):
+    long = long_of(wide()).with_columns(pl.col("who").cast(names))
+    a, b = joined().run(wide(), time="t"), joined().run(long, time="t", by="who", value="what")
+    for column in a.columns:
+        assert np.array_equal(a[column], b[column]), column
+    with pytest.raises(ValueError, match="one of a, b, c"):
+        joined().run(long.with_columns(pl.lit("d").alias("who")), time="t", by="who", value="what")
+
+
+def test_a_stored_centre_goes_on_to_the_bit():
+    whole = joined().run(wide(), time="t")
+    centre = joined()
+    first = centre.run(wide()[:90], time="t")
+    for again in (fb.FusionCentre.from_bytes(centre.to_bytes()), pickle.loads(pickle.dumps(centre)), centre):
+        rest = again.run(wide()[90:], time="t")
+        for column in whole.columns:
+            assert np.array_equal(whole[column], np.concatenate([first[column], rest[column]])), column
+    bytes_of = centre.to_bytes()
+    for at in range(0, len(bytes_of), 7):
+        try:
+            fb.FusionCentre.from_bytes(bytes_of[:at] + bytes([bytes_of[at] ^ 5]) + bytes_of[at + 1 :])
+        except fb.Error:
+            pass
+
+
+def test_live_steps_are_those_of_a_run():
+    whole, centre = joined().run(wide(), time="t"), joined()
+    for row in wide().iter_rows(named=True):
+        now = centre.step(row.pop("t"), row)
+    assert now.mean[0] == whole["x0"][-1] and math.sqrt(now.covariance[0, 0]) == whole["x0_sd"][-1]
+    centre.join("d", noise=0.1)
+    assert centre.step(1e3, {"d": 21.0, "a": None}).mean[0] == pytest.approx(21.0, abs=0.3)
+
+
+def test_silence_kills_and_a_report_revives():
+    centre = fb.FusionCentre(fb.Model.walk(0.01), mean=0.0, deviation=1.0)
+    centre.join("a", noise=0.5)
+    centre.join("b", noise=0.5, loss=0.1, missing="silence")
+    n = 60
+    b = [0.1] * 20 + [None] * 30 + [0.1] * 10
+    result = centre.run(pl.DataFrame({"t": np.arange(n) * 1.0, "a": [0.0] * n, "b": b}), time="t")
+    events = result["events"].tolist()
+    assert "b dead" in events and "b alive" in events and 20 < events.index("b dead") < events.index("b alive") == 50
+
+
+def test_late_values_count():
+    made = lambda: fb.FusionCentre(fb.Model.walk(0.1), mean=0.0, deviation=5.0, learn_noise=False, health="off", window=10)  # noqa: E731
+    late, sorted_ = made(), made()
+    for centre in (late, sorted_):
+        centre.join("a", noise=0.5)
+    rows = pl.DataFrame({"t": [0.0, 1.0, 3.0, 2.0], "a": [1.0, 1.2, 0.8, 0.9]})
+    a, b = late.run(rows, time="t"), sorted_.run(rows.sort("t"), time="t")
+    assert a["events"][-1] == "late" and a["x0"][-1] == pytest.approx(b["x0"][-1], abs=1e-12)
+    with pytest.raises(ValueError, match="do not decrease"):
+        other = joined()
+        other.run(pl.DataFrame({"t": [1.0, 0.0], "a": [1.0, 1.0], "b": [1.0, 1.0], "c": [1.0, 1.0]}), time="t")
+
+
+def test_a_smoother_is_better_and_exact():
+    """Against the joint Gaussian of a random walk, conditioned at once."""
+    rng, n, q, r = np.random.default_rng(5), 30, 0.3, 0.5
+    t = np.cumsum(rng.uniform(0.2, 2, n))
+    z = np.cumsum(rng.standard_normal(n)) + rng.standard_normal(n)
+    z[[4, 5, 17]] = np.nan
+    centre = fb.FusionCentre(fb.Model.walk(q), mean=1.0, deviation=2.0, learn_noise=False, health="off")
+    centre.join("a", noise=math.sqrt(r))
+    found = centre.run(pl.DataFrame({"t": t, "a": z}), time="t", smooth=True)
+    prior = 4.0 + q * np.minimum.outer(t - t[0], t - t[0])
+    seen = ~np.isnan(z)
+    gain = prior[:, seen] @ np.linalg.inv(prior[np.ix_(seen, seen)] + r * np.eye(seen.sum()))
+    mean = 1.0 + gain @ (z[seen] - 1.0)
+    deviation = np.sqrt(np.diag(prior - gain @ prior[seen]))
+    assert np.allclose(found["x0_smooth"], mean, atol=1e-10) and np.allclose(found["x0_smooth_sd"], deviation, atol=1e-10)
+
+
+def test_a_reverting_model_smooths_with_its_offset():
+    model = fb.Model.reverting(mean=20.0, time_constant=3.0, variance=4.0)
+    centre = fb.FusionCentre(model, mean=20.0, deviation=2.0, learn_noise=False, health="off")
+    centre.join("a", noise=0.5)
+    t, z = np.array([0.0, 1.0, 2.5]), np.array([22.0, 21.0, 19.0])
+    found = centre.run(pl.DataFrame({"t": t, "a": z}), time="t", smooth=True)
+    prior = 4.0 * np.exp(-np.abs(np.subtract.outer(t, t)) / 3.0)
+    mean = 20 + prior @ np.linalg.inv(prior + 0.25 * np.eye(3)) @ (z - 20)
+    assert np.allclose(found["x0_smooth"], mean, atol=1e-10)
+
+
+def test_a_lazy_frame_reads_only_what_it_needs(tmp_path):
+    path, n = tmp_path / "a.fewb", 300_000
+    t = np.datetime64("2026-01-01", "ms") + np.arange(n) * np.timedelta64(1000, "ms")
+    frame = pl.DataFrame({"t": t, "a": np.sin(np.arange(n) / 9), "b": np.arange(n) * 1.0})
+    fb.write(frame, path, time="t", effort="fast")
+    start, end = datetime(2026, 1, 2), datetime(2026, 1, 2, 1)
+    utc = timezone.utc
+    lazy = fb.scan(path)
+    assert lazy.collect_schema().names() == ["time", "a", "b"]
+    aware = lazy.collect_schema()["time"].time_zone is not None
+    if aware:
+        start, end = start.replace(tzinfo=utc), end.replace(tzinfo=utc)
+    got = lazy.filter((pl.col("time") >= start) & (pl.col("time") < end) & (pl.col("b") % 2 == 0)).select("a").collect()
+    expected = frame.filter((pl.col("t") >= start.replace(tzinfo=None)) & (pl.col("t") < end.replace(tzinfo=None)) & (pl.col("b") % 2 == 0))
+    assert got["a"].to_list() == expected["a"].to_list()
+    assert lazy.head(7).collect().height == 7 and lazy.select(pl.len()).collect().item() == n
+    from fewbits._polars import _range
+
+    low, high = _range((pl.col("time") >= start) & (start < pl.col("time")) & (pl.col("time") < end), "time")
+    assert high - low == 3602 and _range(pl.col("a") > 3, "time") == (None, None)
+    assert _range((pl.col("row") >= 5) | (pl.col("row") < 2), "row") == (None, None)
+
+
+def test_rows_come_block_by_block(tmp_path):
+    path, n = tmp_path / "a.fewb", 200_000
+    fb.write(pl.DataFrame({"a": np.arange(n) * 1.0}), path, effort="fast")
+    recording = fb.open(path)
+    blocks = [len(block) for block in recording.select(start=10, end=n - 10)]
+    assert len(blocks) > 2 and sum(blocks) == n - 20
+    first = next(iter(recording.select()))
+    assert first["a"][0] == 0.0
+    assert pa.RecordBatchReader.from_stream(recording).read_all().num_rows == n
+
+
+def test_a_recorder_is_read_while_and_after(tmp_path):
+    path = tmp_path / "a.fewb"
+    with fb.Recorder(path, {"x": 0.1, "y": "lossless"}, decimals=3, utc=True) as recorder:
+        for k in range(2000):
+            recorder.push(np.datetime64("2026-01-01", "ms") + k, {"x": math.sin(k / 100), "y": k})
+        recorder.sync()
+        assert len(fb.read(path, damage="skip")) == 2000 and not fb.open(path).finished
+        with pytest.raises(fb.DecodeError, match="not finished"):
+            fb.read(path)
+        recorder.push("2026-01-02", {"y": None})
+        recorder.push(datetime(2026, 1, 3, 2, tzinfo=timezone(timedelta(hours=2))), {})
+    with fb.Recorder(path, resume=True) as recorder:
+        recorder.push_table(pl.DataFrame({"time": [datetime(2026, 1, 4)], "x": [0.5], "y": [1]}))
+    back = fb.read(path)
+    assert len(back) == 2003 and back["time"][-2] == np.datetime64("2026-01-03T00:00") and back["y"][1999] == 1999
+    with pytest.raises(ValueError, match="closed"):
+        recorder.push(0.0, {})
+    with pytest.raises(ValueError, match="column"):
+        fb.Recorder(tmp_path / "b", {"x": 0.1}).push(None, {"z": 1.0})
+
+
+def test_zarr_and_numcodecs(tmp_path):
+    zarr = pytest.importorskip("zarr")
+    from fewbits.numcodecs import Bounded as Codec
+    from fewbits.zarr import Bounded
+
+    rng = np.random.default_rng(2)
+    for dtype in ("f8", "f4", "f2", "i8", "u1"):
+        x = (100 * np.cumsum(rng.standard_normal((60, 50)), axis=0)).astype(dtype)
+        if dtype[0] == "f":
+            x[3, 4] = np.nan
+        store = tmp_path / f"{dtype}.zarr"
+        z = zarr.create_array(store, shape=x.shape, chunks=(25, 50), dtype=x.dtype, serializer=Bounded(bound=0.5), compressors=None)
+        z[:] = x
+        back = zarr.open_array(store)[:]
+        codec = Codec(bound=0.5, dtype=x.dtype.str)
+        other = codec.decode(codec.encode(x)).reshape(x.shape)
+        for y in (back, other):
+            assert y.dtype == x.dtype
+            error = np.abs(y.astype("f8") - x.astype("f8"))
+            assert np.nanmax(error) <= (0.5 if dtype[0] == "f" else 0)
+            assert np.array_equal(np.isnan(y), np.isnan(x)) if dtype[0] == "f" else True
+        assert codec.get_config() == {"id": "fewbits", "bound": 0.5, "dtype": x.dtype.str, "effort": "thorough"}
+    with pytest.raises(ValueError, match="finite number above 0"):
+        Bounded(bound=-1)
+
+
+def test_a_picture_has_lines_and_bands():
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    axes = joined().run(wide(), time="t").plot(band=0.5)
+    assert len(axes.lines) == len(axes.collections) == 2
+    with pytest.raises(ValueError, match="one of"):
+        joined().run(wide(), time="t").plot(y="none")
