@@ -40,7 +40,7 @@ function download(name, type, content) {
 
 // Tabs, by pointer and by arrow keys.
 const tabs = [...document.querySelectorAll("[role=tab]")];
-const shows = { "tab-bit": () => showBit(), "tab-frontier": () => showFrontier(), "tab-table": () => showTable(), "tab-design": () => showDesign() };
+const shows = { "tab-bit": () => showBit(), "tab-frontier": () => showFrontier(), "tab-table": () => { showTable(); showPlan(); }, "tab-design": () => showDesign() };
 function choose(tab) {
   for (const one of tabs) {
     const chosen = one === tab;
@@ -118,14 +118,15 @@ const pack = latest(async () => {
   get("share-text").textContent = `${percent()} of each column's range`;
   get("verdict").textContent = "";
   try {
-    const asked = bound(), packed = await ask("pack", { bound: asked }), shown = await ask("values", { column: drawn() });
+    const asked = bound(), column = drawn(), packed = await ask("pack", { bound: asked }), shown = await ask("values", { column });
     if (now !== table) return;
     now.packed = { ...packed, asked };
-    values = { ...shown, column: drawn() };
+    values = { ...shown, column };
     get("table-problem").textContent = "";
     showTable();
-    const plan = await ask("plan", { column: drawn() });
-    planned = { ...plan, column: drawn() };
+    const plan = await ask("plan", { column: values.column });
+    if (now !== table) return;
+    planned = { ...plan, column: values.column };
     showPlan();
   } catch (problem) {
     get("table-problem").textContent = problem.message;
@@ -319,7 +320,7 @@ const showBit = latest(async () => {
 const priorOf = ({ memory, ratio }) => memory < 1 ? ratio / (1 - memory * memory) : 1;
 function rustOf(setting) {
   const link = setting.loss || setting.flips ? `.with_link(Link::new(${decimal(setting.loss)}, ${decimal(setting.flips)})?)` : "", several = setting.sensors > 1;
-  const step = (pad, sample) => `${pad}let bit = Sign::of(${sample}, filter.threshold(&belief))?; // at the sensor
+  const step = (pad, sample) => `${pad}let bit = Sign::of(${sample}, filter.feedback(&belief))?; // at the sensor
 ${pad}belief = filter.update(&belief, &Observation::Received(bit))?.0; // Observation::Nothing if it was lost`;
   return `use fewbits::core::{Gaussian, ${link ? "Link, " : ""}Observation, Sign};
 use fewbits::dymbo::{DymboFilter, ScalarFilter, ScalarPlant};

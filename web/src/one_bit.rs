@@ -87,12 +87,12 @@ fn simulated(
         state = memory * state + ratio.sqrt() * normal(&mut rng);
         belief = filter.predict(&belief);
         kalman = (memory * kalman.0, memory * memory * kalman.1 + ratio);
-        run.threshold.push(filter.threshold(&belief));
+        run.threshold.push(filter.feedback(&belief));
         for _ in 0..sensors {
             let sample = state + normal(&mut rng);
             let gain = kalman.1 / (kalman.1 + 1.0);
             kalman = (kalman.0 + gain * (sample - kalman.0), (1.0 - gain) * kalman.1);
-            let sent = Sign::of(sample, filter.threshold(&belief))?;
+            let sent = Sign::of(sample, filter.feedback(&belief))?;
             let flipped = rng.random::<f64>() < link.crossover();
             let observation = if rng.random::<f64>() < link.loss() {
                 run.bits.push(0);

@@ -90,6 +90,11 @@ pub(crate) fn read(bytes: Vec<u8>, said: &Said) -> Result<Rows, String> {
     if bytes.starts_with(RECORDING) {
         return of_recording(bytes);
     }
+    if bytes.starts_with(PARQUET) {
+        return Err("a Parquet file, which this page does not read: save the table as CSV, or use the command `fewbits` built with the \
+                    feature `parquet`"
+            .to_owned());
+    }
     let mut left_out = Vec::new();
     if said.numbered {
         // A column of times is no column of numbers.
@@ -126,11 +131,7 @@ pub(crate) fn read(bytes: Vec<u8>, said: &Said) -> Result<Rows, String> {
 }
 
 fn opened(bytes: &Bytes, dialect: &Dialect) -> Result<Table, Error> {
-    if bytes.starts_with(PARQUET) {
-        Table::open_parquet(bytes.clone(), dialect)
-    } else {
-        Table::open(Cursor::new(bytes.clone()), dialect)
-    }
+    Table::open(Cursor::new(bytes.clone()), dialect)
 }
 
 /// A table with the time that the user said, or that it certainly has.

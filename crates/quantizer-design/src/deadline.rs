@@ -21,22 +21,19 @@ pub fn system_clock() -> Duration {
     START.get_or_init(Instant::now).elapsed()
 }
 
-/// Multiplications per second of this machine, measured once.
-fn speed(clock: Clock) -> f64 {
-    static SPEED: OnceLock<f64> = OnceLock::new();
-    *SPEED.get_or_init(|| {
-        let (weights, values) = (vec![0.5; 1024], vec![1.5; 1024]);
-        let measure = |_| {
-            let start = clock();
-            for _ in 0..MEASURED / 1024 {
-                let (weights, values) = (black_box(&weights), black_box(&values));
-                black_box(weights.iter().zip(values).map(|(w, v)| w * v).sum::<f64>());
-            }
-            clock().saturating_sub(start).as_secs_f64()
-        };
-        let fastest = (0..MEASUREMENTS).map(measure).fold(f64::INFINITY, f64::min);
-        MEASURED as f64 / fastest.max(1e-9)
-    })
+/// Multiplications per second of this machine, by this clock.
+pub(crate) fn speed(clock: Clock) -> f64 {
+    let (weights, values) = (vec![0.5; 1024], vec![1.5; 1024]);
+    let measure = |_| {
+        let start = clock();
+        for _ in 0..MEASURED / 1024 {
+            let (weights, values) = (black_box(&weights), black_box(&values));
+            black_box(weights.iter().zip(values).map(|(w, v)| w * v).sum::<f64>());
+        }
+        clock().saturating_sub(start).as_secs_f64()
+    };
+    let fastest = (0..MEASUREMENTS).map(measure).fold(f64::INFINITY, f64::min);
+    MEASURED as f64 / fastest.max(1e-9)
 }
 
 /// The moment of a clock by which a computation must end; `None` without a limit.
@@ -44,6 +41,8 @@ fn speed(clock: Clock) -> f64 {
 pub struct Deadline {
     clock: Clock,
     end: Option<Duration>,
+    /// Multiplications per second.
+    speed: f64,
 }
 
 impl Deadline {
@@ -51,12 +50,13 @@ impl Deadline {
     pub const NEVER: Self = Self {
         clock: system_clock,
         end: None,
+        speed: f64::INFINITY,
     };
 
     /// The moment `limit` after `start`. Never, if there is no limit or the sum overflows.
-    pub(crate) fn after(clock: Clock, start: Duration, limit: Option<Duration>) -> Self {
+    pub(crate) fn after(clock: Clock, start: Duration, limit: Option<Duration>, speed: f64) -> Self {
         let end = limit.and_then(|limit| start.checked_add(limit));
-        Self { clock, end }
+        Self { clock, end, speed }
     }
 
     pub(crate) fn is_over(self) -> bool {
@@ -66,6 +66,6 @@ impl Deadline {
     /// Whether this many multiplications may take longer than the remaining time.
     pub(crate) fn is_short_for(self, work: f64) -> bool {
         self.end
-            .is_some_and(|end| work > speed(self.clock) * end.saturating_sub((self.clock)()).as_secs_f64())
+            .is_some_and(|end| work > self.speed * end.saturating_sub((self.clock)()).as_secs_f64())
     }
 }

@@ -1,6 +1,6 @@
 //! Time limit and progress of a running design.
 
-use crate::deadline::{Clock, Deadline};
+use crate::deadline::{Clock, Deadline, speed};
 use std::time::Duration;
 
 /// Progress of a design, for a display.
@@ -46,6 +46,8 @@ pub(super) struct Control<'a> {
     clock: Clock,
     started: Duration,
     limit: Option<Duration>,
+    /// Multiplications per second; only a time limit needs them.
+    speed: f64,
     deadline: Deadline,
     /// The fraction of the time limit that is used.
     portion: f64,
@@ -55,17 +57,15 @@ pub(super) struct Control<'a> {
 }
 
 impl<'a> Control<'a> {
-    pub(super) fn new(
-        clock: Clock,
-        limit: Option<Duration>,
-        progress: Option<&'a mut dyn FnMut(Progress)>,
-    ) -> Self {
+    pub(super) fn new(clock: Clock, limit: Option<Duration>, progress: Option<&'a mut dyn FnMut(Progress)>) -> Self {
+        let speed = if limit.is_some() { speed(clock) } else { f64::INFINITY };
         let started = clock();
         Self {
             clock,
             started,
             limit,
-            deadline: Deadline::after(clock, started, limit),
+            speed,
+            deadline: Deadline::after(clock, started, limit, speed),
             portion: 1.0,
             progress,
             is_cut_short: false,
@@ -86,7 +86,7 @@ impl<'a> Control<'a> {
             let left = limit.mul_f64(self.portion * stage.end()).saturating_sub(now);
             now + left / parts as u32
         };
-        self.deadline = Deadline::after(self.clock, self.started, self.limit.map(end));
+        self.deadline = Deadline::after(self.clock, self.started, self.limit.map(end), self.speed);
     }
 
     /// Time since the start.
