@@ -69,10 +69,11 @@ impl Opened {
         serde_json::to_string(&summary).map_err(text)
     }
 
-    /// A recording within these bounds, with the bytes of `fewbits pack --bound`.
-    pub fn pack(&self, bound: &str) -> Result<Vec<u8>, String> {
+    /// A recording within these bounds, with the bytes of `fewbits pack --bound`. `identity`: random bits, which a recording of several blocks
+    /// holds.
+    pub fn pack(&self, bound: &str, identity: u32) -> Result<Vec<u8>, String> {
         let schema = Schema::new(self.columns(bound)?, self.rows.time).map_err(text)?;
-        packed(&self.rows.batch, schema)
+        packed(&self.rows.batch, schema, identity)
     }
 
     /// What each column costs if it is packed alone, without times, as JSON.
@@ -96,7 +97,7 @@ impl Opened {
                         ticks: None,
                         columns: vec![self.rows.batch.columns[i].clone()],
                     };
-                    let bytes = packed(&batch, schema)?.len();
+                    let bytes = packed(&batch, schema, 0)?.len();
                     self.alone.insert(key, bytes);
                     bytes
                 }
@@ -205,8 +206,8 @@ impl Opened {
     }
 }
 
-fn packed(batch: &Batch, schema: Schema) -> Result<Vec<u8>, String> {
-    let mut recorder = Recorder::new(Vec::new(), schema);
+fn packed(batch: &Batch, schema: Schema, identity: u32) -> Result<Vec<u8>, String> {
+    let mut recorder = Recorder::new(Vec::new(), schema).with_identity(identity);
     let mut go = |_| ControlFlow::Continue(());
     pack::fill(&mut Pieces::new(batch), &mut recorder, &mut go).map_err(text)?;
     recorder.finish().map_err(text)
