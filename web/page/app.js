@@ -312,7 +312,7 @@ const showBit = latest(async () => {
   });
   const exact = (value) => Number.isFinite(value) ? value.toFixed(4) : "not known in closed form", ratio = found.exact / found.exactKalman;
   get("bit-numbers").textContent = `Mean squared error in this run: ${found.mse.toFixed(4)} from bits, ${found.kalmanMse.toFixed(4)} of the Kalman filter. ` +
-    `In the long run: ${exact(found.exact)} and ${exact(found.exactKalman)}` + (Number.isFinite(ratio) ? `; one bit in place of the sample costs ${(100 * (ratio - 1)).toFixed(1)} %.` : ".");
+    `In the long run: ${exact(found.exact)} and ${exact(found.exactKalman)}` + (Number.isFinite(ratio) ? `; one bit in place of each sample costs ${(100 * (ratio - 1)).toFixed(1)} %.` : ".");
   get("bit-rust").textContent = rustOf(setting);
   get("bit-python").textContent = pythonOf(setting);
   document.body.dataset.bit = ++bitRuns;
