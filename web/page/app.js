@@ -63,6 +63,7 @@ for (const [i, tab] of tabs.entries()) {
 }
 
 // A table of the user.
+const THOROUGH_CELLS = 200_000;
 let table, values, planned, view;
 const shareOf = (position) => 0.001 * 10 ** (position / 15); // per cent of the range: .001 to 10
 const rounded = (value) => +value.toPrecision(2);
@@ -94,6 +95,7 @@ async function take(name, bytes) {
   get("table-problem").textContent = "";
   get("table-state").textContent = `reading ${name} …`;
   const kept = { name, bytes, own: new Map(), said: said() };
+  table = view = values = planned = undefined;
   try {
     table = { ...kept, ...await ask("open", { bytes, said: JSON.stringify(kept.said) }) };
   } catch (problem) {
@@ -105,9 +107,10 @@ async function take(name, bytes) {
     document.body.dataset.packed = "failed";
     return;
   }
-  view = values = planned = undefined;
   get("drawn").replaceChildren(...table.columns.map((column, i) => new Option(column.name, i)));
   get("drawn").value = Math.max(0, table.columns.findIndex((column) => column.kind === "number" && column.max > column.min));
+  // Fewer bits take some ten times the time: large tables begin without.
+  get("thorough").checked = table.rows * table.columns.length <= THOROUGH_CELLS;
   get("table-found").hidden = false;
   await pack();
 }
@@ -118,9 +121,9 @@ const pack = latest(async () => {
   get("share-text").textContent = `${percent()} of each column's range`;
   get("verdict").textContent = "";
   try {
-    const asked = bound(), column = drawn(), packed = await ask("pack", { bound: asked }), shown = await ask("values", { column });
+    const asked = bound(), column = drawn(), effort = get("thorough").checked ? "Thorough" : "Fast", packed = await ask("pack", { bound: asked, effort }), shown = await ask("values", { column });
     if (now !== table) return;
-    now.packed = { ...packed, asked };
+    now.packed = { ...packed, asked, effort };
     values = { ...shown, column };
     get("table-problem").textContent = "";
     showTable();
@@ -157,7 +160,7 @@ function showTable() {
   }).join("");
   const without = [...new Set([...table.said.without, ...table.left_out.map(([name]) => name)])];
   const options = [table.format === "recording" ? "" : table.options, time && !table.said.dialect["time-column"] ? `--time-column ${shell(time.columns.map(plain).join(","))}` : "",
-    time ? `--time ${get("said").tolerance.selectedOptions[0].text}` : "", without.length ? `--without ${shell(without.map(plain).join(","))}` : "", `--bound ${shell(packed.asked)}`];
+    time ? `--time ${get("said").tolerance.selectedOptions[0].text}` : "", without.length ? `--without ${shell(without.map(plain).join(","))}` : "", packed.effort === "Fast" ? "--fast" : "", `--bound ${shell(packed.asked)}`];
   get("command").textContent = table.format === "recording" ? `fewbits unpack ${shell(table.name)} -o table.csv` : `fewbits pack ${shell(table.name)} ${options.filter(Boolean).join(" ")} -o out.fewb`;
   if (!values) return;
   const column = table.columns[values.column], { delta, bound } = packed.columns[values.column], x = Float64Array.from(values.original, (_, i) => i);
@@ -177,13 +180,14 @@ function showTable() {
 
 // Bits per sample against the bound, with the present bound.
 function showPlan() {
-  const column = planned && table?.columns[planned.column], svg = get("plan-plot");
+  const svg = get("plan-plot");
   svg.style.display = planned?.bounds.length ? "" : "none";
-  if (!planned?.bounds.length || !table.packed) return;
+  if (!planned?.bounds.length || !table?.packed) return;
+  const column = table.columns[planned.column];
   const points = planned.bounds.filter(([, delta]) => delta > 0), x = Float64Array.from(points, ([, delta]) => Math.log10(delta)), { delta, bits } = table.packed.columns[planned.column];
   const from = Math.floor(x[0]), to = Math.ceil(x.at(-1));
   draw(svg, {
-    series: [{ x, y: Float64Array.from(points, (point) => point[2]), style: "one", label: `first ${Math.min(table.rows, 16384)} rows alone; lossless ${planned.lossless_bits.toFixed(2)} bits` }],
+    series: [{ x, y: Float64Array.from(points, (point) => point[2]), style: "one", label: `first ${Math.min(table.rows, 4096)} rows alone; lossless ${planned.lossless_bits.toFixed(2)} bits` }],
     xLabel: `bound${column.unit && !column.words ? ` / ${column.unit}` : ""}`, yLabel: "bit/sample", xRange: [x[0] - .1, x.at(-1) + .1], yRange: [0, 1.1 * Math.max(points[0][2], delta > 0 ? bits : 0, .1)],
     xTicks: Array.from({ length: to - from + 1 }, (_, i) => from + i).filter((t) => t >= x[0] - .1 && t <= x.at(-1) + .1), xText: (t) => short(10 ** t),
     extra: (X, Y) => delta > 0 ? `<circle class="mark" cx="${X(Math.log10(delta))}" cy="${Y(bits)}" r="5"><title>now: ±${short(delta)}, ${bits.toFixed(3)} bits</title></circle>` : "",
@@ -231,7 +235,7 @@ get("own").oninput = ({ target }) => {
 };
 get("own-text").onchange = ({ target }) => setOwn(target.value.trim() || undefined);
 get("own-none").onclick = () => setOwn();
-get("drawn").onchange = pack;
+get("drawn").onchange = get("thorough").onchange = pack;
 function look(from, to) {
   const whole = [0, Math.max(1, table.rows - 1)], width = Math.min(to - from, whole[1]), start = Math.min(Math.max(from, 0), whole[1] - width);
   view = width >= whole[1] ? undefined : [start, start + Math.max(width, 4)];

@@ -8,11 +8,11 @@ const answers = {
     opened = wasm_bindgen.Opened.read(bytes, said);
     return JSON.parse(opened.summary());
   },
-  pack({ bound, identity = crypto.getRandomValues(new Uint32Array(1))[0] }) {
+  pack({ bound, effort, identity = crypto.getRandomValues(new Uint32Array(1))[0] }) {
     const began = performance.now();
-    recording = opened.pack(bound, identity);
+    recording = opened.pack(bound, wasm_bindgen.Effort[effort], identity);
     const seconds = 1e-3 * (performance.now() - began);
-    return { bytes: recording.length, columns: JSON.parse(opened.cost(bound)), seconds };
+    return { bytes: recording.length, columns: JSON.parse(opened.cost(bound, wasm_bindgen.Effort[effort])), seconds };
   },
   values({ column }) { return { original: opened.values(column), restored: opened.restored(recording, column) }; },
   plan({ column }) { return JSON.parse(opened.plan(column))[0]; },

@@ -10,7 +10,7 @@ mod writing;
 
 pub use design::design;
 pub use one_bit::{Run, one_bit};
-pub use table::Opened;
+pub use table::{Effort, Opened};
 
 /// An error with its causes, as a sentence.
 fn text(error: impl std::error::Error) -> String {

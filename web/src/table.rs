@@ -12,14 +12,24 @@ use std::ops::ControlFlow;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// Rows from which bits at several bounds are estimated.
-const PLANNED: usize = 1 << 14;
+const PLANNED: usize = 1 << 12;
+
+/// How much computing time packing may take.
+#[wasm_bindgen]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Effort {
+    /// As `fewbits pack --fast`.
+    Fast,
+    /// The fewest bits.
+    Thorough,
+}
 
 /// A table, or a recording, in memory.
 #[wasm_bindgen]
 pub struct Opened {
     rows: Rows,
-    /// Bytes of columns packed alone, by column and bound.
-    alone: BTreeMap<(usize, String), usize>,
+    /// Bytes of columns packed alone, by column, bound and effort.
+    alone: BTreeMap<(usize, String, Effort), usize>,
 }
 
 #[derive(Serialize)]
@@ -71,14 +81,19 @@ impl Opened {
 
     /// A recording within these bounds, with the bytes of `fewbits pack --bound`. `identity`: random bits, which a recording of several blocks
     /// holds.
-    pub fn pack(&self, bound: &str, identity: u32) -> Result<Vec<u8>, String> {
+    pub fn pack(&mut self, bound: &str, effort: Effort, identity: u32) -> Result<Vec<u8>, String> {
         let schema = Schema::new(self.columns(bound)?, self.rows.time).map_err(text)?;
-        packed(&self.rows.batch, schema, identity)
+        let bytes = packed(&self.rows.batch, schema.clone(), effort, identity)?;
+        if let ([column], TimeBase::Numbered) = (schema.columns(), self.rows.time) {
+            self.alone
+                .insert((0, bounds::shown(column.bound(), column.period()), effort), bytes.len());
+        }
+        Ok(bytes)
     }
 
     /// What each column costs if it is packed alone, without times, as JSON.
-    pub fn cost(&mut self, bound: &str) -> Result<String, String> {
-        let mut costs = Vec::new();
+    pub fn cost(&mut self, bound: &str, effort: Effort) -> Result<String, String> {
+        let (mut costs, rows) = (Vec::new(), self.rows.batch.rows());
         for (i, column) in self.columns(bound)?.into_iter().enumerate() {
             let known = &self.rows.columns[i];
             let delta = match (column.bound(), known.min, known.max) {
@@ -88,7 +103,7 @@ impl Opened {
                 _ => 0.0,
             };
             let shown = bounds::shown(column.bound(), column.period());
-            let key = (i, shown.clone());
+            let key = (i, shown.clone(), effort);
             let bytes = match self.alone.get(&key) {
                 Some(bytes) => *bytes,
                 None => {
@@ -97,7 +112,7 @@ impl Opened {
                         ticks: None,
                         columns: vec![self.rows.batch.columns[i].clone()],
                     };
-                    let bytes = packed(&batch, schema, 0)?.len();
+                    let bytes = packed(&batch, schema, effort, 0)?.len();
                     self.alone.insert(key, bytes);
                     bytes
                 }
@@ -105,7 +120,11 @@ impl Opened {
             costs.push(Cost {
                 bound: shown,
                 delta,
-                bits: 8.0 * bytes as f64 / self.rows.batch.rows().max(1) as f64,
+                bits: if rows == 0 {
+                    0.0
+                } else {
+                    8.0 * bytes as f64 / rows as f64
+                },
                 bytes,
             });
         }
@@ -206,8 +225,13 @@ impl Opened {
     }
 }
 
-fn packed(batch: &Batch, schema: Schema, identity: u32) -> Result<Vec<u8>, String> {
-    let mut recorder = Recorder::new(Vec::new(), schema).with_identity(identity);
+fn packed(batch: &Batch, schema: Schema, effort: Effort, identity: u32) -> Result<Vec<u8>, String> {
+    let effort = match effort {
+        Effort::Fast => fewbits_record::Effort::Fast,
+        Effort::Thorough => fewbits_record::Effort::Thorough,
+    };
+    let recorder = Recorder::new(Vec::new(), schema);
+    let mut recorder = recorder.with_effort(effort).with_identity(identity);
     let mut go = |_| ControlFlow::Continue(());
     pack::fill(&mut Pieces::new(batch), &mut recorder, &mut go).map_err(text)?;
     recorder.finish().map_err(text)
