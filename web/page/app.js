@@ -150,7 +150,7 @@ function showTable() {
   if (!table?.packed) return;
   const { packed, time } = table, unit = (column) => column.unit && !column.words ? ` / ${column.unit}` : "", size = table.bytes.length;
   get("table-state").textContent = `${table.name}: ${table.rows} rows, ${table.columns.length} columns. ${size} bytes become ${packed.bytes} (${+(100 * packed.bytes / size).toPrecision(3)} %). ` +
-    (time ? `Time ${time.columns.join(", ")} in ${time.scale}, ${time.from} to ${time.to}. ` : "Rows are numbered. ") + `Read as ${[table.format, table.dialect].filter(Boolean).join(", ")}.`;
+    (time ? `Time ${time.columns.join(", ")} in ${time.scale}${time.from && `, ${time.from} to ${time.to}`}. ` : "Rows are numbered. ") + `Read as ${[table.format, table.dialect].filter(Boolean).join(", ")}.`;
   get("notes").replaceChildren(...notes().map((text) => Object.assign(document.createElement("li"), { textContent: text })));
   get("columns").tBodies[0].innerHTML = table.columns.map((column, i) => {
     const cost = packed.columns[i], of = cost.bound.includes("%") || cost.bound.startsWith("decimals") ? ` = ±${short(cost.delta)}` : "", exact = column.words ? `${column.words.length} words` : cost.bound + of;

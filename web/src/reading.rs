@@ -223,10 +223,13 @@ fn of_table(mut table: Table, survey: &Survey, said: &Said, left_out: Vec<(Strin
                         ticks.push(tick);
                         continue;
                     }
-                    Some(_) => ("has more decimals than a tick", "let times be off a little, or write fewer decimals"),
+                    Some(_) => (
+                        "has more decimals than a tick",
+                        "allow an error of times, as --time ±1us, or write fewer decimals",
+                    ),
                     None => (
                         "does not fit ticks of 64 bits: it is too large, or times have too many decimals",
-                        "let times be off a little",
+                        "allow an error of times, as --time ±1us",
                     ),
                 };
                 let (columns, scale) = table.time().unwrap_or((&[0], Scale::Seconds));
@@ -244,7 +247,7 @@ fn of_table(mut table: Table, survey: &Survey, said: &Said, left_out: Vec<(Strin
                             Kind::Time => "is a time, and its seconds are no double",
                             _ => "is a whole number of more than 53 bits, which no double holds",
                         };
-                        let wrong = (problem, "leave the column out");
+                        let wrong = (problem, "leave the column out with --without");
                         return Err(refused(&table, *column, batch, row, cell, wrong));
                     }
                 }
@@ -321,19 +324,21 @@ fn time_base(table: &Table, survey: &Survey, said: &Said) -> TimeBase {
 }
 
 fn found(table: &Table, survey: &Survey, said: &Said, left_out: Vec<(String, String)>) -> Found {
-    let time = table
-        .time()
-        .zip(survey.times.ends)
-        .map(|((columns, scale), (from, to))| FoundTime {
+    let time = table.time().map(|(columns, scale)| {
+        let shown = |time: Time| time.shown(scale, survey.times.decimals);
+        let ends = survey.times.ends.map(|(from, to)| (shown(from), shown(to)));
+        let (from, to) = ends.unwrap_or_default();
+        FoundTime {
             columns: columns.iter().map(|i| table.columns()[*i].name.clone()).collect(),
             scale: match scale {
                 Scale::Utc => "UTC",
                 Scale::Local => "local time of an unknown zone",
                 _ => "seconds",
             },
-            from: from.shown(scale, survey.times.decimals),
-            to: to.shown(scale, survey.times.decimals),
-        });
+            from,
+            to,
+        }
+    });
     let skipped = &survey.skipped;
     let mut lines: Vec<String> = skipped.faults.clone();
     for (count, what) in [
