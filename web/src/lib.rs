@@ -3,8 +3,10 @@
 
 mod clock;
 mod design;
+mod known;
 mod one_bit;
 mod reading;
+mod recording;
 mod table;
 mod writing;
 

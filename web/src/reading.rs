@@ -1,25 +1,22 @@
-//! A table or a recording, read into memory as `fewbits pack` reads it: the same times, the same cells, the same refusals.
+//! A table, read into memory as `fewbits pack` reads it: the same times, the same cells, the same refusals.
 
-use crate::text;
+use crate::known::{Found, FoundTime, Known, ROWS, Rows};
 use crate::writing::words_of;
+use crate::{recording, text};
 use bytes::Bytes;
-use fewbits_recipes::{Batch, Failure, Source};
-use fewbits_record::{Playback, TimeBase, TimeFormat};
+use fewbits_recipes::Batch;
+use fewbits_record::{TimeBase, TimeFormat};
 use fewbits_table::{Column, Dialect, Error, Kind, Profile, Scale, Survey, Table, Time};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::io::Cursor;
 
 /// The first bytes of a Parquet file, and of a recording.
 const PARQUET: &[u8] = b"PAR1";
 const RECORDING: &[u8] = b"\x8bfew";
-/// Rows that are read at once.
-const ROWS: usize = 4096;
 /// Decimals of a second that the finest tick has where times may be off.
 const NANOSECONDS: u8 = 9;
 /// Largest length of a unit, in which words are listed.
 const MAX_UNIT: usize = 1024;
-/// Largest number of columns of a recording.
-const MAX_COLUMNS: usize = 4096;
 
 /// What the user says of a table; the rest is detected.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -34,61 +31,11 @@ pub(crate) struct Said {
     pub(crate) numbered: bool,
 }
 
-/// All rows, and what is known of them.
-pub(crate) struct Rows {
-    pub(crate) batch: Batch,
-    pub(crate) columns: Vec<Known>,
-    pub(crate) time: TimeBase,
-    pub(crate) found: Found,
-}
-
-/// What is known of a column.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct Known {
-    pub(crate) name: String,
-    /// Its unit, or the list of its words.
-    pub(crate) unit: String,
-    pub(crate) kind: &'static str,
-    pub(crate) words: Option<Vec<String>>,
-    pub(crate) samples: usize,
-    pub(crate) gaps: usize,
-    /// Smallest and largest finite number.
-    pub(crate) min: Option<f64>,
-    pub(crate) max: Option<f64>,
-    /// A value that few cells have and that makes most of the range.
-    pub(crate) sentinel: Option<f64>,
-    pub(crate) sentinel_cells: u64,
-    /// The circumference, if samples are directions.
-    pub(crate) period: Option<f64>,
-}
-
-/// How the table was understood, in words.
-#[derive(Debug, Clone, Default, Serialize)]
-pub(crate) struct Found {
-    pub(crate) format: String,
-    /// Options of the command line that say all that was detected, and those that the user said.
-    pub(crate) dialect: String,
-    pub(crate) options: String,
-    pub(crate) time: Option<FoundTime>,
-    /// Columns that hold no numbers, and why.
-    pub(crate) left_out: Vec<(String, String)>,
-    /// Lines that were left out, and what repeats.
-    pub(crate) skipped: Vec<String>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct FoundTime {
-    pub(crate) columns: Vec<String>,
-    pub(crate) scale: &'static str,
-    pub(crate) from: String,
-    pub(crate) to: String,
-}
-
 /// Reads bytes of any of the known kinds.
 pub(crate) fn read(bytes: Vec<u8>, said: &Said) -> Result<Rows, String> {
     let bytes = Bytes::from(bytes);
     if bytes.starts_with(RECORDING) {
-        return of_recording(bytes);
+        return recording::read(bytes);
     }
     if bytes.starts_with(PARQUET) {
         return Err("a Parquet file, which this page does not read: save the table as CSV, or use the command `fewbits` built with the \
@@ -356,124 +303,5 @@ fn found(table: &Table, survey: &Survey, said: &Said, left_out: Vec<(String, Str
         time,
         left_out,
         skipped: lines,
-    }
-}
-
-fn of_recording(bytes: Bytes) -> Result<Rows, String> {
-    let mut playback = Playback::new(Cursor::new(bytes)).map_err(text)?;
-    let schema = playback.schema().clone();
-    let mut skipped = Vec::new();
-    if !playback.is_finished() {
-        skipped.push("the end is missing (not finished, or cut off)".to_owned());
-    }
-    let mut batch = Batch {
-        ticks: (schema.time() != TimeBase::Numbered).then(Vec::new),
-        columns: vec![Vec::new(); schema.columns().len()],
-    };
-    for block in playback.blocks() {
-        let block = match block {
-            Ok(block) => block,
-            Err(error @ fewbits_record::Error::Block { .. }) => {
-                skipped.push(text(error));
-                continue;
-            }
-            Err(error) => return Err(text(error)),
-        };
-        if let Some(ticks) = &mut batch.ticks {
-            ticks.extend(&block.ticks);
-        }
-        for (all, cells) in batch.columns.iter_mut().zip(block.columns) {
-            all.extend(cells);
-        }
-    }
-    let columns = schema.columns().iter().zip(&batch.columns).map(|(column, cells)| {
-        let numbers = || cells.iter().flatten().copied();
-        let finite = || numbers().filter(|number| number.is_finite());
-        let words = words_of(column.unit());
-        Known {
-            name: column.name().to_owned(),
-            unit: column.unit().to_owned(),
-            kind: if words.is_some() { "words" } else { "number" },
-            words,
-            samples: numbers().count(),
-            gaps: cells.len() - numbers().count(),
-            min: finite().reduce(f64::min),
-            max: finite().reduce(f64::max),
-            sentinel: None,
-            sentinel_cells: 0,
-            period: column.period(),
-        }
-    });
-    let time = batch
-        .ticks
-        .as_ref()
-        .and_then(|ticks| Some((ticks.first()?, ticks.last()?)));
-    let found = Found {
-        format: "recording".to_owned(),
-        dialect: format!("bounds: {}", fewbits_recipes::bounds::summary(schema.columns())),
-        time: time.map(|(from, to)| FoundTime {
-            columns: vec!["time".to_owned()],
-            scale: match schema.time() {
-                TimeBase::Clock {
-                    format: TimeFormat::Utc,
-                    ..
-                } => "UTC",
-                TimeBase::Clock {
-                    format: TimeFormat::Local,
-                    ..
-                } => "local time of an unknown zone",
-                _ => "seconds",
-            },
-            from: crate::writing::tick(*from, schema.time()),
-            to: crate::writing::tick(*to, schema.time()),
-        }),
-        skipped,
-        ..Found::default()
-    };
-    Ok(Rows {
-        columns: columns.collect(),
-        time: schema.time(),
-        found,
-        batch,
-    })
-}
-
-/// Rows of a batch, some at a time.
-pub(crate) struct Pieces<'a> {
-    batch: &'a Batch,
-    next: usize,
-}
-
-impl<'a> Pieces<'a> {
-    pub(crate) fn new(batch: &'a Batch) -> Self {
-        Self { batch, next: 0 }
-    }
-}
-
-impl Source for Pieces<'_> {
-    fn next_batch(&mut self) -> Result<Option<Batch>, Failure> {
-        let from = self.next;
-        self.next = (from + ROWS).min(self.batch.rows());
-        let rows = from..self.next;
-        Ok((!rows.is_empty()).then(|| Batch {
-            ticks: self.batch.ticks.as_ref().map(|ticks| ticks[rows.clone()].to_vec()),
-            columns: self
-                .batch
-                .columns
-                .iter()
-                .map(|cells| cells[rows.clone()].to_vec())
-                .collect(),
-        }))
-    }
-}
-
-/// Refuses more columns than a recording has.
-pub(crate) fn check_columns(rows: &Rows) -> Result<(), String> {
-    match rows.columns.len() {
-        0 => Err("no column has numbers or few words: nothing can be packed".to_owned()),
-        count if count > MAX_COLUMNS => {
-            Err(format!("{count} columns, and a recording has at most {MAX_COLUMNS}: leave some out"))
-        }
-        _ => Ok(()),
     }
 }

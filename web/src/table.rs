@@ -1,6 +1,7 @@
 //! A table of the user: what it costs, packed, restored, verified.
 
-use crate::reading::{self, Pieces, Rows, Said};
+use crate::known::{self, Found, Known, Pieces, Rows};
+use crate::reading::{self, Said};
 use crate::{text, writing};
 use fewbits_recipes::bounds::{self, Spec};
 use fewbits_recipes::{Batch, pack, plan, verify};
@@ -35,9 +36,9 @@ pub struct Opened {
 #[derive(Serialize)]
 struct Summary<'a> {
     rows: usize,
-    columns: &'a [reading::Known],
+    columns: &'a [Known],
     #[serde(flatten)]
-    found: &'a reading::Found,
+    found: &'a Found,
 }
 
 #[derive(Serialize)]
@@ -62,7 +63,7 @@ impl Opened {
     pub fn read(bytes: Vec<u8>, said: &str) -> Result<Opened, String> {
         let said: Said = serde_json::from_str(said).map_err(text)?;
         let rows = reading::read(bytes, &said)?;
-        reading::check_columns(&rows)?;
+        known::check_columns(&rows)?;
         Ok(Self {
             rows,
             alone: BTreeMap::new(),
