@@ -185,11 +185,11 @@ function showPlan() {
   if (!planned?.bounds.length || !table?.packed) return;
   const column = table.columns[planned.column];
   const points = planned.bounds.filter(([, delta]) => delta > 0), x = Float64Array.from(points, ([, delta]) => Math.log10(delta)), { delta, bits } = table.packed.columns[planned.column];
-  const from = Math.floor(x[0]), to = Math.ceil(x.at(-1));
+  const here = delta > 0 ? [Math.log10(delta)] : [], low = Math.min(x[0], ...here) - .1, high = Math.max(x.at(-1), ...here) + .1;
   draw(svg, {
-    series: [{ x, y: Float64Array.from(points, (point) => point[2]), style: "one", label: `first ${Math.min(table.rows, 4096)} rows alone; lossless ${planned.lossless_bits.toFixed(2)} bits` }],
-    xLabel: `bound${column.unit && !column.words ? ` / ${column.unit}` : ""}`, yLabel: "bit/sample", xRange: [x[0] - .1, x.at(-1) + .1], yRange: [0, 1.1 * Math.max(points[0][2], delta > 0 ? bits : 0, .1)],
-    xTicks: Array.from({ length: to - from + 1 }, (_, i) => from + i).filter((t) => t >= x[0] - .1 && t <= x.at(-1) + .1), xText: (t) => short(10 ** t),
+    series: [{ x, y: Float64Array.from(points, (point) => point[2]), style: "one", label: `lossless: ${planned.lossless_bits.toFixed(2)} bit/sample` }],
+    xLabel: `bound${column.unit && !column.words ? ` / ${column.unit}` : ""}`, yLabel: "bit/sample", xRange: [low, high], yRange: [0, 1.1 * Math.max(points[0][2], delta > 0 ? bits : 0, .1)],
+    xTicks: Array.from({ length: Math.floor(high) - Math.ceil(low) + 1 }, (_, i) => Math.ceil(low) + i), xText: (t) => short(10 ** t),
     extra: (X, Y) => delta > 0 ? `<circle class="mark" cx="${X(Math.log10(delta))}" cy="${Y(bits)}" r="5"><title>now: ±${short(delta)}, ${bits.toFixed(3)} bits</title></circle>` : "",
   });
 }
