@@ -1,17 +1,48 @@
 #!/usr/bin/env bash
-# The pages of docs/ as a book with search, in target/book: `docs/book.sh` (needs mdbook: `cargo install mdbook --locked`).
+# One site in target/book: the pages of docs/ with search, the page of web/, the gallery of figures and the reference of every crate. Builds
+# without a network once the dependencies are there. `docs/book.sh quick` leaves out what is not built yet.
+#   the page       from web/, for wasm32-unknown-unknown
+#   the gallery    target/figures, where `cargo xtask figures` put it; otherwise made with few trials
+#   the reference  cargo doc
 set -euo pipefail
 cd "$(dirname "$0")/.."
-command -v mdbook >/dev/null || { echo "skipped: mdbook is not installed"; exit 0; }
+target="${CARGO_TARGET_DIR:-$PWD/target}"
+book="$target/book"
+quick=${1:-}
+parts=()
+rm -rf "$book"
+mkdir -p "$book"
 
-rm -rf target/book-source
-mkdir -p target/book-source/src
-cp -r docs/*.md docs/images target/book-source/src/
-# The order of the book is the order in which the index names its pages.
-{
-  echo '# fewbits'
-  echo '- [Documentation](index.md)'
-  grep -o '\[[^]]*\]([a-z-]*\.md)' docs/index.md | awk -F'[()]' '!seen[$2]++' | sed 's/^/- /'
-} > target/book-source/src/SUMMARY.md
-printf '[book]\ntitle = "fewbits"\n' > target/book-source/book.toml
-mdbook build target/book-source --dest-dir ../book
+page="$target/web/page.html"
+if rustup target list --installed 2>/dev/null | grep -qx wasm32-unknown-unknown; then
+  [ "$quick" = quick ] && [ -f "$page" ] || (cd web && CARGO_TARGET_DIR="$target/web" cargo run --quiet --release --locked --package pack)
+fi
+if [ -f "$page" ]; then
+  cp "$page" "$book/page.html"
+  parts+=("Try it in the browser=page.html")
+else
+  echo "skipped: the page: rustup target add wasm32-unknown-unknown"
+fi
+
+figures="$target/figures"
+if [ ! -f "$figures/index.html" ]; then
+  figures="$target/quick-figures"
+  [ "$quick" = quick ] || [ -f "$figures/index.html" ] || cargo xtask figures --quick --out "$figures"
+fi
+if [ -f "$figures/index.html" ]; then
+  cp -r "$figures" "$book/figures"
+  parts+=("Gallery of figures=figures/index.html")
+else
+  echo "skipped: the gallery: cargo xtask figures"
+fi
+
+[ "$quick" = quick ] || cargo doc --workspace --no-deps --quiet
+if [ -f "$target/doc/fewbits/index.html" ]; then
+  cp -r "$target/doc" "$book/api"
+  rm -f "$book"/api/*.json
+  parts+=("Reference of the crates=api/fewbits/index.html")
+else
+  echo "skipped: the reference: cargo doc --workspace --no-deps"
+fi
+
+(cd web && CARGO_TARGET_DIR="$target/web" cargo run --quiet --release --locked --package site -- .. "$book" "${parts[@]}")

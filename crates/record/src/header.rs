@@ -89,6 +89,11 @@ impl Header {
         header.checked()
     }
 
+    /// The same header for a recording of this identity.
+    pub(crate) fn with_identity(self, identity: u32) -> Self {
+        Self { identity, ..self }.checked()
+    }
+
     /// The same header with starts for columns like these.
     pub(crate) fn with_starts(mut self, columns: &[Vec<Option<f64>>]) -> Self {
         let start = |(column, cells): (usize, &Vec<Option<f64>>)| {
@@ -272,14 +277,14 @@ pub(crate) const COLUMNS: u8 = 0x40;
 /// Flag beside the version: the only block follows.
 pub(crate) const SINGLE: u8 = 0x80;
 
-/// Random bits from the standard library's keys for hash tables, which differ from call to call and from process to process.
+/// Random bits from the standard library's keys for hash tables, which differ from call to call and from process to process. WebAssembly
+/// without a system has neither keys nor a clock: there they differ from call to call only.
 fn random() -> u32 {
     let mut hasher = RandomState::new().build_hasher();
-    hasher.write_u128(
-        SystemTime::now()
-            .duration_since(UNIX_EPOCH)
-            .map_or(0, |time| time.as_nanos()),
-    );
+    if cfg!(not(all(target_family = "wasm", target_os = "unknown"))) {
+        let time = SystemTime::now().duration_since(UNIX_EPOCH);
+        hasher.write_u128(time.map_or(0, |time| time.as_nanos()));
+    }
     hasher.finish() as u32
 }
 

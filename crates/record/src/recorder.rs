@@ -47,6 +47,8 @@ pub struct Recorder<W> {
     /// The append that is undone if the recorder is dropped before it is complete.
     append: Append,
     effort: Effort,
+    /// Identity of a recording of several blocks; `None` for a random one.
+    identity: Option<u32>,
     broken: bool,
 }
 
@@ -115,6 +117,7 @@ impl<W: Write> Recorder<W> {
             next_number: 0,
             append: Append::none(),
             effort: Effort::default(),
+            identity: None,
             broken: false,
         }
     }
@@ -123,6 +126,15 @@ impl<W: Write> Recorder<W> {
     #[must_use]
     pub fn with_effort(self, effort: Effort) -> Self {
         Self { effort, ..self }
+    }
+
+    /// Sets the identity of a recording of several blocks (default: random). Blocks of a recording of another identity are refused in its
+    /// place, so two recordings should not share one. Needed where the standard library has no source of randomness, as in a browser, and where
+    /// equal tables must give equal bytes. Has no effect once the header is written.
+    #[must_use]
+    pub fn with_identity(self, identity: u32) -> Self {
+        let identity = Some(identity);
+        Self { identity, ..self }
     }
 
     /// Columns and time of the recording.
@@ -255,6 +267,9 @@ impl<W: Write> Recorder<W> {
             return Ok(());
         }
         let mut header = self.rows.header(&self.schema);
+        if let Some(identity) = self.identity {
+            header = header.with_identity(identity);
+        }
         if starts == Starts::Learned {
             header = header.with_starts(&self.rows.columns);
         }

@@ -1,7 +1,7 @@
 //! Time limit and progress of a running design.
 
-use crate::deadline::Deadline;
-use std::time::{Duration, Instant};
+use crate::deadline::{Clock, Deadline, speed};
+use std::time::Duration;
 
 /// Progress of a design, for a display.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,8 +43,11 @@ impl Stage {
 
 /// Time limit and progress of a running design.
 pub(super) struct Control<'a> {
-    started: Instant,
+    clock: Clock,
+    started: Duration,
     limit: Option<Duration>,
+    /// Multiplications per second; only a time limit needs them.
+    speed: f64,
     deadline: Deadline,
     /// The fraction of the time limit that is used.
     portion: f64,
@@ -54,12 +57,15 @@ pub(super) struct Control<'a> {
 }
 
 impl<'a> Control<'a> {
-    pub(super) fn new(limit: Option<Duration>, progress: Option<&'a mut dyn FnMut(Progress)>) -> Self {
-        let started = Instant::now();
+    pub(super) fn new(clock: Clock, limit: Option<Duration>, progress: Option<&'a mut dyn FnMut(Progress)>) -> Self {
+        let speed = if limit.is_some() { speed(clock) } else { f64::INFINITY };
+        let started = clock();
         Self {
+            clock,
             started,
             limit,
-            deadline: Deadline::after(started, limit),
+            speed,
+            deadline: Deadline::after(clock, started, limit, speed),
             portion: 1.0,
             progress,
             is_cut_short: false,
@@ -75,12 +81,17 @@ impl<'a> Control<'a> {
 
     /// Begins one of `parts` parts of a stage, which share the stage's remaining time equally.
     pub(super) fn enter(&mut self, stage: Stage, parts: usize) {
-        let now = self.started.elapsed();
+        let now = self.elapsed();
         let end = |limit: Duration| {
             let left = limit.mul_f64(self.portion * stage.end()).saturating_sub(now);
             now + left / parts as u32
         };
-        self.deadline = Deadline::after(self.started, self.limit.map(end));
+        self.deadline = Deadline::after(self.clock, self.started, self.limit.map(end), self.speed);
+    }
+
+    /// Time since the start.
+    fn elapsed(&self) -> Duration {
+        (self.clock)().saturating_sub(self.started)
     }
 
     /// The end of the present part.
@@ -102,7 +113,7 @@ impl<'a> Control<'a> {
     }
 
     pub(super) fn report(&mut self, stage: Stage, done: usize, parts: usize) {
-        let elapsed = self.started.elapsed();
+        let elapsed = self.elapsed();
         if let Some(progress) = &mut self.progress {
             progress(Progress {
                 stage,

@@ -35,6 +35,7 @@ mod share;
 mod solution;
 mod starts;
 
+pub use crate::deadline::{Clock, system_clock};
 pub use adc::{Adc, Rounded};
 pub use additive::AdditiveDecoder;
 pub use control::{Progress, Stage};

@@ -18,7 +18,7 @@ impl Request<'_> {
     /// If a number of bits is above [`MAX_BITS`], all are zero, there is not one per sensor, or the total is more than
     /// the sensors can send; [`Error::TooLarge`] if the sensors have more joint symbols than can be enumerated.
     pub fn run(mut self) -> Result<Solutions, Error> {
-        let mut control = Control::new(self.time_limit, self.progress.take());
+        let mut control = Control::new(self.clock, self.time_limit, self.progress.take());
         let bits = self.checked_bits(&mut control)?;
         let mut found = self.solve(&bits, &mut control)?;
         let sense = self.criterion.sense();

@@ -3,6 +3,7 @@
 use super::control::Progress;
 use super::participant::WordedCells;
 use crate::criterion::{AllowedCells, Criterion};
+use crate::deadline::{Clock, system_clock};
 use crate::error::{Error, refuse};
 use crate::observation_model::ObservationModel;
 use fewbits_core::Link;
@@ -51,6 +52,7 @@ pub struct Request<'a> {
     pub(super) starts: usize,
     /// Breakpoints and words of every sensor, as an additional start.
     pub(super) start: Option<Vec<WordedCells>>,
+    pub(super) clock: Clock,
     pub(super) time_limit: Option<Duration>,
     pub(super) progress: Option<&'a mut dyn FnMut(Progress)>,
 }
@@ -67,6 +69,7 @@ impl<'a> Request<'a> {
             cells: AllowedCells::Intervals,
             starts: 60,
             start: None,
+            clock: system_clock,
             time_limit: None,
             progress: None,
         }
@@ -141,6 +144,14 @@ impl<'a> Request<'a> {
     #[must_use]
     pub fn with_time_limit(mut self, limit: Duration) -> Self {
         self.time_limit = Some(limit);
+        self
+    }
+
+    /// Reads times from this clock (default: [`system_clock`]). Needed for a time limit and for [`Progress::elapsed`] where the standard
+    /// library has no clock, as in a browser.
+    #[must_use]
+    pub fn with_clock(mut self, clock: Clock) -> Self {
+        self.clock = clock;
         self
     }
 

@@ -7,6 +7,7 @@ use super::request::Request;
 use super::search::{cells_of, climb, grid_with, refine, spacing};
 use super::solution::{SensorDesign, Solution};
 use crate::criterion::{AllowedCells, Criterion};
+use crate::deadline::system_clock;
 use crate::error::{Error, refuse};
 use crate::law::Reports;
 use crate::observation_model::{ObservationModel, Resolution};
@@ -237,7 +238,7 @@ fn best_cells(landscape: &Landscape, cells: &[WordedCells]) -> Vec<WordedCells> 
         .map(|n| grid_with(landscape, n, GRID, &cells[n].breakpoints))
         .collect();
     let words = cells.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect();
-    let control = &mut Control::new(None, None);
+    let control = &mut Control::new(system_clock, None, None);
     let Some(mut point) = climb(landscape, grids, words, AllowedCells::Intervals, control) else {
         return cells.to_vec();
     };

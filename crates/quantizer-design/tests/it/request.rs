@@ -6,9 +6,10 @@ use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
 use fewbits_quantizer_design::AllowedCells;
 use fewbits_quantizer_design::design::Scope;
-use fewbits_quantizer_design::solve::{Adc, BitBudget, Request, Solution, minimax};
+use fewbits_quantizer_design::solve::{Adc, BitBudget, Progress, Request, Solution, minimax};
 use fewbits_quantizer_design::{Certificate, Noise, ObservationModel, Prior};
 use rand::RngExt;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 fn pair(scale: f64) -> ObservationModel {
@@ -251,6 +252,29 @@ fn a_time_limit_still_gives_a_design() {
     let found = request.run().unwrap();
     assert!(found.is_cut_short && found.best().value < 16.0);
     assert!(calls > 0);
+}
+
+/// Each reading of this clock is a second later, so that seven of them are a limit of 7 s, however fast the machine is.
+#[test]
+fn times_are_read_from_the_clock_that_is_handed_in() {
+    static READINGS: AtomicU64 = AtomicU64::new(0);
+    fn clock() -> Duration {
+        Duration::from_secs(READINGS.fetch_add(1, Ordering::Relaxed))
+    }
+    let mut elapsed = Vec::new();
+    let mut keep = |progress: Progress| elapsed.push(progress.elapsed);
+    let request = || Request::estimation(pair(1.0), BitBudget::Each(2), Link::PERFECT).with_clock(clock);
+    let limited = request().with_time_limit(Duration::from_secs(7)).run().unwrap();
+    assert!(limited.is_cut_short);
+    let found = request().with_progress(&mut keep).run().unwrap();
+    assert!(!found.is_cut_short && found.best().value <= limited.best().value);
+    assert!(
+        !elapsed.is_empty()
+            && elapsed
+                .iter()
+                .all(|time| time.subsec_nanos() == 0 && time.as_secs() > 0)
+    );
+    assert!(elapsed.windows(2).all(|pair| pair[0] < pair[1]));
 }
 
 /// A million joint symbols with correlated unequal noise, once with bits to share out: without a limit these take minutes.

@@ -201,3 +201,24 @@ fn crafted_bytes_are_searched_in_bounded_time() {
     // A checksum over each claimed record would read 7e10 bytes.
     assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
 }
+
+#[test]
+fn equal_tables_of_one_identity_give_equal_bytes() {
+    let table = rows(ROWS);
+    let of = |identity: Option<u32>| {
+        let recorder = Recorder::new(Vec::new(), schema(PER_BLOCK, TimeBase::Numbered));
+        let mut recorder = match identity {
+            Some(identity) => recorder.with_identity(identity),
+            None => recorder,
+        };
+        table.iter().for_each(|row| recorder.push_next(row).unwrap());
+        recorder.finish().unwrap()
+    };
+    assert_eq!(of(Some(7)), of(Some(7)));
+    assert_ne!(of(Some(7)), of(Some(8)));
+    assert_ne!(of(None), of(None));
+    let whole: Vec<i64> = (0..ROWS as i64).collect();
+    for (ticks, damages) in read(&of(Some(7)), &table) {
+        assert_eq!((ticks, damages), (whole.clone(), Vec::new()));
+    }
+}

@@ -1,0 +1,26 @@
+//! Functions of the page: tables, one bit, quantizer design. Errors are the library's own sentences.
+#![forbid(unsafe_code)]
+
+mod clock;
+mod design;
+mod known;
+mod one_bit;
+mod reading;
+mod recording;
+mod table;
+mod writing;
+
+pub use design::design;
+pub use one_bit::{Run, one_bit};
+pub use table::{Effort, Opened};
+
+/// An error with its causes, as a sentence.
+fn text(error: impl std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        text += &format!(": {error}");
+        cause = error.source();
+    }
+    text
+}
