@@ -145,13 +145,10 @@ impl RoundedSample {
             return Err(ArgumentError::new("multiple", multiple.0, format!("a number from {least} to {most}")));
         }
         let edge = |offset: f64| self.resolution * (multiple.0 as f64 + offset);
-        let lower = if multiple.0 == least {
-            f64::NEG_INFINITY
-        } else {
-            edge(-0.5)
-        };
-        let upper = if multiple.0 == most { f64::INFINITY } else { edge(0.5) };
-        Cell::new(lower, upper)
+        // The outermost cells are open.
+        let (is_first, is_last) = (multiple.0 == least, multiple.0 == most);
+        let lower = if is_first { -f64::INFINITY } else { edge(-0.5) };
+        Cell::new(lower, if is_last { f64::INFINITY } else { edge(0.5) })
     }
 
     /// The belief about the state after a first message and no other knowledge: `theta_hat(0) = m(0)`, variance `sigma^2 + tau^2/12`.
@@ -192,14 +189,8 @@ impl Scheme<1> for RoundedSample {
         self.bits
     }
 
-    fn encode(
-        &self,
-        _: &mut dyn Rng,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        (): &(),
-    ) -> Result<Option<Multiple>, Error> {
-        Ok(Some(self.round(measurement[0])?))
+    fn encode(&self, _: &mut dyn Rng, (): &mut (), z: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, Error> {
+        Ok(Some(self.round(z[0])?))
     }
 
     /// Over a link that inverts bits only words of up to 12 bits are accepted.
@@ -224,7 +215,7 @@ impl Scheme<1> for RoundedSample {
 }
 
 /// Expected variance after a first message, and the message's entropy.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct FirstMessageValue {
     /// `E var(theta(0) | m(0))`, the mean posterior variance in state units squared.
     pub expected_variance: f64,
@@ -248,10 +239,7 @@ pub fn first_message_value(scheme: &RoundedSample, prior: &Gaussian<1>) -> Resul
         return Err(ArgumentError::new("resolution", tau, "at most a million cells within the prior").into());
     }
     let mean = prior.mean()[0];
-    let mut value = FirstMessageValue {
-        expected_variance: 0.0,
-        entropy_bits: 0.0,
-    };
+    let mut value = FirstMessageValue::default();
     for k in scheme.round(mean - reach)?.0..=scheme.round(mean + reach)?.0 {
         let posterior = InCell::certain(scheme.cell(Multiple(k))?, r)?.tilted(prior)?;
         let probability = posterior.log_evidence.exp();
