@@ -6,7 +6,7 @@ use fewbits_cfwmd::no_feedback::{advance, check};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_core::{FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observation};
 use fewbits_densities::GaussianCloud;
-use fewbits_filters::{RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter, impute};
+use fewbits_filters::{RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter};
 use fewbits_numerics::{LogSum, normal};
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
@@ -100,22 +100,29 @@ where
         for (i, ((sensor, (step, rule)), observation)) in sensors().filter(|s| s.1.1.received().is_some() == received) {
             let mut contradicted = 0;
             let (matrix, noise) = (sensor.matrix(), sensor.noise_covariance());
-            impute(rng, &mut next.cloud, matrix, noise, &mut log_weights, |rng, innovation, central, side| {
-                let own = &mut side[i * D..(i + 1) * D];
-                let predicted = sensor.matrix() * SVector::<f64, D>::from_column_slice(own);
-                let (z, log_weight) = match observation {
-                    Observation::Received(z) => {
-                        let clash = rule.statistic(&(z - predicted)) < rule.threshold() * (1.0 - 1e-9);
-                        contradicted += usize::from(clash);
-                        (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
-                    }
-                    Observation::Nothing => impute(rng, innovation, rule, loss, central, &predicted),
-                    Observation::Lost => impute_sent(rng, innovation, rule, central, &predicted),
-                };
-                let moved = step.gain * (z - predicted);
-                own.iter_mut().zip(moved.iter()).for_each(|(x, step)| *x += step);
-                (z, log_weight)
-            })?;
+            fewbits_filters::impute(
+                rng,
+                &mut next.cloud,
+                matrix,
+                noise,
+                &mut log_weights,
+                |rng, innovation, central, side| {
+                    let own = &mut side[i * D..(i + 1) * D];
+                    let predicted = sensor.matrix() * SVector::<f64, D>::from_column_slice(own);
+                    let (z, log_weight) = match observation {
+                        Observation::Received(z) => {
+                            let clash = rule.statistic(&(z - predicted)) < rule.threshold() * (1.0 - 1e-9);
+                            contradicted += usize::from(clash);
+                            (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
+                        }
+                        Observation::Nothing => impute(rng, innovation, rule, loss, central, &predicted),
+                        Observation::Lost => impute_sent(rng, innovation, rule, central, &predicted),
+                    };
+                    let moved = step.gain * (z - predicted);
+                    own.iter_mut().zip(moved.iter()).for_each(|(x, step)| *x += step);
+                    (z, log_weight)
+                },
+            )?;
             info.received += usize::from(received);
             next.violations += usize::from(received && contradicted == log_weights.len());
         }

@@ -4,7 +4,7 @@ use fewbits_core::factor::{Constant, InCell, Scalar};
 use fewbits_core::{Cell, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
     BootstrapFilter, Error, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, Resampling,
-    Schedule, UniformGrid, Workspace, assumed_density,
+    ResamplingRule, Schedule, StateFilter, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;

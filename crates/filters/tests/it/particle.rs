@@ -7,8 +7,8 @@ use fewbits_core::{
 };
 use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
 use fewbits_filters::{
-    BootstrapFilter, GuidedFilter, GuidedParticles, Particles, Resampling, ResamplingRule, Schedule, StateFilter,
-    kalman,
+    BootstrapFilter, GuidedFilter, GuidedParticles, MomentFilter, Particles, Resampling, ResamplingRule, Schedule,
+    StateFilter, kalman,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};

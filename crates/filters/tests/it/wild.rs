@@ -3,7 +3,8 @@
 use fewbits_core::factor::{InCell, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Likelihood, Link, Observed};
 use fewbits_filters::{
-    BootstrapFilter, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, UniformGrid, Workspace,
+    BootstrapFilter, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, ResamplingRule,
+    StateFilter, UniformGrid,
 };
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor, ReceivedPower};
