@@ -4,7 +4,7 @@
 use fewbits::core::{Belief, Dynamics, Gaussian, Link, Observed, Scheme, Sensing};
 use fewbits::densities::{Particles, PointMass};
 use fewbits::dymbo::{DymboFilter, MultibitFilter, ScalarFilter, ScalarPlant};
-use fewbits::filters::{ParticleFilter, Workspace};
+use fewbits::filters::{BootstrapFilter, ResamplingRule};
 use fewbits::monte_carlo::Stream;
 use fewbits_baselines::dymbo::gap::exact_filter;
 
@@ -30,7 +30,7 @@ fn receive<F: ScalarFilter>(filter: &F) -> Agreement {
     let referee = exact_filter(plant, STEPS).unwrap();
     let mut exact = PointMass::normal(*referee.grid(), 0.0, start.covariance()[0]).unwrap();
     let mut cloud = Particles::from_belief(&mut cloud_rng, &start, PARTICLES).unwrap();
-    let (particle, mut workspace) = (ParticleFilter::default(), Workspace::default());
+    let mut particle = BootstrapFilter::new(ResamplingRule::default(), PARTICLES).unwrap();
     let mut special = start;
     let (mut log_likelihoods, mut bits) = ([0.0; 3], 0);
     for _ in 0..STEPS {
@@ -50,7 +50,7 @@ fn receive<F: ScalarFilter>(filter: &F) -> Agreement {
         let (next, log_likelihood) = referee.step(&exact, &observed).unwrap();
         exact = next;
         log_likelihoods[1] += log_likelihood;
-        let step = particle.step_in_place(&mut cloud_rng, plant.dynamics(), &mut cloud, &observed, &mut workspace);
+        let step = particle.step_in_place(&mut cloud_rng, plant.dynamics(), &mut cloud, &[&observed]);
         log_likelihoods[2] += step.unwrap().log_likelihood;
     }
     Agreement {

@@ -13,7 +13,7 @@ use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Factor, Gaussian, Link, Observation};
 use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, Workspace, kalman};
+use fewbits_filters::{BootstrapFilter, ResamplingRule, StateFilter, kalman};
 use fewbits_models::{LinearSensor, ScalarSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
@@ -72,14 +72,14 @@ fn particles_1000(bencher: Bencher<'_, '_>, silent: usize) {
     let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap();
     let mut rng = Stream::new(2).fast_rng();
     let start = Particles::from_belief(&mut rng, &belief, 1000).unwrap();
-    let (filter, mut workspace) = (ParticleFilter::default(), Workspace::default());
+    let mut filter = BootstrapFilter::new(ResamplingRule::default(), 1000).unwrap();
     let mut cloud = start.clone();
     let observations = observed(silent);
     let mut step = || {
         cloud.clone_from(&start);
-        filter.predict(&mut rng, &dynamics, &mut cloud, &mut workspace).unwrap();
+        filter.predict(&mut rng, &dynamics, &mut cloud).unwrap();
         let likelihood = network.likelihood(&rules, &Vector2::zeros(), &observations).unwrap();
-        filter.update(&mut cloud, &likelihood).unwrap();
+        filter.update(&mut rng, &mut cloud, &[&likelihood]).unwrap();
         cloud.mean()
     };
     step();

@@ -63,21 +63,6 @@ pub fn divergence(
     Ok(a + b * innovation * innovation / innovation_variance)
 }
 
-/// The threshold `eta` on `nu^2/s` that is equivalent to a threshold on the divergence. If it is 0 or negative, everything is sent.
-///
-/// # Errors
-/// As [`divergence`].
-pub fn equivalent_threshold(
-    direction: Direction,
-    divergence: f64,
-    innovation_variance: f64,
-    noise_variance: f64,
-) -> Result<f64, Error> {
-    finite("divergence", divergence)?;
-    let (a, b) = line(direction, innovation_variance, noise_variance)?;
-    Ok((divergence - a) / b)
-}
-
 /// Fisher information about `y = h(x)` in one step of a censoring sensor, averaged over reports and silences. With the offset
 /// `mu = y - prediction`, the half-width `c` of the interval of silence and noise variance `r`:
 ///
@@ -104,7 +89,7 @@ pub fn fisher_information(mu: f64, half_width: f64, noise_variance: f64) -> Resu
 
 #[cfg(test)]
 mod tests {
-    use super::{Direction, divergence, equivalent_threshold, fisher_information};
+    use super::{Direction, divergence, fisher_information};
     use fewbits_core::Gaussian;
     use fewbits_filters::kalman;
     use fewbits_models::LinearSensor;
@@ -129,9 +114,6 @@ mod tests {
             ] {
                 let ours = divergence(direction, nu, s, 0.8).unwrap();
                 assert!((ours - exact).abs() < 1e-12 * exact.max(1.0), "{direction:?}: {ours} {exact}");
-                // A threshold at exactly this divergence is a threshold at exactly this innovation.
-                let eta = equivalent_threshold(direction, ours, s, 0.8).unwrap();
-                assert!((eta - nu * nu / s).abs() < 1e-12 * (1.0 + eta.abs()));
             }
         }
     }
@@ -147,7 +129,6 @@ mod tests {
     fn an_uninformative_measurement_has_no_rule() {
         for s in [1.0, 0.5] {
             assert!(divergence(Direction::Symmetric, 1.0, s, 1.0).is_err());
-            assert!(equivalent_threshold(Direction::Symmetric, 1.0, s, 1.0).is_err());
         }
     }
 

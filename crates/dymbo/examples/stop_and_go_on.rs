@@ -1,7 +1,7 @@
 //! A centre is stored as bytes in the middle of a run; its copy goes on with the same bits.
 use fewbits_core::{FullValue, Gaussian, Link, SchemeNode, SensorNode};
 use fewbits_filters::centre::{CentreState, FusionCentre, Reporting, Slot};
-use fewbits_filters::{BootstrapFilter, ParticleFilter};
+use fewbits_filters::{BootstrapFilter, ResamplingRule};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use rand::Rng;
@@ -10,7 +10,7 @@ type Centre = FusionCentre<1, BootstrapFilter<1>>;
 
 fn seated(rng: &mut dyn Rng) -> Result<Centre, Box<dyn std::error::Error>> {
     let world = ContinuousLinear::ornstein_uhlenbeck(0.0, 10.0, 4.0)?;
-    let filter = BootstrapFilter::new(ParticleFilter::default(), 500)?;
+    let filter = BootstrapFilter::new(ResamplingRule::default(), 500)?;
     let mut centre = FusionCentre::new(rng, world, filter, &Gaussian::scalar(0.0, 4.0)?)?;
     centre.join(0, Reporting::values(LinearSensor::direct(0.5)?, FullValue::new(0.5)?, Link::PERFECT))?;
     Ok(centre)

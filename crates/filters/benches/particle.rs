@@ -9,7 +9,7 @@ use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::factor::{InCell, Scalar, Value};
 use fewbits_core::{Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sign};
 use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
+use fewbits_filters::{BootstrapFilter, Resampling, ResamplingRule, Schedule};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector2, Vector4};
@@ -46,15 +46,15 @@ fn bench_steps<const D: usize>(
 ) {
     let mut rng = Stream::new(2).fast_rng();
     let start = Particles::from_belief(&mut rng, &prior, PARTICLES).unwrap();
-    let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
-    let mut workspace = Workspace::default();
+    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Always);
+    let mut filter = BootstrapFilter::new(rule, PARTICLES).unwrap();
     let mut belief = start;
     filter
-        .step_in_place(&mut rng, dynamics, &mut belief, observed, &mut workspace)
+        .step_in_place(&mut rng, dynamics, &mut belief, &[observed])
         .unwrap();
     bencher.bench_local(|| {
         filter
-            .step_in_place(&mut rng, dynamics, &mut belief, observed, &mut workspace)
+            .step_in_place(&mut rng, dynamics, &mut belief, &[observed])
             .unwrap()
     });
 }

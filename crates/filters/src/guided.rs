@@ -1,15 +1,17 @@
 //! A particle filter whose proposal depends on the observations.
 
-use crate::Error;
 use crate::contract::{Info, StateFilter, condition_all};
-use crate::particle::{BootstrapFilter, ParticleFilter, weigh};
+use crate::particle::{BootstrapFilter, weigh};
+use crate::{Error, ResamplingRule};
 use fewbits_core::columns::{set_state, state_at};
-use fewbits_core::{Gaussian, GaussianDynamics, Likelihood};
+use fewbits_core::{Belief, ColumnsMut, Gaussian, GaussianDynamics, Likelihood};
 use fewbits_densities::Particles;
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::linalg::{congruence, semidefinite_factor, solve_semidefinite, symmetrised};
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
+use serde::{Deserialize, Serialize};
 
 /// Fraction of particles that keep the draw from the dynamics.
 const DEFENCE: f64 = 0.1;
@@ -25,26 +27,81 @@ const DEFENCE: f64 = 0.1;
 /// ```
 /// The fraction drawn from the dynamics bounds the weight by ten times the likelihood, even if the tails of `N(d, S)` are light. The filter
 /// is exact for every sensor: linearisation changes the proposal only. `Q` may be singular. An update draws new particles only if it
-/// directly follows a `predict`; a second update only weighs.
+/// directly follows a `predict`; a second update only weighs. `N(f, Q)` is therefore part of the belief ([`GuidedParticles`]): a belief
+/// that was stored, or taken from an earlier time, is drawn again from its own proposals.
 #[derive(Debug, Clone)]
 pub struct GuidedFilter<const D: usize> {
     bootstrap: BootstrapFilter<D>,
-    /// `N(f, Q)` of each particle since the last `predict`.
+}
+
+/// The belief of a [`GuidedFilter`]: particles, and the law `N(f, Q)` that each was drawn from if it has not been observed since.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored<D>")]
+pub struct GuidedParticles<const D: usize> {
+    particles: Particles<D>,
+    /// One per particle, or none after an update.
     moves: Vec<Gaussian<D>>,
-    /// The belief that it left. The moves belong to no other, for instance one that was restored or taken from an earlier time.
-    predicted: Option<Particles<D>>,
+}
+
+/// The stored form of [`GuidedParticles`].
+#[derive(Deserialize)]
+#[serde(rename = "GuidedParticles", deny_unknown_fields)]
+struct Stored<const D: usize> {
+    particles: Particles<D>,
+    moves: Vec<Gaussian<D>>,
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for GuidedParticles<D> {
+    type Error = ArgumentError;
+
+    fn try_from(Stored { particles, moves }: Stored<D>) -> Result<Self, ArgumentError> {
+        if moves.is_empty() || moves.len() == particles.len() {
+            return Ok(Self { particles, moves });
+        }
+        let expected = format!("none, or {}, one per particle", particles.len());
+        Err(ArgumentError::new("moves", format!("{} Gaussians", moves.len()), expected))
+    }
+}
+
+/// Particles that an update weighs and does not draw again.
+impl<const D: usize> From<Particles<D>> for GuidedParticles<D> {
+    fn from(particles: Particles<D>) -> Self {
+        Self {
+            particles,
+            moves: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> GuidedParticles<D> {
+    /// The particles.
+    pub fn particles(&self) -> &Particles<D> {
+        &self.particles
+    }
+}
+
+impl<const D: usize> Belief<D> for GuidedParticles<D> {
+    fn mean(&self) -> SVector<f64, D> {
+        self.particles.mean()
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.particles.covariance()
+    }
+
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+        self.particles.sample_columns(rng, states);
+    }
 }
 
 impl<const D: usize> GuidedFilter<D> {
-    /// The filter with `count` particles.
+    /// The filter that starts with `count` particles.
     ///
     /// # Errors
     /// If `count` is zero.
-    pub fn new(filter: ParticleFilter, count: usize) -> Result<Self, Error> {
+    pub fn new(rule: ResamplingRule, count: usize) -> Result<Self, Error> {
         Ok(Self {
-            bootstrap: BootstrapFilter::new(filter, count)?,
-            moves: Vec::new(),
-            predicted: None,
+            bootstrap: BootstrapFilter::new(rule, count)?,
         })
     }
 }
@@ -80,48 +137,45 @@ fn propose<const D: usize>(
 }
 
 impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
-    type Belief = Particles<D>;
+    type Belief = GuidedParticles<D>;
 
-    fn points(&self, belief: &Particles<D>) -> Option<crate::Points<D>> {
-        self.bootstrap.points(belief)
+    fn points(&self, belief: &GuidedParticles<D>) -> Option<crate::Points<D>> {
+        self.bootstrap.points(&belief.particles)
     }
 
-    fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
-        self.moves.clear();
-        self.bootstrap.start(rng, prior)
+    fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<GuidedParticles<D>, Error> {
+        Ok(self.bootstrap.start(rng, prior)?.into())
     }
 
     fn predict(
         &mut self,
         rng: &mut dyn Rng,
         dynamics: &dyn GaussianDynamics<D>,
-        belief: &mut Particles<D>,
+        belief: &mut GuidedParticles<D>,
     ) -> Result<(), Error> {
-        self.bootstrap.resample(rng, belief)?;
-        let columns = belief.columns();
+        let GuidedParticles { particles, moves } = belief;
+        self.bootstrap.resample(rng, particles)?;
+        let columns = particles.columns();
         let known = |i| Gaussian::from_trusted_parts(state_at(&columns, i), SMatrix::zeros());
-        self.moves.clear();
-        self.moves
-            .extend((0..belief.len()).map(|i| dynamics.predict(&known(i), 1.0)));
-        dynamics.propagate_columns(rng, belief.columns_mut());
-        self.predicted = Some(belief.clone());
+        moves.clear();
+        moves.extend((0..particles.len()).map(|i| dynamics.predict(&known(i), 1.0)));
+        dynamics.propagate_columns(rng, particles.columns_mut());
         Ok(())
     }
 
     fn update(
         &mut self,
         rng: &mut dyn Rng,
-        belief: &mut Particles<D>,
+        belief: &mut GuidedParticles<D>,
         observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
-        let mut next = belief.clone();
-        let mut ratios = vec![0.0; belief.len()];
+        let mut next = belief.particles.clone();
+        let mut ratios = vec![0.0; next.len()];
         // Particles predicted in this step are drawn again from a proposal that depends on the observations. The ratio of the
         // target to the proposal is part of their weights.
-        let are_own = self.moves.len() == belief.len() && self.predicted.as_ref() == Some(&*belief);
-        if are_own && !observed.is_empty() {
+        if !observed.is_empty() {
             let mut columns = next.columns_mut();
-            for (i, (moved, ratio)) in self.moves.iter().zip(&mut ratios).enumerate() {
+            for (i, (moved, ratio)) in belief.moves.iter().zip(&mut ratios).enumerate() {
                 let own = state_at(&columns, i);
                 if let Some((state, log_ratio)) = propose(rng, &own, moved, observed) {
                     set_state(&mut columns, i, &state);
@@ -133,8 +187,7 @@ impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
             logs.iter_mut().zip(&ratios).for_each(|(log, ratio)| *log += ratio);
             observed.add_log_likelihoods(states, logs);
         })?;
-        *belief = next;
-        self.moves.clear();
+        *belief = next.into();
         Ok(info)
     }
 }

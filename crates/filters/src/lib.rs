@@ -2,17 +2,17 @@
 //!
 //! Every filter implements the traits of [`contract`]: `predict` advances a belief by any motion, `update` processes all observations of
 //! one instant, both in place. A belief is a value that can be stored, sent, compared and replayed; a step that fails leaves it unchanged.
-//! The filters also have functions of their own for types that are known at compile time.
+//! A filter is a struct of its parameters and buffers. Closed forms of Gaussian beliefs are plain functions, too.
 //!
-//! | task | item | as a [`contract::StateFilter`] |
+//! | task | [`contract::StateFilter`] | functions and parts |
 //! |---|---|---|
-//! | a Gaussian belief and any factor | [`assumed_density`] | [`MomentFilter`] |
-//! | linear Gaussian filtering of values | [`kalman`] (Joseph form) | [`MomentFilter`] |
-//! | a Gaussian belief and any likelihood of a few coordinates | [`GridFilter`] (a grid that follows the posterior) | [`GridOnAxes`] |
-//! | any dynamics, any likelihood | [`ParticleFilter`], [`Resampling`] | [`BootstrapFilter`], [`GuidedFilter`] |
-//! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`CloudFilter`] |
-//! | several models, one at a time | [`Imm`] (interacting multiple models, any factor) | [`NoiseBank`], [`Switching`] |
-//! | the exact answer for a scalar | [`PointMassFilter`] (filter and smoother on a grid) | [`PointMasses`] |
+//! | a Gaussian belief and any factor | [`MomentFilter`] | [`assumed_density`] |
+//! | linear Gaussian filtering of values | [`MomentFilter`] | [`kalman`] (Joseph form) |
+//! | a Gaussian belief and any likelihood of a few coordinates | [`GridOnAxes`] | [`GridFilter`] (a grid that follows the posterior) |
+//! | any dynamics, any likelihood | [`BootstrapFilter`], [`GuidedFilter`] | [`ResamplingRule`], [`Resampling`] |
+//! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`impute`] |
+//! | several models, one at a time | [`NoiseBank`], [`Switching`] | [`Imm`] (interacting multiple models, any factor) |
+//! | the exact answer for a scalar | [`PointMasses`] | [`PointMassFilter`] (one model on a grid, with a smoother) |
 //! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel) | |
 //! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
@@ -55,13 +55,13 @@ pub use fewbits_core::Error;
 pub use fewbits_core::{Evidence, LinearScalar, assumed_density};
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
 pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};
-pub use guided::GuidedFilter;
+pub use guided::{GuidedFilter, GuidedParticles};
 pub use imm::{Imm, ImmBelief, ImmWorkspace};
 pub use noise_bank::NoiseBank;
-pub use particle::{BootstrapFilter, ParticleFilter, Workspace};
+pub use particle::BootstrapFilter;
 pub use point_mass::{PointMassFilter, PointMasses};
-pub use rao_blackwell::{CloudFilter, CloudWorkspace, RaoBlackwellised};
-pub use resample::{Resampling, Schedule};
+pub use rao_blackwell::{RaoBlackwellised, impute};
+pub use resample::{Resampling, ResamplingRule, Schedule};
 pub use smoother::scalar_fixed_lag_variance;
 pub use steady_state::{ScalarSteadyState, SteadyState, scalar_steady_state, steady_state};
 pub use switching::Switching;

@@ -1,20 +1,16 @@
 //! A Rao-Blackwellised particle filter for linear Gaussian states and reports such as bits, cells and silence.
 
 use crate::contract::{Info, StateFilter};
-use crate::particle::{ParticleFilter, Workspace, weigh};
-use crate::{Error, kalman};
+use crate::particle::weigh;
+use crate::{Error, ResamplingRule, kalman};
 use fewbits_core::columns::{change_each, count, set_state, state_at};
 use fewbits_core::factor::Scalar;
-use fewbits_core::{
-    Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearDynamics, LinearScalar, LinearSensing,
-    Observed,
-};
+use fewbits_core::{Cell, FactoredGaussian, Gaussian, GaussianDynamics, Likelihood, LinearScalar};
 use fewbits_densities::GaussianCloud;
 use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::{LogSum, normal};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
-use serde::{Deserialize, Serialize};
 
 /// A filter for linear Gaussian states that draws the measurements behind the reports (imputes them): bits, cells, silence, symbols.
 ///
@@ -29,118 +25,97 @@ use serde::{Deserialize, Serialize};
 ///     m += K (z - H m)
 /// P = (I - K H) P (I - K H)' + K R K'
 /// ```
-/// For a [`Scalar`] factor, `p(observed | z)` is piecewise constant and the draw is exact. Other likelihoods, and those that depend on the
-/// particle's own history (its auxiliary row), use [`impute`](Self::impute). (Mixture Kalman filters: Chen and Liu 2000; here
-/// the imputation is drawn from the optimal proposal.)
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct RaoBlackwellised {
-    /// How and when the conditional means are resampled.
-    pub filter: ParticleFilter,
-}
-
-/// Buffers that are reused from step to step.
-#[derive(Debug, Clone, Default)]
-pub struct CloudWorkspace<const D: usize> {
-    particles: Workspace<D>,
+/// For a [`Scalar`] factor, `p(observed | z)` is piecewise constant and the draw is exact; other observations are refused. Likelihoods
+/// that depend on the particle's own history (its auxiliary row) use [`impute`]. Dynamics that are not linear are linearised at the mean.
+/// (Mixture Kalman filters: Chen and Liu 2000; here the imputation is drawn from the optimal proposal.)
+///
+/// The buffers are part of the filter, so that a step of the same size allocates little.
+#[derive(Debug, Clone)]
+pub struct RaoBlackwellised<const D: usize> {
+    rule: ResamplingRule,
+    count: usize,
+    ancestors: Vec<u32>,
     log_weights: Vec<f64>,
     next: Option<GaussianCloud<D>>,
 }
 
-impl RaoBlackwellised {
-    /// A filter with this resampling.
-    pub fn new(filter: ParticleFilter) -> Self {
-        Self { filter }
-    }
-
-    /// Resamples if the schedule says so and predicts every mean by the dynamics. Auxiliary rows are unchanged.
+impl<const D: usize> RaoBlackwellised<D> {
+    /// The filter that starts with `count` particles. `rule` says how and when the conditional means are resampled.
     ///
     /// # Errors
-    /// As [`ParticleFilter::resample`]; [`Error::NotANumber`] if the covariance overflows, before anything has
-    /// changed.
-    pub fn predict<const D: usize, R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        dynamics: &impl LinearDynamics<D>,
-        belief: &mut GaussianCloud<D>,
-        workspace: &mut CloudWorkspace<D>,
-    ) -> Result<(), Error> {
-        // All particles share one covariance, since the Riccati recursion does not depend on the data.
-        let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
-        let shared = kalman::predict(dynamics, &shared);
-        self.advance(rng, |mean| dynamics.transition() * mean, &shared, belief, workspace)
+    /// If `count` is zero.
+    pub fn new(rule: ResamplingRule, count: usize) -> Result<Self, Error> {
+        Ok(Self {
+            rule,
+            count: at_least_one("count", count)?,
+            ancestors: Vec::new(),
+            log_weights: Vec::new(),
+            next: None,
+        })
+    }
+}
+
+impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
+    type Belief = GaussianCloud<D>;
+
+    fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<D>) -> Result<GaussianCloud<D>, Error> {
+        GaussianCloud::agreed(prior, self.count)
     }
 
-    /// Resamples if the schedule says so, moves every mean by `mean`, and sets the covariance to that of `shared`.
-    fn advance<const D: usize, R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        mean: impl Fn(&SVector<f64, D>) -> SVector<f64, D>,
-        shared: &Gaussian<D>,
+    /// Resamples if the rule says so and predicts every mean by the dynamics. Auxiliary rows are unchanged.
+    ///
+    /// [`Error::NotANumber`] if the covariance overflows, before anything has changed.
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<D>,
         belief: &mut GaussianCloud<D>,
-        workspace: &mut CloudWorkspace<D>,
     ) -> Result<(), Error> {
+        // All particles share one covariance, since the Riccati recursion does not depend on the data.
+        let shared = Gaussian::from_trusted_parts(belief.means().mean(), *belief.shared_covariance());
+        let moved = dynamics.predict(&shared, 1.0);
         // Checked before resampling, so that a failed prediction leaves the belief as it was.
-        if !shared.is_finite() {
+        if !moved.is_finite() {
             return Err(Error::NotANumber {
                 what: "the predicted covariance",
             });
         }
-        self.filter
-            .resample(rng, belief.means_mut(), &mut workspace.particles)?;
-        change_each(belief.means_mut().columns_mut(), |state| mean(&state));
-        belief.set_shared_covariance(*shared.covariance());
+        self.rule.resample(rng, belief.means_mut(), &mut self.ancestors)?;
+        change_each(belief.means_mut().columns_mut(), |state| dynamics.mean(&state));
+        belief.set_shared_covariance(*moved.covariance());
         Ok(())
     }
 
-    /// Updates with an observation of a scalar sensor.
-    ///
-    /// # Errors
-    /// [`Error::Impossible`] if it has probability zero for every particle. The belief is then unchanged.
-    pub fn update<const D: usize, R: Rng + ?Sized, F: Clone + Into<Scalar>>(
-        &self,
-        rng: &mut R,
+    fn update(
+        &mut self,
+        rng: &mut dyn Rng,
         belief: &mut GaussianCloud<D>,
-        observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
-        workspace: &mut CloudWorkspace<D>,
+        observed: &[&dyn Likelihood<D>],
     ) -> Result<Info, Error> {
-        let (matrix, noise_covariance) = (*observed.sensing.matrix(), *observed.sensing.noise_covariance());
-        let scalar = LinearScalar {
-            matrix,
-            noise_covariance,
-            factor: observed.factor.clone().into(),
-            log_scale: 0.0,
+        let mean = belief.means().mean();
+        let scalars = observed.iter().map(|one| one.as_linear_scalar(&mean));
+        let Some(scalars) = scalars.collect::<Option<Vec<_>>>() else {
+            return refuse("observed", "another likelihood", "scalar factors through linear sensors");
         };
-        self.update_all(rng, belief, vec![scalar], workspace)
-    }
-
-    fn update_all<const D: usize, R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        belief: &mut GaussianCloud<D>,
-        observed: Vec<LinearScalar<D>>,
-        workspace: &mut CloudWorkspace<D>,
-    ) -> Result<Info, Error> {
-        let next = workspace.next.get_or_insert_with(|| belief.clone());
+        let next = self.next.get_or_insert_with(|| belief.clone());
         next.clone_from(belief);
-        let log_weights = &mut workspace.log_weights;
+        let log_weights = &mut self.log_weights;
         log_weights.clear();
         log_weights.resize(belief.means().len(), 0.0);
         // Impute one measurement per observation, one after the other; each adds to the log weights.
-        let log_scale: f64 = observed.iter().map(|one| one.log_scale).sum();
-        for one in observed {
-            let imputation = Imputation::new(one.factor);
-            self.impute(
-                rng,
-                next,
-                &one.matrix,
-                &one.noise_covariance,
-                log_weights,
-                |rng, innovation, predicted, _| {
-                    let (z, log_weight) = imputation.draw(rng, predicted[0], innovation.lower()[(0, 0)]);
-                    ([z].into(), log_weight)
-                },
-            )?;
+        let log_scale: f64 = scalars.iter().map(|one| one.log_scale).sum();
+        for LinearScalar {
+            matrix,
+            noise_covariance,
+            factor,
+            ..
+        } in scalars
+        {
+            let imputation = Imputation::new(factor);
+            impute(rng, next, &matrix, &noise_covariance, log_weights, |rng, innovation, predicted, _| {
+                let (z, log_weight) = imputation.draw(rng, predicted[0], innovation.lower()[(0, 0)]);
+                ([z].into(), log_weight)
+            })?;
         }
         // ln w += sum of ln p(observed | m) over the observations; normalise.
         let info = weigh(next.means_mut(), |_, logs| {
@@ -152,105 +127,6 @@ impl RaoBlackwellised {
         std::mem::swap(belief, next);
         let log_likelihood = info.log_likelihood + log_scale;
         Ok(Info { log_likelihood, ..info })
-    }
-
-    /// The core of an update, for any linear sensor `z = H x + w`, `w ~ N(0, R)`, and any likelihood: imputes a measurement
-    /// for every particle, updates each mean with it, and adds the log importance weights to `log_weights`, one per particle. The caller
-    /// reweighs when all sensors have been processed.
-    ///
-    /// `draw(rng, innovation, predicted, row)` is given `N(0, S)`, a particle's `H m` and its auxiliary row, which it may change. It
-    /// returns a measurement `z` drawn from some density `q`, and `ln (N(z; H m, S) p(observed | z) / q(z))`.
-    ///
-    /// # Errors
-    /// [`Error::SingularInnovation`] if `S` is singular; the belief is then unchanged.
-    pub fn impute<const D: usize, const M: usize, R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        belief: &mut GaussianCloud<D>,
-        matrix: &SMatrix<f64, M, D>,
-        noise_covariance: &SMatrix<f64, M, M>,
-        log_weights: &mut [f64],
-        mut draw: impl FnMut(&mut R, &FactoredGaussian<M>, &SVector<f64, M>, &mut [f64]) -> (SVector<f64, M>, f64),
-    ) -> Result<(), Error> {
-        let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
-        // One Kalman gain for all particles.
-        let (updated, info) = kalman::update_by(matrix, noise_covariance, &shared, &SVector::zeros())?;
-        let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
-            .factored()
-            .map_err(|_| Error::SingularInnovation)?;
-        let width = belief.means().auxiliary_width();
-        let (mut columns, side) = belief.means_mut().parts_mut();
-        for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
-            let mean = state_at(&columns, i);
-            let predicted = matrix * mean;
-            // The measurement is drawn given the report and then used as if it had been received. The weight is multiplied by the
-            // probability of the report.
-            let (z, increment) = draw(rng, &innovation, &predicted, &mut side[i * width..(i + 1) * width]);
-            *log_weight += increment;
-            set_state(&mut columns, i, &(mean + info.gain * (z - predicted)));
-        }
-        belief.set_shared_covariance(*updated.covariance());
-        Ok(())
-    }
-}
-
-/// [`RaoBlackwellised`] with a number of particles, as a [`StateFilter`]. Returns an error for observations that are not a [`Scalar`]
-/// factor of a linear measurement. A motion that is not linear is linearised at the mean.
-#[derive(Debug, Clone)]
-pub struct CloudFilter<const D: usize> {
-    filter: RaoBlackwellised,
-    count: usize,
-    workspace: CloudWorkspace<D>,
-}
-
-impl<const D: usize> CloudFilter<D> {
-    /// The filter with `count` particles.
-    ///
-    /// # Errors
-    /// If `count` is zero.
-    pub fn new(filter: RaoBlackwellised, count: usize) -> Result<Self, Error> {
-        Ok(Self {
-            filter,
-            count: at_least_one("count", count)?,
-            workspace: CloudWorkspace::default(),
-        })
-    }
-}
-
-impl<const D: usize> StateFilter<D> for CloudFilter<D> {
-    type Belief = GaussianCloud<D>;
-
-    fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<D>) -> Result<GaussianCloud<D>, Error> {
-        GaussianCloud::agreed(prior, self.count)
-    }
-
-    fn predict(
-        &mut self,
-        rng: &mut dyn Rng,
-        dynamics: &dyn GaussianDynamics<D>,
-        belief: &mut GaussianCloud<D>,
-    ) -> Result<(), Error> {
-        let shared = Gaussian::from_trusted_parts(belief.means().mean(), *belief.shared_covariance());
-        let moved = dynamics.predict(&shared, 1.0);
-        let mean = |state: &SVector<f64, D>| dynamics.mean(state);
-        self.filter.advance(rng, mean, &moved, belief, &mut self.workspace)
-    }
-
-    fn update(
-        &mut self,
-        rng: &mut dyn Rng,
-        belief: &mut GaussianCloud<D>,
-        observed: &[&dyn Likelihood<D>],
-    ) -> Result<Info, Error> {
-        let mean = belief.means().mean();
-        let mut scalars = Vec::with_capacity(observed.len());
-        for one in observed {
-            let Some(scalar) = one.as_linear_scalar(&mean) else {
-                return refuse("observed", "another likelihood", "scalar factors through linear sensors");
-            };
-            scalars.push(scalar);
-        }
-        self.filter.update_all(rng, belief, scalars, &mut self.workspace)
     }
 
     /// Of more than [`MAX_TESTED`] particles, so many of equal weight.
@@ -272,6 +148,44 @@ impl<const D: usize> StateFilter<D> for CloudFilter<D> {
         }
         Some(picked)
     }
+}
+
+/// The core of an update, for any linear sensor `z = H x + w`, `w ~ N(0, R)`, and any likelihood: imputes a measurement
+/// for every particle, updates each mean with it, and adds the log importance weights to `log_weights`, one per particle. The caller
+/// reweighs when all sensors have been processed.
+///
+/// `draw(rng, innovation, predicted, row)` is given `N(0, S)`, a particle's `H m` and its auxiliary row, which it may change. It
+/// returns a measurement `z` drawn from some density `q`, and `ln (N(z; H m, S) p(observed | z) / q(z))`.
+///
+/// # Errors
+/// [`Error::SingularInnovation`] if `S` is singular; the belief is then unchanged.
+pub fn impute<const D: usize, const M: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    belief: &mut GaussianCloud<D>,
+    matrix: &SMatrix<f64, M, D>,
+    noise_covariance: &SMatrix<f64, M, M>,
+    log_weights: &mut [f64],
+    mut draw: impl FnMut(&mut R, &FactoredGaussian<M>, &SVector<f64, M>, &mut [f64]) -> (SVector<f64, M>, f64),
+) -> Result<(), Error> {
+    let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
+    // One Kalman gain for all particles.
+    let (updated, info) = kalman::update_by(matrix, noise_covariance, &shared, &SVector::zeros())?;
+    let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
+        .factored()
+        .map_err(|_| Error::SingularInnovation)?;
+    let width = belief.means().auxiliary_width();
+    let (mut columns, side) = belief.means_mut().parts_mut();
+    for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
+        let mean = state_at(&columns, i);
+        let predicted = matrix * mean;
+        // The measurement is drawn given the report and then used as if it had been received. The weight is multiplied by the
+        // probability of the report.
+        let (z, increment) = draw(rng, &innovation, &predicted, &mut side[i * width..(i + 1) * width]);
+        *log_weight += increment;
+        set_state(&mut columns, i, &(mean + info.gain * (z - predicted)));
+    }
+    belief.set_shared_covariance(*updated.covariance());
+    Ok(())
 }
 
 /// Largest number of particles by which a centre tests reports.

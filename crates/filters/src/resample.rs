@@ -1,5 +1,7 @@
 //! Resampling: replaces weighted particles by equally weighted ones.
 
+use crate::Error;
+use fewbits_densities::Particles;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels::{sum, vectorised};
 use rand::{Rng, RngExt};
@@ -69,9 +71,9 @@ impl Resampling {
         Ok(())
     }
 
-    /// As [`ancestors`](Self::ancestors), for the weights of [`Particles`](fewbits_densities::Particles), which are checked and normalised
+    /// As [`ancestors`](Self::ancestors), for the weights of [`Particles`], which are checked and normalised
     /// already.
-    pub(crate) fn ancestors_of_normalised<R: Rng + ?Sized>(self, rng: &mut R, weights: &[f64], ancestors: &mut [u32]) {
+    fn ancestors_of_normalised<R: Rng + ?Sized>(self, rng: &mut R, weights: &[f64], ancestors: &mut [u32]) {
         if let Some(last) = weights.iter().rposition(|w| *w > 0.0) {
             self.ancestors_unchecked(rng, weights, sum(weights), last, ancestors);
         }
@@ -112,6 +114,56 @@ fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
     match weights.iter().rposition(|w| *w > 0.0) {
         Some(last) if total.is_finite() => Ok((total, last)),
         _ => Err(ArgumentError::new("weights", format!("a vector summing to {total}"), "a positive finite sum")),
+    }
+}
+
+/// The law of resampling and when it is applied.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResamplingRule {
+    /// The law that draws ancestors.
+    pub resampling: Resampling,
+    /// When to resample.
+    pub schedule: Schedule,
+}
+
+impl ResamplingRule {
+    /// This law at these times.
+    pub fn new(resampling: Resampling, schedule: Schedule) -> Self {
+        Self { resampling, schedule }
+    }
+
+    /// Resamples if the schedule says so. Returns whether it did. `ancestors` is a buffer, of any length.
+    ///
+    /// # Errors
+    /// Not in practice: the weights of [`Particles`] are always normalised.
+    pub fn resample<const D: usize, R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        belief: &mut Particles<D>,
+        ancestors: &mut Vec<u32>,
+    ) -> Result<bool, Error> {
+        let is_due = self.draw_ancestors(rng, belief, ancestors);
+        if is_due {
+            belief.select(ancestors)?;
+        }
+        Ok(is_due)
+    }
+
+    /// Draws an ancestor of each particle if the schedule says so. Returns whether it did.
+    pub(crate) fn draw_ancestors<const D: usize, R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        belief: &Particles<D>,
+        ancestors: &mut Vec<u32>,
+    ) -> bool {
+        let is_due = self.schedule.is_due(belief.effective_sample_size(), belief.len());
+        if is_due {
+            ancestors.resize(belief.len(), 0);
+            self.resampling
+                .ancestors_of_normalised(rng, belief.weights(), ancestors);
+        }
+        is_due
     }
 }
 

@@ -19,7 +19,7 @@
 //! | the recommended tracker | [`GridFilter`] |
 //! | recorded ranges with bias, outliers, missing anchors, unknown speed and start | [`RangeTracker`] |
 //! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
-//! | particles and draws | [`ParticleFilter`](fewbits_filters::ParticleFilter) on [`WithManoeuvre`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
+//! | particles and draws | [`BootstrapFilter`](fewbits_filters::BootstrapFilter) on [`WithManoeuvre`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
 //! | bounds | [`CramerRao`], [`level_information`] |
 //! | which sensor leads, what it hands over, in bits | [`leader`] |
 //!

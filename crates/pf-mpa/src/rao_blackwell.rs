@@ -7,7 +7,7 @@ use crate::tracker::{Ranged, StepInfo, Tracker};
 use fewbits_core::columns::set_state;
 use fewbits_core::{Gaussian, Likelihood};
 use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, Workspace};
+use fewbits_filters::ResamplingRule;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
@@ -83,7 +83,7 @@ impl VelocityCloud {
 /// Buffers that are reused from step to step.
 #[derive(Debug, Default)]
 pub struct VelocityWorkspace {
-    filter: Workspace<6>,
+    ancestors: Vec<u32>,
     next: Option<Particles<6>>,
     increments: Vec<f64>,
 }
@@ -133,8 +133,8 @@ impl Tracker for RaoBlackwellGuided {
         let gain = if spread > 0.0 { cross / spread } else { 0.0 };
         let next = workspace.next.get_or_insert_with(|| belief.particles.clone());
         next.clone_from(&belief.particles);
-        let (filter, manoeuvre) = (ParticleFilter::default(), WithManoeuvre::at(*target, k));
-        filter.resample(rng, next, &mut workspace.filter)?;
+        let manoeuvre = WithManoeuvre::at(*target, k);
+        ResamplingRule::default().resample(rng, next, &mut workspace.ancestors)?;
         workspace.increments.clear();
         let mut columns = next.columns_mut();
         for i in 0..columns[0].len() {

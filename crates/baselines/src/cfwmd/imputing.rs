@@ -6,7 +6,7 @@ use fewbits_cfwmd::no_feedback::{advance, check};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_core::{FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observation};
 use fewbits_densities::GaussianCloud;
-use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule};
+use fewbits_filters::{RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter};
 use fewbits_numerics::{LogSum, normal};
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
@@ -85,8 +85,8 @@ where
 {
     check(network, observations)?;
     let (mut next, mut info) = (belief.clone(), FusionInfo::default());
-    let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5)));
-    filter.predict(rng, dynamics, &mut next.cloud, &mut CloudWorkspace::default())?;
+    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
+    RaoBlackwellised::new(rule, next.cloud.means().len())?.predict(&mut &mut *rng, dynamics, &mut next.cloud)?;
     for estimate in next.cloud.means_mut().parts_mut().1.chunks_exact_mut(D) {
         let moved = dynamics.transition() * SVector::<f64, D>::from_column_slice(estimate);
         estimate.copy_from_slice(moved.as_slice());
@@ -100,7 +100,7 @@ where
         for (i, ((sensor, (step, rule)), observation)) in sensors().filter(|s| s.1.1.received().is_some() == received) {
             let mut contradicted = 0;
             let (matrix, noise) = (sensor.matrix(), sensor.noise_covariance());
-            filter.impute(
+            fewbits_filters::impute(
                 rng,
                 &mut next.cloud,
                 matrix,

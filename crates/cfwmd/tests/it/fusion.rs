@@ -11,7 +11,7 @@ use fewbits_core::{
     Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, Sensing,
 };
 use fewbits_densities::{GaussianCloud, Particles};
-use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
+use fewbits_filters::{BootstrapFilter, RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter, kalman};
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix2, Matrix4, SVector, Vector1, Vector2, Vector4};
@@ -38,8 +38,9 @@ fn vector_network(loss: f64) -> Sensors<2> {
 fn referee(belief: &Gaussian<2>, likelihood: &impl Likelihood<2>) -> (Particles<2>, f64) {
     let mut rng = Stream::new(77).fast_rng();
     let mut cloud = Particles::from_draws(200_000, || belief.sample(&mut rng)).unwrap();
-    let log_likelihood = ParticleFilter::default()
-        .update(&mut cloud, likelihood)
+    let log_likelihood = BootstrapFilter::new(ResamplingRule::default(), 1)
+        .unwrap()
+        .update(&mut rng, &mut cloud, &[likelihood])
         .unwrap()
         .log_likelihood;
     (cloud, log_likelihood)
@@ -162,10 +163,10 @@ fn the_three_centres_agree_over_a_run() {
     let mut recursion = OwnRecursion::new(&start);
     let mut gaussian = start;
     let mut rng = Stream::new(10).fast_rng();
-    let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5));
-    let mut workspace = Workspace::default();
+    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
+    let mut filter = BootstrapFilter::new(rule, 30_000).unwrap();
     let mut cloud = Particles::from_draws(30_000, || *start.mean()).unwrap();
-    let (mixture, mut clouds) = (RaoBlackwellised::new(filter), CloudWorkspace::default());
+    let mut mixture = RaoBlackwellised::new(rule, 3_000).unwrap();
     let mut rao = GaussianCloud::agreed(&start, 3_000).unwrap();
     let (mut squares, mut lowest) = ([0.0; 2], f64::INFINITY);
     for _ in 0..20 {
@@ -180,10 +181,10 @@ fn the_three_centres_agree_over_a_run() {
 
         let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
         filter
-            .step_in_place(&mut rng, &dynamics, &mut cloud, &likelihood, &mut workspace)
+            .step_in_place(&mut rng, &dynamics, &mut cloud, &[&likelihood])
             .unwrap();
 
-        mixture.predict(&mut rng, &dynamics, &mut rao, &mut clouds).unwrap();
+        mixture.predict(&mut rng, &dynamics, &mut rao).unwrap();
         let c = rules[0].half_width();
         let cell = Cell::new(broadcast[0] - c, broadcast[0] + c).unwrap();
         for observation in &observations {
@@ -192,7 +193,7 @@ fn the_three_centres_agree_over_a_run() {
                 _ => InCell::certain(cell, 1.0).unwrap().into(),
             };
             mixture
-                .update(&mut rng, &mut rao, &Observed::new(sensor, what), &mut clouds)
+                .update(&mut rng, &mut rao, &[&Observed::new(sensor, what)])
                 .unwrap();
         }
         let exact = rao.gaussian();

@@ -6,7 +6,7 @@ use fewbits_core::{
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, NoiseLearning, RemoteSensor, Reporting, Slot};
 use fewbits_filters::{
-    BootstrapFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, ParticleFilter, Particles, StateFilter,
+    BootstrapFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, Particles, ResamplingRule, StateFilter,
 };
 use fewbits_models::{ContinuousLinear, LinearSensor, PLANE_POSITION};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -347,7 +347,7 @@ fn three_kinds<F: StateFilter<4>>(filter: F) -> f64 {
 fn three_kinds_of_sensor_share_every_filter() {
     let moment = three_kinds(MomentFilter);
     let grid = three_kinds(GridOnAxes::<4, 2>::new(GridFilter::default(), PLANE_POSITION).unwrap());
-    let cloud = three_kinds(BootstrapFilter::new(ParticleFilter::default(), 20_000).unwrap());
+    let cloud = three_kinds(BootstrapFilter::new(ResamplingRule::default(), 20_000).unwrap());
     println!("RMS error: moments {moment:.3}, grid {grid:.3}, particles {cloud:.3}");
     for error in [moment, grid, cloud] {
         assert!(error < 1.5, "{moment} {grid} {cloud}");
@@ -379,7 +379,7 @@ fn noise_that_is_stated_twice_must_agree() {
 
 #[test]
 fn a_restored_centre_goes_on_with_the_same_bits() {
-    let filter = || BootstrapFilter::new(ParticleFilter::default(), 300).unwrap();
+    let filter = || BootstrapFilter::new(ResamplingRule::default(), 300).unwrap();
     let (mut first, mut second) = (Plane::new(filter(), 8), Plane::new(filter(), 8));
     for k in 0..60 {
         first.step(k);

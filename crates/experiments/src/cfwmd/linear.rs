@@ -14,7 +14,7 @@ use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{NumberFormat, Scheme as _};
 use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace, assumed_density, kalman};
+use fewbits_filters::{BootstrapFilter, Resampling, ResamplingRule, Schedule, StateFilter, assumed_density, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_numerics::linalg::semidefinite_factor;
 
@@ -225,19 +225,19 @@ impl<const M: usize> Line<M> {
         let root = semidefinite_factor("initial covariance", self.start.covariance())?;
         let mut draw = || self.start.mean() + root * Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
         let mut cloud = Particles::from_draws(count, &mut draw)?;
-        let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
-        let mut workspace = Workspace::default();
+        let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Always);
+        let mut filter = BootstrapFilter::new(rule, count)?;
         let moments = |cloud: &Particles<2>| {
             let mean = cloud.mean();
             Gaussian::from_trusted_parts(mean, cloud.covariance_about(&mean))
         };
         Ok(Box::new(move |k| {
-            filter.predict(&mut rng, &self.dynamics, &mut cloud, &mut workspace)?;
+            filter.predict(&mut rng, &self.dynamics, &mut cloud)?;
             let predicted = moments(&cloud);
             let rules = self.rules(k, weighing, &network, &predicted)?;
             let (observations, sent) = self.observe(k, draws, &rules, predicted.mean(), 0.0);
             let likelihood = network.likelihood(&rules, predicted.mean(), &observations)?;
-            filter.update(&mut cloud, &likelihood)?;
+            filter.update(&mut rng, &mut cloud, &[&likelihood])?;
             Ok(Known::of(&moments(&cloud), sent))
         }))
     }

@@ -10,7 +10,7 @@ use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::Observed;
 use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
+use fewbits_filters::{BootstrapFilter, Resampling, ResamplingRule, Schedule};
 use fewbits_models::{LinearGaussian, ReceivedPower, constant_velocity_2d};
 
 /// What is sent, and whether silence is fused.
@@ -75,8 +75,8 @@ impl World<4, 1> for Plane {
         let threshold = self.budget.threshold(1)?;
         let mut rng = stream.named("particles").fast_rng();
         let mut cloud = self.cloud(&mut rng)?;
-        let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
-        let mut workspace = Workspace::default();
+        let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Always);
+        let mut filter = BootstrapFilter::new(rule, self.particles)?;
         let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT)?;
         let always = CensoringRule::scalar(1.0, 0.0)?;
         let mut own = vec![OwnRecursion::new(&self.start); self.sensors.len()];
@@ -114,7 +114,7 @@ impl World<4, 1> for Plane {
                     values.collect::<Result<Vec<_>, Error>>()?
                 }
             };
-            filter.step_in_place(&mut rng, &self.dynamics, &mut cloud, &likelihood, &mut workspace)?;
+            filter.step_in_place(&mut rng, &self.dynamics, &mut cloud, &[&likelihood])?;
             let mean = cloud.mean();
             let covariance = match scheme {
                 Scheme::StateAndCovariance => cloud.covariance_about(&mean),

@@ -3,7 +3,7 @@
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_core::Observed;
-use fewbits_filters::ParticleFilter;
+use fewbits_filters::{BootstrapFilter, ResamplingRule};
 use fewbits_pf_mpa::{
     Encoder, GridFilter, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, QuantizedRange, RangeNoise,
     RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,
@@ -207,14 +207,14 @@ impl Method {
             Self::Messages(m) => track(m, all, &mut rng),
             Self::Bootstrap(n, reports) => {
                 let cloud = WithManoeuvre::cloud(&mut rng, &prior()?, *n)?;
-                let mut workspace = fewbits_filters::Workspace::default();
+                let mut filter = BootstrapFilter::new(ResamplingRule::default(), *n)?;
                 // A range of a state that holds the manoeuvre, too.
                 let in_state = |r: &Ranged| Ok(Observed::new(r.sensing.on_axes::<6>(POSITION)?, r.factor.clone()));
                 follow(under(*reports), cloud, WithManoeuvre::estimate, |k, cloud, observed| {
                     let observed = observed.iter().map(in_state);
                     let observed = observed.collect::<Result<Vec<_>, fewbits_pf_mpa::Error>>()?;
                     let motion = WithManoeuvre::at(*target, k);
-                    ParticleFilter::default().step_in_place(&mut rng, &motion, cloud, &observed, &mut workspace)?;
+                    filter.step_in_place(&mut rng, &motion, cloud, &[&observed])?;
                     Ok(())
                 })
             }

@@ -10,7 +10,7 @@ use fewbits_core::{Cell, Dynamics, Gaussian, Link, Observed, Sensing};
 use fewbits_densities::GaussianCloud;
 use fewbits_experiments::schema::Value;
 use fewbits_experiments::{Context, Measured, all};
-use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, kalman};
+use fewbits_filters::{RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter, kalman};
 use fewbits_models::{LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, MonteCarlo, Stream, Trial};
 use fewbits_numerics::normal;
@@ -81,8 +81,9 @@ fn run(particles: usize, stream: Stream) -> [f64; 3] {
     let mut belief = Gaussian::known(truth).unwrap();
     let mut own = OwnRecursion::new(&belief);
     let mut cloud = GaussianCloud::agreed(&belief, particles.max(1)).unwrap();
-    let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5)));
-    let (mut rng, mut workspace) = (stream.named("particles").fast_rng(), CloudWorkspace::default());
+    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
+    let mut filter = RaoBlackwellised::new(rule, particles.max(1)).unwrap();
+    let mut rng = stream.named("particles").fast_rng();
     let mut world = stream.named("world").rng();
     let mut sums = [0.0; 3];
     for _ in 0..20 {
@@ -90,7 +91,7 @@ fn run(particles: usize, stream: Stream) -> [f64; 3] {
         let step = own.advance(&dynamics, &sensor, &truth).unwrap();
         let rules = vec![CensoringRule::new(&step.innovation_covariance, threshold).unwrap(); 2];
         let predicted = kalman::predict(&dynamics, &belief);
-        filter.predict(&mut rng, &dynamics, &mut cloud, &mut workspace).unwrap();
+        filter.predict(&mut rng, &dynamics, &mut cloud).unwrap();
         let broadcast = if particles > 0 {
             cloud.means().mean()
         } else {
@@ -107,7 +108,7 @@ fn run(particles: usize, stream: Stream) -> [f64; 3] {
                     None => silence.into(),
                 };
                 let observed = Observed::new(sensor, factor);
-                filter.update(&mut rng, &mut cloud, &observed, &mut workspace).unwrap();
+                filter.update(&mut rng, &mut cloud, &[&observed]).unwrap();
             }
             cloud.gaussian()
         } else {

@@ -9,7 +9,9 @@ use fewbits_dymbo::{
     filtered_variance, first_message_value, steady,
 };
 use fewbits_experiments::Measured;
-use fewbits_filters::{CloudWorkspace, GaussianCloud, RaoBlackwellised, scalar_fixed_lag_variance, steady_state};
+use fewbits_filters::{
+    GaussianCloud, RaoBlackwellised, ResamplingRule, StateFilter, scalar_fixed_lag_variance, steady_state,
+};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
@@ -287,16 +289,14 @@ fn vector_run<const M: usize>(filter: &Filter<M>, at_once: bool, start: Gaussian
     // Two clouds that draw independently: the product of their distances from the filter's mean has no share of their own noise.
     let cloud = GaussianCloud::agreed(&belief, particles).unwrap();
     let mut clouds = [cloud.clone(), cloud];
-    let (exact, mut workspace) = (RaoBlackwellised::default(), CloudWorkspace::default());
+    let mut exact = RaoBlackwellised::new(ResamplingRule::default(), particles).unwrap();
     let mut state = belief.sample(&mut rng);
     let mut means = [0.0; 3];
     for n in 0..burn + steps {
         state = filter.dynamics().propagate(&mut rng, &state);
         belief = filter.predict(&belief);
         for cloud in &mut clouds {
-            exact
-                .predict(&mut rng, filter.dynamics(), cloud, &mut workspace)
-                .unwrap();
+            exact.predict(&mut rng, filter.dynamics(), cloud).unwrap();
         }
         let (ahead, mut observations) = (belief, [Observation::Received(Sign::Above); M]);
         for (i, sensor) in filter.sensors().iter().enumerate() {
@@ -307,7 +307,7 @@ fn vector_run<const M: usize>(filter: &Filter<M>, at_once: bool, start: Gaussian
             let factor = InCell::sign(bit, threshold, sensor.noise_variance(), &Link::PERFECT).unwrap();
             for cloud in &mut clouds {
                 exact
-                    .update(&mut rng, cloud, &Observed::new(*sensor, factor), &mut workspace)
+                    .update(&mut rng, cloud, &[&Observed::new(*sensor, factor)])
                     .unwrap();
             }
             if !at_once {

@@ -4,7 +4,7 @@
 //! grid is adapted to the posterior until it resolves it. If that is not possible, an error is returned.
 //!
 //! Not for beliefs that are not Gaussian ([`PointMassFilter`](crate::PointMassFilter)), nor for more than
-//! about three observed coordinates ([`ParticleFilter`](crate::ParticleFilter)).
+//! about three observed coordinates ([`BootstrapFilter`](crate::BootstrapFilter)).
 
 mod on_axes;
 mod pass;

@@ -4,7 +4,7 @@ use fewbits_core::{
     Dynamics, FullValue, Gaussian, GaussianDynamics, Likelihood, Link, Message, NumberFormat, Observation,
 };
 use fewbits_filters::centre::{Event, Failures, FusionCentre, Health, Reporting, Slot};
-use fewbits_filters::{BootstrapFilter, Error, MomentFilter, NoiseBank, ParticleFilter, StateFilter};
+use fewbits_filters::{BootstrapFilter, Error, MomentFilter, NoiseBank, ResamplingRule, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::Vector1;
@@ -153,7 +153,7 @@ fn order_is_nothing<F: StateFilter<1, Belief: PartialEq>>(filter: impl Fn() -> F
 #[test]
 fn the_order_of_reports_decides_nothing() {
     order_is_nothing(|| MomentFilter);
-    order_is_nothing(|| BootstrapFilter::new(ParticleFilter::default(), 200).unwrap());
+    order_is_nothing(|| BootstrapFilter::new(ResamplingRule::default(), 200).unwrap());
 }
 
 /// How the last of the sensors fails.

@@ -7,8 +7,8 @@ use fewbits_core::{
     Observation, Observed, Scheme, Sensing, Sign, laws,
 };
 use fewbits_filters::{
-    BootstrapFilter, CloudFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, ParticleFilter,
-    PointMasses, RaoBlackwellised, StateFilter, Switching, UniformGrid, assumed_density,
+    BootstrapFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, PointMasses,
+    RaoBlackwellised, ResamplingRule, StateFilter, Switching, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -116,10 +116,10 @@ fn every_filter_agrees_with_the_grid() {
         let off: [f64; 3] = std::array::from_fn(|i| found[i] - exact[i]);
         assert!(off.iter().all(|d| d.abs() < slack), "{name}: {off:?}");
     };
-    let filter = ParticleFilter::default();
+    let filter = ResamplingRule::default();
     agree("bootstrap", run(BootstrapFilter::new(filter, 40_000).unwrap()), 0.15);
     agree("guided", run(GuidedFilter::new(filter, 20_000).unwrap()), 0.15);
-    agree("Rao-Blackwellised", run(CloudFilter::new(RaoBlackwellised::new(filter), 20_000).unwrap()), 0.15);
+    agree("Rao-Blackwellised", run(RaoBlackwellised::new(filter, 20_000).unwrap()), 0.15);
     // Two-sided bits make beliefs of two peaks, which a Gaussian blurs: it stays near the evidence.
     for blurred in [
         run(MomentFilter),
@@ -147,13 +147,13 @@ where
 
 #[test]
 fn what_is_impossible_leaves_every_belief_as_it_was() {
-    let filter = ParticleFilter::default();
+    let filter = ResamplingRule::default();
     refused(MomentFilter);
     refused(GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap());
     refused(PointMasses::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
     refused(BootstrapFilter::new(filter, 50).unwrap());
     refused(GuidedFilter::new(filter, 50).unwrap());
-    refused(CloudFilter::new(RaoBlackwellised::new(filter), 50).unwrap());
+    refused(RaoBlackwellised::new(filter, 50).unwrap());
     refused(NoiseBank::new(MomentFilter, vec![1.0, 2.0], 0.1).unwrap());
 }
 

@@ -3,8 +3,8 @@
 use fewbits_core::factor::{Constant, InCell, Scalar};
 use fewbits_core::{Cell, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
-    CloudWorkspace, Error, GaussianCloud, ParticleFilter, Particles, PointMass, PointMassFilter, RaoBlackwellised,
-    Resampling, Schedule, UniformGrid, Workspace, assumed_density,
+    BootstrapFilter, Error, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, Resampling,
+    ResamplingRule, Schedule, StateFilter, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -54,14 +54,14 @@ fn particle_filters() {
     let mut rng = Stream::new(1).fast_rng();
     let before = cloud();
     let mut belief = before.clone();
-    let mut workspace = Workspace::default();
     for schedule in [Schedule::Always, Schedule::Below(0.9), Schedule::Never] {
-        let filter = ParticleFilter::new(Resampling::Systematic, schedule);
+        let rule = ResamplingRule::new(Resampling::Systematic, schedule);
+        let mut filter = BootstrapFilter::new(rule, before.len()).unwrap();
         for never in &nevers::<1>() {
-            impossible(filter.update(&mut belief, never));
-            impossible(filter.step_in_place(&mut rng, &dynamics, &mut belief, never, &mut workspace));
+            impossible(filter.update(&mut rng, &mut belief, &[never]));
+            impossible(filter.step_in_place(&mut rng, &dynamics, &mut belief, &[never]));
         }
-        no_number(filter.update(&mut belief, &NotANumber));
+        no_number(filter.update(&mut rng, &mut belief, &[&NotANumber]));
         assert_eq!(belief, before);
         assert_eq!(belief.weights(), before.weights());
         assert_eq!(belief.effective_sample_size(), before.effective_sample_size());
@@ -72,10 +72,11 @@ fn particle_filters() {
 fn the_rao_blackwellised_filter() {
     let mut rng = Stream::new(1).fast_rng();
     let before = GaussianCloud::new(cloud(), [[2.0]].into()).unwrap();
-    let (mut belief, mut workspace) = (before.clone(), CloudWorkspace::default());
-    let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.9)));
+    let mut belief = before.clone();
+    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.9));
+    let mut filter = RaoBlackwellised::new(rule, 100).unwrap();
     for never in &nevers::<1>() {
-        impossible(filter.update(&mut rng, &mut belief, never, &mut workspace));
+        impossible(filter.update(&mut rng, &mut belief, &[never]));
         assert_eq!(belief, before);
         assert_eq!(belief.means().weights(), before.means().weights());
     }

@@ -1,11 +1,16 @@
 //! Particle filters against the exact Kalman and grid filters.
 
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
-use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sensing, Sign};
-use fewbits_filters::{
-    BootstrapFilter, GuidedFilter, ParticleFilter, Particles, Resampling, Schedule, StateFilter, kalman,
+use fewbits_core::{
+    Belief, BitString, Cell, Dynamics, FullValue, Gaussian, Likelihood, Link, Message, NumberFormat, Observation,
+    Observed, Sensing, Sign,
 };
-use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
+use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
+use fewbits_filters::{
+    BootstrapFilter, GuidedFilter, GuidedParticles, MomentFilter, Particles, Resampling, ResamplingRule, Schedule,
+    StateFilter, kalman,
+};
+use fewbits_models::{Ar1, ContinuousLinear, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix1, Matrix2, SVector, Vector1, Vector2};
 use rand_pcg::Pcg64Mcg;
@@ -74,7 +79,7 @@ impl Kind {
 /// One step of either filter in place; the estimate of the log-likelihood and the effective sample size.
 fn advance<const D: usize>(
     kind: Kind,
-    filter: ParticleFilter,
+    filter: ResamplingRule,
     rng: &mut Pcg64Mcg,
     dynamics: &impl fewbits_core::GaussianDynamics<D>,
     belief: &mut Particles<D>,
@@ -84,18 +89,20 @@ fn advance<const D: usize>(
     let (next, info) = match kind {
         Kind::Bootstrap => BootstrapFilter::new(filter, count)
             .unwrap()
-            .step(rng, dynamics, belief, &[observed]),
-        Kind::Guided => GuidedFilter::new(filter, count)
-            .unwrap()
-            .step(rng, dynamics, belief, &[observed]),
-    }
-    .unwrap();
+            .step(rng, dynamics, belief, &[observed])
+            .unwrap(),
+        Kind::Guided => {
+            let mut guided = GuidedFilter::new(filter, count).unwrap();
+            let (next, info) = guided.step(rng, dynamics, &belief.clone().into(), &[observed]).unwrap();
+            (next.particles().clone(), info)
+        }
+    };
     *belief = next;
     (info.log_likelihood, info.effective_sample_size.unwrap())
 }
 
 /// Runs one filter over the scene; the final belief and the estimate of the log-likelihood.
-fn run(scene: &Scene, kind: Kind, filter: ParticleFilter, count: usize, stream: Stream) -> (Particles<2>, f64) {
+fn run(scene: &Scene, kind: Kind, filter: ResamplingRule, count: usize, stream: Stream) -> (Particles<2>, f64) {
     let mut rng = stream.fast_rng();
     let mut belief = scene.start(count, &mut rng);
     let mut log_likelihood = 0.0;
@@ -113,7 +120,7 @@ fn all_filters_agree_with_the_kalman_filter() {
     let (exact, log_likelihood) = scene.kalman();
     for kind in Kind::ALL {
         for resampling in Resampling::ALL {
-            let filter = ParticleFilter::new(resampling, Schedule::Below(0.7));
+            let filter = ResamplingRule::new(resampling, Schedule::Below(0.7));
             let (mut x, mut v, mut spread, mut evidence) = <(Moments, Moments, Moments, Moments)>::default();
             for repeat in 0..8 {
                 let stream = Stream::new(5).named("kalman").indexed(repeat);
@@ -147,7 +154,7 @@ fn the_likelihood_estimate_is_unbiased_for_every_law() {
     for kind in Kind::ALL {
         for resampling in Resampling::ALL {
             for schedule in [Schedule::Always, Schedule::Below(0.5)] {
-                let filter = ParticleFilter::new(resampling, schedule);
+                let filter = ResamplingRule::new(resampling, schedule);
                 let ratio: Moments = (0..1000)
                     .map(|repeat| {
                         let stream = Stream::new(8).named("unbiased").indexed(repeat);
@@ -169,7 +176,7 @@ fn against_the_grid(observed_at: impl Fn(usize) -> Scalar) {
         .map(|k| Observed::new(LinearSensor::direct(NOISE).unwrap(), observed_at(k)))
         .collect();
     let (exact, evidence) = crate::on_a_grid(&dynamics, [0.0, 3.0], &likelihoods);
-    let filter = ParticleFilter::default();
+    let filter = ResamplingRule::default();
     for kind in Kind::ALL {
         let mut moments = <(Moments, Moments, Moments)>::default();
         for repeat in 0..10 {
@@ -258,7 +265,7 @@ fn a_guided_filter_pays_where_the_dynamics_are_wide() {
         let start = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
         for (kind, moments, sum) in [(Kind::Bootstrap, &mut plain, 0), (Kind::Guided, &mut guided, 1)] {
             let mut belief = start.clone();
-            let (log, size) = advance(kind, ParticleFilter::default(), &mut rng, &dynamics, &mut belief, &observed);
+            let (log, size) = advance(kind, ResamplingRule::default(), &mut rng, &dynamics, &mut belief, &observed);
             moments.add(log.exp());
             sizes[sum] += size;
         }
@@ -266,4 +273,76 @@ fn a_guided_filter_pays_where_the_dynamics_are_wide() {
     let error = plain.standard_error().hypot(guided.standard_error());
     assert!((plain.mean() - guided.mean()).abs() < 4.0 * error, "{:?} {:?}", plain.estimate(), guided.estimate());
     assert!(sizes[1] > 20.0 * sizes[0], "{sizes:?}");
+}
+
+/// Another prediction in between, or a store, changes nothing of an update.
+#[test]
+fn guided_proposals_belong_to_the_belief() {
+    let scene = scene(1);
+    let new = || GuidedFilter::new(ResamplingRule::default(), 300).unwrap();
+    let (mut filter, mut rng) = (new(), Stream::new(23).fast_rng());
+    let mut belief = filter.start(&mut rng, &scene.prior).unwrap();
+    filter.predict(&mut rng, &scene.dynamics, &mut belief).unwrap();
+    let observed = scene.value(scene.measurements[0]);
+    let update = |filter: &mut GuidedFilter<2>, belief: &GuidedParticles<2>| {
+        let mut next = belief.clone();
+        filter
+            .update(&mut Stream::new(24).fast_rng(), &mut next, &[&observed])
+            .unwrap();
+        next
+    };
+    let expected = update(&mut filter, &belief);
+    let weighed = update(&mut filter, &belief.particles().clone().into());
+    assert!(expected.particles().columns() != weighed.particles().columns());
+    let mut later = expected.clone();
+    filter
+        .predict(&mut rng, &constant_velocity_1d(5.0, 2.0).unwrap(), &mut later)
+        .unwrap();
+    assert!(update(&mut filter, &belief) == expected);
+    let mut stored = serde_json::to_value(&belief).unwrap();
+    assert!(update(&mut new(), &serde_json::from_value(stored.clone()).unwrap()) == expected);
+    stored["moves"].as_array_mut().unwrap().pop();
+    let refused = serde_json::from_value::<GuidedParticles<2>>(stored)
+        .unwrap_err()
+        .to_string();
+    assert!(refused.contains("moves") && refused.contains("299 Gaussians"), "{refused}");
+}
+
+/// A report of time 1 that arrives at time 2 counts as if it had been in time.
+#[test]
+fn late_reports_reach_a_guided_filter() {
+    fn centre<F: StateFilter<1>>(rng: &mut Pcg64Mcg, filter: F) -> FusionCentre<1, F> {
+        let world = ContinuousLinear::ornstein_uhlenbeck(0.0, 20.0, 2.0).unwrap();
+        let prior = Gaussian::scalar(0.0, 2.0).unwrap();
+        let centre = FusionCentre::new(rng, world, filter, &prior).unwrap();
+        let mut centre = centre.with_window(10.0).unwrap();
+        for number in 0..2 {
+            let values = FullValue::new(0.1).unwrap();
+            let sensor = Reporting::values(LinearSensor::direct(0.1).unwrap(), values, Link::PERFECT);
+            centre.join(number, sensor).unwrap();
+        }
+        centre
+    }
+    let slot = |sensor, value: f64| {
+        let bits = Message::to_bits(&value, &NumberFormat::Double).unwrap();
+        Slot::new(sensor, BitString::default(), Observation::Received(bits))
+    };
+    let mut rng = Stream::new(25).fast_rng();
+    let mut exact = centre(&mut rng, MomentFilter);
+    exact.advance(&mut rng, 1.0).unwrap();
+    exact.receive(&mut rng, &[slot(0, 1.0), slot(1, 1.6)]).unwrap();
+    exact.advance(&mut rng, 2.0).unwrap();
+    exact.receive(&mut rng, &[slot(0, 1.2)]).unwrap();
+    let mut means = Moments::default();
+    for _ in 0..100 {
+        let mut late = centre(&mut rng, GuidedFilter::new(ResamplingRule::default(), 400).unwrap());
+        for (time, value) in [(1.0, 1.0), (2.0, 1.2)] {
+            late.advance(&mut rng, time).unwrap();
+            late.receive(&mut rng, &[slot(0, value)]).unwrap();
+        }
+        assert!(late.late(&mut rng, 1.0, &[slot(1, 1.6)]).unwrap());
+        means.add(late.estimate().mean()[0]);
+    }
+    let z = means.estimate().z_score(exact.estimate().mean()[0]);
+    assert!(z.abs() < 4.5 && means.standard_error() < 5e-3, "{:?} {z}", means.estimate());
 }

@@ -2,7 +2,7 @@
 
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Link, Observed, Sign};
-use fewbits_filters::{CloudWorkspace, GaussianCloud, ParticleFilter, RaoBlackwellised, Resampling, Schedule, kalman};
+use fewbits_filters::{GaussianCloud, RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter, kalman};
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{SVector, Vector2};
@@ -14,14 +14,14 @@ fn with_values_only_it_is_the_kalman_filter() {
     let mut exact = Gaussian::known(Vector2::new(0.0, 1.0)).unwrap();
     let mut ours = GaussianCloud::agreed(&exact, 3).unwrap();
     let mut rng = Stream::new(1).fast_rng();
-    let (filter, mut workspace) = (RaoBlackwellised::default(), CloudWorkspace::default());
+    let mut filter = RaoBlackwellised::new(ResamplingRule::default(), 3).unwrap();
     for k in 0..20 {
         let z = (k as f64 * 0.7).sin() * 5.0;
         let (next, info) = kalman::step(&dynamics, &sensor, &exact, &SVector::from([z])).unwrap();
         exact = next;
         let observed = Observed::new(sensor, Value::scalar(z, 2.0).unwrap());
-        filter.predict(&mut rng, &dynamics, &mut ours, &mut workspace).unwrap();
-        let update = filter.update(&mut rng, &mut ours, &observed, &mut workspace).unwrap();
+        filter.predict(&mut rng, &dynamics, &mut ours).unwrap();
+        let update = filter.update(&mut rng, &mut ours, &[&observed]).unwrap();
         assert!((update.log_likelihood - info.log_likelihood).abs() < 1e-9);
         assert!((ours.gaussian().mean() - exact.mean()).amax() < 1e-9);
         assert!((ours.gaussian().covariance() - exact.covariance()).amax() < 1e-9);
@@ -51,15 +51,15 @@ fn bits_cells_silence_and_loss_agree_with_the_grid() {
     .map(|factor| Observed::new(sensor, factor));
     let (exact, evidence) = crate::on_a_grid(&dynamics, [0.5, 2.0], &sequence);
     let (mut mean, mut variance, mut ratio) = <(Moments, Moments, Moments)>::default();
-    let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5)));
+    let rule = ResamplingRule::new(Resampling::Systematic, Schedule::Below(0.5));
+    let mut filter = RaoBlackwellised::new(rule, 200).unwrap();
     for repeat in 0..60 {
         let mut rng = Stream::new(4).indexed(repeat).fast_rng();
-        let mut workspace = CloudWorkspace::default();
         let mut ours = GaussianCloud::agreed(&Gaussian::scalar(0.5, 2.0).unwrap(), 200).unwrap();
         let mut total = 0.0;
         for observed in &sequence {
-            filter.predict(&mut rng, &dynamics, &mut ours, &mut workspace).unwrap();
-            let info = filter.update(&mut rng, &mut ours, observed, &mut workspace);
+            filter.predict(&mut rng, &dynamics, &mut ours).unwrap();
+            let info = filter.update(&mut rng, &mut ours, &[observed]);
             total += info.unwrap().log_likelihood;
         }
         mean.add(ours.gaussian().mean()[0]);

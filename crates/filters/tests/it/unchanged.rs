@@ -4,8 +4,8 @@
 use fewbits_core::{BitString, FullValue, Gaussian, Link, Message, NumberFormat, Observation, OnAxes};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, Health, NoiseLearning, Reporting, Slot};
 use fewbits_filters::{
-    BootstrapFilter, CloudFilter, GridFilter, GridOnAxes, MomentFilter, NoiseBank, ParticleFilter, PointMasses,
-    RaoBlackwellised, StateFilter, UniformGrid,
+    BootstrapFilter, GridFilter, GridOnAxes, MomentFilter, NoiseBank, PointMasses, RaoBlackwellised, ResamplingRule,
+    StateFilter, UniformGrid,
 };
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -98,8 +98,8 @@ fn grid() -> UniformGrid {
     UniformGrid::symmetric(9.0, 0.2).unwrap()
 }
 
-fn particles() -> ParticleFilter {
-    ParticleFilter::default()
+fn particles() -> ResamplingRule {
+    ResamplingRule::default()
 }
 
 proptest! {
@@ -110,7 +110,7 @@ proptest! {
         stays("masses", PointMasses::new(grid()), seed);
         stays("grid", GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap(), seed);
         stays("bootstrap", BootstrapFilter::new(particles(), 50).unwrap(), seed);
-        stays("cloud", CloudFilter::new(RaoBlackwellised::new(particles()), 30).unwrap(), seed);
+        stays("cloud", RaoBlackwellised::new(particles(), 30).unwrap(), seed);
         stays("bank", NoiseBank::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap(), seed);
     }
 }
@@ -169,6 +169,6 @@ fn a_centre_stored_between_prediction_and_update_goes_on_with_the_same_bits() {
     goes_on("masses", || PointMasses::new(grid()));
     goes_on("grid", || GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap());
     goes_on("bootstrap", || BootstrapFilter::new(particles(), 200).unwrap());
-    goes_on("cloud", || CloudFilter::new(RaoBlackwellised::new(particles()), 100).unwrap());
+    goes_on("cloud", || RaoBlackwellised::new(particles(), 100).unwrap());
     goes_on("bank", || NoiseBank::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap());
 }

@@ -3,8 +3,8 @@
 use fewbits_core::factor::{InCell, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Likelihood, Link, Observed};
 use fewbits_filters::{
-    CloudWorkspace, GaussianCloud, ParticleFilter, Particles, PointMass, PointMassFilter, RaoBlackwellised,
-    UniformGrid, Workspace,
+    BootstrapFilter, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, ResamplingRule,
+    StateFilter, UniformGrid,
 };
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor, ReceivedPower};
@@ -78,8 +78,10 @@ proptest! {
         let Ok(dynamics) = Ar1::new(x[6], x[7]).or_else(|_| Ar1::new(0.9, 0.5)) else { return Ok(()) };
         let sensor = LinearSensor::<1, 1>::direct(1.0).unwrap();
         let anything = Anything([x[4], x[5]]);
+        let mut bootstrap = BootstrapFilter::new(ResamplingRule::default(), 20).unwrap();
+        let mut imputing = RaoBlackwellised::new(ResamplingRule::default(), 20).unwrap();
         let mut belief = before.clone();
-        match ParticleFilter::default().step_in_place(&mut rng, &dynamics, &mut belief, &anything, &mut Workspace::default()) {
+        match bootstrap.step_in_place(&mut rng, &dynamics, &mut belief, &[&anything]) {
             Ok(info) => prop_assert!(info.log_likelihood.is_finite() && belief.mean()[0].is_finite()),
             Err(_) => prop_assert_eq!(&belief, &before),
         }
@@ -91,12 +93,12 @@ proptest! {
         for factor in factors(&x[..4]) {
             let observed = Observed::new(sensor, factor);
             let mut belief = before.clone();
-            match ParticleFilter::default().step_in_place(&mut rng, &dynamics, &mut belief, &observed, &mut Workspace::default()) {
+            match bootstrap.step_in_place(&mut rng, &dynamics, &mut belief, &[&observed]) {
                 Ok(info) => prop_assert!(info.log_likelihood.is_finite() && belief.mean()[0].is_finite(), "{:?} {:?}", dynamics, observed),
                 Err(_) => prop_assert_eq!(&belief, &before),
             }
             let mut cloud = cloud_before.clone();
-            match RaoBlackwellised::default().update(&mut rng, &mut cloud, &observed, &mut CloudWorkspace::default()) {
+            match imputing.update(&mut rng, &mut cloud, &[&observed]) {
                 Ok(info) => prop_assert!(info.log_likelihood.is_finite() && cloud.gaussian().is_finite(), "{:?} {:?}", dynamics, observed),
                 Err(_) => prop_assert_eq!(&cloud, &cloud_before),
             }

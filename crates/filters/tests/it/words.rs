@@ -6,9 +6,7 @@ use fewbits_core::{
     Scheme,
 };
 use fewbits_filters::centre::{Event, FusionCentre, Reporting, Slot};
-use fewbits_filters::{
-    CloudFilter, MomentFilter, ParticleFilter, PointMasses, RaoBlackwellised, StateFilter, UniformGrid,
-};
+use fewbits_filters::{MomentFilter, PointMasses, RaoBlackwellised, ResamplingRule, StateFilter, UniformGrid};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, Vector1};
@@ -117,6 +115,6 @@ fn a_word_that_does_not_decode_is_no_word_of_the_sensor() {
     assert_eq!(exclusions(|| MomentFilter, 5), 0);
     let grid = UniformGrid::symmetric(6.0, 0.1).unwrap();
     assert_eq!(exclusions(|| PointMasses::new(grid), 1), 0);
-    let particles = RaoBlackwellised::new(ParticleFilter::default());
-    assert_eq!(exclusions(|| CloudFilter::new(particles, 50).unwrap(), 1), 0);
+    let particles = ResamplingRule::default();
+    assert_eq!(exclusions(|| RaoBlackwellised::new(particles, 50).unwrap(), 1), 0);
 }

@@ -3,7 +3,7 @@
 use fewbits_baselines::pf_mpa::{MessagePassing, ProductSampler};
 use fewbits_core::{Error, Gaussian, Observed};
 use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, Workspace};
+use fewbits_filters::{BootstrapFilter, ResamplingRule};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{
     AccelerationChain, BiasedRangeSensor, Encoder, GridFilter, GridWorkspace, GuidedGaussian, Linearised, Network,
@@ -105,8 +105,8 @@ fn a_failed_step_leaves_the_belief_as_it_was() {
         .map(|one| Observed::new(one.sensing.on_axes::<6>(POSITION).unwrap(), one.factor.clone()))
         .collect();
     let motion = WithManoeuvre::at(target, 0);
-    let failed =
-        ParticleFilter::default().step_in_place(&mut rng, &motion, &mut belief, &sensed, &mut Workspace::default());
+    let mut filter = BootstrapFilter::new(ResamplingRule::default(), 5).unwrap();
+    let failed = filter.step_in_place(&mut rng, &motion, &mut belief, &[&sensed]);
     assert!(matches!(failed, Err(Error::Impossible)) || failed.is_ok());
     if failed.is_err() {
         assert_eq!(belief, before);

@@ -5,7 +5,7 @@ use fewbits_core::laws::{factor, likelihood, message, scheme};
 use fewbits_core::{
     Belief, Dynamics, Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, Scheme, Sensing,
 };
-use fewbits_filters::{BootstrapFilter, MomentFilter, ParticleFilter, StateFilter};
+use fewbits_filters::{BootstrapFilter, MomentFilter, ResamplingRule, StateFilter};
 use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor};
@@ -147,7 +147,7 @@ fn tracking_error<F: StateFilter<4>>(mut filter: F, start: &Gaussian<4>) -> f64 
 fn every_filter_of_the_library_tracks_with_it() {
     let covariance = nalgebra::Matrix4::from_diagonal(&Vector4::new(0.04, 0.01, 0.04, 0.01));
     let start = Gaussian::new(Vector4::new(13.0, 0.0, 17.0, -0.6), covariance).unwrap();
-    let particles = BootstrapFilter::new(ParticleFilter::default(), 4000).unwrap();
+    let particles = BootstrapFilter::new(ResamplingRule::default(), 4000).unwrap();
     let (particle, assumed) = (tracking_error(particles, &start), tracking_error(MomentFilter, &start));
     assert!(particle < 0.4 && assumed < 0.4, "{particle} {assumed}");
 }
