@@ -194,15 +194,21 @@ fn rounded<const D: usize>(
     // Of `keep P keep'`, term by term, and of the mean.
     let products = congruence(&keep.abs(), &prior.covariance().abs()).diagonal() * ROUNDING;
     let mean = prior.mean() * ROUNDING;
-    let mut rounding = SMatrix::from_diagonal(&(products + mean.component_mul(&mean)));
-    let mut wider = covariance + rounding;
+    let mut rounding: SVector<f64, D> = products + mean.component_mul(&mean);
+    // The square of a mean may overflow; the largest number says as much.
+    let widened = |rounding: &SVector<f64, D>| {
+        let mut wider = covariance;
+        (0..D).for_each(|i| wider[(i, i)] = (covariance[(i, i)] + rounding[i]).min(f64::MAX));
+        wider
+    };
+    let mut wider = widened(&rounding);
     // A few times the rounding at most; twenty doublings are for what is no covariance already.
     for _ in 0..20 {
         if semidefinite_factor("covariance", &wider).is_ok() {
             break;
         }
         rounding *= 2.0;
-        wider = covariance + rounding;
+        wider = widened(&rounding);
     }
     wider
 }

@@ -60,7 +60,12 @@ fn wild(rng: &mut dyn Rng) -> Slot {
         0 => Observation::Nothing,
         1 => Observation::Lost,
         2 => Observation::Received(report),
-        3 => value(f64::from_bits(rng.random())),
+        // What is no number is among the junk.
+        3 => value(
+            Some(f64::from_bits(rng.random()))
+                .filter(|x| x.is_finite())
+                .unwrap_or(1e300),
+        ),
         _ => value(rng.sample::<f64, _>(StandardNormal)),
     };
     Slot::new(sensor, feedback, observation)
