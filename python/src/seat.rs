@@ -2,7 +2,7 @@
 
 use crate::error::{Outcome, refused};
 use fewbits_cfwmd::scheme::CovarianceFeedback;
-use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, OnAxes, SchemeNode, Sensing, SensorNode};
+use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, SchemeNode, SensorNode};
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{RemoteSensor, Reporting};
 use fewbits_models::LinearSensor;
@@ -86,20 +86,10 @@ impl Seat {
             let ask = |state: &Gaussian<D>, _: &Gaussian<1>| *state;
             return Ok(Box::new(Reporting::new(self.sensing::<D>()?, self.censored::<D>(threshold)?, link, ask)));
         }
-        match &self.reads {
-            Reads::Axis(axis) => {
-                self.sensing::<D>()?;
-                self.reporting(OnAxes::<_, D, 1>::new(LinearSensor::direct(self.variance)?, [*axis])?, link)
-            }
-            Reads::Sum(_) => self.reporting(self.sensing::<D>()?, link),
-        }
+        self.reporting(self.sensing::<D>()?, link)
     }
 
-    fn reporting<const D: usize>(
-        &self,
-        sensing: impl Sensing<D, 1> + Clone + 'static,
-        link: Link,
-    ) -> Outcome<Box<dyn RemoteSensor<D>>> {
+    fn reporting<const D: usize>(&self, sensing: LinearSensor<D, 1>, link: Link) -> Outcome<Box<dyn RemoteSensor<D>>> {
         Ok(match self.send {
             Sends::Bit => {
                 let ask = |_: &Gaussian<D>, m: &Gaussian<1>| m.mean()[0];

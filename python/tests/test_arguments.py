@@ -198,3 +198,14 @@ def test_any_bytes_decode_or_are_refused(content, kind, rows):
         fb.decode(frame + struct.pack("<I", zlib.crc32(frame)))
     except fb.Error as error:
         assert "panicked" not in str(error)
+
+
+def test_more_rows_than_memory_are_refused():
+    import struct
+    import zlib
+
+    whole = fb.encode(np.zeros(3))
+    for rows in (2**45, 2**60, 2**64 - 1):
+        frame = whole[:12] + struct.pack("<Q", rows) + whole[20:-4]
+        with pytest.raises(fb.DecodeError, match="memory"):
+            fb.decode(frame + struct.pack("<I", zlib.crc32(frame)))
