@@ -18,8 +18,8 @@ if rustup target list --installed 2>/dev/null | grep -qx wasm32-unknown-unknown;
   [ "$quick" = quick ] && [ -f "$page" ] || (cd web && CARGO_TARGET_DIR="$target/web" cargo run --quiet --release --locked --package pack)
 fi
 if [ -f "$page" ]; then
-  cp "$page" "$book/page.html"
-  parts+=("Try it in the browser=page.html")
+  cp "$page" "$book/try.html"
+  parts+=("Try it in the browser=try.html")
 else
   echo "skipped: the page: rustup target add wasm32-unknown-unknown"
 fi

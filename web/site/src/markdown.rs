@@ -120,7 +120,14 @@ impl Page {
         let mut out = String::new();
         html::push_html(&mut out, events.collect::<Vec<_>>().into_iter());
         // Wide tables and programs scroll within themselves.
-        out.replace("<table>", "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table\"><table>")
+        let mut parts = out.split("<table>");
+        let mut wrapped = parts.next().unwrap_or_default().to_owned();
+        for (i, part) in parts.enumerate() {
+            let label = format!("Table {} of this page", i + 1);
+            wrapped +=
+                &format!("<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{label}\"><table>{part}");
+        }
+        wrapped
             .replace("</table>", "</table></div>")
             .replace("<pre>", "<pre tabindex=\"0\">")
     }

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let cells = text
         .lines()
         .skip(1)
-        .map(|line| line.parse().map(Some))
+        .map(|line| line.parse::<f64>().map(Some))
         .collect::<Result<Vec<_>, _>>()?;
     let finite = || cells.iter().flatten().copied();
     let range = finite().reduce(f64::min).zip(finite().reduce(f64::max));
