@@ -46,10 +46,13 @@ fn install() {
     });
 }
 
-/// Removes a file if a signal ends the command.
-pub(crate) fn remember(path: &Path) {
+/// Makes a file that is removed if a signal ends the command. A signal waits until it is made and known.
+pub(crate) fn remember<T, E>(make: impl FnOnce() -> Result<(T, PathBuf), E>) -> Result<(T, PathBuf), E> {
     install();
-    state().temporaries.push(path.to_owned());
+    let mut state = state();
+    let made = make()?;
+    state.temporaries.push(made.1.clone());
+    Ok(made)
 }
 
 /// The file is finished or removed.
