@@ -71,18 +71,6 @@ fn standard(_is_input: bool) -> Option<Identity> {
     None
 }
 
-/// Whether an open file is the one that stands at `path` now.
-#[cfg(unix)]
-pub(crate) fn is_at(file: &File, path: &Path) -> bool {
-    file.metadata().is_ok_and(|found| number(&found) == identity(path))
-}
-
-/// Whether an open file is the one that stands at `path` now. Here an open file cannot be replaced.
-#[cfg(not(unix))]
-pub(crate) fn is_at(_file: &File, _path: &Path) -> bool {
-    true
-}
-
 /// Whether a file can be read twice: neither standard input nor a pipe nor a device.
 pub(crate) fn is_regular(file: &str) -> bool {
     file != "-" && std::fs::metadata(file).is_ok_and(|found| found.is_file())

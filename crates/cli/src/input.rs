@@ -312,8 +312,10 @@ impl Table {
         };
         let mut cells = Vec::with_capacity(self.batch.columns.len());
         for (i, column) in self.batch.columns.iter().enumerate() {
-            if matches!(column, fewbits_table::Cells::Times(_)) && self.batch.times.is_empty() {
-                return Err(self.cell_error(i, String::new()));
+            if let fewbits_table::Cells::Times(times) = column
+                && let Some(time) = times[row].filter(|_| self.batch.times.is_empty())
+            {
+                return Err(self.cell_error(i, time.shown(Scale::Local, time.decimals())));
             }
             cells.push(column.number(row).map_err(|cell| self.cell_error(i, cell))?);
         }
@@ -338,7 +340,7 @@ impl Table {
             column: self.names[index].clone(),
             cell,
             problem,
-            mend: mend.to_owned(),
+            mend: mend.replace("--without", &format!("--without {}", fewbits_table::names::quoted(&self.names[index]))),
         })
     }
 

@@ -74,14 +74,7 @@ pub(crate) fn chosen(options: &TableOptions) -> Result<fewbits_table::Table, Err
     match (&options.time_column, &options.time) {
         (Some(list), _) => table.set_time(&time_columns(&table, list)).map_err(&failed)?,
         (None, Some(_)) if !stored.is_empty() => table.set_time(&stored).map_err(&failed)?,
-        (None, Some(_)) => {
-            if !table.find_time().map_err(&failed)? {
-                let first = table.columns().first().map(|column| column.name.clone());
-                table
-                    .set_time(&first.into_iter().collect::<Vec<_>>())
-                    .map_err(&failed)?;
-            }
-        }
+        (None, Some(_)) => table.require_time().map_err(&failed)?,
         (None, None) => {}
     }
     if let Some(text) = &options.time {

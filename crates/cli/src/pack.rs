@@ -11,10 +11,10 @@ use crate::target::{self, Target};
 use crate::{Ending, bounds};
 use fewbits_recipes::bounds::exact;
 use fewbits_record::{Bound, Column, Effort, Playback, Recorder, Schema, TimeBase};
-use fewbits_table::Kind;
+use fewbits_table::{Kind, names};
 use serde::Serialize;
 use std::fs::File;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -43,6 +43,7 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         );
         return Err(Error::content(open.file(), problem));
     }
+    check_words(&open)?;
     let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
     for (i, spec) in specs.iter_mut().enumerate() {
         // Between two words there is nothing.
@@ -83,16 +84,27 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
 
 /// The column with its unit, or with its words.
 fn with_unit(table: &Table, index: usize, column: Column) -> Result<Column, Error> {
-    let unit = table.unit(index);
-    if table.kind(index) == Kind::Words && unit.is_empty() {
-        let problem = format!(
-            "column `{}` has words: together they may have 1024 bytes, and those of a pipe must stand in its first lines: leave the \
-             column out with --without",
-            crate::say::name(column.name())
-        );
-        return Err(Error::content(table.file(), problem));
+    column
+        .with_unit(table.unit(index))
+        .map_err(Error::recording(table.file()))
+}
+
+/// Refuses columns whose words do not fit a header.
+fn check_words(table: &Table) -> Result<(), Error> {
+    let is_too_long = |i: &usize| table.kind(*i) == Kind::Words && table.unit(*i).is_empty();
+    let found: Vec<String> = (0..table.names.len())
+        .filter(is_too_long)
+        .map(|i| names::quoted(&table.names[i]))
+        .collect();
+    if found.is_empty() {
+        return Ok(());
     }
-    column.with_unit(unit).map_err(Error::recording(table.file()))
+    let problem = format!(
+        "words of a column may have 1024 bytes together, and those of a pipe must stand in its first lines: leave such columns out \
+         with --without {}",
+        crate::say::name(&found.join(","))
+    );
+    Err(Error::content(table.file(), problem))
 }
 
 /// Warns if a bound is a share of a range that few cells make.
@@ -206,8 +218,8 @@ fn continued(options: &TableOptions, schema: &Schema, file: &str) -> Result<Tabl
     })
 }
 
-/// Continues a recording. Of a file, the rows go into a copy, which then replaces the recording: a table that is refused, a kill and a full
-/// disk leave the recording as it was.
+/// Continues a recording. Appending is a transaction of the recorder: a table that is refused, a kill and a full disk leave the recording
+/// as it was, and of two commands that append to one recording the second is refused.
 fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, Option<Error>), Error> {
     let file = path.display().to_string();
     let schema = Playback::open(path).map_err(Error::recording(&file))?.schema().clone();
@@ -224,19 +236,11 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     };
     let table = open()?;
     // A live table is appended as it comes: its rows cannot be read again.
-    if target::is_live() {
-        let recorder = Recorder::resume(path).map_err(Error::recording(&file))?;
-        return appended(table, recorder.with_effort(effort), options, &file);
+    if !target::is_live() {
+        TableRows::new(open()?, schema.time()).check()?;
     }
-    TableRows::new(open()?, schema.time()).check()?;
-    // Of two commands that append to one recording the second is refused, instead of losing the rows of the first.
-    let lock = target::lock(path)?;
-    let copy = Target::copy_of(path)?;
-    let recorder = Recorder::resume(copy.unfinished()).map_err(Error::recording(&file))?;
-    let done = appended(table, recorder.with_effort(effort), options, &file)?;
-    copy.finish()?;
-    drop(lock);
-    Ok(done)
+    let recorder = Recorder::resume(path).map_err(Error::recording(&file))?;
+    appended(table, recorder.with_effort(effort), options, &file)
 }
 
 fn appended(
@@ -256,12 +260,30 @@ fn create(options: &PackOptions, effort: Effort) -> Result<(Done, Option<Error>)
     let (table, schema) = schema(&options.table, &options.bounds)?;
     let sink = Target::open_binary(options.output.as_deref())?;
     let file = sink.name().to_owned();
-    let recorder = Recorder::new(Counted { sink, bytes: 0 }, schema.clone()).with_effort(effort);
+    let mut recorder = Recorder::new(Counted { sink, bytes: 0 }, schema.clone()).with_effort(effort);
+    if is_regular(&options.table.file) {
+        let identity = identity(&options.table.file, &schema).map_err(Error::io(&options.table.file, "read"))?;
+        recorder = recorder.with_identity(identity);
+    }
     let (counted, rows, error) = fill(table, recorder, options, &file)?;
     if error.is_none() {
         counted.sink.finish()?;
     }
     Ok((Done::of(rows, counted.bytes, &schema), error))
+}
+
+/// An identity that depends on the bytes of the table and on the schema: the same command gives the same bytes, also after a kill.
+fn identity(file: &str, schema: &Schema) -> std::io::Result<u32> {
+    // FNV-1a.
+    let add = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+    let mut hash = format!("{schema:?}").as_bytes().iter().fold(0xcbf2_9ce4_8422_2325, add);
+    let (mut source, mut chunk) = (File::open(file)?, vec![0; 1 << 16]);
+    loop {
+        match source.read(&mut chunk)? {
+            0 => return Ok((hash ^ (hash >> 32)) as u32),
+            count => hash = chunk[..count].iter().fold(hash, add),
+        }
+    }
 }
 
 /// Runs the task.

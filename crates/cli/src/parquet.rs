@@ -4,13 +4,14 @@ use crate::clock;
 use crate::error::Error;
 use crate::target::Target;
 use arrow_array::cast::AsArray;
-use arrow_array::types::Int64Type;
-use arrow_array::{ArrayRef, Float64Array, RecordBatch};
-use arrow_schema::{DataType, Field};
+use arrow_array::types::{Int64Type, TimestampSecondType};
+use arrow_array::{ArrayRef, Float64Array, RecordBatch, TimestampMillisecondArray};
+use arrow_schema::{DataType, TimeUnit};
 use fewbits_record::{Block, Schema, TimeBase, TimeFormat};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -35,13 +36,27 @@ fn is_seconds(time: TimeBase) -> bool {
     )
 }
 
-/// The fields of a recording, times in seconds as doubles.
-fn fields_with_seconds(schema: &Schema) -> arrow_schema::Schema {
-    let own = schema.to_arrow();
-    if !is_seconds(schema.time()) {
-        return own;
+/// The type of times in Parquet: seconds are doubles, and timestamps of whole seconds, which Parquet has not, are milliseconds.
+fn type_of_times(time: TimeBase, own: &DataType) -> DataType {
+    match own {
+        _ if is_seconds(time) => DataType::Float64,
+        DataType::Timestamp(TimeUnit::Second, zone) => DataType::Timestamp(TimeUnit::Millisecond, zone.clone()),
+        own => own.clone(),
     }
-    let time = Arc::new(Field::new("time", DataType::Float64, false));
+}
+
+/// The fields of a recording with the types of Parquet.
+fn fields_of(schema: &Schema) -> arrow_schema::Schema {
+    let own = schema.to_arrow();
+    let first = own.field(0);
+    let time = first
+        .clone()
+        .with_data_type(type_of_times(schema.time(), first.data_type()));
+    let time = Arc::new(if is_seconds(schema.time()) {
+        time.with_metadata(HashMap::new())
+    } else {
+        time
+    });
     arrow_schema::Schema::new(
         std::iter::once(time)
             .chain(own.fields().iter().skip(1).cloned())
@@ -49,27 +64,29 @@ fn fields_with_seconds(schema: &Schema) -> arrow_schema::Schema {
     )
 }
 
-/// A batch whose ticks of seconds are the doubles next to them.
-fn with_seconds(batch: RecordBatch, time: TimeBase) -> Result<RecordBatch, arrow_schema::ArrowError> {
-    if !is_seconds(time) {
-        return Ok(batch);
-    }
-    let ticks = batch.column(0).as_primitive::<Int64Type>();
-    // The text of a tick is exact, and its double the nearest.
-    let seconds = ticks
-        .values()
-        .iter()
-        .map(|tick| clock::shown(*tick, time).parse().unwrap_or(f64::NAN));
-    let seconds: ArrayRef = Arc::new(Float64Array::from_iter_values(seconds));
-    let columns: Vec<ArrayRef> = std::iter::once(seconds)
+/// A batch with the types of [`fields_of`].
+fn with_times(batch: &RecordBatch, schema: &Schema) -> Result<RecordBatch, Error> {
+    let time = schema.time();
+    let own = batch.column(0);
+    let times: ArrayRef = match own.data_type() {
+        _ if is_seconds(time) => {
+            // The text of a tick is exact, and its double the nearest.
+            let seconds = |tick: &i64| clock::shown(*tick, time).parse().unwrap_or(f64::NAN);
+            Arc::new(Float64Array::from_iter_values(own.as_primitive::<Int64Type>().values().iter().map(seconds)))
+        }
+        DataType::Timestamp(TimeUnit::Second, zone) => {
+            let ticks = own.as_primitive::<TimestampSecondType>().values();
+            let stamps: Option<Vec<i64>> = ticks.iter().map(|tick| tick.checked_mul(1000)).collect();
+            let stamps = stamps
+                .ok_or_else(|| Error::content("Parquet", "a time is beyond its timestamps: write CSV instead"))?;
+            Arc::new(TimestampMillisecondArray::from(stamps).with_timezone_opt(zone.clone()))
+        }
+        _ => own.clone(),
+    };
+    let columns: Vec<ArrayRef> = std::iter::once(times)
         .chain(batch.columns().iter().skip(1).cloned())
         .collect();
-    let own = batch.schema();
-    let field = Arc::new(Field::new("time", DataType::Float64, false));
-    let fields: Vec<_> = std::iter::once(field)
-        .chain(own.fields().iter().skip(1).cloned())
-        .collect();
-    RecordBatch::try_new(Arc::new(arrow_schema::Schema::new(fields)), columns)
+    RecordBatch::try_new(Arc::new(fields_of(schema)), columns).map_err(refused("Parquet"))
 }
 
 /// Rows of a recording as Parquet.
@@ -93,7 +110,7 @@ impl Sink {
             .and_then(|columns| Schema::new(columns, schema.time()))
             .map_err(Error::recording(&file))?;
         let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-        let fields = fields_with_seconds(&schema);
+        let fields = fields_of(&schema);
         let writer = ArrowWriter::try_new(target, fields.into(), Some(properties));
         let mut sink = Self {
             writer: writer.map_err(refused(&file))?,
@@ -129,7 +146,7 @@ impl Sink {
             .block
             .to_record_batch(&self.schema)
             .map_err(Error::recording(&self.file))?;
-        let batch = with_seconds(batch, self.schema.time()).map_err(refused(&self.file))?;
+        let batch = with_times(&batch, &self.schema)?;
         self.clear();
         self.writer.write(&batch).map_err(refused(&self.file))
     }

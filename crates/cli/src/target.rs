@@ -7,8 +7,8 @@
 //! or, if there is an earlier file, beside it under a name that ends in `.partial`, which is kept if the task fails.
 
 use crate::error::Error;
+use crate::interrupt;
 use crate::say::say;
-use crate::{files, interrupt};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -21,8 +21,6 @@ const MAX_NAME: usize = 200;
 
 /// End of the name of an unfinished file.
 const UNFINISHED: &str = ".fewbits-new";
-/// What a recorder adds to the name of the recording that it appends to, for its own file beside it.
-const APPENDING: &str = ".append";
 
 /// Whether the task's source is live; set once from the arguments.
 static IS_LIVE: AtomicBool = AtomicBool::new(false);
@@ -130,28 +128,6 @@ impl Target {
         Self::open(path)
     }
 
-    /// A copy of a file, which replaces the file when it is finished.
-    pub(crate) fn copy_of(path: &Path) -> Result<Self, Error> {
-        let mut copy = Self::open(Some(path))?;
-        let failed = Error::io(&copy.name, "copy");
-        let mut source = File::open(path).map_err(&failed)?;
-        std::io::copy(&mut source, &mut copy).map_err(&failed)?;
-        // The recorder that continues the copy locks it itself. Nobody else writes here: the caller holds the lock of the file.
-        if let Some(file) = &copy.file {
-            let _ = file.unlock();
-        }
-        Ok(copy)
-    }
-
-    /// Where the file stands until it is finished.
-    pub(crate) fn unfinished(&self) -> &Path {
-        match &self.place {
-            Place::Beside { temporary, .. } => temporary,
-            Place::New { path, .. } => path,
-            Place::Direct => Path::new(&self.name),
-        }
-    }
-
     /// The name in messages.
     pub(crate) fn name(&self) -> &str {
         &self.name
@@ -175,28 +151,6 @@ impl Target {
             }
         }
         Ok(())
-    }
-}
-
-/// Locks a file that is to be replaced, as long as the result lives.
-///
-/// # Errors
-/// If another command holds the lock.
-pub(crate) fn lock(path: &Path) -> Result<File, Error> {
-    let name = path.display().to_string();
-    loop {
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .open(path)
-            .map_err(Error::io(&name, "open"))?;
-        if let Err(TryLockError::WouldBlock) = file.try_lock() {
-            return Err(Error::content(&name, "another command writes to it: try again when it has ended"));
-        }
-        // Between opening and locking another command may have replaced the file: the lock is then that of the old one.
-        if files::is_at(&file, path) {
-            return Ok(file);
-        }
     }
 }
 
@@ -243,14 +197,12 @@ fn remove_abandoned(own: &Path, kept: &str) {
     for entry in entries.flatten() {
         let name = entry.file_name();
         let Some(name) = name.to_str() else { continue };
-        // A recorder that appends to a copy keeps a file of its own beside it.
-        let unfinished = name.strip_suffix(APPENDING).unwrap_or(name);
-        let is_other = unfinished.starts_with(kept) && unfinished.ends_with(UNFINISHED);
-        if !is_other || own.file_name().is_some_and(|own| own == unfinished) {
+        let is_other = name.starts_with(kept) && name.ends_with(UNFINISHED);
+        if !is_other || own.file_name().is_some_and(|own| own == name) {
             continue;
         }
         let path = entry.path();
-        if is_abandoned(&path) && is_abandoned(&path.with_file_name(unfinished)) {
+        if is_abandoned(&path) {
             let _ = std::fs::remove_file(&path);
         }
     }

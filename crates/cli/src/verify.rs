@@ -65,7 +65,8 @@ fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result
     let (mut columns, mut matches) = (Vec::new(), Vec::new());
     for (index, column) in schema.columns().iter().enumerate() {
         let name = column.name();
-        if !options.columns.is_empty() && !options.columns.iter().any(|asked| asked == name) {
+        let is_asked = options.columns.is_empty() || options.columns.iter().any(|asked| asked == name);
+        if !is_asked || options.without().iter().any(|out| out == name) {
             continue;
         }
         let found = (0..all.len()).find(|i| all[*i] == name && Some(*i) != time && !columns.contains(i));
@@ -95,6 +96,8 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
         time: None,
         time_column: None,
         columns: Vec::new(),
+        // Columns are chosen by the recording's.
+        without: None,
         ..options.table.clone()
     })?;
     let matches = matched(&mut table, &options.table, &schema)?;

@@ -47,7 +47,7 @@ pub struct Recorder<W> {
     /// The append that is undone if the recorder is dropped before it is complete.
     append: Append,
     effort: Effort,
-    /// Identity of a recording of several blocks; `None` for a random one.
+    /// The identity of a new recording, if it is not random.
     identity: Option<u32>,
     broken: bool,
 }
@@ -128,13 +128,15 @@ impl<W: Write> Recorder<W> {
         Self { effort, ..self }
     }
 
-    /// Sets the identity of a recording of several blocks (default: random). Blocks of a recording of another identity are refused in its
-    /// place, so two recordings should not share one. Needed where the standard library has no source of randomness, as in a browser, and where
-    /// equal tables must give equal bytes. Has no effect once the header is written.
+    /// Sets the identity that tells this recording from others with equal columns, so that the same rows give the same bytes. By default it
+    /// is random. Blocks of recordings with one identity and equal headers can be exchanged unnoticed: derive it from what is recorded. No
+    /// effect on a recording that is resumed.
     #[must_use]
     pub fn with_identity(self, identity: u32) -> Self {
-        let identity = Some(identity);
-        Self { identity, ..self }
+        Self {
+            identity: Some(identity),
+            ..self
+        }
     }
 
     /// Columns and time of the recording.

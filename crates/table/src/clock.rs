@@ -1,14 +1,15 @@
 //! Which columns give the time of a row, and how it is written there.
 
+use crate::civil;
 use crate::column::{Column, Kind};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::guess;
 use crate::time::{Scale, Unit};
-use crate::written::{self, Clock, Order, Problem, Syntax};
+use crate::written::{self, Clock, Order, Part, Problem, Syntax};
 
 /// Names of a column that is taken as time, if no column has dates.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 27] = [
     "second",
     "sec",
     "zeitstempel",
@@ -27,34 +28,126 @@ const NAMES: [&str; 18] = [
     "zeit",
     "datum",
     "utc",
+    "x_value",
+    "created_at",
+    "last_changed",
+    "mess_datum",
+    "yyyymmdd",
+    "tmstamp",
+    "time stamp",
+    "fecha",
+    "zeitpunkt",
+];
+/// Names of a column of times of day beside one of dates.
+const OF_DAY: [&str; 10] = [
+    "time", "zeit", "uhrzeit", "heure", "hora", "ora", "tijd", "gps_time", "hhmm", "hhmmss",
 ];
 
 fn is_time_name(name: &str) -> bool {
     let lower = name.to_lowercase();
     NAMES.contains(&lower.as_str())
-        || ["timestamp", "time_", "time ", "date time", "datetime", "time("]
-            .iter()
-            .any(|begin| lower.starts_with(begin))
+        || [
+            "timestamp",
+            "time_",
+            "time ",
+            "date time",
+            "datetime",
+            "date-time",
+            "time(",
+        ]
+        .iter()
+        .any(|begin| lower.starts_with(begin))
         || ["_time", " time", "_timestamp", "_date"]
             .iter()
             .any(|end| lower.ends_with(end))
 }
 
-/// The columns that give the time by their kinds and names; `None` if none does for certain.
-pub(crate) fn guess(columns: &[Column], dialect: &Dialect, is_certain: bool) -> Option<Vec<usize>> {
+/// What the cells of a column say of the time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Says {
+    Nothing,
+    /// A date and perhaps a time of day.
+    Date,
+    /// A date alone.
+    Day,
+    OfDay,
+}
+
+fn says(column: &Column, sample: &[String], has_named: bool) -> Says {
+    let cells: Vec<&str> = sample.iter().map(String::as_str).collect();
+    let name = column.own_name.to_lowercase();
+    if cells.is_empty() {
+        // Of a typed column no texts are kept.
+        return if column.kind == Kind::Time {
+            Says::Date
+        } else {
+            Says::Nothing
+        };
+    }
+    let is_compact = cells.iter().all(|cell| civil::is_compact(cell));
+    if is_compact {
+        // Equal numbers, and numbers beside a column that is named as the time, are no times unless the name says so.
+        let varies = cells.iter().any(|cell| *cell != cells[0]);
+        let is_time = is_time_name(&name) || (varies && !has_named);
+        return match (is_time, cells.iter().all(|cell| cell.len() == 8)) {
+            (false, _) => Says::Nothing,
+            (true, true) => Says::Day,
+            (true, false) => Says::Date,
+        };
+    }
+    if column.kind != Kind::Time {
+        let is_short = |cell: &&str| cell.len() <= 6 && cell.bytes().all(|c| c.is_ascii_digit());
+        let is_of_day = OF_DAY.contains(&name.as_str()) && cells.iter().all(is_short);
+        return if is_of_day { Says::OfDay } else { Says::Nothing };
+    }
+    let is_of_day = |cell: &&str| civil::of_day(cell.trim()).is_some();
+    if cells.iter().all(is_of_day) {
+        Says::OfDay
+    } else if cells.iter().any(|cell| cell.contains(':') || cell.len() > 16) {
+        Says::Date
+    } else {
+        Says::Day
+    }
+}
+
+/// The columns that give the time by their cells and names; `None` if none does for certain.
+pub(crate) fn guess(
+    columns: &[Column],
+    samples: &[&[String]],
+    dialect: &Dialect,
+    is_certain: bool,
+) -> Option<Vec<usize>> {
     let named = |name: &str| columns.iter().position(|column| column.own_name.to_lowercase() == name);
     if dialect.format.as_deref() == Some("EPW") {
         return Some((0..5).collect());
     }
-    if let (Some(date), Some(time)) = (named("date"), named("time"))
-        && columns[date].kind == Kind::Time
-    {
-        return Some(vec![date, time]);
+    let has_named = NAMES.iter().any(|name| named(name).is_some());
+    let said: Vec<Says> = columns
+        .iter()
+        .zip(samples)
+        .map(|(column, sample)| says(column, sample, has_named))
+        .collect();
+    let of = |what: Says| (0..said.len()).filter(|i| said[*i] == what).collect::<Vec<usize>>();
+    let (dates, days, clocks) = (of(Says::Date), of(Says::Day), of(Says::OfDay));
+    if let ([], [day], [_, ..]) = (dates.as_slice(), days.as_slice(), clocks.as_slice()) {
+        let beside = clocks
+            .first()
+            .filter(|clock| clocks.len() == 1 && clock.abs_diff(*day) == 1);
+        let by_name = clocks
+            .iter()
+            .find(|clock| OF_DAY.contains(&columns[**clock].own_name.to_lowercase().as_str()));
+        if let Some(clock) = by_name.or(beside) {
+            return Some(vec![*day, *clock]);
+        }
     }
-    let dated: Vec<usize> = (0..columns.len()).filter(|i| columns[*i].kind == Kind::Time).collect();
+    let dated = if dates.is_empty() { days } else { dates };
+    if let (true, Some(calendar)) = (dated.is_empty(), calendar(columns)) {
+        return Some(calendar);
+    }
+    let dated = if dated.is_empty() { clocks } else { dated };
     match dated.as_slice() {
-        [one] => return Some(vec![*one]),
-        [] => {}
+        [one] if columns[*one].kind == Kind::Time || said[*one] != Says::OfDay => return Some(vec![*one]),
+        [] | [_] => {}
         several => {
             let by_name = several
                 .iter()
@@ -73,22 +166,80 @@ pub(crate) fn guess(columns: &[Column], dialect: &Dialect, is_certain: bool) -> 
     exact.or_else(like).map(|column| vec![column])
 }
 
-/// Meanings of columns of numbers that give a date together.
-fn parts(names: &[&str]) -> Option<Vec<usize>> {
-    const MEANINGS: [&[&str]; 6] = [
-        &["year", "yyyy", "yr", "jahr"],
-        &["month", "mm", "mo", "monat"],
-        &["day", "dd", "dy", "tag"],
-        &["hour", "hh", "hr", "stunde"],
-        &["minute", "min", "mi", "mn"],
-        &["second", "sec", "ss", "seconds"],
+/// The part of a date that a name means, behind the parts of other columns.
+fn part(name: &str, before: &[Part]) -> Option<Part> {
+    const MEANINGS: [(Part, &[&str]); 8] = [
+        (Part::Year, &["year", "yyyy", "yr", "yy", "#yy", "jahr"]),
+        (Part::Month, &["month", "mm", "mo", "mon", "monat"]),
+        (Part::Day, &["day", "dd", "dy", "tag"]),
+        (Part::Hour, &["hour", "hh", "hr", "stunde"]),
+        (Part::Minute, &["minute", "min", "mi", "mn"]),
+        (Part::Second, &["second", "sec", "ss", "seconds"]),
+        (Part::DayOfYear, &["doy", "jday", "julian", "julian_day", "day_of_year", "yday", "ddd"]),
+        (Part::OfDay, &["time", "hhmm", "hrmn", "hour_minute", "uhrzeit"]),
     ];
-    let meaning = |name: &&str| {
-        let lower = name.to_lowercase();
-        MEANINGS.iter().position(|words| words.contains(&lower.as_str()))
+    let lower = name.to_lowercase();
+    // `MM` and `mm` stand for months and minutes.
+    if lower == "mm" && before.contains(&Part::Hour) {
+        return Some(Part::Minute);
+    }
+    let found = MEANINGS.iter().find(|(_, words)| words.contains(&lower.as_str()))?.0;
+    (!before.contains(&found)).then_some(found)
+}
+
+/// Columns side by side that give a date by their names, from the year on.
+fn calendar(columns: &[Column]) -> Option<Vec<usize>> {
+    let first = columns
+        .iter()
+        .position(|column| part(&column.own_name, &[]) == Some(Part::Year))?;
+    let mut found = Vec::new();
+    for column in &columns[first..] {
+        let Some(part) = part(&column.own_name, &found) else {
+            break;
+        };
+        found.push(part);
+    }
+    let is_date = found.contains(&Part::DayOfYear) || (found.contains(&Part::Month) && found.contains(&Part::Day));
+    is_date.then(|| (first..first + found.len()).collect())
+}
+
+/// Meanings of columns that give a date together, by their names, or by their cells.
+fn parts(names: &[&str], sample: &[String]) -> Option<Vec<Part>> {
+    let mut found = Vec::new();
+    for name in names {
+        match part(name, &found) {
+            Some(part) => found.push(part),
+            None => return by_cells(names.len(), sample),
+        }
+    }
+    (found.contains(&Part::Year) && found.len() >= 2).then_some(found)
+}
+
+/// Meanings of columns of whole numbers in the order of a date: a year of four digits, month, day and so on, or the day of the year.
+fn by_cells(count: usize, sample: &[String]) -> Option<Vec<Part>> {
+    const ORDER: [(Part, i64); 6] = [
+        (Part::Year, 2300),
+        (Part::Month, 12),
+        (Part::Day, 31),
+        (Part::Hour, 24),
+        (Part::Minute, 60),
+        (Part::Second, 60),
+    ];
+    let row = |text: &String| {
+        text.split_whitespace()
+            .map(|cell| cell.parse::<i64>().ok())
+            .collect::<Option<Vec<i64>>>()
     };
-    let found: Option<Vec<usize>> = names.iter().map(meaning).collect();
-    found.filter(|found| found.contains(&0) && found.len() >= 2)
+    let rows: Vec<Vec<i64>> = sample.iter().map(row).collect::<Option<_>>()?;
+    let all = |i: usize, within: std::ops::RangeInclusive<i64>| rows.iter().all(|row| within.contains(&row[i]));
+    if rows.is_empty() || rows.iter().any(|row| row.len() != count) || !all(0, 1700..=2300) {
+        return None;
+    }
+    if (3..=6).contains(&count) && (1..count).all(|i| all(i, i64::from(i < 3)..=ORDER[i].1)) {
+        return Some(ORDER[..count].iter().map(|(part, _)| *part).collect());
+    }
+    let by_day = [Part::Year, Part::DayOfYear, Part::OfDay];
+    (count <= 3 && all(1, 1..=366) && (count < 3 || all(2, 0..=2400))).then(|| by_day[..count].to_vec())
 }
 
 /// The offset that a name states, as `Date Time, GMT-07:00`.
@@ -98,7 +249,7 @@ fn offset_in(name: &str) -> Option<String> {
         .chars()
         .take_while(|c| c.is_ascii_digit() || "+-:".contains(*c))
         .collect();
-    written::offset(&text).map(|_| text)
+    civil::offset(&text).map(|_| text)
 }
 
 /// How times of these columns are written, by what is said and by a sample of their cells (joined by a space).
@@ -111,7 +262,8 @@ pub(crate) fn clock(
     let mut zone_text = dialect.time_zone.clone();
     let is_epw = dialect.format.as_deref() == Some("EPW");
     let syntax = if names.len() > 1
-        && let Some(meaning) = parts(names)
+        && dialect.time_format.is_none()
+        && let Some(meaning) = parts(names, sample)
     {
         Syntax::Parts(meaning, is_epw)
     } else {
@@ -123,14 +275,31 @@ pub(crate) fn clock(
             Some("dmy") => Syntax::Date(Order::Dmy),
             Some("mdy") => Syntax::Date(Order::Mdy),
             Some("ymd" | "iso") => Syntax::Date(Order::Ymd),
+            Some(format) if written::since(format).is_some() => Syntax::Since(0, 0),
             Some(format) if format.contains('%') => Syntax::Format(format.to_owned()),
             Some(other) => {
-                let expected = "`dmy`, `mdy`, `ymd`, the unit of numbers `s`, `ms`, `us` or `ns`, or a format as '%d.%m.%Y %H:%M:%S'";
+                let expected = "`dmy`, `mdy`, `ymd`, the unit of numbers `s`, `ms`, `us` or `ns`, numbers of days or \
+                                seconds as of `excel`, `matlab`, `mjd`, `jd` or `labview`, or a format as '%d.%m.%Y %H:%M:%S'";
                 return Err(Ok(Error::option("--time-format", other, expected)));
             }
-            None => majority(&cells)?,
+            None => by_name(names, &cells).map_or_else(|| majority(&cells), Ok)?,
         }
     };
+    if let Some((syntax, scale)) = dialect.time_format.as_deref().and_then(written::since) {
+        return Ok(Clock {
+            syntax,
+            zone: zone_text
+                .as_deref()
+                .and_then(written::zone)
+                .filter(|_| scale == Scale::Local),
+            scale,
+            takes_leap_seconds: false,
+            cuts: false,
+        });
+    }
+    if syntax == Syntax::Number(Unit::Seconds) && dialect.time_format.is_none() && may_be_days(names, &cells) {
+        return Err(Err((0, written::DAYS)));
+    }
     let has_offset = match &syntax {
         Syntax::Date(order) => cells.iter().any(|cell| guess::has_offset(cell, *order)),
         Syntax::Format(format) => ["%z", "%:z", "%Q", "%s", "%c"].iter().any(|part| format.contains(part)),
@@ -173,6 +342,29 @@ pub(crate) fn clock(
         takes_leap_seconds: false,
         cuts: false,
     })
+}
+
+fn has_date_name(names: &[&str]) -> bool {
+    let is_date = |name: &&str| {
+        let lower = name.to_lowercase();
+        ["date", "datum", "fecha", "yyyyddd", "day"]
+            .iter()
+            .any(|word| lower.contains(word))
+    };
+    names.len() == 1 && names.iter().any(is_date)
+}
+
+/// A year and the day of the year as one number, which only the name of the column tells from a count.
+fn by_name(names: &[&str], cells: &[&str]) -> Option<Syntax> {
+    let is_day =
+        |cell: &&str| cell.len() == 7 && civil::written(cell, Order::Ymd).is_some_and(|found| found.date.is_ok());
+    (has_date_name(names) && !cells.is_empty() && cells.iter().all(is_day)).then_some(Syntax::Date(Order::Ymd))
+}
+
+/// Whether a column of dates has numbers of the size of days since 1900.
+fn may_be_days(names: &[&str], cells: &[&str]) -> bool {
+    let is_days = |cell: &&str| cell.parse().is_ok_and(|days: f64| (20_000.0..80_000.0).contains(&days));
+    has_date_name(names) && !cells.is_empty() && cells.iter().all(is_days)
 }
 
 /// How most of the cells are written: a garbled one must not decide.

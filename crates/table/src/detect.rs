@@ -67,7 +67,20 @@ fn delimiter(lines: &[&str], quote: u8) -> Delimiter {
         .iter()
         .copied()
         .find(|delimiter| score(*delimiter).is_some_and(|found| 10 * found >= 8 * later));
-    if let Some(found) = consistent {
+    // Decimal commas are no delimiters if spaces split all lines alike, the names too, and commas do not.
+    let is_decimal = |delimiter| {
+        let spaces = Split {
+            delimiter: Delimiter::Spaces,
+            quote,
+        };
+        let width = |line: &&str, split| cells(line, split).len();
+        let (words, _) = modal(lines, spaces);
+        delimiter == Delimiter::Byte(b',')
+            && words >= 2
+            && lines.iter().all(|line| width(line, spaces) == words)
+            && lines.first().is_some_and(|line| !line.contains(','))
+    };
+    if let Some(found) = consistent.filter(|found| !is_decimal(*found)) {
         return found;
     }
     let most = candidates
@@ -75,7 +88,7 @@ fn delimiter(lines: &[&str], quote: u8) -> Delimiter {
         .copied()
         .filter_map(|delimiter| score(delimiter).map(|found| (found, delimiter)));
     let best = most
-        .filter(|(found, _)| 2 * found >= later)
+        .filter(|(found, delimiter)| 2 * found >= later && !is_decimal(*delimiter))
         .max_by_key(|(found, _)| *found);
     if let Some((_, found)) = best {
         return found;
@@ -256,25 +269,36 @@ fn layout(
             ..Layout::default()
         });
     }
-    // Names may stand in the last comment before the data.
+    // Names may stand in the last comment before the data, or above one with units.
     let in_comment = || {
-        let (number, line) = comments.iter().rev().find(|(number, _)| number < first_number)?;
         let mark = dialect.comment.as_deref().unwrap_or("#");
-        let names = cells(line.trim_start_matches(mark).trim(), split);
-        let are_names = names.len() == first.len() && names.iter().all(|name| look(name, comma) == Look::Text);
-        are_names.then_some((*number, names))
+        let texts = |line: &str| {
+            let names = cells(line.trim_start_matches(mark).trim(), split);
+            let is_name =
+                |name: &String| look(name, comma) == Look::Text || missing::is_usual(name, true) && !name.is_empty();
+            (names.len() == first.len() && names.iter().all(is_name)).then_some(names)
+        };
+        let before = comments.iter().rev().filter(|(number, _)| number < first_number);
+        let mut before = before.filter(|(_, line)| !line.trim_start_matches(mark).trim().is_empty());
+        let (number, line) = before.next()?;
+        let names = texts(line)?;
+        let above = before.next().and_then(|(number, line)| Some((*number, texts(line)?)));
+        match above {
+            Some((number, above)) if known::are_units(&names) => Some((number, above, names)),
+            _ => Some((*number, names, Vec::new())),
+        }
     };
     let in_comment = if looks.first().is_some_and(is_data) {
         in_comment()
     } else {
         None
     };
-    if let Some(names) = in_comment {
+    if let Some((number, names, units)) = in_comment {
         dialect.skip.get_or_insert(0);
         dialect.no_header.get_or_insert(false);
         return Ok(Layout {
-            names: Some(names),
-            units: Vec::new(),
+            names: Some((number, names)),
+            units,
             first_line: *first_number,
         });
     }
@@ -295,10 +319,10 @@ fn layout(
             let mut header = data - 1;
             if dialect.units_row.is_none() && dialect.skip_after_names.is_none() {
                 let is_units = header > 0
-                    && rows[header - 1].1.len() == rows[header].1.len()
-                    && looks[header - 1]
-                        .iter()
-                        .all(|look| !matches!(look, Look::Number | Look::Time))
+                    && filled(&rows[header - 1].1) == filled(&rows[header].1)
+                    && looks[header - 1].first() != Some(&Look::Number)
+                    && !looks[header - 1].contains(&Look::Time)
+                    && looks[header - 1].contains(&Look::Text)
                     && known::are_units(&rows[header].1);
                 dialect.units_row = Some(is_units);
                 header -= usize::from(is_units);
@@ -319,6 +343,14 @@ fn layout(
             Ok(from_header(rows, 0, dialect))
         }
     }
+}
+
+/// Number of cells up to the last that is not empty.
+fn filled(cells: &[String]) -> usize {
+    cells
+        .iter()
+        .rposition(|cell| !cell.is_empty())
+        .map_or(0, |last| last + 1)
 }
 
 fn from_header(rows: &[(u64, Vec<String>)], header: usize, dialect: &mut Dialect) -> Layout {

@@ -62,7 +62,8 @@ pub struct Dialect {
     /// Columns that give the time, one or several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub time_column: Vec<String>,
-    /// How times are written: as of `strftime`, `dmy`, `mdy`, `ymd`, or the unit of numbers: `s`, `ms`, `us`, `ns`.
+    /// How times are written: as of `strftime`, `dmy`, `mdy`, `ymd`, or the unit of numbers: `s`, `ms`, `us`, `ns`; numbers of days or seconds
+    /// of other programs: `excel`, `matlab`, `mjd`, `jd`, `labview`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_format: Option<String>,
     /// Zone of times without an offset: a name, as `Europe/Berlin`, or an offset, as `+01:00`.
@@ -162,7 +163,11 @@ impl Dialect {
     ///
     /// # Errors
     /// If a mark has more than one byte, two marks are the same, or the delimiter or the zone is unknown.
-    pub fn checked(self) -> Result<Self, Error> {
+    pub fn checked(mut self) -> Result<Self, Error> {
+        if let Some('\u{a0}' | '\u{202f}' | '\u{2009}') = self.thousands {
+            // All kinds of spaces are one mark.
+            self.thousands = Some(' ');
+        }
         if let Some(text) = &self.delimiter {
             let delimiter = Delimiter::parse(text)?;
             let is_used = |mark: Option<char>| {

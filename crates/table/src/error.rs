@@ -76,6 +76,14 @@ pub enum Error {
         /// What it may be.
         expected: String,
     },
+    /// No column is surely the time.
+    #[error(
+        "no column has times, and the first, `{column}`, does not increase: name the column of times with --time-column, or leave --time out"
+    )]
+    NoTime {
+        /// Name of the first column.
+        column: String,
+    },
     /// There is no line of names.
     #[error("the file is empty: a line of names and rows are expected")]
     Empty,

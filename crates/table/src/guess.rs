@@ -1,7 +1,8 @@
 //! How the times of a column are written, by its cells.
 
+use crate::civil::{self, Zone, digits, is_compact};
 use crate::time::{Scale, Unit};
-use crate::written::{AMBIGUOUS, Clock, Order, Problem, Syntax, date, digits, of_day};
+use crate::written::{AMBIGUOUS, Clock, NAMED_ZONE, Order, Problem, Syntax};
 
 /// How cells of a column are written, if all are times; an ambiguity if the day or the month may stand first.
 pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
@@ -18,8 +19,11 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
         !cells.is_empty()
             && cells
                 .iter()
-                .all(|cell| local.parse(cell).is_ok() || utc.parse(cell).is_ok())
+                .all(|cell| local.parse(cell).is_ok() || matches!(utc.parse(cell), Ok(_) | Err(NAMED_ZONE)))
     };
+    if !cells.is_empty() && cells.iter().all(|cell| is_compact(cell)) {
+        return Some(Ok(Syntax::Date(Order::Ymd)));
+    }
     if all(Syntax::Number(Unit::Seconds)) {
         let largest = cells
             .iter()
@@ -32,7 +36,7 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
     }
     let year_first = cells
         .iter()
-        .all(|cell| digits(cell.trim(), 5).is_some_and(|(_, count, _)| count == 4));
+        .all(|cell| digits(cell.trim(), 8).is_some_and(|(_, count, _)| count == 4 || count >= 7));
     if year_first {
         return all(Syntax::Date(Order::Ymd)).then_some(Ok(Syntax::Date(Order::Ymd)));
     }
@@ -55,15 +59,17 @@ pub(crate) fn detect(cells: &[&str]) -> Option<Result<Syntax, Problem>> {
     }
 }
 
-/// Whether a written time has an offset of its own.
+/// Whether a written time says something of its zone.
 pub(crate) fn has_offset(text: &str, order: Order) -> bool {
-    let rest = date(text.trim(), order).map(|(_, rest)| rest.trim_start_matches([' ', 'T', 't', '_', ',']));
-    rest.and_then(of_day)
-        .is_some_and(|(_, _, _, rest)| !rest.trim().is_empty())
+    civil::written(text, order).is_some_and(|found| found.zone != Zone::Nothing)
 }
 
 /// Whether a text looks like a time that is no plain number.
 pub(crate) fn looks_like_time(text: &str) -> bool {
     let text = text.trim();
-    text.starts_with(|c: char| c.is_ascii_digit()) && !matches!(detect(&[text]), None | Some(Ok(Syntax::Number(_))))
+    // A date has digits, and a year and a month alone may be anything.
+    !(text.len() == 7 && text.as_bytes()[4] == b'-')
+        && text.bytes().any(|c| c.is_ascii_digit())
+        && text.starts_with(|c: char| c.is_ascii_alphanumeric())
+        && !matches!(detect(&[text]), None | Some(Ok(Syntax::Number(_))))
 }

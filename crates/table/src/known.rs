@@ -42,6 +42,17 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
         set("HOBO", Some(1), false, 0, ",");
         dialect.time_format.get_or_insert("mdy".to_owned());
         dialect.comment.get_or_insert(String::new());
+    } else if first.starts_with("LabVIEW Measurement") {
+        // LabVIEW: settings, names with a last one for comments, which rows lack.
+        let end = lines
+            .iter()
+            .rposition(|(_, line)| line.starts_with("***End_of_Header***"));
+        set("LabVIEW", end.map(|end| end as u64 + 1), false, 0, "tab");
+        let is_comma = |(_, line): &(u64, String)| line.trim() == "Decimal_Separator\t,";
+        if lines.iter().any(is_comma) {
+            dialect.decimal.get_or_insert(',');
+        }
+        dialect.short_rows = true;
     } else if first.starts_with("LOCATION,") {
         // EnergyPlus weather: eight lines or fewer, then rows without names.
         let data = lines.iter().position(|(_, line)| line.starts_with("DATA PERIODS"));
@@ -54,6 +65,12 @@ pub(crate) fn recognise(lines: &[(u64, String)], dialect: &mut Dialect) {
     } else if first.starts_with("#group") || first.starts_with("#datatype") {
         set("InfluxDB annotated CSV", Some(0), false, 0, ",");
         dialect.comment.get_or_insert("#".to_owned());
+    } else if ["#,", "\"#\",", "#;", "#\t"]
+        .iter()
+        .any(|begin| first.starts_with(begin))
+    {
+        // Rows are numbered, and the column of the numbers is named so.
+        dialect.comment.get_or_insert(String::new());
     } else if first.starts_with('#') {
         // Tab-separated tables of the USGS: comments, names, and a line of widths and kinds, as `5s 15s 20d`.
         let mut rows = lines.iter().filter(|(_, line)| !line.starts_with('#'));
@@ -115,7 +132,7 @@ const UNITS: &str = "ts rn smp volt volts v mv uv kv amp amps a ma ua w mw kw wh
     min mins minute minutes h hr hour hours day days m mm cm km um nm ft in inch inches m/s km/h mph kn knots m3 l ml l/s l/min m3/h \
     kg g mg ug t lb pa hpa kpa mpa bar mbar mb psi atm mmhg inhg c k f degc degf deg degrees °c °f °k ℃ ℉ celsius kelvin fahrenheit % \
     percent rh %rh ppm ppb ppt lux lx w/m2 w/m^2 j kj mj n nm db dba dbm ohm ohms kohm mohm s/m us/cm ms/cm ph ntu mg/l ug/m3 µg/m³ \
-    µg/m3 rad rpm g0 count counts # unitless none unit utc local va var m^3 m² m³ w/m² µs µm µa mm/h umol/m2/s";
+    sequence mol mmol umol µmol nmol degt nmi yr mo dy mn µg/m3 rad rpm g0 count counts # unitless none unit utc local va var m^3 m² m³ w/m² µs µm µa mm/h umol/m2/s";
 
 /// Whether the cells of a row are units: every one that is not empty is a unit's word or stands in brackets, and there is one.
 pub(crate) fn are_units(cells: &[String]) -> bool {
@@ -125,10 +142,18 @@ pub(crate) fn are_units(cells: &[String]) -> bool {
         let in_brackets =
             (lower.starts_with('(') && lower.ends_with(')')) || (lower.starts_with('[') && lower.ends_with(']'));
         let is_date_pattern = lower.contains("yyyy") || lower.contains("hh:mm");
+        let is_known = |text: &str| UNITS.split_ascii_whitespace().any(|unit| unit == text);
+        // A product or quotient of units, as `µmol/m²/s`.
+        let mut factors = lower
+            .split(|c: char| "/·.*^-²³⁻¹ ".contains(c) || c.is_ascii_digit())
+            .filter(|factor| !factor.is_empty())
+            .peekable();
+        let is_compound = factors.peek().is_some() && lower.contains(['/', '·', '²', '³', '^', '.', '⁻']);
         lower.is_empty()
             || in_brackets
             || is_date_pattern
-            || UNITS.split_ascii_whitespace().any(|unit| unit == lower)
+            || is_known(&lower)
+            || (is_compound && factors.all(is_known))
             || lower.parse::<f64>().is_ok()
     };
     let is_word = |cell: &String| !cell.trim().is_empty() && cell.parse::<f64>().is_err();

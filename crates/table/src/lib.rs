@@ -41,6 +41,7 @@
 
 #[cfg(feature = "parquet")]
 mod arrow;
+mod civil;
 mod clock;
 mod column;
 mod detect;
@@ -63,6 +64,7 @@ mod source;
 mod survey;
 mod table;
 mod time;
+mod timing;
 mod written;
 
 pub use column::{Batch, Cells, Column, Kind, MAX_WORDS};

@@ -5,7 +5,7 @@ const ALWAYS: [&str; 12] = [
     "", "na", "n/a", "null", "none", "#n/a", "#na", "<na>", "nat", "nil", "nodata", "no data",
 ];
 /// Spellings that mean a gap in a column of numbers; in a column of words they are words.
-const AMONG_NUMBERS: [&str; 11] = [
+const AMONG_NUMBERS: [&str; 12] = [
     "?",
     "-",
     "--",
@@ -13,6 +13,7 @@ const AMONG_NUMBERS: [&str; 11] = [
     ".",
     "*",
     "m",
+    "mm",
     "missing",
     "unavailable",
     "unknown",

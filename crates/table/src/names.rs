@@ -31,6 +31,15 @@ pub fn unquoted(name: &str) -> String {
     }
 }
 
+/// A name as a list of names takes it: in quotes if it has commas or quotes.
+pub fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '=']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
+}
+
 /// Index of a column by a name that a user wrote: the name, the name as the file has it if only one column has it, or `#3` for the third.
 pub(crate) fn find(names: &[String], own_names: &[String], wanted: &str) -> Option<usize> {
     let exact = names.iter().position(|name| name == wanted);

@@ -78,6 +78,12 @@ pub(crate) fn parse(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
 fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
     let text = std::str::from_utf8(text).map_err(|_| no_number(text))?;
     let mut plain: String = text.replace('\u{2212}', "-");
+    if syntax.thousands == Some(b' ') {
+        plain = plain.replace(SPACES, " ");
+    }
+    if let Some(exponent) = fortran(&plain) {
+        plain = exponent;
+    }
     if let Some(rest) = plain.strip_prefix(['+', '-']).filter(|rest| rest.starts_with(' ')) {
         // A sign apart, as `+ 0.081`.
         plain = format!("{}{}", &plain[..1], rest.trim_start());
@@ -126,6 +132,16 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
     }
 }
 
+/// Spaces between groups of digits that are no plain ones.
+const SPACES: [char; 3] = ['\u{a0}', '\u{202f}', '\u{2009}'];
+
+/// A number with an exponent as of Fortran, `1.95D+01`, with that of others.
+fn fortran(text: &str) -> Option<String> {
+    let (size, exponent) = text.split_once(['D', 'd'])?;
+    let is_exponent = exponent.starts_with(['+', '-']) && exponent[1..].bytes().all(|c| c.is_ascii_digit());
+    (is_exponent && size.contains('.') && size.parse::<f64>().is_ok()).then(|| format!("{size}e{exponent}"))
+}
+
 /// Not-a-number and infinities as runtimes of several systems write them.
 fn special(text: &str) -> Option<f64> {
     Some(match text.to_ascii_lowercase().as_str() {
@@ -168,10 +184,23 @@ pub(crate) fn hint(text: &str) -> &'static str {
     let commas = text.bytes().filter(|c| *c == b',').count();
     let points = text.bytes().filter(|c| *c == b'.').count();
     let plain = text.bytes().all(|c| c.is_ascii_digit() || b"+-.,' eE".contains(&c));
+    let is_spaced = text.contains(SPACES) || text.split(' ').skip(1).any(|group| group.len() >= 3);
+    let is_grouped = is_spaced
+        && text
+            .chars()
+            .all(|c| c.is_ascii_digit() || SPACES.contains(&c) || "+-., ".contains(c));
     if text.contains('\0') {
         "the cell has NUL bytes, as after a loss of power: leave such lines out with --skip-bad 1 or more"
     } else if digits == 0 {
         "make it a gap with --missing, leave such lines out with --skip-bad, or the column with --without"
+    } else if is_grouped {
+        if commas == 1 && points == 0 {
+            "say --thousands ' ' --decimal ,"
+        } else {
+            "say --thousands ' '"
+        }
+    } else if text.starts_with('(') && text.ends_with(')') {
+        "if brackets mean a negative number, write a minus; or leave the column out with --without"
     } else if plain && commas == 1 && points == 0 {
         "if it has a decimal comma, say --decimal , (and --delimiter ';' or tab)"
     } else if plain && (commas > 1 || (commas == 1 && points == 1)) {
@@ -193,11 +222,17 @@ pub(crate) fn hint(text: &str) -> &'static str {
 
 /// Whether a text is likely a number of another spelling, with groups, a decimal comma or a unit.
 pub(crate) fn looks_like_number(text: &str) -> bool {
+    let text = text
+        .strip_prefix('(')
+        .and_then(|text| text.strip_suffix(')'))
+        .unwrap_or(text);
     let size = text.trim_start_matches(['-', '+', '\'', '\u{2212}']);
     if !size.starts_with(|c: char| c.is_ascii_digit()) {
         return false;
     }
-    let is_plain = size.bytes().all(|c| c.is_ascii_digit() || b".,' ".contains(&c));
+    let is_plain = size
+        .chars()
+        .all(|c| c.is_ascii_digit() || ".,' ".contains(c) || SPACES.contains(&c));
     let has_unit = without_unit(size).is_some_and(|(number, unit)| {
         let is_spaced = size.as_bytes().get(number.len()) == Some(&b' ');
         number.parse::<f64>().is_ok()

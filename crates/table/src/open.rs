@@ -178,6 +178,12 @@ impl Table {
                 mend: "make lines of its objects: jq -c '.[]' FILE | fewbits ... -",
             });
         }
+        if first == Some(b'<') {
+            return Err(Error::Format {
+                what: "a page of HTML, or XML",
+                mend: "export the table as CSV",
+            });
+        }
         let (rows, columns) = if is_object {
             of_json(&head, reader, &mut dialect)?
         } else {

@@ -11,6 +11,8 @@ use crate::survey::Survey;
 use crate::table::Table;
 use crate::time::{Scale, Time};
 use ::parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use ::parquet::errors::ParquetError;
+use ::parquet::file::metadata::ParquetMetaData;
 use ::parquet::file::reader::ChunkReader;
 use arrow_array::RecordBatch;
 use arrow_schema::{FieldRef, SchemaRef};
@@ -49,9 +51,9 @@ impl ArrowRows {
         while self.next == self.length {
             let batch = match self.ahead.take() {
                 Some(batch) => batch,
-                None => match self.reader.next() {
+                None => match next_of(&mut self.reader)? {
                     None => return Ok(false),
-                    Some(batch) => batch.map_err(|error| Error::Parquet(error.into()))?,
+                    Some(batch) => batch,
                 },
             };
             self.decoded = vec![None; self.schema.fields().len()];
@@ -94,13 +96,12 @@ impl Table {
     /// # Errors
     /// If it is damaged, or the settings of `said` do not go together.
     pub fn open_parquet(file: impl ChunkReader + 'static, said: &Dialect) -> Result<Self, Error> {
-        let builder = ParquetRecordBatchReaderBuilder::try_new(file)?;
+        let length = file.len();
+        let builder = guarded(|| ParquetRecordBatchReaderBuilder::try_new(file))?;
+        check(builder.metadata(), length)?;
         let schema = builder.schema().clone();
-        let mut reader = builder.with_batch_size(ROWS).build()?;
-        let ahead = reader
-            .next()
-            .transpose()
-            .map_err(|error| Error::Parquet(error.into()))?;
+        let mut reader = guarded(|| builder.with_batch_size(ROWS).build())?;
+        let ahead = next_of(&mut reader)?;
         let own_names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
         let distinct = names::distinct(&own_names);
         let mut profiles = vec![Profile::default(); own_names.len()];
@@ -273,11 +274,7 @@ impl Table {
             let ahead = match self.arrow.as_mut() {
                 Some(rows) if rows.next == rows.length => match rows.ahead.take() {
                     Some(batch) => Some(batch),
-                    None => rows
-                        .reader
-                        .next()
-                        .transpose()
-                        .map_err(|error| Error::Parquet(error.into()))?,
+                    None => next_of(&mut rows.reader)?,
                 },
                 _ => None,
             };
@@ -301,6 +298,49 @@ impl Table {
         survey.skipped = self.skipped;
         Ok(survey)
     }
+}
+
+/// What the Parquet reader gives. Of damaged pages it makes panics, as divisions by a length of zero: they are errors here. The reader is not
+/// used after one.
+fn guarded<T>(read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Error> {
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)) {
+        Ok(found) => Ok(found?),
+        Err(_) => Err(Error::Parquet(ParquetError::General("a page does not decode".to_owned()))),
+    }
+}
+
+fn next_of(reader: &mut ParquetRecordBatchReader) -> Result<Option<RecordBatch>, Error> {
+    guarded(|| Ok(reader.next().transpose()?))
+}
+
+/// Refuses places of pages outside of the file, which a damaged end may state and the reader takes for granted.
+fn check(metadata: &ParquetMetaData, length: u64) -> Result<(), Error> {
+    let refused = |what: &str| Error::Parquet(ParquetError::General(format!("{what} outside of the file")));
+    for group in metadata.row_groups() {
+        if group.num_rows() < 0 || group.total_byte_size() < 0 {
+            return Err(refused("a group of rows"));
+        }
+        for column in group.columns() {
+            let first = column.dictionary_page_offset().unwrap_or(0);
+            let places = [
+                first,
+                column.data_page_offset(),
+                column.compressed_size(),
+                column.num_values(),
+            ];
+            let [first, data, size, _] = places.map(|place| u64::try_from(place).ok());
+            let start = match (first, data) {
+                (Some(0), Some(data)) => data,
+                (Some(first), Some(data)) => first.min(data),
+                _ => return Err(refused("a column")),
+            };
+            let end = size.and_then(|size| start.checked_add(size));
+            if column.num_values() < 0 || end.is_none_or(|end| end > length) {
+                return Err(refused("a column"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Adds the cells of a batch that begins behind so many rows.

@@ -4,6 +4,7 @@ use crate::column::{Batch, Cells, Kind, MAX_WORDS};
 use crate::error::{Error, Place, printable};
 use crate::guess::looks_like_time;
 use crate::missing::{self, Spellings};
+use crate::names;
 use crate::number::{self, Number};
 use crate::profile::boolean;
 use crate::table::Table;
@@ -77,12 +78,20 @@ impl Table {
 
     /// An error of a line with the number of its row.
     fn placed(&self, mut error: Error) -> Error {
-        if let Error::Line { place, problem, mend } = &mut error {
-            place.row = self.count;
-            if self.row.text.contains(&0) {
-                "NUL bytes, as after a loss of power".clone_into(problem);
-                *mend = "leave such lines out with --skip-bad";
+        let has_nul = self.row.text.contains(&0);
+        match &mut error {
+            Error::Line { place, problem, mend } => {
+                place.row = self.count;
+                if has_nul {
+                    "NUL bytes, as after a loss of power".clone_into(problem);
+                    *mend = "leave such lines out with --skip-bad";
+                }
             }
+            Error::Cell { problem, mend, .. } if has_nul => {
+                *problem = "has NUL bytes, as after a loss of power";
+                "leave such lines out with --skip-bad".clone_into(mend);
+            }
+            _ => {}
         }
         error
     }
@@ -202,7 +211,9 @@ impl Table {
         } else {
             mend
         };
-        self.refused(column, cell, problem, mend.to_owned())
+        // The option with the name of this column.
+        let name = names::quoted(&printable(&self.columns[column].name));
+        self.refused(column, cell, problem, mend.replace("--without", &format!("--without {name}")))
     }
 }
 

@@ -11,7 +11,17 @@ const CHUNK: usize = 1 << 18;
 pub(crate) type Bytes = Box<dyn Read + Send>;
 
 /// The first bytes of files that are no tables of text, what they are, and what to do.
-const OTHERS: [(&[u8], &str, &str); 9] = [
+const OTHERS: [(&[u8], &str, &str); 11] = [
+    (
+        b"\xff\xfe\0\0",
+        "text in UTF-32",
+        "save it as UTF-8, as: iconv -f UTF-32 -t UTF-8 FILE | fewbits ... -",
+    ),
+    (
+        b"\0\0\xfe\xff",
+        "text in UTF-32",
+        "save it as UTF-8, as: iconv -f UTF-32 -t UTF-8 FILE | fewbits ... -",
+    ),
     (
         b"PK\x03\x04",
         "a ZIP archive or an Excel workbook (.xlsx)",

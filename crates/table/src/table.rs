@@ -3,7 +3,7 @@
 use crate::clock;
 use crate::column::{Column, Kind};
 use crate::dialect::Dialect;
-use crate::error::{Error, Place, listed, printable};
+use crate::error::{Error, listed, printable};
 use crate::lines::Row;
 use crate::missing::Spellings;
 use crate::names;
@@ -11,7 +11,6 @@ use crate::number;
 use crate::open::Rows;
 use crate::profile::Profile;
 use crate::survey::Survey;
-use crate::time::Scale;
 use crate::written::Clock;
 
 /// A table that is read from front to end.
@@ -252,111 +251,6 @@ impl Table {
             .collect::<Result<_, _>>()?;
         self.selected.retain(|column| !out.contains(column));
         Ok(())
-    }
-
-    /// Takes the times of rows from these columns, which are then no columns of values.
-    ///
-    /// # Errors
-    /// If there is no such column, or its cells are no times.
-    pub fn set_time<S: AsRef<str>>(&mut self, names: &[S]) -> Result<(), Error> {
-        let columns: Vec<usize> = names
-            .iter()
-            .map(|name| self.position(name.as_ref()))
-            .collect::<Result<_, _>>()?;
-        self.set_time_columns(columns)
-    }
-
-    /// Takes the times of rows from the columns whose cells or names say so. Returns whether there are such columns.
-    ///
-    /// # Errors
-    /// If the cells are no times, or may have the day or the month first.
-    pub fn find_time(&mut self) -> Result<bool, Error> {
-        self.find(false)
-    }
-
-    /// As [`find_time`](Self::find_time), but a column of numbers is the time only if its whole name says so: `time`, not `idle_time`.
-    ///
-    /// # Errors
-    /// As [`find_time`](Self::find_time).
-    pub fn find_certain_time(&mut self) -> Result<bool, Error> {
-        self.find(true)
-    }
-
-    fn find(&mut self, is_certain: bool) -> Result<bool, Error> {
-        match clock::guess(&self.columns, &self.dialect, is_certain) {
-            Some(columns) => self.set_time_columns(columns).map(|()| true),
-            None => Ok(false),
-        }
-    }
-
-    fn set_time_columns(&mut self, columns: Vec<usize>) -> Result<(), Error> {
-        #[cfg(feature = "parquet")]
-        if let (Some(rows), [column]) = (&self.arrow, columns.as_slice())
-            && let Some(scale) = rows.scale(*column)
-        {
-            let zone = self
-                .dialect
-                .time_zone
-                .as_deref()
-                .filter(|_| scale == Scale::Local)
-                .and_then(crate::written::zone);
-            let scale = if zone.is_some() { Scale::Utc } else { scale };
-            self.dialect.time_column = vec![self.columns[*column].name.clone()];
-            self.selected.retain(|other| other != column);
-            self.time = Some((columns, Clock::typed(scale, zone)));
-            return Ok(());
-        }
-        let own: Vec<String> = columns.iter().map(|i| self.columns[*i].own_name.clone()).collect();
-        let own: Vec<&str> = own.iter().map(String::as_str).collect();
-        let length = columns
-            .iter()
-            .map(|i| self.profiles[*i].sample.len())
-            .min()
-            .unwrap_or(0);
-        let joined = |row: usize| {
-            columns
-                .iter()
-                .map(|i| self.profiles[*i].sample[row].as_str())
-                .collect::<Vec<_>>()
-                .join(" ")
-        };
-        let sample: Vec<String> = (0..length).map(joined).collect();
-        let found = clock::clock(&own, &sample, &mut self.dialect).map_err(|refused| match refused {
-            Ok(error) => error,
-            Err((row, (problem, mend))) => Error::Cell {
-                place: self.profiles[columns[0]].first_text.as_ref().map_or(
-                    Place {
-                        line: self.rows.line() + 1,
-                        row: 1,
-                    },
-                    |(place, _)| *place,
-                ),
-                column: own.join(", "),
-                cell: printable(&sample[row]),
-                problem,
-                mend: mend.to_owned(),
-            },
-        })?;
-        self.dialect.time_column = columns.iter().map(|i| self.columns[*i].name.clone()).collect();
-        self.selected.retain(|column| !columns.contains(column));
-        self.time = Some((columns, found));
-        Ok(())
-    }
-
-    /// Indices of the columns of the time, and what it is measured from.
-    pub fn time(&self) -> Option<(&[usize], Scale)> {
-        self.time
-            .as_ref()
-            .map(|(columns, clock)| (columns.as_slice(), clock.scale))
-    }
-
-    /// Lets times be off by so much: decimals beyond the 18th are cut if it is not 0, and a leap second becomes the next second if it is a
-    /// second or more.
-    pub fn allow_inexact_times(&mut self, nanoseconds: u64) {
-        if let Some((_, clock)) = &mut self.time {
-            clock.takes_leap_seconds = nanoseconds >= 1_000_000_000;
-            clock.cuts = nanoseconds > 0;
-        }
     }
 
     /// Whether the first lines have numbers in every selected column, and nothing else: then nothing is learned by a

@@ -1,5 +1,6 @@
 //! How times are written: dates and times of day in many spellings, numbers, formats that are said, zones.
 
+use crate::civil::{self, Zone, offset};
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
 use jiff::civil::{Date, DateTime};
 use jiff::tz::{Offset, TimeZone};
@@ -12,6 +13,21 @@ pub(crate) enum Order {
     Mdy,
 }
 
+/// Meaning of a column of a part of a date.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    Year,
+    Month,
+    Day,
+    Hour,
+    Minute,
+    Second,
+    /// Counted from 1.
+    DayOfYear,
+    /// A time of day, as `21:30` or `2130`.
+    OfDay,
+}
+
 /// How the times of a column are written.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Syntax {
@@ -19,8 +35,10 @@ pub(crate) enum Syntax {
     Date(Order),
     /// Hours, minutes and seconds without a date.
     OfDay,
-    /// Year, month, day, hour, minute, second in columns of their own; hours that end, as in EPW, if `true`.
-    Parts(Vec<usize>, bool),
+    /// Parts of a date in columns of their own; hours that end, as in EPW, if `true`.
+    Parts(Vec<Part>, bool),
+    /// Units of so many seconds since a zero, in seconds since 1970.
+    Since(i64, i64),
     Format(String),
 }
 
@@ -37,8 +55,16 @@ const LEAP: Problem = (
 );
 const TOO_FINE: Problem =
     ("has more decimals of a second than the 18 that are kept", "allow an error of times, as --time ±2ns");
-const NO_SUCH_DATE: Problem =
-    ("is no date of the calendar", "mend the cell, or say the order with --time-format dmy, mdy or ymd");
+pub(crate) const NO_SUCH_DATE: Problem = (
+    "is no date of the calendar",
+    "mend the cell, say the order with --time-format dmy, mdy or ymd, or leave such rows out with --skip-bad",
+);
+pub(crate) const NAMED_ZONE: Problem =
+    ("names a zone by letters that several zones share", "say its region, as --time-zone Europe/Berlin");
+pub(crate) const DAYS: Problem = (
+    "may be a number of days, as spreadsheets have them",
+    "say --time-format excel, or --time-format s if these are seconds",
+);
 const NO_ZONE: Problem = ("has no offset, rows before have one", "mend the cell, or say --time-zone");
 const DOUBTFUL: Problem = (
     "is no time of that zone, or two (a change of daylight saving)",
@@ -74,113 +100,17 @@ fn number(text: &str, unit: Unit) -> Result<Time, Problem> {
     Ok(Time(if negative { -ticks } else { ticks }))
 }
 
-/// Reads digits: their value and what follows.
-pub(crate) fn digits(text: &str, at_most: usize) -> Option<(i64, usize, &str)> {
-    let count = text.bytes().take(at_most).take_while(u8::is_ascii_digit).count();
-    let value = text[..count].parse().ok()?;
-    Some((value, count, &text[count..]))
-}
-
-const MONTHS: [&str; 12] = [
-    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
-];
-
-/// Reads a date in an order. A year that stands first with four digits is read in any order.
-pub(crate) fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
-    let (first, length, rest) = digits(text, 4)?;
-    let mark = rest
-        .chars()
-        .next()
-        .filter(|mark| matches!(mark, '-' | '/' | '.' | ' '))?;
-    let rest = &rest[mark.len_utf8()..];
-    let word = rest.get(..3).map(str::to_ascii_lowercase);
-    let month = word.and_then(|word| MONTHS.iter().position(|month| *month == word));
-    let (second, rest) = match month {
-        Some(month) => (month as i64 + 1, rest[3..].trim_start_matches(|c: char| c.is_ascii_alphabetic())),
-        None if mark == ' ' => return None,
-        None => digits(rest, 2).map(|(value, _, rest)| (value, rest))?,
-    };
-    let rest = rest.strip_prefix(mark)?;
-    let (third, third_length, rest) = digits(rest, 4)?;
-    let (year, month, day, year_length) = match (length, month, order) {
-        (4, _, _) => (first, second, third, 4),
-        (_, Some(_), _) | (_, _, Order::Dmy) => (third, second, first, third_length),
-        (_, _, Order::Mdy) => (third, first, second, third_length),
-        (_, _, Order::Ymd) => (first, second, third, length),
-    };
-    let year = match (year_length, year) {
-        (2, 69..) => year + 1900,
-        (2, _) => year + 2000,
-        (4, _) => year,
+/// Formats of numbers of days or seconds since a zero other than 1970: the seconds of a unit, those of the zero since 1970, the scale.
+pub(crate) fn since(format: &str) -> Option<(Syntax, Scale)> {
+    let days = |days: i64| Syntax::Since(86_400, -days * 86_400);
+    Some(match format {
+        "excel" => (days(25_569), Scale::Local),
+        "matlab" => (days(719_529), Scale::Local),
+        "mjd" => (days(40_587), Scale::Utc),
+        "jd" => (Syntax::Since(86_400, -210_866_760_000), Scale::Utc),
+        "labview" => (Syntax::Since(1, -2_082_844_800), Scale::Utc),
         _ => return None,
-    };
-    let date = match (i16::try_from(year), i8::try_from(month), i8::try_from(day)) {
-        (Ok(year), Ok(month), Ok(day)) => Date::new(year, month, day).map_err(|_| NO_SUCH_DATE),
-        _ => Err(NO_SUCH_DATE),
-    };
-    Some((date, rest))
-}
-
-/// Seconds and attoseconds of a time of day, whether it is a leap second, and what follows.
-pub(crate) fn of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
-    let (hours, _, rest) = digits(text, 9)?;
-    let (minutes, _, mut rest) = digits(rest.strip_prefix(':')?, 2)?;
-    let (mut seconds, mut fraction) = (0, 0);
-    if let Some(behind) = rest.strip_prefix(':') {
-        let (value, _, behind) = digits(behind, 2)?;
-        seconds = value;
-        rest = behind;
-        if let Some(behind) = rest.strip_prefix(['.', ',']) {
-            let count = behind.bytes().take_while(u8::is_ascii_digit).count();
-            let kept = behind[..count].trim_end_matches('0');
-            if count == 0 || kept.len() > usize::from(DECIMALS) {
-                return None;
-            }
-            fraction = format!("{kept:0<18}").parse().ok()?;
-            rest = &behind[count..];
-        }
-    }
-    if minutes > 59 || seconds > 60 {
-        return None;
-    }
-    let word: String = rest.trim_start().chars().filter(|c| *c != '.').take(2).collect();
-    let hours = match word.to_ascii_lowercase().as_str() {
-        "am" | "pm" if !(1..=12).contains(&hours) => return None,
-        "am" => hours % 12,
-        "pm" => hours % 12 + 12,
-        _ => hours,
-    };
-    if matches!(word.to_ascii_lowercase().as_str(), "am" | "pm") {
-        rest = rest
-            .trim_start()
-            .trim_start_matches(['a', 'A', 'p', 'P', 'm', 'M', '.']);
-    }
-    Some((hours * 3600 + minutes * 60 + seconds, fraction, seconds == 60, rest))
-}
-
-/// An offset from UTC in seconds.
-pub(crate) fn offset(text: &str) -> Option<i64> {
-    let text = text.trim();
-    if matches!(text.to_ascii_uppercase().as_str(), "Z" | "UTC" | "GMT") {
-        return Some(0);
-    }
-    let text = text.strip_prefix("UTC").or(text.strip_prefix("GMT")).unwrap_or(text);
-    let (sign, rest) = match text.chars().next()? {
-        '+' => (1, &text[1..]),
-        '-' => (-1, &text[1..]),
-        '\u{2212}' => (-1, &text[3..]),
-        _ => return None,
-    };
-    let (hours, _, rest) = digits(rest, 2)?;
-    let minutes = match rest.strip_prefix(':').unwrap_or(rest) {
-        "" => 0,
-        rest => {
-            digits(rest, 2)
-                .filter(|(_, count, rest)| *count == 2 && rest.is_empty())?
-                .0
-        }
-    };
-    (hours <= 18 && minutes < 60).then_some(sign * (hours * 3600 + minutes * 60))
+    })
 }
 
 /// Seconds since 1970 of a date and a second of the day, as if it were UTC.
@@ -228,17 +158,17 @@ impl Clock {
     pub(crate) fn parse(&self, text: &str) -> Result<Time, Problem> {
         let text = text.trim();
         match &self.syntax {
-            Syntax::Number(unit) => match number(text, *unit) {
-                Err(problem) if problem == TOO_FINE && self.cuts => {
-                    let end = text
-                        .find('.')
-                        .map_or(text.len(), |i| (i + 1 + 15 - usize::from(unit.decimals())).min(text.len()));
-                    number(&text[..end], *unit)
-                }
-                found => found,
-            },
+            Syntax::Number(unit) => self.number(text, *unit),
+            Syntax::Since(unit, zero) => {
+                let count = self.number(text, Unit::Seconds)?;
+                let size = count.0.checked_mul(i128::from(*unit)).ok_or(NO_TIME)?;
+                Ok(Time(size.checked_add(i128::from(*zero) * SECOND).ok_or(NO_TIME)?))
+            }
             Syntax::OfDay => {
-                let (second, fraction, leap, rest) = of_day(text).ok_or(NO_TIME)?;
+                if let Some((second, fraction)) = civil::of_hour(text).or_else(|| civil::of_days(text)) {
+                    return Ok(Time::checked(second, fraction));
+                }
+                let (second, fraction, leap, rest) = civil::of_day(text).ok_or(NO_TIME)?;
                 if leap || !rest.trim().is_empty() {
                     return Err(NO_TIME);
                 }
@@ -262,56 +192,74 @@ impl Clock {
         }
     }
 
+    fn number(&self, text: &str, unit: Unit) -> Result<Time, Problem> {
+        match number(text, unit) {
+            Err(problem) if problem == TOO_FINE && self.cuts => {
+                // What is cut is less than a nanosecond.
+                let places = usize::from(DECIMALS - unit.decimals());
+                let end = text
+                    .find(['.', ','])
+                    .map_or(text.len(), |i| (i + 1 + places).min(text.len()));
+                number(text.get(..end).unwrap_or(text), unit).or_else(|_| {
+                    let value: f64 = text.parse().map_err(|_| NO_TIME)?;
+                    number(&format!("{value:.places$}"), unit)
+                })
+            }
+            found => found,
+        }
+    }
+
     fn written(&self, text: &str, order: Order) -> Result<Time, Problem> {
-        let (date, rest) = date(text, order).ok_or(NO_TIME)?;
-        let date = date?;
-        let rest = rest.trim_start_matches([' ', 'T', 't', '_', ',', '\t']);
-        let (second, fraction, leap, rest) = if rest.is_empty() {
-            (0, 0, false, "")
-        } else {
-            of_day(rest).ok_or(NO_TIME)?
-        };
-        if second > 86_400 || (leap && second % 86_400 != 0 && !rest.trim().is_empty() && offset(rest).is_none()) {
+        let found = civil::written(text, order).ok_or(NO_TIME)?;
+        let date = found.date?;
+        if found.second > 86_400 || found.zone == Zone::Unknown {
             return Err(NO_TIME);
         }
-        if leap && !self.takes_leap_seconds {
+        if found.leap && !self.takes_leap_seconds {
             return Err(LEAP);
         }
-        self.placed(date, second, fraction, rest)
+        self.placed(date, found.second, found.fraction, &found.zone)
     }
 
     /// A civil time on its clock: with its own offset, that of the zone, or none.
-    fn placed(&self, date: Date, second: i64, fraction: i128, offset_text: &str) -> Result<Time, Problem> {
+    fn placed(&self, date: Date, second: i64, fraction: i128, zone: &Zone) -> Result<Time, Problem> {
         let seconds = civil_seconds(date, second);
-        if !offset_text.trim().is_empty() {
-            let offset = offset(offset_text).ok_or(NO_TIME)?;
-            return match self.scale {
-                Scale::Utc => Ok(Time::checked(seconds - offset, fraction)),
-                _ => {
-                    Err(("has an offset, rows before have none", "mend the cell, or say --time-zone for those without"))
-                }
-            };
-        }
-        match (&self.zone, self.scale) {
-            (Some(zone), _) => self.in_zone(zone, seconds, fraction),
-            (None, Scale::Utc) => Err(NO_ZONE),
-            (None, _) => Ok(Time::checked(seconds, fraction)),
+        match (zone, &self.zone, self.scale) {
+            (Zone::Unknown, ..) => Err(NO_TIME),
+            (Zone::Offset(offset), _, Scale::Utc) => Ok(Time::checked(seconds - offset, fraction)),
+            (Zone::Offset(_), ..) => {
+                Err(("has an offset, rows before have none", "mend the cell, or say --time-zone for those without"))
+            }
+            (Zone::Name(name), Some(zone), _) => in_named(zone, name, seconds, fraction),
+            (Zone::Name(_), None, _) => Err(NAMED_ZONE),
+            (Zone::Nothing, Some(zone), _) => self.in_zone(zone, seconds, fraction),
+            (Zone::Nothing, None, Scale::Utc) => Err(NO_ZONE),
+            (Zone::Nothing, None, _) => Ok(Time::checked(seconds, fraction)),
         }
     }
 
     fn in_zone(&self, zone: &TimeZone, seconds: i64, fraction: i128) -> Result<Time, Problem> {
-        let civil: DateTime = jiff::Timestamp::from_second(seconds)
-            .map(|stamp| Offset::UTC.to_datetime(stamp))
-            .map_err(|_| NO_SUCH_DATE)?;
-        let stamp = zone.to_ambiguous_timestamp(civil).unambiguous().map_err(|_| DOUBTFUL)?;
+        let stamp = zone
+            .to_ambiguous_timestamp(civil_time(seconds)?)
+            .unambiguous()
+            .map_err(|_| DOUBTFUL)?;
         Ok(Time::checked(stamp.as_second(), fraction))
     }
 
     fn formatted(&self, text: &str, format: &str) -> Result<Time, Problem> {
         let refused = ("is not written as --time-format says", "mend the cell, or the format");
         let parsed = jiff::fmt::strtime::parse(format, text).map_err(|_| refused)?;
+        let has_hour = ["%H", "%I", "%k", "%l", "%T", "%R", "%c", "%s"]
+            .iter()
+            .any(|part| format.contains(part));
         let time = match parsed.to_time() {
             Ok(time) => time,
+            Err(_) if !has_hour && format.contains("%M") => {
+                let part = |part: Option<i8>| part.unwrap_or(0);
+                let nanosecond = parsed.subsec_nanosecond().unwrap_or(0);
+                jiff::civil::Time::new(0, part(parsed.minute()), part(parsed.second()), nanosecond)
+                    .map_err(|_| refused)?
+            }
             Err(_) if !format.contains("%H") && !format.contains("%I") && !format.contains("%T") => {
                 jiff::civil::Time::midnight()
             }
@@ -331,35 +279,88 @@ impl Clock {
         };
         match parsed.offset() {
             Some(offset) => Ok(Time::checked(civil_seconds(date, second) - i64::from(offset.seconds()), fraction)),
-            None => self.placed(date, second, fraction, ""),
+            None => self.placed(date, second, fraction, &Zone::Nothing),
         }
     }
 
-    /// The time of numbers of year, month, day, hour, minute, second in cells of their own.
+    /// The time of parts of a date in cells of their own, or of a date and a time of day in two cells.
     pub(crate) fn of_parts(&self, cells: &[&str]) -> Result<Time, Problem> {
         let Syntax::Parts(meaning, ends) = &self.syntax else {
-            return self.parse(&cells.join(" "));
+            return self.parse(&joined(cells));
         };
-        let mut parts = [0_i64, 1, 1, 0, 0, 0];
-        let mut fraction = 0;
+        let (mut parts, mut fraction) = ([0_i64, 1, 1, 0, 0, 0], 0);
+        let (mut day_of_year, mut of_day) = (None, 0);
         for (cell, part) in cells.iter().zip(meaning) {
+            if *part == Part::OfDay {
+                let text = padded(cell);
+                let found = civil::of_day(&text)
+                    .or_else(|| civil::compact_of_day(&text))
+                    .ok_or(NO_TIME)?;
+                (of_day, fraction) = (found.0, found.1);
+                if found.2 || !found.3.trim().is_empty() || of_day > 86_400 {
+                    return Err(NO_TIME);
+                }
+                continue;
+            }
             let time = number(cell.trim(), Unit::Seconds)?;
-            parts[*part] = i64::try_from(time.0.div_euclid(SECOND)).map_err(|_| NO_TIME)?;
+            let whole = i64::try_from(time.0.div_euclid(SECOND)).map_err(|_| NO_TIME)?;
             let rest = time.0.rem_euclid(SECOND);
-            if rest != 0 && *part != 5 {
+            if rest != 0 && *part != Part::Second {
                 return Err(NO_TIME);
             }
-            fraction = if *part == 5 { rest } else { fraction };
+            match part {
+                Part::DayOfYear => day_of_year = Some(whole),
+                Part::Second => (parts[5], fraction) = (whole, rest),
+                _ => parts[*part as usize] = whole,
+            }
         }
         let [year, month, day, hour, minute, second] = parts;
         let small = |part: i64| i8::try_from(part).map_err(|_| NO_SUCH_DATE);
-        let date = Date::new(i16::try_from(year).map_err(|_| NO_SUCH_DATE)?, small(month)?, small(day)?)
-            .map_err(|_| NO_SUCH_DATE)?;
+        let date = match day_of_year {
+            Some(day) => civil::day_of_year(year, day)?,
+            None => Date::new(i16::try_from(year).map_err(|_| NO_SUCH_DATE)?, small(month)?, small(day)?)
+                .map_err(|_| NO_SUCH_DATE)?,
+        };
         if !(0..=24).contains(&hour) || !(0..=60).contains(&minute) || !(0..60).contains(&second) {
             return Err(NO_TIME);
         }
         // In weather years, hour 1 is the first hour of a day, and minute 60 its end.
         let hour = if *ends { hour - 1 } else { hour };
-        self.placed(date, hour * 3600 + minute * 60 + second, fraction, "")
+        self.placed(date, hour * 3600 + minute * 60 + second + of_day, fraction, &Zone::Nothing)
     }
+}
+
+/// The cells of a date and a time of day as one text.
+pub(crate) fn joined(cells: &[&str]) -> String {
+    match cells {
+        [date, time] => format!("{date} {}", padded(time)),
+        _ => cells.join(" "),
+    }
+}
+
+/// A time of day without marks that lost its zeros, as `930` of `0930`.
+fn padded(cell: &str) -> std::borrow::Cow<'_, str> {
+    let cell = cell.trim();
+    if (1..=5).contains(&cell.len()) && cell.bytes().all(|c| c.is_ascii_digit()) {
+        let width = if cell.len() <= 4 { 4 } else { 6 };
+        return format!("{cell:0>width$}").into();
+    }
+    cell.into()
+}
+
+fn civil_time(seconds: i64) -> Result<DateTime, Problem> {
+    let stamp = jiff::Timestamp::from_second(seconds).map_err(|_| NO_SUCH_DATE)?;
+    Ok(Offset::UTC.to_datetime(stamp))
+}
+
+/// A time that says by letters which of the offsets of a zone it has, as `CEST` of `Europe/Berlin`.
+fn in_named(zone: &TimeZone, name: &str, seconds: i64, fraction: i128) -> Result<Time, Problem> {
+    let ambiguous = zone.to_ambiguous_timestamp(civil_time(seconds)?);
+    let found = [ambiguous.earlier(), ambiguous.later()]
+        .into_iter()
+        .flatten()
+        .find(|stamp| zone.to_offset_info(*stamp).abbreviation().eq_ignore_ascii_case(name));
+    found
+        .map(|stamp| Time::checked(stamp.as_second(), fraction))
+        .ok_or(NAMED_ZONE)
 }

@@ -108,6 +108,9 @@ fn verify_reports_only_what_it_compared() {
     let said = text(&good(&folder, &["verify", "wrong.csv", "a.fewb", "--columns", "temp"], b""));
     assert!(said.contains("not compared: flow, price, direction") && !said.contains("all promises"), "{said}");
     assert_eq!(verdict(&folder, &["wrong.csv", "a.fewb"]).0, Some(1));
+    // A column that is left out is no other column.
+    let (code, found) = verdict(&folder, &["wrong.csv", "a.fewb", "--without", "direction"]);
+    assert_eq!((code, found["columns"].as_array().unwrap().len()), (Some(0), 3));
     let message = refused(&folder, &["verify", "a.csv", "a.fewb", "--columns", "none"], b"");
     assert!(message.contains("none"), "{message}");
 }

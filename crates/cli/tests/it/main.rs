@@ -250,7 +250,7 @@ fn refusals_name_file_row_column_and_mend() {
     assert_eq!(
         message,
         "error: bad.csv: line 3 (row 2), column `x`: `abc` is not a number: make it a gap with --missing, leave such lines out with \
-         --skip-bad, or the column with --without\n"
+         --skip-bad, or the column with --without x\n"
     );
     let message = refused(&folder, &["pack", "a.csv", "--bound", "x=1%", "-o", "x"], b"");
     assert_eq!(message, "error: a.csv: no column `x`: there are time, temp, flow, price, direction\n");

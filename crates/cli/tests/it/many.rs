@@ -187,3 +187,34 @@ fn killed_work_goes_on_with_the_same_bytes() {
         .collect();
     assert_eq!(left, [""; 0]);
 }
+
+/// Recordings of several blocks have an identity. It comes from the table and the options, so that the same command gives the same bytes.
+#[test]
+fn the_same_table_gives_the_same_bytes() {
+    let (_kept, folder) = folder();
+    tables(&folder, 2);
+    let pack = |file: &str, bound: &str, output: &str| {
+        let words = [
+            "pack",
+            file,
+            "--time",
+            "exact",
+            "--bound",
+            bound,
+            "--rows-per-block",
+            "64",
+            "-o",
+            output,
+        ];
+        good(&folder, &words, b"");
+        std::fs::read(folder.join(output)).unwrap()
+    };
+    let first = pack("in/t00.csv", "*=±0.1", "a");
+    assert_eq!(pack("in/t00.csv", "*=±0.1", "b"), first);
+    std::fs::copy(folder.join("in/t00.csv"), folder.join("copy.csv")).unwrap();
+    assert_eq!(pack("copy.csv", "*=±0.1", "c"), first);
+    // Another table with the same columns has another identity (bytes 5 to 9 or so differ), as has one with another bound.
+    let head = |bytes: &[u8]| bytes[..12].to_vec();
+    assert_ne!(head(&pack("in/t01.csv", "*=±0.1", "d")), head(&first));
+    assert_ne!(head(&pack("in/t00.csv", "*=±0.2", "e")), head(&first));
+}

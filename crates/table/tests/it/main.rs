@@ -5,9 +5,11 @@
 mod dialects;
 mod faults;
 mod kinds;
+mod loggers;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod random;
+mod spellings;
 mod times;
 
 use fewbits_table::{Batch, Cells, Dialect, Error, Table};

@@ -1,0 +1,365 @@
+//! Dates and times of day in many spellings: their parts, and what they say of their zone.
+
+use crate::time::DECIMALS;
+use crate::written::{NO_SUCH_DATE, Order, Problem};
+use jiff::civil::Date;
+
+/// A written time in its parts.
+#[derive(Debug)]
+pub(crate) struct Written {
+    pub(crate) date: Result<Date, Problem>,
+    /// Seconds of the day, and attoseconds.
+    pub(crate) second: i64,
+    pub(crate) fraction: i128,
+    /// Whether it is a leap second.
+    pub(crate) leap: bool,
+    pub(crate) zone: Zone,
+}
+
+/// What a written time says of its zone.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Zone {
+    Nothing,
+    /// Seconds ahead of UTC.
+    Offset(i64),
+    /// An abbreviation, as `CET`, which several zones may have.
+    Name(String),
+    Unknown,
+}
+
+/// The parts of a date with or without a time of day.
+pub(crate) fn written(text: &str, order: Order) -> Option<Written> {
+    let text = text.trim();
+    let found = parts(text, order);
+    if found.is_some() {
+        return found;
+    }
+    parts(&arranged(text)?, Order::Ymd)
+}
+
+fn parts(text: &str, order: Order) -> Option<Written> {
+    let (date, rest) = date(text, order)?;
+    let rest = rest.trim_start_matches([' ', 'T', 't', '_', ',', '\t', ':']);
+    let midnight = (0, 0, false, rest);
+    // `2024-03-05-08` may be an hour.
+    let is_offset = offset(rest).is_some() && rest.contains(|c: char| c == ':' || c.is_ascii_alphabetic());
+    let (second, fraction, leap, rest) = if rest.is_empty() || is_offset {
+        midnight
+    } else {
+        of_day(rest).or_else(|| compact_of_day(rest))?
+    };
+    Some(Written {
+        date,
+        second,
+        fraction,
+        leap,
+        zone: zone_of(rest),
+    })
+}
+
+fn zone_of(rest: &str) -> Zone {
+    let rest = rest.trim();
+    // A region behind an offset says no more than the offset.
+    let rest = match rest.split_once('[') {
+        Some((before, region)) if region.ends_with(']') => before.trim(),
+        _ => rest,
+    };
+    if rest.is_empty() {
+        return Zone::Nothing;
+    }
+    match offset(rest) {
+        Some(seconds) => Zone::Offset(seconds),
+        None if (2..=5).contains(&rest.len()) && rest.bytes().all(|c| c.is_ascii_alphabetic()) => {
+            Zone::Name(rest.to_ascii_uppercase())
+        }
+        None => Zone::Unknown,
+    }
+}
+
+/// Reads digits: their value and what follows.
+pub(crate) fn digits(text: &str, at_most: usize) -> Option<(i64, usize, &str)> {
+    let count = text.bytes().take(at_most).take_while(u8::is_ascii_digit).count();
+    let value = text[..count].parse().ok()?;
+    Some((value, count, &text[count..]))
+}
+
+const MONTHS: [&str; 12] = [
+    "january",
+    "february",
+    "march",
+    "april",
+    "may",
+    "june",
+    "july",
+    "august",
+    "september",
+    "october",
+    "november",
+    "december",
+];
+const DAYS: [&str; 7] = [
+    "monday",
+    "tuesday",
+    "wednesday",
+    "thursday",
+    "friday",
+    "saturday",
+    "sunday",
+];
+
+/// The place of a word in a list of names, by three letters or more of it.
+fn named(word: &str, names: &[&str]) -> Option<usize> {
+    let word = word.trim_end_matches('.').to_ascii_lowercase();
+    names.iter().position(|name| word.len() >= 3 && name.starts_with(&word))
+}
+
+fn checked(year: i64, month: i64, day: i64) -> Result<Date, Problem> {
+    match (i16::try_from(year), i8::try_from(month), i8::try_from(day)) {
+        (Ok(year), Ok(month), Ok(day)) => Date::new(year, month, day).map_err(|_| NO_SUCH_DATE),
+        _ => Err(NO_SUCH_DATE),
+    }
+}
+
+/// A day of a year, counted from 1.
+pub(crate) fn day_of_year(year: i64, day: i64) -> Result<Date, Problem> {
+    let first = checked(year, 1, 1)?;
+    let date = first
+        .checked_add(jiff::Span::new().try_days(day - 1).map_err(|_| NO_SUCH_DATE)?)
+        .map_err(|_| NO_SUCH_DATE)?;
+    if day >= 1 && date.year() == first.year() {
+        Ok(date)
+    } else {
+        Err(NO_SUCH_DATE)
+    }
+}
+
+/// Reads a date in an order. A year that stands first with four digits is read in any order.
+fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
+    let (first, length, rest) = digits(text, 4)?;
+    let next = rest.chars().next()?;
+    if next.is_ascii_digit() {
+        return compact(text);
+    }
+    // `05MAR2024`
+    let mark = if next.is_ascii_alphabetic() && length <= 2 {
+        ""
+    } else {
+        &rest[..rest
+            .chars()
+            .next()
+            .filter(|mark| matches!(mark, '-' | '/' | '.' | ' '))?
+            .len_utf8()]
+    };
+    let rest = &rest[mark.len()..];
+    let word_length = rest.bytes().take_while(u8::is_ascii_alphabetic).count();
+    let month = named(&rest[..word_length], &MONTHS);
+    let (second, rest) = match month {
+        Some(month) => (month as i64 + 1, rest[word_length..].trim_start_matches('.')),
+        None if mark.trim().is_empty() => return None,
+        None => {
+            let (value, count, behind) = digits(rest, 3)?;
+            if length == 4 && count == 3 {
+                return Some((day_of_year(first, value), behind));
+            }
+            if count > 2 {
+                return None;
+            }
+            (value, behind)
+        }
+    };
+    if length == 4 && rest.is_empty() && mark == "-" {
+        return Some((checked(first, second, 1), rest));
+    }
+    let rest = rest.strip_prefix(mark)?;
+    let (third, third_length, rest) = digits(rest, 4)?;
+    let (year, month, day, year_length) = match (length, month, order) {
+        (4, _, _) => (first, second, third, 4),
+        (_, Some(_), _) | (_, _, Order::Dmy) => (third, second, first, third_length),
+        (_, _, Order::Mdy) => (third, first, second, third_length),
+        (_, _, Order::Ymd) => (first, second, third, length),
+    };
+    let year = match (year_length, year) {
+        (2, 69..) => year + 1900,
+        (2, _) => year + 2000,
+        (4, _) => year,
+        _ => return None,
+    };
+    Some((checked(year, month, day), rest))
+}
+
+/// A date without marks: `20240305`, also before a time of day, or `2024065`.
+fn compact(text: &str) -> Option<(Result<Date, Problem>, &str)> {
+    let count = text.bytes().take_while(u8::is_ascii_digit).count();
+    let year = digits(text, 4)
+        .map(|(year, ..)| year)
+        .filter(|year| (1700..2300).contains(year))?;
+    match count {
+        7 => Some((day_of_year(year, text[4..7].parse().ok()?), &text[7..])),
+        8 | 10 | 12 | 14 | 17 => Some((checked(year, text[4..6].parse().ok()?, text[6..8].parse().ok()?), &text[8..])),
+        _ => None,
+    }
+}
+
+/// Whether a cell of digits alone is a date, and perhaps a time of day, without marks.
+pub(crate) fn is_compact(cell: &str) -> bool {
+    let (whole, decimals) = cell.split_once('.').unwrap_or((cell, ""));
+    let lengths: &[usize] = if decimals.is_empty() {
+        &[8, 10, 12, 14, 17]
+    } else {
+        &[14]
+    };
+    lengths.contains(&whole.len())
+        && cell.len() != whole.len() + 1
+        && whole.bytes().chain(decimals.bytes()).all(|c| c.is_ascii_digit())
+        && parts(cell, Order::Ymd).is_some_and(|found| found.date.is_ok() && found.second <= 86_400)
+}
+
+/// The digits behind a mark of decimals as attoseconds, and what follows.
+fn fraction(text: &str) -> Option<(i128, &str)> {
+    let count = text.bytes().take_while(u8::is_ascii_digit).count();
+    let kept = text[..count].trim_end_matches('0');
+    if kept.len() > usize::from(DECIMALS) {
+        return None;
+    }
+    Some((format!("{kept:0<18}").parse().ok()?, &text[count..]))
+}
+
+/// Seconds and attoseconds of a time of day, whether it is a leap second, and what follows.
+pub(crate) fn of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
+    let (hours, _, rest) = digits(text, 9)?;
+    let (minutes, _, mut rest) = digits(rest.strip_prefix(':')?, 2)?;
+    let (mut seconds, mut parts) = (0, 0);
+    if let Some(behind) = rest.strip_prefix(':') {
+        let (value, _, behind) = digits(behind, 2)?;
+        seconds = value;
+        rest = behind;
+        // Three digits behind a further colon are thousandths.
+        let is_thousandths =
+            |behind: &&str| digits(behind, 4).is_some_and(|(_, count, rest)| count == 3 && rest.trim().is_empty());
+        if let Some(behind) = rest
+            .strip_prefix(['.', ','])
+            .or(rest.strip_prefix(':').filter(is_thousandths))
+        {
+            (parts, rest) = fraction(behind)?;
+        }
+    }
+    if minutes > 59 || seconds > 60 {
+        return None;
+    }
+    let (hours, rest) = half_day(hours, rest)?;
+    Some((hours * 3600 + minutes * 60 + seconds, parts, seconds == 60, rest))
+}
+
+/// Minutes and seconds with decimals, as `0:30.5`.
+pub(crate) fn of_hour(text: &str) -> Option<(i64, i128)> {
+    let (minutes, _, rest) = digits(text, 9)?;
+    let (seconds, count, rest) = digits(rest.strip_prefix(':')?, 2)?;
+    let (parts, rest) = fraction(rest.strip_prefix('.')?)?;
+    (count == 2 && seconds < 60 && rest.is_empty()).then_some((minutes * 60 + seconds, parts))
+}
+
+/// Days and a time of day, as `2 days 03:04:05`.
+pub(crate) fn of_days(text: &str) -> Option<(i64, i128)> {
+    let (days, _, rest) = digits(text, 6)?;
+    let rest = rest.strip_prefix(" day")?;
+    let rest = rest
+        .strip_prefix('s')
+        .unwrap_or(rest)
+        .trim_start_matches([' ', ',', '+']);
+    let (second, parts, leap, rest) = if rest.is_empty() {
+        (0, 0, false, rest)
+    } else {
+        of_day(rest)?
+    };
+    (!leap && rest.is_empty() && second < 86_400).then_some((days * 86_400 + second, parts))
+}
+
+/// The hour of a clock of twelve hours, by what follows: `am`, `p.m.`, `p`.
+fn half_day(hours: i64, rest: &str) -> Option<(i64, &str)> {
+    let behind = rest.trim_start();
+    let letters = behind
+        .bytes()
+        .take_while(|c| c.is_ascii_alphabetic() || *c == b'.')
+        .count();
+    let word = behind[..letters].replace('.', "").to_ascii_lowercase();
+    let is_afternoon = match word.as_str() {
+        "am" | "a" => false,
+        "pm" | "p" => true,
+        _ => return Some((hours, rest)),
+    };
+    if !(1..=12).contains(&hours) {
+        return None;
+    }
+    Some((hours % 12 + if is_afternoon { 12 } else { 0 }, &behind[letters..]))
+}
+
+/// A time of day without marks: `21`, `2130`, `213000`, `213000.5`, `213000500`.
+pub(crate) fn compact_of_day(text: &str) -> Option<(i64, i128, bool, &str)> {
+    let count = text.bytes().take_while(u8::is_ascii_digit).count();
+    let part = |at: usize| text.get(at..at + 2).and_then(|part| part.parse::<i64>().ok());
+    let (minutes, seconds) = match count {
+        2 => (0, 0),
+        4 => (part(2)?, 0),
+        6 | 9 => (part(2)?, part(4)?),
+        _ => return None,
+    };
+    let (parts, rest) = match (count, text[count..].strip_prefix(['.', ','])) {
+        (6, Some(behind)) => fraction(behind)?,
+        (9, _) => (fraction(&text[6..9])?.0, &text[9..]),
+        _ => (0, &text[count..]),
+    };
+    if rest.starts_with([':', '.', ',', '-', '/']) && count < 6 || minutes > 59 || seconds > 60 {
+        return None;
+    }
+    Some((part(0)? * 3600 + minutes * 60 + seconds, parts, seconds == 60, rest))
+}
+
+/// A date with words, with its parts in the order of ISO 8601: `Tue, 05 Mar 2024 21:30:00 GMT`, `Mar 5, 2024 9:30 PM`.
+fn arranged(text: &str) -> Option<String> {
+    if !text.bytes().any(|c| c.is_ascii_alphabetic()) {
+        return None;
+    }
+    let mut words: Vec<&str> = text.split([' ', ',', '\t']).filter(|word| !word.is_empty()).collect();
+    let has_day = words.first().is_some_and(|word| named(word, &DAYS).is_some());
+    if has_day {
+        words.remove(0);
+    }
+    let Some(at) = words.iter().position(|word| named(word, &MONTHS).is_some()) else {
+        return has_day.then(|| words.join(" "));
+    };
+    let month = named(words.remove(at), &MONTHS)? + 1;
+    let is_number = |word: &str, lengths: std::ops::RangeInclusive<usize>| {
+        lengths.contains(&word.len()) && word.bytes().all(|c| c.is_ascii_digit())
+    };
+    let bare = |word: &str| word.trim_end_matches(['.', 's', 't', 'n', 'd', 'r', 'h']).to_owned();
+    let day = words.iter().position(|word| is_number(&bare(word), 1..=2))?;
+    let day = bare(words.remove(day));
+    let year = words.iter().position(|word| is_number(word, 4..=4))?;
+    let year = words.remove(year);
+    Some(format!("{year}-{month:02}-{day:0>2} {}", words.join(" ")))
+}
+
+/// An offset from UTC in seconds.
+pub(crate) fn offset(text: &str) -> Option<i64> {
+    let text = text.trim();
+    if matches!(text.to_ascii_uppercase().as_str(), "Z" | "UTC" | "GMT" | "UT") {
+        return Some(0);
+    }
+    let text = text.strip_prefix("UTC").or(text.strip_prefix("GMT")).unwrap_or(text);
+    let (sign, rest) = match text.chars().next()? {
+        '+' => (1, &text[1..]),
+        '-' => (-1, &text[1..]),
+        '\u{2212}' => (-1, &text[3..]),
+        _ => return None,
+    };
+    let (hours, _, rest) = digits(rest, 2)?;
+    let minutes = match rest.strip_prefix(':').unwrap_or(rest) {
+        "" => 0,
+        rest => {
+            digits(rest, 2)
+                .filter(|(_, count, rest)| *count == 2 && rest.is_empty())?
+                .0
+        }
+    };
+    (hours <= 18 && minutes < 60).then_some(sign * (hours * 3600 + minutes * 60))
+}
