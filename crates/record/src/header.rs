@@ -105,11 +105,6 @@ impl Header {
         self.checked()
     }
 
-    /// The same header with this identity.
-    pub(crate) fn with_identity(self, identity: u32) -> Self {
-        Self { identity, ..self }.checked()
-    }
-
     /// The same header for blocks that follow in another form.
     pub(crate) fn with_form(self, form: Form) -> Self {
         let only = self.only.filter(|_| form == Form::Single);

@@ -5,8 +5,8 @@ use super::one_wrong::log_sum;
 use super::reading::{Content, Reading, Tested, WORD_BITS, conditioned, words};
 use super::{FusionCentre, Member};
 use crate::Error;
-use crate::contract::{Evidence, Points, StateFilter};
-use fewbits_core::{BitString, Gaussian, Observation};
+use crate::contract::{Points, StateFilter};
+use fewbits_core::{BitString, Evidence, Gaussian, Observation};
 use fewbits_numerics::normal::{cdf, quantile};
 use nalgebra::SVector;
 
