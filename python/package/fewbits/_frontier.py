@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from ._fewbits import FusionCentre, Generator, Model, Table
 from .errors import ArgumentError
 
-_Doubles: TypeAlias = NDArray[np.float64]
-_Own: TypeAlias = Callable[[_Doubles, _Doubles], tuple[ArrayLike, float]]
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    _Doubles: TypeAlias = NDArray[np.float64]
+    _Own: TypeAlias = Callable[[_Doubles, _Doubles], tuple[ArrayLike, float]]
 
 
 def frontier(

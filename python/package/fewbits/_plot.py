@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from .errors import ArgumentError
@@ -35,6 +34,8 @@ def plot(table: Table, *, x: str | None = None, y: str | list[str] | None = None
     for name in [x, *drawn]:
         if name not in names:
             raise ArgumentError("y", f"'{name}'", f"one of {', '.join(names)}")
+    from statistics import NormalDist
+
     import matplotlib.pyplot as plt
 
     axes = plt.subplots()[1] if ax is None else ax

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import warnings
 from collections.abc import Iterator
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -68,6 +66,9 @@ def _range(predicate: pl.Expr | None, key: str) -> tuple[float | int | None, flo
     """
     if predicate is None:
         return None, None
+    import json
+    import warnings
+
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
