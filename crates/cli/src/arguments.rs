@@ -37,7 +37,7 @@ pub(crate) enum Task {
     /// Compare sizes and speeds on a table: this format, pco and (with feature `zstd`) zstd, in the same run.
     Bench(BenchOptions),
     /// Estimate what sensors measure from a table (CSV) of values, of reports of few bits, or of ranges to anchors: estimates with bands.
-    Track(TrackOptions),
+    Track(Box<TrackOptions>),
     /// Estimate a place from distances to anchors at known places, in the plane or in space: estimates with bands.
     Ranges(RangesOptions),
     /// Design quantizers of few bits for one unknown that several sensors measure.

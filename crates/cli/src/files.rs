@@ -3,7 +3,7 @@
 //! An output that is also an input would destroy it. Files are compared by identity (device and number), so that links and other
 //! spellings of a path are found too.
 
-use crate::arguments::{ReceiveOptions, TableOptions, Task, TrackOptions};
+use crate::arguments::{ReceiveOptions, TableOptions, Task};
 use crate::error::Error;
 use crate::{many, target};
 use fewbits_recipes::names;
@@ -69,6 +69,18 @@ fn standard(is_input: bool) -> Option<Identity> {
 #[cfg(not(unix))]
 fn standard(_is_input: bool) -> Option<Identity> {
     None
+}
+
+/// Whether an open file is the one that stands at `path` now.
+#[cfg(unix)]
+pub(crate) fn is_at(file: &File, path: &Path) -> bool {
+    file.metadata().is_ok_and(|found| number(&found) == identity(path))
+}
+
+/// Whether an open file is the one that stands at `path` now. Here an open file cannot be replaced.
+#[cfg(not(unix))]
+pub(crate) fn is_at(_file: &File, _path: &Path) -> bool {
+    true
 }
 
 /// Whether a file can be read twice: neither standard input nor a pipe nor a device.
@@ -222,7 +234,7 @@ fn table(task: &mut Task) -> Option<&mut TableOptions> {
         Task::Verify(options) => Some(&mut options.table),
         Task::Look(options) => Some(&mut options.table),
         Task::Bench(options) => Some(&mut options.table),
-        Task::Track(TrackOptions { table, .. }) => Some(table),
+        Task::Track(options) => Some(&mut options.table),
         Task::Ranges(options) => Some(&mut options.table),
         Task::Send(options) => Some(&mut options.table),
         _ => None,

@@ -7,9 +7,10 @@ use crate::arguments::RepackOptions;
 use crate::error::Error;
 use crate::many::described;
 use crate::say::say;
-use crate::target::{self, Target};
-use crate::{Ending, bounds, words};
+use crate::target::Target;
+use crate::{Ending, bounds, files, words};
 use fewbits_record::{Bound, Effort, Playback, Schema, TimeBase};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::path::Path;
 use std::time::SystemTime;
@@ -26,7 +27,7 @@ enum Done {
 }
 
 /// Whether the last row is older than the age. Times without a zone are taken as UTC, times in seconds as counted from 1970.
-fn is_older(options: &RepackOptions, playback: &Playback<std::fs::File>, file: &str) -> Result<bool, Error> {
+fn is_older(options: &RepackOptions, playback: &Playback<File>, file: &str) -> Result<bool, Error> {
     let Some(age) = options.older_than else { return Ok(true) };
     let TimeBase::Clock { decimals, .. } = playback.schema().time() else {
         return Err(Error::content(file, "its rows have no times: leave out --older-than"));
@@ -74,11 +75,30 @@ impl Write for Counted {
     }
 }
 
+/// Locks a file that is to be replaced, as long as the result lives.
+fn lock(path: &Path) -> Result<File, Error> {
+    let name = path.display().to_string();
+    loop {
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(path)
+            .map_err(Error::io(&name, "open"))?;
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(Error::content(&name, "another command writes to it: try again when it has ended"));
+        }
+        // Between opening and locking another command may have replaced the file: the lock is then that of the old one.
+        if files::is_at(&file, path) {
+            return Ok(file);
+        }
+    }
+}
+
 fn one(options: &RepackOptions, file: &str) -> Result<Done, Error> {
     let path = Path::new(file);
     let output = options.output.as_deref().unwrap_or(path);
     // A command that appends meanwhile would lose its rows.
-    let lock = options.output.is_none().then(|| target::lock(path)).transpose()?;
+    let lock = options.output.is_none().then(|| lock(path)).transpose()?;
     let failed = Error::recording(file);
     let mut playback = Playback::open(path).map_err(&failed)?;
     if !is_older(options, &playback, file)? {

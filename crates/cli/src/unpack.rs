@@ -4,8 +4,8 @@ use crate::arguments::{CatOptions, UnpackOptions};
 use crate::error::Error;
 use crate::files::is_regular;
 use crate::output::{Shape, Writer};
-use crate::say::say;
-use crate::{Ending, clock, recording, say, stretches, words};
+use crate::say::{self, say};
+use crate::{Ending, clock, recording, stretches, words};
 use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase, merged};
 use std::path::Path;
 

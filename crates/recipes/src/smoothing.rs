@@ -8,7 +8,7 @@
 //! mean = mean + C (next mean - f(mean)),  P = (I - C F) P (I - C F)' + C (next P + Q) C'
 //! ```
 
-use fewbits_core::{Error, Evolution, Gaussian, GaussianDynamics};
+use fewbits_core::{Error, Evolution, Gaussian};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::linalg::solve_semidefinite;
 use nalgebra::SMatrix;
@@ -116,7 +116,7 @@ fn step<const D: usize>(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use fewbits_core::{ArgumentError, Dynamics};
+    use fewbits_core::{ArgumentError, Dynamics, GaussianDynamics};
     use nalgebra::{DMatrix, DVector, Matrix1, SVector, Vector1};
     use rand::Rng;
 

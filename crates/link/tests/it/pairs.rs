@@ -2,9 +2,7 @@
 
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::scheme::{Censoring, CovarianceFeedback};
-use fewbits_core::{
-    Dynamics, Evolution, FullValue, Gaussian, Link, NumberFormat, OnAxes, SchemeNode, Sensing, SensorNode,
-};
+use fewbits_core::{Evolution, FullValue, Gaussian, Link, NumberFormat, OnAxes, SchemeNode, Sensing, SensorNode};
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{Event, FusionCentre, RemoteSensor, Reporting, Slot};

@@ -1,6 +1,6 @@
 //! Random rooms: whether a place that the tracker is sure of is right, and whether its bands hold what they say.
 
-use fewbits_core::{Dynamics, Evolution};
+use fewbits_core::Dynamics;
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
