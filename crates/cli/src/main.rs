@@ -89,7 +89,10 @@ fn run(mut task: Task) -> Result<Ending, Error> {
         Task::Plan(options) => plan::run(&options),
         Task::Pack(options) => pack::run(&options),
         Task::Unpack(options) => unpack::run(&options.whole()),
-        Task::Cat(options) => unpack::run(&options),
+        Task::Cat(options) => match &options.every {
+            Some(every) => stretches::run(&options, every),
+            None => unpack::run(&options),
+        },
         Task::Repack(options) => repack::run(&options),
         Task::Info(options) => info::run(&options),
         Task::Verify(options) => verify::run(&options),

@@ -28,7 +28,7 @@ pub(crate) struct CatOptions {
     #[arg(long, value_name = "NAMES")]
     pub(crate) columns: Vec<String>,
     /// Write one row for each stretch of this time (as `1h`, from full hours on) or number of rows, instead of each row.
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) every: Option<String>,
     /// With `--every`: the mean of each column's finite values. The default, if no other is asked for.
     #[arg(long, requires = "every")]

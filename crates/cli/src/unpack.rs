@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::output::{Shape, Writer};
 use crate::say::{self, say};
-use crate::{Ending, clock, recording, stretches, words};
+use crate::{Ending, clock, recording, words};
 use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase, merged};
 use std::path::Path;
 
@@ -101,9 +101,6 @@ pub(crate) fn warn_of_end(file: &str) {
 
 /// Runs the task.
 pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
-    if let Some(every) = &options.every {
-        return stretches::run(options, every);
-    }
     let [file] = options.files.as_slice() else {
         return several(options);
     };

@@ -1,8 +1,23 @@
 //! Dates and times of day in many spellings: their parts, and what they say of their zone.
 
 use crate::time::DECIMALS;
-use crate::written::{NO_SUCH_DATE, Order, Problem};
 use jiff::civil::Date;
+
+/// Order of day, month and year.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    Ymd,
+    Dmy,
+    Mdy,
+}
+
+/// Problem with a time and its mend.
+pub(crate) type Problem = (&'static str, &'static str);
+
+pub(crate) const NO_SUCH_DATE: Problem = (
+    "is no date of the calendar",
+    "mend the cell, say the order with --time-format dmy, mdy or ymd, or leave such rows out with --skip-bad",
+);
 
 /// A written time in its parts.
 #[derive(Debug)]

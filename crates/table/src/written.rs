@@ -1,17 +1,10 @@
 //! How times are written: dates and times of day in many spellings, numbers, formats that are said, zones.
 
 use crate::civil::{self, Zone, offset};
+pub(crate) use crate::civil::{NO_SUCH_DATE, Order, Problem};
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
 use jiff::civil::{Date, DateTime};
 use jiff::tz::{Offset, TimeZone};
-
-/// Order of day, month and year.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Order {
-    Ymd,
-    Dmy,
-    Mdy,
-}
 
 /// Meaning of a column of a part of a date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,9 +35,6 @@ pub(crate) enum Syntax {
     Format(String),
 }
 
-/// Problem with a time and its mend.
-pub(crate) type Problem = (&'static str, &'static str);
-
 pub(crate) const NO_TIME: Problem = (
     "is not a time",
     "say how times are written with --time-format, as '%d.%m.%Y %H:%M', or name another column with --time-column; leave single rows out with --skip-bad",
@@ -55,10 +45,6 @@ const LEAP: Problem = (
 );
 const TOO_FINE: Problem =
     ("has more decimals of a second than the 18 that are kept", "allow an error of times, as --time ±2ns");
-pub(crate) const NO_SUCH_DATE: Problem = (
-    "is no date of the calendar",
-    "mend the cell, say the order with --time-format dmy, mdy or ymd, or leave such rows out with --skip-bad",
-);
 pub(crate) const NAMED_ZONE: Problem =
     ("names a zone by letters that several zones share", "say its region, as --time-zone Europe/Berlin");
 pub(crate) const DAYS: Problem = (

@@ -312,16 +312,23 @@ impl Settings {
         if !(fit_change || fit_noise) {
             return Ok(());
         }
-        let unknown = |is_unknown: bool, number: f64, least: f64| match is_unknown {
-            true => Number::Unknown { guess: number, least },
-            false => Number::Known(number),
-        };
         let noise = |name: &String| match self.noises.of(name) {
-            Some(stated) => Number::Known(*stated),
-            None => unknown(fit_noise, self.noise, floor),
+            // The fit takes values for what they are with rounding.
+            Some(stated) => Number::Known(stated.hypot(floor)),
+            None if fit_noise => Number::Unknown {
+                guess: self.noise,
+                least: floor,
+            },
+            None => Number::Known(self.noise.hypot(floor)),
         };
         let noises: Vec<Number> = names.iter().map(noise).collect();
-        let change = unknown(fit_change, self.world.change, 0.0);
+        let change = match fit_change {
+            true => Number::Unknown {
+                guess: self.world.change,
+                least: 0.0,
+            },
+            false => Number::Known(self.world.change),
+        };
         let instants = values(first, &self.offsets);
         let found = self
             .world
@@ -333,8 +340,8 @@ impl Settings {
         self.world.change = found.change;
         if fit_noise {
             self.noise = median(found.noises.clone());
+            self.found = found.noises;
         }
-        self.found = found.noises;
         Ok(())
     }
 

@@ -120,12 +120,12 @@ fn rounded_readings_are_cells() {
     }
 }
 
-/// A thermometer that writes only when it has moved by half a degree.
+/// A thermometer that writes only when it has moved by half a degree. The level is a walk as the filter supposes.
 #[test]
 fn silence_of_a_sensor_that_sends_on_change_says_something() {
     let mut numbers = Numbers(4);
-    let truth: Vec<f64> = (0..1400).map(|row| 20.0 + 6.0 * (row as f64 / 220.0).sin()).collect();
-    let (mut table, mut last) = ("temp\n".to_owned(), f64::NAN);
+    let truth = walk(&mut numbers, 1400, 20.0, 0.06);
+    let (mut table, mut last, mut squares) = ("temp\n".to_owned(), f64::NAN, 0.0);
     for level in &truth {
         let value: f64 = level + 0.05 * numbers.normal();
         if (value - last).abs() < 0.5 {
@@ -134,19 +134,15 @@ fn silence_of_a_sensor_that_sends_on_change_says_something() {
             last = value;
             table += &format!("{value}\n");
         }
+        squares += (last - level).powi(2);
     }
-    let options = [
-        "--silent-within",
-        "0.5",
-        "--noise",
-        "0.05",
-        "--change",
-        "0.06",
-        "--prior",
-        "20±2",
-    ];
-    let (error, held) = against(&table, &truth, &options);
-    assert!(error < 0.25 && held > 0.85, "{error} {held}");
+    let known = ["--noise", "0.05", "--change", "0.06", "--prior", "20±2"];
+    let (error, held) = against(&table, &truth, &[&["--silent-within", "0.5"][..], &known].concat());
+    let last_value = (squares / 1400.0).sqrt();
+    assert!(error < 1.02 * last_value && (0.92..=0.98).contains(&held), "{error} {last_value} {held}");
+    // Without it an empty cell says nothing, and the band grows.
+    let (without, _) = against(&table, &truth, &known);
+    assert!(error < without, "{error} {without}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A measurement known to lie in a cell, reported over a link that may lose or invert bits.
 
-use super::{Factor, Tilted};
+use super::{Factor, Scalar, Tilted};
 use crate::cell::Cell;
 use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
@@ -227,6 +227,10 @@ impl Factor<1> for InCell {
             let pairs = log_weights.iter_mut().zip(buffer);
             pairs.for_each(|(log_weight, log)| *log_weight += constant + *log);
         }
+    }
+
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        Some(((*self).into(), 0.0))
     }
 
     /// The measurement `m + n ~ N(mu, s^2)` with `s^2 = v + r` is truncated to the cell. The posterior of `m` given the cell follows by the

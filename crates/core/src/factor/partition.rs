@@ -1,7 +1,7 @@
 //! A probability for each cell of a partition of the measurement axis.
 
 use super::moments::Feature;
-use super::{Factor, Tilted};
+use super::{Factor, Scalar, Tilted};
 use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
@@ -215,6 +215,10 @@ impl Factor<1> for Partition {
                 }
             }
         }
+    }
+
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        Some((self.clone().into(), 0.0))
     }
 
     /// The posterior is a mixture of those of the single cells, each in closed form.

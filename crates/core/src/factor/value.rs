@@ -1,6 +1,6 @@
 //! A value observed in Gaussian noise.
 
-use super::{Factor, Tilted};
+use super::{Factor, Scalar, Tilted};
 use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::{FactoredGaussian, Gaussian};
@@ -94,6 +94,12 @@ impl<const M: usize> Factor<M> for Value<M> {
         } else {
             self.noise.add_log_pdfs(means, log_weights);
         }
+    }
+
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        let variance = self.noise_covariance().iter().next().filter(|_| M == 1)?;
+        let one = Value::scalar(self.value()[0], *variance).ok()?;
+        Some((one.into(), 0.0))
     }
 
     /// `S = V + R`, gain `K = V S^-1`: mean `mu + K (z - mu)`, covariance `(I - K) V (I - K)' + K R K'`, evidence

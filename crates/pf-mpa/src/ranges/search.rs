@@ -117,7 +117,15 @@ impl Search<'_> {
             .collect();
         found.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
         found.truncate(MAXIMA);
-        found.into_iter().map(place).collect()
+        // The grid is coarse beside the prior of a height, and anchors of like heights have a second place on their other side.
+        let heights: &[f64] = if axes == 3 { &[0.0, -1.0, 1.0] } else { &[0.0] };
+        let beside = |index: usize| {
+            heights.iter().map(move |off| {
+                let [x, y, z] = place(index);
+                [x, y, z + off * self.known.spreads[2]]
+            })
+        };
+        found.into_iter().flat_map(beside).collect()
     }
 
     /// Mean and variances of the state before the first range.
