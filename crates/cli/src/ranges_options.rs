@@ -37,8 +37,7 @@ pub(crate) struct RangesOptions {
     /// Standard deviation of the error of scale; `0` if there is none. Ranges are `1 + scale` times the distance.
     #[arg(long, default_value_t = 0.1, value_name = "DEVIATION")]
     pub(crate) scale: f64,
-    /// Height of the target if the anchors have heights: `0.3` if it is known, `0.5±0.5` if it is estimated from there. Default: estimated if
-    /// the anchors have heights.
+    /// Height of the target. Needed if the anchors have heights; it is not estimated.
     #[arg(long, value_name = "HEIGHT", allow_hyphen_values = true)]
     pub(crate) height: Option<String>,
     /// The ranges of one time share an unknown offset: differences of times of arrival, times the speed of propagation.

@@ -107,15 +107,16 @@ fn read_anchors(file: &str) -> Result<Vec<Anchor>, Error> {
     Ok(anchors)
 }
 
-fn settings(options: &RangesOptions) -> Result<RangeSettings, Error> {
-    const EXPECTED: &str =
-        "a known height as `0.3`, or one that is estimated from a mean and its standard deviation, as `0.5±0.5`";
+fn settings(options: &RangesOptions, anchors: &[Anchor]) -> Result<RangeSettings, Error> {
+    const EXPECTED: &str = "a known height as `0.3`; heights are not estimated";
     let height = match options.height.as_deref() {
-        None => Height::Unsaid,
-        Some(text) if text.contains('±') => {
-            let (mean, deviation) = mean_and_deviation("--height", text)?;
-            Height::Estimated { mean, deviation }
+        None if anchors.iter().any(|(_, place)| place.z != 0.0) => {
+            return Err(Error::Needed {
+                option: "--height",
+                reason: "the anchors have heights, and that of the target is not estimated",
+            });
         }
+        None => Height::Unsaid,
         Some(text) => Height::Known(number("--height", text, EXPECTED)?),
     };
     Ok(RangeSettings {
@@ -170,7 +171,7 @@ pub(super) fn run(options: &RangesOptions, mut instants: Instants) -> Result<End
         Report::Sign => Travel::Bits(1),
         Report::Word { bits } => Travel::Bits(bits),
     };
-    let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings(options)?)
+    let mut tracker = RangeTracker::new(anchors.iter().cloned(), travel, settings(options, &anchors)?)
         .map_err(Error::refused("the tracker of ranges is refused"))?;
     let known = |name: &str| anchors.iter().position(|(known, _)| known == name);
     if let Some(name) = instants.names.iter().find(|name| known(name).is_none()) {

@@ -33,7 +33,8 @@ pub enum Height {
     Unsaid,
     /// It is known and constant, in the unit of the anchors' coordinates.
     Known(f64),
-    /// It is estimated and may change: mean and standard deviation before the first range.
+    /// It is estimated and may change: mean and standard deviation before the first range. Anchors of like heights leave two sides, and the
+    /// estimate can settle on the wrong one with a narrow band: use it only where the anchors' heights differ as much as their places.
     Estimated {
         /// Mean.
         mean: f64,
