@@ -132,7 +132,7 @@ pub trait StateFilter<const D: usize> {
     }
 }
 
-/// The filter of [`assumed_density`]; with values it is the extended Kalman filter. Observations of one instant are processed one after
+/// The filter of [`assumed_density`](crate::assumed_density); with values it is the extended Kalman filter. Observations of one instant are processed one after
 /// the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MomentFilter;

@@ -129,7 +129,7 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
         Ok(Info { log_likelihood, ..info })
     }
 
-    /// Of more than [`MAX_TESTED`] particles, so many of equal weight.
+    /// Of more than 500 particles, 500 of equal weight.
     fn mixture(&self, belief: &GaussianCloud<D>) -> Option<Vec<(f64, Gaussian<D>)>> {
         let (means, logs) = (belief.means(), belief.means().log_weights());
         let of = |i: usize| Gaussian::from_trusted_parts(state_at(&means.columns(), i), *belief.shared_covariance());

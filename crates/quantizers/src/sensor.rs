@@ -11,7 +11,7 @@ use fewbits_core::{Deterministic, Link, MeasurementNoise, Observation, Scheme};
 use fewbits_numerics::error::positive;
 use serde::{Deserialize, Serialize};
 
-/// A sensor that reports the level of its scalar sample in every slot, as a [`Scheme`](fewbits_core::Scheme) that every filter accepts.
+/// A sensor that reports the level of its scalar sample in every slot, as a [`Scheme`] that every filter accepts.
 ///
 /// Over a [`Link`] of crossover `e` each bit of the word is inverted with probability `e`. A word without a level is a symbol
 /// too, so every received word decodes. The sensor is never silent, so a missing report does not depend on the sample.

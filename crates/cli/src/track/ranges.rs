@@ -7,7 +7,7 @@ use crate::Ending;
 use crate::arguments::{RangesOptions, TableOptions, TrackOptions};
 use crate::error::Error;
 use crate::input::Table;
-use crate::numbers::{mean_and_deviation, number};
+use crate::numbers::number;
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
 use crate::report::Report;
