@@ -2,7 +2,7 @@
 
 use crate::array::{matrix, vector};
 use crate::error::{Outcome, refused};
-use fewbits_core::{Dynamics, Evolution};
+use fewbits_core::{Dynamics, Evolution, GaussianDynamics};
 use fewbits_models::{AffineGaussian, ContinuousLinear};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
@@ -94,10 +94,8 @@ impl<const D: usize> Moves<D> {
 type Affine<const D: usize> = (SMatrix<f64, D, D>, SVector<f64, D>, SMatrix<f64, D, D>);
 
 impl<const D: usize> Evolution<D> for Moves<D> {
-    type Step = AffineGaussian<D>;
-
-    fn over(&self, seconds: f64) -> Result<AffineGaussian<D>, ArgumentError> {
-        self.lasting(seconds)
+    fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError> {
+        Ok(Box::new(self.lasting(seconds)?))
     }
 }
 

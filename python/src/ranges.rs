@@ -3,9 +3,8 @@
 use crate::error::{Outcome, refused};
 use crate::table::{Given, Table};
 use arrow_array::{ArrayRef, BooleanArray, Float64Array};
-use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{RangeEstimate, RangeSettings, Travel};
-use nalgebra::Vector2;
+use nalgebra::Vector3;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,13 +31,12 @@ pub(crate) struct RangeTracker {
     anchors: BTreeMap<String, (f64, f64)>,
     travel: Travel,
     settings: RangeSettings,
-    seed: u64,
 }
 
 #[pymethods]
 impl RangeTracker {
     #[new]
-    #[pyo3(signature = (anchors, *, send="value", noise=1.8, noise_factor=4.0, speed=1.0, speed_factor=4.0, persistence=6.0, outliers=0.02, bias=5.0, silence=30.0, seed=0))]
+    #[pyo3(signature = (anchors, *, send="value", noise=1.8, noise_factor=4.0, speed=1.0, speed_factor=4.0, persistence=6.0, outliers=0.02, bias=5.0, silence=30.0))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         anchors: BTreeMap<String, (f64, f64)>,
@@ -51,7 +49,6 @@ impl RangeTracker {
         outliers: f64,
         bias: f64,
         silence: f64,
-        seed: u64,
     ) -> Outcome<Self> {
         let bits = send.strip_prefix("word:").and_then(|bits| bits.parse().ok());
         let travel = match (send, bits) {
@@ -60,13 +57,13 @@ impl RangeTracker {
             _ => return refused("send", format!("'{send}'"), "'value', or 'word:1' to 'word:8'"),
         };
         let settings = RangeSettings {
-            noise,
-            noise_factor,
-            speed,
-            speed_factor,
+            noise: Some(noise),
+            noise_factor: Some(noise_factor),
+            speed: Some(speed),
+            speed_factor: Some(speed_factor),
             persistence,
             outliers,
-            bias,
+            bias: Some(bias),
             silence,
             ..RangeSettings::default()
         };
@@ -74,7 +71,6 @@ impl RangeTracker {
             anchors,
             travel,
             settings,
-            seed,
         };
         made.tracker()?;
         Ok(made)
@@ -91,7 +87,6 @@ impl RangeTracker {
         let (names, cells) = (given.texts(by)?, given.numbers(value)?);
         let (rows, found, bits) = py.detach(|| {
             let mut tracker = self.tracker()?;
-            let mut rng = Stream::new(self.seed).rng();
             let (mut rows, mut found, mut bits) = (Vec::new(), Vec::new(), Vec::new());
             for (row, ((second, name), cell)) in seconds.iter().zip(&names).zip(&cells).enumerate() {
                 if row % 256 == 255 {
@@ -101,7 +96,7 @@ impl RangeTracker {
                     continue;
                 };
                 let before = tracker.bits();
-                found.push(tracker.push(&mut rng, *second, name, range)?);
+                found.push(tracker.push(*second, name, range)?);
                 bits.push((tracker.bits() - before) as i64);
                 rows.push(row);
             }
@@ -135,7 +130,7 @@ impl RangeTracker {
         let places = self
             .anchors
             .iter()
-            .map(|(name, (x, y))| (name.clone(), Vector2::new(*x, *y)));
+            .map(|(name, (x, y))| (name.clone(), Vector3::new(*x, *y, 0.0)));
         Ok(fewbits_pf_mpa::RangeTracker::new(places, self.travel, self.settings)?)
     }
 }

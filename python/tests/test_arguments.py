@@ -90,7 +90,7 @@ CALLS = {
     ),
     "GridFilter.step": (lambda *a, **k: grid().step(*a, **k), ["observation"], ["dt"]),
     "GridFilter.run": (lambda *a, **k: grid().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
-    "RangeTracker": (fb.RangeTracker, ["anchors"], ["send", "noise", "outliers", "silence", "seed"]),
+    "RangeTracker": (fb.RangeTracker, ["anchors"], ["send", "noise", "outliers", "silence"]),
     "RangeTracker.run": (fb.RangeTracker(ANCHORS).run, ["table", "time", "by", "value"], []),
     "SourceSearch": (
         lambda *a, **k: fb.SourceSearch(
