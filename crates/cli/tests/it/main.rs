@@ -9,6 +9,7 @@ mod links;
 mod live;
 mod many;
 mod node;
+mod numbers;
 mod outputs;
 mod pages;
 mod ranges;

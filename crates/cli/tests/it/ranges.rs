@@ -1,24 +1,8 @@
 //! `fewbits ranges` on rooms with the faults that real ones have: ghosts, exact ranges, bad anchors, units, heights, unknown clocks.
 
+use crate::numbers::Numbers;
 use crate::{good, refused, text};
 use std::path::Path;
-
-/// A linear congruential generator, and from it numbers that are nearly normal (twelve uniform ones added up).
-struct Numbers(u64);
-
-impl Numbers {
-    fn normal(&mut self) -> f64 {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            self.0 = self
-                .0
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            sum += (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
-        }
-        sum
-    }
-}
 
 type Point = [f64; 3];
 

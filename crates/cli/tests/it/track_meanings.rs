@@ -1,23 +1,7 @@
 //! `fewbits track` where a row says more than a number: thresholds, accuracies, rounding, silence, limits; and smoothing.
 
+use crate::numbers::Numbers;
 use crate::{good, text};
-
-/// A linear congruential generator.
-struct Numbers(u64);
-
-impl Numbers {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
 
 fn walk(numbers: &mut Numbers, rows: usize, start: f64, change: f64) -> Vec<f64> {
     let mut level = start;
