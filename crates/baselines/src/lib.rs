@@ -10,6 +10,7 @@
 //! | [`dymbo`] | how normal the posterior of one bit is; successive bits of one sample |
 //! | [`handoff`] | bounds of the error after several hand-overs |
 //! | [`mixture_codec`] | the paper's reductions |
+//! | [`over_bits`] | published estimators of identical sensors, slot by slot, as receivers of `fewbits-protocol` |
 //! | [`pf_mpa`] | particle message passing, as published and with its errata corrected |
 //! | [`quantizer_design`] | algorithms of the publications for one sensor, and every assignment of words |
 
@@ -20,5 +21,6 @@ pub mod cfwmd;
 pub mod dymbo;
 pub mod handoff;
 pub mod mixture_codec;
+pub mod over_bits;
 pub mod pf_mpa;
 pub mod quantizer_design;

@@ -55,7 +55,6 @@
 //! Not here: the radio (`fewbits-network`), and the design of a quantizer for the values (`fewbits-quantizer-design`).
 
 pub mod censored;
-pub mod centre;
 pub mod ellipsoid;
 pub mod information;
 pub mod network;

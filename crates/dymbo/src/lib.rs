@@ -43,7 +43,6 @@
 //!
 //! Not here: energy and radio (`fewbits-network`), and the choice of which sensor reports (`fewbits-sensor-assignment`).
 
-mod centre;
 pub mod chain;
 mod filter;
 mod first_message;
@@ -55,7 +54,6 @@ pub mod sign_bit;
 pub mod steady;
 mod vector;
 
-pub use centre::{ParallelEstimator, ScalarEstimator};
 pub use fewbits_core::Error;
 pub use filter::{DymboFilter, ScalarFilter, StepInfo};
 pub use first_message::{FirstMessageValue, Multiple, RoundedSample, first_message_mse, first_message_value};

@@ -26,21 +26,27 @@
 //! its own random stream. A run is therefore a function of its arguments and can be repeated bit for bit.
 //!
 //! ```
-//! use fewbits_core::{Gaussian, SchemeNode, SensorNode};
-//! use fewbits_dymbo::{DymboFilter, ScalarEstimator, ScalarFilter, ScalarPlant};
+//! use fewbits_core::{Gaussian, Link};
+//! use fewbits_dymbo::SignBit;
+//! use fewbits_filters::MomentFilter;
+//! use fewbits_filters::centre::{FusionCentre, Reporting};
+//! use fewbits_link::FusionReceiver;
+//! use fewbits_models::{ContinuousLinear, LinearSensor};
 //! use fewbits_monte_carlo::Stream;
 //! use fewbits_network::{BitStar, Clock, Radio, Seconds, Setup};
-//! use fewbits_protocol::{Feedback, OverBits, ReportLength};
 //! use nalgebra::Vector1;
 //!
-//! let filter = DymboFilter::new(ScalarPlant::new(0.9, 0.5, 1.0)?);
-//! let start = Gaussian::scalar(0.0, 2.63)?;
-//! let centre = move || Ok(OverBits::new(ScalarEstimator { filter, start }));
-//! let node = move |_| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(filter.scheme())) };
+//! let scheme = SignBit::new(1.0)?;
+//! let centre = move || {
+//!     let (world, prior) = (ContinuousLinear::random_walk(0.5)?, Gaussian::scalar(0.0, 2.63)?);
+//!     let mut centre = FusionCentre::new(&mut Stream::new(1).rng(), world, MomentFilter, &prior)?;
+//!     let told = |_: &Gaussian<1>, measured: &Gaussian<1>| measured.mean()[0];
+//!     centre.join(0, Reporting::new(LinearSensor::direct(1.0)?, scheme, Link::PERFECT, told))?;
+//!     Ok(FusionReceiver::new(centre, 1.0, Stream::new(2)))
+//! };
 //! let measurements = [1.2, 0.8, 1.9, 2.4].map(|z| vec![Vector1::new(z)]).to_vec();
 //! let clock = Clock::new(Seconds::new(1.0)?)?;
-//! let star =
-//!     BitStar::new(centre, Feedback::Echoed, ReportLength::Fixed(1), node, measurements, clock, Stream::new(1))?;
+//! let star = BitStar::of_scheme(centre, scheme, measurements, clock, Stream::new(1))?;
 //! let mut network = star.simulate(10.0, Setup::new(Radio::cc2420(0.0)?, Stream::new(2)))?;
 //! network.run_until(clock.end(4))?;
 //! let sensor = network.ledger().accounts()[1];

@@ -6,7 +6,6 @@
 //! | [`Sensor`] | you write a sensor: for a simulator, a process or a microcontroller |
 //! | `Centre` (feature `std`) | you write a fusion centre |
 //! | `Receiver` (feature `std`) | an estimator runs under a `Centre`; feedback, reports and state are bits |
-//! | `Estimator`, `OverBits` (feature `std`) | the same, with feedback, reports and belief as Rust types |
 //! | `Leader`, `Bearer` (feature `std`) | a belief is sent from leader to leader |
 //!
 //! **A state machine takes events and returns what to do; it does nothing itself.** Its inputs are the time, received bytes, fired timers
@@ -46,8 +45,6 @@ mod frame;
 #[cfg(feature = "std")]
 mod handover;
 mod note;
-#[cfg(feature = "std")]
-mod over_bits;
 mod payload;
 #[cfg(feature = "std")]
 mod receiver;
@@ -62,8 +59,6 @@ pub use frame::{CHECK_BYTES, Check, DecodeError, Frame, Kind, VERSION, digest};
 #[cfg(feature = "std")]
 pub use handover::{Bearer, Errand, Lead, Leader};
 pub use note::Note;
-#[cfg(feature = "std")]
-pub use over_bits::{Estimator, OverBits, moments};
 pub use payload::Payload;
 #[cfg(feature = "std")]
 pub use receiver::{

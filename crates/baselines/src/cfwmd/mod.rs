@@ -1,5 +1,7 @@
-//! Comparisons of the publications: silence ignored, a random trigger, and withheld measurements imputed.
+//! The published closed loop over bits, and comparisons of the publications: silence ignored, a random trigger, and withheld
+//! measurements imputed.
 
+pub mod centre;
 pub mod imputing;
 pub mod trigger;
 

@@ -6,7 +6,9 @@
 //! | successive bits about one sample beside one word | [`iterated`] |
 //! | the exact moments after a first message, by enumeration of all reports | [`tree`] |
 //! | a filter beside the exact posterior of the same bits | [`gap`] |
+//! | the published centre of identical sensors over bits | [`centre`] |
 
+pub mod centre;
 pub mod gap;
 pub mod iterated;
 pub mod skew_normal;

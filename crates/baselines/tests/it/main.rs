@@ -7,4 +7,5 @@ mod chains;
 #[path = "../../../densities/tests/it/common.rs"]
 mod common;
 mod divergences;
+mod over_bits;
 mod products;

@@ -3,7 +3,8 @@
 use super::receivers::{each, over_bits};
 use super::worlds::{self, COEFFICIENT, PROCESS, RADIUS, SENSORS};
 use crate::prelude::*;
-use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant};
+use fewbits_baselines::dymbo::centre::ParallelEstimator;
+use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
 use fewbits_network::{BitStar, Channel, Fault, FaultKind, Loss, Seconds, SensorId, Setup};
 use fewbits_protocol::{Feedback, ReportLength};
 

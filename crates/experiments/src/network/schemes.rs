@@ -3,14 +3,14 @@
 use super::receivers::{Followers, LookUp, each};
 use super::worlds::{COEFFICIENT, Entry, PROCESS, SENSORS, World, member};
 use crate::prelude::Error;
+use fewbits_baselines::cfwmd::centre::CensoringEstimator;
+use fewbits_baselines::dymbo::centre::{ParallelEstimator, ScalarEstimator};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
-use fewbits_cfwmd::centre::CensoringEstimator;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{FullValue, Gaussian, LinearDynamics, Link, SensorNode};
 use fewbits_dymbo::{
-    CountFusion, InnovationWord, MultibitFilter, ParallelEstimator, ParallelFilter, Prediction, ScalarEstimator,
-    ScalarFilter, ScalarPlant,
+    CountFusion, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarFilter, ScalarPlant,
 };
 use fewbits_models::{Ar1, LinearGaussian, PLANE_POSITION};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};

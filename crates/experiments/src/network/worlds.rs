@@ -5,6 +5,7 @@
 
 use super::receivers::{each, mixed, over_bits};
 use crate::prelude::*;
+use fewbits_baselines::over_bits::Estimator;
 use fewbits_core::factor::Value;
 use fewbits_core::{LinearDynamics, MeasurementNoise, NumberFormat, Observed, Scheme, SensorNode};
 use fewbits_densities::Mixture;
@@ -14,7 +15,7 @@ use fewbits_mixture_codec::Reduction;
 use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_network::{Account, BitStar, Clock, Field, Ledger, Radio, Seconds, SensorId, Setup, Walk};
-use fewbits_protocol::{BoxError, Estimator, Feedback, Member, Receiver, ReportLength};
+use fewbits_protocol::{BoxError, Feedback, Member, Receiver, ReportLength};
 
 /// Sensors of either world; their noise has unit variance.
 pub const SENSORS: usize = 4;

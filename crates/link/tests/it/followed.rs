@@ -2,8 +2,9 @@
 
 use crate::world::SENSORS;
 use fewbits_adaptive::{Config, Packet, Receiver, Sensor};
+use fewbits_baselines::over_bits::Estimator;
 use fewbits_core::{BitReader, BitString, BitWriter, CodecError, Error, Message, Observation, SensorNode};
-use fewbits_protocol::{BoxError, Estimator};
+use fewbits_protocol::BoxError;
 use nalgebra::Vector1;
 use rand::Rng;
 

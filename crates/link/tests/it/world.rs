@@ -1,14 +1,16 @@
 //! A world of ten sensors of a scalar, and their centre.
 
+use fewbits_baselines::dymbo::centre::ParallelEstimator;
+use fewbits_baselines::over_bits::OverBits;
 use fewbits_cfwmd::scheme::CovarianceFeedback;
 use fewbits_core::{BitString, Gaussian, Link, NumberFormat, Observation, SchemeNode, SensorNode};
-use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant, SignBit};
+use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant, SignBit};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting};
 use fewbits_link::{FusionReceiver, Key, Peer, Step};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
-use fewbits_protocol::{CentreSettings, Feedback, Member, OverBits, Receiver, ReportLength, Schedule, update_asked};
+use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, ReportLength, Schedule, update_asked};
 use nalgebra::Vector1;
 use std::num::NonZeroU64;
 

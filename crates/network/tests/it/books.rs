@@ -1,7 +1,7 @@
 //! The ledger's laws.
 
 use crate::worlds::{clock, counted, plane, plane_sensors, plane_start, scalar, setup, star};
-use fewbits_cfwmd::centre::CensoringEstimator;
+use fewbits_baselines::cfwmd::centre::CensoringEstimator;
 use fewbits_cfwmd::network::Network;
 use fewbits_core::{BitString, Link, SensorNode};
 use fewbits_models::constant_velocity_2d;

@@ -2,14 +2,16 @@
 
 use crate::bit_star::{Counter, Speaker};
 use crate::worlds::{AllSend, clock, counted, each, plant, scalar, setup, star, start};
+use fewbits_baselines::dymbo::centre::ParallelEstimator;
+use fewbits_baselines::over_bits::OverBits;
 use fewbits_core::{BitString, FullValue, Link, SchemeNode, SensorNode};
-use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter};
+use fewbits_dymbo::{CountFusion, ParallelFilter};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
     BitStar, Channel, Check, Clock, Detail, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Loss, Measurements,
     Note, Radio, Seconds, SensorId, Setup, Stage, Walk, on_air,
 };
-use fewbits_protocol::{BoxError, Feedback, Lead, Leader, OverBits, ReportLength, Slot, digest};
+use fewbits_protocol::{BoxError, Feedback, Lead, Leader, ReportLength, Slot, digest};
 use fewbits_topology::Deployment;
 use nalgebra::{Vector1, Vector2};
 use rand::Rng;

@@ -2,14 +2,16 @@
 
 use crate::books::conserves;
 use crate::worlds::{Counted, clock, counted, plant, scalar, setup, start};
+use fewbits_baselines::dymbo::centre::ParallelEstimator;
+use fewbits_baselines::over_bits::OverBits;
 use fewbits_core::{BitString, Link};
-use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter};
+use fewbits_dymbo::{CountFusion, ParallelFilter};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
     Batching, BitNode, Channel, Check, Fault, FaultKind, Field, Log, Loss, Note, Seconds, SensorId, Setup, Simulator,
     Walk,
 };
-use fewbits_protocol::{BoxError, Feedback, Lead, Leader, OverBits, Receiver};
+use fewbits_protocol::{BoxError, Feedback, Lead, Leader, Receiver};
 use proptest::prelude::*;
 use rand::Rng;
 use std::collections::BTreeMap;

@@ -1,14 +1,15 @@
 //! A network without faults gives, to the last bit, the estimates of the estimator alone, and its ledger has the estimator's bits.
 
 use crate::worlds::{clock, counted, each, plane, plane_sensors, plane_start, plant, scalar, setup, star, start};
-use fewbits_cfwmd::centre::CensoringEstimator;
+use fewbits_baselines::cfwmd::centre::CensoringEstimator;
+use fewbits_baselines::dymbo::centre::ScalarEstimator;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_core::factor::Value;
 use fewbits_core::{Gaussian, Link, NumberFormat, Observation, Observed, SensorNode, Sign};
 use fewbits_densities::Mixture;
 use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SearchField, SourceChain, SourceSensor, Status};
-use fewbits_dymbo::{CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarEstimator, ScalarFilter};
+use fewbits_dymbo::{CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter};
 use fewbits_filters::kalman;
 use fewbits_handoff::{Coded, HandoffFilter, Leaders};
 use fewbits_mixture_codec::Reduction;

@@ -1,14 +1,16 @@
 //! Truths and measurements, the same for an estimator alone and over a network.
 
+use fewbits_baselines::dymbo::centre::ParallelEstimator;
+use fewbits_baselines::over_bits::{Estimator, OverBits, moments};
 use fewbits_core::{
     Dynamics, FullValue, Gaussian, Link, NumberFormat, Observation, Observed, Scheme, SchemeNode, Sensing, SensorNode,
 };
-use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant};
+use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{BitStar, Clock, Measurements, Radio, Seconds, Setup};
-use fewbits_protocol::{BoxError, Estimator, Feedback, OverBits, ReportLength, moments};
+use fewbits_protocol::{BoxError, Feedback, ReportLength};
 use nalgebra::{Matrix4, SVector, Vector1, Vector4};
 
 pub fn plant() -> ScalarPlant {

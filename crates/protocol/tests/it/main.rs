@@ -4,7 +4,6 @@
 mod centre;
 mod frame;
 mod handover;
-mod over_bits;
 mod sensor;
 mod uplink;
 mod wild;

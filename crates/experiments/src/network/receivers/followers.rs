@@ -1,6 +1,7 @@
 //! Signals followed within a guaranteed error, and a filter of what they measure.
 
 use fewbits_adaptive::{Config, Packet, Receiver, Sensor};
+use fewbits_baselines::over_bits::{Estimator, moments};
 use fewbits_core::factor::InCell;
 use fewbits_core::{
     BitReader, BitString, BitWriter, Cell, CodecError, Gaussian, LinearDynamics, Message, Observation, Observed,
@@ -8,7 +9,7 @@ use fewbits_core::{
 };
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_numerics::ArgumentError;
-use fewbits_protocol::{BoxError, Estimator, moments};
+use fewbits_protocol::BoxError;
 use nalgebra::Vector1;
 use rand::Rng;
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,11 @@
 //! Static quantizers and a table at the fusion centre: no feedback, no memory. Every slot stands alone.
 
 use crate::prelude::Error;
+use fewbits_baselines::over_bits::{Estimator, moments};
 use fewbits_binary_patterns::LookupTable;
 use fewbits_core::{Gaussian, Message, NumberFormat, Observation};
 use fewbits_numerics::ArgumentError;
-use fewbits_protocol::{BoxError, Estimator, moments};
+use fewbits_protocol::BoxError;
 use fewbits_quantizer_design::System;
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizers::{Labelling, QuantizingSensor, Symbol};

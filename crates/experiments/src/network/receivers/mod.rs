@@ -10,8 +10,9 @@ pub use followers::{Followed, Followers};
 pub use look_up::LookUp;
 pub use mixed::mixed;
 
+use fewbits_baselines::over_bits::{Estimator, OverBits};
 use fewbits_core::{Scheme, SchemeNode, SensorNode};
-use fewbits_protocol::{BoxError, Estimator, OverBits};
+use fewbits_protocol::BoxError;
 
 /// The receiver of an estimator in types, before its first slot.
 pub fn over_bits<E>(estimator: E) -> impl Fn() -> Result<OverBits<E>, BoxError> + Clone + Send + Sync + 'static

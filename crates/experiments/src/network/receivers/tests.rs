@@ -2,6 +2,7 @@
 
 use super::{Followers, LookUp, each};
 use fewbits_adaptive::{Config, Receiver as Following, Sensor};
+use fewbits_baselines::over_bits::{Estimator, OverBits};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
 use fewbits_core::factor::InCell;
 use fewbits_core::{Cell, Dynamics, Gaussian, Observation, Sensing, SensorNode};
@@ -9,7 +10,7 @@ use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{BitStar, Channel, Clock, Fault, FaultKind, Field, Radio, Seconds, SensorId, Setup, Simulator};
-use fewbits_protocol::{Estimator, Feedback, OverBits, ReportLength};
+use fewbits_protocol::{Feedback, ReportLength};
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::{ObservationModel, System};
 use fewbits_quantizers::Symbol;

@@ -1,11 +1,10 @@
-//! [`Estimator`]s of the scalar one-bit filters. [`OverBits`](fewbits_protocol::OverBits) turns them into fusion centres that
+//! [`Estimator`]s of the scalar one-bit filters. [`OverBits`](crate::over_bits::OverBits) turns them into fusion centres that
 //! receive frames of bits. The sensors' half is [`SchemeNode`](fewbits_core::SchemeNode) of the filter's scheme.
 
-use crate::filter::ScalarFilter;
-use crate::parallel::ParallelFilter;
-use crate::{Error, SignBit};
+use crate::over_bits::{Estimator, moments};
 use fewbits_core::{Gaussian, Message, NumberFormat, Observation, Scheme, Sign};
-use fewbits_protocol::{BoxError, Estimator, moments};
+use fewbits_dymbo::{Error, ParallelFilter, ScalarFilter, SignBit};
+use fewbits_protocol::BoxError;
 
 /// One sensor under a [`ScalarFilter`]: one bit per sample, or several.
 #[derive(Debug, Clone, PartialEq)]

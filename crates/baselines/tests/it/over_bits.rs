@@ -1,7 +1,8 @@
 //! Estimators in types as receivers over bits.
 
+use fewbits_baselines::over_bits::{Estimator, OverBits};
 use fewbits_core::{BitString, NumberFormat, Observation};
-use fewbits_protocol::{BoxError, Estimator, OverBits, Receiver};
+use fewbits_protocol::{BoxError, Receiver};
 use proptest::prelude::*;
 
 /// A level that grows by one in each slot, and is set to what is reported.

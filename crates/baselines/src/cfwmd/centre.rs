@@ -1,10 +1,11 @@
 //! Censoring sensors and their fusion centre with messages as bits: an [`Estimator`], and the sensors' half.
 
-use crate::Error;
-use crate::network::Network;
-use crate::no_feedback::advance;
-use crate::rule::{CensoringRule, OwnRecursion, Weighing};
-use crate::scheme::Censoring;
+use crate::over_bits::{Estimator, moments};
+use fewbits_cfwmd::Error;
+use fewbits_cfwmd::network::Network;
+use fewbits_cfwmd::no_feedback::advance;
+use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, Weighing};
+use fewbits_cfwmd::scheme::Censoring;
 use fewbits_core::{
     BitReader, BitString, BitWriter, CodecError, Gaussian, LinearDynamics, LinearSensing, Message, NumberFormat,
     Observation, Scheme, SensorNode,
@@ -12,7 +13,7 @@ use fewbits_core::{
 use fewbits_filters::kalman;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
-use fewbits_protocol::{BoxError, Estimator, moments};
+use fewbits_protocol::BoxError;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
-//! Estimators with typed messages, and the conversion of their messages to bits.
+//! Estimators with typed messages, and the conversion of their messages to bits: the published closed loops, each a [`Receiver`].
 
-use crate::receiver::{BoxError, Receiver};
 use fewbits_core::{BitReader, BitString, BitWriter, Gaussian, Message, Observation};
+use fewbits_protocol::{BoxError, Receiver};
 
 /// An estimator at a fusion centre with a typed belief. [`OverBits`] makes a [`Receiver`] of it.
 ///
