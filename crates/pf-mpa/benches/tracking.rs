@@ -4,12 +4,10 @@
 
 use divan::{AllocProfiler, Bencher};
 use fewbits_baselines::pf_mpa::MessagePassing;
+use fewbits_baselines::pf_mpa::{Encoder, GuidedGaussian, Linearised, Network, Ranged, Reports, Target, Tracker};
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::{
-    Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeNoise, Ranged, Reports, Target,
-    Tracker,
-};
+use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise};
 use nalgebra::{Matrix4, Vector2, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;

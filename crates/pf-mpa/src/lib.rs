@@ -1,82 +1,73 @@
 //! Tracking a target from quantized ranges.
 //!
-//! Sensors at known places measure their distance to a target. The noise grows with the distance. Each sends the level of a quantizer of
-//! a few bits. Chapter 3 of the thesis that this crate follows uses particle message passing on a factor graph. The trackers of this
-//! crate have smaller errors at lower cost.
+//! Sensors at known places measure their distance to a target. The noise may grow with the distance. Each sends the level of a quantizer of
+//! a few bits.
 //!
-//! **The likelihood of a level is in closed form** ([`RangeFactor`]), instead of a ring of particles with kernels. As a function of the
-//! position it is `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))` at the *hypothesised* distance `d`. It needs no
-//! kernel, no weights and no Jacobian, and every filter of the library accepts it. The recommended tracker is [`GridFilter`]: it
-//! multiplies a Gaussian belief with all factors on a grid of 15 x 15 nodes about the posterior and returns the Gaussian of the
-//! same moments. It uses no random numbers. Its mean squared error is a third below those of Gaussian message passing and of improved
-//! particle message passing, at a tenth of the latter's cost. It cannot represent a belief with several modes.
+//! **The likelihood of a level is in closed form** ([`RangeFactor`]). As a function of the position it is
+//! `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))` at the *hypothesised* distance `d`. It needs no kernel, no weights and no
+//! Jacobian, and every filter of the library accepts it. The recommended filter is [`GridFilter`]: it multiplies a Gaussian belief with all
+//! factors on a grid of 15 x 15 nodes about the posterior and returns the Gaussian of the same moments. It uses no random numbers. Its
+//! mean squared error is a third below those of Gaussian message passing and of improved particle message passing (chapter 3 of the thesis
+//! that this crate follows), at a tenth of the latter's cost. It cannot represent a belief with several modes.
 //!
 //! | task | item |
 //! |---|---|
 //! | sensor, noise, quantizer, likelihood of a level | [`RangeSensor`], [`RangeNoise`], [`QuantizedRange`], [`RangeFactor`] |
-//! | how all nodes compute the same cells | [`Encoder`]: published, predicted, adaptive |
-//! | models of the target: plain, nine interacting models, with its manoeuvre in the state | [`Target`], [`WithManoeuvre`] |
-//! | the recommended tracker | [`GridFilter`] |
+//! | cells about the expected range, as wide as its uncertainty | [`RangeReference::about`] with [`optimal_loading`] |
+//! | the recommended tracker | [`GridOnAxes`](fewbits_filters::GridOnAxes) in a [`FusionCentre`](fewbits_filters::centre::FusionCentre) |
 //! | recorded ranges with bias, outliers, missing anchors, unknown speed and start | [`RangeTracker`] |
-//! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
-//! | particles and draws | [`BootstrapFilter`](fewbits_filters::BootstrapFilter) on [`WithManoeuvre`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
-//! | bounds | [`CramerRao`], [`level_information`] |
-//! | which sensor leads, what it hands over, in bits | [`leader`] |
+//! | information of a range and of a level | [`range_information`], [`level_information`] |
 //!
 //! ```
-//! use fewbits_core::Gaussian;
+//! use fewbits_core::{Gaussian, Link, SchemeNode, SensorNode};
+//! use fewbits_filters::GridOnAxes;
+//! use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
+//! use fewbits_models::{ContinuousLinear, PLANE_POSITION};
 //! use fewbits_monte_carlo::Stream;
-//! use fewbits_pf_mpa::{Encoder, GridFilter, Network, QuantizedRange, RangeNoise, Reports, Target, Tracker};
-//! use nalgebra::{Matrix4, Vector2, Vector4};
+//! use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
+//! use nalgebra::{Matrix4, Vector1, Vector4};
 //!
-//! let (target, scheme) = (Target::printed()?, QuantizedRange::new(4, RangeNoise::from_snr_db(50.0)?)?);
-//! let places = [[4.0, 4.0], [16.0, 4.0], [10.0, 16.0]].map(Vector2::from);
-//! let network = Network::new(&places, scheme, Encoder::adaptive(4)?)?;
-//! let belief = Gaussian::new(Vector4::new(9.0, 9.0, 0.0, 0.5), Matrix4::identity() * 0.1)?;
-//! let mut rng = Stream::new(1).rng();
-//! let ranges = network.measure(&mut rng, 9.2, 9.4);
-//! let observed = network.observe(&target, 0, &belief, &ranges, Reports::Levels)?;
-//! let (belief, info) = GridFilter::default().step(&mut rng, &target, 0, &belief, &observed)?;
-//! assert_eq!((network.report_bits(), info.fallbacks), (6, 0));
-//! assert!((belief.mean()[0] - 9.2).abs() < 0.5);
+//! let (noise, loading) = (RangeNoise::from_snr_db(50.0)?, optimal_loading(4)?);
+//! let scheme = QuantizedRange::new(4, noise)?;
+//! let prior = Gaussian::new(Vector4::new(9.0, 0.0, 9.0, 0.5), Matrix4::identity() * 0.1)?;
+//! let (mut rng, world) = (Stream::new(1).rng(), ContinuousLinear::nearly_constant_velocity_2d(0.02)?);
+//! let filter = GridOnAxes::new(GridFilter::default(), PLANE_POSITION)?;
+//! let mut centre = FusionCentre::new(&mut rng, world, filter, &prior)?;
+//! let places = [[4.0, 4.0], [16.0, 4.0], [10.0, 16.0]];
+//! for (number, place) in (0..).zip(places) {
+//!     let sensor = RangeSensor::new(place.into(), noise)?.on_axes::<4>(PLANE_POSITION)?;
+//!     let ask = move |_: &Gaussian<4>, range: &Gaussian<1>| RangeReference::about(range, loading);
+//!     centre.join(number, Reporting::new(sensor, scheme.clone(), Link::PERFECT, ask))?;
+//! }
+//! centre.advance(&mut rng, 1.0)?;
+//! let mut slots = Vec::new();
+//! for (number, place) in (0..).zip(places) {
+//!     let feedback = centre.feedback(number)?;
+//!     let sensor = RangeSensor::new(place.into(), noise)?;
+//!     let range = Vector1::new(sensor.measure(&mut rng, sensor.distance(9.2, 9.4)));
+//!     let report = SchemeNode::new(scheme.clone()).report(&mut rng, &range, &feedback)?;
+//!     slots.push(Slot::new(number, feedback, report.into()));
+//! }
+//! centre.receive(&mut rng, &slots)?;
+//! assert!((centre.estimate().mean()[0] - 9.2).abs() < 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: radio, energy and delays (`fewbits-network`); more than two targets.
-
-/// Parts of the trackers, for the comparisons in `fewbits-baselines`. No promise is made of them.
-#[doc(hidden)]
-pub mod engine {
-    pub use crate::chain::draw;
-}
+//! Not here: radio, energy and delays (`fewbits-network`); several targets.
 
 mod bound;
-mod chain;
-mod encoder;
 mod factor;
-mod grid;
-mod guided;
-pub mod leader;
-mod linearised;
+mod loading;
 mod quantized;
 mod ranges;
-mod rao_blackwell;
 mod sensor;
-mod target;
-mod tracker;
 
-pub use bound::{CramerRao, level_information, position_information, range_information};
-pub use chain::AccelerationChain;
-pub use encoder::{Encoder, Normalisation, optimal_loading};
+pub use bound::{level_information, range_information};
 pub use factor::RangeFactor;
 pub use fewbits_core::Error;
 pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
-pub use guided::{GuidedGaussian, GuidedWorkspace};
-pub use linearised::{Linearised, QuantizationNoise, Velocity};
+pub use loading::optimal_loading;
 pub use quantized::{IntervalRule, QuantizedRange, RangeReference};
 pub use ranges::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
-pub use rao_blackwell::{RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
 pub use sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
-pub use target::{Manoeuvres, Target, WithManoeuvre};
-pub use tracker::{GaussianTracker, Network, POSITION, Ranged, Reports, Step, StepInfo, Tracker};
 pub use {nalgebra, rand};

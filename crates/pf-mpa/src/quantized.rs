@@ -83,7 +83,7 @@ impl Message for RangeReference {
 ///
 /// The innovation `I = (z - centre) / half_width` is in the cell `clamp(floor((I + 1) L / 2), 0, L - 1)`; a range on an edge
 /// belongs to the cell above. The reference is the scheme's feedback. Nodes that receive all reports and run the same
-/// deterministic filter compute it themselves without communication ([`Encoder`](crate::Encoder)); otherwise it is broadcast.
+/// deterministic filter compute it themselves without communication; otherwise it is broadcast.
 ///
 /// ```
 /// use fewbits_core::factor::Factor;

@@ -1,16 +1,16 @@
 //! Particle message passing, Algorithm 6 of the thesis. Its errata are settings.
 
+use crate::pf_mpa::Velocity;
+use crate::pf_mpa::chain::draw;
 use crate::pf_mpa::message::{DynamicsWeight, KernelMessage, KernelRule, Ring, RingWeight, kernel_of};
 use crate::pf_mpa::product_sampler::{Drawn, ProductSampler, ProductWorkspace};
+use crate::pf_mpa::{GaussianTracker, Ranged, Step, StepInfo};
 use fewbits_core::Gaussian;
 use fewbits_core::columns::set_state;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::triangular_factor;
 use fewbits_pf_mpa::Error;
-use fewbits_pf_mpa::Velocity;
-use fewbits_pf_mpa::engine::draw;
-use fewbits_pf_mpa::{GaussianTracker, Ranged, Step, StepInfo};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -348,8 +348,10 @@ impl GaussianTracker for MessagePassing {
             covariance += d * d.transpose();
         }
         covariance /= (n - 1) as f64;
-        let mut info = StepInfo::default();
-        info.fallbacks = fallbacks;
+        let info = StepInfo {
+            fallbacks,
+            ..StepInfo::default()
+        };
         Ok((Gaussian::from_trusted_parts(mean, covariance), info))
     }
 }

@@ -3,7 +3,7 @@
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, Score, World, prior};
 use crate::prelude::*;
-use fewbits_pf_mpa::{CramerRao, Target, position_information};
+use fewbits_baselines::pf_mpa::{CramerRao, Target, position_information};
 
 parameters! {
     pub struct Parameters {

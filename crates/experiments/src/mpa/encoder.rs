@@ -4,7 +4,7 @@ use super::scores::{Row, agree, find, mse, rows};
 use super::sweeps::SPEED;
 use super::world::{Method, Point};
 use crate::prelude::*;
-use fewbits_pf_mpa::Encoder;
+use fewbits_baselines::pf_mpa::Encoder;
 
 parameters! {
     pub struct Parameters {

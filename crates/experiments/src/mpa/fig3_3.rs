@@ -3,7 +3,7 @@
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, World, canonical};
 use crate::prelude::*;
-use fewbits_pf_mpa::Target;
+use fewbits_baselines::pf_mpa::Target;
 
 parameters! {
     pub struct Parameters {

@@ -4,9 +4,9 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::MessagePassing;
+use fewbits_baselines::pf_mpa::leader::{elect, nearest};
+use fewbits_baselines::pf_mpa::{Reports, Target, Tracker};
 use fewbits_core::{NumberFormat, RoundedGaussian};
-use fewbits_pf_mpa::leader::{elect, nearest};
-use fewbits_pf_mpa::{Reports, Target, Tracker};
 
 parameters! {
     pub struct Parameters {

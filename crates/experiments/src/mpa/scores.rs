@@ -2,7 +2,7 @@
 
 use super::world::{Field, Method, Point, Score, World};
 use crate::prelude::*;
-use fewbits_pf_mpa::{Reports, Target};
+use fewbits_baselines::pf_mpa::{Reports, Target};
 
 parameters! {
     pub struct Effort {

@@ -3,7 +3,7 @@
 use super::scores::{Effort, GAUSSIAN, MSE, Row, agree, clouds, deterministic, find, ladder, messages, mse, rows};
 use super::world::{LAYOUTS, Method, Point};
 use crate::prelude::*;
-use fewbits_pf_mpa::Reports;
+use fewbits_baselines::pf_mpa::Reports;
 
 /// The speed of the canonical scenario.
 pub(super) const SPEED: f64 = 3.0;

@@ -2,12 +2,13 @@
 
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
+use fewbits_baselines::pf_mpa::{
+    Encoder, GuidedGaussian, Linearised, Network, POSITION, Ranged, RaoBlackwellGuided, Reports, Target, Tracker,
+    Velocity, WithManoeuvre,
+};
 use fewbits_core::Observed;
 use fewbits_filters::{BootstrapFilter, ResamplingRule};
-use fewbits_pf_mpa::{
-    Encoder, GridFilter, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, QuantizedRange, RangeNoise,
-    RangeSensor, Ranged, RaoBlackwellGuided, Reports, Target, Tracker, Velocity, WithManoeuvre,
-};
+use fewbits_pf_mpa::{GridFilter, IntervalRule, QuantizedRange, RangeNoise, RangeSensor};
 
 /// Steps of a trajectory.
 pub(super) const STEPS: usize = 25;

@@ -26,7 +26,7 @@ pub use estimate::RangeEstimate;
 pub use settings::{Height, RangeSettings};
 
 use crate::Error;
-use crate::encoder::optimal_loading;
+use crate::loading::optimal_loading;
 use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::RangeNoise;
 use acquisition::hypotheses;

@@ -2,12 +2,12 @@
 
 use allocation_counter::measure;
 use fewbits_baselines::pf_mpa::MessagePassing;
+use fewbits_baselines::pf_mpa::{
+    Encoder, GuidedGaussian, Linearised, Network, RaoBlackwellGuided, Reports, Target, Tracker,
+};
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::{
-    Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports,
-    Target, Tracker,
-};
+use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise};
 use nalgebra::{Matrix4, Vector2, Vector4};
 use std::hint::black_box;
 

@@ -1,14 +1,16 @@
 //! Bad input is a typed error, extreme input an answer.
 
+use fewbits_baselines::pf_mpa::{
+    AccelerationChain, Encoder, GuidedGaussian, Linearised, Network, POSITION, RaoBlackwellGuided, Reports, Target,
+    Tracker, WithManoeuvre,
+};
 use fewbits_baselines::pf_mpa::{MessagePassing, ProductSampler};
 use fewbits_core::{Error, Gaussian, Observed};
 use fewbits_densities::Particles;
 use fewbits_filters::{BootstrapFilter, ResamplingRule};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{
-    AccelerationChain, BiasedRangeSensor, Encoder, GridFilter, GridWorkspace, GuidedGaussian, Linearised, Network,
-    POSITION, QuantizedRange, RangeNoise, RangeReference, RangeSensor, RaoBlackwellGuided, Reports, Target, Tracker,
-    WithManoeuvre,
+    BiasedRangeSensor, GridFilter, GridWorkspace, QuantizedRange, RangeNoise, RangeReference, RangeSensor,
 };
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, Vector2, Vector4};

@@ -1,16 +1,18 @@
 //! Reference values of another program, every one by its id.
 
 use fewbits_baselines::pf_mpa::association::{self, AssociationRule, tanh_rule};
+use fewbits_baselines::pf_mpa::leader::StepBits;
 use fewbits_baselines::pf_mpa::product;
+use fewbits_baselines::pf_mpa::{
+    AccelerationChain, CramerRao, Encoder, Linearised, Manoeuvres, Network, Normalisation, Reports, Target, Tracker,
+    position_information,
+};
 use fewbits_baselines::pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
 use fewbits_core::factor::Factor;
 use fewbits_core::{Gaussian, NumberFormat};
 use fewbits_densities::{Bandwidth, BandwidthRule, Component, Mixture};
-use fewbits_pf_mpa::leader::StepBits;
 use fewbits_pf_mpa::{
-    AccelerationChain, CramerRao, Encoder, GridFilter, GridWorkspace, Linearised, Manoeuvres, Network, Normalisation,
-    QuantizedRange, RangeNoise, RangeReference, Reports, Target, Tracker, level_information, position_information,
-    range_information,
+    GridFilter, GridWorkspace, QuantizedRange, RangeNoise, RangeReference, level_information, range_information,
 };
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, SMatrix, SVector, Vector1, Vector2, Vector4};

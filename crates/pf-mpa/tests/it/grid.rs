@@ -1,11 +1,11 @@
 //! The grid that adapts: consistent from blunt to sharp ranges, exact where something exact exists, an error where it cannot follow.
 
+use fewbits_baselines::pf_mpa::Ranged;
 use fewbits_core::Error;
 use fewbits_core::{Gaussian, Likelihood, Observed};
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_pf_mpa::{
-    GridFilter, GridWorkspace, QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor, Ranged,
-    optimal_loading,
+    GridFilter, GridWorkspace, QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor, optimal_loading,
 };
 use nalgebra::{Matrix2, Vector2};
 

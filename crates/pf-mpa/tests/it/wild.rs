@@ -1,14 +1,16 @@
 //! Wild arguments: ranges, references, associations and trackers answer numbers or errors, and a failed step keeps the belief.
 
 use fewbits_baselines::pf_mpa::association::{AssociationRule, separation, update};
+use fewbits_baselines::pf_mpa::leader::elect;
+use fewbits_baselines::pf_mpa::{
+    AccelerationChain, Encoder, GuidedGaussian, Linearised, Network, RaoBlackwellGuided, Reports, Target, Tracker,
+};
 use fewbits_baselines::pf_mpa::{MessagePassing, RingBias, kernel_error};
 use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::wild;
-use fewbits_pf_mpa::leader::elect;
 use fewbits_pf_mpa::{
-    AccelerationChain, Encoder, GridFilter, GuidedGaussian, Linearised, Network, QuantizedRange, RangeFactor,
-    RangeNoise, RangeReference, RangeSensor, RaoBlackwellGuided, Reports, Target, Tracker, level_information,
+    GridFilter, QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor, level_information,
     range_information,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
@@ -104,7 +106,7 @@ fn step<T: Tracker>(
     tracker: &T,
     target: &Target,
     prior: &Gaussian<4>,
-    observed: &[fewbits_pf_mpa::Ranged],
+    observed: &[fewbits_baselines::pf_mpa::Ranged],
 ) -> Result<(), TestCaseError>
 where
     T::Belief: Clone + PartialEq + std::fmt::Debug,

@@ -1,9 +1,9 @@
 //! Which sensor leads the next step, what the leaders hand over, and how many bits both cost.
 
-use crate::Error;
 use fewbits_core::{Gaussian, Message, NumberFormat, RoundedGaussian};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
+use fewbits_pf_mpa::Error;
 use nalgebra::{Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 

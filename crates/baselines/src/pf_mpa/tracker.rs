@@ -1,19 +1,19 @@
 //! The traits of the trackers of this crate, and the network of sensors that they use.
 
-use crate::Error;
-use crate::encoder::Encoder;
-use crate::factor::RangeFactor;
-use crate::quantized::{QuantizedRange, RangeReference};
-use crate::sensor::RangeSensor;
-use crate::target::{Manoeuvres, Target};
+use crate::pf_mpa::encoder::Encoder;
+use crate::pf_mpa::target::{Manoeuvres, Target};
 use fewbits_core::{Gaussian, Observed};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
+use fewbits_pf_mpa::Error;
+use fewbits_pf_mpa::RangeFactor;
+use fewbits_pf_mpa::RangeSensor;
+use fewbits_pf_mpa::{QuantizedRange, RangeReference};
 use nalgebra::Vector2;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// Coordinates of the position in the states of [`Target`] and of [`WithManoeuvre`](crate::WithManoeuvre).
+/// Coordinates of the position in the states of [`Target`] and of [`WithManoeuvre`](crate::pf_mpa::WithManoeuvre).
 pub const POSITION: [usize; 2] = [0, 1];
 
 /// One range sensor's report, as a likelihood of the position.

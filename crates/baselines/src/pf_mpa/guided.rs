@@ -1,14 +1,14 @@
 //! Gaussian beliefs, updated by a few weighted draws from a proposal that depends on the observations.
 
-use crate::Error;
-use crate::linearised::Linearised;
-use crate::target::Manoeuvres;
-use crate::tracker::{GaussianTracker, Ranged, Step, StepInfo};
+use crate::pf_mpa::linearised::Linearised;
+use crate::pf_mpa::target::Manoeuvres;
+use crate::pf_mpa::tracker::{GaussianTracker, Ranged, Step, StepInfo};
 use fewbits_core::columns::set_state;
 use fewbits_core::{Gaussian, Likelihood};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
+use fewbits_pf_mpa::Error;
 use nalgebra::{Matrix2, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;

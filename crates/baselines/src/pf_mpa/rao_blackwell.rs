@@ -1,9 +1,8 @@
 //! Particles whose velocity is a Gaussian given the positions (Rao-Blackwellised).
 
-use crate::Error;
-use crate::linearised::LinearRange;
-use crate::target::{Target, WithManoeuvre};
-use crate::tracker::{Ranged, StepInfo, Tracker};
+use crate::pf_mpa::linearised::LinearRange;
+use crate::pf_mpa::target::{Target, WithManoeuvre};
+use crate::pf_mpa::tracker::{Ranged, StepInfo, Tracker};
 use fewbits_core::columns::set_state;
 use fewbits_core::{Gaussian, Likelihood};
 use fewbits_densities::Particles;
@@ -11,6 +10,7 @@ use fewbits_filters::ResamplingRule;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
+use fewbits_pf_mpa::Error;
 use nalgebra::{Cholesky, Matrix2, SMatrix, Vector2, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;

@@ -1,12 +1,12 @@
 //! A target that manoeuvres: constant velocity with white acceleration noise and an acceleration that jumps between three values.
 
-use crate::Error;
-use crate::chain::AccelerationChain;
+use crate::pf_mpa::chain::AccelerationChain;
 use fewbits_core::{Dynamics, Gaussian};
 use fewbits_densities::Particles;
 use fewbits_filters::Imm;
 use fewbits_models::{AffineGaussian, LinearGaussian};
 use fewbits_numerics::error::{non_negative, positive};
+use fewbits_pf_mpa::Error;
 use nalgebra::{Matrix4, Matrix4x2, SVector, Vector2, Vector4, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;

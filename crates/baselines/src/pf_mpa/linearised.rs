@@ -1,11 +1,11 @@
 //! Gaussian trackers that linearise the range: the extended Kalman filters and Gaussian message passing.
 
-use crate::Error;
-use crate::target::Manoeuvres;
-use crate::tracker::{GaussianTracker, Ranged, Step, StepInfo};
+use crate::pf_mpa::target::Manoeuvres;
+use crate::pf_mpa::tracker::{GaussianTracker, Ranged, Step, StepInfo};
 use fewbits_core::Gaussian;
 use fewbits_filters::kalman;
 use fewbits_models::LinearSensor;
+use fewbits_pf_mpa::Error;
 use nalgebra::{Matrix1, Matrix4, RowVector4, Vector1, Vector2, Vector4};
 use rand::Rng;
 use serde::{Deserialize, Serialize};

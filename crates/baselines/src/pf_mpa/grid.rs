@@ -1,11 +1,11 @@
 //! The recommended tracker: [`GridFilter`] over the position.
 
-use crate::Error;
-use crate::linearised::Linearised;
-use crate::target::Manoeuvres;
-use crate::tracker::{GaussianTracker, POSITION, Step, StepInfo};
+use crate::pf_mpa::linearised::Linearised;
+use crate::pf_mpa::target::Manoeuvres;
+use crate::pf_mpa::tracker::{GaussianTracker, POSITION, Step, StepInfo};
 use fewbits_core::Gaussian;
 use fewbits_filters::{GridFilter, GridWorkspace};
+use fewbits_pf_mpa::Error;
 use rand::Rng;
 
 /// If the posterior underflows or the grid cannot resolve it, the step is that of Gaussian message passing and counts a fallback.

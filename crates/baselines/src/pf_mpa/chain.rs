@@ -1,7 +1,7 @@
 //! Manoeuvres: the acceleration of a target along one axis.
 
-use crate::Error;
 use fewbits_numerics::error::{non_negative, probabilities};
+use fewbits_pf_mpa::Error;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
