@@ -22,6 +22,8 @@ enum Task {
     Alone(xtask::alone::Options),
     /// List every public item of the library crates in `docs/api`, or compare with what is there.
     Api(xtask::api::Options),
+    /// Count lines and public items of every crate.
+    Size(xtask::size::Options),
     /// Check the house rules.
     Tidy,
 }
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
         Task::Bench(options) => xtask::bench::run(&options).map(ended),
         Task::Alone(options) => xtask::alone::run(&options).map(ended),
         Task::Api(options) => xtask::api::run(&options).map(ended),
+        Task::Size(options) => xtask::size::run(&options).map(ended),
         Task::Tidy => xtask::tidy::run().map(ended),
     };
     match done {

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`binary_patterns`] | other ways to send one bit per sensor, and substitutes for a search |
 //! | [`cfwmd`] | silence ignored, a random trigger, and withheld measurements imputed |
+//! | [`diffusive`] | Tierney and Kadane's ratios, and cumulants |
 //! | [`dymbo`] | how normal the posterior of one bit is; successive bits of one sample |
 //! | [`handoff`] | bounds of the error after several hand-overs |
 //! | [`mixture_codec`] | the paper's reductions |
@@ -18,6 +19,7 @@
 
 pub mod binary_patterns;
 pub mod cfwmd;
+pub mod diffusive;
 pub mod dymbo;
 pub mod handoff;
 pub mod mixture_codec;

@@ -1,6 +1,6 @@
 //! The domain: which cells of a grid are free, and the boundary conditions at their faces.
 
-use crate::grid::LARGEST;
+use crate::grid::MAX_MAGNITUDE;
 use crate::{Error, Grid};
 use fewbits_numerics::error::{refuse, within};
 
@@ -115,7 +115,7 @@ impl Domain {
         });
         for boundary in of_cells.chain(sides.as_flattened()) {
             if let Boundary::Leaking(leak) = boundary {
-                within("leak", *leak, 0.0, LARGEST)?;
+                within("leak", *leak, 0.0, MAX_MAGNITUDE)?;
             }
         }
         let is_free = |cell: &usize| !matches!(cells[*cell], Cell::Blocked(_));

@@ -42,7 +42,7 @@ pub struct SensorField {
 type Corner = (usize, f64, Vector3<f64>);
 
 /// Largest response, kg/m^3 per kg/s: the gradient of a larger one could overflow.
-const LARGEST_RESPONSE: f64 = 1e240;
+const MAX_RESPONSE: f64 = 1e240;
 
 impl SensorField {
     /// Steady responses of sensors at the given points, m.
@@ -84,7 +84,7 @@ impl SensorField {
         let responses = respond(&patches)?;
         // Gradients divide by widths of cells.
         for response in responses.iter().flatten().flatten() {
-            within("response", *response, f64::MIN, LARGEST_RESPONSE)?;
+            within("response", *response, f64::MIN, MAX_RESPONSE)?;
         }
         Ok(Self {
             domain,

@@ -5,7 +5,7 @@ use fewbits_numerics::error::{at_least_one, positive, refuse};
 
 /// Largest coordinate, diffusivity, velocity and decay in SI units, and reciprocal of the smallest width and diffusivity. Products of such
 /// numbers do not overflow.
-pub(crate) const LARGEST: f64 = 1e30;
+pub(crate) const MAX_MAGNITUDE: f64 = 1e30;
 
 /// A rectilinear grid: boxes of any widths along one, two or three axes.
 ///
@@ -25,8 +25,8 @@ impl Grid {
     /// least 1e-30 m.
     pub fn new(edges: &[Vec<f64>]) -> Result<Self, Error> {
         let increase = |axis: &Vec<f64>| {
-            let apart = axis.windows(2).all(|pair| pair[1] - pair[0] >= LARGEST.recip());
-            axis.len() >= 2 && apart && axis.iter().all(|edge| edge.abs() <= LARGEST)
+            let apart = axis.windows(2).all(|pair| pair[1] - pair[0] >= MAX_MAGNITUDE.recip());
+            axis.len() >= 2 && apart && axis.iter().all(|edge| edge.abs() <= MAX_MAGNITUDE)
         };
         if !(1..=3).contains(&edges.len()) || !edges.iter().all(increase) {
             let expected = "one to three axes of two or more increasing numbers from -1e30 to 1e30";

@@ -1,7 +1,7 @@
 //! Diffusion, wind and decay on a domain: the matrix.
 
 use crate::domain::{Face, OUTSIDE};
-use crate::grid::LARGEST;
+use crate::grid::MAX_MAGNITUDE;
 use crate::solver::{Direction, Factor, Solver};
 use crate::{Boundary, Domain, Error, Flow, Patch};
 use faer::Mat;
@@ -120,7 +120,7 @@ impl Transport {
     ) -> Result<Self, Error> {
         let domain = domain.into();
         flow.check(&domain)?;
-        let mut diffusivity = values("diffusivity", diffusivity.into(), &domain, LARGEST.recip())?;
+        let mut diffusivity = values("diffusivity", diffusivity.into(), &domain, MAX_MAGNITUDE.recip())?;
         let decay = values("decay", decay.into(), &domain, 0.0)?;
         let volumes = domain.volumes();
         let mut diagonal: Vec<f64> = decay.iter().zip(&volumes).map(|(decay, v)| decay * v).collect();
@@ -308,7 +308,7 @@ fn values(name: &'static str, given: PerCell, domain: &Domain, least: f64) -> Re
     };
     domain.check_count(name, values.len())?;
     for value in &values {
-        within(name, *value, least, LARGEST)?;
+        within(name, *value, least, MAX_MAGNITUDE)?;
     }
     Ok(values)
 }

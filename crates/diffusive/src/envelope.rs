@@ -11,7 +11,7 @@ use fewbits_numerics::normal::interval;
 use nalgebra::Vector2;
 
 /// Largest number of cells that represent the posterior; more do not change the quantiles.
-const MOST: usize = 1500;
+const MAX_CELLS: usize = 1500;
 /// Number of bisections for a quantile.
 const BISECTIONS: usize = 60;
 
@@ -76,7 +76,7 @@ impl Envelope {
         let [x, y] = posterior.cells.columns();
         let weights = posterior.cells.weights();
         // Cells at equal steps of the cumulative weight. Neighbours in the order of splitting are near each other in space.
-        let order = systematic(weights, weights.len().min(MOST), 0.5);
+        let order = systematic(weights, weights.len().min(MAX_CELLS), 0.5);
         let mut points = Vec::with_capacity(order.len());
         let share = 1.0 / order.len().max(1) as f64;
         for i in order {

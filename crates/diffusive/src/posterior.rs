@@ -70,7 +70,7 @@ impl Posterior {
     pub fn clumps(&self, count: usize) -> Result<Clumps<2>, Error> {
         let clumps = Clumps::new(&self.cells.columns(), &[&[], &[]], self.cells.weights(), count)?;
         let least = self.least_variance();
-        clumps.with_least_variances(Vector2::new(least, least))
+        clumps.with_min_variances(Vector2::new(least, least))
     }
 
     /// Position and rate as clumps. If the rate is known, its variance is zero.
@@ -89,7 +89,7 @@ impl Posterior {
         };
         let clumps = Clumps::new(&[x, y, mean], &[&[], &[], spread], self.cells.weights(), count)?;
         let least = self.least_variance();
-        clumps.with_least_variances(Vector3::new(least, least, 0.0))
+        clumps.with_min_variances(Vector3::new(least, least, 0.0))
     }
 
     /// The square of half a cell. A narrower ridge would not have let the evidence converge. For Gaussians at least this wide, sums

@@ -7,7 +7,7 @@ use fewbits_numerics::normal::{LN_SQRT_2PI, log_interval, truncated_moments};
 use serde::{Deserialize, Serialize};
 
 /// Largest rate, and largest sample and response in units of the noise: products of their squares are then finite.
-const LARGEST: f64 = 1e60;
+const MAX_MAGNITUDE: f64 = 1e60;
 
 /// A uniform prior of the release rate, kg/s.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -24,7 +24,7 @@ impl RateRange {
     /// If `low` is negative, or `high` is not above `low` or exceeds 1e60.
     pub fn new(low: f64, high: f64) -> Result<Self, ArgumentError> {
         non_negative("low", low)?;
-        within("high", high, 0.0, LARGEST)?;
+        within("high", high, 0.0, MAX_MAGNITUDE)?;
         if high > low {
             Ok(Self { low, high })
         } else {
@@ -80,7 +80,7 @@ impl RateModel {
     /// If a known rate is not a positive number up to 1e60.
     pub(crate) fn check(&self) -> Result<(), ArgumentError> {
         match self {
-            Self::Known(rate) => within("rate", positive("rate", *rate)?, 0.0, LARGEST).map(|_| ()),
+            Self::Known(rate) => within("rate", positive("rate", *rate)?, 0.0, MAX_MAGNITUDE).map(|_| ()),
             _ => Ok(()),
         }
     }
@@ -163,8 +163,8 @@ impl RateSums {
         };
         for (y, a) in samples.iter().zip(responses) {
             let (y, a) = (
-                within("samples over noise", y / noise, -LARGEST, LARGEST)?,
-                within("responses over noise", a / noise, -LARGEST, LARGEST)?,
+                within("samples over noise", y / noise, -MAX_MAGNITUDE, MAX_MAGNITUDE)?,
+                within("responses over noise", a / noise, -MAX_MAGNITUDE, MAX_MAGNITUDE)?,
             );
             sums.response += a * a;
             sums.correlation += a * y;

@@ -9,12 +9,12 @@ use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::Vector2;
 
 /// A table with more panels than this is not made.
-const MOST_PANELS: f64 = 2000.0;
+const MAX_PANELS: f64 = 2000.0;
 /// Number of panels of a finer table.
 const PANELS: f64 = 32.0;
 /// Smallest width of a panel as a share of the widest. Height differences below 1e-5 of a diffusion length change the responses by less
 /// than the rounding of the widest panels.
-const MOST_HALVINGS: f64 = 1e-5;
+const MIN_WIDTH_RATIO: f64 = 1e-5;
 /// Number of instants whose concentrations are computed together.
 const TOGETHER: usize = 16;
 
@@ -125,7 +125,7 @@ impl Record {
     fn tabulate(&self, homogeneous: &Homogeneous) -> Result<Vec<Profile<2>>, Error> {
         // Widest panels: a quarter of the shortest diffusion length.
         let widest = 0.25 * (4.0 * homogeneous.diffusivity * self.sensor.shortest_age()).sqrt();
-        if self.sensor.reach() / widest > MOST_PANELS {
+        if self.sensor.reach() / widest > MAX_PANELS {
             return Ok(Vec::new());
         }
         let downwind = homogeneous.wind.try_normalize(0.0).unwrap_or_else(Vector2::x);
@@ -149,7 +149,7 @@ impl Record {
             self.sensor.source_height() + self.sensor.sensor_height(),
         ];
         let least = heights.into_iter().filter(|h| *h > 0.0).fold(f64::INFINITY, f64::min);
-        let (mut tables, mut width) = (Vec::new(), (0.25 * least).max(MOST_HALVINGS * widest));
+        let (mut tables, mut width) = (Vec::new(), (0.25 * least).max(MIN_WIDTH_RATIO * widest));
         // Beyond some panels of one width the distance itself is the scale: use wider panels.
         while width < widest && PANELS * width < self.sensor.reach() {
             tables.push(table(PANELS * width, width)?);

@@ -3,11 +3,10 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher, black_box};
+use fewbits_baselines::dymbo::SignFilter;
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
-use fewbits_dymbo::{
-    CellIndex, CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, SignFilter,
-};
+use fewbits_dymbo::{CellIndex, CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
 use fewbits_models::{ScalarSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix4, Vector4};

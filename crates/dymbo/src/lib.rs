@@ -14,7 +14,7 @@
 //! |---|---|
 //! | the sensors' schemes | [`SignBit`] (any threshold), [`InnovationWord`], [`RoundedSample`] |
 //! | the filter, one bit | [`DymboFilter`] |
-//! | several bits per sample, several sensors, vector states | [`MultibitFilter`], [`ParallelFilter`], [`SignFilter`] |
+//! | several bits per sample, several sensors, vector states | [`MultibitFilter`], [`ParallelFilter`], the factor of [`SignBit`] in any filter of `fewbits_filters` |
 //! | one slot of sensor, link and filter in one call | [`ScalarFilter::exchange`] |
 //! | expected errors | [`steady`] (closed forms, contours), [`chain`] (exact errors) |
 //!
@@ -52,15 +52,13 @@ mod parallel;
 mod plant;
 pub mod sign_bit;
 pub mod steady;
-mod vector;
 
 pub use fewbits_core::Error;
 pub use filter::{DymboFilter, ScalarFilter, StepInfo};
-pub use first_message::{FirstMessageValue, Multiple, RoundedSample, first_message_mse, first_message_value};
+pub use first_message::{Multiple, RoundedSample};
 pub use innovation_word::{CellIndex, InnovationWord, Prediction};
 pub use multibit::MultibitFilter;
 pub use parallel::{CountFusion, ParallelFilter};
 pub use plant::{ScalarPlant, filtered_variance, innovation_gain};
 pub use sign_bit::SignBit;
-pub use vector::{SignFilter, VectorInfo};
 pub use {nalgebra, rand};

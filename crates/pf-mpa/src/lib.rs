@@ -69,5 +69,5 @@ pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
 pub use loading::optimal_loading;
 pub use quantized::{IntervalRule, QuantizedRange, RangeReference};
 pub use ranges::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
-pub use sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
+pub use sensor::{RangeNoise, RangeSensor};
 pub use {nalgebra, rand};

@@ -6,7 +6,7 @@ use fewbits_core::{Columns, ColumnsMut, OnAxes, Sensing};
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{all_finite, finite, non_negative};
 use fewbits_numerics::kernels::vectorised;
-use nalgebra::{Matrix1, RowVector2, RowVector4, Vector1, Vector2, Vector4};
+use nalgebra::{Matrix1, RowVector2, Vector1, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
@@ -264,56 +264,11 @@ impl Sensing<2, 1> for RangeSensor {
     }
 }
 
-/// A range sensor that is not calibrated: its measurements have a bias `b` and an error of scale `s`, `z = (1 + s) |p - n| + b + v`. Its
-/// state is `[x, y, b, s]`. The noise is evaluated at the mean of `z`, which is exact if it is constant.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BiasedRangeSensor(pub RangeSensor);
-
-impl BiasedRangeSensor {
-    /// The same sensor in a state of `D` coordinates that has position, bias and error of scale at `axes`.
-    ///
-    /// # Errors
-    /// If an axis is not below `D`, or one is named twice.
-    pub fn on_axes<const D: usize>(self, axes: [usize; 4]) -> Result<OnAxes<Self, D, 4>, Error> {
-        Ok(OnAxes::new(self, axes)?)
-    }
-}
-
-impl Sensing<4, 1> for BiasedRangeSensor {
-    #[inline]
-    fn mean(&self, state: &Vector4<f64>) -> Vector1<f64> {
-        Vector1::new((1.0 + state[3]) * self.0.distance(state[0], state[1]) + state[2])
-    }
-
-    fn jacobian(&self, state: &Vector4<f64>) -> RowVector4<f64> {
-        let slope = (1.0 + state[3]) * self.0.direction(state[0], state[1]);
-        RowVector4::new(slope[0], slope[1], 1.0, self.0.distance(state[0], state[1]))
-    }
-
-    fn noise_covariance_at(&self, state: &Vector4<f64>) -> Matrix1<f64> {
-        let deviation = self.0.noise.deviation(self.mean(state)[0]);
-        Matrix1::new(deviation * deviation)
-    }
-
-    fn sample(&self, rng: &mut dyn Rng, state: &Vector4<f64>) -> Vector1<f64> {
-        Vector1::new(self.0.measure(rng, self.mean(state)[0]))
-    }
-
-    fn mean_columns(&self, states: &Columns<'_, 4>, [means]: ColumnsMut<'_, 1>) {
-        if !measurements_agree(states, &mut [&mut *means]) {
-            return;
-        }
-        self.0.distances(states[0], states[1], means);
-        for ((mean, bias), scale) in means.iter_mut().zip(states[2]).zip(states[3]) {
-            *mean = (1.0 + scale) * *mean + bias;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use fewbits_core::laws::sensing;
+    use nalgebra::Vector4;
 
     fn sensor(noise: RangeNoise) -> RangeSensor {
         RangeSensor::new(Vector2::new(1.0, -2.0), noise).unwrap()
@@ -332,10 +287,6 @@ mod tests {
             sensing::is_consistent(&sensed, &[at, Vector4::new(-3.0, 0.0, 7.0, 1.0)]).unwrap();
             let mut rng = fewbits_monte_carlo::Stream::new(3).rng();
             sensing::draws_have_the_law(&sensed, &mut rng, &at, 20_000).unwrap();
-            let biased = BiasedRangeSensor(sensor(noise));
-            let at = Vector4::new(4.0, 2.0, 0.5, -0.1);
-            sensing::is_consistent(&biased, &[at]).unwrap();
-            sensing::draws_have_the_law(&biased, &mut rng, &at, 20_000).unwrap();
         }
     }
 

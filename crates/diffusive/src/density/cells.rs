@@ -50,7 +50,7 @@ impl Default for CellOptions {
 }
 
 /// Largest number of splits: the cells are then 2^-48 of the box.
-const DEEPEST: usize = 48;
+const MAX_DEPTH: usize = 48;
 /// Cells below this share of the largest weight are dropped at the end.
 const NEGLIGIBLE: f64 = 1e-12;
 
@@ -112,7 +112,7 @@ impl<const D: usize> Cells<D> {
         let mut before: Option<(f64, f64)> = None;
         let mut evaluations = 0;
         // Each level halves the width of the cells that are kept.
-        for _ in 0..DEEPEST {
+        for _ in 0..MAX_DEPTH {
             let count = centres[0].len();
             logs.clear();
             logs.resize(count, 0.0);

@@ -115,7 +115,7 @@ impl<const D: usize> Clumps<D> {
     ///
     /// # Errors
     /// If a variance is negative or not finite.
-    pub fn with_least_variances(self, least: SVector<f64, D>) -> Result<Self, Error> {
+    pub fn with_min_variances(self, least: SVector<f64, D>) -> Result<Self, Error> {
         for variance in &least {
             non_negative("least", *variance)?;
         }

@@ -15,7 +15,7 @@ pub struct MixtureFit {
     /// Largest number of components.
     pub components: usize,
     /// A component below this weight is dropped, and the others are fitted again.
-    pub least_weight: f64,
+    pub min_weight: f64,
     /// Limit on the steps of expectation-maximisation.
     pub iterations: usize,
     /// The iteration stops if the mean log density rises by less than this, in nats.
@@ -30,7 +30,7 @@ impl MixtureFit {
     pub fn new(components: usize) -> Result<Self, Error> {
         Ok(Self {
             components: at_least_one("components", components)?,
-            least_weight: 0.02,
+            min_weight: 0.02,
             iterations: 60,
             tolerance: 1e-4,
         })
@@ -39,10 +39,10 @@ impl MixtureFit {
     /// The same settings with another least weight.
     ///
     /// # Errors
-    /// If `least_weight` is outside `[0, 1]`.
-    pub fn with_least_weight(self, least_weight: f64) -> Result<Self, Error> {
-        within("least_weight", least_weight, 0.0, 1.0)?;
-        Ok(Self { least_weight, ..self })
+    /// If `min_weight` is outside `[0, 1]`.
+    pub fn with_min_weight(self, min_weight: f64) -> Result<Self, Error> {
+        within("min_weight", min_weight, 0.0, 1.0)?;
+        Ok(Self { min_weight, ..self })
     }
 }
 
@@ -69,7 +69,7 @@ impl<const D: usize> Clumps<D> {
                 .map(|(at, c)| (at, c.weight));
             // A component of little weight is removed, and the others are fitted again.
             match least {
-                Some((at, weight)) if weight < options.least_weight && fitted.len() > 1 => {
+                Some((at, weight)) if weight < options.min_weight && fitted.len() > 1 => {
                     components = fitted;
                     components.swap_remove(at);
                 }
@@ -262,9 +262,9 @@ mod tests {
                 assert!((a.weight() - b.weight).abs() < 1e-8 && off.amax() < 1e-8 && gap.amax() < 1e-7, "{off} {gap}");
             }
         };
-        let options = |iterations, tolerance, least_weight| MixtureFit {
+        let options = |iterations, tolerance, min_weight| MixtureFit {
             components: 3,
-            least_weight,
+            min_weight,
             iterations,
             tolerance,
         };
@@ -306,7 +306,7 @@ mod tests {
                     .amax()
                     < 1e-12
         );
-        assert!(MixtureFit::new(0).is_err() && MixtureFit::new(3).unwrap().with_least_weight(1.1).is_err());
-        assert_eq!(MixtureFit::new(3).unwrap().with_least_weight(0.3).unwrap().least_weight, 0.3);
+        assert!(MixtureFit::new(0).is_err() && MixtureFit::new(3).unwrap().with_min_weight(1.1).is_err());
+        assert_eq!(MixtureFit::new(3).unwrap().with_min_weight(0.3).unwrap().min_weight, 0.3);
     }
 }

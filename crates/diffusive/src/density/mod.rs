@@ -5,7 +5,7 @@
 //! | [`Cells`] | moments must be exact (about 1e-7) in one to three dimensions; needs thousands of evaluations |
 //! | [`Clumps`] | a mixture is to be fitted to cells: a few hundred weighted Gaussians with the moments of all cells |
 //! | [`Lpg`] | the shape must be described by few numbers: the square of a series of Hermite polynomials about Gaussians |
-//! | [`laplace`] | there is one peak: its mode and curvature, or its cumulants |
+//! | [`laplace`] | there is one peak: its mode and curvature |
 //!
 //! [`polynomials`] has the Hermite polynomials and the plain series of the paper.
 

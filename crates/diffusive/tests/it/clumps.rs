@@ -115,7 +115,7 @@ fn components_are_no_narrower_than_what_the_points_resolve() {
     }
     let least = 0.25;
     let clumps = Clumps::new(&[&x, &y], &[&[], &[]], &weights, 200).unwrap();
-    let clumps = clumps.with_least_variances(SVector::from([least; 2])).unwrap();
+    let clumps = clumps.with_min_variances(SVector::from([least; 2])).unwrap();
     let fit = clumps.fit(&MixtureFit::new(8).unwrap()).unwrap();
     for c in fit.components() {
         let (values, _) = symmetric_eigen(*c.covariance());
@@ -127,5 +127,5 @@ fn components_are_no_narrower_than_what_the_points_resolve() {
     // Sums over cells of a Gaussian this narrow are up to 3 per cent above one.
     assert!(kl > -0.03, "{kl}");
     let bad = Clumps::<1>::new(&[&[0.0, 1.0]], &[&[]], &[1.0, 1.0], 3).unwrap();
-    assert!(bad.with_least_variances(SVector::from([-1.0])).is_err());
+    assert!(bad.with_min_variances(SVector::from([-1.0])).is_err());
 }

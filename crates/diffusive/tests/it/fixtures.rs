@@ -1,9 +1,10 @@
 //! Reference values, computed by an independent program.
 
 use crate::diffusion_entries::{beginning_with, number};
+use fewbits_baselines::diffusive::cumulant_laplace;
 use fewbits_core::{Belief, Gaussian, Likelihood};
 use fewbits_diffusive::density::CellOptions;
-use fewbits_diffusive::density::laplace::{Peak, cumulant_laplace};
+use fewbits_diffusive::density::laplace::Peak;
 use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite, multi_indices};
 use fewbits_diffusive::information::{Predictions, Unknown, fisher_information};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, RateSums, SearchBox, SourceLikelihood, SourceSensor};

@@ -3,13 +3,15 @@
 //! The deterministic ones are computed here and compared within their tolerance. Those that carry a standard error are
 //! Monte-Carlo results; the figures reproduce them, and this test only makes sure that none is forgotten.
 
+use fewbits_baselines::dymbo::SignFilter;
+use fewbits_baselines::dymbo::first_message::{first_message_mse, first_message_value};
 use fewbits_baselines::dymbo::{iterated, skew_normal, tree};
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::chain::{self, TransientStep};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant,
-    SignFilter, filtered_variance, first_message_mse, first_message_value, sign_bit, steady,
+    filtered_variance, sign_bit, steady,
 };
 use fewbits_filters::{
     PointMass, PointMassFilter, UniformGrid, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,

@@ -1,9 +1,11 @@
 //! Wild arguments: every constructor and step returns numbers or an error.
 
+use fewbits_baselines::dymbo::SignFilter;
+use fewbits_baselines::dymbo::first_message::first_message_value;
 use fewbits_core::{Gaussian, Link, Observation, Sign};
 use fewbits_dymbo::{
     CellIndex, CountFusion, DymboFilter, InnovationWord, MultibitFilter, Multiple, ParallelFilter, Prediction,
-    RoundedSample, ScalarFilter, ScalarPlant, SignBit, SignFilter, first_message_value,
+    RoundedSample, ScalarFilter, ScalarPlant, SignBit,
 };
 use fewbits_models::{LinearGaussian, ScalarSensor};
 use nalgebra::{Matrix2, Vector2};

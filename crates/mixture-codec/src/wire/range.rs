@@ -9,9 +9,9 @@ use fewbits_core::{BitReader, BitWriter, CodecError};
 /// Number of bits of one uniform digit.
 const DIGIT: u32 = 12;
 /// If the scale exceeds this many steps, an integer is coded in two parts, the lower bits uniformly.
-const LARGEST_SCALE: f64 = 64.0;
+const MAX_SCALE: f64 = 64.0;
 /// Integers of at most this absolute value can be coded.
-pub(super) const LARGEST: f64 = 2_147_483_648.0;
+pub(super) const MAX_SYMBOL: f64 = 2_147_483_648.0;
 
 /// Distribution of one integer, in steps of its quantiser.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,10 +25,10 @@ pub(super) enum Law {
 impl Law {
     /// The logistic distribution's table, and the number of low bits that are coded uniformly; `None` if the numbers are out of range.
     fn table(location: f64, scale: f64) -> Option<(Table, u32)> {
-        let in_range = location.abs() < LARGEST && scale > 0.0 && scale < LARGEST;
+        let in_range = location.abs() < MAX_SYMBOL && scale > 0.0 && scale < MAX_SYMBOL;
         let mut low = 0;
         let (mut location, mut scale) = (location, scale.max(0.01));
-        while in_range && scale > LARGEST_SCALE {
+        while in_range && scale > MAX_SCALE {
             // `n = 2 h + l` with a uniform bit `l`: the distribution of `h` has half the location, less a quarter, and half the scale.
             (location, scale) = (0.5 * location - 0.25, 0.5 * scale);
             low += 1;
@@ -91,9 +91,9 @@ pub(super) trait Coder {
                         ((first + i64::from(index)) << low) + self.uniform(low, wanted.map(|n| n as u64))? as i64
                     );
                 }
-                let raw = |n| u32::try_from(n + (LARGEST as i64)).map_err(|_| out_of_range("symbol", n));
+                let raw = |n| u32::try_from(n + (MAX_SYMBOL as i64)).map_err(|_| out_of_range("symbol", n));
                 let raw = wanted.map(raw).transpose()?;
-                Ok(self.uniform(32, raw.map(u64::from))? as i64 - LARGEST as i64)
+                Ok(self.uniform(32, raw.map(u64::from))? as i64 - MAX_SYMBOL as i64)
             }
         }
     }
@@ -233,9 +233,9 @@ mod tests {
         };
         let law = |location, scale| Law::Logistic { location, scale };
         for bad in [
-            law(LARGEST, 1.0),
-            law(-LARGEST, 1.0),
-            law(0.0, LARGEST),
+            law(MAX_SYMBOL, 1.0),
+            law(-MAX_SYMBOL, 1.0),
+            law(0.0, MAX_SYMBOL),
             law(0.0, 0.0),
             law(0.0, -1.0),
             law(0.0, f64::NAN),
@@ -254,8 +254,8 @@ mod tests {
             );
         }
         for good in [
-            law(LARGEST - 1.0, 1e-9),
-            law(-3.7, 0.9 * LARGEST),
+            law(MAX_SYMBOL - 1.0, 1e-9),
+            law(-3.7, 0.9 * MAX_SYMBOL),
             law(0.3, 64.0),
             law(0.3, 64.1),
             law(-900.0, 7e5),

@@ -1,7 +1,7 @@
 //! The order and the distributions of a message's numbers, used by quantiser and decoder alike.
 
 use super::format::WireFormat;
-use super::range::{Coder, LARGEST, Law, Reader, out_of_range};
+use super::range::{Coder, Law, MAX_SYMBOL, Reader, out_of_range};
 use fewbits_core::CodecError;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::factored::Factored;
@@ -24,7 +24,7 @@ impl Source for Quantiser {
         let rounded = wanted.map_or(f64::NAN, f64::round);
         let fits = match *law {
             Law::Uniform { count } => rounded >= 0.0 && rounded < count as f64,
-            Law::Logistic { .. } => rounded.abs() < LARGEST,
+            Law::Logistic { .. } => rounded.abs() < MAX_SYMBOL,
         };
         if !fits {
             return Err(out_of_range("parameter in steps", rounded));

@@ -16,8 +16,8 @@ const CLOSEST: f64 = 1e-3;
 const SQRT_PI: f64 = 1.772_453_850_905_516;
 /// Largest absolute value, in SI units, of diffusivity, wind, distance and age; the smallest of divisors is its reciprocal. Within these
 /// limits no product of a closed form overflows. At larger distances the concentration is 0; a larger age gives the steady state.
-const LARGEST: f64 = 1e60;
-pub(super) const SMALLEST: f64 = 1e-60;
+const MAX_MAGNITUDE: f64 = 1e60;
+pub(super) const MIN_MAGNITUDE: f64 = 1e-60;
 
 /// Lower boundary of the medium.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,9 +55,9 @@ impl Air {
     /// If `diffusivity` is not in `[1e-60, 1e60]`, a component of `wind` not in `[-1e60, 1e60]`, or the wind blows across the ground. For
     /// the last case use a [`Space`], where the wall's condition states which flux it is about.
     pub fn new(diffusivity: f64, wind: Vector3<f64>, ground: Ground) -> Result<Self, Error> {
-        within("diffusivity", positive("diffusivity", diffusivity)?, SMALLEST, LARGEST)?;
+        within("diffusivity", positive("diffusivity", diffusivity)?, MIN_MAGNITUDE, MAX_MAGNITUDE)?;
         for component in wind.iter() {
-            within("wind", *component, -LARGEST, LARGEST)?;
+            within("wind", *component, -MAX_MAGNITUDE, MAX_MAGNITUDE)?;
         }
         let open = |v| Axis::open(diffusivity)?.with_wind(v, Flux::Total);
         let vertical = match ground {
@@ -84,7 +84,7 @@ impl Air {
     /// If `closest` is not in `[1e-60, 1e60]`.
     pub fn with_closest(self, closest: f64) -> Result<Self, Error> {
         Ok(Self {
-            closest: within("closest", closest, SMALLEST, LARGEST)?,
+            closest: within("closest", closest, MIN_MAGNITUDE, MAX_MAGNITUDE)?,
             ..self
         })
     }
@@ -131,10 +131,10 @@ impl Air {
     /// away.
     fn counted_age(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> Option<f64> {
         let below = self.has_ground() && (field.z < 0.0 || source.z < 0.0);
-        if age < SMALLEST || below || (field - source).amax() > LARGEST {
+        if age < MIN_MAGNITUDE || below || (field - source).amax() > MAX_MAGNITUDE {
             return None;
         }
-        Some(if age > LARGEST { LARGEST } else { age })
+        Some(if age > MAX_MAGNITUDE { MAX_MAGNITUDE } else { age })
     }
 
     /// Concentration at `field`, kg/m^3 per kg/s, of a source at `source` that has released for `age` seconds. Zero at age zero
@@ -313,16 +313,16 @@ impl SourceModel for Air {
     /// square, or twice that over ground.
     fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
         let here = self.concentration(&receptor.place, source, age);
-        if age < SMALLEST {
+        if age < MIN_MAGNITUDE {
             return here;
         }
-        let age = age.min(LARGEST);
+        let age = age.min(MAX_MAGNITUDE);
         let reach = std::f64::consts::SQRT_2 * half_width;
         let offset = receptor.place - source;
         let near = offset
             .z
             .hypot((offset.x.hypot(offset.y) - reach).max(0.0))
-            .clamp(self.closest, LARGEST);
+            .clamp(self.closest, MAX_MAGNITUDE);
         let far = offset.norm() + reach;
         let slope = near.recip() + 2.0 * far / (4.0 * self.diffusivity * age) + self.speed / self.diffusivity;
         let downwind = self.wind.try_normalize(0.0).unwrap_or_else(Vector3::x);

@@ -1,6 +1,6 @@
 //! The region on the ground where the concentration exceeds a threshold.
 
-use super::air::{Air, Ground, SMALLEST};
+use super::air::{Air, Ground, MIN_MAGNITUDE};
 use super::space::ImpulseResponse;
 use crate::Error;
 use fewbits_numerics::error::{at_least_one, positive};
@@ -17,7 +17,7 @@ use std::f64::consts::{PI, TAU};
 pub fn contour_radius(rate: f64, threshold: f64, age: f64, diffusivity: f64) -> Result<f64, Error> {
     positive("rate", rate)?;
     positive("threshold", threshold)?;
-    let air = Air::new(diffusivity, Vector3::zeros(), Ground::Impermeable)?.with_closest(SMALLEST)?;
+    let air = Air::new(diffusivity, Vector3::zeros(), Ground::Impermeable)?.with_closest(MIN_MAGNITUDE)?;
     Ok(reach(&air, &Vector3::zeros(), &Vector3::x(), rate, threshold, age))
 }
 

@@ -9,9 +9,7 @@ use fewbits_core::{Error, Gaussian, Observed};
 use fewbits_densities::Particles;
 use fewbits_filters::{BootstrapFilter, ResamplingRule};
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::{
-    BiasedRangeSensor, GridFilter, GridWorkspace, QuantizedRange, RangeNoise, RangeReference, RangeSensor,
-};
+use fewbits_pf_mpa::{GridFilter, GridWorkspace, QuantizedRange, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, Vector2, Vector4};
 
@@ -198,7 +196,6 @@ fn every_kind_of_bad_input_is_a_typed_error() {
         ("no stored noise", serde_json::from_str::<RangeNoise>(r#"{"constant":0,"relative":0}"#).is_err()),
         ("place", RangeSensor::new(Vector2::new(nan, 0.0), noise).is_err()),
         ("axes", [[0, 0], [0, 4]].iter().all(|axes| sensor.on_axes::<4>(*axes).is_err())),
-        ("axes with bias", BiasedRangeSensor(sensor).on_axes::<4>([0, 1, 2, 2]).is_err()),
         (
             "signal-to-noise ratio",
             [nan, f64::INFINITY, 1e9, -1e9]

@@ -1,11 +1,11 @@
 //! Orthonormal Hermite polynomials and the Gauss-Hermite quadrature.
 
-use super::polynomials::HIGHEST_DEGREE;
+use super::polynomials::MAX_DEGREE;
 use nalgebra::{DMatrix, SVector};
 use std::sync::LazyLock;
 
 /// `sqrt(n)` for `n` from 0 on.
-static ROOTS: LazyLock<[f64; HIGHEST_DEGREE + 2]> = LazyLock::new(|| std::array::from_fn(|n| (n as f64).sqrt()));
+static ROOTS: LazyLock<[f64; MAX_DEGREE + 2]> = LazyLock::new(|| std::array::from_fn(|n| (n as f64).sqrt()));
 
 /// Orthonormal Hermite products `prod_d he_nu_d(u_d) / sqrt(nu_d!)` for every index.
 #[inline]
@@ -15,7 +15,7 @@ pub(super) fn hermite_products<const D: usize>(
     u: &SVector<f64, D>,
     out: &mut [f64],
 ) {
-    let mut table = [[0.0; HIGHEST_DEGREE + 1]; D];
+    let mut table = [[0.0; MAX_DEGREE + 1]; D];
     for (row, x) in table.iter_mut().zip(u.iter()) {
         row_of_polynomials(*x, &mut row[..=degree]);
     }

@@ -8,15 +8,15 @@ use nalgebra::SVector;
 use std::collections::HashMap;
 
 /// Largest total degree of the polynomials.
-pub const HIGHEST_DEGREE: usize = 20;
+pub const MAX_DEGREE: usize = 20;
 
 /// # Errors
-/// If `degree` exceeds [`HIGHEST_DEGREE`].
+/// If `degree` exceeds [`MAX_DEGREE`].
 pub(crate) fn check_degree(degree: usize) -> Result<usize, ArgumentError> {
-    if degree <= HIGHEST_DEGREE {
+    if degree <= MAX_DEGREE {
         Ok(degree)
     } else {
-        Err(ArgumentError::new("degree", degree, format!("at most {HIGHEST_DEGREE}")))
+        Err(ArgumentError::new("degree", degree, format!("at most {MAX_DEGREE}")))
     }
 }
 
@@ -129,8 +129,8 @@ pub fn gaussian_moment<const D: usize>(
     covariance: &SMatrix<f64, D, D>,
 ) -> Result<f64, Error> {
     let order: usize = nu.iter().sum();
-    if order > 2 * HIGHEST_DEGREE {
-        return refuse("nu", order, format!("a sum of at most {}", 2 * HIGHEST_DEGREE));
+    if order > 2 * MAX_DEGREE {
+        return refuse("nu", order, format!("a sum of at most {}", 2 * MAX_DEGREE));
     }
     Ok(value_at(nu, mean, covariance))
 }

@@ -2,7 +2,7 @@
 
 use super::basis::{LANES, gauss_hermite, row_of_polynomials, sums_of_polynomials};
 use super::fit::{LpgFit, NEGLIGIBLE};
-use super::polynomials::{HIGHEST_DEGREE, check_degree};
+use super::polynomials::{MAX_DEGREE, check_degree};
 use super::{Lpg, Term};
 use crate::Error;
 use crate::density::Cells;
@@ -30,7 +30,7 @@ struct SliceTerm {
     height: f64,
     centre: f64,
     deviation: f64,
-    coefficients: [f64; HIGHEST_DEGREE + 1],
+    coefficients: [f64; MAX_DEGREE + 1],
 }
 
 /// Integral, mean and variance of a slice times a likelihood.
@@ -48,8 +48,8 @@ pub struct SliceMoments {
 const ENDS: f64 = 8.5;
 /// Largest width of a quadrature panel, in standard deviations; also the smallest number of panels of an interval.
 const PANEL: f64 = 2.5;
-const LEAST_PANELS: usize = 6;
-const MOST_PANELS: usize = 200;
+const MIN_PANELS: usize = 6;
+const MAX_PANELS: usize = 200;
 /// Terms this many nats below the largest are omitted.
 const FAINT: f64 = 60.0;
 
@@ -114,7 +114,7 @@ impl Lpg<3> {
         let degree = self.degree;
         slice.terms.clear();
         (slice.degree, slice.absolute) = (degree, half_width > 0.0);
-        let (mut first, mut second) = ([0.0; HIGHEST_DEGREE + 1], [0.0; HIGHEST_DEGREE + 1]);
+        let (mut first, mut second) = ([0.0; MAX_DEGREE + 1], [0.0; MAX_DEGREE + 1]);
         for term in &self.terms {
             let (u, centre, deviation) = term.at_place(place);
             let w = &term.gaussian.factor().whitener;
@@ -124,7 +124,7 @@ impl Lpg<3> {
             let shift = half_width * (w[(2, 0)].abs() + w[(2, 1)].abs()) * deviation;
             row_of_polynomials(u.x, &mut first[..=degree]);
             row_of_polynomials(u.y, &mut second[..=degree]);
-            let mut coefficients = [0.0; HIGHEST_DEGREE + 1];
+            let mut coefficients = [0.0; MAX_DEGREE + 1];
             for ([i, j, k], c) in self.indices.iter().zip(&term.coefficients) {
                 let value = c * first[*i] * second[*j];
                 coefficients[*k] += match slice.absolute {
@@ -195,7 +195,7 @@ impl Slice {
                 others = further;
             }
             rest = others;
-            let panels = (((whole.to - whole.from) / whole.step).ceil() as usize).clamp(LEAST_PANELS, MOST_PANELS);
+            let panels = (((whole.to - whole.from) / whole.step).ceil() as usize).clamp(MIN_PANELS, MAX_PANELS);
             let mut nodes = gauss_legendre::<LANES>().panels(whole.from, whole.to, panels);
             while let Some(node) = nodes.next() {
                 // One panel.

@@ -4,10 +4,8 @@
 //! `(pi/2)(h'Ph + sigma^2) - h'Ph`. The sensors of a slot report one after the other, each against the refreshed prediction, or
 //! all at once against the same one.
 
-use crate::plant::scalar;
-use crate::sign_bit::SignBit;
-use crate::{Error, sign_bit};
 use fewbits_core::{Factor, Gaussian, LinearDynamics, Link, Observation, Scheme, Sign};
+use fewbits_dymbo::{Error, SignBit, sign_bit};
 use fewbits_filters::{SteadyState, kalman};
 use fewbits_models::ScalarSensor;
 use fewbits_numerics::error::ArgumentError;
@@ -35,7 +33,7 @@ pub struct VectorInfo {
 ///
 /// ```
 /// use fewbits_core::{Gaussian, Observation, Sign};
-/// use fewbits_dymbo::SignFilter;
+/// use fewbits_baselines::dymbo::SignFilter;
 /// use fewbits_models::{constant_velocity_1d, ScalarSensor};
 /// let position = ScalarSensor::scalar([1.0, 0.0].into(), 1.0)?;
 /// let filter = SignFilter::new(constant_velocity_1d(1.0, 0.1)?, [position]);
@@ -167,7 +165,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         let mut mean = SVector::<f64, M>::zeros();
         for (i, (sensor, observation)) in self.sensors.iter().zip(observations).enumerate() {
             let seen = (spread[(i, i)] - sensor.noise_variance()).max(0.0);
-            let prior = scalar(mean[i], seen);
+            let prior = Gaussian::from_trusted_parts([mean[i]].into(), [[seen]].into());
             let factor = SignBit::new(sensor.noise_variance())?.factor(&0.0, observation, &self.link)?;
             let tilted = factor.tilted(&prior)?;
             if seen > 0.0 {
@@ -294,9 +292,8 @@ const SETTLED: f64 = 1e-15;
 #[cfg(test)]
 mod tests {
     use super::SignFilter;
-    use crate::SignBit;
-    use crate::{CountFusion, DymboFilter, Error, ParallelFilter, ScalarFilter, ScalarPlant};
     use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
+    use fewbits_dymbo::{CountFusion, DymboFilter, Error, ParallelFilter, ScalarFilter, ScalarPlant, SignBit};
     use fewbits_filters::{assumed_density, kalman};
     use fewbits_models::{Ar1, LinearGaussian, LinearSensor, ScalarSensor};
     use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
