@@ -8,6 +8,7 @@ use fewbits::dymbo::{DymboFilter, ScalarFilter, ScalarPlant, SignBit};
 use fewbits::filters::centre::{FusionCentre, Reporting, Slot};
 use fewbits::filters::{BootstrapFilter, GridFilter, GridOnAxes, MomentFilter, ResamplingRule, StateFilter};
 use fewbits::handoff::{Coded, HandoffFilter};
+use fewbits::link::FusionReceiver;
 use fewbits::mixture_codec::Reduction;
 use fewbits::mixture_codec::wire::{CodedMixture, WireFormat};
 use fewbits::models::diffusion::{Air, Ground};
@@ -19,7 +20,6 @@ use fewbits::protocol::{
     ReportLength, Schedule, SensorSettings, Task, predict_and_ask, update_or_drop,
 };
 use fewbits::topology::{Deployment, Graph};
-use fewbits_link::FusionReceiver;
 use nalgebra::{Matrix4, Vector1, Vector2, Vector3, Vector4};
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Estimation from sensors that may send only a few bits: one bit per sample, a message only when it matters.
 //!
 //! This crate only re-exports; depend on the single crates if you need one of them. Each is behind a feature of its name,
-//! all but `diffusion` (which builds a sparse solver) and those of `link` (processes) on by default:
+//! all but `diffusion` (which builds a sparse solver), `link-mqtt` and `link-zenoh` on by default:
 //!
 //! | module | feature | what it is for |
 //! |---|---|---|
@@ -23,7 +23,7 @@
 //! | `recipes` | `recipes` | what a person does with a table: bounds, plan, pack, verify, as functions |
 //! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh |
 //! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
-//! | `network`, `protocol` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
+//! | `network`, `protocol` | `network` | a simulated network: bits, joules, faults, and every estimator over it; brings `link`, whose `FusionReceiver` is the fusion centre over bits |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
 
 pub use fewbits_core as core;
