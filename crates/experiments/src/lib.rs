@@ -36,6 +36,7 @@ pub mod real;
 pub mod reference;
 pub mod schema;
 mod sweep;
+pub mod targets;
 mod words;
 
 #[doc(hidden)]
@@ -150,5 +151,6 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         &mpa::bound::Bounds,
         &mpa::encoder::Encoders,
         &mpa::leader::Leaders,
+        &targets::gospa::Targets,
     ]
 }
