@@ -6,6 +6,7 @@
 //! | module | compares |
 //! |---|---|
 //! | [`binary_patterns`] | other ways to send one bit per sensor, and substitutes for a search |
+//! | [`bussgang`] | signs of several sensors, by the linear estimator |
 //! | [`cfwmd`] | silence ignored, a random trigger, and withheld measurements imputed |
 //! | [`dymbo`] | how normal the posterior of one bit is; successive bits of one sample |
 //! | [`handoff`] | bounds of the error after several hand-overs |
@@ -16,6 +17,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod binary_patterns;
+pub mod bussgang;
 pub mod cfwmd;
 pub mod dymbo;
 pub mod handoff;

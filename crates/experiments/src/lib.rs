@@ -32,6 +32,7 @@ pub mod network;
 mod parameters;
 mod picture;
 mod prelude;
+pub mod problems;
 pub mod real;
 pub mod reference;
 pub mod schema;
@@ -151,6 +152,8 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         &mpa::bound::Bounds,
         &mpa::encoder::Encoders,
         &mpa::leader::Leaders,
+        &problems::filters::Filters,
+        &problems::bussgang::Bussgang,
         &targets::gospa::Targets,
     ]
 }

@@ -10,8 +10,8 @@ const CUTOFF: f64 = 20.0;
 
 parameters! {
     pub struct Parameters {
-        bits: Vec<u32> [1..=8; 1..] = vec![1, 2, 3, 4, 5] => "Bits of a report.",
-        trials: u64 [2..=10_000] = 40 => quick 4 => "Runs of each scenario.",
+        bits: Vec<u32> [1..=6; 1..] = vec![1, 2, 3, 4] => "Bits of a report.",
+        trials: u64 [2..=10_000] = 60 => quick 4 => "Runs of each scenario.",
     }
     cost |p| Cost::new(0.02 * (p.trials * (p.bits.len() as u64 + 1)) as f64, 1e8);
 }
@@ -38,10 +38,10 @@ fn run(scenario: Scenario, world: &[Moment], reporting: &Reporting) -> Result<[f
     let (mut tracks, mut sums) = (Tracks::default(), [0.0; 4]);
     for moment in world {
         tracker.predict(&motion, &mut tracks)?;
-        for (k, (sensor, ranges)) in sensors.iter().zip(&moment.ranges).enumerate() {
+        for (sensor, ranges) in sensors.iter().zip(&moment.ranges) {
             let mut seen: Vec<(Seen, f64)> = Vec::new();
             for range in ranges {
-                let (factor, clutter) = reporting.report(k, *range)?;
+                let (factor, clutter) = reporting.report(*range)?;
                 seen.push((Observed::new(*sensor, factor), clutter));
             }
             let reports: Vec<Report<'_, 4>> = seen
@@ -75,13 +75,13 @@ fn run(scenario: Scenario, world: &[Moment], reporting: &Reporting) -> Result<[f
 impl Figure for Targets {
     figure!(Parameters => Vec<Row>, "targets-gospa", "Several targets from few bits", "our own comparison",
         "Joint association of reports whose origin is unknown: five range sensors (deviation 5 m) see each target with \
-         probability 0.9 and report one false range a step. A report is a full range, or the index of one of 2^b cells, the \
-         same cells all the time and without feedback. Targets enter at known places."; linear("GOSPA / m"));
+         probability 0.9 and report one false range a step. A report is a full range, or the index of its cell modulo 2^b: \
+         a period of the words is 40 m, without feedback. Targets enter at known places."; linear("GOSPA / m"));
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let all: Vec<Reporting> = [Reporting::Full]
             .into_iter()
-            .chain(p.bits.iter().map(|bits| Reporting::new(*bits)))
+            .chain(p.bits.iter().map(|bits| Reporting::Cells(*bits)))
             .collect();
         let mut rows = Vec::new();
         for (name, scenario) in Scenario::ALL {
@@ -119,8 +119,8 @@ impl Figure for Targets {
             let id = name.replace(' ', "-");
             let what = "three bits a report come within 15 per cent of full values";
             full.at_most(format!("three-bits-{id}"), what, of(3), 1.15);
-            let what = "five bits come within three per cent";
-            full.at_most(format!("five-bits-{id}"), what, of(5), 1.03);
+            let what = "four bits come within five per cent";
+            full.at_most(format!("four-bits-{id}"), what, of(4), 1.05);
             full.decreasing(format!("bits-{id}"), "more bits, less error", [1, 2, 3].map(of));
         }
         let sum = |r: &Row| {

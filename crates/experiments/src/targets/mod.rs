@@ -1,4 +1,4 @@
 //! Several targets: association of few-bit reports, against the same with full values.
 
-pub mod gospa;
+pub(crate) mod gospa;
 mod world;

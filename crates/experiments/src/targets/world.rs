@@ -1,15 +1,13 @@
 //! Worlds of several targets among range sensors, and what the sensors report.
 
 use crate::prelude::*;
-use fewbits_core::factor::{InCell, Scalar, Value};
-use fewbits_core::{Cell, Observed};
+use fewbits_core::Observed;
+use fewbits_core::factor::{Partition, Scalar, Value};
 use fewbits_models::{AutoSensing, Differentiable, LinearGaussian, Number, constant_velocity_2d};
 use fewbits_multi_target::{Birth, Tracker};
 
 /// Steps of a run.
 pub(super) const STEPS: usize = 40;
-/// Side of the field.
-const SIDE: f64 = 100.0;
 /// Deviation of a range.
 const NOISE: f64 = 5.0;
 /// Probability that a sensor reports a target.
@@ -18,7 +16,7 @@ pub(super) const DETECTION: f64 = 0.9;
 const FALSE: f64 = 1.0;
 /// False ranges are uniform up to this.
 const FARTHEST: f64 = 115.0;
-/// Where the sensors are.
+/// Where the sensors are, in a field of 100 m by 100 m.
 const SENSORS: [[f64; 2]; 5] = [[20.0, 20.0], [80.0, 20.0], [50.0, 50.0], [20.0, 80.0], [80.0, 80.0]];
 
 /// The distance from a sensor to `(x[0], x[2])`.
@@ -143,41 +141,35 @@ pub(super) fn draw(scenario: Scenario, stream: Stream) -> Result<Vec<Moment>, Er
 pub(super) enum Reporting {
     /// The range.
     Full,
-    /// The index of one of `2^bits` cells that a target anywhere in the field is equally likely to be in.
-    Cells(Vec<Vec<f64>>),
+    /// The index of the cell that holds it, counted modulo `2^bits`: a period of the cells is 40 m, and the tracker's belief says which.
+    Cells(u32),
 }
 
-impl Reporting {
-    pub(super) fn new(bits: u32) -> Self {
-        let edges = |place: &[f64; 2]| {
-            const NODES: usize = 200;
-            let at = |i: usize| (i as f64 + 0.5) * SIDE / NODES as f64;
-            let mut ranges: Vec<f64> = (0..NODES * NODES)
-                .map(|i| (at(i / NODES) - place[0]).hypot(at(i % NODES) - place[1]))
-                .collect();
-            ranges.sort_by(f64::total_cmp);
-            let cells = 1_usize << bits;
-            (1..cells).map(|i| ranges[i * ranges.len() / cells]).collect()
-        };
-        Self::Cells(SENSORS.iter().map(edges).collect())
-    }
+/// Length of one period of the words.
+const PERIOD: f64 = 40.0;
+/// Cells are counted up to this range; the last goes on.
+const LAST: f64 = 160.0;
 
-    /// The factor of a report of a sensor, and the intensity of false reports at it.
-    pub(super) fn report(&self, sensor: usize, range: f64) -> Result<(Scalar, f64), Error> {
+impl Reporting {
+    /// The factor of a report, and the intensity of false reports at it.
+    pub(super) fn report(&self, range: f64) -> Result<(Scalar, f64), Error> {
         match self {
             Self::Full => Ok((Value::scalar(range, NOISE * NOISE)?.into(), FALSE / FARTHEST)),
-            Self::Cells(edges) => {
-                let edges = &edges[sensor];
-                let index = edges.partition_point(|edge| *edge <= range);
-                let lower = if index == 0 {
-                    f64::NEG_INFINITY
-                } else {
-                    edges[index - 1]
-                };
-                let upper = edges.get(index).copied().unwrap_or(f64::INFINITY);
-                let share = (upper.min(FARTHEST) - lower.max(0.0)) / FARTHEST;
-                let factor = InCell::certain(Cell::new(lower, upper)?, NOISE * NOISE)?;
-                Ok((factor.into(), FALSE * share))
+            Self::Cells(bits) => {
+                let words = 1_usize << bits;
+                let width = PERIOD / words as f64;
+                let cells = (LAST / width) as usize;
+                let index = |range: f64| ((range / width).max(0.0) as usize).min(cells - 1);
+                let own = |cell: usize| cell % words == index(range) % words;
+                let overlap = |cell: usize| ((cell + 1) as f64 * width).min(FARTHEST) - cell as f64 * width;
+                let share: f64 = (0..cells)
+                    .filter(|cell| own(*cell))
+                    .map(|cell| overlap(cell).max(0.0))
+                    .sum();
+                let edges = (1..cells).map(|cell| cell as f64 * width).collect();
+                let given_cell = (0..cells).map(|cell| f64::from(u8::from(own(cell)))).collect();
+                let factor = Partition::new(edges, given_cell, NOISE * NOISE)?;
+                Ok((factor.into(), FALSE * share / FARTHEST))
             }
         }
     }
