@@ -6,6 +6,7 @@
 //! | module | compares |
 //! |---|---|
 //! | [`binary_patterns`] | other ways to send one bit per sensor, and substitutes for a search |
+//! | [`bussgang`] | signs of several sensors, by the linear estimator |
 //! | [`cfwmd`] | silence ignored, a random trigger, and withheld measurements imputed |
 //! | [`diffusive`] | Tierney and Kadane's ratios, and cumulants |
 //! | [`dymbo`] | how normal the posterior of one bit is; successive bits of one sample |
@@ -18,6 +19,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod binary_patterns;
+pub mod bussgang;
 pub mod cfwmd;
 pub mod diffusive;
 pub mod dymbo;

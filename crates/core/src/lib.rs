@@ -59,6 +59,7 @@ pub mod number;
 pub mod observation;
 pub mod observed;
 pub mod on_axes;
+pub mod points;
 pub mod scheme;
 pub mod sensing;
 pub mod sensor_node;

@@ -1,11 +1,12 @@
 //! The likelihood of an observation as a function of the state.
 
 use crate::assumed_density;
-use crate::columns::{Columns, lengths_agree, state_at};
+use crate::columns::{Columns, ColumnsMut, lengths_agree, state_at};
 use crate::error::Error;
 use crate::factor::{Factor, Scalar};
 use crate::gaussian::Gaussian;
 use crate::observed::Observed;
+use crate::points;
 use crate::sensing::Sensing;
 use fewbits_numerics::error::refuse;
 use nalgebra::{SMatrix, SVector};
@@ -42,6 +43,20 @@ pub trait Likelihood<const D: usize>: Send + Sync {
             "one that only weighs",
             "one that updates Gaussians, or a filter of particles or on a grid",
         )
+    }
+
+    /// Moves points whose weights sum to one so that they have the moments of the posterior. A sensing model is regressed on the points
+    /// instead of being linearised ([`points::move_points`]); by default the points follow [`condition`](Self::condition) of their moments.
+    ///
+    /// # Errors
+    /// As [`condition`](Self::condition), or if there is not one weight per point. The points are then unchanged.
+    fn move_points(&self, mut states: ColumnsMut<'_, D>, weights: &[f64]) -> Result<Evidence, Error> {
+        points::check(&mut states, weights)?;
+        let before = points::moments(&states.each_ref().map(|column| &**column), weights);
+        let mut after = before;
+        let evidence = self.condition(&mut after)?;
+        points::transport(states, &before, &after)?;
+        Ok(evidence)
     }
 
     /// Log likelihood of the observation under a Gaussian, and the correction of the measurement.
@@ -113,6 +128,10 @@ impl<const D: usize, L: Likelihood<D> + ?Sized> Likelihood<D> for &L {
         (**self).condition(belief)
     }
 
+    fn move_points(&self, states: ColumnsMut<'_, D>, weights: &[f64]) -> Result<Evidence, Error> {
+        (**self).move_points(states, weights)
+    }
+
     fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error> {
         (**self).evidence(belief)
     }
@@ -164,6 +183,23 @@ impl<const D: usize, L: Likelihood<D>> Likelihood<D> for [L] {
         Ok(all)
     }
 
+    /// One after the other; the correction is that of the last.
+    fn move_points(&self, mut states: ColumnsMut<'_, D>, weights: &[f64]) -> Result<Evidence, Error> {
+        let mut next: [Vec<f64>; D] = states.each_ref().map(|column| column.to_vec());
+        let (mut log_likelihood, mut correction) = (0.0, 0.0);
+        for observed in self {
+            let one = observed.move_points(next.each_mut().map(Vec::as_mut_slice), weights)?;
+            (log_likelihood, correction) = (log_likelihood + one.log_likelihood, one.correction);
+        }
+        for (state, next) in states.iter_mut().zip(&next) {
+            state.copy_from_slice(next);
+        }
+        Ok(Evidence {
+            log_likelihood,
+            correction,
+        })
+    }
+
     fn as_constant(&self) -> Option<f64> {
         self.iter().map(Likelihood::as_constant).sum()
     }
@@ -185,6 +221,10 @@ impl<const D: usize, L: Likelihood<D>> Likelihood<D> for Vec<L> {
 
     fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
         self.as_slice().condition(belief)
+    }
+
+    fn move_points(&self, states: ColumnsMut<'_, D>, weights: &[f64]) -> Result<Evidence, Error> {
+        self.as_slice().move_points(states, weights)
     }
 
     fn as_constant(&self) -> Option<f64> {
@@ -224,6 +264,11 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
         let (posterior, info) = assumed_density::update_through(belief, self)?;
         *belief = posterior;
         Ok(Evidence::new(info.log_likelihood, &info.correction))
+    }
+
+    fn move_points(&self, states: ColumnsMut<'_, D>, weights: &[f64]) -> Result<Evidence, Error> {
+        let (log_likelihood, correction) = points::move_points(states, weights, self)?;
+        Ok(Evidence::new(log_likelihood, &correction))
     }
 
     fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error> {

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | which cells are air, and the boundary conditions | [`Plan`] (text, PBM), [`Domain`] |
 //! | the wind: potential flow, a function, measured velocities | [`PotentialFlow`], [`Flow`] |
+//! | a room, its wind and its concentrations from files of the simulator GADEN | [`gaden::Room`], [`gaden::Table`] |
 //! | diffusivity, decay, the matrix, and where the substance goes | [`Transport`], [`Budget`] |
 //! | the concentration that sources cause: steady, in time | [`Steady::concentration`], [`Transient::run`] |
 //! | what a sensor measures of a source **anywhere** | [`SensorField`], [`Steady::adjoint`], [`Transient::step_responses`] |
@@ -44,6 +45,7 @@ mod domain;
 mod error;
 mod field;
 mod flow;
+pub mod gaden;
 mod grid;
 mod plan;
 mod solver;

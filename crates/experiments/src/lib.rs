@@ -32,10 +32,12 @@ pub mod network;
 mod parameters;
 mod picture;
 mod prelude;
+pub mod problems;
 pub mod real;
 pub mod reference;
 pub mod schema;
 mod sweep;
+pub mod targets;
 mod words;
 
 #[doc(hidden)]
@@ -150,5 +152,8 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         &mpa::bound::Bounds,
         &mpa::encoder::Encoders,
         &mpa::leader::Leaders,
+        &problems::filters::Filters,
+        &problems::bussgang::Bussgang,
+        &targets::gospa::Targets,
     ]
 }

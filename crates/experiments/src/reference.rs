@@ -48,7 +48,8 @@ systems![
     "dymbo",
     "handoff",
     "mi",
-    "mpa"
+    "mpa",
+    "problems"
 ];
 
 fn of(key: &str) -> Result<&'static [Reference], String> {

@@ -16,6 +16,7 @@
 //! | `quantizers` | `quantizers` | the quantizer a sensor holds, its words, Lloyd-Max tables |
 //! | `quantizer_design` | `quantizer-design` | joint design and decoding of distributed scalar quantizers |
 //! | `binary_patterns` | `binary-patterns` | one-bit quantizers with patterned cells |
+//! | `multi_target` | `multi-target` | several targets that appear and disappear, labelled tracks, GOSPA |
 //! | `pf_mpa` | `pf-mpa` | tracking from quantized ranges |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `block_codec`, `record` | `record` | blocks of samples in few bits; files and frames of many columns within guaranteed errors |
@@ -56,6 +57,8 @@ pub use fewbits_link as link;
 pub use fewbits_mixture_codec as mixture_codec;
 #[cfg(feature = "filters")]
 pub use fewbits_models as models;
+#[cfg(feature = "multi-target")]
+pub use fewbits_multi_target as multi_target;
 #[cfg(feature = "network")]
 pub use fewbits_network as network;
 #[cfg(feature = "node")]
@@ -106,4 +109,6 @@ mod pages {
     struct Network;
     #[doc = include_str!("../../../docs/pf-mpa.md")]
     struct PfMpa;
+    #[doc = include_str!("../../../docs/problems.md")]
+    struct Problems;
 }

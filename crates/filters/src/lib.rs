@@ -7,6 +7,7 @@
 //! | task | [`contract::StateFilter`] | functions and parts |
 //! |---|---|---|
 //! | a Gaussian belief and any factor | [`MomentFilter`] | [`assumed_density`] |
+//! | a Gaussian belief and curved models | [`SigmaPointFilter`] (unscented, cubature; square-root form), [`EnsembleFilter`] | [`RootGaussian`] |
 //! | linear Gaussian filtering of values | [`MomentFilter`] | [`kalman`] (Joseph form) |
 //! | a Gaussian belief and any likelihood of a few coordinates | [`GridOnAxes`] | [`GridFilter`] (a grid that follows the posterior) |
 //! | any dynamics, any likelihood | [`BootstrapFilter`], [`GuidedFilter`] | [`ResamplingRule`], [`Resampling`] |
@@ -37,6 +38,7 @@ pub mod calibration;
 pub mod centre;
 pub mod contract;
 pub mod cramer_rao;
+mod ensemble;
 mod grid_filter;
 mod guided;
 mod imm;
@@ -46,11 +48,14 @@ mod particle;
 mod point_mass;
 mod rao_blackwell;
 mod resample;
+mod root_gaussian;
+mod sigma_points;
 pub mod smoother;
 mod steady_state;
 mod switching;
 
 pub use contract::{Info, MomentFilter, Points, StateFilter};
+pub use ensemble::EnsembleFilter;
 pub use fewbits_core::Error;
 pub use fewbits_core::{Evidence, LinearScalar, assumed_density};
 pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
@@ -62,6 +67,8 @@ pub use particle::BootstrapFilter;
 pub use point_mass::{PointMassFilter, PointMasses};
 pub use rao_blackwell::{RaoBlackwellised, impute};
 pub use resample::{Resampling, ResamplingRule, Schedule};
+pub use root_gaussian::RootGaussian;
+pub use sigma_points::SigmaPointFilter;
 pub use smoother::scalar_fixed_lag_variance;
 pub use steady_state::{ScalarSteadyState, SteadyState, scalar_steady_state, steady_state};
 pub use switching::Switching;

@@ -16,6 +16,7 @@
 //! | linear with Gaussian noise, any dimension | [`LinearGaussian`] |
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
 //! | linear in continuous time (Ornstein-Uhlenbeck, nearly constant velocity, random walk) | [`ContinuousLinear`], [`AffineGaussian`] |
+//! | dynamics and sensing of one's own, with Jacobians by automatic differentiation | [`AutoDynamics`], [`AutoSensing`], [`Flow`] |
 //! | one of several models at a time, such as a manoeuvring target | [`Switching`], for an IMM filter |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
@@ -35,9 +36,10 @@
 //! # Ok::<(), fewbits_models::Error>(())
 //! ```
 //!
-//! Not in this crate: other nonlinear dynamics, time-varying matrices, estimation.
+//! Not in this crate: time-varying matrices, estimation.
 
 mod ar1;
+mod auto;
 mod constant_velocity;
 mod continuous;
 pub mod diffusion;
@@ -48,6 +50,7 @@ mod source_model;
 mod switching;
 
 pub use ar1::Ar1;
+pub use auto::{AutoDynamics, AutoSensing, Differentiable, DualNum, Flow, Number};
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
 pub use continuous::{AffineGaussian, ContinuousLinear, PLANE_POSITION};
 pub use fewbits_core::Error;

@@ -38,7 +38,7 @@ impl Standing {
 }
 
 /// Systems in the order of the publications, then ours, with their headings.
-const SYSTEMS: [(&str, &str); 10] = [
+const SYSTEMS: [(&str, &str); 12] = [
     ("dymbo", "Dymbo: one bit per sample"),
     ("cfwmd", "CFwMD: censored measurements"),
     ("mi", "Quantizers designed by mutual information"),
@@ -49,6 +49,8 @@ const SYSTEMS: [(&str, &str); 10] = [
     ("diffusive", "A diffusive source"),
     ("network", "The simulated network"),
     ("real", "Recorded signals"),
+    ("problems", "Curved models and two bits"),
+    ("targets", "Several targets"),
 ];
 
 /// Figures under one heading.

@@ -14,6 +14,7 @@ mod closed;
 mod cylinder;
 mod field;
 mod fixtures;
+mod gaden;
 mod laws;
 mod refusals;
 mod round;

@@ -11,6 +11,7 @@ mod imm;
 mod particle;
 mod rao_blackwell;
 mod resample;
+mod sigma_points;
 mod state_noise;
 mod stored;
 mod tangent;

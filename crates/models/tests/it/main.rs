@@ -7,6 +7,7 @@
     reason = "a panic is how a test fails"
 )]
 
+mod auto;
 mod diffusion_entries;
 mod diffusion_fixtures;
 mod diffusion_laws;

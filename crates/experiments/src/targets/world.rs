@@ -1,0 +1,179 @@
+//! Worlds of several targets among range sensors, and what the sensors report.
+
+use crate::prelude::*;
+use fewbits_core::Observed;
+use fewbits_core::factor::{Partition, Scalar, Value};
+use fewbits_models::{AutoSensing, Differentiable, LinearGaussian, Number, constant_velocity_2d};
+use fewbits_multi_target::{Birth, Tracker};
+
+/// Steps of a run.
+pub(super) const STEPS: usize = 40;
+/// Deviation of a range.
+const NOISE: f64 = 5.0;
+/// Probability that a sensor reports a target.
+pub(super) const DETECTION: f64 = 0.9;
+/// Expected false reports of a sensor in a step.
+const FALSE: f64 = 1.0;
+/// False ranges are uniform up to this.
+const FARTHEST: f64 = 115.0;
+/// Where the sensors are, in a field of 100 m by 100 m.
+const SENSORS: [[f64; 2]; 5] = [[20.0, 20.0], [80.0, 20.0], [50.0, 50.0], [20.0, 80.0], [80.0, 80.0]];
+
+/// The distance from a sensor to `(x[0], x[2])`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Range([f64; 2]);
+
+impl Differentiable<4, 1> for Range {
+    fn at<N: Number>(&self, x: &[N; 4]) -> [N; 1] {
+        let (dx, dy) = (x[0] - self.0[0], x[2] - self.0[1]);
+        [(dx * dx + dy * dy).sqrt()]
+    }
+}
+
+/// The two worlds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scenario {
+    /// Two targets whose paths cross in the middle of the run.
+    Crossing,
+    /// Five targets that appear one after the other; two of them leave.
+    Appearing,
+}
+
+impl Scenario {
+    pub(super) const ALL: [(&str, Self); 2] = [("two crossing", Self::Crossing), ("five appearing", Self::Appearing)];
+
+    /// Where each target enters (x, y), its velocity, and its first step and the step after its last.
+    fn targets(self) -> Vec<([f64; 4], [usize; 2])> {
+        match self {
+            Self::Crossing => {
+                vec![
+                    ([10.0, 2.0, 40.0, 0.5], [0, STEPS]),
+                    ([10.0, 2.0, 60.0, -0.5], [0, STEPS]),
+                ]
+            }
+            Self::Appearing => vec![
+                ([10.0, 1.5, 10.0, 1.0], [0, STEPS]),
+                ([90.0, -1.5, 10.0, 1.0], [4, 30]),
+                ([10.0, 1.0, 90.0, -1.5], [8, STEPS]),
+                ([90.0, -1.0, 90.0, -1.0], [12, 36]),
+                ([10.0, 1.0, 10.0, 1.5], [16, STEPS]),
+            ],
+        }
+    }
+
+    /// Deviations of a target about its entrance.
+    fn spread(place: [f64; 4]) -> Result<Gaussian<4>, Error> {
+        let covariance = Matrix4::from_diagonal(&Vector4::new(25.0, 0.25, 25.0, 0.25));
+        Ok(Gaussian::new(Vector4::from(place), covariance)?)
+    }
+
+    /// A tracker that knows the entrances and how often targets come.
+    pub(super) fn tracker(self) -> Result<Tracker<4>, Error> {
+        let mut births = Vec::new();
+        for (place, _) in self.targets() {
+            // The fifth enters where the first did.
+            let known = |birth: &Birth<4>| (birth.belief.mean() - Vector4::from(place)).amax() < 1.0;
+            if !births.iter().any(known) {
+                births.push(Birth {
+                    probability: 0.02,
+                    belief: Self::spread(place)?,
+                });
+            }
+        }
+        Ok(Tracker::new(0.99, births)?)
+    }
+}
+
+pub(super) fn motion() -> Result<LinearGaussian<4, 2>, Error> {
+    Ok(constant_velocity_2d(1.0, 0.01)?)
+}
+
+/// One step of a world: the targets that are there, and the ranges that each sensor measured, false ones among them.
+pub(super) struct Moment {
+    pub(super) targets: Vec<Vector2<f64>>,
+    pub(super) ranges: Vec<Vec<f64>>,
+}
+
+/// The sensors of all worlds.
+pub(super) fn sensors() -> Result<Vec<AutoSensing<Range, 1>>, Error> {
+    let sensor = |place| Ok(AutoSensing::new(Range(place), Matrix1::new(NOISE * NOISE))?);
+    SENSORS.map(sensor).into_iter().collect()
+}
+
+/// A run of the scenario.
+pub(super) fn draw(scenario: Scenario, stream: Stream) -> Result<Vec<Moment>, Error> {
+    let (mut rng, motion, sensors) = (stream.named("truth").rng(), motion()?, sensors()?);
+    let mut targets = Vec::new();
+    for (place, times) in scenario.targets() {
+        targets.push((Scenario::spread(place)?.sample(&mut rng), times));
+    }
+    let mut moments = Vec::new();
+    for k in 0..STEPS {
+        let mut ranges = vec![Vec::new(); SENSORS.len()];
+        let mut there = Vec::new();
+        for (state, [from, to]) in &mut targets {
+            if !(*from..*to).contains(&k) {
+                continue;
+            }
+            *state = motion.propagate(&mut rng, state);
+            there.push(Vector2::new(state[0], state[2]));
+            for (sensor, ranges) in sensors.iter().zip(&mut ranges) {
+                let z = sensor.sample(&mut rng, state)[0];
+                if rng.random::<f64>() < DETECTION {
+                    ranges.push(z.max(0.0));
+                }
+            }
+        }
+        for ranges in &mut ranges {
+            // Poisson of mean `FALSE`, by the product of uniform numbers.
+            let mut left = rng.random::<f64>();
+            while left > (-FALSE).exp() {
+                ranges.push(rng.random::<f64>() * FARTHEST);
+                left *= rng.random::<f64>();
+            }
+        }
+        moments.push(Moment { targets: there, ranges });
+    }
+    Ok(moments)
+}
+
+/// What a sensor sends of a range.
+pub(super) enum Reporting {
+    /// The range.
+    Full,
+    /// The index of the cell that holds it, counted modulo `2^bits`: a period of the cells is 40 m, and the tracker's belief says which.
+    Cells(u32),
+}
+
+/// Length of one period of the words.
+const PERIOD: f64 = 40.0;
+/// Cells are counted up to this range; the last goes on.
+const LAST: f64 = 160.0;
+
+impl Reporting {
+    /// The factor of a report, and the intensity of false reports at it.
+    pub(super) fn report(&self, range: f64) -> Result<(Scalar, f64), Error> {
+        match self {
+            Self::Full => Ok((Value::scalar(range, NOISE * NOISE)?.into(), FALSE / FARTHEST)),
+            Self::Cells(bits) => {
+                let words = 1_usize << bits;
+                let width = PERIOD / words as f64;
+                let cells = (LAST / width) as usize;
+                let index = |range: f64| ((range / width).max(0.0) as usize).min(cells - 1);
+                let own = |cell: usize| cell % words == index(range) % words;
+                let overlap = |cell: usize| ((cell + 1) as f64 * width).min(FARTHEST) - cell as f64 * width;
+                let share: f64 = (0..cells)
+                    .filter(|cell| own(*cell))
+                    .map(|cell| overlap(cell).max(0.0))
+                    .sum();
+                let edges = (1..cells).map(|cell| cell as f64 * width).collect();
+                let given_cell = (0..cells).map(|cell| f64::from(u8::from(own(cell)))).collect();
+                let factor = Partition::new(edges, given_cell, NOISE * NOISE)?;
+                Ok((factor.into(), FALSE * share / FARTHEST))
+            }
+        }
+    }
+}
+
+/// A report as the tracker takes it.
+pub(super) type Seen = Observed<AutoSensing<Range, 1>, Scalar, 1>;
