@@ -58,7 +58,9 @@ mod number;
 mod open;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod plain;
 mod profile;
+mod quick;
 mod read;
 mod source;
 mod survey;

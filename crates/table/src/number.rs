@@ -38,7 +38,7 @@ const TOO_LONG: Problem = (
 );
 
 /// Powers of ten that are exact doubles.
-const TENS: [f64; 23] = [
+pub(crate) const TENS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
     1e21, 1e22,
 ];
@@ -70,7 +70,26 @@ pub(crate) fn parse(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
         let size = mantissa as f64 / TENS[usize::from(decimals)];
         return Ok(Number::Double(if negative { -size } else { size }, decimals));
     }
-    slowly(text, syntax)
+    match syntax {
+        Syntax {
+            decimal: b'.',
+            thousands: None,
+        } => long(text).map_or_else(|| slowly(text, syntax), Ok),
+        _ => slowly(text, syntax),
+    }
+}
+
+/// A number of many digits or with an exponent, as programs write doubles; `None` if it may be anything else.
+fn long(text: &[u8]) -> Option<Number> {
+    let is_plain = text
+        .iter()
+        .all(|c| c.is_ascii_digit() || matches!(c, b'.' | b'-' | b'+' | b'e' | b'E'));
+    let text = std::str::from_utf8(text).ok().filter(|_| is_plain)?;
+    let places = text.split_once('.').map_or("", |(_, places)| places);
+    let value: f64 = text.parse().ok()?;
+    // Whole numbers, and those that are too small or too large, are looked at more closely.
+    let decimals = u8::try_from(places.len()).unwrap_or(u8::MAX);
+    (value.is_finite() && value.fract() != 0.0).then_some(Number::Double(value, decimals))
 }
 
 /// Everything that is not a short plain number.

@@ -124,6 +124,31 @@ impl Profile {
         }
     }
 
+    /// Adds a cell that is a short number.
+    #[inline]
+    pub(crate) fn add_number(&mut self, value: f64, decimals: u8, cell: &str, gaps: &Spellings) {
+        if !gaps.is_empty() && gaps.has_text(cell) {
+            self.gap(cell);
+            return;
+        }
+        self.keep(cell);
+        if gaps.has_number(value) {
+            self.gap(cell);
+        } else {
+            self.number(value, decimals, cell);
+        }
+    }
+
+    /// Adds a cell that is a time with a date.
+    pub(crate) fn add_written_time(&mut self, cell: &str, gaps: &Spellings) {
+        if !gaps.is_empty() && gaps.has_text(cell) {
+            self.gap(cell);
+            return;
+        }
+        self.keep(cell);
+        self.times += 1;
+    }
+
     fn gap(&mut self, cell: &str) {
         match self.missing.get_mut(cell) {
             Some(count) => *count += 1,

@@ -22,35 +22,108 @@ impl Table {
     /// reading goes on behind it.
     pub fn read(&mut self, batch: &mut Batch, limit: usize) -> Result<usize, Error> {
         batch.reset(self.selected.iter().map(|i| self.columns[*i].kind));
+        self.read_rows(batch, limit, true)
+    }
+
+    /// As [`read`](Self::read); `takes_plain`: whether plain lines are split where they lie.
+    pub(crate) fn read_rows(&mut self, batch: &mut Batch, limit: usize, takes_plain: bool) -> Result<usize, Error> {
         if let Some(error) = self.late_error.take() {
             return Err(error);
         }
         while batch.rows < limit {
-            let outcome = match self.next_into(batch) {
-                Ok(false) => break,
-                other => other,
+            let plain = if takes_plain {
+                self.plain_rows(batch, limit)
+            } else {
+                Ok(())
             };
-            if let Err(error) = outcome {
-                batch.cut();
-                let error = self.placed(error);
-                if error.place().is_none() || self.is_repeated() {
-                    if error.place().is_some() {
-                        self.skipped.repeated += 1;
-                        continue;
-                    }
-                    return Err(error);
-                }
-                if self.skipped.bad < self.dialect.skip_bad {
-                    self.skip(&error);
-                } else if batch.rows > 0 {
-                    self.late_error = Some(error);
-                    break;
-                } else {
-                    return Err(error);
-                }
+            let outcome = match plain {
+                Ok(()) if batch.rows == limit => break,
+                Ok(()) => self.next_into(batch),
+                Err(error) => Err(error),
+            };
+            let error = match outcome {
+                Ok(true) => continue,
+                Ok(false) => break,
+                Err(error) => self.placed(error),
+            };
+            batch.cut();
+            let is_of_row = error.place().is_some();
+            if is_of_row && self.is_repeated() {
+                self.skipped.repeated += 1;
+            } else if is_of_row && self.skipped.bad < self.dialect.skip_bad {
+                self.skip(&error);
+            } else if batch.rows > 0 {
+                self.late_error = Some(error);
+                break;
+            } else {
+                return Err(error);
             }
         }
         Ok(batch.rows)
+    }
+
+    /// Reads rows as long as they are plain and lie in the buffer.
+    fn plain_rows(&mut self, batch: &mut Batch, limit: usize) -> Result<(), Error> {
+        let Some(scanner) = self.scanner.as_mut().filter(|_| self.label.is_none()) else {
+            return Ok(());
+        };
+        let (before, bytes) = self.rows.buffered()?;
+        let (mut used, mut lines) = (0, 0);
+        while batch.rows < limit {
+            let line = &bytes[used..];
+            let Some(length) = scanner.line(line) else {
+                break;
+            };
+            let mut is_taken = true;
+            if let Some((columns, clock)) = &self.time {
+                let time = match columns.as_slice() {
+                    [column] => clock.parse(scanner.cells[*column].text(line)),
+                    several => {
+                        let cells: Vec<&str> = several.iter().map(|i| scanner.cells[*i].text(line)).collect();
+                        clock.of_parts(&cells)
+                    }
+                };
+                match time {
+                    Ok(time) => batch.times.push(time),
+                    Err(_) => is_taken = false,
+                }
+            }
+            for (i, column) in self.selected.iter().enumerate() {
+                let cell = scanner.cells[*column];
+                let gaps = &self.gaps[*column];
+                match (&mut batch.columns[i], cell.number) {
+                    (Cells::Numbers(numbers), Some((value, _))) => {
+                        numbers.push(Some(value).filter(|_| !gaps.has_numbers() || !gaps.has_number(value)));
+                    }
+                    (Cells::Numbers(numbers), None) if cell.is_empty() => numbers.push(None),
+                    (cells, _) => {
+                        let meaning = Meaning {
+                            syntax: self.syntax,
+                            gaps,
+                            strips: self.dialect.strip_units,
+                            clock: self.clocks[*column].as_ref(),
+                            kind: self.columns[*column].kind,
+                            is_fixed: self.is_fixed[*column],
+                        };
+                        is_taken &= push_cell(cells, cell.text(line), &meaning, &mut self.words[*column]).is_ok();
+                    }
+                }
+            }
+            if !is_taken {
+                // Read anew by itself, so that an error has its place.
+                batch.cut();
+                break;
+            }
+            (used, lines) = (used + length, lines + 1);
+            batch.places.push(Place {
+                line: before + lines,
+                row: self.count + lines,
+            });
+            batch.rows += 1;
+        }
+        self.count += lines;
+        self.rows.consume(used, lines);
+        Ok(())
     }
 
     /// Reads the next row into `batch`. Returns whether there was one.

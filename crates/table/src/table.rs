@@ -9,6 +9,7 @@ use crate::missing::Spellings;
 use crate::names;
 use crate::number;
 use crate::open::Rows;
+use crate::plain::Scanner;
 use crate::profile::Profile;
 use crate::survey::Survey;
 use crate::written::Clock;
@@ -33,6 +34,8 @@ pub struct Table {
     pub(crate) time: Option<(Vec<usize>, Clock)>,
     pub(crate) label: Option<usize>,
     pub(crate) row: Row,
+    /// What splits plain lines, if the table may have some.
+    pub(crate) scanner: Option<Scanner>,
     pub(crate) count: u64,
     pub(crate) skipped: Skipped,
     /// An error that came behind rows that were handed out first.
@@ -71,6 +74,7 @@ impl Table {
                 .iter()
                 .map(|column| dialect.missing_of(&column.name, &column.own_name))
                 .collect(),
+            scanner: rows.scanner(syntax, count),
             rows,
             #[cfg(feature = "parquet")]
             arrow: None,

@@ -2,6 +2,7 @@
 
 use crate::civil::{self, Zone, offset};
 pub(crate) use crate::civil::{NO_SUCH_DATE, Order, Problem};
+use crate::quick;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
 use jiff::civil::{Date, DateTime};
 use jiff::tz::{Offset, TimeZone};
@@ -141,7 +142,27 @@ impl Clock {
         }
     }
 
+    /// The time of a cell.
     pub(crate) fn parse(&self, text: &str) -> Result<Time, Problem> {
+        self.quick(text).map_or_else(|| self.slowly(text), Ok)
+    }
+
+    /// The time of a cell in one of the usual spellings; `None` if it may be anything.
+    fn quick(&self, text: &str) -> Option<Time> {
+        match self.syntax {
+            Syntax::Number(unit) => quick::ticks(text.as_bytes(), unit.decimals()),
+            Syntax::Date(_) => self.quick_date(text),
+            _ => None,
+        }
+    }
+
+    /// The time of a cell with a date in one of the usual spellings; `None` if it may be anything.
+    pub(crate) fn quick_date(&self, text: &str) -> Option<Time> {
+        let is_placed = matches!(self.syntax, Syntax::Date(_)) && (self.zone.is_none() || self.scale == Scale::Utc);
+        is_placed.then(|| quick::date(text.as_bytes(), self.scale))?
+    }
+
+    fn slowly(&self, text: &str) -> Result<Time, Problem> {
         let text = text.trim();
         match &self.syntax {
             Syntax::Number(unit) => self.number(text, *unit),
@@ -350,3 +371,5 @@ fn in_named(zone: &TimeZone, name: &str, seconds: i64, fraction: i128) -> Result
         .map(|stamp| Time::checked(stamp.as_second(), fraction))
         .ok_or(NAMED_ZONE)
 }
+#[cfg(test)]
+mod tests;

@@ -8,6 +8,7 @@ mod kinds;
 mod loggers;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod plain;
 mod random;
 mod spellings;
 mod times;
