@@ -33,6 +33,7 @@
 //! |---|---|
 //! | reading in batches of columns | [`Table`], [`Batch`], [`Cells`] |
 //! | how a table is written | [`Dialect`] |
+//! | a row per reading, made a column per sensor | [`Table::widened`] |
 //! | what is in it: kinds, ranges, gaps by spelling, sentinels, steps of time | [`Table::survey`], [`Profile`] |
 //! | lists of names in options | [`names`] |
 //!
@@ -47,6 +48,7 @@ mod column;
 mod detect;
 mod dialect;
 mod error;
+mod extent;
 mod guess;
 mod head;
 mod json;
@@ -67,11 +69,13 @@ mod survey;
 mod table;
 mod time;
 mod timing;
+mod wide;
 mod written;
 
 pub use column::{Batch, Cells, Column, Kind, MAX_WORDS};
 pub use dialect::Dialect;
 pub use error::{Error, Place, printable};
+pub use extent::FewCells;
 pub use profile::{Profile, Sentinel};
 pub use survey::{Survey, Times};
 pub use table::{Skipped, Table};

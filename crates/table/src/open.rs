@@ -340,7 +340,7 @@ fn named(own_names: &[String], units: &[String]) -> Vec<Column> {
 
 /// Profiles of the columns over the whole lines of the head.
 fn first_profiles(head: &Head, rows: &Rows, columns: &[Column], dialect: &Dialect) -> Vec<Profile> {
-    let mut profiles = vec![Profile::default(); columns.len()];
+    let mut profiles = Profile::of_columns(columns.len());
     let byte = |mark: char| mark as u32 as u8;
     let syntax = number::Syntax {
         decimal: dialect.decimal.map_or(b'.', byte),

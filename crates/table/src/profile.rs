@@ -2,6 +2,7 @@
 
 use crate::column::{Kind, MAX_WORDS};
 use crate::error::Place;
+use crate::extent::{Extent, FewCells};
 use crate::guess;
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
@@ -35,6 +36,9 @@ pub struct Profile {
     pub range: Option<(f64, f64)>,
     low: End,
     high: End,
+    extent: Extent,
+    /// Smallest and largest whole number, exact also beyond doubles.
+    whole: Option<(i64, i64)>,
     /// Largest number of decimals.
     pub decimals: u8,
     /// The first cell that is no number.
@@ -99,6 +103,15 @@ pub(crate) fn boolean(cell: &str) -> Option<bool> {
 }
 
 impl Profile {
+    /// Profiles of the columns of a table, without cells.
+    pub(crate) fn of_columns(columns: usize) -> Vec<Self> {
+        let profile = Self {
+            extent: Extent::new(columns),
+            ..Self::default()
+        };
+        vec![profile; columns]
+    }
+
     /// Adds a trimmed cell.
     pub(crate) fn add(&mut self, cell: &str, place: Place, syntax: number::Syntax, gaps: &Spellings, strips: bool) {
         if cell.is_empty() || (!gaps.is_empty() && gaps.has_text(cell)) {
@@ -119,6 +132,7 @@ impl Profile {
             Ok(Number::Whole(whole)) => {
                 self.integers += 1;
                 self.extend(whole as f64);
+                self.extend_whole(whole);
             }
             Err(_) => self.text(cell, place),
         }
@@ -161,7 +175,13 @@ impl Profile {
     fn number(&mut self, value: f64, decimals: u8, cell: &str) {
         self.numbers += 1;
         self.decimals = self.decimals.max(decimals);
-        self.fractions += u64::from(value.fract() != 0.0);
+        // The cast of a double beyond 64 bits saturates: all of these are whole.
+        let whole = value as i64;
+        if whole as f64 == value {
+            self.extend_whole(whole);
+        } else {
+            self.fractions += u64::from(value.abs() < 9.3e18);
+        }
         if value.is_finite() {
             self.extend(value);
         }
@@ -176,6 +196,12 @@ impl Profile {
         self.range = Some((low.min(value), high.max(value)));
         self.low.add(value, -1.0);
         self.high.add(value, 1.0);
+        self.extent.push(value);
+    }
+
+    fn extend_whole(&mut self, whole: i64) {
+        let (low, high) = self.whole.unwrap_or((whole, whole));
+        self.whole = Some((low.min(whole), high.max(whole)));
     }
 
     fn word(&mut self, cell: &str) {
@@ -234,6 +260,7 @@ impl Profile {
                 self.keep(&whole.to_string());
                 self.integers += 1;
                 self.extend(whole as f64);
+                self.extend_whole(whole);
             }
             value => self.add_double(value.map(|whole| whole as f64), gaps),
         }
@@ -317,6 +344,16 @@ impl Profile {
             Kind::Time => self.faults + self.texts + self.booleans + self.numbers + self.integers,
             _ => 0,
         }
+    }
+
+    /// Smallest and largest number of a column of [`Kind::Integer`], which doubles may not hold.
+    pub fn whole_range(&self) -> Option<(i64, i64)> {
+        self.whole.filter(|_| self.kind() == Kind::Integer)
+    }
+
+    /// A few cells that make most of the range.
+    pub fn few(&self) -> Option<FewCells> {
+        self.extent.few(self.range?)
     }
 
     /// A value that makes three quarters of the range or more and that a twentieth of the cells or less have.

@@ -22,7 +22,11 @@ impl Table {
     /// reading goes on behind it.
     pub fn read(&mut self, batch: &mut Batch, limit: usize) -> Result<usize, Error> {
         batch.reset(self.selected.iter().map(|i| self.columns[*i].kind));
-        self.read_rows(batch, limit, true)
+        self.read_rows(batch, limit, true)?;
+        if !self.own_lines.is_empty() {
+            batch.places = batch.places.iter().map(|place| self.own_place(*place)).collect();
+        }
+        Ok(batch.rows)
     }
 
     /// As [`read`](Self::read); `takes_plain`: whether plain lines are split where they lie.
@@ -165,6 +169,9 @@ impl Table {
                 "leave such lines out with --skip-bad".clone_into(mend);
             }
             _ => {}
+        }
+        if let Error::Line { place, .. } | Error::Cell { place, .. } = &mut error {
+            *place = self.own_place(*place);
         }
         error
     }

@@ -17,7 +17,7 @@ impl Table {
             return self.survey_arrow();
         }
         let mut survey = Survey {
-            columns: vec![Profile::default(); self.columns.len()],
+            columns: Profile::of_columns(self.columns.len()),
             ..Survey::default()
         };
         let mut batch = Batch::default();
@@ -35,6 +35,11 @@ impl Table {
             }
             if let Some(time) = batch.times.first() {
                 survey.times.add(*time);
+            }
+        }
+        for profile in &mut survey.columns {
+            if let Some((place, _)) = &mut profile.first_text {
+                *place = self.own_place(*place);
             }
         }
         survey.skipped = self.skipped;

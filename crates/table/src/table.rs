@@ -33,6 +33,11 @@ pub struct Table {
     pub(crate) selected: Vec<usize>,
     pub(crate) time: Option<(Vec<usize>, Clock)>,
     pub(crate) label: Option<usize>,
+    /// Columns of values of a long table that is made wide.
+    pub(crate) values: Vec<usize>,
+    /// Of a wide table that was made of a long one: the line of each row there, and how that is written.
+    pub(crate) own_lines: Vec<u64>,
+    pub(crate) own_dialect: Option<Dialect>,
     pub(crate) row: Row,
     /// What splits plain lines, if the table may have some.
     pub(crate) scanner: Option<Scanner>,
@@ -86,6 +91,9 @@ impl Table {
             selected: (0..count).collect(),
             time: None,
             label: None,
+            values: Vec::new(),
+            own_lines: Vec::new(),
+            own_dialect: None,
             row: Row::default(),
             count: 0,
             skipped: Skipped::default(),
@@ -196,7 +204,7 @@ impl Table {
 
     /// How the table is written, completed by what was detected.
     pub fn dialect(&self) -> &Dialect {
-        &self.dialect
+        self.own_dialect.as_ref().unwrap_or(&self.dialect)
     }
 
     /// All columns of the table.
