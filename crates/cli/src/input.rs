@@ -192,13 +192,35 @@ impl Table {
     }
 
     /// States the words of the columns of a recording, so that cells are the numbers that it has for them.
-    pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) {
+    ///
+    /// # Errors
+    /// If rows that were read ahead have other words.
+    pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) -> Result<(), Error> {
         let selected = self.table.selected().to_vec();
-        for (column, recorded) in selected.into_iter().zip(columns) {
-            if let Some(words) = crate::words::of(recorded.unit()) {
-                self.table.fix_words(column, words);
+        for (i, (column, recorded)) in selected.into_iter().zip(columns).enumerate() {
+            let Some(words) = crate::words::of(recorded.unit()) else {
+                continue;
+            };
+            let known = self.table.words(column);
+            if let Some(row) = self
+                .batch
+                .columns
+                .get(i)
+                .and_then(|cells| crate::words::other(cells, known, &words))
+            {
+                self.next = row;
+                let shown = self.batch.columns[i].number(row).ok().flatten().unwrap_or_default();
+                let cell = known.get(shown as usize).cloned().unwrap_or_default();
+                return Err(self.refused(
+                    i,
+                    cell,
+                    "is none of the words of the column",
+                    "mend the cell, or leave the row out with --skip-bad",
+                ));
             }
+            self.table.fix_words(column, words);
         }
+        Ok(())
     }
 
     /// Loads rows if all were given out. Returns whether there are any.
@@ -342,12 +364,18 @@ impl Table {
                 "split the column, or leave it out with --without",
             ),
         };
+        self.refused(index, cell, problem, mend)
+    }
+
+    /// The refusal of a cell of the next row.
+    fn refused(&self, index: usize, cell: String, problem: &'static str, mend: &str) -> Error {
+        let name = &self.names[index];
         Error::of_table(&self.file)(fewbits_table::Error::Cell {
             place: self.batch.places[self.next],
-            column: self.names[index].clone(),
+            column: name.clone(),
             cell,
             problem,
-            mend: mend.replace("--without", &format!("--without {}", fewbits_table::names::quoted(&self.names[index]))),
+            mend: mend.replace("--without", &format!("--without {}", fewbits_table::names::quoted(name))),
         })
     }
 

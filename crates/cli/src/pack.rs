@@ -43,6 +43,10 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         );
         return Err(Error::content(open.file(), problem));
     }
+    if open.names.is_empty() {
+        let problem = "no column of values beside the time: name what separates cells with --delimiter, or the time with --time-column";
+        return Err(Error::content(open.file(), problem));
+    }
     check_words(&open)?;
     let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
     for (i, spec) in specs.iter_mut().enumerate() {
@@ -75,7 +79,7 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     let time = open.time_base(table, survey.as_ref())?;
     let schema = Schema::new(columns, time).and_then(|schema| schema.with_rows_per_block(options.rows_per_block));
     let schema = schema.map_err(Error::recording(open.file()))?;
-    open.use_words(&schema.columns().iter().collect::<Vec<_>>());
+    open.use_words(&schema.columns().iter().collect::<Vec<_>>())?;
     if let Some(survey) = survey.filter(|_| needs_range) {
         warn_of_few(&table.file, &schema, &survey);
     }
@@ -217,7 +221,7 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {
         let mut table = Table::open(&table_options)?;
-        table.use_words(&schema.columns().iter().collect::<Vec<_>>());
+        table.use_words(&schema.columns().iter().collect::<Vec<_>>())?;
         if !schema.columns().iter().map(Column::name).eq(table.names.iter()) {
             let names = table.names.join(", ");
             let problem = format!("columns {names}: {file} has other columns, choose and order them with --columns");

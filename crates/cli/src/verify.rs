@@ -91,7 +91,7 @@ fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result
         .map_or(options.time_column.as_deref(), |_| Some("#1"));
     table.choose(list, time, &columns, schema.time())?;
     let recorded: Vec<&fewbits_record::Column> = matches.iter().map(|index| &schema.columns()[*index]).collect();
-    table.use_words(&recorded);
+    table.use_words(&recorded)?;
     Ok(matches)
 }
 

@@ -53,6 +53,13 @@ pub(crate) fn row(keys: &[String], row: &mut Row, found: &Line) -> Result<Option
                 mend: "put a line with all keys first, or leave such lines out with --skip-bad",
             });
         };
+        if row.cells[column].1 > 0 {
+            return Err(Error::Line {
+                place: Place { line, row: 0 },
+                problem: format!("the key `{}` stands twice", printable(&key)),
+                mend: "mend the line, or leave such lines out with --skip-bad",
+            });
+        }
         let from = row.text.len();
         row.text.extend_from_slice(value.trim().as_bytes());
         row.cells[column] = (from as u32, row.text.len() as u32);

@@ -42,11 +42,13 @@
 
 #[cfg(feature = "parquet")]
 mod arrow;
+mod calendar;
 mod civil;
 mod clock;
 mod column;
 mod detect;
 mod dialect;
+mod ends;
 mod error;
 mod extent;
 mod guess;
@@ -54,12 +56,14 @@ mod head;
 mod json;
 mod known;
 mod lines;
+mod marks;
 mod missing;
 pub mod names;
 mod number;
 mod open;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod parts;
 mod plain;
 mod profile;
 mod quick;
@@ -74,9 +78,10 @@ mod written;
 
 pub use column::{Batch, Cells, Column, Kind, MAX_WORDS};
 pub use dialect::Dialect;
+pub use ends::Sentinel;
 pub use error::{Error, Place, printable};
 pub use extent::FewCells;
-pub use profile::{Profile, Sentinel};
+pub use profile::Profile;
 pub use survey::{Survey, Times};
 pub use table::{Skipped, Table};
 pub use time::{DECIMALS, Scale, Time, Unit};

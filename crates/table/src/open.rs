@@ -12,6 +12,9 @@ use crate::table::Table;
 use crate::{json, known, names, number, source};
 use std::io::{BufRead, Cursor, Read};
 
+/// The mark of UTF-8.
+const MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Rows of a text.
 pub(crate) struct Rows {
     lines: Lines,
@@ -55,6 +58,10 @@ impl Rows {
             let Some(found) = self.lines.next(&mut row.text)? else {
                 return Ok(None);
             };
+            if row.text.starts_with(MARK) {
+                // The mark of an encoding, where files were joined.
+                row.text.drain(..MARK.len());
+            }
             if let Some(keys) = &self.keys {
                 return json::row(keys, row, &found);
             }

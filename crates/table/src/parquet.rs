@@ -234,6 +234,7 @@ impl Table {
                         clock: self.clocks[*column].as_ref(),
                         kind: self.columns[*column].kind,
                         is_fixed: self.is_fixed[*column],
+                        unit: self.profiles[*column].unit.as_deref(),
                     };
                     push_cell(into, rows.text(*column).trim(), &meaning, &mut self.words[*column])
                 }

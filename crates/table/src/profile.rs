@@ -1,17 +1,16 @@
 //! What the cells of a column are, counted over rows: its kind, its range, its gaps by spelling, and what looks wrong.
 
 use crate::column::{Kind, MAX_WORDS};
+use crate::ends::{self, End, Sentinel};
 use crate::error::Place;
 use crate::extent::{Extent, FewCells};
 use crate::guess;
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Number of cells that are kept to find out how times are written.
 const SAMPLE: usize = 64;
-/// A range that shrinks by this factor without one value, at either end, is made by that value.
-const SHRINK: f64 = 4.0;
 
 /// Counts over the cells of a column.
 #[derive(Debug, Clone, Default)]
@@ -30,6 +29,12 @@ pub struct Profile {
     faults: u64,
     /// Gaps by their spelling.
     pub missing: BTreeMap<String, u64>,
+    /// Texts of numbers before the first text: they are words if the column is one of words. `None` behind that, or if there are too many.
+    early: Early,
+    /// Whether there are too many words by the numbers alone.
+    has_too_many: bool,
+    /// The unit behind the first number, if units are cut off.
+    pub(crate) unit: Option<String>,
     /// Words and how often each occurs, up to [`MAX_WORDS`] and one more.
     pub words: BTreeMap<String, u64>,
     /// Smallest and largest finite number.
@@ -46,48 +51,17 @@ pub struct Profile {
     pub(crate) sample: Vec<String>,
 }
 
-/// The extreme value at one end, how often it occurs, and the next.
-#[derive(Debug, Clone, Copy, Default)]
-struct End {
-    value: f64,
-    count: u64,
-    next: Option<f64>,
+/// Distinct texts of the numbers that come first.
+#[derive(Debug, Clone)]
+enum Early {
+    Words(HashMap<String, u64>, String),
+    TooMany,
 }
 
-impl End {
-    /// Adds a value; `sign` is 1 at the upper end and -1 at the lower.
-    fn add(&mut self, value: f64, sign: f64) {
-        let beyond = |a: f64, b: f64| sign * a > sign * b;
-        if self.count == 0 {
-            *self = Self {
-                value,
-                count: 1,
-                next: None,
-            };
-        } else if value == self.value {
-            self.count += 1;
-        } else if beyond(value, self.value) {
-            *self = Self {
-                value,
-                count: 1,
-                next: Some(self.value),
-            };
-        } else if self.next.is_none_or(|next| beyond(value, next)) {
-            self.next = Some(value);
-        }
+impl Default for Early {
+    fn default() -> Self {
+        Self::Words(HashMap::new(), String::new())
     }
-}
-
-/// A value that may stand for a gap: it makes most of the range of its column, and few cells have it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct Sentinel {
-    /// The value.
-    pub value: f64,
-    /// Cells that have it.
-    pub count: u64,
-    /// The range without it.
-    pub range_without: (f64, f64),
 }
 
 /// Words of booleans.
@@ -120,10 +94,11 @@ impl Profile {
         }
         self.keep(cell);
         let parsed = number::parse(cell.as_bytes(), syntax);
-        let parsed = match (&parsed, strips) {
-            (Err(_), true) => {
-                number::without_unit(cell).map_or(parsed, |(number, _)| number::parse(number.as_bytes(), syntax))
-            }
+        let parsed = match (&parsed, number::without_unit(cell).filter(|_| strips)) {
+            (Err(_), Some((number, unit))) => match number::parse(number.as_bytes(), syntax) {
+                Ok(_) if self.unit.get_or_insert_with(|| unit.to_owned()) != unit => parsed,
+                found => found,
+            },
             _ => parsed,
         };
         match parsed {
@@ -188,6 +163,17 @@ impl Profile {
         // Numbers may be words among words: `A1`, `7`, `B2`.
         if self.texts > 0 {
             self.word(cell);
+        } else if let Early::Words(words, last) = &mut self.early
+            && last != cell
+        {
+            cell.clone_into(last);
+            if words.len() > MAX_WORDS {
+                self.early = Early::TooMany;
+            } else if let Some(count) = words.get_mut(cell) {
+                *count += 1;
+            } else {
+                words.insert(cell.to_owned(), 1);
+            }
         }
     }
 
@@ -230,6 +216,10 @@ impl Profile {
             self.faults += 1;
         } else {
             self.texts += 1;
+            match std::mem::replace(&mut self.early, Early::TooMany) {
+                Early::Words(words, _) => self.words.extend(words),
+                Early::TooMany => self.has_too_many |= self.texts == 1,
+            }
         }
         self.first_text.get_or_insert_with(|| (place, cell.to_owned()));
         self.word(cell);
@@ -308,7 +298,7 @@ impl Profile {
             Kind::Number
         } else if self.texts == 0 && numbers == 0 {
             Kind::Boolean
-        } else if self.words.len() <= MAX_WORDS && self.times == 0 {
+        } else if self.words.len() <= MAX_WORDS && self.times == 0 && !self.has_too_many {
             Kind::Words
         } else {
             Kind::Text
@@ -351,25 +341,22 @@ impl Profile {
         self.whole.filter(|_| self.kind() == Kind::Integer)
     }
 
-    /// A few cells that make most of the range.
+    /// A few cells that make most of the range; or more of them, if they have a value that usually stands for a gap, as -9999.
     pub fn few(&self) -> Option<FewCells> {
-        self.extent.few(self.range?)
+        let ends = self.range?;
+        self.extent.few(ends).or_else(|| {
+            let sentinel = self.sentinel()?;
+            Some(FewCells {
+                ends,
+                most: sentinel.range_without,
+                share_outside: sentinel.count as f64 / (self.numbers + self.integers) as f64,
+            })
+        })
     }
 
-    /// A value that makes three quarters of the range or more and that a twentieth of the cells or less have.
+    /// A value that makes three quarters of the range or more and that a twentieth of the cells or less have; up to nine tenths, if it is one
+    /// that usually stands for a gap.
     pub fn sentinel(&self) -> Option<Sentinel> {
-        let (low, high) = self.range?;
-        let all = self.numbers + self.integers;
-        let rare = |count: u64| 20 * count <= all || count == 1;
-        let found = |end: End, without: (f64, f64)| {
-            let is_made = high - low > SHRINK * (without.1 - without.0) && without.1 > without.0;
-            (rare(end.count) && is_made && all >= 8).then_some(Sentinel {
-                value: end.value,
-                count: end.count,
-                range_without: without,
-            })
-        };
-        let lower = self.low.next.and_then(|next| found(self.low, (next, high)));
-        lower.or_else(|| self.high.next.and_then(|next| found(self.high, (low, next))))
+        ends::sentinel(self.range?, self.low, self.high, self.numbers + self.integers)
     }
 }

@@ -108,6 +108,7 @@ impl Table {
                             clock: self.clocks[*column].as_ref(),
                             kind: self.columns[*column].kind,
                             is_fixed: self.is_fixed[*column],
+                            unit: self.profiles[*column].unit.as_deref(),
                         };
                         is_taken &= push_cell(cells, cell.text(line), &meaning, &mut self.words[*column]).is_ok();
                     }
@@ -258,6 +259,7 @@ impl Table {
                     clock: self.clocks[*column].as_ref(),
                     kind: self.columns[*column].kind,
                     is_fixed: self.is_fixed[*column],
+                    unit: self.profiles[*column].unit.as_deref(),
                 },
                 &mut self.words[*column],
             );
@@ -305,6 +307,8 @@ pub(crate) struct Meaning<'a> {
     pub(crate) clock: Option<&'a Clock>,
     pub(crate) kind: Kind,
     pub(crate) is_fixed: bool,
+    /// The unit behind the first number, if units are cut off.
+    pub(crate) unit: Option<&'a str>,
 }
 
 /// Adds a cell to the cells of its column.
@@ -361,7 +365,13 @@ pub(crate) fn push_cell(
 fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Problem> {
     let parsed = number::parse(text.as_bytes(), meaning.syntax);
     let parsed = match (&parsed, meaning.strips, number::without_unit(text)) {
-        (Err(_), true, Some((number, _))) => number::parse(number.as_bytes(), meaning.syntax),
+        (Err(_), true, Some((number, unit))) => match number::parse(number.as_bytes(), meaning.syntax) {
+            Ok(_) if meaning.unit.is_some_and(|known| known != unit) => Err((
+                "has another unit than rows before",
+                "write all cells in one unit, or leave such rows out with --skip-bad",
+            )),
+            found => found,
+        },
         _ => parsed,
     };
     match parsed {

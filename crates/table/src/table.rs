@@ -172,6 +172,9 @@ impl Table {
     /// Uses what a [`survey`](Self::survey) of the same table found: the kinds of columns over all rows.
     pub fn use_survey(&mut self, survey: &Survey) {
         self.set_words(&survey.columns);
+        for (profile, known) in survey.columns.iter().zip(&mut self.profiles) {
+            known.unit.clone_from(&profile.unit);
+        }
         #[cfg(feature = "parquet")]
         if self.arrow.is_some() {
             self.set_arrow_kinds(&survey.columns);
