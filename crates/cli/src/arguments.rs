@@ -253,9 +253,6 @@ pub(crate) struct TrackOptions {
     /// Detection limits, as `0.25..` or `0.25..40`: a value at or beyond a limit says only that the measurement is beyond it.
     #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
     pub(crate) limits: Option<String>,
-    /// Each row is one report: the column with the name of its sensor or anchor. Values are in the other column, or that of `--columns`.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) by: Option<String>,
     /// Standard deviation of the measurement noise in the unit of the column, as `0.3` or `column=0.3,*=0.5`. Default: estimated from the
     /// first 200 rows. With `--model ranges` as in the task `ranges`.
     #[arg(long, default_value = "", value_name = "DEVIATION")]

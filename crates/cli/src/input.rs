@@ -7,7 +7,7 @@ use crate::files::is_regular;
 use crate::opening::{chosen, name_of, time_columns};
 use crate::say::say;
 use fewbits_record::{TimeBase, TimeFormat};
-use fewbits_table::{Batch, Kind, Scale, Time};
+use fewbits_table::{Batch, FewCells, Kind, Scale, Time};
 
 /// A row: its tick (`None` if rows are numbered) and its cells.
 pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
@@ -29,6 +29,8 @@ pub(crate) struct Table {
     /// Whether what was left out has been said.
     is_told: bool,
     row: u64,
+    /// What reading the table once has shown, if that was done.
+    learned: Option<fewbits_table::Survey>,
     pub(crate) names: Vec<String>,
 }
 
@@ -36,6 +38,8 @@ pub(crate) struct Table {
 pub(crate) struct Survey {
     /// Smallest and largest finite value of each column.
     pub(crate) ends: Vec<Option<(f64, f64)>>,
+    /// Few cells that make most of the range of each column.
+    pub(crate) few: Vec<Option<FewCells>>,
     /// Largest number of decimals of a time.
     pub(crate) decimals: u8,
     /// Whether there are no rows.
@@ -47,9 +51,11 @@ impl Table {
     pub(crate) fn open(options: &TableOptions) -> Result<Self, Error> {
         let mut table = chosen(options)?;
         let is_file = is_regular(&options.file);
+        let mut learned = None;
         if is_file && !table.is_plain() {
             let survey = chosen(options)?.survey().map_err(Error::of_table(name_of(options)))?;
             table.use_survey(&survey);
+            learned = Some(survey);
         }
         let mut open = Self {
             names: Vec::new(),
@@ -61,6 +67,7 @@ impl Table {
             is_long: false,
             is_told: false,
             row: 0,
+            learned,
         };
         open.rename();
         Ok(open)
@@ -185,13 +192,35 @@ impl Table {
     }
 
     /// States the words of the columns of a recording, so that cells are the numbers that it has for them.
-    pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) {
+    ///
+    /// # Errors
+    /// If rows that were read ahead have other words.
+    pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) -> Result<(), Error> {
         let selected = self.table.selected().to_vec();
-        for (column, recorded) in selected.into_iter().zip(columns) {
-            if let Some(words) = crate::words::of(recorded.unit()) {
-                self.table.fix_words(column, words);
+        for (i, (column, recorded)) in selected.into_iter().zip(columns).enumerate() {
+            let Some(words) = crate::words::of(recorded.unit()) else {
+                continue;
+            };
+            let known = self.table.words(column);
+            if let Some(row) = self
+                .batch
+                .columns
+                .get(i)
+                .and_then(|cells| crate::words::other(cells, known, &words))
+            {
+                self.next = row;
+                let shown = self.batch.columns[i].number(row).ok().flatten().unwrap_or_default();
+                let cell = known.get(shown as usize).cloned().unwrap_or_default();
+                return Err(self.refused(
+                    i,
+                    cell,
+                    "is none of the words of the column",
+                    "mend the cell, or leave the row out with --skip-bad",
+                ));
             }
+            self.table.fix_words(column, words);
         }
+        Ok(())
     }
 
     /// Loads rows if all were given out. Returns whether there are any.
@@ -335,12 +364,18 @@ impl Table {
                 "split the column, or leave it out with --without",
             ),
         };
+        self.refused(index, cell, problem, mend)
+    }
+
+    /// The refusal of a cell of the next row.
+    fn refused(&self, index: usize, cell: String, problem: &'static str, mend: &str) -> Error {
+        let name = &self.names[index];
         Error::of_table(&self.file)(fewbits_table::Error::Cell {
             place: self.batch.places[self.next],
-            column: self.names[index].clone(),
+            column: name.clone(),
             cell,
             problem,
-            mend: mend.replace("--without", &format!("--without {}", fewbits_table::names::quoted(&self.names[index]))),
+            mend: mend.replace("--without", &format!("--without {}", fewbits_table::names::quoted(name))),
         })
     }
 
@@ -361,13 +396,16 @@ impl Table {
         Ok((ticks, columns))
     }
 
-    /// Reads the whole table once.
-    pub(crate) fn survey(options: &TableOptions) -> Result<Survey, Error> {
-        let table = chosen(options)?;
-        let selected = table.selected().to_vec();
-        let survey = table.survey().map_err(Error::of_table(name_of(options)))?;
+    /// What reading the whole table once shows of the selected columns. `options` are those with which it was opened.
+    pub(crate) fn survey(&mut self, options: &TableOptions) -> Result<Survey, Error> {
+        let survey = match self.learned.take() {
+            Some(survey) => survey,
+            None => chosen(options)?.survey().map_err(Error::of_table(&self.file))?,
+        };
+        let columns = self.table.selected().iter().map(|i| &survey.columns[*i]);
         Ok(Survey {
-            ends: selected.iter().map(|i| survey.columns[*i].range).collect(),
+            ends: columns.clone().map(|column| column.range).collect(),
+            few: columns.map(fewbits_table::Profile::few).collect(),
             decimals: survey.times.decimals,
             is_empty: survey.rows == 0,
         })

@@ -26,11 +26,15 @@ pub(crate) fn progress(bytes: Option<u64>) -> ProgressBar {
 /// The table of a file or of standard input, all columns selected and without a time.
 fn opened(options: &TableOptions, file: &str) -> Result<fewbits_table::Table, Error> {
     let said = options.dialect.said()?;
-    // The time is chosen later: some tasks have none.
-    let said = fewbits_table::Dialect {
+    let mut said = fewbits_table::Dialect {
+        // The time is chosen later: some tasks have none.
         time_column: Vec::new(),
         ..said
     };
+    if options.by.is_some() {
+        // Spellings of gaps of one column are those of a sensor, which is no column yet.
+        said.missing.retain(|word| !word.contains('='));
+    }
     if options.file == "-" {
         return fewbits_table::Table::open(std::io::stdin(), &said).map_err(Error::of_table(file));
     }
@@ -68,22 +72,59 @@ pub(crate) fn name_of(options: &TableOptions) -> &str {
 /// A table with the time and the columns that the options choose.
 pub(crate) fn chosen(options: &TableOptions) -> Result<fewbits_table::Table, Error> {
     let file = name_of(options);
-    let mut table = opened(options, file)?;
     let failed = Error::of_table(file);
     let stored = options.dialect.said()?.time_column;
+    let mut table = opened(options, file)?;
     match (&options.time_column, &options.time) {
         (Some(list), _) => table.set_time(&time_columns(&table, list)).map_err(&failed)?,
-        (None, Some(_)) if !stored.is_empty() => table.set_time(&stored).map_err(&failed)?,
+        (None, time) if !stored.is_empty() && (time.is_some() || options.by.is_some()) => {
+            table.set_time(&stored).map_err(&failed)?;
+        }
         (None, Some(_)) => table.require_time().map_err(&failed)?,
+        (None, None) if options.by.is_some() => drop(table.find_time().map_err(&failed)?),
         (None, None) => {}
     }
     if let Some(text) = &options.time {
         table.allow_inexact_times(clock::tolerance(text)?);
     }
-    if !options.columns.is_empty() {
-        table.select(&options.columns).map_err(&failed)?;
+    if let Some(by) = &options.by {
+        return wide(table, options, by, file);
     }
-    table.leave_out(&options.without()).map_err(&failed)?;
+    select(&mut table, &options.columns, &options.without()).map_err(&failed)?;
+    Ok(table)
+}
+
+fn select(
+    table: &mut fewbits_table::Table,
+    columns: &[String],
+    without: &[String],
+) -> Result<(), fewbits_table::Error> {
+    if !columns.is_empty() {
+        table.select(columns)?;
+    }
+    table.leave_out(without)
+}
+
+/// A long table as a wide one. Columns are chosen there; names of the long table choose among its columns of values.
+fn wide(
+    mut long: fewbits_table::Table,
+    options: &TableOptions,
+    by: &str,
+    file: &str,
+) -> Result<fewbits_table::Table, Error> {
+    let failed = Error::of_table(file);
+    let is_long = |name: &String| long.position(name).is_ok() && !name.starts_with('#');
+    let (values, columns): (Vec<_>, Vec<_>) = options.columns.iter().cloned().partition(is_long);
+    let (out, without): (Vec<_>, Vec<_>) = options.without().into_iter().partition(is_long);
+    select(&mut long, &values, &out).map_err(&failed)?;
+    let mut table = long.widened(by, &options.dialect.said()?.missing).map_err(&failed)?;
+    if options.time.is_some() || options.time_column.is_some() {
+        table.set_time(&["#1"]).map_err(&failed)?;
+        if let Some(text) = &options.time {
+            table.allow_inexact_times(clock::tolerance(text)?);
+        }
+    }
+    select(&mut table, &columns, &without).map_err(&failed)?;
     Ok(table)
 }
 
@@ -101,8 +142,10 @@ pub(crate) fn look(
 ) -> Result<(Vec<fewbits_table::Column>, fewbits_table::Dialect, Option<Scale>, fewbits_table::Survey), Error> {
     let failed = Error::of_table(name_of(options));
     let mut table = chosen(options)?;
-    if table.time().is_none() {
-        table.find_certain_time().map_err(&failed)?;
+    match options.by {
+        Some(_) => table.set_time(&["#1"]).map_err(&failed)?,
+        None if table.time().is_none() => drop(table.find_certain_time().map_err(&failed)?),
+        None => {}
     }
     let (columns, dialect) = (table.columns().to_vec(), table.dialect().clone());
     let scale = table.time().map(|(_, scale)| scale);

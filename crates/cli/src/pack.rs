@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::input::{Survey, Table};
 use crate::live::{self, RowSink};
-use crate::rows::{TableRows, few_cells};
+use crate::rows::TableRows;
 use crate::say::say;
 use crate::target::{self, Target};
 use crate::{Ending, bounds};
@@ -43,6 +43,10 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         );
         return Err(Error::content(open.file(), problem));
     }
+    if open.names.is_empty() {
+        let problem = "no column of values beside the time: name what separates cells with --delimiter, or the time with --time-column";
+        return Err(Error::content(open.file(), problem));
+    }
     check_words(&open)?;
     let mut specs = bounds::parse(&options.bound, &open.names, open.file())?;
     for (i, spec) in specs.iter_mut().enumerate() {
@@ -54,7 +58,7 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     let needs_range = specs.iter().any(|spec| matches!(spec.bound, Bound::ShareOfRange(_)));
     let has_time = table.time.is_some() || table.time_column.is_some();
     let survey: Option<Survey> = if is_regular(&table.file) && (needs_range || has_time) {
-        Some(Table::survey(table)?)
+        Some(open.survey(table)?)
     } else {
         None
     };
@@ -75,9 +79,9 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
     let time = open.time_base(table, survey.as_ref())?;
     let schema = Schema::new(columns, time).and_then(|schema| schema.with_rows_per_block(options.rows_per_block));
     let schema = schema.map_err(Error::recording(open.file()))?;
-    open.use_words(&schema.columns().iter().collect::<Vec<_>>());
-    if needs_range && is_regular(&table.file) {
-        warn_of_few(table, &schema)?;
+    open.use_words(&schema.columns().iter().collect::<Vec<_>>())?;
+    if let Some(survey) = survey.filter(|_| needs_range) {
+        warn_of_few(&table.file, &schema, &survey);
     }
     Ok((open, schema))
 }
@@ -108,16 +112,8 @@ fn check_words(table: &Table) -> Result<(), Error> {
 }
 
 /// Warns if a bound is a share of a range that few cells make.
-fn warn_of_few(table: &TableOptions, schema: &Schema) -> Result<(), Error> {
-    // Times are of no interest here, and their column is no column of values.
-    let options = TableOptions {
-        time: None,
-        time_column: None,
-        columns: schema.columns().iter().map(|column| column.name().to_owned()).collect(),
-        ..table.clone()
-    };
-    let found = few_cells(Table::open(&options)?)?;
-    for (column, few) in schema.columns().iter().zip(found) {
+fn warn_of_few(file: &str, schema: &Schema, survey: &Survey) {
+    for (column, few) in schema.columns().iter().zip(&survey.few) {
         let (Bound::ShareOfRange(share), None, Some(few)) = (column.bound(), column.period(), few) else {
             continue;
         };
@@ -125,7 +121,7 @@ fn warn_of_few(table: &TableOptions, schema: &Schema) -> Result<(), Error> {
         say!(
             "warning: {}: column `{}`: few cells ({:.2}%) make most of the range {} to {}, all others lie within {} to {}: {} is ±{}; if \
              they mean gaps, mend them or name them with --missing, or write the bound as ±SIZE",
-            table.file,
+            file,
             column.name(),
             100.0 * few.share_outside,
             exact(low),
@@ -136,7 +132,6 @@ fn warn_of_few(table: &TableOptions, schema: &Schema) -> Result<(), Error> {
             crate::numbers::short(share * (high - low)),
         );
     }
-    Ok(())
 }
 
 /// Rows into a recording.
@@ -226,7 +221,7 @@ fn append(options: &PackOptions, path: &Path, effort: Effort) -> Result<(Done, O
     let table_options = continued(&options.table, &schema, &file)?;
     let open = || -> Result<Table, Error> {
         let mut table = Table::open(&table_options)?;
-        table.use_words(&schema.columns().iter().collect::<Vec<_>>());
+        table.use_words(&schema.columns().iter().collect::<Vec<_>>())?;
         if !schema.columns().iter().map(Column::name).eq(table.names.iter()) {
             let names = table.names.join(", ");
             let problem = format!("columns {names}: {file} has other columns, choose and order them with --columns");

@@ -16,11 +16,11 @@ const MAX_ROWS: usize = 1 << 17;
 
 /// Runs the task.
 pub(crate) fn run(options: &PlanOptions) -> Result<Ending, Error> {
+    let mut table = Table::open(&options.table)?;
     let survey = match is_regular(&options.table.file) {
-        true => Some(Table::survey(&options.table)?),
+        true => Some(table.survey(&options.table)?),
         false => None,
     };
-    let mut table = Table::open(&options.table)?;
     let time = table.time_base(&options.table, survey.as_ref())?;
     let (file, names) = (table.file().to_owned(), table.names.clone());
     let mut rows = TableRows::new(table, time);

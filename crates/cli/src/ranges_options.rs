@@ -13,9 +13,6 @@ pub(crate) struct RangesOptions {
     /// Table of the anchors: name, x, y, and z if heights differ, in the unit of the ranges.
     #[arg(long, value_name = "FILE")]
     pub(crate) anchors: String,
-    /// Each row is one range: the column with the name of its anchor. Ranges are in the other column, or that of `--columns`.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) by: Option<String>,
     /// How ranges travel: `value`, `bit`, or `word:2` to `word:4`: the innovation, quantized in so many bits.
     #[arg(long, default_value = "value", value_name = "WHAT")]
     pub(crate) send: String,

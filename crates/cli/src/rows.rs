@@ -2,7 +2,6 @@
 
 use crate::error::Error;
 use crate::input::Table;
-use fewbits_recipes::survey::{Extent, FewCells};
 use fewbits_recipes::{Batch, Failure, Source};
 use fewbits_record::TimeBase;
 
@@ -57,16 +56,4 @@ impl Source for TableRows {
     fn next_batch(&mut self) -> Result<Option<Batch>, Failure> {
         Ok(self.take(ROWS)?)
     }
-}
-
-/// For each column the few cells that make most of its range.
-pub(crate) fn few_cells(mut table: Table) -> Result<Vec<Option<FewCells>>, Error> {
-    let columns = table.names.len();
-    let mut extents = vec![Extent::new(columns); columns];
-    while let Some((_, cells)) = table.next(TimeBase::Numbered)? {
-        for (extent, value) in extents.iter_mut().zip(cells) {
-            value.into_iter().for_each(|value| extent.push(value));
-        }
-    }
-    Ok(extents.iter().map(Extent::few).collect())
 }

@@ -22,6 +22,10 @@ pub(crate) struct TableOptions {
     /// Columns that are left out.
     #[arg(long, value_name = "NAMES")]
     pub(crate) without: Option<String>,
+    /// Each row is one reading: the column with the name of its sensor or anchor. Sensors become columns. Values are in the other columns,
+    /// or those of `--columns`.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) by: Option<String>,
     #[command(flatten)]
     pub(crate) dialect: DialectOptions,
 }

@@ -62,10 +62,13 @@ fn time_column(all: &[String], schema: &Schema) -> Option<usize> {
 fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result<Vec<usize>, Error> {
     let (all, file) = (table.names.clone(), table.file().to_owned());
     let time = time_column(&all, schema);
+    // Of a long table, some names are those of its own columns.
+    let is_own = |name: &&str| options.by.is_none() || schema.position(name).is_ok();
+    let asked: Vec<&str> = options.columns.iter().map(String::as_str).filter(is_own).collect();
     let (mut columns, mut matches) = (Vec::new(), Vec::new());
     for (index, column) in schema.columns().iter().enumerate() {
         let name = column.name();
-        let is_asked = options.columns.is_empty() || options.columns.iter().any(|asked| asked == name);
+        let is_asked = asked.is_empty() || asked.contains(&name);
         if !is_asked || options.without().iter().any(|out| out == name) {
             continue;
         }
@@ -76,14 +79,19 @@ fn matched(table: &mut Table, options: &TableOptions, schema: &Schema) -> Result
         columns.push(found);
         matches.push(index);
     }
-    if let Some(name) = options.columns.iter().find(|name| schema.position(name).is_err()) {
+    if let Some(name) = asked.iter().find(|name| schema.position(name).is_err()) {
         let names: Vec<&str> = schema.columns().iter().map(fewbits_record::Column::name).collect();
         let problem = format!("--columns: the recording has no column `{name}`, there are {}", names::shown(&names));
         return Err(Error::content(&file, problem));
     }
-    table.choose(options.time_column.as_deref(), time, &columns, schema.time())?;
+    // A wide table begins with its time.
+    let list = options
+        .by
+        .as_ref()
+        .map_or(options.time_column.as_deref(), |_| Some("#1"));
+    table.choose(list, time, &columns, schema.time())?;
     let recorded: Vec<&fewbits_record::Column> = matches.iter().map(|index| &schema.columns()[*index]).collect();
-    table.use_words(&recorded);
+    table.use_words(&recorded)?;
     Ok(matches)
 }
 
@@ -92,13 +100,20 @@ pub(crate) fn run(options: &VerifyOptions) -> Result<Ending, Error> {
     let file = options.packed.display().to_string();
     let mut playback = recording::open(&options.packed)?;
     let schema = playback.schema().clone();
-    let mut table = Table::open(&TableOptions {
-        time: None,
-        time_column: None,
-        columns: Vec::new(),
+    let mut table = Table::open(&match options.table.by {
+        // Columns of the long table are chosen here.
+        Some(_) => TableOptions {
+            time: None,
+            ..options.table.clone()
+        },
         // Columns are chosen by the recording's.
-        without: None,
-        ..options.table.clone()
+        None => TableOptions {
+            time: None,
+            time_column: None,
+            columns: Vec::new(),
+            without: None,
+            ..options.table.clone()
+        },
     })?;
     let matches = matched(&mut table, &options.table, &schema)?;
     let mut rows = TableRows::new(table, schema.time());

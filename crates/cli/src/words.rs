@@ -1,6 +1,6 @@
 //! Words of a column in its unit: `words: off, on` says that 0 is `off` and 1 is `on`. Recordings know numbers only.
 
-use fewbits_table::names;
+use fewbits_table::{Cells, names};
 
 const PREFIX: &str = "words: ";
 /// Largest length of a unit.
@@ -29,6 +29,16 @@ pub(crate) fn of(unit: &str) -> Option<Vec<String>> {
             .map(|word| names::unquoted(word))
             .collect(),
     )
+}
+
+/// The first of these cells of words whose word, or place among the words, `stated` has not; `None` if there is none.
+pub(crate) fn other(cells: &Cells, known: &[String], stated: &[String]) -> Option<usize> {
+    let Cells::Words(cells) = cells else { return None };
+    let is_other = |cell: &Option<u32>| {
+        let index = cell.as_ref().map(|index| *index as usize);
+        index.is_some_and(|index| known.get(index) != stated.get(index))
+    };
+    cells.iter().position(is_other)
 }
 
 #[cfg(test)]

@@ -37,7 +37,6 @@
 //! | rows in batches | [`Source`], [`Batch`] |
 //! | lists of names, quoted where they contain commas | [`names`] |
 //! | bounds and their language | [`bounds`] |
-//! | ranges, and cells that make most of one | [`survey`] |
 //! | bits that a table would need | [`plan`] |
 //! | rows into a recording | [`pack`] |
 //! | a recording against its table | [`verify`] |
@@ -57,7 +56,6 @@ pub mod plan;
 pub mod smoothing;
 pub mod source;
 pub mod stated;
-pub mod survey;
 pub mod verify;
 
 pub use error::{Error, Failure};

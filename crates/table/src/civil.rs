@@ -1,7 +1,9 @@
 //! Dates and times of day in many spellings: their parts, and what they say of their zone.
 
+use crate::calendar::{checked, day_of_year, is_day_name, month_named, of_week};
 use crate::time::DECIMALS;
 use jiff::civil::Date;
+use jiff::tz::TimeZone;
 
 /// Order of day, month and year.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,13 +13,7 @@ pub(crate) enum Order {
     Mdy,
 }
 
-/// Problem with a time and its mend.
-pub(crate) type Problem = (&'static str, &'static str);
-
-pub(crate) const NO_SUCH_DATE: Problem = (
-    "is no date of the calendar",
-    "mend the cell, say the order with --time-format dmy, mdy or ymd, or leave such rows out with --skip-bad",
-);
+pub(crate) use crate::calendar::{NO_SUCH_DATE, Problem};
 
 /// A written time in its parts.
 #[derive(Debug)]
@@ -39,6 +35,8 @@ pub(crate) enum Zone {
     Offset(i64),
     /// An abbreviation, as `CET`, which several zones may have.
     Name(String),
+    /// A region, as `Europe/Berlin`.
+    Region(TimeZone),
     Unknown,
 }
 
@@ -87,6 +85,7 @@ fn zone_of(rest: &str) -> Zone {
         None if (2..=5).contains(&rest.len()) && rest.bytes().all(|c| c.is_ascii_alphabetic()) => {
             Zone::Name(rest.to_ascii_uppercase())
         }
+        None if rest.contains('/') => TimeZone::get(rest).map_or(Zone::Unknown, Zone::Region),
         None => Zone::Unknown,
     }
 }
@@ -98,62 +97,20 @@ pub(crate) fn digits(text: &str, at_most: usize) -> Option<(i64, usize, &str)> {
     Some((value, count, &text[count..]))
 }
 
-const MONTHS: [&str; 12] = [
-    "january",
-    "february",
-    "march",
-    "april",
-    "may",
-    "june",
-    "july",
-    "august",
-    "september",
-    "october",
-    "november",
-    "december",
-];
-const DAYS: [&str; 7] = [
-    "monday",
-    "tuesday",
-    "wednesday",
-    "thursday",
-    "friday",
-    "saturday",
-    "sunday",
-];
-
-/// The place of a word in a list of names, by three letters or more of it.
-fn named(word: &str, names: &[&str]) -> Option<usize> {
-    let word = word.trim_end_matches('.').to_ascii_lowercase();
-    names.iter().position(|name| word.len() >= 3 && name.starts_with(&word))
-}
-
-fn checked(year: i64, month: i64, day: i64) -> Result<Date, Problem> {
-    match (i16::try_from(year), i8::try_from(month), i8::try_from(day)) {
-        (Ok(year), Ok(month), Ok(day)) => Date::new(year, month, day).map_err(|_| NO_SUCH_DATE),
-        _ => Err(NO_SUCH_DATE),
-    }
-}
-
-/// A day of a year, counted from 1.
-pub(crate) fn day_of_year(year: i64, day: i64) -> Result<Date, Problem> {
-    let first = checked(year, 1, 1)?;
-    let date = first
-        .checked_add(jiff::Span::new().try_days(day - 1).map_err(|_| NO_SUCH_DATE)?)
-        .map_err(|_| NO_SUCH_DATE)?;
-    if day >= 1 && date.year() == first.year() {
-        Ok(date)
-    } else {
-        Err(NO_SUCH_DATE)
-    }
-}
-
 /// Reads a date in an order. A year that stands first with four digits is read in any order.
 fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
     let (first, length, rest) = digits(text, 4)?;
     let next = rest.chars().next()?;
     if next.is_ascii_digit() {
         return compact(text);
+    }
+    if length == 4 && (next == 'W' || rest.starts_with("-W")) {
+        return week(first, rest);
+    }
+    if length == 4 && next == ':' {
+        // `2024:065:21:30:00`
+        let (day, count, rest) = digits(&rest[1..], 3)?;
+        return (count == 3 && rest.starts_with(':')).then(|| (day_of_year(first, day), rest));
     }
     // `05MAR2024`
     let mark = if next.is_ascii_alphabetic() && length <= 2 {
@@ -167,7 +124,7 @@ fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
     };
     let rest = &rest[mark.len()..];
     let word_length = rest.bytes().take_while(u8::is_ascii_alphabetic).count();
-    let month = named(&rest[..word_length], &MONTHS);
+    let month = month_named(&rest[..word_length]);
     let (second, rest) = match month {
         Some(month) => (month as i64 + 1, rest[word_length..].trim_start_matches('.')),
         None if mark.trim().is_empty() => return None,
@@ -200,6 +157,17 @@ fn date(text: &str, order: Order) -> Option<(Result<Date, Problem>, &str)> {
         _ => return None,
     };
     Some((checked(year, month, day), rest))
+}
+
+/// A week and a day of it, as `-W10-2` or `W102` behind the year.
+fn week(year: i64, text: &str) -> Option<(Result<Date, Problem>, &str)> {
+    let (week, count, rest) = digits(text.trim_start_matches('-').strip_prefix('W')?, 2)?;
+    let rest = match text.starts_with('-') {
+        true => rest.strip_prefix('-')?,
+        false => rest,
+    };
+    let (day, _, rest) = digits(rest, 1)?;
+    (count == 2).then(|| (of_week(year, week, day), rest))
 }
 
 /// A date without marks: `20240305`, also before a time of day, or `2024065`.
@@ -292,11 +260,19 @@ pub(crate) fn of_days(text: &str) -> Option<(i64, i128)> {
 /// The hour of a clock of twelve hours, by what follows: `am`, `p.m.`, `p`.
 fn half_day(hours: i64, rest: &str) -> Option<(i64, &str)> {
     let behind = rest.trim_start();
-    let letters = behind
-        .bytes()
-        .take_while(|c| c.is_ascii_alphabetic() || *c == b'.')
-        .count();
-    let word = behind[..letters].replace('.', "").to_ascii_lowercase();
+    let letters = ["a. m.", "p. m."]
+        .iter()
+        .find(|word| behind.get(..5).is_some_and(|begin| begin.eq_ignore_ascii_case(word)))
+        .map_or_else(
+            || {
+                behind
+                    .bytes()
+                    .take_while(|c| c.is_ascii_alphabetic() || *c == b'.')
+                    .count()
+            },
+            |word| word.len(),
+        );
+    let word = behind[..letters].replace(['.', ' '], "").to_ascii_lowercase();
     let is_afternoon = match word.as_str() {
         "am" | "a" => false,
         "pm" | "p" => true,
@@ -335,14 +311,14 @@ fn arranged(text: &str) -> Option<String> {
         return None;
     }
     let mut words: Vec<&str> = text.split([' ', ',', '\t']).filter(|word| !word.is_empty()).collect();
-    let has_day = words.first().is_some_and(|word| named(word, &DAYS).is_some());
+    let has_day = words.first().is_some_and(|word| is_day_name(word));
     if has_day {
         words.remove(0);
     }
-    let Some(at) = words.iter().position(|word| named(word, &MONTHS).is_some()) else {
+    let Some(at) = words.iter().position(|word| month_named(word).is_some()) else {
         return has_day.then(|| words.join(" "));
     };
-    let month = named(words.remove(at), &MONTHS)? + 1;
+    let month = month_named(words.remove(at))? + 1;
     let is_number = |word: &str, lengths: std::ops::RangeInclusive<usize>| {
         lengths.contains(&word.len()) && word.bytes().all(|c| c.is_ascii_digit())
     };

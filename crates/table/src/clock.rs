@@ -5,26 +5,22 @@ use crate::column::{Column, Kind};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::guess;
+use crate::parts::{calendar, of_day_parts, parts};
 use crate::time::{Scale, Unit};
-use crate::written::{self, Clock, Order, Part, Problem, Syntax};
+use crate::written::{self, Clock, Order, Problem, Syntax};
 
 /// Names of a column that is taken as time, if no column has dates.
 const NAMES: [&str; 27] = [
-    "second",
-    "sec",
-    "zeitstempel",
-    "when",
     "time",
     "timestamp",
     "datetime",
     "date",
-    "seconds",
-    "t",
     "ts",
     "_time",
     "epoch",
     "date_time",
     "date time",
+    "zeitstempel",
     "zeit",
     "datum",
     "utc",
@@ -37,10 +33,28 @@ const NAMES: [&str; 27] = [
     "time stamp",
     "fecha",
     "zeitpunkt",
+    "when",
+    // Short ones last: beside another, they may be anything.
+    "seconds",
+    "second",
+    "sec",
+    "t",
 ];
 /// Names of a column of times of day beside one of dates.
-const OF_DAY: [&str; 10] = [
-    "time", "zeit", "uhrzeit", "heure", "hora", "ora", "tijd", "gps_time", "hhmm", "hhmmss",
+const OF_DAY: [&str; 13] = [
+    "time",
+    "zeit",
+    "uhrzeit",
+    "heure",
+    "hora",
+    "ora",
+    "tijd",
+    "gps_time",
+    "hhmm",
+    "hhmmss",
+    "hrmn",
+    "hrmin",
+    "hour_minute",
 ];
 
 fn is_time_name(name: &str) -> bool {
@@ -140,6 +154,13 @@ pub(crate) fn guess(
             return Some(vec![*day, *clock]);
         }
     }
+    if let ([], [day], []) = (dates.as_slice(), days.as_slice(), clocks.as_slice()) {
+        let behind = columns[day + 1..].iter().map(|column| column.own_name.as_str());
+        let hours = of_day_parts(behind).len();
+        if hours > 0 {
+            return Some((*day..=day + hours).collect());
+        }
+    }
     let dated = if dates.is_empty() { days } else { dates };
     if let (true, Some(calendar)) = (dated.is_empty(), calendar(columns)) {
         return Some(calendar);
@@ -166,82 +187,6 @@ pub(crate) fn guess(
     exact.or_else(like).map(|column| vec![column])
 }
 
-/// The part of a date that a name means, behind the parts of other columns.
-fn part(name: &str, before: &[Part]) -> Option<Part> {
-    const MEANINGS: [(Part, &[&str]); 8] = [
-        (Part::Year, &["year", "yyyy", "yr", "yy", "#yy", "jahr"]),
-        (Part::Month, &["month", "mm", "mo", "mon", "monat"]),
-        (Part::Day, &["day", "dd", "dy", "tag"]),
-        (Part::Hour, &["hour", "hh", "hr", "stunde"]),
-        (Part::Minute, &["minute", "min", "mi", "mn"]),
-        (Part::Second, &["second", "sec", "ss", "seconds"]),
-        (Part::DayOfYear, &["doy", "jday", "julian", "julian_day", "day_of_year", "yday", "ddd"]),
-        (Part::OfDay, &["time", "hhmm", "hrmn", "hour_minute", "uhrzeit"]),
-    ];
-    let lower = name.to_lowercase();
-    // `MM` and `mm` stand for months and minutes.
-    if lower == "mm" && before.contains(&Part::Hour) {
-        return Some(Part::Minute);
-    }
-    let found = MEANINGS.iter().find(|(_, words)| words.contains(&lower.as_str()))?.0;
-    (!before.contains(&found)).then_some(found)
-}
-
-/// Columns side by side that give a date by their names, from the year on.
-fn calendar(columns: &[Column]) -> Option<Vec<usize>> {
-    let first = columns
-        .iter()
-        .position(|column| part(&column.own_name, &[]) == Some(Part::Year))?;
-    let mut found = Vec::new();
-    for column in &columns[first..] {
-        let Some(part) = part(&column.own_name, &found) else {
-            break;
-        };
-        found.push(part);
-    }
-    let is_date = found.contains(&Part::DayOfYear) || (found.contains(&Part::Month) && found.contains(&Part::Day));
-    is_date.then(|| (first..first + found.len()).collect())
-}
-
-/// Meanings of columns that give a date together, by their names, or by their cells.
-fn parts(names: &[&str], sample: &[String]) -> Option<Vec<Part>> {
-    let mut found = Vec::new();
-    for name in names {
-        match part(name, &found) {
-            Some(part) => found.push(part),
-            None => return by_cells(names.len(), sample),
-        }
-    }
-    (found.contains(&Part::Year) && found.len() >= 2).then_some(found)
-}
-
-/// Meanings of columns of whole numbers in the order of a date: a year of four digits, month, day and so on, or the day of the year.
-fn by_cells(count: usize, sample: &[String]) -> Option<Vec<Part>> {
-    const ORDER: [(Part, i64); 6] = [
-        (Part::Year, 2300),
-        (Part::Month, 12),
-        (Part::Day, 31),
-        (Part::Hour, 24),
-        (Part::Minute, 60),
-        (Part::Second, 60),
-    ];
-    let row = |text: &String| {
-        text.split_whitespace()
-            .map(|cell| cell.parse::<i64>().ok())
-            .collect::<Option<Vec<i64>>>()
-    };
-    let rows: Vec<Vec<i64>> = sample.iter().map(row).collect::<Option<_>>()?;
-    let all = |i: usize, within: std::ops::RangeInclusive<i64>| rows.iter().all(|row| within.contains(&row[i]));
-    if rows.is_empty() || rows.iter().any(|row| row.len() != count) || !all(0, 1700..=2300) {
-        return None;
-    }
-    if (3..=6).contains(&count) && (1..count).all(|i| all(i, i64::from(i < 3)..=ORDER[i].1)) {
-        return Some(ORDER[..count].iter().map(|(part, _)| *part).collect());
-    }
-    let by_day = [Part::Year, Part::DayOfYear, Part::OfDay];
-    (count <= 3 && all(1, 1..=366) && (count < 3 || all(2, 0..=2400))).then(|| by_day[..count].to_vec())
-}
-
 /// The offset that a name states, as `Date Time, GMT-07:00`.
 fn offset_in(name: &str) -> Option<String> {
     let at = name.find("GMT").or(name.find("UTC"))?;
@@ -266,6 +211,8 @@ pub(crate) fn clock(
         && let Some(meaning) = parts(names, sample)
     {
         Syntax::Parts(meaning, is_epw)
+    } else if let Some(found) = dated_hours(names, sample, dialect.time_format.as_deref()) {
+        found?
     } else {
         match dialect.time_format.as_deref() {
             Some("s") => Syntax::Number(Unit::Seconds),
@@ -306,7 +253,7 @@ pub(crate) fn clock(
         _ => false,
     };
     let is_dated = match &syntax {
-        Syntax::Date(_) | Syntax::Parts(..) => true,
+        Syntax::Date(_) | Syntax::Parts(..) | Syntax::DateAnd(..) => true,
         Syntax::Format(format) => ["%Y", "%y", "%F", "%D", "%s", "%G", "%c"]
             .iter()
             .any(|part| format.contains(part)),
@@ -344,6 +291,36 @@ pub(crate) fn clock(
     })
 }
 
+/// A date in the first column and the hour, and perhaps minute and second, in those behind it.
+fn dated_hours(
+    names: &[&str],
+    sample: &[String],
+    format: Option<&str>,
+) -> Option<Result<Syntax, Result<Error, (usize, Problem)>>> {
+    let behind = of_day_parts(names.get(1..)?.iter().copied());
+    if behind.is_empty() || behind.len() + 1 != names.len() {
+        return None;
+    }
+    let date = |text: &String| {
+        let words: Vec<&str> = text.split(' ').collect();
+        words[..words.len().saturating_sub(behind.len())].join(" ")
+    };
+    let dates: Vec<String> = sample.iter().map(date).collect();
+    let dates: Vec<&str> = dates.iter().map(String::as_str).collect();
+    let order = match format {
+        Some("dmy") => Order::Dmy,
+        Some("mdy") => Order::Mdy,
+        Some("ymd" | "iso") => Order::Ymd,
+        Some(_) => return None,
+        None => match majority(&dates) {
+            Ok(Syntax::Date(order)) => order,
+            Ok(_) => return None,
+            Err(refused) => return Some(Err(refused)),
+        },
+    };
+    Some(Ok(Syntax::DateAnd(order, behind)))
+}
+
 fn has_date_name(names: &[&str]) -> bool {
     let is_date = |name: &&str| {
         let lower = name.to_lowercase();
@@ -363,8 +340,16 @@ fn by_name(names: &[&str], cells: &[&str]) -> Option<Syntax> {
 
 /// Whether a column of dates has numbers of the size of days since 1900.
 fn may_be_days(names: &[&str], cells: &[&str]) -> bool {
-    let is_days = |cell: &&str| cell.parse().is_ok_and(|days: f64| (20_000.0..80_000.0).contains(&days));
-    has_date_name(names) && !cells.is_empty() && cells.iter().all(is_days)
+    let within = |low: f64, high: f64| {
+        !cells.is_empty()
+            && cells
+                .iter()
+                .all(|cell| cell.parse().is_ok_and(|days: f64| (low..high).contains(&days)))
+    };
+    // Times of day as shares of a day have many decimals: 36,500 is in 1999, and 55,000 in 2050.
+    let is_share = |cell: &&str| cell.split_once('.').is_some_and(|(_, places)| places.len() >= 5);
+    (has_date_name(names) && within(20_000.0, 80_000.0))
+        || (names.len() == 1 && cells.iter().any(is_share) && within(36_500.0, 55_000.0))
 }
 
 /// How most of the cells are written: a garbled one must not decide.

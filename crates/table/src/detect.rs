@@ -4,7 +4,7 @@ use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::head::Head;
 use crate::lines::{MAX_ROW_LINES, Row, Split};
-use crate::{guess, known, missing, number};
+use crate::{guess, known, marks, missing, number};
 
 /// What a cell looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,7 +173,14 @@ pub(crate) fn detect(head: &Head, dialect: &mut Dialect) -> Result<Layout, Error
         .filter(|(_, cells)| cells.len() > 1 || cells.iter().any(|cell| !cell.is_empty()))
         .collect();
     if dialect.decimal.is_none() {
-        let is_comma = delimiter != Delimiter::Byte(b',') && has_decimal_commas(&rows);
+        let is_comma = delimiter != Delimiter::Byte(b',') && marks::has_decimal_commas(&rows);
+        if let (false, None, Some((line, cell))) = (is_comma, dialect.thousands, marks::doubtful_groups(&rows)) {
+            return Err(Error::Line {
+                place: Place { line, row: 0 },
+                problem: format!("`{cell}` may have a point between groups of digits, or before decimals"),
+                mend: "say --thousands . (and --decimal ,) for groups, or --decimal . for decimals",
+            });
+        }
         dialect.decimal = Some(if is_comma { ',' } else { '.' });
     }
     let lines_before = |number: u64| lines.iter().filter(|(line, _)| *line < number).count() as u64;
@@ -204,23 +211,6 @@ fn joined(lines: &[(u64, &str)]) -> Vec<(u64, String)> {
         at = end;
     }
     rows
-}
-
-/// Whether numbers have decimal commas without a doubt: a comma before other than three digits, and no decimal points.
-fn has_decimal_commas(rows: &[(u64, Vec<String>)]) -> bool {
-    let (mut certain, mut points) = (false, false);
-    for cell in rows.iter().flat_map(|(_, cells)| cells) {
-        let size = cell.trim_start_matches(['-', '+']);
-        let is_number = size.bytes().all(|c| c.is_ascii_digit() || matches!(c, b',' | b'.')) && !size.is_empty();
-        match (size.split_once(','), is_number) {
-            (Some((whole, places)), true) if !whole.contains(',') && !size.contains('.') => {
-                certain |= !places.contains(',') && places.len() != 3 && !places.is_empty();
-            }
-            (None, true) => points |= size.split('.').count() == 2,
-            _ => {}
-        }
-    }
-    certain && !points
 }
 
 /// Finds the line of names: the last one before the data that has no number, units not counted.
@@ -330,6 +320,18 @@ fn layout(
                 let behind =
                     usize::from(dialect.units_row == Some(true)) + dialect.skip_after_names.unwrap_or(0) as usize;
                 header = header.saturating_sub(behind);
+            }
+            // Rows with a fault are no names: these are the nearest line above of words alone.
+            let is_row = |row: &Vec<Look>| {
+                row.len() >= count
+                    && measured
+                        .iter()
+                        .any(|i| matches!(row.get(*i), Some(Look::Number | Look::Time)))
+            };
+            let are_names = |row: &Vec<Look>| row.len() >= count && row[..count].iter().all(|look| *look == Look::Text);
+            let above = (0..header).rev().find(|i| !is_row(&looks[*i]));
+            if let Some(above) = above.filter(|above| is_row(&looks[header]) && are_names(&looks[*above])) {
+                header = above;
             }
             // A title or settings above the names are skipped; a short line above the data is no line of names.
             while header > 0 && rows[header].1.len() < count && rows[header - 1].1.len() >= count {

@@ -1,7 +1,8 @@
 //! Lines of JSON objects as rows: `{"Time": "...", "SI7021": {"Temperature": 20.0}}` has the columns `Time` and `SI7021.Temperature`.
 //! Numbers keep their digits: they are read as text, as those of other tables.
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Place, printable};
+use crate::lines::{Line, Row};
 
 /// Largest depth of objects and lists.
 const MAX_DEPTH: usize = 16;
@@ -20,6 +21,50 @@ pub(crate) fn flattened(line: &str, number: u64) -> Result<Vec<(String, String)>
     };
     let done = reader.value("", 0, &mut pairs).is_some() && reader.peek().is_none();
     if done { Ok(pairs) } else { Err(refused(reader.at)) }
+}
+
+/// A row of an object: a cell for each key.
+pub(crate) fn row(keys: &[String], row: &mut Row, found: &Line) -> Result<Option<()>, Error> {
+    let Line::Text(line) = *found else {
+        let (Line::Text(line) | Line::TooLong(line)) = *found;
+        return Err(Error::Line {
+            place: Place { line, row: 0 },
+            problem: "too long".to_owned(),
+            mend: "one object stands on each line",
+        });
+    };
+    row.line = line;
+    let text = String::from_utf8_lossy(&row.text).into_owned();
+    row.cells = vec![(0, 0); keys.len()];
+    if text.trim().is_empty() {
+        row.cells.clear();
+        return Ok(Some(()));
+    }
+    let pairs = flattened(&text, line)?;
+    row.text.clear();
+    for (key, value) in pairs {
+        let Some(column) = keys.iter().position(|known| *known == key) else {
+            if value.is_empty() {
+                continue;
+            }
+            return Err(Error::Line {
+                place: Place { line, row: 0 },
+                problem: format!("the key `{}` is in none of the first lines", printable(&key)),
+                mend: "put a line with all keys first, or leave such lines out with --skip-bad",
+            });
+        };
+        if row.cells[column].1 > 0 {
+            return Err(Error::Line {
+                place: Place { line, row: 0 },
+                problem: format!("the key `{}` stands twice", printable(&key)),
+                mend: "mend the line, or leave such lines out with --skip-bad",
+            });
+        }
+        let from = row.text.len();
+        row.text.extend_from_slice(value.trim().as_bytes());
+        row.cells[column] = (from as u32, row.text.len() as u32);
+    }
+    Ok(Some(()))
 }
 
 struct Reader<'a> {

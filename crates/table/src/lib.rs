@@ -33,6 +33,7 @@
 //! |---|---|
 //! | reading in batches of columns | [`Table`], [`Batch`], [`Cells`] |
 //! | how a table is written | [`Dialect`] |
+//! | a row per reading, made a column per sensor | [`Table::widened`] |
 //! | what is in it: kinds, ranges, gaps by spelling, sentinels, steps of time | [`Table::survey`], [`Profile`] |
 //! | lists of names in options | [`names`] |
 //!
@@ -41,36 +42,46 @@
 
 #[cfg(feature = "parquet")]
 mod arrow;
+mod calendar;
 mod civil;
 mod clock;
 mod column;
 mod detect;
 mod dialect;
+mod ends;
 mod error;
+mod extent;
 mod guess;
 mod head;
 mod json;
 mod known;
 mod lines;
+mod marks;
 mod missing;
 pub mod names;
 mod number;
 mod open;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod parts;
+mod plain;
 mod profile;
+mod quick;
 mod read;
 mod source;
 mod survey;
 mod table;
 mod time;
 mod timing;
+mod wide;
 mod written;
 
 pub use column::{Batch, Cells, Column, Kind, MAX_WORDS};
 pub use dialect::Dialect;
+pub use ends::Sentinel;
 pub use error::{Error, Place, printable};
-pub use profile::{Profile, Sentinel};
+pub use extent::FewCells;
+pub use profile::Profile;
 pub use survey::{Survey, Times};
 pub use table::{Skipped, Table};
 pub use time::{DECIMALS, Scale, Time, Unit};

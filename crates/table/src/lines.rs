@@ -93,6 +93,29 @@ impl Lines {
         }
     }
 
+    /// The last byte of lines.
+    pub(crate) fn end(&self) -> u8 {
+        self.end
+    }
+
+    /// Bytes that are there, from the beginning of a line on, and the number of the line before; none if lines were read ahead.
+    pub(crate) fn buffered(&mut self) -> Result<(u64, &[u8]), Error> {
+        if !self.queue.is_empty() {
+            return Ok((self.line, &[]));
+        }
+        match self.reader.fill_buf() {
+            Ok(bytes) => Ok((self.line, bytes)),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => Ok((self.line, &[])),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Takes so many bytes of [`buffered`](Self::buffered), which are so many lines.
+    pub(crate) fn consume(&mut self, bytes: usize, lines: u64) {
+        self.reader.consume(bytes);
+        self.line += lines;
+    }
+
     /// Number of the line before the next.
     pub(crate) fn line(&self) -> u64 {
         self.queue.front().map_or(self.line, |(line, _)| line.saturating_sub(1))

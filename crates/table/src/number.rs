@@ -38,7 +38,7 @@ const TOO_LONG: Problem = (
 );
 
 /// Powers of ten that are exact doubles.
-const TENS: [f64; 23] = [
+pub(crate) const TENS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
     1e21, 1e22,
 ];
@@ -70,16 +70,38 @@ pub(crate) fn parse(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
         let size = mantissa as f64 / TENS[usize::from(decimals)];
         return Ok(Number::Double(if negative { -size } else { size }, decimals));
     }
-    slowly(text, syntax)
+    match syntax {
+        Syntax {
+            decimal: b'.',
+            thousands: None,
+        } => long(text).map_or_else(|| slowly(text, syntax), Ok),
+        _ => slowly(text, syntax),
+    }
+}
+
+/// A number of many digits or with an exponent, as programs write doubles; `None` if it may be anything else.
+fn long(text: &[u8]) -> Option<Number> {
+    let is_plain = text
+        .iter()
+        .all(|c| c.is_ascii_digit() || matches!(c, b'.' | b'-' | b'+' | b'e' | b'E'));
+    let text = std::str::from_utf8(text).ok().filter(|_| is_plain)?;
+    let places = text.split_once('.').map_or("", |(_, places)| places);
+    let value: f64 = text.parse().ok()?;
+    // Whole numbers, and those that are too small or too large, are looked at more closely.
+    let decimals = u8::try_from(places.len()).unwrap_or(u8::MAX);
+    (value.is_finite() && value.fract() != 0.0).then_some(Number::Double(value, decimals))
 }
 
 /// Everything that is not a short plain number.
 #[cold]
 fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
     let text = std::str::from_utf8(text).map_err(|_| no_number(text))?;
-    let mut plain: String = text.replace('\u{2212}', "-");
+    let mut plain: String = text.trim_matches(BLANKS).replace('\u{2212}', "-");
     if syntax.thousands == Some(b' ') {
         plain = plain.replace(SPACES, " ");
+    }
+    if syntax.thousands == Some(b'\'') {
+        plain = plain.replace('\u{2019}', "'");
     }
     if let Some(exponent) = fortran(&plain) {
         plain = exponent;
@@ -132,6 +154,10 @@ fn slowly(text: &[u8], syntax: Syntax) -> Result<Number, Problem> {
     }
 }
 
+/// Marks without ink at the ends of cells, as programs leave them: spaces of several kinds, and the mark of an encoding.
+const BLANKS: [char; 7] = [
+    '\u{a0}', '\u{202f}', '\u{2009}', '\u{200b}', '\u{feff}', '\u{b}', '\u{c}',
+];
 /// Spaces between groups of digits that are no plain ones.
 const SPACES: [char; 3] = ['\u{a0}', '\u{202f}', '\u{2009}'];
 
@@ -147,8 +173,8 @@ fn special(text: &str) -> Option<f64> {
     Some(match text.to_ascii_lowercase().as_str() {
         "nan(ind)" | "1.#qnan" | "1.#ind" | "nan(snan)" | "1.#snan" => f64::NAN,
         "-nan(ind)" | "-1.#ind" | "-1.#qnan" | "-nan(snan)" => -f64::NAN,
-        "1.#inf" | "+1.#inf" => f64::INFINITY,
-        "-1.#inf" => f64::NEG_INFINITY,
+        "1.#inf" | "+1.#inf" | "∞" | "+∞" => f64::INFINITY,
+        "-1.#inf" | "-∞" => f64::NEG_INFINITY,
         _ => return None,
     })
 }
@@ -183,7 +209,9 @@ pub(crate) fn hint(text: &str) -> &'static str {
     let digits = text.bytes().filter(u8::is_ascii_digit).count();
     let commas = text.bytes().filter(|c| *c == b',').count();
     let points = text.bytes().filter(|c| *c == b'.').count();
-    let plain = text.bytes().all(|c| c.is_ascii_digit() || b"+-.,' eE".contains(&c));
+    let plain = text
+        .chars()
+        .all(|c| c.is_ascii_digit() || "+-.,'\u{2019}\u{2212} eE".contains(c));
     let is_spaced = text.contains(SPACES) || text.split(' ').skip(1).any(|group| group.len() >= 3);
     let is_grouped = is_spaced
         && text
@@ -201,6 +229,10 @@ pub(crate) fn hint(text: &str) -> &'static str {
         }
     } else if text.starts_with('(') && text.ends_with(')') {
         "if brackets mean a negative number, write a minus; or leave the column out with --without"
+    } else if plain && digits > 1 && text.ends_with('-') {
+        "if a minus behind the number makes it negative, write it in front; or leave the column out with --without"
+    } else if plain && commas == 1 && points == 0 && text.len() - text.find(',').unwrap_or(0) == 4 {
+        "say --thousands , if these are groups of digits, or --decimal , (with --delimiter ';' or tab) if they are decimals"
     } else if plain && commas == 1 && points == 0 {
         "if it has a decimal comma, say --decimal , (and --delimiter ';' or tab)"
     } else if plain && (commas > 1 || (commas == 1 && points == 1)) {
@@ -209,7 +241,11 @@ pub(crate) fn hint(text: &str) -> &'static str {
         } else {
             "say --thousands ,"
         }
-    } else if plain && (points > 2 || text.contains('\'') && !text.starts_with('\'')) {
+    } else if plain && text.contains(['\'', '\u{2019}']) && !text.starts_with('\'') {
+        "say --thousands \"'\""
+    } else if text.bytes().all(|c| c.is_ascii_digit() || b"+-.,_".contains(&c)) && text.contains('_') {
+        "say --thousands _"
+    } else if plain && points > 2 {
         "say --thousands and the mark between groups"
     } else if text.ends_with('%') || text.ends_with(|c: char| c.is_alphabetic()) && !text.contains('x') {
         "if a unit stands behind the number, say --strip-units"
@@ -226,13 +262,20 @@ pub(crate) fn looks_like_number(text: &str) -> bool {
         .strip_prefix('(')
         .and_then(|text| text.strip_suffix(')'))
         .unwrap_or(text);
-    let size = text.trim_start_matches(['-', '+', '\'', '\u{2212}']);
-    if !size.starts_with(|c: char| c.is_ascii_digit()) {
+    let size = text
+        .trim_matches(BLANKS)
+        .trim_start_matches(['-', '+', '\'', '\u{2212}']);
+    if !size.starts_with(char::is_numeric) {
         return false;
     }
+    // A minus behind the number, fractions and digits of other scripts too.
+    let hexadecimal = size.strip_prefix("0x").or(size.strip_prefix("0X"));
     let is_plain = size
+        .strip_suffix('-')
+        .unwrap_or(size)
         .chars()
-        .all(|c| c.is_ascii_digit() || ".,' ".contains(c) || SPACES.contains(&c));
+        .all(|c| c.is_numeric() || ".,'_\u{2019} ".contains(c) || SPACES.contains(&c))
+        || hexadecimal.is_some_and(|digits| digits.bytes().all(|c| c.is_ascii_hexdigit()));
     let has_unit = without_unit(size).is_some_and(|(number, unit)| {
         let is_spaced = size.as_bytes().get(number.len()) == Some(&b' ');
         number.parse::<f64>().is_ok()

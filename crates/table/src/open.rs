@@ -6,10 +6,14 @@ use crate::dialect::{Delimiter, Dialect};
 use crate::error::{Error, Place};
 use crate::head::Head;
 use crate::lines::{Line, Lines, Row, Split};
+use crate::plain::Scanner;
 use crate::profile::Profile;
 use crate::table::Table;
 use crate::{json, known, names, number, source};
 use std::io::{BufRead, Cursor, Read};
+
+/// The mark of UTF-8.
+const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Rows of a text.
 pub(crate) struct Rows {
@@ -54,8 +58,12 @@ impl Rows {
             let Some(found) = self.lines.next(&mut row.text)? else {
                 return Ok(None);
             };
+            if row.text.starts_with(MARK) {
+                // The mark of an encoding, where files were joined.
+                row.text.drain(..MARK.len());
+            }
             if let Some(keys) = &self.keys {
-                return json_row(keys, row, &found);
+                return json::row(keys, row, &found);
             }
             if !self.comment.is_empty() && row.text.starts_with(&self.comment) {
                 self.check_comment(row, &found)?;
@@ -80,6 +88,27 @@ impl Rows {
             });
         }
         Ok(())
+    }
+
+    /// What splits plain lines; `None` if there are none.
+    pub(crate) fn scanner(&self, syntax: number::Syntax, columns: usize) -> Option<Scanner> {
+        let Delimiter::Byte(delimiter) = self.split.delimiter else {
+            return None;
+        };
+        let first_name = self.header.first().map_or("", String::as_str);
+        let marks = (delimiter, self.split.quote);
+        let scanner = Scanner::new(marks, syntax, &self.comment, first_name, columns);
+        scanner.filter(|_| self.keys.is_none() && self.lines.end() == b'\n')
+    }
+
+    /// Bytes that are there, from the beginning of a line on, and the number of the line before.
+    pub(crate) fn buffered(&mut self) -> Result<(u64, &[u8]), Error> {
+        self.lines.buffered()
+    }
+
+    /// Takes so many bytes of [`buffered`](Self::buffered), which are so many lines.
+    pub(crate) fn consume(&mut self, bytes: usize, lines: u64) {
+        self.lines.consume(bytes, lines);
     }
 
     pub(crate) fn is_header_again(&self, row: &Row) -> bool {
@@ -119,43 +148,6 @@ impl Rows {
             },
         })
     }
-}
-
-/// A row of an object: a cell for each key.
-fn json_row(keys: &[String], row: &mut Row, found: &Line) -> Result<Option<()>, Error> {
-    let Line::Text(line) = *found else {
-        let (Line::Text(line) | Line::TooLong(line)) = *found;
-        return Err(Error::Line {
-            place: Place { line, row: 0 },
-            problem: "too long".to_owned(),
-            mend: "one object stands on each line",
-        });
-    };
-    row.line = line;
-    let text = String::from_utf8_lossy(&row.text).into_owned();
-    row.cells = vec![(0, 0); keys.len()];
-    if text.trim().is_empty() {
-        row.cells.clear();
-        return Ok(Some(()));
-    }
-    let pairs = json::flattened(&text, line)?;
-    row.text.clear();
-    for (key, value) in pairs {
-        let Some(column) = keys.iter().position(|known| *known == key) else {
-            if value.is_empty() {
-                continue;
-            }
-            return Err(Error::Line {
-                place: Place { line, row: 0 },
-                problem: format!("the key `{}` is in none of the first lines", crate::error::printable(&key)),
-                mend: "put a line with all keys first, or leave such lines out with --skip-bad",
-            });
-        };
-        let from = row.text.len();
-        row.text.extend_from_slice(value.trim().as_bytes());
-        row.cells[column] = (from as u32, row.text.len() as u32);
-    }
-    Ok(Some(()))
 }
 
 impl Table {
@@ -355,7 +347,7 @@ fn named(own_names: &[String], units: &[String]) -> Vec<Column> {
 
 /// Profiles of the columns over the whole lines of the head.
 fn first_profiles(head: &Head, rows: &Rows, columns: &[Column], dialect: &Dialect) -> Vec<Profile> {
-    let mut profiles = vec![Profile::default(); columns.len()];
+    let mut profiles = Profile::of_columns(columns.len());
     let byte = |mark: char| mark as u32 as u8;
     let syntax = number::Syntax {
         decimal: dialect.decimal.map_or(b'.', byte),

@@ -68,7 +68,7 @@ impl ArrowRows {
     }
 
     /// A cell as text, for times of several columns, labels and messages.
-    fn text(&self, column: usize) -> String {
+    pub(crate) fn text(&self, column: usize) -> String {
         let row = self.next - 1;
         match &self.decoded[column] {
             Some(Decoded::Texts(texts)) => texts[row].clone().unwrap_or_default(),
@@ -104,7 +104,7 @@ impl Table {
         let ahead = next_of(&mut reader)?;
         let own_names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
         let distinct = names::distinct(&own_names);
-        let mut profiles = vec![Profile::default(); own_names.len()];
+        let mut profiles = Profile::of_columns(own_names.len());
         let dialect = Dialect {
             format: Some("Parquet".to_owned()),
             decimal: Some('.'),
@@ -234,6 +234,7 @@ impl Table {
                         clock: self.clocks[*column].as_ref(),
                         kind: self.columns[*column].kind,
                         is_fixed: self.is_fixed[*column],
+                        unit: self.profiles[*column].unit.as_deref(),
                     };
                     push_cell(into, rows.text(*column).trim(), &meaning, &mut self.words[*column])
                 }
@@ -258,13 +259,20 @@ impl Table {
     /// Columns whose cells are needed.
     fn needed(&self) -> Vec<usize> {
         let time = self.time.iter().flat_map(|(columns, _)| columns.iter().copied());
-        self.selected.iter().copied().chain(time).chain(self.label).collect()
+        let values = self.values.iter().copied();
+        self.selected
+            .iter()
+            .copied()
+            .chain(time)
+            .chain(self.label)
+            .chain(values)
+            .collect()
     }
 
     /// Counts over all rows.
     pub(crate) fn survey_arrow(mut self) -> Result<Survey, Error> {
         let mut survey = Survey {
-            columns: vec![Profile::default(); self.columns.len()],
+            columns: Profile::of_columns(self.columns.len()),
             ..Survey::default()
         };
         self.selected.clear();

@@ -1,16 +1,16 @@
 //! What the cells of a column are, counted over rows: its kind, its range, its gaps by spelling, and what looks wrong.
 
 use crate::column::{Kind, MAX_WORDS};
+use crate::ends::{self, End, Sentinel};
 use crate::error::Place;
+use crate::extent::{Extent, FewCells};
 use crate::guess;
 use crate::missing::{self, Spellings};
 use crate::number::{self, Number};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Number of cells that are kept to find out how times are written.
 const SAMPLE: usize = 64;
-/// A range that shrinks by this factor without one value, at either end, is made by that value.
-const SHRINK: f64 = 4.0;
 
 /// Counts over the cells of a column.
 #[derive(Debug, Clone, Default)]
@@ -29,12 +29,21 @@ pub struct Profile {
     faults: u64,
     /// Gaps by their spelling.
     pub missing: BTreeMap<String, u64>,
+    /// Texts of numbers before the first text: they are words if the column is one of words. `None` behind that, or if there are too many.
+    early: Early,
+    /// Whether there are too many words by the numbers alone.
+    has_too_many: bool,
+    /// The unit behind the first number, if units are cut off.
+    pub(crate) unit: Option<String>,
     /// Words and how often each occurs, up to [`MAX_WORDS`] and one more.
     pub words: BTreeMap<String, u64>,
     /// Smallest and largest finite number.
     pub range: Option<(f64, f64)>,
     low: End,
     high: End,
+    extent: Extent,
+    /// Smallest and largest whole number, exact also beyond doubles.
+    whole: Option<(i64, i64)>,
     /// Largest number of decimals.
     pub decimals: u8,
     /// The first cell that is no number.
@@ -42,48 +51,17 @@ pub struct Profile {
     pub(crate) sample: Vec<String>,
 }
 
-/// The extreme value at one end, how often it occurs, and the next.
-#[derive(Debug, Clone, Copy, Default)]
-struct End {
-    value: f64,
-    count: u64,
-    next: Option<f64>,
+/// Distinct texts of the numbers that come first.
+#[derive(Debug, Clone)]
+enum Early {
+    Words(HashMap<String, u64>, String),
+    TooMany,
 }
 
-impl End {
-    /// Adds a value; `sign` is 1 at the upper end and -1 at the lower.
-    fn add(&mut self, value: f64, sign: f64) {
-        let beyond = |a: f64, b: f64| sign * a > sign * b;
-        if self.count == 0 {
-            *self = Self {
-                value,
-                count: 1,
-                next: None,
-            };
-        } else if value == self.value {
-            self.count += 1;
-        } else if beyond(value, self.value) {
-            *self = Self {
-                value,
-                count: 1,
-                next: Some(self.value),
-            };
-        } else if self.next.is_none_or(|next| beyond(value, next)) {
-            self.next = Some(value);
-        }
+impl Default for Early {
+    fn default() -> Self {
+        Self::Words(HashMap::new(), String::new())
     }
-}
-
-/// A value that may stand for a gap: it makes most of the range of its column, and few cells have it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct Sentinel {
-    /// The value.
-    pub value: f64,
-    /// Cells that have it.
-    pub count: u64,
-    /// The range without it.
-    pub range_without: (f64, f64),
 }
 
 /// Words of booleans.
@@ -99,6 +77,15 @@ pub(crate) fn boolean(cell: &str) -> Option<bool> {
 }
 
 impl Profile {
+    /// Profiles of the columns of a table, without cells.
+    pub(crate) fn of_columns(columns: usize) -> Vec<Self> {
+        let profile = Self {
+            extent: Extent::new(columns),
+            ..Self::default()
+        };
+        vec![profile; columns]
+    }
+
     /// Adds a trimmed cell.
     pub(crate) fn add(&mut self, cell: &str, place: Place, syntax: number::Syntax, gaps: &Spellings, strips: bool) {
         if cell.is_empty() || (!gaps.is_empty() && gaps.has_text(cell)) {
@@ -107,10 +94,11 @@ impl Profile {
         }
         self.keep(cell);
         let parsed = number::parse(cell.as_bytes(), syntax);
-        let parsed = match (&parsed, strips) {
-            (Err(_), true) => {
-                number::without_unit(cell).map_or(parsed, |(number, _)| number::parse(number.as_bytes(), syntax))
-            }
+        let parsed = match (&parsed, number::without_unit(cell).filter(|_| strips)) {
+            (Err(_), Some((number, unit))) => match number::parse(number.as_bytes(), syntax) {
+                Ok(_) if self.unit.get_or_insert_with(|| unit.to_owned()) != unit => parsed,
+                found => found,
+            },
             _ => parsed,
         };
         match parsed {
@@ -119,9 +107,35 @@ impl Profile {
             Ok(Number::Whole(whole)) => {
                 self.integers += 1;
                 self.extend(whole as f64);
+                self.extend_whole(whole);
             }
             Err(_) => self.text(cell, place),
         }
+    }
+
+    /// Adds a cell that is a short number.
+    #[inline]
+    pub(crate) fn add_number(&mut self, value: f64, decimals: u8, cell: &str, gaps: &Spellings) {
+        if !gaps.is_empty() && gaps.has_text(cell) {
+            self.gap(cell);
+            return;
+        }
+        self.keep(cell);
+        if gaps.has_number(value) {
+            self.gap(cell);
+        } else {
+            self.number(value, decimals, cell);
+        }
+    }
+
+    /// Adds a cell that is a time with a date.
+    pub(crate) fn add_written_time(&mut self, cell: &str, gaps: &Spellings) {
+        if !gaps.is_empty() && gaps.has_text(cell) {
+            self.gap(cell);
+            return;
+        }
+        self.keep(cell);
+        self.times += 1;
     }
 
     fn gap(&mut self, cell: &str) {
@@ -136,13 +150,30 @@ impl Profile {
     fn number(&mut self, value: f64, decimals: u8, cell: &str) {
         self.numbers += 1;
         self.decimals = self.decimals.max(decimals);
-        self.fractions += u64::from(value.fract() != 0.0);
+        // The cast of a double beyond 64 bits saturates: all of these are whole.
+        let whole = value as i64;
+        if whole as f64 == value {
+            self.extend_whole(whole);
+        } else {
+            self.fractions += u64::from(value.abs() < 9.3e18);
+        }
         if value.is_finite() {
             self.extend(value);
         }
         // Numbers may be words among words: `A1`, `7`, `B2`.
         if self.texts > 0 {
             self.word(cell);
+        } else if let Early::Words(words, last) = &mut self.early
+            && last != cell
+        {
+            cell.clone_into(last);
+            if words.len() > MAX_WORDS {
+                self.early = Early::TooMany;
+            } else if let Some(count) = words.get_mut(cell) {
+                *count += 1;
+            } else {
+                words.insert(cell.to_owned(), 1);
+            }
         }
     }
 
@@ -151,6 +182,12 @@ impl Profile {
         self.range = Some((low.min(value), high.max(value)));
         self.low.add(value, -1.0);
         self.high.add(value, 1.0);
+        self.extent.push(value);
+    }
+
+    fn extend_whole(&mut self, whole: i64) {
+        let (low, high) = self.whole.unwrap_or((whole, whole));
+        self.whole = Some((low.min(whole), high.max(whole)));
     }
 
     fn word(&mut self, cell: &str) {
@@ -179,6 +216,10 @@ impl Profile {
             self.faults += 1;
         } else {
             self.texts += 1;
+            match std::mem::replace(&mut self.early, Early::TooMany) {
+                Early::Words(words, _) => self.words.extend(words),
+                Early::TooMany => self.has_too_many |= self.texts == 1,
+            }
         }
         self.first_text.get_or_insert_with(|| (place, cell.to_owned()));
         self.word(cell);
@@ -209,6 +250,7 @@ impl Profile {
                 self.keep(&whole.to_string());
                 self.integers += 1;
                 self.extend(whole as f64);
+                self.extend_whole(whole);
             }
             value => self.add_double(value.map(|whole| whole as f64), gaps),
         }
@@ -256,7 +298,7 @@ impl Profile {
             Kind::Number
         } else if self.texts == 0 && numbers == 0 {
             Kind::Boolean
-        } else if self.words.len() <= MAX_WORDS && self.times == 0 {
+        } else if self.words.len() <= MAX_WORDS && self.times == 0 && !self.has_too_many {
             Kind::Words
         } else {
             Kind::Text
@@ -294,20 +336,27 @@ impl Profile {
         }
     }
 
-    /// A value that makes three quarters of the range or more and that a twentieth of the cells or less have.
-    pub fn sentinel(&self) -> Option<Sentinel> {
-        let (low, high) = self.range?;
-        let all = self.numbers + self.integers;
-        let rare = |count: u64| 20 * count <= all || count == 1;
-        let found = |end: End, without: (f64, f64)| {
-            let is_made = high - low > SHRINK * (without.1 - without.0) && without.1 > without.0;
-            (rare(end.count) && is_made && all >= 8).then_some(Sentinel {
-                value: end.value,
-                count: end.count,
-                range_without: without,
+    /// Smallest and largest number of a column of [`Kind::Integer`], which doubles may not hold.
+    pub fn whole_range(&self) -> Option<(i64, i64)> {
+        self.whole.filter(|_| self.kind() == Kind::Integer)
+    }
+
+    /// A few cells that make most of the range; or more of them, if they have a value that usually stands for a gap, as -9999.
+    pub fn few(&self) -> Option<FewCells> {
+        let ends = self.range?;
+        self.extent.few(ends).or_else(|| {
+            let sentinel = self.sentinel()?;
+            Some(FewCells {
+                ends,
+                most: sentinel.range_without,
+                share_outside: sentinel.count as f64 / (self.numbers + self.integers) as f64,
             })
-        };
-        let lower = self.low.next.and_then(|next| found(self.low, (next, high)));
-        lower.or_else(|| self.high.next.and_then(|next| found(self.high, (low, next))))
+        })
+    }
+
+    /// A value that makes three quarters of the range or more and that a twentieth of the cells or less have; up to nine tenths, if it is one
+    /// that usually stands for a gap.
+    pub fn sentinel(&self) -> Option<Sentinel> {
+        ends::sentinel(self.range?, self.low, self.high, self.numbers + self.integers)
     }
 }

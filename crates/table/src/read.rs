@@ -22,35 +22,113 @@ impl Table {
     /// reading goes on behind it.
     pub fn read(&mut self, batch: &mut Batch, limit: usize) -> Result<usize, Error> {
         batch.reset(self.selected.iter().map(|i| self.columns[*i].kind));
+        self.read_rows(batch, limit, true)?;
+        if !self.own_lines.is_empty() {
+            batch.places = batch.places.iter().map(|place| self.own_place(*place)).collect();
+        }
+        Ok(batch.rows)
+    }
+
+    /// As [`read`](Self::read); `takes_plain`: whether plain lines are split where they lie.
+    pub(crate) fn read_rows(&mut self, batch: &mut Batch, limit: usize, takes_plain: bool) -> Result<usize, Error> {
         if let Some(error) = self.late_error.take() {
             return Err(error);
         }
         while batch.rows < limit {
-            let outcome = match self.next_into(batch) {
-                Ok(false) => break,
-                other => other,
+            let plain = if takes_plain {
+                self.plain_rows(batch, limit)
+            } else {
+                Ok(())
             };
-            if let Err(error) = outcome {
-                batch.cut();
-                let error = self.placed(error);
-                if error.place().is_none() || self.is_repeated() {
-                    if error.place().is_some() {
-                        self.skipped.repeated += 1;
-                        continue;
-                    }
-                    return Err(error);
-                }
-                if self.skipped.bad < self.dialect.skip_bad {
-                    self.skip(&error);
-                } else if batch.rows > 0 {
-                    self.late_error = Some(error);
-                    break;
-                } else {
-                    return Err(error);
-                }
+            let outcome = match plain {
+                Ok(()) if batch.rows == limit => break,
+                Ok(()) => self.next_into(batch),
+                Err(error) => Err(error),
+            };
+            let error = match outcome {
+                Ok(true) => continue,
+                Ok(false) => break,
+                Err(error) => self.placed(error),
+            };
+            batch.cut();
+            let is_of_row = error.place().is_some();
+            if is_of_row && self.is_repeated() {
+                self.skipped.repeated += 1;
+            } else if is_of_row && self.skipped.bad < self.dialect.skip_bad {
+                self.skip(&error);
+            } else if batch.rows > 0 {
+                self.late_error = Some(error);
+                break;
+            } else {
+                return Err(error);
             }
         }
         Ok(batch.rows)
+    }
+
+    /// Reads rows as long as they are plain and lie in the buffer.
+    fn plain_rows(&mut self, batch: &mut Batch, limit: usize) -> Result<(), Error> {
+        let Some(scanner) = self.scanner.as_mut().filter(|_| self.label.is_none()) else {
+            return Ok(());
+        };
+        let (before, bytes) = self.rows.buffered()?;
+        let (mut used, mut lines) = (0, 0);
+        while batch.rows < limit {
+            let line = &bytes[used..];
+            let Some(length) = scanner.line(line) else {
+                break;
+            };
+            let mut is_taken = true;
+            if let Some((columns, clock)) = &self.time {
+                let time = match columns.as_slice() {
+                    [column] => clock.parse(scanner.cells[*column].text(line)),
+                    several => {
+                        let cells: Vec<&str> = several.iter().map(|i| scanner.cells[*i].text(line)).collect();
+                        clock.of_parts(&cells)
+                    }
+                };
+                match time {
+                    Ok(time) => batch.times.push(time),
+                    Err(_) => is_taken = false,
+                }
+            }
+            for (i, column) in self.selected.iter().enumerate() {
+                let cell = scanner.cells[*column];
+                let gaps = &self.gaps[*column];
+                match (&mut batch.columns[i], cell.number) {
+                    (Cells::Numbers(numbers), Some((value, _))) => {
+                        numbers.push(Some(value).filter(|_| !gaps.has_numbers() || !gaps.has_number(value)));
+                    }
+                    (Cells::Numbers(numbers), None) if cell.is_empty() => numbers.push(None),
+                    (cells, _) => {
+                        let meaning = Meaning {
+                            syntax: self.syntax,
+                            gaps,
+                            strips: self.dialect.strip_units,
+                            clock: self.clocks[*column].as_ref(),
+                            kind: self.columns[*column].kind,
+                            is_fixed: self.is_fixed[*column],
+                            unit: self.profiles[*column].unit.as_deref(),
+                        };
+                        is_taken &= push_cell(cells, cell.text(line), &meaning, &mut self.words[*column]).is_ok();
+                    }
+                }
+            }
+            if !is_taken {
+                // Read anew by itself, so that an error has its place.
+                batch.cut();
+                break;
+            }
+            (used, lines) = (used + length, lines + 1);
+            batch.places.push(Place {
+                line: before + lines,
+                row: self.count + lines,
+            });
+            batch.rows += 1;
+        }
+        self.count += lines;
+        self.rows.consume(used, lines);
+        Ok(())
     }
 
     /// Reads the next row into `batch`. Returns whether there was one.
@@ -92,6 +170,9 @@ impl Table {
                 "leave such lines out with --skip-bad".clone_into(mend);
             }
             _ => {}
+        }
+        if let Error::Line { place, .. } | Error::Cell { place, .. } = &mut error {
+            *place = self.own_place(*place);
         }
         error
     }
@@ -178,6 +259,7 @@ impl Table {
                     clock: self.clocks[*column].as_ref(),
                     kind: self.columns[*column].kind,
                     is_fixed: self.is_fixed[*column],
+                    unit: self.profiles[*column].unit.as_deref(),
                 },
                 &mut self.words[*column],
             );
@@ -225,6 +307,8 @@ pub(crate) struct Meaning<'a> {
     pub(crate) clock: Option<&'a Clock>,
     pub(crate) kind: Kind,
     pub(crate) is_fixed: bool,
+    /// The unit behind the first number, if units are cut off.
+    pub(crate) unit: Option<&'a str>,
 }
 
 /// Adds a cell to the cells of its column.
@@ -281,7 +365,13 @@ pub(crate) fn push_cell(
 fn number(text: &str, meaning: &Meaning<'_>) -> Result<Option<f64>, number::Problem> {
     let parsed = number::parse(text.as_bytes(), meaning.syntax);
     let parsed = match (&parsed, meaning.strips, number::without_unit(text)) {
-        (Err(_), true, Some((number, _))) => number::parse(number.as_bytes(), meaning.syntax),
+        (Err(_), true, Some((number, unit))) => match number::parse(number.as_bytes(), meaning.syntax) {
+            Ok(_) if meaning.unit.is_some_and(|known| known != unit) => Err((
+                "has another unit than rows before",
+                "write all cells in one unit, or leave such rows out with --skip-bad",
+            )),
+            found => found,
+        },
         _ => parsed,
     };
     match parsed {

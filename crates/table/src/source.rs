@@ -11,7 +11,9 @@ const CHUNK: usize = 1 << 18;
 pub(crate) type Bytes = Box<dyn Read + Send>;
 
 /// The first bytes of files that are no tables of text, what they are, and what to do.
-const OTHERS: [(&[u8], &str, &str); 11] = [
+const OTHERS: [(&[u8], &str, &str); 13] = [
+    (b"\"TOB", "a binary file of Campbell Scientific", "convert it to TOA5 with CardConvert or LoggerNet"),
+    (b"TOB1", "a binary file of Campbell Scientific", "convert it to TOA5 with CardConvert or LoggerNet"),
     (
         b"\xff\xfe\0\0",
         "text in UTF-32",

@@ -1,7 +1,7 @@
 //! Counts over all rows of a table.
 
 use crate::column::{Batch, Column, Kind};
-use crate::error::Error;
+use crate::error::{Error, Place};
 use crate::profile::Profile;
 use crate::table::{Skipped, Table};
 use crate::time::Time;
@@ -17,16 +17,16 @@ impl Table {
             return self.survey_arrow();
         }
         let mut survey = Survey {
-            columns: vec![Profile::default(); self.columns.len()],
+            columns: Profile::of_columns(self.columns.len()),
             ..Survey::default()
         };
         let mut batch = Batch::default();
         self.selected.clear();
         loop {
-            match self.read(&mut batch, 1) {
-                Ok(0) => break,
-                Ok(_) => {}
-                Err(error) => return Err(error),
+            self.plain_survey(&mut survey)?;
+            batch.reset(std::iter::empty());
+            if self.read_rows(&mut batch, 1, false)? == 0 {
+                break;
             }
             survey.rows += 1;
             let place = self.place();
@@ -37,8 +37,63 @@ impl Table {
                 survey.times.add(*time);
             }
         }
+        for profile in &mut survey.columns {
+            if let Some((place, _)) = &mut profile.first_text {
+                *place = self.own_place(*place);
+            }
+        }
         survey.skipped = self.skipped;
         Ok(survey)
+    }
+
+    /// Counts rows as long as they are plain and lie in the buffer.
+    fn plain_survey(&mut self, survey: &mut Survey) -> Result<(), Error> {
+        let Some(scanner) = self.scanner.as_mut() else {
+            return Ok(());
+        };
+        let strips = self.dialect.strip_units;
+        let (before, bytes) = self.rows.buffered()?;
+        let (mut used, mut lines) = (0, 0);
+        loop {
+            let line = &bytes[used..];
+            let Some(length) = scanner.line(line) else {
+                break;
+            };
+            if let Some((columns, clock)) = &self.time {
+                let time = match columns.as_slice() {
+                    [column] => clock.parse(scanner.cells[*column].text(line)),
+                    several => {
+                        let cells: Vec<&str> = several.iter().map(|i| scanner.cells[*i].text(line)).collect();
+                        clock.of_parts(&cells)
+                    }
+                };
+                let Ok(time) = time else {
+                    break;
+                };
+                survey.times.add(time);
+            }
+            (used, lines) = (used + length, lines + 1);
+            let place = Place {
+                line: before + lines,
+                row: self.count + lines,
+            };
+            for (i, profile) in survey.columns.iter_mut().enumerate() {
+                let (cell, gaps) = (scanner.cells[i], &self.gaps[i]);
+                let text = cell.text(line);
+                let clock = self.clocks[i].as_ref();
+                match cell.number {
+                    Some((value, decimals)) => profile.add_number(value, decimals, text, gaps),
+                    None if clock.is_some_and(|clock| clock.quick_date(text).is_some()) => {
+                        profile.add_written_time(text, gaps);
+                    }
+                    None => profile.add(text, place, self.syntax, gaps, strips),
+                }
+            }
+        }
+        survey.rows += lines;
+        self.count += lines;
+        self.rows.consume(used, lines);
+        Ok(())
     }
 }
 

@@ -9,6 +9,7 @@ use crate::missing::Spellings;
 use crate::names;
 use crate::number;
 use crate::open::Rows;
+use crate::plain::Scanner;
 use crate::profile::Profile;
 use crate::survey::Survey;
 use crate::written::Clock;
@@ -32,7 +33,14 @@ pub struct Table {
     pub(crate) selected: Vec<usize>,
     pub(crate) time: Option<(Vec<usize>, Clock)>,
     pub(crate) label: Option<usize>,
+    /// Columns of values of a long table that is made wide.
+    pub(crate) values: Vec<usize>,
+    /// Of a wide table that was made of a long one: the line of each row there, and how that is written.
+    pub(crate) own_lines: Vec<u64>,
+    pub(crate) own_dialect: Option<Dialect>,
     pub(crate) row: Row,
+    /// What splits plain lines, if the table may have some.
+    pub(crate) scanner: Option<Scanner>,
     pub(crate) count: u64,
     pub(crate) skipped: Skipped,
     /// An error that came behind rows that were handed out first.
@@ -71,6 +79,7 @@ impl Table {
                 .iter()
                 .map(|column| dialect.missing_of(&column.name, &column.own_name))
                 .collect(),
+            scanner: rows.scanner(syntax, count),
             rows,
             #[cfg(feature = "parquet")]
             arrow: None,
@@ -82,6 +91,9 @@ impl Table {
             selected: (0..count).collect(),
             time: None,
             label: None,
+            values: Vec::new(),
+            own_lines: Vec::new(),
+            own_dialect: None,
             row: Row::default(),
             count: 0,
             skipped: Skipped::default(),
@@ -160,6 +172,9 @@ impl Table {
     /// Uses what a [`survey`](Self::survey) of the same table found: the kinds of columns over all rows.
     pub fn use_survey(&mut self, survey: &Survey) {
         self.set_words(&survey.columns);
+        for (profile, known) in survey.columns.iter().zip(&mut self.profiles) {
+            known.unit.clone_from(&profile.unit);
+        }
         #[cfg(feature = "parquet")]
         if self.arrow.is_some() {
             self.set_arrow_kinds(&survey.columns);
@@ -192,7 +207,7 @@ impl Table {
 
     /// How the table is written, completed by what was detected.
     pub fn dialect(&self) -> &Dialect {
-        &self.dialect
+        self.own_dialect.as_ref().unwrap_or(&self.dialect)
     }
 
     /// All columns of the table.

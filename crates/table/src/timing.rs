@@ -90,7 +90,7 @@ impl Table {
             .unwrap_or(0);
         let joined = |row: usize| {
             let cells: Vec<&str> = columns.iter().map(|i| self.profiles[*i].sample[row].as_str()).collect();
-            crate::written::joined(&cells)
+            crate::parts::joined(&cells)
         };
         let sample: Vec<String> = (0..length).map(joined).collect();
         let found = clock::clock(&own, &sample, &mut self.dialect).map_err(|refused| match refused {
@@ -106,7 +106,9 @@ impl Table {
                 column: own.join(", "),
                 cell: printable(&sample[row]),
                 problem,
-                mend: if self.columns.len() == 1 && sample[row].contains([';', '\t', '|', ' ', ':', ',']) {
+                mend: if self.columns.len() == 1
+                    && sample[row].contains(|c: char| !c.is_alphanumeric() && !".-+/".contains(c))
+                {
                     format!("name what separates cells with --delimiter; or {mend}")
                 } else {
                     mend.to_owned()

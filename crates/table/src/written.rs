@@ -1,25 +1,13 @@
 //! How times are written: dates and times of day in many spellings, numbers, formats that are said, zones.
 
+use crate::calendar;
 use crate::civil::{self, Zone, offset};
 pub(crate) use crate::civil::{NO_SUCH_DATE, Order, Problem};
+use crate::parts::{Part, joined, padded};
+use crate::quick;
 use crate::time::{DECIMALS, SECOND, Scale, Time, Unit};
 use jiff::civil::{Date, DateTime};
 use jiff::tz::{Offset, TimeZone};
-
-/// Meaning of a column of a part of a date.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
-    Year,
-    Month,
-    Day,
-    Hour,
-    Minute,
-    Second,
-    /// Counted from 1.
-    DayOfYear,
-    /// A time of day, as `21:30` or `2130`.
-    OfDay,
-}
 
 /// How the times of a column are written.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +18,8 @@ pub(crate) enum Syntax {
     OfDay,
     /// Parts of a date in columns of their own; hours that end, as in EPW, if `true`.
     Parts(Vec<Part>, bool),
+    /// A date, and hour, minute and second in columns of their own.
+    DateAnd(Order, Vec<Part>),
     /// Units of so many seconds since a zero, in seconds since 1970.
     Since(i64, i64),
     Format(String),
@@ -141,7 +131,27 @@ impl Clock {
         }
     }
 
+    /// The time of a cell.
     pub(crate) fn parse(&self, text: &str) -> Result<Time, Problem> {
+        self.quick(text).map_or_else(|| self.slowly(text), Ok)
+    }
+
+    /// The time of a cell in one of the usual spellings; `None` if it may be anything.
+    fn quick(&self, text: &str) -> Option<Time> {
+        match self.syntax {
+            Syntax::Number(unit) => quick::ticks(text.as_bytes(), unit.decimals()),
+            Syntax::Date(_) => self.quick_date(text),
+            _ => None,
+        }
+    }
+
+    /// The time of a cell with a date in one of the usual spellings; `None` if it may be anything.
+    pub(crate) fn quick_date(&self, text: &str) -> Option<Time> {
+        let is_placed = matches!(self.syntax, Syntax::Date(_)) && (self.zone.is_none() || self.scale == Scale::Utc);
+        is_placed.then(|| quick::date(text.as_bytes(), self.scale))?
+    }
+
+    fn slowly(&self, text: &str) -> Result<Time, Problem> {
         let text = text.trim();
         match &self.syntax {
             Syntax::Number(unit) => self.number(text, *unit),
@@ -162,7 +172,7 @@ impl Clock {
             }
             Syntax::Date(order) => self.written(text, *order),
             Syntax::Format(format) => self.formatted(text, format),
-            Syntax::Parts(..) => Err(NO_TIME),
+            Syntax::Parts(..) | Syntax::DateAnd(..) => Err(NO_TIME),
         }
     }
 
@@ -218,6 +228,10 @@ impl Clock {
             }
             (Zone::Name(name), Some(zone), _) => in_named(zone, name, seconds, fraction),
             (Zone::Name(_), None, _) => Err(NAMED_ZONE),
+            (Zone::Region(zone), _, Scale::Utc) => self.in_zone(zone, seconds, fraction),
+            (Zone::Region(_), ..) => {
+                Err(("names a zone, rows before have none", "mend the cell, or say --time-zone for those without"))
+            }
             (Zone::Nothing, Some(zone), _) => self.in_zone(zone, seconds, fraction),
             (Zone::Nothing, None, Scale::Utc) => Err(NO_ZONE),
             (Zone::Nothing, None, _) => Ok(Time::checked(seconds, fraction)),
@@ -271,8 +285,10 @@ impl Clock {
 
     /// The time of parts of a date in cells of their own, or of a date and a time of day in two cells.
     pub(crate) fn of_parts(&self, cells: &[&str]) -> Result<Time, Problem> {
-        let Syntax::Parts(meaning, ends) = &self.syntax else {
-            return self.parse(&joined(cells));
+        let (meaning, ends) = match &self.syntax {
+            Syntax::Parts(meaning, ends) => (meaning, ends),
+            Syntax::DateAnd(order, behind) => return self.date_and(cells, *order, behind),
+            _ => return self.parse(&joined(cells)),
         };
         let (mut parts, mut fraction) = ([0_i64, 1, 1, 0, 0, 0], 0);
         let (mut day_of_year, mut of_day) = (None, 0);
@@ -303,7 +319,7 @@ impl Clock {
         let [year, month, day, hour, minute, second] = parts;
         let small = |part: i64| i8::try_from(part).map_err(|_| NO_SUCH_DATE);
         let date = match day_of_year {
-            Some(day) => civil::day_of_year(year, day)?,
+            Some(day) => calendar::day_of_year(year, day)?,
             None => Date::new(i16::try_from(year).map_err(|_| NO_SUCH_DATE)?, small(month)?, small(day)?)
                 .map_err(|_| NO_SUCH_DATE)?,
         };
@@ -316,22 +332,33 @@ impl Clock {
     }
 }
 
-/// The cells of a date and a time of day as one text.
-pub(crate) fn joined(cells: &[&str]) -> String {
-    match cells {
-        [date, time] => format!("{date} {}", padded(time)),
-        _ => cells.join(" "),
+impl Clock {
+    /// A date in the first cell, and hour, minute and second in those behind it.
+    fn date_and(&self, cells: &[&str], order: Order, behind: &[Part]) -> Result<Time, Problem> {
+        let (date, rest) = cells.split_first().ok_or(NO_TIME)?;
+        let found = civil::written(date, order).ok_or(NO_TIME)?;
+        if found.second != 0 || found.fraction != 0 || rest.len() != behind.len() {
+            return Err(NO_TIME);
+        }
+        let (mut second, mut fraction) = (0, 0);
+        for (cell, part) in rest.iter().zip(behind) {
+            let time = number(cell.trim(), Unit::Seconds)?;
+            let whole = i64::try_from(time.0.div_euclid(SECOND)).map_err(|_| NO_TIME)?;
+            let (unit, most) = match part {
+                Part::Hour => (3600, 24),
+                Part::Minute => (60, 59),
+                _ => (1, 59),
+            };
+            if !(0..=most).contains(&whole) || (time.0.rem_euclid(SECOND) != 0 && *part != Part::Second) {
+                return Err(NO_TIME);
+            }
+            (second, fraction) = (second + unit * whole, time.0.rem_euclid(SECOND));
+        }
+        if second > 86_400 {
+            return Err(NO_TIME);
+        }
+        self.placed(found.date?, second, fraction, &found.zone)
     }
-}
-
-/// A time of day without marks that lost its zeros, as `930` of `0930`.
-fn padded(cell: &str) -> std::borrow::Cow<'_, str> {
-    let cell = cell.trim();
-    if (1..=5).contains(&cell.len()) && cell.bytes().all(|c| c.is_ascii_digit()) {
-        let width = if cell.len() <= 4 { 4 } else { 6 };
-        return format!("{cell:0>width$}").into();
-    }
-    cell.into()
 }
 
 fn civil_time(seconds: i64) -> Result<DateTime, Problem> {
@@ -350,3 +377,5 @@ fn in_named(zone: &TimeZone, name: &str, seconds: i64, fraction: i128) -> Result
         .map(|stamp| Time::checked(stamp.as_second(), fraction))
         .ok_or(NAMED_ZONE)
 }
+#[cfg(test)]
+mod tests;

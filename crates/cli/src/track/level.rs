@@ -265,7 +265,7 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     let mut run = Run::new(options, settings, &instants)?;
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
     let lag = options.smooth.as_deref().map(lag).transpose()?;
-    let mut rhythm = options.by.is_some().then(Rhythm::default);
+    let mut rhythm = options.table.by.is_some().then(Rhythm::default);
     let mut waiting = Vec::new();
     while let Some(mut instant) = instants.next()? {
         if let Some(rhythm) = &mut rhythm {

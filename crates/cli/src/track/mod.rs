@@ -42,7 +42,7 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
 /// Runs the task `ranges`.
 pub(crate) fn ranges(options: &RangesOptions) -> Result<Ending, Error> {
     let kind = Kind {
-        by: options.by.clone(),
+        by: options.table.by.clone(),
         ..Kind::default()
     };
     ranges::run(options, Instants::open(&options.table, &kind)?)

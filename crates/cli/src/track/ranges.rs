@@ -54,7 +54,6 @@ pub(super) fn options(track: &TrackOptions, anchors: &str) -> Result<RangesOptio
         table: track.table.clone(),
         many: track.many.clone(),
         anchors: anchors.to_owned(),
-        by: track.by.clone(),
         send: track.send.clone(),
         noise,
         speed: track.speed,

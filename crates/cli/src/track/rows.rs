@@ -28,7 +28,7 @@ pub(super) struct Kind {
 impl Kind {
     pub(super) fn of(options: &TrackOptions) -> Self {
         Self {
-            by: options.by.clone(),
+            by: options.table.by.clone(),
             accuracy: options.accuracy_column.clone(),
             threshold: options.threshold_column.clone(),
         }
@@ -88,6 +88,8 @@ pub(super) struct Instants {
 impl Instants {
     pub(super) fn open(options: &TableOptions, kind: &Kind) -> Result<Self, Error> {
         let mut chosen = options.clone();
+        // Each row is a report by itself: an instant may have several of one sensor.
+        chosen.by = None;
         if !chosen.columns.is_empty() {
             chosen.columns.extend(kind.columns().cloned());
         }

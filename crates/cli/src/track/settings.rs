@@ -113,7 +113,7 @@ impl Settings {
         let thresholds =
             PerColumn::parse(&options.threshold, None, |text| number("--threshold", text, THRESHOLD).map(Some))?;
         let sends = PerColumn::parse(&options.send, Report::Value, sensors::parse)?;
-        if options.by.is_none() {
+        if options.table.by.is_none() {
             noises.check(&instants.names, instants.file())?;
             thresholds.check(&instants.names, instants.file())?;
             sends.check(&instants.names, instants.file())?;
@@ -132,7 +132,7 @@ impl Settings {
         } else {
             FIRST_ROWS.max(options.align.unwrap_or(0))
         };
-        if options.by.is_some() && !known {
+        if options.table.by.is_some() && !known {
             // Rows are single reports.
             instants.peek(rows)?;
             rows = (FIRST_REPORTS * instants.names.len()).clamp(rows, MOST_FIRST.max(rows));

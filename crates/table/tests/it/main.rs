@@ -6,11 +6,14 @@ mod dialects;
 mod faults;
 mod kinds;
 mod loggers;
+mod long;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod plain;
 mod random;
 mod spellings;
 mod times;
+mod unseen;
 
 use fewbits_table::{Batch, Cells, Dialect, Error, Table};
 

@@ -1,7 +1,7 @@
-//! Ranges of columns, and a few cells that make most of one.
+//! The few cells that make most of the range of a column.
 //!
 //! A bound that is a share of the range is as wide as the range. One sentinel such as -9999 among temperatures makes `1%` a hundred
-//! degrees. [`Extent::few`] finds such columns: nine tenths of the cells lie within a tenth of the range.
+//! degrees. Such columns are found by a sample of their values: nine tenths of the cells lie within a tenth of the range.
 
 /// Largest number of values of a column that are kept. If a column has more, every second one is dropped.
 const MAX_KEPT: usize = 1 << 13;
@@ -12,15 +12,20 @@ const MANY: f64 = 0.9;
 /// Share of the range in which they lie.
 const NARROW: f64 = 0.1;
 
-/// Smallest and largest finite value of a column, and a sample of its values.
+/// A sample of the finite values of a column.
 #[derive(Debug, Clone)]
-pub struct Extent {
-    ends: Option<(f64, f64)>,
+pub(crate) struct Extent {
     count: u64,
     kept: Vec<f64>,
     max_kept: usize,
-    /// Every this many values one is kept.
+    /// Every this many values one is kept: a power of two.
     stride: u64,
+}
+
+impl Default for Extent {
+    fn default() -> Self {
+        Self::new(1)
+    }
 }
 
 /// A few cells that make most of a column's range.
@@ -37,9 +42,8 @@ pub struct FewCells {
 
 impl Extent {
     /// The extent of no values; `columns` is the number of columns of the table, which bounds the memory.
-    pub fn new(columns: usize) -> Self {
+    pub(crate) fn new(columns: usize) -> Self {
         Self {
-            ends: None,
             count: 0,
             kept: Vec::new(),
             max_kept: MAX_KEPT.min(MAX_KEPT_OF_ALL / columns.max(1)).max(64),
@@ -47,14 +51,10 @@ impl Extent {
         }
     }
 
-    /// Takes one value in. NaN and infinities are left out.
-    pub fn push(&mut self, value: f64) {
-        if !value.is_finite() {
-            return;
-        }
-        let (low, high) = self.ends.unwrap_or((value, value));
-        self.ends = Some((low.min(value), high.max(value)));
-        if self.count.is_multiple_of(self.stride) {
+    /// Takes one finite value in.
+    #[inline]
+    pub(crate) fn push(&mut self, value: f64) {
+        if self.count & (self.stride - 1) == 0 {
             self.kept.push(value);
             if self.kept.len() >= self.max_kept {
                 let mut index = 0;
@@ -68,14 +68,8 @@ impl Extent {
         self.count += 1;
     }
 
-    /// Smallest and largest value; `None` without values.
-    pub fn ends(&self) -> Option<(f64, f64)> {
-        self.ends
-    }
-
     /// The few cells that make most of the range; `None` if there are none.
-    pub fn few(&self) -> Option<FewCells> {
-        let ends = self.ends?;
+    pub(crate) fn few(&self, ends: (f64, f64)) -> Option<FewCells> {
         let mut sorted = self.kept.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let inside = (MANY * sorted.len() as f64).ceil() as usize;
@@ -106,9 +100,13 @@ mod tests {
     use super::*;
 
     fn few(values: impl IntoIterator<Item = f64>) -> Option<FewCells> {
-        let mut extent = Extent::new(3);
-        values.into_iter().for_each(|value| extent.push(value));
-        extent.few()
+        let (mut extent, mut ends) = (Extent::new(3), None);
+        for value in values {
+            let (low, high): (f64, f64) = ends.unwrap_or((value, value));
+            ends = Some((low.min(value), high.max(value)));
+            extent.push(value);
+        }
+        extent.few(ends?)
     }
 
     #[test]
@@ -129,6 +127,6 @@ mod tests {
         assert_eq!(few((0..1000).map(|i| (0.1 * f64::from(i)).sin())), None);
         assert_eq!(few((0..1000).map(|_| 7.0)), None);
         assert_eq!(few([]), None);
-        assert_eq!(few([f64::NAN, 1.0, f64::INFINITY]), None);
+        assert_eq!(few([1.0]), None);
     }
 }

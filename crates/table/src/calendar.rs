@@ -1,0 +1,132 @@
+//! Dates of the calendar: by month and day, by the day of the year, by weeks, and the names of months and days.
+
+use jiff::civil::{Date, ISOWeekDate, Weekday};
+
+/// Problem with a time and its mend.
+pub(crate) type Problem = (&'static str, &'static str);
+
+pub(crate) const NO_SUCH_DATE: Problem = (
+    "is no date of the calendar",
+    "mend the cell, say the order with --time-format dmy, mdy or ymd, or leave such rows out with --skip-bad",
+);
+
+const MONTHS: [&str; 12] = [
+    "january",
+    "february",
+    "march",
+    "april",
+    "may",
+    "june",
+    "july",
+    "august",
+    "september",
+    "october",
+    "november",
+    "december",
+];
+const DAYS: [&str; 7] = [
+    "monday",
+    "tuesday",
+    "wednesday",
+    "thursday",
+    "friday",
+    "saturday",
+    "sunday",
+];
+
+/// Beginnings of the names of months in other languages: German, Dutch, Swedish, French, Spanish, Italian, Portuguese.
+const OTHERS: [(&str, usize); 26] = [
+    ("ene", 0),
+    ("gen", 0),
+    ("fév", 1),
+    ("fev", 1),
+    ("mär", 2),
+    ("maa", 2),
+    ("mrt", 2),
+    ("avr", 3),
+    ("abr", 3),
+    ("mai", 4),
+    ("maj", 4),
+    ("mei", 4),
+    ("mag", 4),
+    ("juin", 5),
+    ("giu", 5),
+    ("juil", 6),
+    ("lug", 6),
+    ("aoû", 7),
+    ("aou", 7),
+    ("ago", 7),
+    ("set", 8),
+    ("okt", 9),
+    ("out", 9),
+    ("ott", 9),
+    ("dez", 11),
+    ("dic", 11),
+];
+
+/// The place of a word in a list of names, by three letters or more of it.
+fn named(word: &str, names: &[&str]) -> Option<usize> {
+    let word = word.trim_end_matches('.').to_lowercase();
+    names.iter().position(|name| word.len() >= 3 && name.starts_with(&word))
+}
+
+/// The number of a month, from 0, by its name or three letters of it.
+pub(crate) fn month_named(word: &str) -> Option<usize> {
+    named(word, &MONTHS).or_else(|| {
+        let word = word.trim_end_matches('.').to_lowercase();
+        let word = if word == "déc" || word.starts_with("décem") {
+            "dez"
+        } else {
+            word.as_str()
+        };
+        // Names that begin as the English ones do, as `mars`, `januari`, `oktober`.
+        let like = || {
+            let known = [
+                "janu", "janv", "janeiro", "febr", "febbr", "mars", "marz", "março", "märz", "april", "juni", "junho",
+                "juli", "julho", "augus", "sept", "octu", "octo", "outu", "novem", "decem", "desem",
+            ];
+            let begin = known.iter().find(|begin| word.starts_with(*begin))?;
+            MONTHS.iter().position(|name| name.starts_with(&begin[..3]))
+        };
+        OTHERS
+            .iter()
+            .find(|(begin, _)| word.starts_with(begin))
+            .map(|(_, month)| *month)
+            .or_else(like)
+    })
+}
+
+/// Whether a word names a day of the week.
+pub(crate) fn is_day_name(word: &str) -> bool {
+    named(word, &DAYS).is_some()
+}
+
+/// A date.
+pub(crate) fn checked(year: i64, month: i64, day: i64) -> Result<Date, Problem> {
+    match (i16::try_from(year), i8::try_from(month), i8::try_from(day)) {
+        (Ok(year), Ok(month), Ok(day)) => Date::new(year, month, day).map_err(|_| NO_SUCH_DATE),
+        _ => Err(NO_SUCH_DATE),
+    }
+}
+
+/// A day of a year, counted from 1.
+pub(crate) fn day_of_year(year: i64, day: i64) -> Result<Date, Problem> {
+    let first = checked(year, 1, 1)?;
+    let date = first
+        .checked_add(jiff::Span::new().try_days(day - 1).map_err(|_| NO_SUCH_DATE)?)
+        .map_err(|_| NO_SUCH_DATE)?;
+    if day >= 1 && date.year() == first.year() {
+        Ok(date)
+    } else {
+        Err(NO_SUCH_DATE)
+    }
+}
+
+/// A day of a week of ISO 8601, both counted from 1.
+pub(crate) fn of_week(year: i64, week: i64, day: i64) -> Result<Date, Problem> {
+    let small = |number: i64| i8::try_from(number).map_err(|_| NO_SUCH_DATE);
+    let weekday = Weekday::from_monday_one_offset(small(day)?).map_err(|_| NO_SUCH_DATE)?;
+    let year = i16::try_from(year).map_err(|_| NO_SUCH_DATE)?;
+    let date = ISOWeekDate::new(year, small(week)?, weekday).map_err(|_| NO_SUCH_DATE)?;
+    Ok(date.date())
+}

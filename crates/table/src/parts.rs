@@ -1,0 +1,126 @@
+//! Dates in several columns: which columns give one, and what each of them means.
+
+use crate::column::Column;
+
+/// Meaning of a column of a part of a date.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    Year,
+    Month,
+    Day,
+    Hour,
+    Minute,
+    Second,
+    /// Counted from 1.
+    DayOfYear,
+    /// A time of day, as `21:30` or `2130`.
+    OfDay,
+}
+
+/// The part of a date that a name means, behind the parts of other columns.
+fn part(name: &str, before: &[Part]) -> Option<Part> {
+    const MEANINGS: [(Part, &[&str]); 8] = [
+        (Part::Year, &["year", "yyyy", "yr", "yy", "#yy", "jahr"]),
+        (Part::Month, &["month", "mm", "mo", "mon", "monat"]),
+        (Part::Day, &["day", "dd", "dy", "tag"]),
+        (Part::Hour, &["hour", "hh", "hr", "stunde", "heure", "hora"]),
+        (Part::Minute, &["minute", "min", "mi", "mn"]),
+        (Part::Second, &["second", "sec", "ss", "seconds"]),
+        (Part::DayOfYear, &["doy", "jday", "julian", "julian_day", "day_of_year", "yday", "ddd"]),
+        (Part::OfDay, &["time", "hhmm", "hrmn", "hrmin", "hour_minute", "uhrzeit"]),
+    ];
+    let lower = name.to_lowercase();
+    // `MM` and `mm` stand for months and minutes.
+    if lower == "mm" && before.contains(&Part::Hour) {
+        return Some(Part::Minute);
+    }
+    let found = MEANINGS.iter().find(|(_, words)| words.contains(&lower.as_str()))?.0;
+    (!before.contains(&found)).then_some(found)
+}
+
+/// Columns side by side that give a date by their names, from the year on.
+pub(crate) fn calendar(columns: &[Column]) -> Option<Vec<usize>> {
+    let first = columns
+        .iter()
+        .position(|column| part(&column.own_name, &[]) == Some(Part::Year))?;
+    let mut found = Vec::new();
+    for column in &columns[first..] {
+        let Some(part) = part(&column.own_name, &found) else {
+            break;
+        };
+        found.push(part);
+    }
+    let is_date = found.contains(&Part::DayOfYear) || (found.contains(&Part::Month) && found.contains(&Part::Day));
+    is_date.then(|| (first..first + found.len()).collect())
+}
+
+/// Meanings of columns that give a date together, by their names, or by their cells.
+pub(crate) fn parts(names: &[&str], sample: &[String]) -> Option<Vec<Part>> {
+    let mut found = Vec::new();
+    for name in names {
+        match part(name, &found) {
+            Some(part) => found.push(part),
+            None => return by_cells(names.len(), sample),
+        }
+    }
+    (found.contains(&Part::Year) && found.len() >= 2).then_some(found)
+}
+
+/// Meanings of columns of whole numbers in the order of a date: a year of four digits, month, day and so on, or the day of the year.
+fn by_cells(count: usize, sample: &[String]) -> Option<Vec<Part>> {
+    const ORDER: [(Part, i64); 6] = [
+        (Part::Year, 2300),
+        (Part::Month, 12),
+        (Part::Day, 31),
+        (Part::Hour, 24),
+        (Part::Minute, 60),
+        (Part::Second, 60),
+    ];
+    let row = |text: &String| {
+        text.split_whitespace()
+            .map(|cell| cell.parse::<i64>().ok())
+            .collect::<Option<Vec<i64>>>()
+    };
+    let rows: Vec<Vec<i64>> = sample.iter().map(row).collect::<Option<_>>()?;
+    let all = |i: usize, within: std::ops::RangeInclusive<i64>| rows.iter().all(|row| within.contains(&row[i]));
+    if rows.is_empty() || rows.iter().any(|row| row.len() != count) || !all(0, 1700..=2300) {
+        return None;
+    }
+    if (3..=6).contains(&count) && (1..count).all(|i| all(i, i64::from(i < 3)..=ORDER[i].1)) {
+        return Some(ORDER[..count].iter().map(|(part, _)| *part).collect());
+    }
+    let by_day = [Part::Year, Part::DayOfYear, Part::OfDay];
+    (count <= 3 && all(1, 1..=366) && (count < 3 || all(2, 0..=2400))).then(|| by_day[..count].to_vec())
+}
+
+/// Meanings of columns behind that of a date by their names: hour, minute, second.
+pub(crate) fn of_day_parts<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<Part> {
+    let mut found = Vec::new();
+    for name in names {
+        let expected = [Part::Hour, Part::Minute, Part::Second].get(found.len()).copied();
+        // `mm` behind an hour is a minute.
+        match part(name, &found).filter(|part| Some(*part) == expected) {
+            Some(part) => found.push(part),
+            None => break,
+        }
+    }
+    found
+}
+
+/// The cells of a date and a time of day as one text.
+pub(crate) fn joined(cells: &[&str]) -> String {
+    match cells {
+        [date, time] => format!("{date} {}", padded(time)),
+        _ => cells.join(" "),
+    }
+}
+
+/// A time of day without marks that lost its zeros, as `930` of `0930`.
+pub(crate) fn padded(cell: &str) -> std::borrow::Cow<'_, str> {
+    let cell = cell.trim();
+    if (1..=5).contains(&cell.len()) && cell.bytes().all(|c| c.is_ascii_digit()) {
+        let width = if cell.len() <= 4 { 4 } else { 6 };
+        return format!("{cell:0>width$}").into();
+    }
+    cell.into()
+}
