@@ -19,7 +19,7 @@ const REACH: f64 = 8.6;
 ///
 /// ```
 /// use fewbits_filters::{Lattice, LatticeFilter, UniformGrid};
-/// let axes = vec![UniformGrid::new(-8.0, 8.0, 0.25)?; 2];
+/// let axes = vec![UniformGrid::new(-12.0, 12.0, 0.25)?; 2];
 /// let start = Lattice::normal(axes, &[1.0, 0.0], &[1.0, 0.5])?;
 /// let (x, y) = (start.positions(0), start.positions(1));
 /// let mean = [x.iter().zip(&y).map(|(x, y)| x + y).collect(), y.clone()];       // place and speed
