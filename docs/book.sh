@@ -15,7 +15,7 @@ mkdir -p "$book"
 
 page="$target/web/page.html"
 if rustup target list --installed 2>/dev/null | grep -qx wasm32-unknown-unknown; then
-  [ "$quick" = quick ] && [ -f "$page" ] || (cd web && CARGO_TARGET_DIR="$target/web" cargo run --quiet --release --locked --package pack)
+  [ "$quick" = quick ] && [ -f "$page" ] || (cd web && CARGO_TARGET_DIR="$target/web" cargo run --quiet --locked --package pack)
 fi
 if [ -f "$page" ]; then
   cp "$page" "$book/try.html"
@@ -45,4 +45,4 @@ else
   echo "skipped: the reference: cargo doc --workspace --no-deps"
 fi
 
-(cd web && CARGO_TARGET_DIR="$target/web" cargo run --quiet --release --locked --package site -- .. "$book" "${parts[@]}")
+(cd web && CARGO_TARGET_DIR="$target/web" cargo run --quiet --locked --package site -- .. "$book" "${parts[@]}")

@@ -170,7 +170,7 @@ impl GridFilter {
 }
 
 /// Differences of times to the nanosecond: steps of equal length then share their kernel.
-fn dt_of(second: f64, before: f64) -> f64 {
+pub(crate) fn dt_of(second: f64, before: f64) -> f64 {
     let dt = second - before;
     let rounded = (dt * 1e9).round() / 1e9;
     if rounded > 0.0 { rounded } else { dt }

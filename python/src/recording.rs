@@ -3,10 +3,10 @@
 use crate::error::{Outcome, refused};
 use crate::record::opened;
 use crate::recorder::tick_of;
-use crate::table::Table;
+use crate::table::{Table, joined};
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
-use arrow_array::{RecordBatch, RecordBatchReader};
-use arrow_schema::{ArrowError, SchemaRef};
+use arrow_array::{Array, RecordBatch, RecordBatchReader};
+use arrow_schema::{ArrowError, Field, SchemaRef};
 use fewbits_recipes::bounds;
 use fewbits_record::{Block, Schema};
 use pyo3::prelude::*;
@@ -241,7 +241,13 @@ impl Rows {
             }
             Ok(batches)
         })?;
-        Ok(Table::of(arrow_select::concat::concat_batches(&fields, &batches)?))
+        let column = |(i, field): (usize, &Arc<Field>)| {
+            let parts: Vec<&dyn Array> = batches.iter().map(|batch| &**batch.column(i)).collect();
+            joined(field.data_type(), &parts)
+        };
+        let columns = fields.fields().iter().enumerate().map(column);
+        let columns = columns.collect::<Result<_, _>>()?;
+        Ok(Table::of(RecordBatch::try_new(fields.clone(), columns)?))
     }
 }
 

@@ -4,6 +4,7 @@ use crate::array::{matrix, vector};
 use crate::error::{Outcome, refused};
 use crate::table::{Table, doubles};
 use arrow_array::{ArrayRef, Int64Array};
+use fewbits_diffusion::{Flow, Plan, PotentialFlow, Scheme, SensorField, StepControl, Transport};
 use fewbits_diffusive::{Error, RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
@@ -12,12 +13,19 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
-/// A search for a source that releases a substance into open air, by sensors on the ground.
+/// Largest number of cells of a plan, times its nodes and instants.
+const MOST_NUMBERS: usize = 1 << 27;
+
+/// A search for a source that releases a substance, by sensors on the ground, in open air or in rooms.
 ///
 /// `places` are those of the nodes, (n, 2), in metres; two nodes within `reach` hear each other. Each samples the concentration (kg/m^3) at the
 /// `instants`, seconds after the release began, with noise of deviation `noise`. `diffusivity` is in m^2/s, `wind` in m/s. `rate` is the
 /// release in kg/s: a number if it is known, or lowest and highest. The source lies between the corners of `box`. The search ends when the
 /// determinant of the position's covariance falls below `threshold`, in m^4.
+///
+/// In rooms, `plan` is a drawing: `#` is wall, `.` air, `I` where air comes in, `O` where it goes out. A character is a square of `square`
+/// metres, computed in `split` by `split` cells; the first line begins at y = 0, the first character at x = 0. `flow` (m^2/s) passes from `I`
+/// to `O`, and `wind` stays zero. Concentrations are then per metre of height (kg/m^2), and `concentration` is that at a node.
 ///
 /// >>> import numpy as np, fewbits as fb
 /// >>> rng = np.random.default_rng(1)
@@ -32,6 +40,22 @@ use std::sync::Arc;
 /// >>> found = search.run(samples, start=search.nearest((44, 52)), deviation=50.0)
 /// >>> found.status, bool(np.hypot(*(found.mean - source)) < 1)
 /// ('converged', True)
+///
+/// >>> plan = '''
+/// ... ########
+/// ... ...#...#
+/// ... ...#...#
+/// ... ##.##.##
+/// ... I......O'''
+/// >>> places = [(x + 0.5, y + 0.5) for y, line in enumerate(plan.split()) for x, square in enumerate(line) if square != "#"]
+/// >>> rooms = fb.SourceSearch(
+/// ...     places, reach=1.6, instants=[60.0, 120.0], noise=0.3, diffusivity=0.05, rate=(0.5, 1.5), box=((0, 0), (8, 5)), plan=plan, flow=0.05
+/// ... )
+/// >>> source = np.array([1.2, 1.6])
+/// >>> samples = lambda node: rooms.concentration(places[node], source) + 0.3 * rng.standard_normal(2)
+/// >>> found = rooms.run(samples, start=rooms.nearest((6.5, 4.5)), deviation=4.0)
+/// >>> bool(np.hypot(*(found.mean - source)) < 0.5)
+/// True
 #[pyclass(frozen, module = "fewbits")]
 pub(crate) struct SourceSearch {
     field: SearchField,
@@ -61,7 +85,7 @@ pub(crate) struct SourceFound {
 #[pymethods]
 impl SourceSearch {
     #[new]
-    #[pyo3(signature = (places, *, reach, instants, noise, diffusivity, wind=(0.0, 0.0), rate, r#box, threshold=1e-5, max_nodes=40))]
+    #[pyo3(signature = (places, *, reach, instants, noise, diffusivity, wind=(0.0, 0.0), rate, r#box, threshold=1e-5, max_nodes=40, plan=None, square=1.0, split=2, flow=0.0))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
@@ -75,15 +99,22 @@ impl SourceSearch {
         r#box: ((f64, f64), (f64, f64)),
         threshold: f64,
         max_nodes: usize,
+        plan: Option<&str>,
+        square: f64,
+        split: usize,
+        flow: f64,
     ) -> Outcome<Self> {
         let (rows, columns, numbers) = matrix("places", places)?;
         if columns != 2 {
             return refused("places", format!("{rows} by {columns}"), "two numbers a node, x and y");
         }
-        let places = numbers
+        let places: Vec<Vector2<f64>> = numbers
             .chunks_exact(2)
             .map(|place| Vector2::new(place[0], place[1]))
             .collect();
+        if plan.is_some() && wind != (0.0, 0.0) {
+            return refused("wind", format!("{wind:?} with a plan"), "none: `flow` moves the air in rooms");
+        }
         let instants = vector("instants", instants)?;
         let rate = match (rate.extract::<f64>(), rate.extract::<(f64, f64)>()) {
             (Ok(known), _) => RateModel::Known(known),
@@ -99,8 +130,16 @@ impl SourceSearch {
             return refused("box", format!("{:?}", r#box), "finite corners");
         }
         let (field, sensor) = py.detach(|| -> Outcome<_> {
-            let air = Air::new(diffusivity, Vector3::new(wind.0, wind.1, 0.0), Ground::Impermeable)?;
-            let sensor = SourceSensor::new(air, instants, noise)?;
+            let sensor = match plan {
+                Some(plan) => {
+                    let field = rooms(plan, (square, split), diffusivity, flow, &places, &instants)?;
+                    SourceSensor::new(Arc::new(field), instants, noise)?
+                }
+                None => {
+                    let air = Air::new(diffusivity, Vector3::new(wind.0, wind.1, 0.0), Ground::Impermeable)?;
+                    SourceSensor::new(air, instants, noise)?
+                }
+            };
             let nodes = Deployment::given(places)?;
             let graph = Graph::within(nodes.positions(), reach)?;
             Ok((SearchField::new(sensor.clone(), nodes, graph)?, sensor))
@@ -198,6 +237,36 @@ impl SourceSearch {
             visited: Py::new(py, visited)?,
         })
     }
+}
+
+/// What sensors at these places measure in rooms, at these ages of the source.
+fn rooms(
+    plan: &str,
+    (square, split): (f64, usize),
+    diffusivity: f64,
+    flow: f64,
+    places: &[Vector2<f64>],
+    ages: &[f64],
+) -> Outcome<SensorField> {
+    let squares = plan.chars().filter(|square| *square != '\n').count();
+    let numbers = [split, split, squares, places.len().max(1), ages.len().max(1)];
+    let numbers = numbers
+        .iter()
+        .try_fold(1_usize, |product, one| product.checked_mul(*one));
+    if numbers.is_none_or(|numbers| numbers > MOST_NUMBERS) {
+        let expected =
+            format!("at most {MOST_NUMBERS} cells times nodes times instants: the plan has {squares} squares");
+        return refused("split", split, expected);
+    }
+    let plan = Plan::parse(plan)?;
+    let domain = plan.domain(square, split, 0.0)?;
+    let wind = match flow {
+        0.0 => Flow::still(&domain),
+        flow => PotentialFlow::new(&domain, flow)?.flow,
+    };
+    let transport = Transport::new(domain, diffusivity, &wind, 0.0, Scheme::default())?;
+    let points: Vec<[f64; 3]> = places.iter().map(|place| [place.x, place.y, 0.0]).collect();
+    Ok(SensorField::transient(&transport, &points, ages, StepControl::default())?)
 }
 
 impl SourceSearch {

@@ -45,6 +45,12 @@ def grid():
     return fb.GridFilter(lambda x, dt: x, lambda x, dt: 1.0, lambda x, z: -np.abs(x), lower=-2, upper=2, spacing=0.5, start=(0, 1))
 
 
+def lattice():
+    return fb.LatticeFilter(
+        lambda x, dt: x, lambda x, dt: 1.0, lambda x, z: -np.abs(x[0]), lower=[-2, -2], upper=[2, 2], spacing=[0.5, 1.0], start=([0, 0], [1, 1])
+    )
+
+
 def search():
     return fb.SourceSearch(
         [[0.0, 0.0], [5.0, 0.0]], reach=9.0, instants=[5.0], noise=1e-5, diffusivity=40.0, rate=1.0, box=((-9, -9), (9, 9))
@@ -88,6 +94,14 @@ CALLS = {
         ["mean", "deviation", "likelihood"],
         ["lower", "upper", "spacing", "start"],
     ),
+    "LatticeFilter": (
+        lambda *a, **k: fb.LatticeFilter(*a, **{"lower": [-1, -1], "upper": [1, 1], "spacing": [0.5, 1], "start": ([0, 0], [1, 1]), **k}),
+        ["mean", "deviation", "likelihood"],
+        ["lower", "upper", "spacing", "start"],
+    ),
+    "LatticeFilter.step": (lambda *a, **k: lattice().step(*a, **k), ["observation"], ["dt"]),
+    "LatticeFilter.run": (lambda *a, **k: lattice().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
+    "LatticeFilter.marginal": (lambda *a: lattice().marginal(*a), ["coordinate"], []),
     "GridFilter.step": (lambda *a, **k: grid().step(*a, **k), ["observation"], ["dt"]),
     "GridFilter.run": (lambda *a, **k: grid().run(*a, **{"time": "t", **k}), ["table"], ["time"]),
     "RangeTracker": (fb.RangeTracker, ["anchors"], ["send", "noise", "outliers", "silence"]),
@@ -97,7 +111,7 @@ CALLS = {
             *a, **{"reach": 9.0, "instants": [5.0], "noise": 1.0, "diffusivity": 1.0, "rate": 1.0, "box": ((0, 0), (1, 1)), **k}
         ),
         ["places"],
-        ["reach", "instants", "noise", "diffusivity", "wind", "rate", "box", "threshold", "max_nodes"],
+        ["reach", "instants", "noise", "diffusivity", "wind", "rate", "box", "threshold", "max_nodes", "plan", "square", "split", "flow"],
     ),
     "SourceSearch.nearest": (search().nearest, ["place"], []),
     "SourceSearch.concentration": (search().concentration, ["place", "source"], ["rate"]),

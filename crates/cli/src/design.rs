@@ -14,6 +14,7 @@ use fewbits_recipes::{self as recipe, design};
 use fewbits_record::TimeBase;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// The option of a setting.
@@ -110,6 +111,7 @@ fn solve(options: &DesignOptions, prior: Prior) -> Result<Solution, Error> {
         bar.set_length(progress.parts as u64);
         bar.set_position(progress.done as u64);
         bar.set_message(format!("{:?}", progress.stage));
+        ControlFlow::Continue(())
     };
     let solutions = task.search(&mut show).map_err(option)?;
     bar.finish_and_clear();

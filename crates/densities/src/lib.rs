@@ -10,9 +10,10 @@
 //! | [`KernelEstimate`] | particles need a value of the density; [`Bandwidth`] chooses the kernel | sum of Gaussians of one covariance |
 //! | [`Mixture`] | a few Gaussians describe it, each with a covariance of its own | sum of Gaussians |
 //! | [`PointMass`] on a [`UniformGrid`] | one dimension, values at the nodes of a grid | linear between nodes |
+//! | [`Lattice`] | several numbers, their count known at run time; values at the nodes of a product of grids | at the nodes |
 //!
-//! All of them implement [`Belief`](fewbits_core::Belief): mean, covariance, draws into columns. Those with a value also implement
-//! [`Density`](fewbits_core::Density).
+//! All of them but [`Lattice`] implement [`Belief`](fewbits_core::Belief): mean, covariance, draws into columns. Those with a value also
+//! implement [`Density`](fewbits_core::Density).
 //!
 //! ```
 //! use fewbits_densities::Particles;
@@ -65,7 +66,7 @@ mod mixture;
 mod particles;
 
 pub use fewbits_core::Error;
-pub use grids::{PointMass, UniformGrid};
+pub use grids::{Lattice, PointMass, UniformGrid};
 pub use kernel_estimate::{Bandwidth, BandwidthRule, KernelEstimate, SampleSize, Shape, add_cross_sums};
 pub use mixture::{Component, Mixture, ellipse, moment_matched};
 pub use particles::{Categorical, GaussianCloud, Particles, normalise_log_weights, systematic};

@@ -14,6 +14,7 @@
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`impute`] |
 //! | several models, one at a time | [`NoiseBank`], [`Switching`] | [`Imm`] (interacting multiple models, any factor) |
 //! | the exact answer for a scalar | [`PointMasses`] | [`PointMassFilter`] (one model on a grid, with a smoother) |
+//! | the exact answer for a few numbers | | [`LatticeFilter`] (independent noise on each) |
 //! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel) | |
 //! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
@@ -43,6 +44,7 @@ mod grid_filter;
 mod guided;
 mod imm;
 pub mod kalman;
+mod lattice;
 mod noise_bank;
 mod particle;
 mod point_mass;
@@ -58,10 +60,11 @@ pub use contract::{Info, MomentFilter, Points, StateFilter};
 pub use ensemble::EnsembleFilter;
 pub use fewbits_core::Error;
 pub use fewbits_core::{Evidence, LinearScalar, assumed_density};
-pub use fewbits_densities::{GaussianCloud, Particles, PointMass, UniformGrid};
+pub use fewbits_densities::{GaussianCloud, Lattice, Particles, PointMass, UniformGrid};
 pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};
 pub use guided::{GuidedFilter, GuidedParticles};
 pub use imm::{Imm, ImmBelief, ImmWorkspace};
+pub use lattice::LatticeFilter;
 pub use noise_bank::NoiseBank;
 pub use particle::BootstrapFilter;
 pub use point_mass::{PointMassFilter, PointMasses};

@@ -201,6 +201,10 @@ impl<const D: usize> ContinuousLinear<D> {
             noise += spread;
             integrand = self.drift * integrand * (h / (n + 1) as f64);
             spread = (self.drift * spread + spread * self.drift.transpose()) * (h / (n + 1) as f64);
+            // Powers of a chain of integrals are zero from some on, and so are all further terms.
+            if power.iter().chain(&integrand).chain(&spread).all(|x| *x == 0.0) {
+                break;
+            }
         }
         for _ in 0..doublings {
             // Double the interval: x(2h) is the model applied twice.

@@ -2,9 +2,8 @@
 
 use crate::error::Error;
 use fewbits_core::Link;
-use fewbits_quantizer_design::{
-    Adc, AllowedCells, BitBudget, Noise, ObservationModel, Prior, Progress, Request, Solutions,
-};
+use fewbits_quantizer_design::solve::Watch;
+use fewbits_quantizer_design::{Adc, AllowedCells, BitBudget, Noise, ObservationModel, Prior, Request, Solutions};
 use std::time::Duration;
 
 const PRIOR: &str =
@@ -47,11 +46,11 @@ pub struct Task {
 }
 
 impl Task {
-    /// Searches for the best design; `progress` is called as the search goes on.
+    /// Searches for the best design; `progress` is called as the search goes on, and ends it with the best so far if it breaks.
     ///
     /// # Errors
     /// If prior, noise, bits, links and criterion do not go together.
-    pub fn search(&self, progress: &mut dyn FnMut(Progress)) -> Result<Solutions, Error> {
+    pub fn search<'a>(&self, progress: &'a mut Watch<'a>) -> Result<Solutions, Error> {
         let noise = if self.correlation == 0.0 {
             Noise::independent_with_deviations(&self.deviations)
         } else {
@@ -316,7 +315,11 @@ mod tests {
             time_limit: None,
         };
         let mut calls = 0;
-        let solutions = task.search(&mut |_| calls += 1).unwrap();
+        let mut count = |_| {
+            calls += 1;
+            std::ops::ControlFlow::Continue(())
+        };
+        let solutions = task.search(&mut count).unwrap();
         // One bit of a standard normal: threshold 0, mean squared error 1 - 2 / pi.
         let best = solutions.best();
         assert!(best.sensors()[0].breakpoints[0].abs() < 1e-4 && calls > 0);

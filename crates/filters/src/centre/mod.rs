@@ -318,8 +318,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
 
     fn seated(&self, number: u32, guess: usize) -> Result<usize, Error> {
         let seated = self.members.len();
-        let expected = format!("one of the {seated} sensors that have joined");
-        let unknown = |_| ArgumentError::new("number", number, expected).into();
+        let expected = || format!("one of the {seated} sensors that have joined");
+        let unknown = |_| ArgumentError::new("number", number, expected()).into();
         self.seat(number, guess).map_err(unknown)
     }
 

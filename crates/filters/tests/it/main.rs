@@ -8,6 +8,7 @@ mod centre;
 mod contract;
 mod failure;
 mod imm;
+mod lattice;
 mod particle;
 mod rao_blackwell;
 mod resample;

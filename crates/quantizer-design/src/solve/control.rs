@@ -1,7 +1,12 @@
 //! Time limit and progress of a running design.
 
 use crate::deadline::{Clock, Deadline, speed};
+use std::ops::ControlFlow;
 use std::time::Duration;
+
+/// Is told of the progress between steps of the search, often several times at the same part. If it breaks, the search ends as at a time
+/// limit: with the best design so far.
+pub type Watch<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
 
 /// Progress of a design, for a display.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,13 +56,16 @@ pub(super) struct Control<'a> {
     deadline: Deadline,
     /// The fraction of the time limit that is used.
     portion: f64,
-    progress: Option<&'a mut dyn FnMut(Progress)>,
+    progress: Option<&'a mut Watch<'a>>,
+    /// Stage, finished parts and parts of the last report.
+    last: (Stage, usize, usize),
+    is_stopped: bool,
     pub(super) is_cut_short: bool,
     pub(super) steps: usize,
 }
 
 impl<'a> Control<'a> {
-    pub(super) fn new(clock: Clock, limit: Option<Duration>, progress: Option<&'a mut dyn FnMut(Progress)>) -> Self {
+    pub(super) fn new(clock: Clock, limit: Option<Duration>, progress: Option<&'a mut Watch<'a>>) -> Self {
         let speed = if limit.is_some() { speed(clock) } else { f64::INFINITY };
         let started = clock();
         Self {
@@ -68,6 +76,8 @@ impl<'a> Control<'a> {
             deadline: Deadline::after(clock, started, limit, speed),
             portion: 1.0,
             progress,
+            last: (Stage::SingleSensors, 0, 1),
+            is_stopped: false,
             is_cut_short: false,
             steps: 0,
         }
@@ -96,12 +106,16 @@ impl<'a> Control<'a> {
 
     /// The end of the present part.
     pub(super) fn deadline(&self) -> Deadline {
+        if self.is_stopped {
+            return Deadline::over(self.clock);
+        }
         self.deadline
     }
 
-    /// Whether time is left in the present part.
+    /// Whether time is left in the present part, and the caller has not stopped the search.
     pub(super) fn go_on(&mut self) -> bool {
-        let is_over = self.deadline.is_over();
+        self.tell();
+        let is_over = self.is_stopped || self.deadline.is_over();
         self.is_cut_short |= is_over;
         !is_over
     }
@@ -113,14 +127,24 @@ impl<'a> Control<'a> {
     }
 
     pub(super) fn report(&mut self, stage: Stage, done: usize, parts: usize) {
-        let elapsed = self.elapsed();
+        self.last = (stage, done, parts);
+        self.tell();
+    }
+
+    fn tell(&mut self) {
+        let ((stage, done, parts), elapsed) = (self.last, self.elapsed());
+        if self.is_stopped {
+            return;
+        }
         if let Some(progress) = &mut self.progress {
-            progress(Progress {
+            let now = Progress {
                 stage,
                 done,
                 parts,
                 elapsed,
-            });
+            };
+            self.is_stopped = progress(now).is_break();
+            self.is_cut_short |= self.is_stopped;
         }
     }
 }

@@ -38,7 +38,7 @@ mod starts;
 pub use crate::deadline::{Clock, system_clock};
 pub use adc::{Adc, Rounded};
 pub use additive::AdditiveDecoder;
-pub use control::{Progress, Stage};
+pub use control::{Progress, Stage, Watch};
 pub use export::{Export, JSON_SCHEMA};
 pub use request::{BitBudget, MAX_BITS, Request};
 pub use robust::{Minimax, Mismatch, Sensitivity, minimax};

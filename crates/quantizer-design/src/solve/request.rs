@@ -1,6 +1,6 @@
 //! A request: the design problem and its options.
 
-use super::control::Progress;
+use super::control::Watch;
 use super::participant::WordedCells;
 use crate::criterion::{AllowedCells, Criterion};
 use crate::deadline::{Clock, system_clock};
@@ -54,7 +54,7 @@ pub struct Request<'a> {
     pub(super) start: Option<Vec<WordedCells>>,
     pub(super) clock: Clock,
     pub(super) time_limit: Option<Duration>,
-    pub(super) progress: Option<&'a mut dyn FnMut(Progress)>,
+    pub(super) progress: Option<&'a mut Watch<'a>>,
 }
 
 impl<'a> Request<'a> {
@@ -147,7 +147,7 @@ impl<'a> Request<'a> {
         self
     }
 
-    /// Reads times from this clock (default: [`system_clock`]). Needed for a time limit and for [`Progress::elapsed`] where the standard
+    /// Reads times from this clock (default: [`system_clock`]). Needed for a time limit and for [`Progress::elapsed`](super::Progress::elapsed) where the standard
     /// library has no clock, as in a browser.
     #[must_use]
     pub fn with_clock(mut self, clock: Clock) -> Self {
@@ -155,9 +155,10 @@ impl<'a> Request<'a> {
         self
     }
 
-    /// Calls `progress` between the parts of the design.
+    /// Calls `progress` between steps of the search. If it breaks, the search ends with the best design so far, which is marked as cut
+    /// short.
     #[must_use]
-    pub fn with_progress(mut self, progress: &'a mut dyn FnMut(Progress)) -> Self {
+    pub fn with_progress(mut self, progress: &'a mut Watch<'a>) -> Self {
         self.progress = Some(progress);
         self
     }

@@ -9,6 +9,7 @@ use fewbits_quantizer_design::design::Scope;
 use fewbits_quantizer_design::solve::{Adc, BitBudget, Progress, Request, Solution, minimax};
 use fewbits_quantizer_design::{Certificate, Noise, ObservationModel, Prior};
 use rand::RngExt;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -245,13 +246,42 @@ fn random_models_are_no_worse_than_nelder_mead() {
 #[test]
 fn a_time_limit_still_gives_a_design() {
     let mut calls = 0;
-    let mut count = |_| calls += 1;
+    let mut count = |_| {
+        calls += 1;
+        ControlFlow::Continue(())
+    };
     let request = Request::estimation(pair(1.0), BitBudget::Each(3), Link::PERFECT)
         .with_time_limit(Duration::ZERO)
         .with_progress(&mut count);
     let found = request.run().unwrap();
     assert!(found.is_cut_short && found.best().value < 16.0);
     assert!(calls > 0);
+}
+
+/// Told to stop at any call, the search ends at once with a design that it may use, and calls no more.
+#[test]
+fn a_search_that_is_stopped_gives_its_best_so_far() {
+    let alone = best(pair(1.0).subset(&[0]).unwrap(), BitBudget::Each(1), Link::PERFECT).value;
+    let whole = best(pair(1.0), BitBudget::Each(3), Link::PERFECT).value;
+    let mut all = 0;
+    for last in [1, 2, 7, 40, usize::MAX] {
+        let mut calls = 0;
+        let mut stop = |_| {
+            calls += 1;
+            if calls >= last {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let request = Request::estimation(pair(1.0), BitBudget::Each(3), Link::PERFECT);
+        let found = request.with_progress(&mut stop).run().unwrap();
+        let value = found.best().value;
+        assert_eq!((found.is_cut_short, calls), (last < usize::MAX, last.min(calls)), "{last}");
+        assert!(value >= whole * (1.0 - 1e-12) && value < alone, "{last}: {value}, {whole}, {alone}");
+        all = calls;
+    }
+    assert!(all > 40, "{all}");
 }
 
 /// Each reading of this clock is a second later, so that seven of them are a limit of 7 s, however fast the machine is.
@@ -262,7 +292,10 @@ fn times_are_read_from_the_clock_that_is_handed_in() {
         Duration::from_secs(READINGS.fetch_add(1, Ordering::Relaxed))
     }
     let mut elapsed = Vec::new();
-    let mut keep = |progress: Progress| elapsed.push(progress.elapsed);
+    let mut keep = |progress: Progress| {
+        elapsed.push(progress.elapsed);
+        ControlFlow::Continue(())
+    };
     let request = || Request::estimation(pair(1.0), BitBudget::Each(2), Link::PERFECT).with_clock(clock);
     let limited = request().with_time_limit(Duration::from_secs(7)).run().unwrap();
     assert!(limited.is_cut_short);

@@ -1,0 +1,213 @@
+//! The exact filter of several numbers on a lattice, with the user's dynamics and likelihood as functions of all nodes at once.
+
+use crate::array::{matrix, vector};
+use crate::callbacks::{Likelihoods, returned, rising};
+use crate::error::{Failure, Outcome, refused};
+use crate::grid::dt_of;
+use crate::table::{Given, Table, doubles};
+use fewbits_filters::{Lattice, LatticeFilter as Kernel, UniformGrid};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+/// An exact filter of two or a few numbers, on the nodes of a lattice: on each axis from `lower` to `upper`, `spacing` apart.
+///
+/// Over `dt` seconds the state at node `x` becomes normal and independent along the axes, with means `mean(x, dt)` and deviations
+/// `deviation(x, dt)`. In `x` each row is a coordinate and each column a node; the means have its shape, and the deviations too, unless they
+/// are one number per axis or one for all. `likelihood(x, z)` returns the logarithms of the likelihood of the observation `z` at the nodes; a
+/// dictionary has one such function per column. `start` is means and deviations before the first observation, or the density at the nodes, of
+/// any sum. A deviation must be at least the distance between nodes on its axis.
+///
+/// >>> import numpy as np, fewbits as fb
+/// >>> place = fb.LatticeFilter(
+/// ...     lambda x, dt: x, lambda x, dt: 0.3 * np.sqrt(dt), lambda x, z: -0.5 * ((z - np.hypot(x[0], x[1])) / 0.2) ** 2,
+/// ...     lower=[0, 0], upper=[6, 6], spacing=[0.2, 0.2], start=([3.0, 1.0], [1.0, 0.5]),
+/// ... )
+/// >>> _ = place.step(5.0)
+/// >>> place.density.shape, place.nodes.shape, bool(abs(np.hypot(*place.mean) - 5) < 0.2)
+/// ((31, 31), (2, 961), True)
+#[pyclass(module = "fewbits")]
+pub(crate) struct LatticeFilter {
+    mean: Py<PyAny>,
+    deviation: Py<PyAny>,
+    likelihoods: Likelihoods,
+    belief: Lattice,
+    /// The kernel of the last step, and its seconds.
+    kernel: Option<(f64, Kernel)>,
+}
+
+#[pymethods]
+impl LatticeFilter {
+    #[new]
+    #[pyo3(signature = (mean, deviation, likelihood, *, lower, upper, spacing, start))]
+    fn new(
+        mean: &Bound<'_, PyAny>,
+        deviation: &Bound<'_, PyAny>,
+        likelihood: &Bound<'_, PyAny>,
+        lower: &Bound<'_, PyAny>,
+        upper: &Bound<'_, PyAny>,
+        spacing: &Bound<'_, PyAny>,
+        start: &Bound<'_, PyAny>,
+    ) -> Outcome<Self> {
+        for (name, function) in [("mean", mean), ("deviation", deviation)] {
+            if !function.is_callable() {
+                return refused(name, function.get_type().name()?, "a function of the nodes and seconds");
+            }
+        }
+        let (lower, upper) = (vector("lower", lower)?, vector("upper", upper)?);
+        let spacing = vector("spacing", spacing)?;
+        for (name, ends) in [("upper", &upper), ("spacing", &spacing)] {
+            if ends.len() != lower.len() {
+                return refused(name, format!("{} numbers", ends.len()), format!("{}, as in `lower`", lower.len()));
+            }
+        }
+        let axes = lower.iter().zip(&upper).zip(&spacing);
+        let axes: Result<Vec<_>, _> = axes.map(|((l, u), s)| UniformGrid::new(*l, *u, *s)).collect();
+        let axes = axes?;
+        let belief = match start.extract::<(Vec<f64>, Vec<f64>)>() {
+            Ok((means, deviations)) => Lattice::normal(axes, &means, &deviations)?,
+            Err(_) => {
+                let made = Lattice::uniform(axes)?;
+                let flat = crate::array::flat("start", start)?;
+                made.with_density(flat)?
+            }
+        };
+        Ok(Self {
+            mean: mean.clone().unbind(),
+            deviation: deviation.clone().unbind(),
+            likelihoods: Likelihoods::parsed(likelihood)?,
+            belief,
+            kernel: None,
+        })
+    }
+
+    /// Prediction over `dt` seconds (none if 0) and update by the observation (none if None or NaN). Returns the log likelihood. With
+    /// likelihoods by name the observation is a dictionary. A step that fails leaves the density as it was.
+    #[pyo3(signature = (observation=None, *, dt=1.0))]
+    fn step(&mut self, py: Python<'_>, observation: Option<Bound<'_, PyAny>>, dt: f64) -> Outcome<f64> {
+        if !(dt >= 0.0 && dt.is_finite()) {
+            return refused("dt", dt, "a finite number, 0 or above");
+        }
+        let mut next = self.belief.clone();
+        if dt > 0.0 {
+            let kernel = match self.kernel.take() {
+                Some((seconds, kernel)) if seconds == dt => kernel,
+                _ => self.moved(py, dt)?,
+            };
+            let predicted = py.detach(|| kernel.predict(&self.belief));
+            self.kernel = Some((dt, kernel));
+            next = predicted?;
+        }
+        let mut log_likelihood = 0.0;
+        for (function, observation) in self.likelihoods.of(observation.as_ref())? {
+            let found = function.bind(py).call1((self.nodes(py)?, observation))?;
+            let found = returned("likelihood", "node", &found, next.density().len())?;
+            let logs: Vec<f64> = found.as_array().iter().copied().collect();
+            log_likelihood += next.update(&logs)?;
+        }
+        self.belief = next;
+        Ok(log_likelihood)
+    }
+
+    /// One step per row of a table, its column `time` in seconds or timestamps; null and NaN are missing. The first row is the time of the
+    /// start. The result has mean and deviation of each coordinate.
+    #[pyo3(signature = (table, *, time))]
+    fn run(&mut self, py: Python<'_>, table: &Bound<'_, PyAny>, time: &str) -> Outcome<Table> {
+        let given = Given::read(table)?;
+        let seconds = rising(&given.times(time)?)?;
+        let columns = self.likelihoods.columns(&given, time)?;
+        let (mut moments, mut logs, mut now) = (vec![Vec::new(); 2 * self.belief.axes().len()], Vec::new(), 0.0);
+        for (row, second) in seconds.into_iter().enumerate() {
+            py.check_signals()?;
+            let observation = self.likelihoods.row(py, &columns, row)?;
+            logs.push(self.step(py, Some(observation), dt_of(second, now))?);
+            now = second;
+            for (axis, (mean, variance)) in self.belief.moments().into_iter().enumerate() {
+                moments[2 * axis].push(mean);
+                moments[2 * axis + 1].push(variance.max(0.0).sqrt());
+            }
+        }
+        let rows: Vec<usize> = (0..logs.len()).collect();
+        let mut made = vec![(time.to_owned(), given.taken(time, &rows)?)];
+        for (i, column) in moments.into_iter().enumerate() {
+            made.push((format!("x{}{}", i / 2, if i % 2 == 1 { "_sd" } else { "" }), doubles(column)));
+        }
+        made.push(("log_likelihood".to_owned(), doubles(logs)));
+        Table::new(made)
+    }
+
+    /// The nodes, a coordinate in each row.
+    #[getter]
+    fn nodes<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyArray2<f64>>> {
+        let rows: Vec<Vec<f64>> = (0..self.belief.axes().len())
+            .map(|axis| self.belief.positions(axis))
+            .collect();
+        Ok(PyArray2::from_vec2(py, &rows).map_err(PyErr::from)?)
+    }
+
+    /// The density at the nodes, an axis for each coordinate: its sum times the product of the spacings is one.
+    #[getter]
+    fn density<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let shape: Vec<usize> = self.belief.axes().iter().map(UniformGrid::points).collect();
+        PyArray1::from_slice(py, self.belief.density()).call_method1("reshape", (shape,))
+    }
+
+    /// The density of one coordinate, at the nodes of its axis.
+    ///
+    /// >>> import numpy as np, fewbits as fb
+    /// >>> still = fb.LatticeFilter(
+    /// ...     lambda x, dt: x, lambda x, dt: 1.0, lambda x, z: 0 * x[0], lower=[-4, -4], upper=[4, 4], spacing=[0.5, 1], start=([0, 0], [1, 1])
+    /// ... )
+    /// >>> still.marginal(1).shape, round(float(still.marginal(1).sum()), 6)
+    /// ((9,), 1.0)
+    fn marginal<'py>(&self, py: Python<'py>, coordinate: usize) -> Outcome<Bound<'py, PyArray1<f64>>> {
+        let axes = self.belief.axes().len();
+        if coordinate >= axes {
+            return refused("coordinate", coordinate, format!("0 to {}", axes - 1));
+        }
+        Ok(PyArray1::from_vec(py, self.belief.marginal(coordinate)))
+    }
+
+    /// Means of the coordinates.
+    #[getter]
+    fn mean<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.belief.moments().into_iter().map(|(mean, _)| mean).collect())
+    }
+
+    /// Their standard deviations.
+    #[getter]
+    fn deviation<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let deviations = self
+            .belief
+            .moments()
+            .into_iter()
+            .map(|(_, variance)| variance.max(0.0).sqrt());
+        PyArray1::from_vec(py, deviations.collect())
+    }
+}
+
+impl LatticeFilter {
+    /// The kernel over `dt` seconds.
+    fn moved(&self, py: Python<'_>, dt: f64) -> Outcome<Kernel> {
+        let (d, n) = (self.belief.axes().len(), self.belief.density().len());
+        let by_rows = |name: &'static str, found: &Bound<'_, PyAny>| -> Outcome<Vec<Vec<f64>>> {
+            let (rows, columns, numbers) = matrix(name, found)?;
+            if (rows, columns) != (d, n) {
+                return refused(
+                    name,
+                    format!("an array of shape ({rows}, {columns})"),
+                    format!("({d}, {n}), as the nodes"),
+                );
+            }
+            Ok(numbers.chunks_exact(n).map(<[f64]>::to_vec).collect())
+        };
+        let means = by_rows("mean", &self.mean.bind(py).call1((self.nodes(py)?, dt))?)?;
+        let found = self.deviation.bind(py).call1((self.nodes(py)?, dt))?;
+        let deviations = match vector("deviation", &found) {
+            Ok(one) if one.len() == 1 => vec![vec![one[0]; n]; d],
+            Ok(each) if each.len() == d => each.into_iter().map(|one| vec![one; n]).collect(),
+            _ => by_rows("deviation", &found)?,
+        };
+        py.detach(|| Kernel::new(means, deviations, &self.belief))
+            .map_err(Failure::from)
+    }
+}
