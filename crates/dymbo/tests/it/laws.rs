@@ -1,8 +1,12 @@
 //! The laws of schemes, on every scheme of this crate and all kinds of links.
 
 use fewbits_core::laws::{factor, message, scheme};
-use fewbits_core::{Deterministic, Gaussian, Link, Message, Observation, Scheme, Sign};
-use fewbits_dymbo::{CellIndex, InnovationWord, Multiple, Prediction, RoundedSample, SignBit};
+use fewbits_core::{Deterministic, Error, Gaussian, Link, Message, Observation, Scheme, Sign};
+use fewbits_dymbo::{
+    CellIndex, DymboFilter, InnovationWord, MultibitFilter, Multiple, Prediction, RoundedSample, ScalarFilter,
+    ScalarPlant, SignBit,
+};
+use fewbits_filters::assumed_density;
 use fewbits_monte_carlo::Stream;
 use nalgebra::Vector1;
 use rand::RngExt;
@@ -98,5 +102,78 @@ fn rounded_samples_obey() {
             .unwrap();
         let reports: Vec<Multiple> = (-4..4).map(Multiple).collect();
         obeys(&rounded, &(), 0.6 * unit * unit, unit, &reports);
+    }
+}
+
+/// Belief and log likelihood of an update, or its error.
+type Updated = Result<([f64; 2], f64), Error>;
+
+/// What a filter's closed form and the update of the contract make of an observation.
+fn both_ways<F: ScalarFilter>(filter: &F, observation: &Observation<<F::Scheme as Scheme<1>>::Report>) -> [Updated; 2] {
+    let predicted = Gaussian::scalar(0.4, 1.7).unwrap();
+    let of = |belief: &Gaussian<1>| [belief.mean()[0], belief.covariance()[0]];
+    let closed = filter
+        .update(&predicted, observation)
+        .map(|(belief, info)| (of(&belief), info.log_likelihood));
+    let factor = filter
+        .scheme()
+        .factor(&filter.feedback(&predicted), observation, filter.link());
+    let sensor = *filter.plant().sensor();
+    let contract = factor.and_then(|factor| assumed_density::update(&predicted, sensor.matrix(), &factor));
+    [
+        closed,
+        contract.map(|(belief, info)| (of(&belief), info.log_likelihood)),
+    ]
+}
+
+/// Equal means and log likelihoods, or both impossible; the two variances.
+fn same([closed, contract]: [Updated; 2], case: &str) -> Option<([f64; 2], f64)> {
+    match (closed, contract) {
+        (Ok((a, la)), Ok((b, lb))) => {
+            let apart = (a[0] - b[0]).abs().max((la - lb).abs());
+            assert!(apart < 1e-11, "{case}: {a:?} {la}, {b:?} {lb}");
+            Some(([a[1], b[1]], la))
+        }
+        (Err(Error::Impossible), Err(Error::Impossible)) => None,
+        (a, b) => panic!("{case}: {a:?}, {b:?}"),
+    }
+}
+
+/// A report, and the two observations without one.
+fn or_none<R>(report: R) -> [Observation<R>; 3] {
+    [Observation::Received(report), Observation::Nothing, Observation::Lost]
+}
+
+/// Over links that lose nothing, half or all, and that invert bits: also where nothing arrives, and where something arrives that cannot.
+/// The variance after a word is that of the contract on average over the words, and after a bit or without a report always.
+#[test]
+fn closed_forms_are_the_update_of_the_contract() {
+    let plant = ScalarPlant::new(0.9, 0.5, 1.3).unwrap();
+    for (loss, crossover) in [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.3, 0.1), (1.0, 0.1)] {
+        let link = Link::new(loss, crossover).unwrap();
+        let bit = DymboFilter::new(plant).with_link(link);
+        let words = MultibitFilter::new(plant, 2).unwrap().with_link(link);
+        for observation in or_none(Sign::Above) {
+            let case = format!("{loss} {crossover} {observation:?}");
+            if let Some(([closed, contract], _)) = same(both_ways(&bit, &observation), &case) {
+                assert!((closed - contract).abs() < 1e-12, "{case}: {closed} {contract}");
+            }
+        }
+        let mut average = [0.0; 3];
+        for word in 0..4 {
+            let [received, nothing, lost] = or_none(CellIndex(word));
+            let case = format!("{loss} {crossover} word {word}");
+            if let Some(([closed, contract], log)) = same(both_ways(&words, &received), &case) {
+                let p = log.exp();
+                average = [average[0] + p, average[1] + p * closed, average[2] + p * contract];
+            }
+            for observation in [nothing, lost] {
+                if let Some(([closed, contract], _)) = same(both_ways(&words, &observation), &case) {
+                    assert!((closed - contract).abs() < 1e-12, "{case}: {closed} {contract}");
+                }
+            }
+        }
+        assert!((average[0] - (1.0 - loss)).abs() < 1e-11, "{average:?}");
+        assert!((average[1] - average[2]).abs() < 1e-11, "{average:?}");
     }
 }
