@@ -74,9 +74,9 @@ mod tests {
         let law = Gaussian::new(Vector2::zeros(), spread).unwrap().factored().unwrap();
         let regression = prior().covariance() * matrix.transpose() * spread.try_inverse().unwrap();
         let mut orthogonal = Matrix2::zeros();
-        let step = 0.02;
-        for i in -600..600 {
-            for j in -600..600 {
+        let step = 0.05;
+        for i in -240..240 {
+            for j in -240..240 {
                 let v = Vector2::new((f64::from(i) + 0.5) * step, (f64::from(j) + 0.5) * step);
                 let weight = law.log_pdf(&v).exp() * step * step;
                 let signs = v.map(f64::signum);

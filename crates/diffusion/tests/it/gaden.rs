@@ -110,7 +110,7 @@ fn averages_are_the_means_of_what_was_written() {
 #[test]
 fn what_is_wrong_is_named() {
     let room = |from: &str, to: &str| Room::parse(&room_text().replacen(from, to, 1)).unwrap_err().to_string();
-    assert!(room("#num_cells 6", "#num_cells 7").contains("env_max"));
+    assert!(room("#num_cells 6", "#num_cells 8").contains("env_max"));
     assert!(room("#cell_size(m) 0.5", "#cell_size(m) -1").contains("cell_size"));
     assert!(room("2 2 2 2", "2 2 3 2").contains("`3`"));
     assert!(room("2 2 2 2 \n", "").contains("cells"));

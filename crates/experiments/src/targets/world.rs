@@ -1,22 +1,22 @@
 //! Worlds of several targets among range sensors, and what the sensors report.
 
 use crate::prelude::*;
-use fewbits_core::Observed;
-use fewbits_core::factor::{Partition, Scalar, Value};
+use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::{Cell, Observed};
 use fewbits_models::{AutoSensing, Differentiable, LinearGaussian, Number, constant_velocity_2d};
 use fewbits_multi_target::{Birth, Tracker};
 
 /// Steps of a run.
 pub(super) const STEPS: usize = 40;
-/// Deviation of a range.
-const NOISE: f64 = 5.0;
+/// Side of the field.
+const SIDE: f64 = 100.0;
 /// Probability that a sensor reports a target.
 pub(super) const DETECTION: f64 = 0.9;
 /// Expected false reports of a sensor in a step.
 const FALSE: f64 = 1.0;
 /// False ranges are uniform up to this.
 const FARTHEST: f64 = 115.0;
-/// Where the sensors are, in a field of 100 m by 100 m.
+/// Where the sensors are.
 const SENSORS: [[f64; 2]; 5] = [[20.0, 20.0], [80.0, 20.0], [50.0, 50.0], [20.0, 80.0], [80.0, 80.0]];
 
 /// The distance from a sensor to `(x[0], x[2])`.
@@ -94,15 +94,15 @@ pub(super) struct Moment {
     pub(super) ranges: Vec<Vec<f64>>,
 }
 
-/// The sensors of all worlds.
-pub(super) fn sensors() -> Result<Vec<AutoSensing<Range, 1>>, Error> {
-    let sensor = |place| Ok(AutoSensing::new(Range(place), Matrix1::new(NOISE * NOISE))?);
+/// The sensors of all worlds, with this deviation of a range.
+pub(super) fn sensors(noise: f64) -> Result<Vec<AutoSensing<Range, 1>>, Error> {
+    let sensor = |place| Ok(AutoSensing::new(Range(place), Matrix1::new(noise * noise))?);
     SENSORS.map(sensor).into_iter().collect()
 }
 
 /// A run of the scenario.
-pub(super) fn draw(scenario: Scenario, stream: Stream) -> Result<Vec<Moment>, Error> {
-    let (mut rng, motion, sensors) = (stream.named("truth").rng(), motion()?, sensors()?);
+pub(super) fn draw(scenario: Scenario, noise: f64, stream: Stream) -> Result<Vec<Moment>, Error> {
+    let (mut rng, motion, sensors) = (stream.named("truth").rng(), motion()?, sensors(noise)?);
     let mut targets = Vec::new();
     for (place, times) in scenario.targets() {
         targets.push((Scenario::spread(place)?.sample(&mut rng), times));
@@ -141,35 +141,61 @@ pub(super) fn draw(scenario: Scenario, stream: Stream) -> Result<Vec<Moment>, Er
 pub(super) enum Reporting {
     /// The range.
     Full,
-    /// The index of the cell that holds it, counted modulo `2^bits`: a period of the cells is 40 m, and the tracker's belief says which.
-    Cells(u32),
+    /// The index of one of `2^bits` cells: the edges of each sensor in even and in odd steps.
+    Cells(Vec<[Vec<f64>; 2]>),
 }
 
-/// Length of one period of the words.
-const PERIOD: f64 = 40.0;
-/// Cells are counted up to this range; the last goes on.
-const LAST: f64 = 160.0;
-
 impl Reporting {
-    /// The factor of a report, and the intensity of false reports at it.
-    pub(super) fn report(&self, range: f64) -> Result<(Scalar, f64), Error> {
+    /// Cells for targets that may be anywhere in the field: their density is the cube root of that of the range, which for many cells has
+    /// the least distortion (Panter and Dite 1951). In odd steps the edges lie half a cell beside those of even ones, so that no target
+    /// stays in the middle of a wide cell.
+    pub(super) fn cells(bits: u32) -> Self {
+        let edges = |place: &[f64; 2]| {
+            const NODES: usize = 100;
+            let at = |i: usize| (i as f64 + 0.5) * SIDE / NODES as f64;
+            // How often a range lies in each metre, and the cumulative cube root.
+            let mut counts = vec![0.0; FARTHEST as usize];
+            for i in 0..NODES * NODES {
+                let range = (at(i / NODES) - place[0]).hypot(at(i % NODES) - place[1]);
+                if let Some(count) = counts.get_mut(range as usize) {
+                    *count += 1.0;
+                }
+            }
+            let mut sums = vec![0.0];
+            for count in counts {
+                sums.push(sums[sums.len() - 1] + f64::cbrt(count));
+            }
+            let cells = f64::from(1_u32 << bits);
+            let edge = |share: f64| {
+                let wanted = share * sums[sums.len() - 1];
+                let above = sums.partition_point(|sum| *sum < wanted).max(1);
+                above as f64 - (sums[above] - wanted) / (sums[above] - sums[above - 1])
+            };
+            [-0.25, 0.25].map(|shift| {
+                (1..1_u32 << bits)
+                    .map(|k| edge((f64::from(k) + shift) / cells))
+                    .collect()
+            })
+        };
+        Self::Cells(SENSORS.iter().map(edges).collect())
+    }
+
+    /// The factor of a report of a sensor in a step, and the intensity of false reports at it.
+    pub(super) fn report(&self, step: usize, sensor: usize, range: f64, noise: f64) -> Result<(Scalar, f64), Error> {
         match self {
-            Self::Full => Ok((Value::scalar(range, NOISE * NOISE)?.into(), FALSE / FARTHEST)),
-            Self::Cells(bits) => {
-                let words = 1_usize << bits;
-                let width = PERIOD / words as f64;
-                let cells = (LAST / width) as usize;
-                let index = |range: f64| ((range / width).max(0.0) as usize).min(cells - 1);
-                let own = |cell: usize| cell % words == index(range) % words;
-                let overlap = |cell: usize| ((cell + 1) as f64 * width).min(FARTHEST) - cell as f64 * width;
-                let share: f64 = (0..cells)
-                    .filter(|cell| own(*cell))
-                    .map(|cell| overlap(cell).max(0.0))
-                    .sum();
-                let edges = (1..cells).map(|cell| cell as f64 * width).collect();
-                let given_cell = (0..cells).map(|cell| f64::from(u8::from(own(cell)))).collect();
-                let factor = Partition::new(edges, given_cell, NOISE * NOISE)?;
-                Ok((factor.into(), FALSE * share / FARTHEST))
+            Self::Full => Ok((Value::scalar(range, noise * noise)?.into(), FALSE / FARTHEST)),
+            Self::Cells(edges) => {
+                let edges = &edges[sensor][step % 2];
+                let index = edges.partition_point(|edge| *edge <= range);
+                let lower = if index == 0 {
+                    f64::NEG_INFINITY
+                } else {
+                    edges[index - 1]
+                };
+                let upper = edges.get(index).copied().unwrap_or(f64::INFINITY);
+                let share = (upper.min(FARTHEST) - lower.max(0.0)) / FARTHEST;
+                let factor = InCell::certain(Cell::new(lower, upper)?, noise * noise)?;
+                Ok((factor.into(), FALSE * share))
             }
         }
     }
