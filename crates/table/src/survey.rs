@@ -6,16 +6,29 @@ use crate::profile::Profile;
 use crate::table::{Skipped, Table};
 use crate::time::Time;
 
+/// Rows between two calls of a watch, at least.
+pub(crate) const WATCHED: u64 = 4096;
+
 impl Table {
     /// Reads all that is left and counts: kinds, ranges, gaps and times.
     ///
     /// # Errors
     /// As [`read`](Self::read), but cells of values are counted, not refused.
-    pub fn survey(mut self) -> Result<Survey, Error> {
+    pub fn survey(self) -> Result<Survey, Error> {
+        self.survey_watched(&mut |_| true)
+    }
+
+    /// As [`survey`](Self::survey). `watch` is called with the number of rows now and then; the rows behind are not counted if it returns
+    /// `false`.
+    ///
+    /// # Errors
+    /// As [`survey`](Self::survey).
+    pub fn survey_watched(mut self, watch: &mut dyn FnMut(u64) -> bool) -> Result<Survey, Error> {
         #[cfg(feature = "parquet")]
         if self.arrow.is_some() {
-            return self.survey_arrow();
+            return self.survey_arrow(watch);
         }
+        let mut next = 0;
         let mut survey = Survey {
             columns: Profile::of_columns(self.columns.len()),
             ..Survey::default()
@@ -24,6 +37,12 @@ impl Table {
         self.selected.clear();
         loop {
             self.plain_survey(&mut survey)?;
+            if survey.rows > next {
+                next = survey.rows + WATCHED;
+                if !watch(survey.rows) {
+                    break;
+                }
+            }
             batch.reset(std::iter::empty());
             if self.read_rows(&mut batch, 1, false)? == 0 {
                 break;
