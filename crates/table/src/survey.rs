@@ -4,7 +4,7 @@ use crate::column::{Batch, Column, Kind};
 use crate::error::{Error, Place};
 use crate::profile::Profile;
 use crate::table::{Skipped, Table};
-use crate::time::Time;
+use crate::time::{DECIMALS, Time, decimals_of};
 
 /// Rows between two calls of a watch, at least.
 pub(crate) const WATCHED: u64 = 4096;
@@ -154,17 +154,27 @@ pub struct Times {
     pub repeated: u64,
     /// The smallest and the largest step forward, in seconds.
     pub steps: Option<(f64, f64)>,
+    /// The last step, in attoseconds, which is often the next one too.
+    step: i128,
 }
 
 impl Times {
     pub(crate) fn add(&mut self, time: Time) {
-        self.decimals = self.decimals.max(time.decimals());
+        // Few times need more decimals than those before.
+        let fraction = time.fraction();
+        if !fraction.is_multiple_of(10_u64.pow(u32::from(DECIMALS - self.decimals))) {
+            self.decimals = decimals_of(fraction);
+        }
         let Some((first, last)) = self.ends else {
             self.ends = Some((time, time));
             return;
         };
         self.ends = Some((first, time));
+        if time > last && time.0 - last.0 == self.step {
+            return;
+        }
         let step = time.seconds_since(last);
+        self.step = time.0 - last.0;
         if time == last {
             self.repeated += 1;
         } else if step < 0.0 {
