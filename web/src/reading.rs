@@ -4,8 +4,8 @@ use crate::known::{Found, FoundTime, Known, ROWS, Rows};
 use crate::writing::words_of;
 use crate::{recording, text};
 use bytes::Bytes;
-use fewbits_recipes::Batch;
-use fewbits_record::{TimeBase, TimeFormat};
+use fewbits_recipes::{Batch, table as recipe, times};
+use fewbits_record::TimeBase;
 use fewbits_table::{Column, Dialect, Error, Kind, Profile, Scale, Survey, Table, Time};
 use serde::Deserialize;
 use std::io::Cursor;
@@ -13,10 +13,6 @@ use std::io::Cursor;
 /// The first bytes of a Parquet file, and of a recording.
 const PARQUET: &[u8] = b"PAR1";
 const RECORDING: &[u8] = b"\x8bfew";
-/// Decimals of a second that the finest tick has where times may be off.
-const NANOSECONDS: u8 = 9;
-/// Largest length of a unit, in which words are listed.
-const MAX_UNIT: usize = 1024;
 
 /// What the user says of a table; the rest is detected.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -97,7 +93,7 @@ fn unfit(table: &Table) -> Vec<(String, String)> {
         let column = &table.columns()[*i];
         let why = match column.kind {
             Kind::Text => "text",
-            Kind::Words if unit_of(table, *i).is_empty() => "too many different words",
+            Kind::Words if recipe::unit(table, *i).is_empty() => "too many different words",
             _ => return None,
         };
         Some((column.name.clone(), why.to_owned()))
@@ -105,102 +101,35 @@ fn unfit(table: &Table) -> Vec<(String, String)> {
     table.selected().iter().filter_map(why).collect()
 }
 
-/// The unit of a column, or the list of its words.
-fn unit_of(table: &Table, column: usize) -> String {
-    match table.columns()[column].kind {
-        Kind::Words => {
-            let quoted = table
-                .words(column)
-                .iter()
-                .map(|word| format!("\"{}\"", word.replace('"', "\"\"")));
-            let unit = format!("words: {}", quoted.collect::<Vec<_>>().join(","));
-            if table.words(column).is_empty() || unit.len() > MAX_UNIT {
-                String::new()
-            } else {
-                unit
-            }
-        }
-        Kind::Time => "s since 1970".to_owned(),
-        _ => table.columns()[column].unit.clone(),
-    }
-}
-
-fn refused(
-    table: &Table,
-    column: usize,
-    place: fewbits_table::Batch,
-    row: usize,
-    cell: String,
-    (problem, mend): (&'static str, &str),
-) -> Error {
-    Error::Cell {
-        place: place.places[row],
-        column: table.columns()[column].name.clone(),
-        cell,
-        problem,
-        mend: mend.to_owned(),
-    }
-}
-
 fn of_table(mut table: Table, survey: &Survey, said: &Said, left_out: Vec<(String, String)>) -> Result<Rows, Error> {
     let selected = table.selected().to_vec();
-    let units: Vec<String> = selected.iter().map(|i| unit_of(&table, *i)).collect();
+    let units: Vec<String> = selected.iter().map(|i| recipe::unit(&table, *i)).collect();
     for (column, unit) in selected.iter().zip(&units) {
         if let Some(words) = words_of(unit) {
             table.fix_words(*column, words);
         }
     }
-    let time = time_base(&table, survey, said);
+    let time = match table.time() {
+        Some((_, scale)) => {
+            let first = survey.times.ends.map(|ends| ends.0);
+            times::base(scale, first, Some(survey.times.decimals), said.tolerance)
+        }
+        None => TimeBase::Numbered,
+    };
     let mut rows = Batch {
         ticks: (time != TimeBase::Numbered).then(Vec::new),
         columns: vec![Vec::new(); selected.len()],
     };
-    let mut batch = fewbits_table::Batch::default();
-    while table.read(&mut batch, ROWS)? > 0 {
-        if let (
-            Some(ticks),
-            TimeBase::Clock {
-                decimals, tolerance, ..
-            },
-        ) = (&mut rows.ticks, time)
-        {
-            for (row, found) in batch.times.iter().enumerate() {
-                let wrong = match found.ticks(decimals) {
-                    Some((tick, is_whole)) if is_whole || tolerance > 0 => {
-                        ticks.push(tick);
-                        continue;
-                    }
-                    Some(_) => (
-                        "has more decimals than a tick",
-                        "allow an error of times, as --time ±1us, or write fewer decimals",
-                    ),
-                    None => (
-                        "does not fit ticks of 64 bits: it is too large, or times have too many decimals",
-                        "allow an error of times, as --time ±1us",
-                    ),
-                };
-                let (columns, scale) = table.time().unwrap_or((&[0], Scale::Seconds));
-                let (column, cell) = (columns[0], found.shown(scale, found.decimals()));
-                return Err(refused(&table, column, batch, row, cell, wrong));
-            }
+    let mut source = recipe::TableRows::new(table, time);
+    while let Some(batch) = source.take(ROWS)? {
+        if let (Some(all), Some(ticks)) = (&mut rows.ticks, batch.ticks) {
+            all.extend(ticks);
         }
-        for (i, column) in selected.iter().enumerate() {
-            rows.columns[i].reserve(batch.rows);
-            for row in 0..batch.rows {
-                match batch.columns[i].number(row) {
-                    Ok(cell) => rows.columns[i].push(cell),
-                    Err(cell) => {
-                        let problem = match table.columns()[*column].kind {
-                            Kind::Time => "is a time, and its seconds are no double",
-                            _ => "is a whole number of more than 53 bits, which no double holds",
-                        };
-                        let wrong = (problem, "leave the column out with --without");
-                        return Err(refused(&table, *column, batch, row, cell, wrong));
-                    }
-                }
-            }
+        for (all, cells) in rows.columns.iter_mut().zip(batch.columns) {
+            all.extend(cells);
         }
     }
+    let table = source.table();
     let known = selected.iter().zip(units).zip(&rows.columns).map(|((i, unit), cells)| {
         let (column, profile) = (&table.columns()[*i], &survey.columns[*i]);
         known(column, unit, profile, cells)
@@ -208,7 +137,7 @@ fn of_table(mut table: Table, survey: &Survey, said: &Said, left_out: Vec<(Strin
     Ok(Rows {
         columns: known.collect(),
         time,
-        found: found(&table, survey, said, left_out),
+        found: found(table, survey, said, left_out),
         batch: rows,
     })
 }
@@ -237,36 +166,6 @@ fn known(column: &Column, unit: String, profile: &Profile, cells: &[Option<f64>]
         sentinel: sentinel.map(|sentinel| sentinel.value),
         sentinel_cells: sentinel.map_or(0, |sentinel| sentinel.count),
         period: None,
-    }
-}
-
-/// The time base of `fewbits pack --time`: ticks as fine as the finest time of the table, or as 64 bits allow.
-fn time_base(table: &Table, survey: &Survey, said: &Said) -> TimeBase {
-    let Some((_, scale)) = table.time() else {
-        return TimeBase::Numbered;
-    };
-    let format = match scale {
-        Scale::Utc => TimeFormat::Utc,
-        Scale::Local => TimeFormat::Local,
-        _ => TimeFormat::Seconds,
-    };
-    let decimals = match (format, said.tolerance) {
-        (TimeFormat::Seconds, 0) => survey.times.decimals.min(18),
-        (_, 0) => survey.times.decimals.next_multiple_of(3).min(18),
-        _ => {
-            let first = survey.times.ends.map(|ends| ends.0);
-            let is_small = |tick: i64| tick.abs() < i64::MAX / 4;
-            let fits = |decimals: &u8| {
-                first.is_none_or(|first: Time| first.ticks(*decimals).is_some_and(|(tick, _)| is_small(tick)))
-            };
-            (0..=NANOSECONDS).rev().find(fits).unwrap_or(0)
-        }
-    };
-    TimeBase::Clock {
-        decimals,
-        // One tick of the tolerance is reserved for decimals beyond a tick, which are cut off.
-        tolerance: (said.tolerance / 10_u64.pow(u32::from(NANOSECONDS.saturating_sub(decimals)))).saturating_sub(1),
-        format,
     }
 }
 

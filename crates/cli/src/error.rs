@@ -180,6 +180,7 @@ impl Error {
                 Err(failure) => Self::content(&file, failure),
             },
             fewbits_recipes::Error::Record(source) => Self::recording(&file)(source),
+            fewbits_recipes::Error::Table(source) => Self::of_table(&file)(source),
             source => Self::Recipe {
                 file: file.clone(),
                 source: Box::new(source),

@@ -6,8 +6,9 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::opening::{chosen, name_of, time_columns};
 use crate::say::say;
-use fewbits_record::{TimeBase, TimeFormat};
-use fewbits_table::{Batch, FewCells, Kind, Scale, Time};
+use fewbits_recipes::{table as recipe, times};
+use fewbits_record::TimeBase;
+use fewbits_table::{Batch, FewCells, Kind};
 
 /// A row: its tick (`None` if rows are numbered) and its cells.
 pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
@@ -162,14 +163,8 @@ impl Table {
 
     /// The unit of the column at an index of `names`, or the list of its words.
     pub(crate) fn unit(&self, index: usize) -> String {
-        let Some(column) = self.table.selected().get(index) else {
-            return String::new();
-        };
-        match self.kind(index) {
-            Kind::Words => crate::words::unit(self.table.words(*column)),
-            Kind::Time => "s since 1970".to_owned(),
-            _ => self.table.columns()[*column].unit.clone(),
-        }
+        let column = self.table.selected().get(index);
+        column.map_or(String::new(), |column| recipe::unit(&self.table, *column))
     }
 
     /// Refuses columns of words, for tasks that compute with cells.
@@ -196,31 +191,7 @@ impl Table {
     /// # Errors
     /// If rows that were read ahead have other words.
     pub(crate) fn use_words(&mut self, columns: &[&fewbits_record::Column]) -> Result<(), Error> {
-        let selected = self.table.selected().to_vec();
-        for (i, (column, recorded)) in selected.into_iter().zip(columns).enumerate() {
-            let Some(words) = crate::words::of(recorded.unit()) else {
-                continue;
-            };
-            let known = self.table.words(column);
-            if let Some(row) = self
-                .batch
-                .columns
-                .get(i)
-                .and_then(|cells| crate::words::other(cells, known, &words))
-            {
-                self.next = row;
-                let shown = self.batch.columns[i].number(row).ok().flatten().unwrap_or_default();
-                let cell = known.get(shown as usize).cloned().unwrap_or_default();
-                return Err(self.refused(
-                    i,
-                    cell,
-                    "is none of the words of the column",
-                    "mend the cell, or leave the row out with --skip-bad",
-                ));
-            }
-            self.table.fix_words(column, words);
-        }
-        Ok(())
+        recipe::use_words(&mut self.table, &self.batch, columns).map_err(Error::of_table(&self.file))
     }
 
     /// Loads rows if all were given out. Returns whether there are any.
@@ -259,64 +230,17 @@ impl Table {
         }
     }
 
-    fn time_error(&self, time: Time, (problem, mend): clock::Problem) -> Error {
-        let scale = self.table.time().map_or(Scale::Seconds, |(_, scale)| scale);
-        let column = self
-            .table
-            .time()
-            .map(|(columns, _)| self.table.columns()[columns[0]].name.clone());
-        Error::of_table(&self.file)(fewbits_table::Error::Cell {
-            place: self.batch.places[self.next],
-            column: column.unwrap_or_default(),
-            cell: time.shown(scale, time.decimals()),
-            problem,
-            mend: mend.to_owned(),
-        })
-    }
-
     /// The time base for the times of the table, from its first row.
     pub(crate) fn time_base(&mut self, options: &TableOptions, survey: Option<&Survey>) -> Result<TimeBase, Error> {
         let Some((_, scale)) = self.table.time() else {
             return Ok(TimeBase::Numbered);
-        };
-        let format = match scale {
-            Scale::Utc => TimeFormat::Utc,
-            Scale::Local => TimeFormat::Local,
-            _ => TimeFormat::Seconds,
         };
         let nanoseconds = clock::tolerance(options.time.as_deref().unwrap_or("exact"))?;
         let first = match survey {
             Some(survey) if survey.is_empty => None,
             _ => self.fill()?.then(|| self.batch.times.first().copied()).flatten(),
         };
-        let decimals = match (format, survey) {
-            // Exact times: a tick is as fine as the finest time of the table.
-            (TimeFormat::Seconds, Some(survey)) if nanoseconds == 0 => survey.decimals,
-            // Units that timestamps of other programs have.
-            (_, Some(survey)) if nanoseconds == 0 => survey.decimals.next_multiple_of(3),
-            _ => clock::NANOSECONDS,
-        };
-        // Ticks of 64 bits: the first time tells how fine they can be.
-        let fits = |decimals: &u8| {
-            first.is_none_or(|first| {
-                first
-                    .ticks(*decimals)
-                    .is_some_and(|(tick, _)| tick.abs() < i64::MAX / 4)
-            })
-        };
-        let is_exact = nanoseconds == 0 && survey.is_some();
-        let decimals = if is_exact {
-            decimals.min(18)
-        } else {
-            (0..=decimals).rev().find(fits).unwrap_or(0)
-        };
-        let scale = 10_u64.pow(u32::from(clock::NANOSECONDS.saturating_sub(decimals)));
-        Ok(TimeBase::Clock {
-            decimals,
-            // One tick of the tolerance is reserved for decimals beyond a tick, which are cut off.
-            tolerance: (nanoseconds / scale).saturating_sub(1),
-            format,
-        })
+        Ok(times::base(scale, first, survey.map(|survey| survey.decimals), nanoseconds))
     }
 
     /// The next row; `None` after the last.
@@ -326,57 +250,19 @@ impl Table {
         }
         let row = self.next;
         self.row = self.batch.places[row].row;
-        let tick = match (self.batch.times.get(row), time) {
-            (
-                Some(found),
-                TimeBase::Clock {
-                    decimals, tolerance, ..
-                },
-            ) => match found.ticks(decimals) {
-                None => return Err(self.time_error(*found, clock::TOO_LARGE)),
-                Some((_, false)) if tolerance == 0 => return Err(self.time_error(*found, clock::TOO_FINE)),
-                Some((tick, _)) => Some(tick),
-            },
-            _ => None,
+        let failed = Error::of_table(&self.file);
+        let tick = match self.batch.times.get(row) {
+            Some(found) => times::of_row(*found, time)
+                .map_err(|problem| failed(recipe::time_refused(&self.table, &self.batch, row, *found, problem)))?,
+            None => None,
         };
-        let mut cells = Vec::with_capacity(self.batch.columns.len());
-        for (i, column) in self.batch.columns.iter().enumerate() {
-            if let fewbits_table::Cells::Times(times) = column
-                && let Some(time) = times[row].filter(|_| self.batch.times.is_empty())
-            {
-                return Err(self.cell_error(i, time.shown(Scale::Local, time.decimals())));
-            }
-            cells.push(column.number(row).map_err(|cell| self.cell_error(i, cell))?);
-        }
+        let cell = |index| recipe::cell(&self.table, &self.batch, index, row);
+        let cells = (0..self.batch.columns.len())
+            .map(cell)
+            .collect::<Result<_, _>>()
+            .map_err(failed)?;
         self.next += 1;
         Ok(Some((tick, cells)))
-    }
-
-    fn cell_error(&self, index: usize, cell: String) -> Error {
-        let (problem, mend) = match self.kind(index) {
-            Kind::Time if self.batch.times.is_empty() => (
-                "is a time",
-                "if this is the time of the row, add --time exact; otherwise leave the column out with --without",
-            ),
-            Kind::Time => ("is a time, and its seconds are no double", "leave the column out with --without"),
-            _ => (
-                "is a whole number of more than 53 bits, which no double holds",
-                "split the column, or leave it out with --without",
-            ),
-        };
-        self.refused(index, cell, problem, mend)
-    }
-
-    /// The refusal of a cell of the next row.
-    fn refused(&self, index: usize, cell: String, problem: &'static str, mend: &str) -> Error {
-        let name = &self.names[index];
-        Error::of_table(&self.file)(fewbits_table::Error::Cell {
-            place: self.batch.places[self.next],
-            column: name.clone(),
-            cell,
-            problem,
-            mend: mend.replace("--without", &format!("--without {}", fewbits_table::names::quoted(name))),
-        })
     }
 
     /// The next rows, at least one and at most `limit`: their ticks (or numbers), and a column of cells for each name.

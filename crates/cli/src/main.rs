@@ -50,7 +50,6 @@ mod target;
 mod track;
 mod unpack;
 mod verify;
-mod words;
 
 use arguments::{Cli, Task};
 use clap::Parser;

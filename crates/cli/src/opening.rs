@@ -3,7 +3,7 @@
 use crate::arguments::TableOptions;
 use crate::clock;
 use crate::error::Error;
-use fewbits_table::{Scale, names};
+use fewbits_table::names;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
 use std::io::{IsTerminal, Read, Seek};
@@ -136,10 +136,8 @@ pub(crate) fn time_columns(table: &fewbits_table::Table, list: &str) -> Vec<Stri
     }
 }
 
-/// What `fewbits look` shows: columns with their kinds, the dialect, what times are measured from, and counts over all rows.
-pub(crate) fn look(
-    options: &TableOptions,
-) -> Result<(Vec<fewbits_table::Column>, fewbits_table::Dialect, Option<Scale>, fewbits_table::Survey), Error> {
+/// A table with the time that the options choose, or that it certainly has.
+pub(crate) fn with_time(options: &TableOptions) -> Result<fewbits_table::Table, Error> {
     let failed = Error::of_table(name_of(options));
     let mut table = chosen(options)?;
     match options.by {
@@ -147,13 +145,5 @@ pub(crate) fn look(
         None if table.time().is_none() => drop(table.find_certain_time().map_err(&failed)?),
         None => {}
     }
-    let (columns, dialect) = (table.columns().to_vec(), table.dialect().clone());
-    let scale = table.time().map(|(_, scale)| scale);
-    let survey = table.survey().map_err(&failed)?;
-    let with_kind = |(mut column, profile): (fewbits_table::Column, &fewbits_table::Profile)| {
-        column.kind = survey.kind(&column, profile);
-        column
-    };
-    let columns = columns.into_iter().zip(&survey.columns).map(with_kind).collect();
-    Ok((columns, dialect, scale, survey))
+    Ok(table)
 }

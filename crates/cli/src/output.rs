@@ -1,10 +1,11 @@
 //! Output of tables: rows of recordings and of other results.
 
 use crate::error::Error;
+use crate::say;
 use crate::target::Target;
-use crate::words;
-use crate::{clock, say};
-use fewbits_record::{Schema, TimeBase};
+pub(crate) use fewbits_recipes::unpack::Cell;
+use fewbits_recipes::unpack::Cells;
+use fewbits_record::Schema;
 use std::io::{BufWriter, IsTerminal, Write};
 use std::path::Path;
 
@@ -35,37 +36,12 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
     text(None, &(serde_json::to_string_pretty(value)? + "\n"))
 }
 
-/// A cell of a row.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Cell {
-    Text(String),
-    Whole(i64),
-    /// A number; `None` is a gap.
-    Number(Option<f64>),
-}
-
-impl Cell {
-    /// The cell as text: the shortest that reads back as the same number; empty for a gap.
-    fn text(&self) -> String {
-        match self {
-            Self::Text(text) => text.clone(),
-            Self::Whole(number) => number.to_string(),
-            Self::Number(None) => String::new(),
-            Self::Number(Some(value)) if value.is_nan() => "NaN".to_owned(),
-            Self::Number(Some(value)) if *value != 0.0 && (value.abs() < 1e-5 || value.abs() >= 1e16) => {
-                format!("{value:e}")
-            }
-            Self::Number(Some(value)) => format!("{value}"),
-        }
-    }
-
-    fn json(&self) -> serde_json::Value {
-        match self {
-            Self::Whole(number) => (*number).into(),
-            Self::Number(value) if value.is_none_or(f64::is_finite) => (*value).into(),
-            // JSON has no NaN and no infinity.
-            _ => self.text().into(),
-        }
+fn json_of(cell: &Cell) -> serde_json::Value {
+    match cell {
+        Cell::Whole(number) => (*number).into(),
+        Cell::Number(value) if value.is_none_or(f64::is_finite) => (*value).into(),
+        // JSON has no NaN and no infinity.
+        _ => cell.text().into(),
     }
 }
 
@@ -126,7 +102,7 @@ impl Sheet {
                 .write_record(cells.into_iter().map(|cell| cell.text()))
                 .map_err(Error::table(&self.file)),
             Rows::Json(sink) => {
-                let cells = cells.into_iter().map(|cell| cell.json());
+                let cells = cells.into_iter().map(|cell| json_of(&cell));
                 let object: serde_json::Map<_, _> = self.names.iter().cloned().zip(cells).collect();
                 serde_json::to_writer(&mut *sink, &object)
                     .map_err(|error| Error::io(&self.file, "write")(error.into()))?;
@@ -164,10 +140,7 @@ pub(crate) fn is_parquet(path: &Path) -> bool {
 pub(crate) enum Writer {
     Sheet {
         sheet: Sheet,
-        time: TimeBase,
-        is_json: bool,
-        /// Words of the columns that have any.
-        words: Vec<Option<Vec<String>>>,
+        cells: Cells,
     },
     #[cfg(feature = "parquet")]
     Parquet(Box<crate::parquet::Sink>),
@@ -184,44 +157,16 @@ impl Writer {
                 file: path.display().to_string(),
             });
         }
-        let is_json = shape == Shape::Json;
-        let first = match schema.time() {
-            TimeBase::Numbered => is_json.then_some("row"),
-            _ => Some("time"),
-        };
-        let unit = |name: &String| schema.position(name).ok().map(|i| schema.columns()[i].unit());
-        let words = names.iter().map(|name| unit(name).and_then(words::of)).collect();
-        let names = first.into_iter().map(str::to_owned).chain(names.iter().cloned());
+        let cells = Cells::new(schema, names, shape == Shape::Json);
         Ok(Self::Sheet {
-            sheet: Sheet::new(path, shape, names.collect())?,
-            time: schema.time(),
-            is_json,
-            words,
+            sheet: Sheet::new(path, shape, cells.names().to_vec())?,
+            cells,
         })
     }
 
     pub(crate) fn write(&mut self, tick: i64, values: &[Option<f64>]) -> Result<(), Error> {
         match self {
-            Self::Sheet {
-                sheet,
-                time,
-                is_json,
-                words,
-            } => {
-                let first = match *time {
-                    TimeBase::Numbered => is_json.then_some(Cell::Whole(tick)),
-                    time => Some(Cell::Text(clock::shown(tick, time))),
-                };
-                let cell = |(value, words): (&Option<f64>, &Option<Vec<String>>)| match (value, words) {
-                    (Some(index), Some(words)) if index.fract() == 0.0 && *index >= 0.0 => {
-                        let word = words.get(*index as usize).cloned();
-                        word.map_or(Cell::Number(*value), Cell::Text)
-                    }
-                    _ => Cell::Number(*value),
-                };
-                let cells = values.iter().zip(words.iter()).map(cell);
-                sheet.write(first.into_iter().chain(cells))
-            }
+            Self::Sheet { sheet, cells } => sheet.write(cells.row(tick, values)),
             #[cfg(feature = "parquet")]
             Self::Parquet(sink) => sink.write(tick, values),
         }

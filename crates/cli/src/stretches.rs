@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::output::{Cell, Shape, Sheet, is_parquet};
 use crate::say::say;
 use crate::unpack::{selection, warn_of_end};
-use crate::{Ending, clock, recording, words};
+use crate::{Ending, clock, recording};
+use fewbits_recipes::words;
 use fewbits_record::{Aggregate, Schema, Stretch, TimeBase};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -104,7 +105,7 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
             say!("warning: {file}: {error}; the rest is read");
             ending = Ending::Failed;
         };
-        let stretches = playback.aggregates(every, (selection.from, selection.to), damaged);
+        let stretches = playback.aggregates(every, selection.ticks, damaged);
         for stretch in stretches.map_err(Error::recording(file))? {
             match found.entry(stretch.tick) {
                 std::collections::btree_map::Entry::Vacant(entry) => {

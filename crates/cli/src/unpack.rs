@@ -5,8 +5,11 @@ use crate::error::Error;
 use crate::files::is_regular;
 use crate::output::{Shape, Writer};
 use crate::say::{self, say};
-use crate::{Ending, clock, recording, words};
-use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase, merged};
+use crate::{Ending, clock, recording};
+use fewbits_recipes::unpack::{self, Selection};
+use fewbits_recipes::{Failure, words};
+use fewbits_record::{Block, BlockReader, Playback, Schema, TimeBase, merged};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 impl UnpackOptions {
@@ -28,14 +31,6 @@ impl UnpackOptions {
     }
 }
 
-/// The selected rows and columns.
-pub(crate) struct Selection {
-    pub(crate) from: i64,
-    pub(crate) to: i64,
-    columns: Vec<usize>,
-    pub(crate) names: Vec<String>,
-}
-
 fn end(text: Option<&String>, option: &'static str, time: TimeBase, otherwise: i64) -> Result<i64, Error> {
     let Some(text) = text else { return Ok(otherwise) };
     let expected = match time {
@@ -45,51 +40,31 @@ fn end(text: Option<&String>, option: &'static str, time: TimeBase, otherwise: i
     clock::tick(text, time).map_err(|_| Error::option(option, text, expected))
 }
 
+/// The selected rows and columns.
 pub(crate) fn selection(options: &CatOptions, schema: &Schema, file: &str) -> Result<Selection, Error> {
-    let all = || schema.columns().iter().map(|column| column.name().to_owned()).collect();
-    let names: Vec<String> = if options.columns.is_empty() {
-        all()
-    } else {
-        options.columns.clone()
-    };
-    let columns = names.iter().map(|name| schema.position(name)).collect::<Result<_, _>>();
-    Ok(Selection {
-        from: end(options.from.as_ref(), "--from", schema.time(), i64::MIN)?,
-        to: end(options.to.as_ref(), "--to", schema.time(), i64::MAX)?,
-        columns: columns.map_err(Error::recording(file))?,
-        names,
-    })
+    let mut selection = Selection::new(schema, &options.columns).map_err(Error::recording(file))?;
+    selection.ticks = (
+        end(options.from.as_ref(), "--from", schema.time(), i64::MIN)?,
+        end(options.to.as_ref(), "--to", schema.time(), i64::MAX)?,
+    );
+    Ok(selection)
 }
 
 /// Writes the rows. Damaged parts are reported on standard error.
 pub(crate) fn write_blocks(
     blocks: impl Iterator<Item = Result<Block, fewbits_record::Error>>,
     writer: &mut Writer,
-    ticks: (i64, i64),
-    columns: &[usize],
+    selection: &Selection,
     file: &str,
 ) -> Result<Ending, Error> {
     let mut ending = Ending::Good;
-    for block in blocks {
-        let block = match block {
-            Ok(block) => block,
-            Err(error @ fewbits_record::Error::Block { .. }) => {
-                say!("warning: {file}: {error}; the rest is read");
-                ending = Ending::Failed;
-                continue;
-            }
-            Err(error) => return Err(Error::recording(file)(error)),
-        };
-        let mut values = Vec::with_capacity(columns.len());
-        for (row, tick) in block.ticks.iter().enumerate() {
-            if *tick < ticks.0 || *tick > ticks.1 {
-                continue;
-            }
-            values.clear();
-            values.extend(columns.iter().map(|column| block.columns[*column][row]));
-            writer.write(*tick, &values)?;
-        }
-    }
+    let mut write = |tick: i64, values: &[Option<f64>]| -> Result<(), Failure> { Ok(writer.write(tick, values)?) };
+    let mut damaged = |error: &fewbits_record::Error| {
+        say!("warning: {file}: {error}; the rest is read");
+        ending = Ending::Failed;
+    };
+    let mut go = |_| ControlFlow::Continue(());
+    unpack::rows(blocks, selection, &mut write, &mut damaged, &mut go).map_err(Error::recipe(file))?;
     writer.flush()?;
     Ok(ending)
 }
@@ -111,8 +86,7 @@ pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
         let blocks = BlockReader::new(source).map_err(Error::recording(file))?;
         let selection = selection(options, blocks.schema(), file)?;
         let mut writer = Writer::new(options.output.as_deref(), shape, blocks.schema(), &selection.names)?;
-        let ticks = (selection.from, selection.to);
-        let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, file)?;
+        let ending = write_blocks(blocks, &mut writer, &selection, file)?;
         return writer.finish().map(|()| ending);
     }
     let mut playback = Playback::open(file).map_err(Error::recording(file))?;
@@ -121,9 +95,8 @@ pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
     let names: Vec<&str> = selection.names.iter().map(String::as_str).collect();
     playback.columns(&names).map_err(Error::recording(file))?;
     let is_finished = playback.is_finished();
-    let ticks = (selection.from, selection.to);
-    let blocks = playback.blocks_between(ticks.0, ticks.1);
-    let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, file)?;
+    let blocks = playback.blocks_between(selection.ticks.0, selection.ticks.1);
+    let ending = write_blocks(blocks, &mut writer, &selection, file)?;
     writer.finish()?;
     if !is_finished {
         warn_of_end(file);
@@ -143,7 +116,7 @@ fn several(options: &CatOptions) -> Result<Ending, Error> {
     let unfinished: Vec<usize> = (0..playbacks.len()).filter(|i| !playbacks[*i].is_finished()).collect();
     let together = format!("{} recordings", options.files.len());
     words_agree(&schema, playbacks.iter().map(Playback::schema), &options.files)?;
-    let rows = merged(&mut playbacks, &names, (selection.from, selection.to)).map_err(Error::recording(&together))?;
+    let rows = merged(&mut playbacks, &names, selection.ticks).map_err(Error::recording(&together))?;
     let mut writer = Writer::new(options.output.as_deref(), Shape::of(options.json), &schema, &selection.names)?;
     let mut ending = Ending::Good;
     for row in rows {
@@ -188,10 +161,4 @@ pub(crate) fn words_agree<'a>(
         }
     }
     Ok(())
-}
-
-/// All columns of a schema.
-pub(crate) fn all_columns(schema: &Schema) -> (Vec<usize>, Vec<String>) {
-    let names = schema.columns().iter().map(Column::name).map(str::to_owned);
-    ((0..schema.columns().len()).collect(), names.collect())
 }

@@ -78,7 +78,10 @@ pub enum Error {
     /// The recorder or the reader of a recording failed.
     #[error(transparent)]
     Record(#[from] fewbits_record::Error),
-    /// The source of rows failed.
+    /// The table was refused.
+    #[error(transparent)]
+    Table(#[from] fewbits_table::Error),
+    /// The source of rows, or what takes them, failed.
     #[error(transparent)]
     Source(Failure),
     /// A batch has columns of different lengths, or not as many as expected.

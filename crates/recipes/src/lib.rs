@@ -1,4 +1,4 @@
-//! What a person does with a table of sensor values, as functions: state bounds, plan, pack, verify.
+//! What a person does with a table of sensor values, as functions: look, state bounds, plan, pack, unpack, verify, design.
 //!
 //! The command line, Python and the page call the same functions, so that the same table gives the same bytes in all three. A recipe
 //! takes rows from a [`Source`] in batches, reports its [`Progress`] to a callback between batches, and stops when the callback breaks.
@@ -35,10 +35,13 @@
 //! | part | where |
 //! |---|---|
 //! | rows in batches | [`Source`], [`Batch`] |
+//! | how a table is understood | [`look`] |
+//! | a table as rows: ticks, cells as doubles, units | [`table`], [`times`], [`words`] |
 //! | lists of names, quoted where they contain commas | [`names`] |
 //! | bounds and their language | [`bounds`] |
 //! | bits that a table would need | [`plan`] |
 //! | rows into a recording | [`pack`] |
+//! | rows out of a recording | [`unpack`] |
 //! | a recording against its table | [`verify`] |
 //! | quantizers for an unknown that several sensors measure | [`design`] |
 //! | estimates that know what came after them | [`smoothing`] |
@@ -50,13 +53,18 @@
 pub mod bounds;
 pub mod design;
 mod error;
+pub mod look;
 pub mod names;
 pub mod pack;
 pub mod plan;
 pub mod smoothing;
 pub mod source;
 pub mod stated;
+pub mod table;
+pub mod times;
+pub mod unpack;
 pub mod verify;
+pub mod words;
 
 pub use error::{Error, Failure};
 pub use source::{Batch, Progress, Source, Watch};

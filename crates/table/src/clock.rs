@@ -291,12 +291,11 @@ pub(crate) fn clock(
     })
 }
 
+/// How times are written, or the refusal: an error, or the row of the sample and its problem.
+type Found = Result<Syntax, Result<Error, (usize, Problem)>>;
+
 /// A date in the first column and the hour, and perhaps minute and second, in those behind it.
-fn dated_hours(
-    names: &[&str],
-    sample: &[String],
-    format: Option<&str>,
-) -> Option<Result<Syntax, Result<Error, (usize, Problem)>>> {
+fn dated_hours(names: &[&str], sample: &[String], format: Option<&str>) -> Option<Found> {
     let behind = of_day_parts(names.get(1..)?.iter().copied());
     if behind.is_empty() || behind.len() + 1 != names.len() {
         return None;
@@ -353,7 +352,7 @@ fn may_be_days(names: &[&str], cells: &[&str]) -> bool {
 }
 
 /// How most of the cells are written: a garbled one must not decide.
-fn majority(cells: &[&str]) -> Result<Syntax, Result<Error, (usize, Problem)>> {
+fn majority(cells: &[&str]) -> Found {
     if cells.is_empty() {
         return Ok(Syntax::Number(Unit::Seconds));
     }

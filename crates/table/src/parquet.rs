@@ -7,7 +7,7 @@ use crate::error::{Error, Place, printable};
 use crate::names;
 use crate::profile::Profile;
 use crate::read::{Meaning, push_cell};
-use crate::survey::Survey;
+use crate::survey::{Survey, WATCHED};
 use crate::table::Table;
 use crate::time::{Scale, Time};
 use ::parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
@@ -270,7 +270,7 @@ impl Table {
     }
 
     /// Counts over all rows.
-    pub(crate) fn survey_arrow(mut self) -> Result<Survey, Error> {
+    pub(crate) fn survey_arrow(mut self, watch: &mut dyn FnMut(u64) -> bool) -> Result<Survey, Error> {
         let mut survey = Survey {
             columns: Profile::of_columns(self.columns.len()),
             ..Survey::default()
@@ -299,6 +299,9 @@ impl Table {
                 break;
             }
             survey.rows += 1;
+            if survey.rows.is_multiple_of(WATCHED) && !watch(survey.rows) {
+                break;
+            }
             if let Some(time) = batch.times.first() {
                 survey.times.add(*time);
             }

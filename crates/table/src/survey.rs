@@ -4,18 +4,31 @@ use crate::column::{Batch, Column, Kind};
 use crate::error::{Error, Place};
 use crate::profile::Profile;
 use crate::table::{Skipped, Table};
-use crate::time::Time;
+use crate::time::{DECIMALS, Time, decimals_of};
+
+/// Rows between two calls of a watch, at least.
+pub(crate) const WATCHED: u64 = 4096;
 
 impl Table {
     /// Reads all that is left and counts: kinds, ranges, gaps and times.
     ///
     /// # Errors
     /// As [`read`](Self::read), but cells of values are counted, not refused.
-    pub fn survey(mut self) -> Result<Survey, Error> {
+    pub fn survey(self) -> Result<Survey, Error> {
+        self.survey_watched(&mut |_| true)
+    }
+
+    /// As [`survey`](Self::survey). `watch` is called with the number of rows now and then; the rows behind are not counted if it returns
+    /// `false`.
+    ///
+    /// # Errors
+    /// As [`survey`](Self::survey).
+    pub fn survey_watched(mut self, watch: &mut dyn FnMut(u64) -> bool) -> Result<Survey, Error> {
         #[cfg(feature = "parquet")]
         if self.arrow.is_some() {
-            return self.survey_arrow();
+            return self.survey_arrow(watch);
         }
+        let mut next = 0;
         let mut survey = Survey {
             columns: Profile::of_columns(self.columns.len()),
             ..Survey::default()
@@ -24,6 +37,12 @@ impl Table {
         self.selected.clear();
         loop {
             self.plain_survey(&mut survey)?;
+            if survey.rows > next {
+                next = survey.rows + WATCHED;
+                if !watch(survey.rows) {
+                    break;
+                }
+            }
             batch.reset(std::iter::empty());
             if self.read_rows(&mut batch, 1, false)? == 0 {
                 break;
@@ -135,17 +154,27 @@ pub struct Times {
     pub repeated: u64,
     /// The smallest and the largest step forward, in seconds.
     pub steps: Option<(f64, f64)>,
+    /// The last step, in attoseconds, which is often the next one too.
+    step: i128,
 }
 
 impl Times {
     pub(crate) fn add(&mut self, time: Time) {
-        self.decimals = self.decimals.max(time.decimals());
+        // Few times need more decimals than those before.
+        let fraction = time.fraction();
+        if !fraction.is_multiple_of(10_u64.pow(u32::from(DECIMALS - self.decimals))) {
+            self.decimals = decimals_of(fraction);
+        }
         let Some((first, last)) = self.ends else {
             self.ends = Some((time, time));
             return;
         };
         self.ends = Some((first, time));
+        if time > last && time.0 - last.0 == self.step {
+            return;
+        }
         let step = time.seconds_since(last);
+        self.step = time.0 - last.0;
         if time == last {
             self.repeated += 1;
         } else if step < 0.0 {

@@ -80,15 +80,13 @@ impl Time {
 
     /// Decimals of a second that the time needs.
     pub fn decimals(self) -> u8 {
-        let (mut rest, mut decimals) = (self.0.rem_euclid(SECOND), DECIMALS);
-        if rest == 0 {
-            return 0;
-        }
-        while rest % 10 == 0 {
-            rest /= 10;
-            decimals -= 1;
-        }
-        decimals
+        decimals_of(self.fraction())
+    }
+
+    /// Attoseconds behind the whole second.
+    pub(crate) fn fraction(self) -> u64 {
+        // Less than a second fits 64 bits, where divisions are fast.
+        self.0.rem_euclid(SECOND) as u64
     }
 
     /// Seconds, rounded to a double.
@@ -130,7 +128,26 @@ impl Time {
     }
 }
 
+/// Decimals of a second that attoseconds below one second need.
+pub(crate) fn decimals_of(mut fraction: u64) -> u8 {
+    if fraction == 0 {
+        return 0;
+    }
+    let mut decimals = DECIMALS;
+    for (power, places) in [(1_000_000_000, 9), (1000, 3), (1000, 3), (10, 1), (10, 1)] {
+        if fraction.is_multiple_of(power) {
+            fraction /= power;
+            decimals -= places;
+        }
+    }
+    decimals
+}
+
 /// Attoseconds as seconds: whole seconds are exact.
 fn as_seconds(attoseconds: i128) -> f64 {
+    if let Ok(few) = i64::try_from(attoseconds) {
+        const UNIT: i64 = 1_000_000_000_000_000_000;
+        return few.div_euclid(UNIT) as f64 + few.rem_euclid(UNIT) as f64 / UNIT as f64;
+    }
     attoseconds.div_euclid(SECOND) as f64 + attoseconds.rem_euclid(SECOND) as f64 / SECOND as f64
 }

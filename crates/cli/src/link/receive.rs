@@ -5,9 +5,10 @@ use crate::arguments::ReceiveOptions;
 use crate::error::Error;
 use crate::output::{Shape, Writer};
 use crate::say::say;
-use crate::unpack::{all_columns, write_blocks};
+use crate::unpack::write_blocks;
 use crate::{Ending, node, recording, serial};
 use fewbits_link::{Transport, Udp};
+use fewbits_recipes::unpack::Selection;
 use fewbits_record::BlockReader;
 use std::time::Duration;
 
@@ -40,12 +41,12 @@ pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
 fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
     let (source, name) = recording::stream(&options.file)?;
     let blocks = BlockReader::new(source).map_err(Error::recording(name))?;
-    let (columns, names) = all_columns(blocks.schema());
-    let mut writer = Writer::new(options.output.as_deref(), Shape::Csv, blocks.schema(), &names)?;
+    let all = Selection::all(blocks.schema());
+    let mut writer = Writer::new(options.output.as_deref(), Shape::Csv, blocks.schema(), &all.names)?;
     let mut ending = Ending::Good;
     // Flush after each block, so that rows are written as soon as they arrive.
     for block in blocks {
-        let one = write_blocks(std::iter::once(block), &mut writer, (i64::MIN, i64::MAX), &columns, name)?;
+        let one = write_blocks(std::iter::once(block), &mut writer, &all, name)?;
         if one == Ending::Failed {
             ending = Ending::Failed;
         }

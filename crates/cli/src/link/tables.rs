@@ -4,7 +4,8 @@ use crate::Ending;
 use crate::error::Error;
 use crate::output::{Shape, Writer};
 use crate::say::say;
-use crate::unpack::{all_columns, write_blocks};
+use crate::unpack::write_blocks;
+use fewbits_recipes::unpack::Selection;
 use fewbits_record::{Block, FrameReader, Schema};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -31,7 +32,7 @@ struct Table {
 
 struct Sheet {
     writer: Writer,
-    columns: Vec<usize>,
+    all: Selection,
     schema: Schema,
 }
 
@@ -129,13 +130,9 @@ impl<'a> Tables<'a> {
         if let (Some(path), true) = (&path, !self.sheets.is_empty()) {
             say!("note: {address}: another table begins: {}", path.display());
         }
-        let (columns, names) = all_columns(&schema);
-        let writer = Writer::new(path.as_deref(), Shape::Csv, &schema, &names)?;
-        self.sheets.push(Sheet {
-            writer,
-            columns,
-            schema,
-        });
+        let all = Selection::all(&schema);
+        let writer = Writer::new(path.as_deref(), Shape::Csv, &schema, &all.names)?;
+        self.sheets.push(Sheet { writer, all, schema });
         Ok(Some(self.sheets.len() - 1))
     }
 
@@ -147,8 +144,7 @@ impl<'a> Tables<'a> {
             self.refused += blocks.len() as u64;
             return Ok(());
         };
-        let (all, blocks) = ((i64::MIN, i64::MAX), blocks.into_iter().map(Ok));
-        write_blocks(blocks, &mut sheet.writer, all, &sheet.columns, self.address).map(drop)
+        write_blocks(blocks.into_iter().map(Ok), &mut sheet.writer, &sheet.all, self.address).map(drop)
     }
 
     fn report(&mut self, reason: &str) {

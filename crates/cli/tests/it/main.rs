@@ -7,6 +7,7 @@ mod fleet;
 mod language;
 mod links;
 mod live;
+mod long;
 mod many;
 mod node;
 mod numbers;

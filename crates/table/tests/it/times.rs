@@ -120,6 +120,29 @@ fn what_cannot_be_kept_is_refused() {
 }
 
 #[test]
+fn decimals_and_steps_are_counted() {
+    for (cells, decimals, steps) in [
+        (vec!["0", "1", "2.5", "3.5"], 1, (1.0, 1.5)),
+        (vec!["0.000000000000000001", "1"], 18, (1.0 - 1e-18, 1.0)),
+        (vec!["0.0000001", "20.0000001", "40.00025"], 7, (20.0, 20.000_249_9)),
+        (vec!["0.120", "0.240", "0.350"], 2, (0.11, 0.12)),
+        (vec!["-0.5", "9999999999"], 1, (9_999_999_999.5, 9_999_999_999.5)),
+    ] {
+        let rows: String = cells.iter().map(|cell| format!("{cell},1\n")).collect();
+        let survey = open(&format!("time,x\n{rows}")).survey().unwrap();
+        assert_eq!((survey.times.decimals, survey.times.steps), (decimals, Some(steps)), "{cells:?}");
+    }
+    let needed = |cell: &str| {
+        let mut table = open(&format!("time,x\n{cell},1\n"));
+        rows(&mut table).times[0].decimals()
+    };
+    for places in 1..=18_usize {
+        assert_eq!(usize::from(needed(&format!("7.{:0>places$}", 3))), places);
+        assert_eq!(usize::from(needed(&format!("-7.{:0<places$}", "10"))), 1);
+    }
+}
+
+#[test]
 fn all_decimals_are_kept() {
     let mut table = open_said(&column(&["0.30000000000000004", "2", "1e-3"]), &Dialect::default()).unwrap();
     table.set_time(&["when"]).unwrap();

@@ -1,13 +1,13 @@
 //! Words of a column in its unit: `words: off, on` says that 0 is `off` and 1 is `on`. Recordings know numbers only.
 
-use fewbits_table::{Cells, names};
+use fewbits_table::names;
 
 const PREFIX: &str = "words: ";
 /// Largest length of a unit.
 const MAX_UNIT: usize = 1024;
 
 /// The unit of a column of words; empty if the words are too long for a unit.
-pub(crate) fn unit(words: &[String]) -> String {
+pub fn unit(words: &[String]) -> String {
     let quoted: Vec<String> = words
         .iter()
         .map(|word| format!("\"{}\"", word.replace('"', "\"\"")))
@@ -21,7 +21,7 @@ pub(crate) fn unit(words: &[String]) -> String {
 }
 
 /// The words that a unit lists; `None` if it is the unit of numbers.
-pub(crate) fn of(unit: &str) -> Option<Vec<String>> {
+pub fn of(unit: &str) -> Option<Vec<String>> {
     let list = unit.strip_prefix(PREFIX)?;
     Some(
         names::pieces(list, ',')
@@ -29,16 +29,6 @@ pub(crate) fn of(unit: &str) -> Option<Vec<String>> {
             .map(|word| names::unquoted(word))
             .collect(),
     )
-}
-
-/// The first of these cells of words whose word, or place among the words, `stated` has not; `None` if there is none.
-pub(crate) fn other(cells: &Cells, known: &[String], stated: &[String]) -> Option<usize> {
-    let Cells::Words(cells) = cells else { return None };
-    let is_other = |cell: &Option<u32>| {
-        let index = cell.as_ref().map(|index| *index as usize);
-        index.is_some_and(|index| known.get(index) != stated.get(index))
-    };
-    cells.iter().position(is_other)
 }
 
 #[cfg(test)]
