@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
-import pathlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +10,7 @@ from ._fewbits import Table
 from .errors import ArgumentError
 
 if TYPE_CHECKING:
+    import pathlib
     from os import PathLike
 
 
@@ -31,8 +29,10 @@ def figures(folder: str | PathLike[str]) -> Table:
     >>> table["n"].tolist(), table["error"].tolist(), table["kind"].tolist()
     ([1, 2], [0.5, nan], ['a', 'b'])
     """
-    found = [_read(path) for path in sorted(pathlib.Path(folder).glob("*.json"))]
-    found = [one for one in found if one is not None]
+    import pathlib
+
+    made = (_read(path) for path in sorted(pathlib.Path(folder).glob("*.json")))
+    found = [one for one in made if one is not None]
     if not found:
         raise ArgumentError("folder", f"'{folder}'", "a folder that `cargo xtask figures --out` made")
     verdicts = [[claim.get("verdict") for claim in one.get("claims", [])] for one in found]
@@ -50,6 +50,9 @@ def figures(folder: str | PathLike[str]) -> Table:
 
 def figure(folder: str | PathLike[str], name: str) -> dict[str, Table]:
     """The tables of one figure, by their names. A column has whole numbers, numbers (NaN where a cell is empty) or texts. See `figures`."""
+    import csv
+    import pathlib
+
     whole = _read(pathlib.Path(folder) / f"{name}.json")
     if whole is None:
         raise ArgumentError("name", f"'{name}'", "the name of a figure in this folder, see `figures`")
@@ -63,6 +66,8 @@ def figure(folder: str | PathLike[str], name: str) -> dict[str, Table]:
 
 
 def _read(path: pathlib.Path) -> dict[str, Any] | None:
+    import json
+
     try:
         made = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -26,13 +26,15 @@ def plot(table: Table, *, x: str | None = None, y: str | list[str] | None = None
         raise ArgumentError("band", str(band), "a share between 0 and 1")
     names = table.columns
     x = names[0] if x is None else x
+    if not isinstance(x, str):
+        raise ArgumentError("x", type(x).__name__, "the name of a column")
     drawn = [y] if isinstance(y, str) else y
     if drawn is None:
         drawn = [name for name in names if f"{name}_sd" in names]
-    if not drawn:
+    if isinstance(drawn, (list, tuple)) and not drawn:
         drawn = [name for name in names if name != x and table[name].dtype.kind in "fiu"]
     for name in [x, *drawn]:
-        if name not in names:
+        if not isinstance(name, str) or name not in names:
             raise ArgumentError("y", f"'{name}'", f"one of {', '.join(names)}")
     from statistics import NormalDist
 
