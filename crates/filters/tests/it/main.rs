@@ -8,6 +8,7 @@ mod centre;
 mod contract;
 mod failure;
 mod imm;
+mod own_law;
 mod particle;
 mod rao_blackwell;
 mod resample;
