@@ -104,7 +104,7 @@ where
     }
 
     fn events(&self) -> Vec<ReceiverEvent> {
-        let place = |number: u32| self.numbers.iter().position(|known| *known == number);
+        let place = |number: u32| self.numbers.binary_search(&number).ok();
         let event = |event: &Event| {
             Some(match *event {
                 Event::Dead(number) => ReceiverEvent::Dead(place(number)?),
@@ -114,6 +114,10 @@ where
                 Event::Lost => ReceiverEvent::Lost,
                 Event::NoiseOverstated => ReceiverEvent::NoiseOverstated,
                 Event::Reacquired => ReceiverEvent::Reacquired,
+                Event::Rejected(number) => ReceiverEvent::Rejected(place(number)?),
+                Event::Disputed(number) => ReceiverEvent::Disputed(place(number)?),
+                Event::Copied(number) => ReceiverEvent::Copied(place(number)?),
+                Event::Reopened => ReceiverEvent::Reopened,
                 _ => return None,
             })
         };
