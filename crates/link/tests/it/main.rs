@@ -9,5 +9,6 @@ mod pairs;
 mod restarts;
 mod stops;
 mod transports;
+mod unchanged;
 mod world;
 mod worlds;
