@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod design;
+mod doors;
 mod fleet;
+mod kills;
 mod language;
 mod links;
 mod live;

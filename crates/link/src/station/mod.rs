@@ -200,6 +200,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         if self.said_behind.is_none_or(is_new) {
             self.said_behind = Some(now);
             let wait = schedule.start(self.centre.slot().saturating_add(1)).saturating_sub(now);
+            tracing::warn!(seconds = wait / 1_000_000_000, "no slot begins: the clock is behind the last one");
             outputs.push(Output::ClockBehind { wait });
         }
     }
@@ -236,6 +237,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             (Some(place), Ok(taken)) => (place, taken),
             (_, outcome) => {
                 let refusal = outcome.err().unwrap_or(Refusal::Unknown);
+                tracing::debug!(sensor = sensor_of(bytes), ?refusal, "an envelope was refused");
                 counts.into_iter().for_each(|counts| counts.add(refusal));
                 return Ok(());
             }
@@ -286,6 +288,17 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         step.estimate = self.receiver.estimate();
         step.health = self.receiver.health();
         step.events = self.receiver.events();
+        for event in &step.events {
+            let sensor = event
+                .sensor()
+                .and_then(|sensor| self.remotes.get(sensor))
+                .map(|remote| remote.number);
+            tracing::info!(slot, sensor, "{}", event.name());
+        }
+        if let Some(trouble) = &step.trouble {
+            tracing::warn!(slot, "{trouble}");
+        }
+        tracing::debug!(slot, reports = step.reports(), "a slot was updated");
         self.last = Some(step);
         self.is_held = true;
         // If it cannot be stored now, it is published with the next slot that can be.
@@ -304,6 +317,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             Err(error) if error.is_of_file() => {
                 let source = std::error::Error::source(&error).map(ToString::to_string);
                 let reason = format!("cannot store the state: {error}: {}", source.unwrap_or_default());
+                tracing::warn!(slot, "{reason}");
                 outputs.push(Output::Passed { slot, reason });
                 Ok(false)
             }
@@ -334,6 +348,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             }
             Err(error) => {
                 let reason = error.to_string();
+                tracing::warn!(slot, "the slot passes: {reason}");
                 outputs.push(Output::Passed { slot, reason });
                 Ok(())
             }

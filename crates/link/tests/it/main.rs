@@ -8,6 +8,7 @@ mod live;
 mod pairs;
 mod restarts;
 mod stops;
+mod traces;
 mod transports;
 mod unchanged;
 mod world;
