@@ -137,7 +137,10 @@ impl Shard {
         let time = Instant::now();
         // A few at a time: the centre's answers come in between.
         for _ in 0..64 {
-            let Some((_, index)) = self.hellos.pop_front_if(|(at, _)| *at <= time) else {
+            if self.hellos.front().is_none_or(|(at, _)| *at > time) {
+                break;
+            }
+            let Some((_, index)) = self.hellos.pop_front() else {
                 break;
             };
             let again = match self.asked_at[index].elapsed() < HELLO_EVERY && self.links[index].counts().taken > 0 {

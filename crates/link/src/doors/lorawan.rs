@@ -4,8 +4,8 @@
 //! Sources: the integration events of ChirpStack (`UplinkEvent`, `DownlinkCommand`) and the data formats of The Things Stack
 //! (`ApplicationUp`, `DownlinkQueueRequest`), as JSON.
 
-use super::base64;
 use super::home_assistant::Message;
+use crate::base64;
 use crate::error::Error;
 use fewbits_numerics::error::refuse;
 use serde_json::{Value, json};

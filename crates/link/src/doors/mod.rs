@@ -9,7 +9,6 @@
 //! | [`cayenne`] | in | LoRaWAN devices with Cayenne LPP payloads |
 //! | [`lorawan`] | in, out | ChirpStack and The Things Stack over MQTT: uplinks, downlinks |
 
-mod base64;
 pub mod cayenne;
 pub mod home_assistant;
 mod influx;
