@@ -6,6 +6,7 @@ mod floods;
 mod followed;
 mod live;
 mod pairs;
+mod prometheus;
 mod restarts;
 mod stops;
 mod traces;
