@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[cfg(feature = "mqtt")]
+mod brokers;
 mod design;
 mod doors;
 mod fleet;
