@@ -187,6 +187,15 @@ pub(crate) struct ReceiveOptions {
     /// Bits per second of the serial line.
     #[arg(long, default_value_t = 115200, value_name = "BAUD")]
     pub(crate) baud: u32,
+    /// Messages of other programs instead of frames: readings as rows `time,name,value,unit`.
+    #[arg(long, value_enum, conflicts_with_all = ["udp", "serial"])]
+    pub(crate) format: Option<crate::link::messages::Format>,
+    /// With `--format`: read the messages on this topic of a broker, as `mqtt://user:password@host/application/+/device/+/event/up`.
+    #[arg(long, value_name = "MQTT", requires = "format", conflicts_with = "file")]
+    pub(crate) mqtt: Option<String>,
+    /// With `--format lorawan`: only this device, by its EUI or name.
+    #[arg(long, value_name = "DEVICE", requires = "format")]
+    pub(crate) device: Option<String>,
     /// Frames are those of one sensor with the adaptive encoder of `fewbits-node`, within this bound: `±0.05`, on a circle `±2@360`. Rows
     /// are slots and values. From a loss that is noticed to the next refresh there are gaps.
     #[arg(long, value_name = "BOUND", conflicts_with = "udp", allow_hyphen_values = true)]

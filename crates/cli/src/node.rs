@@ -6,7 +6,6 @@ use crate::bounds::{self, Spec};
 use crate::error::Error;
 use crate::output::{Cell, Shape, Sheet};
 use crate::say::say;
-use crate::serial::Frames;
 use fewbits_adaptive::{Config, Packet, Receiver};
 use fewbits_core::{BitString, Message, Observation};
 use fewbits_protocol::{Check, Frame, Kind, Payload, digest};
@@ -36,14 +35,14 @@ pub(crate) fn config(bound: &str, sequence_bits: u32) -> Result<Config, Error> {
 pub(crate) fn receive(
     options: &ReceiveOptions,
     config: Config,
-    frames: &mut Frames,
     name: &str,
+    mut next: impl FnMut() -> std::io::Result<Option<Vec<u8>>>,
 ) -> Result<Ending, Error> {
     let names = ["slot", "value"].map(str::to_owned).to_vec();
     let mut sheet = Sheet::new(options.output.as_deref(), Shape::Csv, names)?;
     let mut sensor = Slots::new(config);
     let mut understood = false;
-    while let Some(bytes) = frames.next().map_err(Error::io(name, "read"))? {
+    while let Some(bytes) = next().map_err(Error::io(name, "read"))? {
         match sensor.frame(&bytes) {
             Ok(rows) => {
                 understood = true;

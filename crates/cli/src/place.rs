@@ -5,13 +5,24 @@ use fewbits_link::mqtt::rumqttc::v5::MqttOptions;
 #[cfg(feature = "zenoh")]
 use fewbits_link::zenoh::zenoh::{Config, Session, Wait};
 
-/// `host:port`, `mqtt://[user:password@]host[:port]/fleet` or `zenoh://host:port/fleet`.
+/// Port of the application on which sensors behind a LoRaWAN server send, unless another is given.
+#[cfg(feature = "mqtt")]
+const LORAWAN_PORT: u8 = 10;
+
+/// `host:port`, `chirpstack://[user:password@]host[:port]/application[/port]`, `ttn://` the same, `mqtt://[user:password@]host[:port]/fleet` or `zenoh://host:port/fleet`.
 pub(crate) enum Place<'a> {
     Udp(&'a str),
     #[cfg(feature = "mqtt")]
     Mqtt {
         broker: &'a str,
         fleet: &'a str,
+    },
+    /// Devices of a LoRaWAN network server.
+    #[cfg(feature = "mqtt")]
+    Lorawan {
+        broker: &'a str,
+        server: fewbits_link::doors::lorawan::Server,
+        port: u8,
     },
     #[cfg(feature = "zenoh")]
     Zenoh {
@@ -28,10 +39,25 @@ impl<'a> Place<'a> {
         match (kind, rest.split_once('/')) {
             #[cfg(feature = "mqtt")]
             ("mqtt", Some((broker, fleet))) => Ok(Self::Mqtt { broker, fleet }),
+            #[cfg(feature = "mqtt")]
+            ("chirpstack" | "ttn", Some((broker, application))) => {
+                use fewbits_link::doors::lorawan::Server;
+                // A port of the application may follow.
+                let (application, port) = match application.rsplit_once('/').map(|(rest, port)| (rest, port.parse())) {
+                    Some((rest, Ok(port))) => (rest, port),
+                    _ => (application, LORAWAN_PORT),
+                };
+                let application = application.to_owned();
+                let server = match kind {
+                    "ttn" => Server::TheThings(application),
+                    _ => Server::ChirpStack(application),
+                };
+                Ok(Self::Lorawan { broker, server, port })
+            }
             #[cfg(feature = "zenoh")]
             ("zenoh", Some((endpoint, fleet))) => Ok(Self::Zenoh { endpoint, fleet }),
             #[cfg(not(feature = "mqtt"))]
-            ("mqtt", _) => {
+            ("mqtt" | "chirpstack" | "ttn", _) => {
                 Err(format!("{}: this program was built without it: build it with `--features mqtt`", shown(text)))
             }
             #[cfg(not(feature = "zenoh"))]
@@ -49,7 +75,16 @@ impl<'a> Place<'a> {
 /// The text without user and password, for messages: what stands before the last `@` is left out.
 pub(crate) fn shown(text: &str) -> String {
     let (kind, rest) = text.split_once("://").map_or(("", text), |(kind, rest)| (kind, rest));
-    let rest = rest.rsplit_once('@').map_or(rest, |(_, place)| place);
+    // An application of The Things Stack has an `@` of its own.
+    let application = if kind == "ttn" {
+        rest.rfind('/').unwrap_or(rest.len())
+    } else {
+        rest.len()
+    };
+    let rest = match rest[..application].rfind('@') {
+        Some(at) => &rest[at + 1..],
+        None => rest,
+    };
     match kind {
         "" => rest.to_owned(),
         kind => format!("{kind}://{rest}"),

@@ -72,6 +72,16 @@ impl Report {
         kind.ok_or_else(|| format!("report is `{word}`: expected {expected}"))
     }
 
+    /// The words that [`of_word`](Self::of_word) reads.
+    pub(crate) fn word(self) -> String {
+        match self {
+            Self::Sign => "bit".to_owned(),
+            Self::Word { bits } => format!("word:{bits}"),
+            Self::Value => "value".to_owned(),
+            Self::Censored { threshold } => format!("silent:{threshold}"),
+        }
+    }
+
     /// Whether the sensor is told the covariance of the state.
     pub(crate) fn needs_coordinates(self) -> bool {
         matches!(self, Self::Censored { .. })

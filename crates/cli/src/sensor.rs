@@ -98,6 +98,10 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
             let mut mqtt = fewbits_link::mqtt::Mqtt::sensor(broker, fleet, given.number)?;
             run_sensor(&mut mqtt, &given.number, &mut link, &mut program)?;
         }
+        #[cfg(feature = "mqtt")]
+        Place::Lorawan { .. } => {
+            return Err(configured(file)("centre: a sensor behind a LoRaWAN server is a device, not a process"));
+        }
         #[cfg(feature = "zenoh")]
         Place::Zenoh { endpoint, fleet } => {
             let session = crate::place::zenoh(endpoint, false).map_err(configured(file))?;

@@ -4,6 +4,7 @@ use crate::contract::{Info, StateFilter};
 use crate::imm::{ImmWorkspace, by_rows, evenly, mix, weigh};
 use crate::{Error, ImmBelief};
 use fewbits_core::{Gaussian, GaussianDynamics, Likelihood, ScaledNoise};
+use fewbits_numerics::LogSum;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
 use rand::Rng;
 
@@ -153,11 +154,18 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
     }
 
     fn mixture(&self, belief: &ImmBelief<D>) -> Option<Vec<(f64, Gaussian<D>)>> {
-        // Only filters of moments have the law of their Gaussians.
-        let of = |(j, mode): (usize, &Gaussian<D>)| {
-            self.filters.get(j)?.of_moments(mode)?;
-            Some((belief.probabilities()[j].ln(), *mode))
-        };
-        belief.modes().iter().enumerate().map(of).collect()
+        let mut all = Vec::new();
+        for ((filter, mode), probability) in self.filters.iter().zip(belief.modes()).zip(belief.probabilities()) {
+            let log = probability.ln();
+            // Filters of moments have the law of their Gaussian.
+            if filter.of_moments(mode).is_some() {
+                all.push((log, *mode));
+                continue;
+            }
+            let parts = filter.mixture(mode)?;
+            let total = parts.iter().map(|(log, _)| *log).collect::<LogSum>().value();
+            all.extend(parts.into_iter().map(|(part, gaussian)| (log + part - total, gaussian)));
+        }
+        Some(all)
     }
 }

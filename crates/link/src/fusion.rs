@@ -7,6 +7,9 @@ use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{BoxError, Receiver, ReceiverEvent, SensorHealth};
 use serde::{Serialize, de::DeserializeOwned};
 
+/// First byte of a state: CBOR follows behind two numbers. JSON begins otherwise.
+const COMPACT: u8 = 1;
+
 /// A [`FusionCentre`] that advances by one period per slot. Sensors are numbered in increasing order of their numbers there.
 ///
 /// The random stream of a slot is a function of seed and slot, so a stopped centre continues with the same draws.
@@ -104,7 +107,7 @@ where
     }
 
     fn events(&self) -> Vec<ReceiverEvent> {
-        let place = |number: u32| self.numbers.iter().position(|known| *known == number);
+        let place = |number: u32| self.numbers.binary_search(&number).ok();
         let event = |event: &Event| {
             Some(match *event {
                 Event::Dead(number) => ReceiverEvent::Dead(place(number)?),
@@ -114,6 +117,10 @@ where
                 Event::Lost => ReceiverEvent::Lost,
                 Event::NoiseOverstated => ReceiverEvent::NoiseOverstated,
                 Event::Reacquired => ReceiverEvent::Reacquired,
+                Event::Rejected(number) => ReceiverEvent::Rejected(place(number)?),
+                Event::Disputed(number) => ReceiverEvent::Disputed(place(number)?),
+                Event::Copied(number) => ReceiverEvent::Copied(place(number)?),
+                Event::Reopened => ReceiverEvent::Reopened,
                 _ => return None,
             })
         };
@@ -121,13 +128,26 @@ where
     }
 
     fn state(&self) -> Result<BitString, BoxError> {
-        let bytes = serde_json::to_vec(&(self.origin, self.slot, self.centre.state()))?;
+        let mut bytes = vec![COMPACT];
+        bytes.extend(self.origin.unwrap_or(u64::MAX).to_be_bytes());
+        bytes.extend(self.slot.to_be_bytes());
+        bytes.extend(self.centre.state().to_bytes()?);
         let bits = 8 * bytes.len();
         Ok(BitString::from_bytes(bytes, bits)?)
     }
 
     fn restore(&mut self, state: &BitString) -> Result<(), BoxError> {
-        let (origin, slot, state): (_, _, CentreState<F::Belief>) = serde_json::from_slice(state.bytes())?;
+        let (origin, slot, state) = match state.bytes() {
+            [COMPACT, rest @ ..] => {
+                let short = "the state ends too early";
+                let (origin, rest) = rest.split_first_chunk().ok_or(short)?;
+                let (slot, rest) = rest.split_first_chunk().ok_or(short)?;
+                let origin = Some(u64::from_be_bytes(*origin)).filter(|origin| *origin != u64::MAX);
+                (origin, u64::from_be_bytes(*slot), CentreState::<F::Belief>::from_bytes(rest)?)
+            }
+            // As earlier programs wrote it.
+            json => serde_json::from_slice(json)?,
+        };
         self.centre.restore(state)?;
         (self.origin, self.slot) = (origin, slot);
         Ok(())

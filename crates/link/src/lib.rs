@@ -34,6 +34,7 @@
 //!
 //! Not here: radio and energy (`fewbits-network`), estimators.
 
+mod base64;
 pub mod doors;
 mod envelope;
 mod error;

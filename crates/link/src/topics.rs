@@ -47,47 +47,42 @@ impl Topics {
     }
 
     /// The sensor number in the topic of a received datagram.
-    fn sensor_of(&self, topic: &str) -> Option<u32> {
+    pub(crate) fn sensor_of(&self, topic: &str) -> Option<u32> {
         let rest = topic.strip_prefix(&self.fleet)?.strip_prefix('/')?;
         rest.strip_suffix(self.ways().1)?.strip_suffix('/')?.parse().ok()
     }
 }
 
-/// The sending end of the queue, for a thread of the transport.
-pub(crate) struct Inlet {
-    topics: Topics,
-    sender: mpsc::SyncSender<(u32, Vec<u8>)>,
-}
+/// The sending end of a queue, for a thread of the transport.
+pub(crate) struct Inlet<A>(mpsc::SyncSender<(A, Vec<u8>)>);
 
-impl Inlet {
-    pub(crate) fn leave(&self, topic: &str, bytes: impl AsRef<[u8]> + Into<Vec<u8>>) {
-        if let Some(sensor) = self
-            .topics
-            .sensor_of(topic)
-            .filter(|_| bytes.as_ref().len() <= MAX_DATAGRAM)
-        {
-            let _ = self.sender.try_send((sensor, bytes.into()));
+impl<A> Inlet<A> {
+    /// Both ends of a queue.
+    pub(crate) fn new() -> (Self, Queue<A>) {
+        let (sender, receiver) = mpsc::sync_channel(QUEUE);
+        let last = Vec::new();
+        (Self(sender), Queue { receiver, last })
+    }
+
+    /// Leaves a datagram from this address. What is too long for one, or for which there is no room, is dropped.
+    pub(crate) fn leave(&self, from: A, bytes: &[u8]) {
+        if bytes.len() <= MAX_DATAGRAM {
+            let _ = self.0.try_send((from, bytes.to_vec()));
         }
     }
 }
 
 /// The queue of received datagrams.
 #[derive(Debug)]
-pub(crate) struct Queue {
-    receiver: mpsc::Receiver<(u32, Vec<u8>)>,
+pub(crate) struct Queue<A> {
+    receiver: mpsc::Receiver<(A, Vec<u8>)>,
     last: Vec<u8>,
 }
 
-impl Queue {
-    pub(crate) fn new(topics: Topics) -> (Inlet, Self) {
-        let (sender, receiver) = mpsc::sync_channel(QUEUE);
-        let last = Vec::new();
-        (Inlet { topics, sender }, Self { receiver, last })
-    }
-
-    pub(crate) fn receive(&mut self, wait: Duration) -> Option<Datagram<'_, u32>> {
-        let (sensor, bytes) = self.receiver.recv_timeout(wait).ok()?;
+impl<A> Queue<A> {
+    pub(crate) fn receive(&mut self, wait: Duration) -> Option<Datagram<'_, A>> {
+        let (from, bytes) = self.receiver.recv_timeout(wait).ok()?;
         self.last = bytes;
-        Some((sensor, &self.last))
+        Some((from, &self.last))
     }
 }

@@ -5,6 +5,7 @@ use crate::sensor::{Request, SensorLink};
 use crate::station::{Output, Station};
 use fewbits_core::BitString;
 use fewbits_protocol::{Note, Receiver, Slot};
+use std::collections::VecDeque;
 use std::fmt::{Debug, Display};
 use std::ops::ControlFlow;
 use std::str::FromStr;
@@ -14,6 +15,10 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 pub(crate) const MAX_DATAGRAM: usize = 65_535;
 /// Largest number of datagrams that a station processes before timers are checked again: many datagrams do not delay a slot.
 const BATCH: usize = 256;
+/// So many datagrams are sent at once; before the next ones a station takes in what has come, for this time at least. Otherwise the questions
+/// to many sensors would overflow the buffers between, and so would their answers.
+const BURST: usize = 64;
+const BURST_PAUSE: u64 = 1_000_000;
 /// Longest wait: the caller is asked ten times a second whether to continue.
 const MAX_WAIT: Duration = Duration::from_millis(100);
 const HELLO_EVERY: Duration = Duration::from_secs(1);
@@ -88,6 +93,7 @@ pub fn run_station<R: Receiver, T: Transport>(
     mut watch: impl FnMut(&Station<R, T::Address>, &[Output<T::Address>]) -> ControlFlow<()>,
 ) -> Result<(), Error> {
     let mut outputs = Vec::new();
+    let mut waiting: VecDeque<(T::Address, Vec<u8>)> = VecDeque::new();
     let mut said_unset = None::<Instant>;
     loop {
         let is_set = now() >= EARLIEST;
@@ -98,9 +104,21 @@ pub fn run_station<R: Receiver, T: Transport>(
             let wait = EARLIEST - now();
             outputs.push(Output::ClockBehind { wait });
         }
+        let mut room = BURST;
+        while room > 0
+            && let Some((to, bytes)) = waiting.pop_front()
+        {
+            transport.send(&to, &bytes);
+            room -= 1;
+        }
         for output in &outputs {
-            if let Output::Datagram { to, bytes } = output {
-                transport.send(to, bytes);
+            match output {
+                Output::Datagram { to, bytes } if room > 0 => {
+                    transport.send(to, bytes);
+                    room -= 1;
+                }
+                Output::Datagram { to, bytes } => waiting.push_back((to.clone(), bytes.clone())),
+                _ => {}
             }
         }
         if watch(station, &outputs).is_break() {
@@ -108,7 +126,11 @@ pub fn run_station<R: Receiver, T: Transport>(
         }
         outputs.clear();
         // What datagrams cause is sent in the next round, and watched then.
-        let until = station.next_timer().filter(|_| is_set).unwrap_or(u64::MAX);
+        let timer = station.next_timer().filter(|_| is_set).unwrap_or(u64::MAX);
+        let until = match waiting.is_empty() {
+            true => timer,
+            false => timer.min(now() + BURST_PAUSE),
+        };
         receive(transport, until, BATCH, |from, bytes| station.on_datagram(from, bytes, &mut outputs))?;
     }
 }

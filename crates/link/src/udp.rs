@@ -110,7 +110,10 @@ fn read(socket: &UdpSocket, queue: &Queue, sender: &mpsc::Sender<Arrived>) {
                 | ErrorKind::HostUnreachable
                 | ErrorKind::NetworkUnreachable => {}
                 // The interface may come back, and memory too. The pause keeps the thread from spinning.
-                ErrorKind::NetworkDown | ErrorKind::OutOfMemory => std::thread::sleep(PAUSE),
+                ErrorKind::NetworkDown | ErrorKind::OutOfMemory => {
+                    tracing::warn!(%error, "the socket cannot be read for a moment");
+                    std::thread::sleep(PAUSE);
+                }
                 _ => {
                     let _ = sender.send(Err(error));
                     return;

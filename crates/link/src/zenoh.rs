@@ -1,7 +1,7 @@
 //! Datagrams over zenoh, between peers or through routers.
 
 use crate::error::Error;
-use crate::topics::{Queue, Topics};
+use crate::topics::{Inlet, Queue, Topics};
 use crate::transport::{Datagram, Transport};
 pub use ::zenoh;
 use ::zenoh::pubsub::Subscriber;
@@ -16,7 +16,7 @@ use std::time::Duration;
 pub struct Zenoh {
     session: Session,
     topics: Topics,
-    queue: Queue,
+    queue: Queue<u32>,
     /// Receives datagrams until it is dropped.
     _subscriber: Subscriber<()>,
 }
@@ -39,11 +39,13 @@ impl Zenoh {
     }
 
     fn subscribe(session: Session, topics: Topics) -> Result<Self, Error> {
-        let (inlet, queue) = Queue::new(topics.clone());
-        let key = topics.from("*");
-        let subscriber = session
-            .declare_subscriber(&key)
-            .callback(move |sample| inlet.leave(sample.key_expr().as_str(), sample.payload().to_bytes()));
+        let (inlet, queue) = Inlet::new();
+        let (key, own) = (topics.from("*"), topics.clone());
+        let subscriber = session.declare_subscriber(&key).callback(move |sample| {
+            if let Some(sensor) = own.sensor_of(sample.key_expr().as_str()) {
+                inlet.leave(sensor, &sample.payload().to_bytes());
+            }
+        });
         let subscriber = subscriber.wait();
         Ok(Self {
             _subscriber: subscriber.map_err(|error| Error::socket(key, std::io::Error::other(error)))?,

@@ -82,6 +82,14 @@ pub enum ReceiverEvent {
     NoiseOverstated,
     /// The estimate began anew.
     Reacquired,
+    /// The sensor's report was not used in this slot: it is impossible, or too unlikely beside the others.
+    Rejected(usize),
+    /// The sensor contradicts another, and nothing decides which of them is wrong.
+    Disputed(usize),
+    /// A second, equal report of the sensor was dropped.
+    Copied(usize),
+    /// The estimate was widened, since most reports contradicted it.
+    Reopened,
 }
 
 impl ReceiverEvent {
@@ -95,16 +103,24 @@ impl ReceiverEvent {
             Self::Lost => "lost",
             Self::NoiseOverstated => "noise overstated",
             Self::Reacquired => "reacquired",
+            Self::Rejected(_) => "rejected",
+            Self::Disputed(_) => "disputed",
+            Self::Copied(_) => "copied",
+            Self::Reopened => "reopened",
         }
     }
 
     /// The sensor; `None` if the event is about all.
     pub fn sensor(self) -> Option<usize> {
         match self {
-            Self::Dead(sensor) | Self::Alive(sensor) | Self::Excluded(sensor) | Self::Readmitted(sensor) => {
-                Some(sensor)
-            }
-            Self::Lost | Self::NoiseOverstated | Self::Reacquired => None,
+            Self::Dead(sensor)
+            | Self::Alive(sensor)
+            | Self::Excluded(sensor)
+            | Self::Readmitted(sensor)
+            | Self::Rejected(sensor)
+            | Self::Disputed(sensor)
+            | Self::Copied(sensor) => Some(sensor),
+            Self::Lost | Self::NoiseOverstated | Self::Reacquired | Self::Reopened => None,
         }
     }
 }

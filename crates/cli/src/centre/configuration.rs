@@ -31,6 +31,18 @@ pub(super) struct Configuration {
     pub(super) sensors: Vec<Sensor>,
     /// The secret from which the keys of sensors without one follow.
     pub(super) fleet: Option<FleetKey>,
+    /// Broker and name of the fleet at which Home Assistant finds the estimates.
+    pub(super) home_assistant: Option<String>,
+    /// Names and units of the coordinates of the state there.
+    pub(super) coordinates: Vec<Coordinate>,
+}
+
+#[derive(Deserialize, Clone)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Coordinate {
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) unit: String,
 }
 
 #[derive(Debug, Deserialize, Clone, Copy)]
@@ -184,6 +196,21 @@ impl Configuration {
         if let (Some(model), Some(prior)) = (model, &prior) {
             check_prior(model.coordinates(), prior, faults);
         }
+        let home_assistant = faults.take::<String>(&mut table, "home_assistant");
+        if let Some(Err(fault)) = home_assistant.as_deref().map(super::home::parts) {
+            faults.add(fault);
+        }
+        let coordinates = faults
+            .take::<Vec<Coordinate>>(&mut table, "coordinates")
+            .unwrap_or_default();
+        if let Some(model) = model.filter(|model| !(coordinates.is_empty() || coordinates.len() == model.coordinates()))
+        {
+            let expected = model.coordinates();
+            faults.add(format_args!(
+                "coordinates: {} entries: expected {expected}, as many as the model has",
+                coordinates.len()
+            ));
+        }
         let fleet = fleet_key(&mut table, file, faults);
         let revoked = faults.take::<Vec<u32>>(&mut table, "revoked").unwrap_or_default();
         let entries = faults.need::<Vec<Value>>(&mut table, "sensor").unwrap_or_default();
@@ -221,6 +248,8 @@ impl Configuration {
             prior: prior?,
             sensors,
             fleet,
+            home_assistant,
+            coordinates,
         })
     }
 }

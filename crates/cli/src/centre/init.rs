@@ -3,6 +3,7 @@
 use super::configuration::Configuration;
 use crate::Ending;
 use crate::error::Error;
+use crate::report::Report;
 use crate::say::say;
 use fewbits_link::{FleetKey, write_private};
 use std::io::Read;
@@ -38,15 +39,19 @@ loss = 0.05                  # probability that a question or its report is lost
     )
 }
 
-fn sensor(number: u32, key: &str, centre: &str, like: Option<&super::Sensor>) -> String {
-    let (deviation, note) = match like {
-        Some(sensor) => (sensor.deviation, ""),
-        None => (0.5, ""),
-    };
-    format!(
+/// The file of one sensor. `given` is the configuration that it must agree with; without it, the template.
+fn sensor(number: u32, key: &str, centre: &str, given: Option<(&Configuration, &super::Sensor)>) -> String {
+    let (deviation, report) = given.map_or((0.5, Report::Sign), |(_, like)| (like.deviation, like.report));
+    let mut text = format!(
         "centre = \"{centre}\"   # the centre's address, as this sensor reaches it\nnumber = {number}\nkey = \"{key}\"\n\
-         deviation = {deviation}{note}\nreport = \"bit\"               # as in the centre's file\nstate = \"sensor-{number}.state\"\n"
-    )
+         deviation = {deviation}\nreport = \"{}\"               # as in the centre's file\nstate = \"sensor-{number}.state\"\n",
+        report.word()
+    );
+    if let Some((given, like)) = given.filter(|_| report.needs_coordinates()) {
+        // A censoring sensor is told the covariance of the whole state.
+        text += &format!("coordinates = {}\nreads = {}\n", given.model.coordinates(), like.reads);
+    }
+    text
 }
 
 /// Writes the files. None of them may exist.
@@ -90,7 +95,12 @@ pub(super) fn print_sensor(file: &Path, given: &Configuration, number: u32) -> R
         if fleet.key_of(number, version)?.fingerprint() == like.key.fingerprint() {
             crate::output::text(
                 None,
-                &sensor(number, &fleet.hex_of(number, version)?, &crate::place::shown(&given.listen), Some(like)),
+                &sensor(
+                    number,
+                    &fleet.hex_of(number, version)?,
+                    &crate::place::shown(&given.listen),
+                    Some((given, like)),
+                ),
             )?;
             return Ok(Ending::Good);
         }

@@ -1,6 +1,7 @@
 //! `fewbits centre`: a fusion centre over UDP, MQTT or zenoh. Each slot's estimate is a row on standard output.
 
 mod configuration;
+mod home;
 mod init;
 mod log;
 mod rows;
@@ -46,6 +47,15 @@ pub(crate) fn run(options: &CentreOptions) -> Result<Ending, Error> {
             Some(|| {
                 let broker = crate::place::mqtt(broker).map_err(configured(file))?;
                 Ok(fewbits_link::mqtt::Mqtt::centre(broker, fleet)?)
+            }),
+        ),
+        #[cfg(feature = "mqtt")]
+        Place::Lorawan { broker, server, port } => over(
+            options,
+            &given,
+            Some(|| {
+                let broker = crate::place::mqtt(broker).map_err(configured(file))?;
+                Ok(fewbits_link::mqtt::Lorawan::centre(broker, server, port)?)
             }),
         ),
         #[cfg(feature = "zenoh")]
@@ -184,13 +194,22 @@ fn serve<R: Receiver, T: Transport>(
     }
     let page = match options.live {
         Some(address) => {
-            let page = fewbits_link::LivePage::serve(address, numbers, given.period)?;
+            let page = fewbits_link::LivePage::serve(address, numbers.clone(), given.period)?;
             say!("page at http://{}/", page.address());
             Some(page)
         }
         None => None,
     };
+    let home = home::Home::open(given, &numbers, coordinates)?;
     let mut remaining = options.slots;
+    // A signal ends the centre after the step of the slot, which is stored: another process goes on with the next slot.
+    let stopped = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let stop = stopped.clone();
+    crate::interrupt::on_stop(move || {
+        say!("stopping after this slot; a second signal stops at once");
+        stop.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+    let mut has_step = false;
     // What is called at each step can only say whether to go on: its error is kept until the station has ended.
     let mut outcome = Ok(());
     run_station(&mut transport, station, |station, outputs| {
@@ -201,13 +220,18 @@ fn serve<R: Receiver, T: Transport>(
                 if let Some(page) = &page {
                     page.show(step, station.counts());
                 }
+                if let Some(home) = &home {
+                    home.show(step);
+                }
+                has_step = true;
                 if let Some(remaining) = &mut remaining {
                     *remaining = remaining.saturating_sub(1);
                 }
             }
         }
         log.look(station);
-        match outcome.is_err() || remaining == Some(0) {
+        let is_over = std::mem::take(&mut has_step) && stopped.load(std::sync::atomic::Ordering::Relaxed);
+        match outcome.is_err() || remaining == Some(0) || is_over {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         }

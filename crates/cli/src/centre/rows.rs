@@ -19,6 +19,8 @@ pub(crate) enum RowFormat {
     Influx,
     /// A list of SenML (RFC 8428) in JSON per slot.
     Senml,
+    /// A list of SenML in CBOR per slot, one behind the other.
+    SenmlCbor,
 }
 
 pub(super) struct Rows {
@@ -70,7 +72,12 @@ impl Rows {
                 let end = ((step.slot + 1) as f64 * self.period * 1e9) as u64;
                 influx_line("fewbits", step, &self.events(step), more, end)
             }
-            RowFormat::Senml => self.senml(step)?,
+            RowFormat::Senml => senml::to_json(&self.senml(step))?,
+            RowFormat::SenmlCbor => {
+                let bytes = senml::to_cbor(&self.senml(step))?;
+                let written = self.sink.write_all(&bytes).and_then(|()| self.sink.flush());
+                return written.map_err(Error::io("standard output", "write"));
+            }
         };
         self.line(&line)
     }
@@ -89,7 +96,7 @@ impl Rows {
     }
 
     fn csv(&self, step: &Step, refused: u64) -> String {
-        let mut row = format!("{},{}", step.slot, reports(step));
+        let mut row = format!("{},{}", step.slot, step.reports());
         for (mean, deviation) in &step.estimate {
             let _ = write!(row, ",{mean},{deviation}");
         }
@@ -120,7 +127,7 @@ impl Rows {
         });
         json!({
             "slot": step.slot,
-            "reports": reports(step),
+            "reports": step.reports(),
             "estimate": estimate,
             "refused": refused,
             "events": self.events(step),
@@ -130,17 +137,12 @@ impl Rows {
         .to_string()
     }
 
-    fn senml(&self, step: &Step) -> Result<String, Error> {
+    fn senml(&self, step: &Step) -> Vec<senml::Record> {
         let time = (step.slot + 1) as f64 * self.period;
         let records = step.estimate.iter().enumerate().flat_map(|(i, (mean, deviation))| {
             [("mean", *mean), ("deviation", *deviation)]
                 .map(|(name, value)| senml::Record::new(format!("fewbits:{name}{i}"), "", value, time))
         });
-        Ok(senml::to_json(&records.collect::<Vec<_>>())?)
+        records.collect()
     }
-}
-
-fn reports(step: &Step) -> usize {
-    let received = |o: &&Observation<_>| matches!(o, Observation::Received(_));
-    step.observed.iter().filter(received).count()
 }

@@ -1,4 +1,5 @@
 //! Frames of links to rows.
 
+pub(crate) mod messages;
 pub(crate) mod receive;
 mod tables;

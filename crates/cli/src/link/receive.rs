@@ -17,6 +17,9 @@ const WAIT: Duration = Duration::from_secs(60);
 
 /// Runs `receive`.
 pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
+    if let Some(format) = options.format {
+        return super::messages::run(options, format);
+    }
     let sensor = options.sensor.as_deref();
     let sensor = sensor
         .map(|bound| node::config(bound, options.sequence_bits))
@@ -26,13 +29,14 @@ pub(crate) fn run(options: &ReceiveOptions) -> Result<Ending, Error> {
         (None, Some(device), sensor) => {
             let mut frames = serial::Frames::of_line(serial::open(device, options.baud)?, options.timeout);
             match sensor {
-                Some(config) => node::receive(options, config, &mut frames, device),
+                Some(config) => node::receive(options, config, device, || frames.next()),
                 None => receive_frames(options, device, Senders::One, || frames.next()),
             }
         }
         (None, None, Some(config)) => {
             let (source, name) = recording::stream(&options.file)?;
-            node::receive(options, config, &mut serial::Frames::of_stream(source), name)
+            let mut frames = serial::Frames::of_stream(source);
+            node::receive(options, config, name, || frames.next())
         }
         (None, None, None) => receive_stream(options),
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Child;
 
 /// Slot, reports, mean.
-type Row = (u64, u32, f64);
+pub(crate) type Row = (u64, u32, f64);
 
 /// Writes a file that only its owner may read.
 fn private(path: &Path, content: &str) {
@@ -16,12 +16,12 @@ fn private(path: &Path, content: &str) {
     std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600)).unwrap();
 }
 
-fn key(digit: char) -> String {
+pub(crate) fn key(digit: char) -> String {
     digit.to_string().repeat(64)
 }
 
 /// Files of a centre at `place` and of its two sensors; the second has the key `second` at its side.
-fn written(folder: &Path, place: &str, second: &str) {
+pub(crate) fn written(folder: &Path, place: &str, second: &str) {
     let centre = format!(
         "listen = \"{place}\"\nperiod = 0.04\nstate = \"centre.state\"\n\
          model = {{ kind = \"random-walk\", density = 0.01 }}\nprior = {{ mean = [0.0], deviation = [10.0] }}\n\
@@ -75,16 +75,19 @@ fn ended(sensors: [Child; 2]) {
 }
 
 /// Both sensors at work.
-fn measuring(folder: &Path) -> [Child; 2] {
-    ["sensor1.toml", "sensor2.toml"].map(|file| {
-        let mut child = start(folder, &["sensor", file]);
-        let samples = "value\n".to_owned() + &"5.0\n5.2\n".repeat(800);
-        child.stdin.take().unwrap().write_all(samples.as_bytes()).unwrap();
-        child
-    })
+pub(crate) fn measuring(folder: &Path) -> [Child; 2] {
+    ["sensor1.toml", "sensor2.toml"].map(|file| sensor(folder, file))
 }
 
-fn free_place() -> String {
+/// A sensor at work.
+pub(crate) fn sensor(folder: &Path, file: &str) -> Child {
+    let mut child = start(folder, &["sensor", file]);
+    let samples = "value\n".to_owned() + &"5.0\n5.2\n".repeat(800);
+    child.stdin.take().unwrap().write_all(samples.as_bytes()).unwrap();
+    child
+}
+
+pub(crate) fn free_place() -> String {
     UdpSocket::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()
@@ -93,7 +96,7 @@ fn free_place() -> String {
 }
 
 /// Slot, reports and mean of each row.
-fn rows<'a>(mut lines: impl Iterator<Item = &'a str>) -> Vec<Row> {
+pub(crate) fn rows<'a>(mut lines: impl Iterator<Item = &'a str>) -> Vec<Row> {
     assert_eq!(lines.next(), Some("slot,reports,mean0,deviation0,refused,events"));
     let row = |line: &str| {
         let mut cells = line.split(',');

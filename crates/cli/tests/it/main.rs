@@ -2,8 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[cfg(feature = "mqtt")]
+mod brokers;
 mod design;
+mod doors;
 mod fleet;
+mod kills;
 mod language;
 mod links;
 mod live;

@@ -9,6 +9,7 @@ mod contract;
 mod failure;
 mod imm;
 mod lattice;
+mod own_law;
 mod particle;
 mod rao_blackwell;
 mod resample;

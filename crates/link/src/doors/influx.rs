@@ -1,7 +1,6 @@
 //! InfluxDB's line protocol.
 
 use crate::station::Step;
-use fewbits_core::Observation;
 use std::fmt::Write;
 
 /// A step as one line of InfluxDB's line protocol, without a line end. `time` is the end of its slot in nanoseconds since 1970.
@@ -9,8 +8,7 @@ use std::fmt::Write;
 /// The fields are `mean0`, `deviation0` and so on, `reports`, `sensors`, `refused` and `events`. A number that is not finite is left out,
 /// since the protocol has none.
 pub fn influx_line(measurement: &str, step: &Step, events: &str, refused: u64, time: u64) -> String {
-    let received = |o: &&Observation<_>| matches!(o, Observation::Received(_));
-    let reports = step.observed.iter().filter(received).count();
+    let reports = step.reports();
     let mut line = escaped(measurement, &[',', ' ']);
     let _ = write!(line, " reports={reports}i,sensors={}i,refused={refused}i", step.observed.len());
     for (i, (mean, deviation)) in step.estimate.iter().enumerate() {
@@ -42,6 +40,7 @@ fn escaped(text: &str, special: &[char]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fewbits_core::Observation;
 
     #[test]
     fn line_is_that_of_the_protocol() {

@@ -7,10 +7,12 @@
 //! | [`home_assistant`] | out | Home Assistant over MQTT, with discovery |
 //! | [`senml`] | in, out | gateways and CoAP servers: RFC 8428, JSON and CBOR |
 //! | [`cayenne`] | in | LoRaWAN devices with Cayenne LPP payloads |
+//! | [`lorawan`] | in, out | ChirpStack and The Things Stack over MQTT: uplinks, downlinks |
 
 pub mod cayenne;
 pub mod home_assistant;
 mod influx;
+pub mod lorawan;
 mod metrics;
 pub mod senml;
 

@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;
 use std::net::SocketAddr;
 use std::str::FromStr;
-use stored::{Remote, Stored};
+use stored::{Remote, Stored, text_of};
 
 /// Largest number of envelopes to one sensor in one slot.
 const COUNTERS_PER_SLOT: u64 = 1 << 16;
@@ -55,6 +55,8 @@ pub struct Station<R, A = SocketAddr> {
     is_held: bool,
     /// When it was last said that the clock is behind.
     said_behind: Option<u64>,
+    /// The estimator's state as it is stored, until the estimator changes.
+    state: Option<String>,
 }
 
 impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
@@ -112,9 +114,8 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             stored.take_remotes(start, &mut remotes, &places).map_err(refused)?;
             counted = stored.counted.max(stored.slot);
             if start == Start::Continue {
-                receiver
-                    .restore(&stored.receiver)
-                    .map_err(|error| refused(error.to_string()))?;
+                let state = stored.receiver().ok_or_else(|| refused("its estimator".to_owned()))?;
+                receiver.restore(&state).map_err(|error| refused(error.to_string()))?;
                 centre.resume(stored.slot);
                 last = stored.last;
             }
@@ -131,6 +132,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             last,
             is_held: false,
             said_behind: None,
+            state: None,
         })
     }
 
@@ -200,6 +202,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         if self.said_behind.is_none_or(is_new) {
             self.said_behind = Some(now);
             let wait = schedule.start(self.centre.slot().saturating_add(1)).saturating_sub(now);
+            tracing::warn!(seconds = wait / 1_000_000_000, "no slot begins: the clock is behind the last one");
             outputs.push(Output::ClockBehind { wait });
         }
     }
@@ -236,6 +239,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             (Some(place), Ok(taken)) => (place, taken),
             (_, outcome) => {
                 let refusal = outcome.err().unwrap_or(Refusal::Unknown);
+                tracing::debug!(sensor = sensor_of(bytes), ?refusal, "an envelope was refused");
                 counts.into_iter().for_each(|counts| counts.add(refusal));
                 return Ok(());
             }
@@ -278,6 +282,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         let observed = observed.into_iter().map(|o| o.unwrap_or(Observation::Nothing));
         let mut step = Step::new(slot, observed.collect(), Vec::new());
         step.asked = asked;
+        self.state = None;
         step.trouble = match update_asked(&mut self.receiver, step.observed_when_asked()) {
             Outcome::Used => None,
             Outcome::SilentDropped(error) => Some(format!("silent sensors were left out: {error}")),
@@ -286,6 +291,17 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         step.estimate = self.receiver.estimate();
         step.health = self.receiver.health();
         step.events = self.receiver.events();
+        for event in &step.events {
+            let sensor = event
+                .sensor()
+                .and_then(|sensor| self.remotes.get(sensor))
+                .map(|remote| remote.number);
+            tracing::info!(slot, sensor, "{}", event.name());
+        }
+        if let Some(trouble) = &step.trouble {
+            tracing::warn!(slot, "{trouble}");
+        }
+        tracing::debug!(slot, reports = step.reports(), "a slot was updated");
         self.last = Some(step);
         self.is_held = true;
         // If it cannot be stored now, it is published with the next slot that can be.
@@ -304,6 +320,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             Err(error) if error.is_of_file() => {
                 let source = std::error::Error::source(&error).map(ToString::to_string);
                 let reason = format!("cannot store the state: {error}: {}", source.unwrap_or_default());
+                tracing::warn!(slot, "{reason}");
                 outputs.push(Output::Passed { slot, reason });
                 Ok(false)
             }
@@ -326,6 +343,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         for (member, remote) in members.iter().zip(&mut self.remotes) {
             remote.asked = member.feedback == Feedback::Clock || remote.addresses.is_known();
         }
+        self.state = None;
         match predict_and_ask(&mut self.receiver, members, slot) {
             Ok((feedback, state)) => {
                 let mut actions = Vec::new();
@@ -334,6 +352,7 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
             }
             Err(error) => {
                 let reason = error.to_string();
+                tracing::warn!(slot, "the slot passes: {reason}");
                 outputs.push(Output::Passed { slot, reason });
                 Ok(())
             }
@@ -355,10 +374,17 @@ impl<R: Receiver, A: Clone + PartialEq + Display + FromStr> Station<R, A> {
         }));
     }
 
-    fn save(&self) -> Result<(), Error> {
-        let Some(store) = &self.store else { return Ok(()) };
-        let state = self.receiver.state().map_err(Error::Estimator)?;
+    fn save(&mut self) -> Result<(), Error> {
+        if self.store.is_none() {
+            return Ok(());
+        }
+        let state = match self.state.take() {
+            Some(state) => state,
+            None => text_of(&self.receiver.state().map_err(Error::Estimator)?),
+        };
+        self.state = Some(state.clone());
         let slots = (self.centre.slot(), self.counted);
-        store.save(&Stored::new(&self.remotes, slots, state, self.last.clone()))
+        let stored = Stored::new(&self.remotes, slots, state, self.last.clone());
+        self.store.as_ref().map_or(Ok(()), |store| store.save(&stored))
     }
 }

@@ -54,6 +54,12 @@ impl Step {
         }
     }
 
+    /// Number of reports that came.
+    pub fn reports(&self) -> usize {
+        let received = |o: &&Observation<_>| matches!(o, Observation::Received(_));
+        self.observed.iter().filter(received).count()
+    }
+
     /// The observations of the sensors that were asked, each with its index.
     pub fn observed_when_asked(&self) -> Vec<(usize, Observation<BitString>)> {
         let all = self.observed.iter().cloned().enumerate();

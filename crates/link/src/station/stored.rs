@@ -2,6 +2,7 @@
 
 use super::address::Addresses;
 use super::output::{Counts, Peer, Start, Step};
+use crate::base64;
 use crate::envelope::{Key, ReplayWindow};
 use fewbits_core::BitString;
 use serde::{Deserialize, Serialize};
@@ -56,15 +57,34 @@ pub(super) struct Stored {
     windows: Vec<ReplayWindow>,
     /// Last addresses of the sensors: a restarted centre need not wait until they send.
     addresses: Vec<Option<String>>,
-    pub(super) receiver: BitString,
+    /// Base64 of the bytes; earlier programs wrote a list of them with their number of bits.
+    receiver: AnyState,
     pub(super) last: Option<Step>,
+}
+
+/// The estimator's state.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum AnyState {
+    Text(String),
+    Bits(BitString),
+}
+
+/// The text of an estimator's state in the store.
+pub(super) fn text_of(state: &BitString) -> String {
+    format!("{}:{}", state.bits(), base64::encode(state.bytes()))
+}
+
+fn state_of(text: &str) -> Option<BitString> {
+    let (bits, bytes) = text.split_once(':')?;
+    BitString::from_bytes(base64::decode(bytes)?, bits.parse().ok()?).ok()
 }
 
 impl Stored {
     pub(super) fn new<A: Display + PartialEq + Clone>(
         remotes: &[Remote<A>],
         (slot, counted): (u64, u64),
-        receiver: BitString,
+        receiver: String,
         last: Option<Step>,
     ) -> Self {
         let address = |remote: &Remote<A>| remote.addresses.confirmed().map(A::to_string);
@@ -76,8 +96,16 @@ impl Stored {
             counted,
             windows: remotes.iter().map(|remote| remote.window).collect(),
             addresses: remotes.iter().map(address).collect(),
-            receiver,
+            receiver: AnyState::Text(receiver),
             last,
+        }
+    }
+
+    /// The estimator's state; `None` if it is not readable.
+    pub(super) fn receiver(&self) -> Option<BitString> {
+        match &self.receiver {
+            AnyState::Bits(state) => Some(state.clone()),
+            AnyState::Text(text) => state_of(text),
         }
     }
 
@@ -110,5 +138,23 @@ impl Stored {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn both_forms_of_an_estimators_state_are_read() {
+        let state = BitString::from_bytes(vec![0xa5, 0x80], 9).unwrap();
+        let old = serde_json::to_string(&state).unwrap();
+        assert!(matches!(serde_json::from_str(&old).unwrap(), AnyState::Bits(read) if read == state));
+        let new = serde_json::to_string(&AnyState::Text(text_of(&state))).unwrap();
+        assert!(
+            matches!(serde_json::from_str(&new).unwrap(), AnyState::Text(text) if state_of(&text).as_ref() == Some(&state))
+        );
+        assert!(state_of("9:pYA").is_some() && state_of("pYA=").is_none() && state_of("40:pYA=").is_none());
     }
 }

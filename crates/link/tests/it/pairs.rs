@@ -13,14 +13,14 @@ use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 use rand::Rng;
 
-type Measure = Box<dyn Fn(&mut dyn Rng, &Vector4<f64>) -> Vector1<f64>>;
+pub type Measure = Box<dyn Fn(&mut dyn Rng, &Vector4<f64>) -> Vector1<f64>>;
 
 /// A sensor's two halves, and what it measures.
-struct Pair {
-    name: &'static str,
-    remote: Box<dyn RemoteSensor<4>>,
-    node: Box<dyn SensorNode<1>>,
-    measure: Measure,
+pub struct Pair {
+    pub name: &'static str,
+    pub remote: Box<dyn RemoteSensor<4>>,
+    pub node: Box<dyn SensorNode<1>>,
+    pub measure: Measure,
 }
 
 const NOISE: f64 = 0.25;
@@ -39,7 +39,8 @@ fn pair(
     }
 }
 
-fn pairs() -> Vec<Pair> {
+/// All pairs of the documentation, as sensors of a point in the plane.
+pub fn pairs() -> Vec<Pair> {
     let link = Link::lossy(0.1).unwrap();
     let x = OnAxes::<_, 4, 1>::new(LinearSensor::direct(NOISE).unwrap(), [0]).unwrap();
     let row = LinearSensor::scalar(Vector4::new(0.0, 0.0, 1.0, 0.0), NOISE).unwrap();
@@ -49,9 +50,11 @@ fn pairs() -> Vec<Pair> {
     let bit = SignBit::new(NOISE).unwrap();
     let ask = |_: &Gaussian<4>, m: &Gaussian<1>| m.mean()[0];
     all.push(pair("bit", x, Reporting::new(x, bit, link, ask), SchemeNode::new(bit)));
-    let word = InnovationWord::new(NOISE, 2).unwrap();
-    let ask = |_: &Gaussian<4>, m: &Gaussian<1>| Prediction::from(m);
-    all.push(pair("word", x, Reporting::new(x, word, link, ask), SchemeNode::new(word)));
+    for bits in [2, 3, 4] {
+        let word = InnovationWord::new(NOISE, bits).unwrap();
+        let ask = |_: &Gaussian<4>, m: &Gaussian<1>| Prediction::from(m);
+        all.push(pair("word", x, Reporting::new(x, word, link, ask), SchemeNode::new(word)));
+    }
     for format in [NumberFormat::Double, NumberFormat::Single] {
         let rule = CovarianceFeedback::new(row, 1.0, format).unwrap();
         let ask = |state: &Gaussian<4>, _: &Gaussian<1>| *state;

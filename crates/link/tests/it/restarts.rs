@@ -328,3 +328,25 @@ fn state_of_the_first_format_goes_on() {
     let (counter, _) = key(3).open(Direction::ToCentre, &hello(&mut link)).unwrap();
     assert_eq!(counter, 8193);
 }
+
+/// States of estimators were JSON.
+#[test]
+fn estimator_state_in_json_goes_on() {
+    use crate::world::{Reports, mixed};
+    use fewbits_protocol::Receiver;
+    let mut before = mixed(Reports::Signs, 0.05);
+    before.predict(5).unwrap();
+    let json = serde_json::to_vec(&(Some(4_u64), 5_u64, before.centre().state())).unwrap();
+    let bits = 8 * json.len();
+    let mut after = mixed(Reports::Signs, 0.05);
+    after
+        .restore(&fewbits_core::BitString::from_bytes(json, bits).unwrap())
+        .unwrap();
+    assert_eq!((after.estimate(), after.state().unwrap()), (before.estimate(), before.state().unwrap()));
+    let compact = before.state().unwrap();
+    let mut again = mixed(Reports::Signs, 0.05);
+    again.restore(&compact).unwrap();
+    assert_eq!(again.state().unwrap(), compact);
+    let cut = fewbits_core::BitString::from_bytes(compact.bytes()[..9].to_vec(), 72).unwrap();
+    assert!(again.restore(&cut).is_err() && again.state().unwrap() == compact);
+}

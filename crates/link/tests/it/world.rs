@@ -49,7 +49,7 @@ pub fn receiver(reports: Reports, loss: f64) -> Box<dyn Receiver> {
     }
 }
 
-fn mixed(reports: Reports, loss: f64) -> FusionReceiver<1, MomentFilter> {
+pub fn mixed(reports: Reports, loss: f64) -> FusionReceiver<1, MomentFilter> {
     let model = ContinuousLinear::ornstein_uhlenbeck(0.0, 20.0, 10.0).unwrap();
     let sensing = LinearSensor::direct(1.0).unwrap();
     let prior = Gaussian::scalar(0.0, 10.0).unwrap();

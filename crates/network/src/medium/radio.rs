@@ -4,6 +4,8 @@
 //! |---|---|
 //! | [`Radio::cc2420`] | Texas Instruments, *CC2420 data sheet* (SWRS041): 250 kbit/s, currents at 3.3 V, turnaround of 12 symbols; times to and from sleep: Castalia 3.3, `CC2420.txt`; frame of IEEE 802.15.4-2006, sections 6.3 and 7.2 |
 //! | [`Radio::lorawan`] | Semtech, *SX1276/77/78/79 data sheet*, table 10: currents at 3.3 V; LoRaWAN 1.0.4: frame, 1 s to the first receive window |
+//! | [`Radio::esp32_wifi`] | Espressif, *ESP32 series data sheet*, "RF power consumption" and "Current consumption depending on work modes": currents at 3.3 V; wake-up below 1 ms: *ESP-IDF programming guide*, "Sleep modes"; frame of IEEE 802.11-2016, clauses 9 and 16, with LLC/SNAP, IPv4 and UDP |
+//! | [`Radio::nrf52840`] | Nordic Semiconductor, *nRF52840 product specification*, key features and "CLOCK": currents at 3 V with the DC/DC regulator, start of the crystal; frame and turnaround of IEEE 802.15.4-2006 |
 //! | [`Radio::first_order`] | Heinzelman, Chandrakasan and Balakrishnan, *Energy-efficient communication protocol for wireless microsensor networks*, HICSS 2000: 50 nJ/bit, 100 pJ/bit/m^2 |
 
 use super::lora::{LORAWAN_OVERHEAD, Lora};
@@ -161,6 +163,58 @@ impl Radio {
         })
     }
 
+    /// An ESP32 as a station of a Wi-Fi network with two AA cells: 802.11b at 1 Mbit/s and 19.5 dBm, whose currents the data sheet states (240
+    /// mA, and 100 mA while it receives). Frames are datagrams over UDP. The radio stays in light sleep (0.8 mA) between frames and keeps
+    /// its connection. The access point's beacons, which it must hear to keep it, are not counted.
+    pub fn esp32_wifi() -> Self {
+        let (transmit, receive) = (Watts::trusted(792e-3), Watts::trusted(330e-3));
+        Self {
+            bit_rate: 1e6,
+            transceiver: Transceiver::Powers { transmit, receive },
+            sleep: Watts::trusted(2.64e-3),
+            baseline: Watts::ZERO,
+            active: receive,
+            // Short interframe space.
+            turnaround: Seconds::trusted(10e-6),
+            wake: Seconds::trusted(1e-3),
+            doze: Seconds::ZERO,
+            guard: Seconds::ZERO,
+            // Long preamble and header of the physical layer, 192 us.
+            preamble: Bits(192),
+            // 26 bytes of the link, 8 of LLC and SNAP, 20 of IPv4, 8 of UDP, and the check of 4.
+            header: Bits(66 * 8),
+            // 14 bytes.
+            acknowledgement: Bits(192 + 112),
+            // A datagram of 1500 bytes.
+            mtu: Some(Bits(1538 * 8)),
+            battery: Some(TWO_AA_CELLS),
+            lora: None,
+        }
+    }
+
+    /// An nRF52840 with frames of IEEE 802.15.4 at 0 dBm and two AA cells: 4.8 mA sending, 4.6 mA receiving, 1.5 uA asleep with its clock
+    /// running. The wake-up is that of the crystal (0.36 ms) and the ramp of the radio (0.04 ms).
+    pub fn nrf52840() -> Self {
+        let (transmit, receive) = (Watts::trusted(14.4e-3), Watts::trusted(13.8e-3));
+        Self {
+            bit_rate: 250e3,
+            transceiver: Transceiver::Powers { transmit, receive },
+            sleep: Watts::trusted(4.5e-6),
+            baseline: Watts::ZERO,
+            active: receive,
+            turnaround: Seconds::trusted(0.192e-3),
+            wake: Seconds::trusted(0.4e-3),
+            doze: Seconds::ZERO,
+            guard: Seconds::ZERO,
+            preamble: Bits(48),
+            header: Bits(72),
+            acknowledgement: Bits(88),
+            mtu: Some(Bits(127 * 8)),
+            battery: Some(TWO_AA_CELLS),
+            lora: None,
+        }
+    }
+
     /// The first-order model: only bits cost energy.
     pub fn first_order() -> Self {
         Self {
@@ -296,6 +350,24 @@ mod tests {
         let simple = Radio::first_order();
         assert!((simple.transmit(Bits(2000), 100.0).value() - 2000.0 * (50e-9 + 100e-12 * 1e4)).abs() < 1e-15);
         assert!((simple.receive(Bits(2000)).value() - 1e-4).abs() < 1e-18);
+    }
+
+    /// A report of ten bytes by hand: its time on air, and its energy at the sender with the wake-up.
+    #[test]
+    fn wifi_and_nordic_frames_cost_what_their_currents_say() {
+        let wifi = Radio::esp32_wifi();
+        let report = wifi.on_air(Bits(80));
+        assert!((wifi.duration(report).value() - (192e-6 + 76.0 * 8e-6)).abs() < 1e-12);
+        assert!((wifi.transmit(report, 1.0).value() - 0.240 * 3.3 * 800e-6).abs() < 1e-9);
+        assert!((wifi.wake_up().value() - 0.100 * 3.3 * 1e-3).abs() < 1e-9);
+        let nordic = Radio::nrf52840();
+        let report = nordic.on_air(Bits(80));
+        assert!((nordic.duration(report).value() - 200.0 / 250e3).abs() < 1e-12);
+        assert!((nordic.transmit(report, 1.0).value() - 4.8e-3 * 3.0 * 800e-6).abs() < 1e-12);
+        assert!((nordic.sleep.value() - 1.5e-6 * 3.0).abs() < 1e-12);
+        // The same frames as a CC2420, so the two understand each other.
+        assert!(nordic.understands(&Radio::cc2420(0.0).unwrap()) && !nordic.understands(&wifi));
+        assert!(wifi.checked().is_ok() && nordic.checked().is_ok());
     }
 
     #[test]

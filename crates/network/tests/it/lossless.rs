@@ -309,14 +309,21 @@ fn a_source_found_by_a_chain() {
         .steps
         .iter()
         .zip(1..)
-        .map(|(step, slot)| (slot, step.node, step.estimate.mean().as_slice().to_vec()))
+        .map(|(step, slot)| (slot, step.node, step.estimate))
         .collect();
     assert_eq!(estimates.len(), expected.len());
     for (walked, alone) in estimates.iter().zip(&expected) {
         assert_eq!((walked.0, walked.1), (alone.0, alone.1));
-        // After raw records the first cells differ, so the estimates agree to the accuracy of the cells.
-        for (a, b) in walked.2.iter().zip(&alone.2) {
-            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        // A node that received raw records covers the whole box with its first cells; `run` remembers where the last posterior was. The
+        // estimates therefore agree to the accuracy of cells of 0.8 deviations, 1e-7 of a deviation, and not to the bit.
+        for ((a, b), deviation) in walked
+            .2
+            .iter()
+            .zip(alone.2.mean().iter())
+            .zip(alone.2.standard_deviations().iter())
+        {
+            println!("{:e}", (a - b).abs() / deviation);
+            assert!((a - b).abs() < 1e-7 * deviation, "{a} {b}, deviation {deviation}");
         }
     }
     assert_eq!(network.ledger().messages().payload.0, alone.bits() as u64);

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-const FRAMES: usize = 20_000;
+const FRAMES: usize = 100_000;
 /// Reads a frame in hexadecimal from each line and writes what the decoder returns.
 const PROGRAM: &str = "const { decodeUplink } = require(process.argv[1]);
     const lines = require('fs').readFileSync(0, 'utf8').split('\\n').filter((line) => line.length > 0);

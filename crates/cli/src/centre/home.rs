@@ -1,0 +1,79 @@
+//! Estimates for Home Assistant, through its broker.
+
+use super::Configuration;
+use crate::error::Error;
+use fewbits_link::Step;
+use fewbits_link::doors::home_assistant::Fleet;
+
+/// Broker and name of the fleet in `mqtt://[user:password@]host[:port]/fleet`.
+pub(super) fn parts(text: &str) -> Result<(&str, &str), String> {
+    let parts = text.strip_prefix("mqtt://").and_then(|rest| rest.split_once('/'));
+    match parts.filter(|(broker, fleet)| !(broker.is_empty() || fleet.is_empty())) {
+        Some(_) if cfg!(not(feature = "mqtt")) => Err(NOT_BUILT.to_owned()),
+        Some(parts) => Ok(parts),
+        None => {
+            let expected = "mqtt://[user:password@]host[:port]/fleet";
+            Err(format!("home_assistant is {}: expected {expected}", crate::place::shown(text)))
+        }
+    }
+}
+
+const NOT_BUILT: &str = "home_assistant: this program was built without MQTT: build it with `--features mqtt`";
+
+#[cfg(feature = "mqtt")]
+type Broker = fewbits_link::mqtt::Messages;
+
+#[cfg(feature = "mqtt")]
+fn connect(broker: &str) -> Result<Broker, Error> {
+    let options = crate::place::mqtt(broker).map_err(|error| Error::content("home_assistant", error))?;
+    Ok(Broker::open(options, Vec::new())?)
+}
+
+/// There is none without MQTT.
+#[cfg(not(feature = "mqtt"))]
+enum Broker {}
+
+#[cfg(not(feature = "mqtt"))]
+impl Broker {
+    fn publish(&self, _: &fewbits_link::doors::home_assistant::Message) {
+        match *self {}
+    }
+}
+
+#[cfg(not(feature = "mqtt"))]
+fn connect(_: &str) -> Result<Broker, Error> {
+    Err(Error::content("home_assistant", NOT_BUILT))
+}
+
+/// A fleet at the broker of Home Assistant.
+pub(super) struct Home {
+    fleet: Fleet,
+    broker: Broker,
+}
+
+impl Home {
+    /// Connects, and says what is to be found. `None` if the configuration names no broker.
+    pub(super) fn open(given: &Configuration, numbers: &[u32], coordinates: usize) -> Result<Option<Self>, Error> {
+        let Some(text) = &given.home_assistant else {
+            return Ok(None);
+        };
+        let (broker, fleet) = parts(text).map_err(|error| Error::content("home_assistant", error))?;
+        let named = |i: usize| match given.coordinates.get(i) {
+            Some(coordinate) => (coordinate.name.clone(), coordinate.unit.clone()),
+            None => (format!("estimate {i}"), String::new()),
+        };
+        let fleet = Fleet {
+            name: fleet.to_owned(),
+            period: given.period,
+            sensors: numbers.to_vec(),
+            coordinates: (0..coordinates).map(named).collect(),
+        };
+        let broker = connect(broker)?;
+        fleet.discovery().iter().for_each(|message| broker.publish(message));
+        Ok(Some(Self { fleet, broker }))
+    }
+
+    pub(super) fn show(&self, step: &Step) {
+        self.broker.publish(&self.fleet.state(step));
+    }
+}
