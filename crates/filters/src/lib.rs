@@ -13,7 +13,8 @@
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`impute`] |
 //! | several models, one at a time | [`NoiseBank`], [`Switching`] | [`Imm`] (interacting multiple models, any factor) |
 //! | the exact answer for a scalar | [`PointMasses`] | [`PointMassFilter`] (one model on a grid, with a smoother) |
-//! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel) | |
+//! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`PointMassFilter::smooth`] (a grid) |
+//! | calibration of sensors and level from recorded readings | [`fit`] (maximum likelihood), [`calibration`] (noises and change alone) | |
 //! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
 //! | a receiver of many sensors: prediction over time, failed sensors, tests of the model, learnt noise | [`centre::FusionCentre`] | |
@@ -33,10 +34,12 @@
 //!
 //! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
 
+mod backward_simulation;
 pub mod calibration;
 pub mod centre;
 pub mod contract;
 pub mod cramer_rao;
+pub mod fit;
 mod grid_filter;
 mod guided;
 mod imm;
@@ -50,6 +53,7 @@ pub mod smoother;
 mod steady_state;
 mod switching;
 
+pub use backward_simulation::backward_simulation;
 pub use contract::{Info, MomentFilter, Points, StateFilter};
 pub use fewbits_core::Error;
 pub use fewbits_core::{Evidence, LinearScalar, assumed_density};

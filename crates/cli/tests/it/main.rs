@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod design;
+mod fit;
 mod fleet;
 mod language;
 mod links;

@@ -29,6 +29,8 @@ const DISTORTION: [f64; 4] = [0.363, 0.119, 0.037, 0.012];
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Arrived {
     Value(f64),
+    /// The first range of an instant whose clock is unknown: it tells the clock, and nothing of the anchor.
+    First(f64),
     Level {
         level: usize,
         levels: usize,
@@ -40,7 +42,7 @@ impl Arrived {
     /// Density or probability of what arrived if the range does not depend on the distance.
     fn stray(&self, width: f64) -> f64 {
         match self {
-            Self::Value(_) => 1.0 / width,
+            Self::Value(_) | Self::First(_) => 1.0 / width,
             Self::Level {
                 level,
                 levels,
@@ -63,7 +65,7 @@ impl Arrived {
         let deviation = total.sqrt();
         let gain = predicted.variance / total;
         let (density, mean, left, score) = match self {
-            Self::Value(value) => {
+            Self::Value(value) | Self::First(value) => {
                 let score = (value - predicted.mean) / deviation;
                 (normal::pdf(score) / deviation, score, 0.0, score)
             }
@@ -325,6 +327,14 @@ impl Hypothesis {
         holds_scale: bool,
     ) -> Result<f64, Error> {
         let (noises, stray) = (known.noises.len(), arrived.stray(known.stray));
+        if matches!(arrived, Arrived::First(_)) {
+            for i in (0..self.filters.len()).filter(|i| self.weights[*i] > 0.0) {
+                let predicted = &self.predicted[i];
+                let (_, mean, variance, _) = arrived.right(predicted, known.noises[i % noises])?;
+                self.filters[i].condition(predicted, mean, variance, holds_scale);
+            }
+            return Ok(0.0);
+        }
         let (good, outliers) = (self.good[anchor], known.outliers);
         let right_share = good * (1.0 - outliers);
         let (mut total, mut agreeing, mut score) = (0.0, 0.0, 0.0);

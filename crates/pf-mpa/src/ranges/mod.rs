@@ -303,6 +303,7 @@ impl RangeTracker {
             square += share * (variance + expected * expected);
         }
         let arrived = match self.travel {
+            Travel::Full if known.clock.is_some() && is_new => Arrived::First(f64::from(range as f32)),
             Travel::Full => Arrived::Value(f64::from(range as f32)),
             Travel::Bits(bits) => {
                 // All nodes that hear the reports compute the reference themselves, so it is not sent.
