@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::design_options::DesignOptions;
+pub(crate) use crate::fit_options::FitOptions;
 pub(crate) use crate::fleet_options::{CentreOptions, CheckOptions, SensorOptions};
 pub(crate) use crate::ranges_options::RangesOptions;
 pub(crate) use crate::recording_options::{CatOptions, RepackOptions, UnpackOptions};
@@ -40,6 +41,8 @@ pub(crate) enum Task {
     Track(Box<TrackOptions>),
     /// Estimate a place from distances to anchors at known places, in the plane or in space: estimates with bands.
     Ranges(RangesOptions),
+    /// Calibrate: find noise, offset, gain, drift and delay of each sensor and the change of the level from a table, with standard errors.
+    Fit(FitOptions),
     /// Design quantizers of few bits for one unknown that several sensors measure.
     Design(DesignOptions),
     /// Send rows from standard input or a file as frames, to a file, a pipe, UDP or a serial line.
@@ -272,11 +275,11 @@ pub(crate) struct TrackOptions {
     /// Mean and standard deviation of the level before the first row, as `20±5`. Default: estimated from the first 200 rows.
     #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
     pub(crate) prior: Option<String>,
-    /// Whether the change is adapted during the run. Default: off if `--change` states it, otherwise on.
+    /// Whether the change is adapted during the run. Default: on, unless `--change` states it or cells are intervals.
     #[arg(long, value_enum, value_name = "on|off")]
     pub(crate) learning: Option<Switch>,
     /// With `--model velocity` and `acceleration`: mean and standard deviation of the slope per second before the first row, as `0±3`.
-    /// Default: 0, and ten times the change.
+    /// Default: 0, and what the first rows suggest; if they are not waited for, ten times the change.
     #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
     pub(crate) slope: Option<String>,
     /// Improve each estimate by the rows after it: by all (`all`), or by those up to a time later (`30s`). Rows are then written at the end.
@@ -288,6 +291,9 @@ pub(crate) struct TrackOptions {
     /// Subtract from each sensor its offset, found from this many first rows. The median of all offsets is zero. Default: no correction.
     #[arg(long, value_name = "ROWS")]
     pub(crate) align: Option<usize>,
+    /// File of `fewbits fit -o`: noises, offsets, gains, drifts, thresholds and change that other options do not state.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) settings: Option<PathBuf>,
     /// With `--model ranges`: CSV file of the anchors with columns name, x, y.
     #[arg(long, value_name = "FILE", required_if_eq("model", "ranges"))]
     pub(crate) anchors: Option<String>,

@@ -144,6 +144,12 @@ impl Files {
             Task::Track(options) => {
                 let mut files = Self::reading(&options.table.file).writing([&options.output, &options.plot]);
                 files.reads.extend(options.anchors.iter().map(PathBuf::from));
+                files.reads.extend(options.settings.clone());
+                files
+            }
+            Task::Fit(options) => {
+                let mut files = Self::reading(&options.table.file).writing([&None]);
+                files.writes.extend(options.output.clone());
                 files
             }
             Task::Ranges(options) => {
@@ -236,6 +242,7 @@ fn table(task: &mut Task) -> Option<&mut TableOptions> {
         Task::Bench(options) => Some(&mut options.table),
         Task::Track(options) => Some(&mut options.table),
         Task::Ranges(options) => Some(&mut options.table),
+        Task::Fit(options) => Some(&mut options.table),
         Task::Send(options) => Some(&mut options.table),
         _ => None,
     }

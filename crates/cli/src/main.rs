@@ -12,6 +12,7 @@ mod design;
 mod design_options;
 mod error;
 mod files;
+mod fit_options;
 mod fleet_options;
 mod generate;
 mod info;
@@ -98,6 +99,7 @@ fn run(mut task: Task) -> Result<Ending, Error> {
         Task::Bench(options) => bench::run(&options),
         Task::Track(options) => track::run(&options),
         Task::Ranges(options) => track::ranges(&options),
+        Task::Fit(options) => track::fit(&options),
         Task::Design(options) => design::run(&options),
         Task::Send(options) => send::run(&options),
         Task::Receive(options) => link::receive::run(&options),

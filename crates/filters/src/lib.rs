@@ -15,7 +15,8 @@
 //! | several models, one at a time | [`NoiseBank`], [`Switching`] | [`Imm`] (interacting multiple models, any factor) |
 //! | the exact answer for a scalar | [`PointMasses`] | [`PointMassFilter`] (one model on a grid, with a smoother) |
 //! | the exact answer for a few numbers | | [`LatticeFilter`] (independent noise on each) |
-//! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel) | |
+//! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`PointMassFilter::smooth`] (a grid) |
+//! | calibration of sensors and level from recorded readings | [`fit`] (maximum likelihood), [`calibration`] (noises and change alone) | |
 //! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
 //! | a receiver of many sensors: prediction over time, failed sensors, tests of the model, learnt noise | [`centre::FusionCentre`] | |
@@ -35,11 +36,13 @@
 //!
 //! Not in this crate: the scheme of any single paper, and time-varying models (pass another model at each step).
 
+mod backward_simulation;
 pub mod calibration;
 pub mod centre;
 pub mod contract;
 pub mod cramer_rao;
 mod ensemble;
+pub mod fit;
 mod grid_filter;
 mod guided;
 mod imm;
@@ -56,6 +59,7 @@ pub mod smoother;
 mod steady_state;
 mod switching;
 
+pub use backward_simulation::backward_simulation;
 pub use contract::{Info, MomentFilter, Points, StateFilter};
 pub use ensemble::EnsembleFilter;
 pub use fewbits_core::Error;

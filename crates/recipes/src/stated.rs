@@ -3,9 +3,10 @@
 //! ```text
 //! value v of deviation s               N(v; m, s^2)
 //! rounded to a step, v                 P(v - step/2 <= m + noise < v + step/2) / step
-//! beyond a limit, or unchanged         P(lower <= m + noise < upper) / width
+//! unchanged                            P(lower <= m + noise < upper) / width
+//! beyond a limit                       P(lower <= m + noise)
 //! ```
-//! All are densities of the reading, so that a gate can compare them with the density of a usual value.
+//! All but half-lines are densities of the reading.
 
 use fewbits_core::factor::{Constant, Factor, InCell, Scalar, Tilted, Value};
 use fewbits_core::rand::Rng;
@@ -47,6 +48,14 @@ impl StatedReading {
             upper: value + 0.5 * step,
             deviation,
         }
+    }
+}
+
+impl StatedReading {
+    /// Width of the cell; 1 if it is a half-line, 0 of a value.
+    pub fn width(&self) -> f64 {
+        let width = self.upper - self.lower;
+        if width.is_finite() { width } else { 1.0 }
     }
 }
 
@@ -180,12 +189,13 @@ impl Scheme<1> for Stating {
         if lower.is_nan() || upper.is_nan() || lower > upper {
             return refuse("reading", format!("from {lower} to {upper}"), "ends in order");
         }
-        // A half-line has no width: its reading is compared with the highest density of a usual value.
-        let width = if (upper - lower).is_finite() {
-            upper - lower
-        } else {
-            (std::f64::consts::TAU * self.usual_variance).sqrt()
-        };
+        // A half-line has no width: its reading is a probability.
+        let width = StatedReading {
+            lower,
+            upper,
+            deviation,
+        }
+        .width();
         Ok(Statement {
             cell: Some(InCell::certain(Cell::new(lower, upper)?, variance)?),
             value: None,

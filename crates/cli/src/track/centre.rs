@@ -6,13 +6,13 @@ use super::sensors;
 use crate::arguments::Model;
 use crate::error::Failure;
 use crate::report::Report;
-use fewbits_core::{Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode};
+use fewbits_core::{BitString, Gaussian, Link, Message, NumberFormat, Observation, OnAxes, SensorNode};
 use fewbits_filters::calibration::{self, Calibration, Level, Number};
-use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, Reporting, Slot};
+use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, ReportTest, Reporting, Slot};
 use fewbits_filters::{Error as FilterError, MomentFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_recipes::smoothing::{Filtered, smooth};
-use fewbits_recipes::stated::Stating;
+use fewbits_recipes::stated::{StatedReading, Stating};
 use nalgebra::{SMatrix, SVector, Vector1};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -25,6 +25,8 @@ const ALARMS: FalseAlarms = FalseAlarms {
     sensor: 1e-6,
     centre: 1e-5,
 };
+/// Step of the learnt change for one sensor. The change that is found from the first rows is accurate already, so it is small.
+const LEARNING: f64 = 0.01;
 /// Bits of a value.
 const VALUE_BITS: usize = 64;
 /// Standard deviation of an unknown slope, in multiples of the change per time.
@@ -41,10 +43,14 @@ pub(super) struct World {
     pub(super) prior: (f64, f64),
     /// The same of the slope per second, if it is stated.
     pub(super) slope: Option<(f64, f64)>,
+    /// Standard deviation of the slope per second that the first rows suggest; 0 if they are not known.
+    pub(super) steepest: f64,
     /// Period of the level, if it is an angle.
     pub(super) period: Option<f64>,
     /// Whether the change is adapted during the run.
     pub(super) is_learning: bool,
+    /// Number of sensors of the first rows.
+    pub(super) sensors: usize,
     /// Whether all beliefs are kept, to be smoothed.
     pub(super) is_smoothed: bool,
     /// Seconds between rows.
@@ -58,6 +64,7 @@ impl World {
         let of = |i: usize| match (i, self.slope) {
             (0, _) => self.prior,
             (1, Some(slope)) => slope,
+            (1, None) => (0.0, (per_time / self.within).max(self.steepest)),
             _ => (0.0, per_time / self.within.powi(i as i32)),
         };
         let mean = SVector::<f64, D>::from_fn(|i, _| of(i).0);
@@ -168,6 +175,16 @@ pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, 
     })
 }
 
+/// How a reading that states its meaning is tested.
+fn tested(bits: &BitString) -> Option<ReportTest> {
+    let reading = StatedReading::from_bits(&NumberFormat::Double, bits).ok()?;
+    Some(if reading.lower == reading.upper {
+        ReportTest::Value(reading.deviation * reading.deviation)
+    } else {
+        ReportTest::Cell(reading.upper - reading.lower)
+    })
+}
+
 struct Member {
     seat: Seat,
     node: Box<dyn SensorNode<1>>,
@@ -204,7 +221,12 @@ impl<const D: usize> Centre<D> {
         let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior)?.with_failures(failures)?;
         centre = centre.with_false_alarms(ALARMS)?;
         if world.is_learning && purpose != Use::Comparison {
-            centre = centre.learning_noise(NoiseLearning::DEFAULT)?;
+            let learning = NoiseLearning {
+                // Every sensor adds a term in each row, and they do not depend on each other.
+                gain: LEARNING / (world.sensors.max(1) as f64).sqrt(),
+                ..NoiseLearning::DEFAULT
+            };
+            centre = centre.learning_noise(learning)?;
         }
         Ok(Self {
             centre,
@@ -271,7 +293,9 @@ impl<const D: usize> Estimator for Centre<D> {
             let usual = seat.usual() * seat.usual();
             let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(usual)?, [0])?;
             let nothing = |_: &Gaussian<D>, _: &Gaussian<1>| ();
-            let remote = Reporting::new(sensing, Stating::new(usual)?, link, nothing).sending_values();
+            let remote = Reporting::new(sensing, Stating::new(usual)?, link, nothing)
+                .sending_values()
+                .testing(tested);
             self.centre.join_boxed(number, Box::new(remote))?;
         } else {
             self.centre.join_boxed(number, sends.remote::<D>(0, variance, link)?)?;

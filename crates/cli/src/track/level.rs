@@ -31,6 +31,8 @@ struct Summary {
     difference_from_full_values: Option<f64>,
     sensors: Vec<SensorSummary>,
     events: Vec<EventSummary>,
+    /// What the first rows suggest that no option says.
+    hints: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -111,6 +113,7 @@ impl Run {
                 difference_from_full_values: None,
                 sensors: Vec::new(),
                 events: Vec::new(),
+                hints: settings.hints.clone(),
             },
             settings,
             path: Thinned::new(),
@@ -356,6 +359,7 @@ fn lines(summary: &Summary) -> Vec<String> {
     if let Some(difference) = summary.difference_from_full_values {
         lines.push(format!("estimates differ by {difference:.4} (root mean square) from those of values in full"));
     }
+    lines.extend(summary.hints.iter().cloned());
     if summary.copies > 0 {
         lines.push(format!("{} copies of reports were dropped", summary.copies));
     }

@@ -7,12 +7,20 @@
 //! | `centre` | the centre of a level |
 //! | `meaning` | what the cells of a sensor mean |
 //! | `settings` | what options and first rows say |
+//! | `found` | what is found from the first rows |
+//! | `hints` | what the first rows suggest that no option says |
 //! | `rhythm` | silence in a table of single reports |
 //! | `report` | first cell of a row, summary |
+//! | `applied` | what `fit` found, as settings |
+//! | `fit` | the task `fit`: calibration |
 //! | `level` | the task `track`: a level |
 //! | `ranges` | the task `ranges`: a place |
 
+mod applied;
 mod centre;
+mod fit;
+mod found;
+mod hints;
 mod level;
 mod meaning;
 mod ranges;
@@ -23,7 +31,7 @@ mod sensors;
 mod settings;
 
 use crate::Ending;
-use crate::arguments::{Model, RangesOptions, TrackOptions};
+use crate::arguments::{FitOptions, Model, RangesOptions, TrackOptions};
 use crate::error::Error;
 use rows::{Instants, Kind};
 
@@ -35,8 +43,17 @@ pub(crate) fn run(options: &TrackOptions) -> Result<Ending, Error> {
             option: "--model ranges",
             reason: "--anchors says where ranges are measured from",
         }),
-        _ => level::run(options, Instants::open(&options.table, &Kind::of(options))?),
+        _ => {
+            let instants = Instants::open(&options.table, &Kind::of(options))?;
+            let (options, corrections) = applied::applied(options, &instants.names)?;
+            level::run(&options, instants.corrected(corrections))
+        }
     }
+}
+
+/// Runs the task `fit`.
+pub(crate) fn fit(options: &FitOptions) -> Result<Ending, Error> {
+    fit::run(options)
 }
 
 /// Runs the task `ranges`.

@@ -1,5 +1,6 @@
 //! Conversion of rows of a table to instants: what each sensor reported at one time.
 
+use super::applied::Correction;
 use crate::arguments::{TableOptions, TrackOptions};
 use crate::clock;
 use crate::error::Error;
@@ -77,6 +78,8 @@ pub(super) struct Instants {
     pub(super) names: Vec<String>,
     /// Number of rows that were dropped because they repeat one of the same time.
     pub(super) copies: u64,
+    /// What is corrected in the values of a sensor.
+    corrections: Vec<Correction>,
     /// Time and cells of the last row.
     before: Option<(f64, Reports)>,
     /// Rows that were read ahead.
@@ -149,10 +152,16 @@ impl Instants {
             last: 0.0,
             next_number: 0,
             copies: 0,
+            corrections: Vec::new(),
             before: None,
             ahead: VecDeque::new(),
             pending: None,
         })
+    }
+
+    /// The same rows with corrected values.
+    pub(super) fn corrected(self, corrections: Vec<Correction>) -> Self {
+        Self { corrections, ..self }
     }
 
     /// The name of the table in messages.
@@ -271,6 +280,16 @@ impl Instants {
         } else {
             cells.enumerate().map(|(sensor, (_, cell))| (sensor, cell)).collect()
         };
+        let mut reports = reports;
+        if !self.corrections.is_empty() {
+            for (sensor, cell) in &mut reports {
+                let name = self.names.get(*sensor);
+                let correction = self.corrections.iter().find(|one| Some(&one.name) == name);
+                if let (Some(correction), Some(value)) = (correction, cell) {
+                    *value = correction.of(*value, seconds);
+                }
+            }
+        }
         let said = Said {
             accuracy: own[0],
             threshold: own[1],

@@ -6,6 +6,7 @@
 mod brokers;
 mod design;
 mod doors;
+mod fit;
 mod fleet;
 mod kills;
 mod language;

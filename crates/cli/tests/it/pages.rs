@@ -43,6 +43,7 @@ fn listings_print_what_the_pages_say() {
     for (page, least) in [
         ("track.md", 2),
         ("ranges.md", 1),
+        ("fit.md", 2),
         ("quantizers.md", 1),
         ("record.md", 3),
     ] {
@@ -76,6 +77,7 @@ fn completions_and_manual_are_generated() {
         "fewbits.1",
         "fewbits-track.1",
         "fewbits-ranges.1",
+        "fewbits-fit.1",
         "fewbits-design.1",
         "fewbits-pack.1",
     ] {

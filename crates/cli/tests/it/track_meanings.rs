@@ -168,3 +168,102 @@ fn smoothing_knows_what_came_after() {
     assert!(all < 0.8 * filtered && all <= 1.02 * lagged && lagged < 0.9 * filtered, "{filtered} {lagged} {all}");
     assert!((0.92..=0.98).contains(&held), "{held}");
 }
+
+/// The summary of a run.
+fn summary(table: &str, options: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let words = [&["track", "-", "-o", "x.csv"], options].concat();
+    text(&crate::fewbits(folder.path(), &words, table.as_bytes()).stderr)
+}
+
+/// A thermometer that sends on change: with the width said, noise and change are found from silence too; without it the summary says so.
+#[test]
+fn values_that_come_on_change() {
+    let mut numbers = Numbers(5);
+    let truth = walk(&mut numbers, 2000, 20.0, 0.05);
+    let (mut table, mut last) = ("time,temp\n".to_owned(), None);
+    for (row, level) in truth.iter().enumerate() {
+        let value = level + 0.05 * numbers.normal();
+        let is_sent = last.is_none_or(|last: f64| (value - last).abs() >= 0.5);
+        if is_sent {
+            last = Some(value);
+            table += &format!("{},{value:.2}\n", 60 * row);
+        } else {
+            table += &format!("{},\n", 60 * row);
+        }
+    }
+    let (error, held) = against(&table, &truth, &["--silent-within", "0.5"]);
+    assert!(error < 0.3 && held > 0.85, "{error} {held}");
+    assert!(summary(&table, &[]).contains("--silent-within 0.5"));
+    assert!(!summary(&table, &["--silent-within", "0.5"]).contains("if it sends on change"));
+}
+
+/// Defect: accuracies of rows were taken for noise when change was found, and a row of another accuracy than usual raised alarms.
+#[test]
+fn accuracies_of_rows_raise_no_alarm() {
+    let mut numbers = Numbers(6);
+    let truth = walk(&mut numbers, 800, 0.0, 0.3);
+    let mut table = "x,sd\n".to_owned();
+    for (row, level) in truth.iter().enumerate() {
+        let deviation = [0.3, 1.0, 5.0][row * 7 % 3];
+        table += &format!("{:.3},{deviation}\n", level + deviation * numbers.normal());
+    }
+    for options in [
+        &["--accuracy-column", "sd"][..],
+        &[
+            "--accuracy-column",
+            "sd",
+            "--noise",
+            "1",
+            "--change",
+            "0.3/1s",
+            "--prior",
+            "0±1",
+        ],
+    ] {
+        let (error, held) = against(&table, &truth, options);
+        assert!(error < 0.55 && held > 0.91, "{options:?}: {error} {held}");
+        assert!(!summary(&table, options).contains("lost"), "{options:?}");
+    }
+}
+
+/// Two values only, 0 and then 100: no step of rounding is 100 wide.
+#[test]
+fn two_values_are_no_step_of_rounding() {
+    let table = "pot\n".to_owned() + &"0\n".repeat(20) + &"100\n".repeat(60);
+    let truth: Vec<f64> = (0..80).map(|row| if row < 20 { 0.0 } else { 100.0 }).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let out = text(&good(folder.path(), &["track", "-", "--json"], table.as_bytes()));
+    let last: serde_json::Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();
+    let of = |name: &str| last[name].as_f64().unwrap();
+    assert!((of("level") - truth[79]).abs() < 1.0 && of("level_high") - of("level_low") < 3.0, "{last}");
+}
+
+/// A ramp that rises by 10 000 in a second, in noise of 1, 10 000 readings a second: the slope's prior comes from the first rows.
+#[test]
+fn a_steep_slope_is_followed_from_the_first_rows() {
+    let mut numbers = Numbers(7);
+    let mut table = "time,z\n".to_owned();
+    let truth: Vec<f64> = (0..400).map(f64::from).collect();
+    for (row, level) in truth.iter().enumerate() {
+        table += &format!("{:.4},{:.4}\n", row as f64 * 1e-4, level + numbers.normal());
+    }
+    let (error, held) = against(&table, &truth, &["--model", "velocity"]);
+    assert!(error < 0.5 && held > 0.9, "{error} {held}");
+}
+
+#[test]
+fn hints_name_what_no_option_says() {
+    let mut numbers = Numbers(8);
+    let mut headings = "heading\n".to_owned();
+    for level in walk(&mut numbers, 300, 0.0, 0.3) {
+        headings += &format!("{:.1}\n", (level + 5.0 * numbers.normal()).rem_euclid(360.0));
+    }
+    assert!(summary(&headings, &[]).contains("--period 360"));
+    assert!(!summary(&headings, &["--period", "360"]).contains("--period 360"));
+    let mut two = "a,b\n".to_owned();
+    for level in walk(&mut numbers, 300, 0.0, 0.1) {
+        two += &format!("{:.3},{:.3}\n", level + 0.5 * numbers.normal(), level + 2.0 + 0.5 * numbers.normal());
+    }
+    assert!(summary(&two, &["--align", "200"]).contains("nothing says which is right"));
+}

@@ -29,6 +29,8 @@ const LARGE_DRIFT: f64 = 1.0;
 pub(super) const CLIP: f64 = 3.0;
 /// Differences of probabilities, or deviations of their logarithms, that are treated as zero.
 const EQUAL: f64 = 1e-3;
+/// `ln` of a ratio of probabilities below which a cell is improbable: that of a value three deviations off.
+const IMPROBABLE: f64 = -4.5;
 /// Number of sequences per sensor.
 pub(super) const SEQUENCES: usize = 3;
 /// Number of sums per sensor: one for each sequence, and the second one of residuals.
@@ -101,6 +103,14 @@ impl Residual {
         // -2 ln N(innovation; 0, S) = innovation^2 / S + ln(2 pi S); rounding may leave a negative rest.
         let nis = (-2.0 * log_density - (std::f64::consts::TAU * variance).ln()).max(0.0);
         Self::of_normal(nis.sqrt().copysign(correction))
+    }
+
+    /// Residual of a cell, from `ln` of its probability beside the likeliest cell's and the sign of the correction. `None` if it is not improbable.
+    pub fn of_cell(log_ratio: f64, correction: f64) -> Option<Self> {
+        if log_ratio > IMPROBABLE {
+            return None;
+        }
+        Self::of_normal((-2.0 * log_ratio).sqrt().copysign(correction))
     }
 
     /// Residual of a variable that is standard normal if the model is right. `None` if it is not finite.

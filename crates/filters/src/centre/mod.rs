@@ -41,7 +41,7 @@ mod state;
 pub use health::{FalseAlarms, Health};
 pub use learning::NoiseLearning;
 pub use presence::Failures;
-pub use remote::{RemoteSensor, Reporting};
+pub use remote::{RemoteSensor, ReportTest, Reporting};
 pub use slot::{Event, Received, Slot};
 pub use state::CentreState;
 

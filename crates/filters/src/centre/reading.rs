@@ -1,10 +1,12 @@
 //! The slots of one instant, as the centre reads them: their likelihoods, and how likely each report is.
 
 use super::health::Residual;
+use super::remote::ReportTest;
 use super::{FusionCentre, Member, Slot};
 use crate::Error;
 use crate::contract::StateFilter;
 use fewbits_core::{BitString, Evidence, Gaussian, Likelihood, Observation};
+use fewbits_numerics::normal::log_interval;
 
 /// Reports of at most this many bits are treated as words; the residual then sums over all possible words.
 pub(super) const WORD_BITS: usize = 4;
@@ -218,10 +220,22 @@ impl<const D: usize> Member<D> {
         if bits.bits() == 1 && self.always_speaks {
             return Residual::of_bit((received.log_likelihood.exp() / self.arrival).min(1.0), received.correction);
         }
-        if let Some(variance) = self.sensor.value_variance(predicted) {
+        if let Some(test) = self.sensor.test_of(slot, predicted) {
             // The likelihood includes the probability that the value arrives; only the value itself is tested.
             let log_density = received.log_likelihood - self.arrival.ln();
-            return Residual::of_value(log_density, variance, received.correction);
+            return match test {
+                ReportTest::Value(variance) => Residual::of_value(log_density, variance, received.correction),
+                ReportTest::Cell(width) => {
+                    let (own, likeliest) = if width.is_finite() {
+                        // Compared with a cell of this width about the prediction.
+                        let half = 0.5 * width / self.sensor.value_variance(predicted)?.sqrt();
+                        (log_density + width.ln(), log_interval(-half, half))
+                    } else {
+                        (log_density, 0.0)
+                    };
+                    Residual::of_cell(own - likeliest, received.correction)
+                }
+            };
         }
         if bits.bits() == 0 || bits.bits() > WORD_BITS {
             return None;

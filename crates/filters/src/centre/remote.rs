@@ -46,6 +46,11 @@ pub trait RemoteSensor<const D: usize>: Send + Sync {
     /// `None` for words, vectors and sensors that may be silent.
     fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64>;
 
+    /// How the report in a slot is tested, if its sensor sends values. Default: as a value of [`value_variance`](Self::value_variance).
+    fn test_of(&self, _slot: &Slot, predicted: &Gaussian<D>) -> Option<ReportTest> {
+        self.value_variance(predicted).map(ReportTest::Value)
+    }
+
     /// Probability that a report that was sent arrives.
     fn arrival(&self) -> f64;
 
@@ -60,6 +65,17 @@ pub trait RemoteSensor<const D: usize>: Send + Sync {
     }
 }
 
+/// How a report of a sensor that sends values is tested.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ReportTest {
+    /// By its normalised innovation: it is a value whose predicted variance is this, noise included.
+    Value(f64),
+    /// By its probability beside that of a cell about the prediction: it says that the measurement lies in a cell of this width, and its
+    /// likelihood is the cell's probability divided by the width; of a half-line, of infinite width, its probability. Only an improbable cell
+    /// is tested, since nothing says which others there were.
+    Cell(f64),
+}
+
 /// A sensor that reports by a [`Scheme`]: its sensing model, its scheme, its link, and the rule for its feedback.
 ///
 /// `ask` computes the scheme's feedback from the predicted state and the predicted measurement `N(h(m), H P H' + R)`.
@@ -70,6 +86,7 @@ pub struct Reporting<S, C, A, const M: usize> {
     link: Link,
     ask: A,
     sends_values: bool,
+    tests: Option<fn(&BitString) -> Option<ReportTest>>,
 }
 
 /// Relative difference between the noise of sensing model and scheme that is treated as rounding.
@@ -84,6 +101,7 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
             link,
             ask,
             sends_values: false,
+            tests: None,
         }
     }
 
@@ -92,6 +110,16 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
     pub fn sending_values(self) -> Self {
         Self {
             sends_values: true,
+            ..self
+        }
+    }
+
+    /// The same sensor, whose values do not all mean the same: how a report is tested, from its bits. The variance in
+    /// [`ReportTest::Value`] is that of its noise alone. `None`: as a usual value.
+    #[must_use]
+    pub fn testing(self, tests: fn(&BitString) -> Option<ReportTest>) -> Self {
+        Self {
+            tests: Some(tests),
             ..self
         }
     }
@@ -186,6 +214,21 @@ where
             return None;
         }
         Some(self.predicted(predicted).ok()?.covariance()[(0, 0)])
+    }
+
+    fn test_of(&self, slot: &Slot, predicted: &Gaussian<D>) -> Option<ReportTest> {
+        let usual = RemoteSensor::value_variance(self, predicted)?;
+        let own = self
+            .tests
+            .and_then(|tests| slot.observation.received().and_then(|bits| tests(bits)));
+        Some(match own {
+            None => ReportTest::Value(usual),
+            Some(ReportTest::Value(noise)) => {
+                let mean = self.sensing.mean(predicted.mean());
+                ReportTest::Value((usual - self.scheme.noise_covariance_at(&mean)[(0, 0)]).max(0.0) + noise)
+            }
+            Some(cell) => cell,
+        })
     }
 
     fn arrival(&self) -> f64 {

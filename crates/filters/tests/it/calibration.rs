@@ -1,7 +1,7 @@
 //! Noise, change and offsets found from recorded values, against the numbers that made them.
 
 use fewbits_core::Gaussian;
-use fewbits_filters::calibration::{Calibration, Instant, Level, Number, median, offsets};
+use fewbits_filters::calibration::{Calibration, Instant, Level, Number, Reading, median, offsets};
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
 use rand::{Rng, RngExt};
@@ -21,9 +21,11 @@ fn recorded(seed: u64, change: f64, noises: &[f64], offsets: &[f64], rows: u32) 
             let value = |(n, size): (usize, &f64)| {
                 (
                     n,
-                    level
-                        + size * noise(&mut Stream::new(seed).indexed(row.into()).indexed(n as u64).rng())
-                        + offsets.get(n).unwrap_or(&0.0),
+                    Reading::from(
+                        level
+                            + size * noise(&mut Stream::new(seed).indexed(row.into()).indexed(n as u64).rng())
+                            + offsets.get(n).unwrap_or(&0.0),
+                    ),
                 )
             };
             Instant {
@@ -73,11 +75,75 @@ fn noise_of_each_sensor_is_found() {
 fn wild_values_do_not_move_what_is_found() {
     let mut instants = recorded(3, 0.02, &[0.05], &[], 200);
     for row in [40, 41, 90, 150] {
-        instants[row].values[0].1 = 195.8;
+        instants[row].values[0].1 = 195.8.into();
     }
     let found = found(&instants, &[UNKNOWN]);
     assert!((found.noises[0] / 0.05).ln().abs() < 0.25, "{found:?}");
     assert!((found.change / 0.02).ln().abs() < 0.7, "{found:?}");
+}
+
+/// Values of a sensor that sends on change, whose silence says that the level is near its last value: noise and change are found from the
+/// cells. Taken as values alone, the few that come make the noise as wide as the cells.
+#[test]
+fn silence_and_rounding_are_cells() {
+    let (mut misses, width) = (0, 0.5);
+    for seed in 0..8 {
+        let mut instants = recorded(seed, 0.1, &[0.05], &[], 400);
+        let mut last: Option<f64> = None;
+        for instant in &mut instants {
+            let value = instant.values[0].1.value().unwrap();
+            match last.filter(|last| (value - last).abs() < width) {
+                Some(last) => {
+                    instant.values[0].1 = Reading::Within {
+                        lower: last - width,
+                        upper: last + width,
+                    };
+                }
+                None => last = Some(value),
+            }
+        }
+        let sent = found(&instants, &[Number::Unknown { guess: 0.3, least: 0.0 }]);
+        misses += u32::from((sent.change / 0.1).ln().abs() > 0.5);
+        // Whole steps of four deviations of the noise.
+        let mut instants = recorded(seed, 0.1, &[0.25], &[], 400);
+        for instant in &mut instants {
+            let value = instant.values[0].1.value().unwrap().round();
+            instant.values[0].1 = Reading::Within {
+                lower: value - 0.5,
+                upper: value + 0.5,
+            };
+        }
+        let rounded = found(&instants, &[Number::Unknown { guess: 0.3, least: 0.0 }]);
+        misses += u32::from((rounded.noises[0] / 0.25).ln().abs() > 0.5);
+        println!("{sent:?} {rounded:?}");
+    }
+    assert!(misses <= 1, "{misses}");
+}
+
+/// Each row states its accuracy: only the change is left to be found, and it is not mistaken for the accuracies.
+#[test]
+fn stated_accuracies_are_used() {
+    let instants: Vec<Instant> = recorded(4, 0.3, &[1.0], &[], 400)
+        .into_iter()
+        .zip(recorded(4, 0.3, &[1e-9], &[], 400))
+        .enumerate()
+        .map(|(row, (noisy, level))| {
+            let deviation = [0.2, 1.0, 5.0][row % 3];
+            let (value, level) = (noisy.values[0].1.value().unwrap(), level.values[0].1.value().unwrap());
+            Instant {
+                seconds: noisy.seconds,
+                values: vec![(
+                    0,
+                    Reading::Value {
+                        value: level + deviation * (value - level),
+                        deviation: Some(deviation),
+                    },
+                )],
+            }
+        })
+        .collect();
+    let found = found(&instants, &[UNKNOWN]);
+    assert!((found.change / 0.3).ln().abs() < 0.3, "{found:?}");
 }
 
 #[test]
@@ -89,7 +155,11 @@ fn known_numbers_stay_and_units_do_not_matter() {
     for unit in [1e-4, 1e4] {
         let scaled = |instant: &Instant| Instant {
             seconds: instant.seconds,
-            values: instant.values.iter().map(|(n, value)| (*n, value * unit)).collect(),
+            values: instant
+                .values
+                .iter()
+                .map(|(n, value)| (*n, (value.value().unwrap() * unit).into()))
+                .collect(),
         };
         let scaled: Vec<Instant> = instants.iter().map(scaled).collect();
         let prior = Gaussian::scalar(20.0 * unit, 100.0 * unit * unit).unwrap();
@@ -120,7 +190,7 @@ fn what_cannot_be_calibrated_is_refused() {
     assert!(level.calibrate(&good, UNKNOWN, &[UNKNOWN]).is_err());
     assert!(level.calibrate(&good, Number::Known(-1.0), &[UNKNOWN; 2]).is_err());
     let mut wrong = good.clone();
-    wrong[3].values[0].1 = f64::NAN;
+    wrong[3].values[0].1 = f64::NAN.into();
     assert!(level.calibrate(&wrong, UNKNOWN, &[UNKNOWN; 2]).is_err());
     let mut wrong = good;
     wrong.swap(3, 4);
@@ -143,7 +213,7 @@ fn offsets_have_no_part_in_common() {
     }
     let offset = [0.0, 2.0, 0.0, -1.0, 0.0];
     let mut instants = recorded(7, 0.05, &[0.5; 5], &offset, 200);
-    instants[9].values[0].1 = 1e6;
+    instants[9].values[0].1 = 1e6.into();
     let found = offsets(&instants, 5, None);
     assert!(found.iter().zip(offset).all(|(one, other)| (one - other).abs() < 0.2), "{found:?}");
     // Of two sensors nothing says which is right: both are shifted to the middle.

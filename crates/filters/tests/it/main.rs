@@ -3,10 +3,12 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
+mod backward_simulation;
 mod calibration;
 mod centre;
 mod contract;
 mod failure;
+mod fit;
 mod imm;
 mod lattice;
 mod own_law;

@@ -6,6 +6,9 @@
 //!     at each local maximum:     the most probable state by Gauss-Newton steps, for each noise; its covariance and evidence there
 //! keep:  the places whose evidence is not negligible beside the best, each as one hypothesis
 //! ```
+//! Fewer ranges than position, bias and error of scale have coordinates leave a curve of places: it is cut into pieces, each with an error of scale
+//! of its own, which is then not estimated ([`Normal::condition`]).
+//!
 //! Anchors on a circle have a second place, the inverse of the first in that circle: its ranges differ by a factor only. Which of the two it is
 //! is decided by the prior of scale and bias alone, so both are kept while both are probable.
 
@@ -23,6 +26,10 @@ const BAD_ANCHOR: f64 = 0.01;
 /// Probability that an anchor is good before its first range, and after a first range that was an outlier.
 const GOOD: f64 = 0.99;
 const GOOD_AFTER_OUTLIER: f64 = 0.6;
+/// Pieces of an error of scale that the ranges do not determine: middles and common deviation in deviations of its prior, and their weights. Together
+/// they have its mean and variance.
+const PIECES: [(f64, f64); 5] = [(0.0, 0.375), (-0.8, 0.25), (0.8, 0.25), (-1.6, 0.0625), (1.6, 0.0625)];
+const PIECE: f64 = 0.6;
 /// Two places are the same if they differ by less than this many deviations.
 const SAME: f64 = 1.0;
 
@@ -98,14 +105,28 @@ pub(super) fn hypotheses(
     };
     found.retain(|one| one.log_evidence > best - WORSE);
     found.truncate(KEPT);
-    let mut parts: Vec<Found> = Vec::new();
+    let mut parts: Vec<(Search<'_>, Found, f64)> = Vec::new();
     for one in found {
         let ranges = left(one.without);
+        if ranges.len() < known.axes + 2 && calibration[1].1 > 0.0 {
+            for piece in pieces(&search, &one, &ranges, typical) {
+                let is_known = parts.iter().any(|(other, known, _)| {
+                    known.without == one.without
+                        && other.calibration == piece.0.calibration
+                        && is_same(&known.normal, &piece.1.normal)
+                });
+                if !is_known {
+                    parts.push(piece);
+                }
+            }
+            continue;
+        }
         let slices = search.sliced(&one, &ranges, typical);
-        parts.extend(if slices.is_empty() { vec![one] } else { slices });
+        let slices = if slices.is_empty() { vec![one] } else { slices };
+        parts.extend(slices.into_iter().map(|slice| (search, slice, 0.0)));
     }
     let mut all = Vec::new();
-    for one in &parts {
+    for (search, one, log_share) in &parts {
         let ranges = left(one.without);
         let out = one.without.map(|i| collected[i].anchor);
         let good: Vec<f64> = (0..anchors)
@@ -115,11 +136,37 @@ pub(super) fn hypotheses(
             let Some((filters, weights, log_evidence)) = search.bank(one, &ranges, *own) else {
                 continue;
             };
-            let log_weight = log_evidence + penalty(one.without, ranges.len()) + probability.ln();
+            let log_weight = log_evidence + penalty(one.without, ranges.len()) + probability.ln() + log_share;
             all.push(Hypothesis::new(log_weight, filters, weights, good.clone(), variant));
         }
     }
     all.retain(Hypothesis::is_finite);
     all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     all
+}
+
+/// A place cut by the error of scale: what each piece is searched with, the place, and `ln` of the piece's share.
+fn pieces<'a>(search: &Search<'a>, one: &Found, ranges: &[Collected], typical: f64) -> Vec<(Search<'a>, Found, f64)> {
+    let [bias, (middle, variance)] = search.calibration;
+    let deviation = variance.sqrt();
+    let mut found = Vec::new();
+    for sign in [1.0, -1.0] {
+        let mut from = one.normal.mean.clone();
+        for (off, share) in PIECES {
+            // The middle belongs to the first direction; each piece starts where its neighbour ended.
+            if off * sign < 0.0 || off == 0.0 && sign < 0.0 {
+                continue;
+            }
+            let scale = (middle + off * deviation, (PIECE * deviation).powi(2));
+            let piece = Search {
+                calibration: [bias, scale],
+                ..*search
+            };
+            if let Some(place) = piece.best(&from, ranges, one.without, typical) {
+                from.clone_from(&place.normal.mean);
+                found.push((piece, place, share.ln()));
+            }
+        }
+    }
+    found
 }

@@ -13,10 +13,15 @@ const NOISE_CHANGES: f64 = 0.1 * SPEED_CHANGES;
 const MIXED: u32 = 5;
 /// Probability per range of an anchor that it starts, or ceases, to send ranges that do not depend on the distance.
 const ANCHOR_CHANGES: f64 = 1e-3;
-/// A share of another filter below this does not change a filter.
-const NEGLIGIBLE: f64 = 1e-12;
+/// A share of its neighbours below this does not change the moments of a filter.
+const NEGLIGIBLE: f64 = 1e-6;
+/// A filter of less weight than this is left out, until changes from its neighbours reach it again.
+const LEFT_OUT: f64 = 1e-6;
 /// Share of a range's score that stays in the sum of an anchor's scores.
 const SCORE_KEPT: f64 = 0.9;
+/// Share of a range's evidence that stays in the recent evidence, and by how many nats that of two hypotheses may differ without deciding.
+const RECALLED: f64 = 0.98;
+const UNDECIDED: f64 = 6.0;
 /// Mean squared error of a normal variable of unit variance given its level: 1, 2, 3, 4 bits.
 const DISTORTION: [f64; 4] = [0.363, 0.119, 0.037, 0.012];
 
@@ -24,6 +29,8 @@ const DISTORTION: [f64; 4] = [0.363, 0.119, 0.037, 0.012];
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Arrived {
     Value(f64),
+    /// The first range of an instant whose clock is unknown: it tells the clock, and nothing of the anchor.
+    First(f64),
     Level {
         level: usize,
         levels: usize,
@@ -35,7 +42,7 @@ impl Arrived {
     /// Density or probability of what arrived if the range does not depend on the distance.
     fn stray(&self, width: f64) -> f64 {
         match self {
-            Self::Value(_) => 1.0 / width,
+            Self::Value(_) | Self::First(_) => 1.0 / width,
             Self::Level {
                 level,
                 levels,
@@ -58,7 +65,7 @@ impl Arrived {
         let deviation = total.sqrt();
         let gain = predicted.variance / total;
         let (density, mean, left, score) = match self {
-            Self::Value(value) => {
+            Self::Value(value) | Self::First(value) => {
                 let score = (value - predicted.mean) / deviation;
                 (normal::pdf(score) / deviation, score, 0.0, score)
             }
@@ -91,11 +98,11 @@ impl Arrived {
 }
 
 /// One explanation of all ranges so far.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Hypothesis {
     /// `ln` of its probability, up to a constant of all.
     pub(super) log_weight: f64,
-    /// Speed by speed, for each the noises.
+    /// Speed by speed, for each the noises. Those of weight 0 are left out: what they hold means nothing.
     pub(super) filters: Vec<Normal>,
     pub(super) weights: Vec<f64>,
     /// Per anchor, the probability that its ranges depend on the distance.
@@ -104,11 +111,57 @@ pub(super) struct Hypothesis {
     pub(super) variant: usize,
     /// Probability that a range is no outlier, averaged over the latest ranges.
     pub(super) agreement: f64,
+    /// Ranges in a row for which the anchors that are left did not determine the position.
+    pub(super) contradicted: usize,
+    /// Decaying `ln` evidence while the ranges do not determine the state, and by how much it counts.
+    recent: f64,
+    behind: f64,
     /// Per anchor, the decaying sum of scores and that of their variances.
     scores: Vec<(f64, f64)>,
     ranges: u32,
     /// The next range, by each filter.
     predicted: Vec<Predicted>,
+}
+
+impl Clone for Hypothesis {
+    fn clone(&self) -> Self {
+        Self {
+            log_weight: self.log_weight,
+            filters: self.filters.clone(),
+            weights: self.weights.clone(),
+            good: self.good.clone(),
+            variant: self.variant,
+            agreement: self.agreement,
+            contradicted: self.contradicted,
+            recent: self.recent,
+            behind: self.behind,
+            scores: self.scores.clone(),
+            ranges: self.ranges,
+            predicted: self.predicted.clone(),
+        }
+    }
+
+    /// Copies into the buffers that are there; filters that are left out are not copied.
+    fn clone_from(&mut self, from: &Self) {
+        self.log_weight = from.log_weight;
+        self.weights.clone_from(&from.weights);
+        self.good.clone_from(&from.good);
+        self.variant = from.variant;
+        self.agreement = from.agreement;
+        self.contradicted = from.contradicted;
+        (self.recent, self.behind) = (from.recent, from.behind);
+        self.scores.clone_from(&from.scores);
+        self.ranges = from.ranges;
+        self.filters.truncate(from.filters.len());
+        let kept = self.filters.len();
+        for ((own, other), weight) in self.filters.iter_mut().zip(&from.filters).zip(&from.weights) {
+            if *weight > 0.0 {
+                own.clone_from(other);
+            }
+        }
+        self.filters.extend_from_slice(&from.filters[kept..]);
+        self.predicted.resize_with(from.predicted.len(), Predicted::default);
+    }
 }
 
 impl Hypothesis {
@@ -127,6 +180,9 @@ impl Hypothesis {
             good,
             variant,
             agreement: 1.0,
+            contradicted: 0,
+            recent: 0.0,
+            behind: 0.0,
             scores: vec![(0.0, 0.0); anchors],
             ranges: 0,
             predicted: vec![Predicted::default(); count],
@@ -140,35 +196,58 @@ impl Hypothesis {
         if self.ranges.is_multiple_of(MIXED) {
             let changes = |a_range: f64| -(f64::from(MIXED) * (-a_range).ln_1p()).exp_m1();
             for noise in 0..noises {
-                self.mix((0..speeds).map(|speed| speed * noises + noise).collect(), changes(SPEED_CHANGES));
+                self.mix((0..speeds).map(|speed| speed * noises + noise), changes(SPEED_CHANGES));
             }
             for speed in 0..speeds {
-                self.mix((0..noises).map(|noise| speed * noises + noise).collect(), changes(NOISE_CHANGES));
+                self.mix(speed * noises..(speed + 1) * noises, changes(NOISE_CHANGES));
             }
         }
         for (i, filter) in self.filters.iter_mut().enumerate() {
-            let speed = known.speeds[i / noises];
-            filter.predict(step, speed * speed);
+            if self.weights[i] > 0.0 {
+                let speed = known.speeds[i / noises];
+                filter.predict(step, speed * speed);
+            }
         }
     }
 
-    /// With probability `changes`, a new filter is drawn evenly from `among`.
-    fn mix(&mut self, among: Vec<usize>, changes: f64) {
-        if among.len() < 2 {
+    /// With probability `changes`, a filter becomes one of its two neighbours in a row of filters.
+    fn mix(&mut self, row: impl Iterator<Item = usize>, changes: f64) {
+        let row: Vec<usize> = row.collect();
+        if row.len() < 2 || row.iter().all(|i| self.weights[*i] == 0.0) {
             return;
         }
-        let all: f64 = among.iter().map(|i| self.weights[*i]).sum();
-        let common = merged(among.iter().map(|i| (self.weights[*i], &self.filters[*i])));
-        let Some(common) = common else { return };
-        let arriving = changes * all / among.len() as f64;
-        for i in among {
-            let staying = (1.0 - changes) * self.weights[i];
-            if arriving > NEGLIGIBLE * staying
-                && let Some(next) = merged([(staying, &self.filters[i]), (arriving, &common)].into_iter())
-            {
-                self.filters[i] = next;
+        let mut next: Vec<(usize, f64, Option<Normal>)> = Vec::with_capacity(row.len());
+        for (at, i) in row.iter().enumerate() {
+            let neighbours = [at.checked_sub(1), Some(at + 1)].map(|at| row.get(at?).copied());
+            let leaving = 0.5 * changes * neighbours.iter().flatten().count() as f64;
+            let staying = (1.0 - leaving) * self.weights[*i];
+            let arriving = || {
+                neighbours
+                    .iter()
+                    .flatten()
+                    .map(|j| (0.5 * changes * self.weights[*j], *j))
+                    .filter(|(weight, _)| *weight > 0.0)
+            };
+            let added: f64 = arriving().map(|(weight, _)| weight).sum();
+            let total = staying + added;
+            let moments = if total < LEFT_OUT || added <= NEGLIGIBLE * staying {
+                None
+            } else {
+                let own = (staying > 0.0).then_some((staying, *i));
+                merged(
+                    own.into_iter()
+                        .chain(arriving())
+                        .map(|(weight, j)| (weight, &self.filters[j])),
+                )
+            };
+            let is_known = self.weights[*i] > 0.0 || moments.is_some();
+            next.push((*i, if is_known { total } else { 0.0 }, moments));
+        }
+        for (i, weight, moments) in next {
+            self.weights[i] = weight;
+            if let Some(moments) = moments {
+                self.filters[i] = moments;
             }
-            self.weights[i] = staying + arriving;
         }
     }
 
@@ -178,6 +257,9 @@ impl Hypothesis {
         let noises = known.noises.len();
         let (mut mean, mut square) = (0.0, 0.0);
         for (i, (filter, out)) in self.filters.iter().zip(&mut self.predicted).enumerate() {
+            if self.weights[i] == 0.0 {
+                continue;
+            }
             filter.range(place, above, anchor, out);
             let noise = known.noises[i % noises];
             mean += self.weights[i] * out.mean;
@@ -187,6 +269,7 @@ impl Hypothesis {
             .predicted
             .iter()
             .zip(&self.weights)
+            .filter(|(_, w)| **w > 0.0)
             .map(|(p, w)| w * (p.mean - mean).powi(2))
             .sum();
         (mean, square + between)
@@ -195,21 +278,71 @@ impl Hypothesis {
     /// Gives all filters an unknown bias: with it the next range is as expected.
     pub(super) fn forget_bias(&mut self, known: &Known, deviation: f64, place: &[f64; 3], anchor: usize, range: f64) {
         let mut out = Predicted::default();
-        for filter in &mut self.filters {
+        for (filter, weight) in self.filters.iter_mut().zip(&self.weights) {
+            if *weight == 0.0 {
+                continue;
+            }
             filter.range(place, place[2] - known.level, anchor, &mut out);
             let bias = filter.mean[filter.bias()] + range - out.mean;
             filter.forget_bias(bias, deviation * deviation);
         }
     }
 
-    /// Updates with what arrived from an anchor whose range was [expected](Self::expect).
-    pub(super) fn update(&mut self, known: &Known, anchor: usize, arrived: &Arrived) -> Result<(), Error> {
+    /// Number of anchors among `heard` whose ranges depend on the distance.
+    pub(super) fn usable(&self, heard: impl Fn(usize) -> bool) -> usize {
+        (0..self.good.len())
+            .filter(|anchor| heard(*anchor) && self.good[*anchor] > 0.5)
+            .count()
+    }
+
+    /// `ln` of its probability, up to a constant of all.
+    pub(super) fn log_share(&self) -> f64 {
+        self.log_weight - self.behind
+    }
+
+    /// Takes in the evidence of a range that determines the state.
+    pub(super) fn weigh(&mut self, log_evidence: f64) {
+        self.log_weight += log_evidence - self.behind;
+        (self.recent, self.behind) = (0.0, 0.0);
+    }
+
+    /// Takes in the evidence of a range that does not.
+    pub(super) fn recall(&mut self, log_evidence: f64) -> f64 {
+        self.recent = RECALLED * self.recent + log_evidence;
+        self.recent
+    }
+
+    /// Compares its recent evidence with the best one's.
+    pub(super) fn fall_behind(&mut self, best: f64) {
+        self.behind = (best - self.recent - UNDECIDED).max(0.0);
+    }
+
+    /// Updates with what arrived from an anchor whose range was [expected](Self::expect). `holds_scale`: the error of scale is not estimated
+    /// ([`Normal::condition`]). Returns `ln` of the evidence.
+    pub(super) fn update(
+        &mut self,
+        known: &Known,
+        anchor: usize,
+        arrived: &Arrived,
+        holds_scale: bool,
+    ) -> Result<f64, Error> {
         let (noises, stray) = (known.noises.len(), arrived.stray(known.stray));
+        if matches!(arrived, Arrived::First(_)) {
+            for i in (0..self.filters.len()).filter(|i| self.weights[*i] > 0.0) {
+                let predicted = &self.predicted[i];
+                let (_, mean, variance, _) = arrived.right(predicted, known.noises[i % noises])?;
+                self.filters[i].condition(predicted, mean, variance, holds_scale);
+            }
+            return Ok(0.0);
+        }
         let (good, outliers) = (self.good[anchor], known.outliers);
         let right_share = good * (1.0 - outliers);
         let (mut total, mut agreeing, mut score) = (0.0, 0.0, 0.0);
         let old: f64 = self.weights.iter().sum();
         for i in 0..self.filters.len() {
+            if self.weights[i] == 0.0 {
+                continue;
+            }
             let predicted = &self.predicted[i];
             let (density, mean, variance, innovation) = arrived.right(predicted, known.noises[i % noises])?;
             let right = right_share * density;
@@ -220,7 +353,7 @@ impl Hypothesis {
             let after = predicted.mean + share * off;
             let spread = share * variance + (1.0 - share) * predicted.variance + share * (1.0 - share) * off * off;
             let weight = self.weights[i] / old;
-            self.filters[i].condition(predicted, after, spread);
+            self.filters[i].condition(predicted, after, spread, holds_scale);
             score += weight * innovation.clamp(-3.0, 3.0);
             self.weights[i] = weight * evidence;
             total += self.weights[i];
@@ -229,8 +362,12 @@ impl Hypothesis {
         if total <= 0.0 {
             return Err(Error::Impossible);
         }
-        self.weights.iter_mut().for_each(|weight| *weight /= total);
-        self.log_weight += total.ln();
+        self.weights.iter_mut().for_each(|weight| {
+            *weight /= total;
+            if *weight < LEFT_OUT {
+                *weight = 0.0;
+            }
+        });
         // The anchor: with `density` the mean over the filters, `agreeing` is `good (1 - outliers) density`.
         let still_good = (agreeing + good * outliers * stray) / total;
         self.good[anchor] = ANCHOR_CHANGES + (1.0 - 2.0 * ANCHOR_CHANGES) * still_good.clamp(0.0, 1.0);
@@ -239,7 +376,7 @@ impl Hypothesis {
         let (sum, variance) = &mut self.scores[anchor];
         *sum = SCORE_KEPT * *sum + score;
         *variance = SCORE_KEPT * SCORE_KEPT * *variance + 1.0;
-        Ok(())
+        Ok(total.ln())
     }
 
     /// How much the scores of all anchors differ from independent ones of mean zero, in standard deviations of the sum of their squares
@@ -257,10 +394,15 @@ impl Hypothesis {
 
     /// The filters' common moments.
     pub(super) fn moments(&self) -> Option<Normal> {
-        merged(self.weights.iter().copied().zip(&self.filters))
+        merged(self.parts())
+    }
+
+    fn parts(&self) -> impl Iterator<Item = (f64, &Normal)> + Clone {
+        let all = self.weights.iter().copied().zip(&self.filters);
+        all.filter(|(weight, _)| *weight > 0.0)
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        self.filters.iter().all(Normal::is_finite) && self.log_weight.is_finite()
+        self.parts().all(|(_, filter)| filter.is_finite()) && self.log_weight.is_finite()
     }
 }

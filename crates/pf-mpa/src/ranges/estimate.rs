@@ -14,6 +14,9 @@ const APART: f64 = 3.0;
 /// Deviations to either side of a mean that hold 95 % of a normal law.
 const BAND: f64 = 1.959_963_984_540_054;
 
+/// Halvings of the interval in which the end of a band lies.
+const HALVINGS: usize = 24;
+
 /// The estimate after one range. Lengths are in the unit of the anchors' coordinates.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -79,7 +82,7 @@ pub(super) fn of(known: &Known, hypotheses: &[Hypothesis], lost: bool) -> Option
         .count();
     let (mut noise, mut speed) = (0.0, 0.0);
     for (share, one) in shares.iter().zip(hypotheses) {
-        for (i, weight) in one.weights.iter().enumerate() {
+        for (i, weight) in one.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
             noise += share * weight * known.noises[i % noises].ln();
             speed += share * weight * known.speeds[i / noises].ln();
         }
@@ -131,7 +134,7 @@ fn band(laws: &[(f64, f64, f64)]) -> (f64, f64) {
     };
     let bisect = |target: f64, mut from: f64, mut to: f64| {
         if laws.len() > 1 {
-            for _ in 0..40 {
+            for _ in 0..HALVINGS {
                 let middle = 0.5 * (from + to);
                 if below(middle) < target {
                     from = middle

@@ -7,7 +7,7 @@
 //! ```
 
 /// A normal law of the state. The covariance is stored in full, row by row.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(super) struct Normal {
     pub(super) mean: Vec<f64>,
     pub(super) covariance: Vec<f64>,
@@ -56,6 +56,23 @@ impl Step {
             velocity: -(-2.0 * u).exp_m1(),
             drift: drift * seconds,
         }
+    }
+}
+
+impl Clone for Normal {
+    fn clone(&self) -> Self {
+        Self {
+            mean: self.mean.clone(),
+            covariance: self.covariance.clone(),
+            axes: self.axes,
+        }
+    }
+
+    /// Copies into the buffers that are there.
+    fn clone_from(&mut self, from: &Self) {
+        self.mean.clone_from(&from.mean);
+        self.covariance.clone_from(&from.covariance);
+        self.axes = from.axes;
     }
 }
 
@@ -205,12 +222,16 @@ impl Normal {
         Some(root)
     }
 
-    /// Conditions on a range whose noise-free value has this mean and variance afterwards.
-    pub(super) fn condition(&mut self, predicted: &Predicted, mean: f64, variance: f64) {
+    /// Conditions on a range whose noise-free value has this mean and variance afterwards. `holds_scale`: mean and variance of the error of
+    /// scale stay as they are, and what it does to the other coordinates is kept in its covariances with them (a filter with a considered
+    /// parameter, Schmidt 1966). So a direction in which the ranges say nothing is not taken for known because the range is linearised at
+    /// another place each time.
+    pub(super) fn condition(&mut self, predicted: &Predicted, mean: f64, variance: f64, holds_scale: bool) {
         if predicted.variance <= 0.0 {
             return;
         }
-        let n = self.mean.len();
+        let (n, scale) = (self.mean.len(), self.scale());
+        let held = (self.mean[scale], self.variance(scale));
         let shift = (mean - predicted.mean) / predicted.variance;
         let shrink = (predicted.variance - variance) / (predicted.variance * predicted.variance);
         for i in 0..n {
@@ -219,6 +240,9 @@ impl Normal {
             for j in 0..n {
                 self.covariance[i * n + j] -= row * predicted.cross[j];
             }
+        }
+        if holds_scale {
+            (self.mean[scale], self.covariance[scale * n + scale]) = held;
         }
         // Rounding must not leave a negative variance of a coordinate that is known.
         (0..n).for_each(|i| self.covariance[i * n + i] = self.covariance[i * n + i].max(0.0));

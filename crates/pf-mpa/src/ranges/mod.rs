@@ -16,6 +16,7 @@
 mod acquisition;
 mod bank;
 mod estimate;
+mod fit;
 mod gaussian;
 mod odds;
 mod rows;
@@ -45,10 +46,15 @@ use std::collections::BTreeMap;
 const COMPARED: usize = 8;
 /// The track is lost if fewer than this share of the latest ranges agree.
 const AGREEMENT: f64 = 0.35;
+/// Or if for so many ranges of each anchor those that do not contradict the others are too few for a place.
+const CONTRADICTED: usize = 5;
 /// Or if the misfit of levels is this many deviations: about once in a hundred thousand ranges.
 const MISFIT: f64 = 4.3;
 /// Added to the variances of bias and scale when the track is lost, as a share of those before the first range.
 const LOST_SHARE: f64 = 0.04;
+/// The edge between the two levels of a single bit lies beside the expected range by as many of its deviations as the `ln` of the noise is
+/// uncertain, at most so many: a bit about the expected range says nothing about the noise.
+const ASIDE: f64 = 0.8;
 /// Bits of a range that is sent in full.
 const FULL_BITS: usize = 32;
 
@@ -69,6 +75,10 @@ pub struct RangeTracker {
     travel: Travel,
     known: Known,
     hypotheses: Vec<Hypothesis>,
+    /// A buffer: the next hypotheses while they are computed.
+    next: Vec<Hypothesis>,
+    /// When each anchor last sent a range.
+    heard: Vec<f64>,
     /// The latest range in full of each anchor.
     collected: BTreeMap<usize, (f64, f64)>,
     /// Ranges since acquisition began.
@@ -112,6 +122,8 @@ impl RangeTracker {
             places: places.iter().map(|place| [place.x, place.y, place.z]).collect(),
             travel,
             hypotheses: Vec::new(),
+            next: Vec::new(),
+            heard: vec![f64::NEG_INFINITY; places.len()],
             collected: BTreeMap::new(),
             tried: 0,
             calibration: [(0.0, known.bias * known.bias), (0.0, known.scale * known.scale)],
@@ -183,13 +195,15 @@ impl RangeTracker {
             self.collected.clear();
         }
         self.pushed += 1;
+        self.heard[anchor] = time;
         if self.hypotheses.is_empty() {
             self.bits += FULL_BITS;
             self.search(time, is_new, anchor, f64::from(range as f32));
             self.last = time;
             return Ok(self.estimate(false));
         }
-        let mut next = self.hypotheses.clone();
+        let mut next = std::mem::take(&mut self.next);
+        next.clone_from(&self.hypotheses);
         let lost = match self.track(&mut next, if is_new { elapsed } else { 0.0 }, is_new, anchor, range) {
             Ok(()) => self.is_lost(&next),
             // The range has probability zero under every hypothesis, even as an outlier.
@@ -208,8 +222,9 @@ impl RangeTracker {
             self.collected.insert(anchor, (time, f64::from(range as f32)));
         }
         if !next.is_empty() {
-            self.hypotheses = next;
+            std::mem::swap(&mut self.hypotheses, &mut next);
         }
+        self.next = next;
         let estimate = self.estimate(lost);
         if lost {
             self.losses += 1;
@@ -288,11 +303,18 @@ impl RangeTracker {
             square += share * (variance + expected * expected);
         }
         let arrived = match self.travel {
+            Travel::Full if known.clock.is_some() && is_new => Arrived::First(f64::from(range as f32)),
             Travel::Full => Arrived::Value(f64::from(range as f32)),
             Travel::Bits(bits) => {
                 // All nodes that hear the reports compute the reference themselves, so it is not sent.
                 let levels = 1_usize << bits;
-                let expected = Gaussian::scalar(mean, (square - mean * mean).max(f64::MIN_POSITIVE))?;
+                let variance = (square - mean * mean).max(f64::MIN_POSITIVE);
+                let aside = if bits == 1 {
+                    self.aside(next, &shares) * variance.sqrt()
+                } else {
+                    0.0
+                };
+                let expected = Gaussian::scalar(mean + aside, variance)?;
                 let reference = RangeReference::about(&expected, optimal_loading(levels)?);
                 let scheme = QuantizedRange::new(levels, RangeNoise::constant(known.noises[0])?)?;
                 let level = scheme.level(range, &reference)?.0;
@@ -304,13 +326,39 @@ impl RangeTracker {
             }
         };
         let mut failed = None;
-        next.retain_mut(|one| match one.update(known, anchor, &arrived) {
-            Ok(()) => one.is_finite(),
+        let (heard, last) = (&self.heard, self.heard[anchor]);
+        // Fewer anchors than unknowns: position, common bias, error of scale.
+        let is_short = |one: &Hypothesis| {
+            known.scale > 0.0 && one.usable(|other| last - heard[other] <= known.silence) < known.axes + 2
+        };
+        // Evidence of ranges that every hypothesis can explain is evidence of little errors of the model. Only much of it decides.
+        let is_undecided = next.iter().all(is_short);
+        let mut best = f64::NEG_INFINITY;
+        next.retain_mut(|one| match one.update(known, anchor, &arrived, is_short(one)) {
+            Ok(log_evidence) if is_undecided => {
+                best = best.max(one.recall(log_evidence));
+                one.is_finite()
+            }
+            Ok(log_evidence) => {
+                one.weigh(log_evidence);
+                one.is_finite()
+            }
             Err(error) => {
                 failed = Some(error);
                 false
             }
         });
+        // Anchors that send ranges, but contradict each other so much that those that are left do not determine the position.
+        let is_heard = |other: usize| last - heard[other] <= known.silence;
+        let enough = known.axes + 1;
+        let are_enough = (0..heard.len()).filter(|other| is_heard(*other)).count() >= enough;
+        for one in next.iter_mut() {
+            let is_short = are_enough && one.usable(is_heard) < enough;
+            one.contradicted = if is_short { one.contradicted + 1 } else { 0 };
+        }
+        if is_undecided {
+            next.iter_mut().for_each(|one| one.fall_behind(best));
+        }
         if next.is_empty() {
             return Err(failed.unwrap_or(Error::Impossible));
         }
@@ -321,6 +369,26 @@ impl RangeTracker {
         Ok(())
     }
 
+    /// By how many deviations of the expected range the edge of a single bit lies beside it: above and below in turn.
+    fn aside(&self, hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
+        let noises = &self.known.noises;
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (one, share) in hypotheses.iter().zip(shares) {
+            for (i, weight) in one.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                let log = noises[i % noises.len()].ln();
+                mean += share * weight * log;
+                square += share * weight * log * log;
+            }
+        }
+        let size = (square - mean * mean).max(0.0).sqrt().min(ASIDE);
+        // Not the same side for an anchor each time.
+        if (self.pushed + self.pushed / self.places.len()).is_multiple_of(2) {
+            size
+        } else {
+            -size
+        }
+    }
+
     fn is_lost(&self, hypotheses: &[Hypothesis]) -> bool {
         let shares = shares_of(hypotheses);
         let agreement: f64 = hypotheses
@@ -328,11 +396,17 @@ impl RangeTracker {
             .zip(&shares)
             .map(|(one, share)| share * one.agreement)
             .sum();
+        let contradicted: f64 = hypotheses
+            .iter()
+            .zip(&shares)
+            .filter(|(one, _)| one.contradicted > CONTRADICTED * self.places.len())
+            .map(|(_, share)| share)
+            .sum();
         let misfit = match self.travel {
             Travel::Full => 0.0,
             Travel::Bits(_) => hypotheses.iter().map(Hypothesis::misfit).fold(f64::INFINITY, f64::min),
         };
-        agreement < AGREEMENT || misfit > MISFIT
+        agreement < AGREEMENT || misfit > MISFIT || contradicted > 0.5
     }
 
     fn shares(&self) -> Vec<f64> {
@@ -349,7 +423,7 @@ impl RangeTracker {
         let best = self
             .hypotheses
             .iter()
-            .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
+            .max_by(|a, b| a.log_share().total_cmp(&b.log_share()));
         if let Some(moments) = best.and_then(Hypothesis::moments) {
             for ((axis, prior), known) in [moments.bias(), moments.scale()]
                 .into_iter()

@@ -11,9 +11,9 @@ const DROPPED: f64 = 1e-5;
 pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
     let best = hypotheses
         .iter()
-        .map(|one| one.log_weight)
+        .map(Hypothesis::log_share)
         .fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = hypotheses.iter().map(|one| (one.log_weight - best).exp()).collect();
+    let weights: Vec<f64> = hypotheses.iter().map(|one| (one.log_share() - best).exp()).collect();
     let total: f64 = weights.iter().sum();
     weights.iter().map(|weight| weight / total).collect()
 }
@@ -22,16 +22,16 @@ pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
 pub(super) fn drop_improbable(hypotheses: &mut Vec<Hypothesis>) {
     let best = hypotheses
         .iter()
-        .map(|one| one.log_weight)
+        .map(Hypothesis::log_share)
         .fold(f64::NEG_INFINITY, f64::max);
-    hypotheses.retain(|one| one.log_weight - best > DROPPED.ln());
+    hypotheses.retain(|one| one.log_share() - best > DROPPED.ln());
     // Only differences matter.
     hypotheses.iter_mut().for_each(|one| one.log_weight -= best);
 }
 
 /// Of hypotheses about the same place with the same model, keeps the most probable, with the probability of all.
 pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>) {
-    hypotheses.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    hypotheses.sort_by(|a, b| b.log_share().total_cmp(&a.log_share()));
     let mut kept: Vec<(Hypothesis, Option<Normal>)> = Vec::new();
     for one in hypotheses.drain(..) {
         let moments = one.moments();
@@ -40,7 +40,7 @@ pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>) {
             _ => false,
         });
         match twin {
-            Some((other, _)) => other.log_weight += (one.log_weight - other.log_weight).exp().ln_1p(),
+            Some((other, _)) => other.log_weight += (one.log_share() - other.log_share()).exp().ln_1p(),
             None => kept.push((one, moments)),
         }
     }

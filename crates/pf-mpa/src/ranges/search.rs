@@ -1,16 +1,15 @@
-//! Places that explain a set of ranges: the grid of positions, and the most probable state near a node.
+//! Places that explain a set of ranges: the grid of positions, and the filters of a place.
 
+use super::fit::fit;
 use super::gaussian::Normal;
 use super::rows::{Collected, Rows, Slice};
 use super::settings::Known;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Grid: nodes to either side of the middle, and from one to the next in deviations of the prior, for two coordinates and for three.
 const NODES: [(i32, f64); 2] = [(12, 0.25), (6, 0.4)];
 /// Local maxima of the grid that are refined, for each set of anchors.
 const MAXIMA: usize = 4;
-/// Gauss-Newton steps at most.
-const STEPS: usize = 30;
 /// Slices to either side of the middle at most, and by how many nats one may be worse than the best.
 const SLICES: i32 = 8;
 const NEGLIGIBLE_SLICE: f64 = 6.0;
@@ -19,6 +18,7 @@ const NEGLIGIBLE_SLICE: f64 = 6.0;
 pub(super) type Calibration = [(f64, f64); 2];
 
 /// What is known before the ranges.
+#[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
     pub(super) known: &'a Known,
     pub(super) calibration: Calibration,
@@ -26,6 +26,7 @@ pub(super) struct Search<'a> {
 }
 
 /// A place that explains some of the ranges.
+#[derive(Clone)]
 pub(super) struct Found {
     /// Index of the range that is left out.
     pub(super) without: Option<usize>,
@@ -41,7 +42,7 @@ impl Search<'_> {
         self.known.axes
     }
 
-    fn distance(&self, point: &[f64], one: &Collected) -> f64 {
+    pub(super) fn distance(&self, point: &[f64], one: &Collected) -> f64 {
         let squares: f64 = (0..self.axes()).map(|i| (point[i] - one.place[i]).powi(2)).sum();
         let above = if self.axes() == 2 {
             one.place[2] - self.known.level
@@ -60,12 +61,19 @@ impl Search<'_> {
             let off = (point[i] - self.known.middle[i]) / self.known.spreads[i];
             total -= 0.5 * off * off;
         }
-        for one in ranges {
+        // A product of few ratios does not overflow, and one logarithm is cheaper than many.
+        let mut ratio = 1.0;
+        for (number, one) in ranges.iter().enumerate() {
             let d = self.distance(point, one);
             let cross = [p[0] + d * p[1], p[1] + d * p[2]];
             let spread = cross[0] + d * cross[1] + variance;
             let off = one.range - (1.0 + mean[1]) * d - mean[0];
-            total -= 0.5 * (off * off / spread + spread.ln());
+            total -= 0.5 * off * off / spread;
+            ratio *= spread / variance;
+            if number % 8 == 7 || number + 1 == ranges.len() {
+                total -= 0.5 * f64::ln(ratio);
+                ratio = 1.0;
+            }
             let gain = cross.map(|c| c / spread);
             mean = [mean[0] + gain[0] * off, mean[1] + gain[1] * off];
             p = [
@@ -128,114 +136,6 @@ impl Search<'_> {
         found.into_iter().flat_map(beside).collect()
     }
 
-    /// Mean and variances of the state before the first range.
-    fn prior(&self, speed: f64, own: f64) -> (Vec<f64>, Vec<f64>) {
-        let axes = self.axes();
-        let size = 2 * axes + 2 + if own > 0.0 { self.anchors } else { 0 };
-        let (mut mean, mut variances) = (vec![0.0; size], vec![own * own; size]);
-        for i in 0..axes {
-            (mean[i], variances[i]) = (self.known.middle[i], self.known.spreads[i].powi(2));
-            variances[axes + i] = speed * speed;
-        }
-        for (i, (middle, variance)) in self.calibration.into_iter().enumerate() {
-            (mean[2 * axes + i], variances[2 * axes + i]) = (middle, variance);
-        }
-        (mean, variances)
-    }
-
-    /// The most probable state near a start, its covariance there, and the evidence, in a slice of the positions if there is one. `None` if the
-    /// covariance of the ranges is singular.
-    fn fit(&self, start: &[f64], rows: &Rows<'_>, speed: f64, own: f64) -> Option<(Normal, f64)> {
-        let axes = self.axes();
-        let (middle, variances) = self.prior(speed, own);
-        let size = middle.len();
-        let (middle, variances) = (DVector::from_vec(middle), DVector::from_vec(variances));
-        let mut deviations = rows.deviations.clone();
-        deviations.extend(rows.slice.map(|slice| slice.deviation));
-        let count = deviations.len();
-        let ranges_at = |x: &DVector<f64>| {
-            let mut jacobian = DMatrix::<f64>::zeros(count, size);
-            let mut off = DVector::<f64>::zeros(count);
-            for (row, one) in rows.ranges.iter().enumerate() {
-                let d = self.distance(x.as_slice(), one);
-                let factor = 1.0 + x[2 * axes + 1];
-                for i in 0..axes {
-                    jacobian[(row, i)] = if d > 0.0 {
-                        factor * (x[i] - one.place[i]) / d
-                    } else {
-                        0.0
-                    };
-                }
-                (jacobian[(row, 2 * axes)], jacobian[(row, 2 * axes + 1)]) = (1.0, d);
-                let mut expected = factor * d + x[2 * axes];
-                if own > 0.0 {
-                    let at = 2 * axes + 2 + one.anchor;
-                    jacobian[(row, at)] = 1.0;
-                    expected += x[at];
-                }
-                off[row] = one.range - expected;
-            }
-            if let Some(slice) = rows.slice {
-                let along: f64 = (0..axes).map(|i| slice.direction[i] * x[i]).sum();
-                (0..axes).for_each(|i| jacobian[(count - 1, i)] = slice.direction[i]);
-                off[count - 1] = slice.middle - along;
-            }
-            (jacobian, off)
-        };
-        let cost = |x: &DVector<f64>, off: &DVector<f64>| {
-            let prior: f64 = (0..size)
-                .filter(|i| variances[*i] > 0.0)
-                .map(|i| (x[i] - middle[i]).powi(2) / variances[i])
-                .sum();
-            prior
-                + off
-                    .iter()
-                    .zip(&deviations)
-                    .map(|(off, deviation)| (off / deviation).powi(2))
-                    .sum::<f64>()
-        };
-        let mut x = middle.clone();
-        x.as_mut_slice()[..axes].copy_from_slice(&start[..axes]);
-        let (mut jacobian, mut off) = ranges_at(&x);
-        let mut best = cost(&x, &off);
-        for _ in 0..STEPS {
-            let spread = innovation(&jacobian, &variances, &deviations)?;
-            let from_middle = &off - &jacobian * (&middle - &x);
-            let target = &middle + variances.component_mul(&(jacobian.transpose() * spread.solve(&from_middle)));
-            let whole = target - &x;
-            let (mut has_moved, mut share) = (false, 1.0);
-            while share > 1e-4 {
-                let next = &x + &whole * share;
-                let (next_jacobian, next_off) = ranges_at(&next);
-                let found = cost(&next, &next_off);
-                if found < best {
-                    has_moved = best - found > 1e-7 * (1.0 + found);
-                    (x, jacobian, off, best) = (next, next_jacobian, next_off, found);
-                    break;
-                }
-                share *= 0.5;
-            }
-            if !has_moved {
-                break;
-            }
-        }
-        let spread = innovation(&jacobian, &variances, &deviations)?;
-        let from_middle = &off - &jacobian * (&middle - &x);
-        let log_determinant: f64 = spread.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
-        let constants = log_determinant + count as f64 * std::f64::consts::TAU.ln();
-        let log_evidence = -0.5 * (from_middle.dot(&spread.solve(&from_middle)) + constants);
-        let cross = DMatrix::from_fn(size, count, |i, j| variances[i] * jacobian[(j, i)]);
-        let covariance = DMatrix::from_diagonal(&variances) - &cross * spread.solve(&cross.transpose());
-        let normal = Normal {
-            mean: x.as_slice().to_vec(),
-            covariance: (0..size * size)
-                .map(|k| 0.5 * (covariance[k] + covariance[k % size * size + k / size]))
-                .collect(),
-            axes,
-        };
-        (normal.is_finite() && log_evidence.is_finite()).then_some((normal, log_evidence))
-    }
-
     /// The most probable place near a start, over all noises.
     pub(super) fn best(
         &self,
@@ -248,7 +148,7 @@ impl Search<'_> {
         let mut from = start.to_vec();
         // From the largest noise down: the place of one is the start of the next.
         for noise in self.known.noises.iter().rev() {
-            let Some((normal, log_evidence)) = self.fit(&from, &Rows::new(ranges, *noise, speed, None), speed, 0.0)
+            let Some((normal, log_evidence)) = fit(self, &from, &Rows::new(ranges, *noise, speed, None), speed, 0.0)
             else {
                 continue;
             };
@@ -298,7 +198,7 @@ impl Search<'_> {
                     deviation,
                 };
                 let rows = Rows::new(ranges, one.noise, speed, Some(slice));
-                let Some((normal, log_evidence)) = self.fit(&from, &rows, speed, 0.0) else {
+                let Some((normal, log_evidence)) = fit(self, &from, &rows, speed, 0.0) else {
                     break;
                 };
                 from.clone_from(&normal.mean);
@@ -336,7 +236,7 @@ impl Search<'_> {
                         (normal.axes..2 * normal.axes).for_each(|v| normal.covariance[v * n + v] = speed * speed);
                         Some((normal, *log_evidence))
                     }
-                    _ => self.fit(&one.normal.mean, &Rows::new(ranges, *noise, *speed, one.slice), *speed, own),
+                    _ => fit(self, &one.normal.mean, &Rows::new(ranges, *noise, *speed, one.slice), *speed, own),
                 };
                 filters.push(next);
             }
@@ -360,17 +260,4 @@ impl Search<'_> {
             .map(|one| one.map_or_else(|| stand_in.clone(), |(normal, _)| normal));
         Some((filters.collect(), weights.iter().map(|weight| weight / total).collect(), log_evidence))
     }
-}
-
-fn innovation(
-    jacobian: &DMatrix<f64>,
-    variances: &DVector<f64>,
-    deviations: &[f64],
-) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
-    let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |i, j| jacobian[(i, j)] * variances[j]);
-    let mut spread = scaled * jacobian.transpose();
-    for (i, deviation) in deviations.iter().enumerate() {
-        spread[(i, i)] += deviation * deviation;
-    }
-    spread.cholesky()
 }

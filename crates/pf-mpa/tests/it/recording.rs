@@ -224,9 +224,7 @@ fn learnt_and_told(worlds: &[World]) -> Vec<[(Score, Score); 3]> {
             let told = score(&recordings, travel, told);
             println!("{travel:?} {world:?}: {:.3}\n    {learnt:.3?}\n    {told:.3?}", learnt.rms / told.rms);
             assert!((0.4..2.5).contains(&(learnt.speed / world.speed)), "{travel:?} {world:?}: {learnt:?}");
-            // A single bit says little about the noise, so that the largest noises of the bank keep their weight: the bands are too wide.
-            let least = if travel == Travel::Bits(1) { 0.5 } else { 0.7 };
-            assert!((least..1.5).contains(&learnt.nees), "{travel:?} {world:?}: {learnt:?}");
+            assert!((0.7..1.5).contains(&learnt.nees), "{travel:?} {world:?}: {learnt:?}");
             (learnt, told)
         })
     };

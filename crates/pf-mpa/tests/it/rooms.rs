@@ -75,7 +75,8 @@ struct Outcome {
     squares: f64,
     nees: f64,
     searching: usize,
-    seconds: f64,
+    /// Seconds of pushes while searching and while tracking.
+    seconds: [f64; 2],
 }
 
 fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outcome {
@@ -97,7 +98,8 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
             (1.0 + room.scale) * (truth - place).norm() + room.bias + room.noise * rng.sample::<f64, _>(StandardNormal);
         let begun = std::time::Instant::now();
         let found = tracker.push(time, name, range).unwrap();
-        outcome.seconds += begun.elapsed().as_secs_f64();
+        let is_first = found.is_some() && outcome.rows == 0;
+        outcome.seconds[usize::from(found.is_some() && !is_first)] += begun.elapsed().as_secs_f64();
         let Some(found) = found else {
             outcome.searching += 1;
             continue;
@@ -106,7 +108,9 @@ fn walk(room: &Room, seed: u64, travel: Travel, settings: RangeSettings) -> Outc
             outcome.held += usize::from((found.bands[i].0..=found.bands[i].1).contains(&truth[i]));
             outcome.rows += 1;
         }
-        let nees = found.normalised_error(&truth).unwrap();
+        let nees = found
+            .normalised_error(&truth)
+            .unwrap_or_else(|| panic!("seed {seed}, range {k}: {found:?}"));
         outcome.nees += nees;
         outcome.squares += (found.position - truth).norm_squared();
         wrong = if nees > WRONG && !found.lost { wrong + 1 } else { 0 };
@@ -162,11 +166,26 @@ fn measure(rooms: u64, travel: Travel) -> (f64, usize) {
     let share = held as f64 / rows as f64;
     let sum = |of: fn(&Outcome) -> f64| outcomes.iter().map(|(_, one)| of(one)).sum::<f64>();
     println!(
-        "{travel:?}: {rooms} rooms: held {share:.4}, wrong in {wrong}, losses {}, searching {}, {:.1} us a range",
+        "{travel:?}: {rooms} rooms: held {share:.4}, wrong in {wrong}, losses {}, searching {}: {:.0} us a range; tracking {:.1} us a range",
         sum(|one| one.losses as f64),
         sum(|one| one.searching as f64),
-        1e6 * sum(|one| one.seconds) / (rooms as f64 * LENGTH as f64)
+        1e6 * sum(|one| one.seconds[0]) / sum(|one| one.searching as f64 + 1.0),
+        2e6 * sum(|one| one.seconds[1]) / sum(|one| one.rows as f64)
     );
+    for anchors in 3..9 {
+        let of = |number: &dyn Fn(&Outcome) -> f64| {
+            let some = outcomes.iter().filter(|(room, _)| room.anchors.len() == anchors);
+            some.map(|(_, one)| number(one)).sum::<f64>()
+        };
+        let rows = of(&|one| one.rows as f64).max(1.0);
+        println!(
+            "    {anchors} anchors: held {:.4}, NEES {:.2}, rms {:.2}, tracking {:.1} us",
+            of(&|one| one.held as f64) / rows,
+            2.0 * of(&|one| one.nees) / rows,
+            (2.0 * of(&|one| one.squares) / rows).sqrt(),
+            2e6 * of(&|one| one.seconds[1]) / rows
+        );
+    }
     (share, wrong)
 }
 
@@ -178,6 +197,76 @@ fn no_confident_place_is_wrong() {
         let (share, wrong) = measure(12, travel);
         assert!(wrong == 0 && share > 0.9, "{travel:?}: {wrong} rooms, bands hold {share}");
     }
+}
+
+/// Three ranges without error that never change leave a curve of places when bias and scale are unknown: the band holds the true one for good.
+#[test]
+fn a_still_target_of_three_anchors_stays_in_the_band() {
+    for (places, truth) in [
+        ([[80.0, 33.0], [80.0, 57.0], [52.0, 57.0]], [55.0, 35.0]),
+        ([[0.0, 0.0], [12.0, 1.0], [4.0, 9.0]], [6.0, 3.5]),
+        ([[0.0, 0.0], [12.0, 1.0], [4.0, 9.0]], [2.5, 5.5]),
+    ] {
+        let truth = Vector3::new(truth[0], truth[1], 0.0);
+        let anchors = places.map(|[x, y]| (format!("{x} {y}"), Vector3::new(x, y, 0.0)));
+        let mut tracker = RangeTracker::new(anchors.clone(), Travel::Full, RangeSettings::default()).unwrap();
+        let (mut held, mut rows) = (0, 0);
+        for k in 0..300 {
+            let (name, place) = &anchors[k % 3];
+            let Some(found) = tracker.push(k as f64, name, (truth - place).norm()).unwrap() else {
+                continue;
+            };
+            rows += 1;
+            let is_held = (0..2).all(|i| (found.bands[i].0..=found.bands[i].1).contains(&truth[i]));
+            held += usize::from(is_held);
+        }
+        println!("{truth:?}: {held} of {rows}");
+        assert!(rows > 290 && held == rows, "{truth:?}: {held} of {rows}");
+    }
+}
+
+/// Defect: the first range of each instant, which tells the clock alone, was judged as if it told the place: every ninth instant the track was
+/// lost.
+#[test]
+fn an_unknown_clock_loses_no_track() {
+    let places = [
+        [0.0, 0.0],
+        [21.0, 1.0],
+        [19.0, 16.0],
+        [-1.0, 14.0],
+        [9.0, 20.0],
+        [26.0, 7.0],
+    ];
+    let anchors = places.map(|[x, y]| (format!("{x} {y}"), Vector3::new(x, y, 0.0)));
+    let settings = RangeSettings {
+        unknown_clock: true,
+        ..RangeSettings::default()
+    };
+    let mut tracker = RangeTracker::new(anchors.clone(), Travel::Full, settings).unwrap();
+    let mut rng = Stream::new(16).named("clock").rng();
+    let model = ContinuousLinear::forgotten_velocity_2d(0.5, 6.0).unwrap();
+    let (mut state, mut clock) = (Vector4::new(10.0, 0.3, 8.0, 0.2), 500.0);
+    let (mut squares, mut held, mut rows) = (0.0, 0, 0);
+    for k in 0..200 {
+        state = model.over(0.5).unwrap().propagate(&mut rng, &state);
+        clock += 5.0 * rng.sample::<f64, _>(StandardNormal);
+        let truth = Vector3::new(state[0], state[2], 0.0);
+        for (name, place) in &anchors {
+            let range = (truth - place).norm() + clock + 0.1 * rng.sample::<f64, _>(StandardNormal);
+            let Some(found) = tracker.push(0.5 * f64::from(k), name, range).unwrap() else {
+                continue;
+            };
+            rows += 1;
+            squares += (found.position - truth).norm_squared();
+            held += usize::from((0..2).all(|i| (found.bands[i].0..=found.bands[i].1).contains(&truth[i])));
+        }
+    }
+    let rms = (squares / f64::from(rows)).sqrt();
+    assert!(
+        tracker.losses() == 0 && rms < 0.4 && held * 10 > rows as usize * 8,
+        "{rms}, {held} of {rows}, {}",
+        tracker.losses()
+    );
 }
 
 /// The measurement in full: 400 rooms.

@@ -2,11 +2,17 @@
 //!
 //! ```text
 //! p(all values | process noise, noise of each sensor) by the Kalman filter of the level, which every sensor measures
-//! each value is wild with probability 1/100, and then anywhere between the smallest and the largest value: it hardly moves the filter
+//! each value is wild with probability 1/500, and then anywhere between the smallest and the largest value: it hardly moves the filter
 //! maximum: first the process noise and one noise of all sensors, then each number by itself, again and again
 //! ```
 //! The density of a value is proper, wild values included. Numbers that are too small are therefore punished by every value that they make
 //! wild. Offsets of sensors are another question: [`offsets`].
+
+mod offsets;
+mod reading;
+
+pub use offsets::{median, offsets};
+pub use reading::Reading;
 
 use crate::{Error, assumed_density};
 use fewbits_core::{Evolution, Gaussian, GaussianDynamics};
@@ -14,7 +20,7 @@ use fewbits_numerics::error::{finite, positive, refuse};
 use nalgebra::SMatrix;
 
 /// Assumed share of wild values.
-const WILD: f64 = 0.01;
+const WILD: f64 = 0.002;
 /// Instants in a row without a value that agrees with the prediction after which the level is taken to have jumped.
 const JUMP: u32 = 4;
 /// Steps of the search, in `ln`, and its reach about the start.
@@ -22,16 +28,21 @@ const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 const REACH: f64 = 9.0;
 /// Rounds over the single numbers.
 const ROUNDS: usize = 3;
+/// A number is raised by these steps while the likelihood, which is as high (within so many nats) so far below, loses little.
+const FAR_BELOW: f64 = 2.0;
+const AS_HIGH: f64 = 0.2;
+const RAISED: f64 = 0.25;
+const LITTLE: f64 = 1.0;
 /// A sensor with fewer values than this has the noise that all have together.
 const FEWEST: usize = 12;
 
-/// The values of one instant.
+/// The readings of one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
     /// Time in seconds, not before that of the instant above.
     pub seconds: f64,
-    /// Index of a sensor, and its value.
-    pub values: Vec<(usize, f64)>,
+    /// Index of a sensor, and what it says.
+    pub values: Vec<(usize, Reading)>,
 }
 
 /// A standard deviation or a factor: known, or to be found from a first guess.
@@ -129,13 +140,15 @@ where
         for instant in instants {
             finite("seconds", instant.seconds)?;
         }
-        for (sensor, value) in instants.iter().flat_map(|instant| &instant.values) {
-            finite("values", *value)?;
+        for (sensor, reading) in instants.iter().flat_map(|instant| &instant.values) {
+            reading.check()?;
             let Some(count) = counts.get_mut(*sensor) else {
                 return refuse("sensor", sensor, format!("below {}, the number of noises", noises.len()));
             };
             *count += 1;
-            (low, high) = (low.min(*value), high.max(*value));
+            for number in reading.numbers() {
+                (low, high) = (low.min(number), high.max(number));
+            }
         }
         let is_wide = high > low;
         if !is_wide {
@@ -176,6 +189,10 @@ where
                 break;
             }
         }
+        // What may as well be zero would make bands of no width: then the largest that is not improbable.
+        for axis in together.iter().chain(change.is_unknown().then_some(&0)) {
+            found.raise(*axis);
+        }
         let number = |number: &Number, shift: f64| number.at(shift).unwrap_or(number.start());
         Ok(Calibration {
             change: number(&change, found.shifts[0]),
@@ -206,22 +223,21 @@ where
                 }
             }
             let (mut agreeing, mut farthest) = (0.0, 0.0_f64);
-            for (sensor, value) in &instant.values {
+            for (sensor, reading) in &instant.values {
                 let (mean, covariance) = (*belief.mean(), *belief.covariance());
-                let variance = covariance[(0, 0)] + noises[*sensor] * noises[*sensor];
-                let innovation = wrapped(value - mean[0], self.period);
-                let density =
-                    (-0.5 * innovation * innovation / variance).exp() / (std::f64::consts::TAU * variance).sqrt();
-                let (right, wild) = ((1.0 - WILD) * density, WILD / range);
+                let said = reading.said(mean[0], covariance[(0, 0)], noises[*sensor], self.period)?;
+                let deviation = said.variance.sqrt();
+                let (right, wild) = ((1.0 - WILD) * said.log.exp(), reading.wild(WILD, range));
                 total += (right + wild).ln();
                 // The moments of the mixture of "it is wild" and "it is not".
                 let weight = right / (right + wild);
                 agreeing += weight;
-                farthest = farthest.max(innovation.abs());
-                let gain = covariance.column(0) / variance;
-                let spread = weight * (variance - (1.0 - weight) * innovation * innovation);
+                farthest = farthest.max((said.score * deviation).abs());
+                let gain = covariance.column(0) / deviation;
+                let off = said.score * said.score;
+                let spread = weight * ((1.0 - said.left) - (1.0 - weight) * off);
                 let next: SMatrix<f64, D, D> = covariance - gain * gain.transpose() * spread;
-                belief = Gaussian::from_trusted_parts(mean + gain * (weight * innovation), next);
+                belief = Gaussian::from_trusted_parts(mean + gain * (weight * said.score), next);
             }
             astray = if instant.values.is_empty() || agreeing > 0.5 {
                 0
@@ -263,6 +279,37 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
         }
     }
 
+    /// Raises a number of which the likelihood is as high far below as far as it loses little.
+    fn raise(&mut self, axis: usize) {
+        let moved = |by: f64| {
+            let mut other = self.shifts.clone();
+            other[axis] += by;
+            other
+        };
+        let number = if axis == 0 {
+            &self.change
+        } else {
+            &self.noises[axis - 1]
+        };
+        // Not below the least number that is considered.
+        let room = match number {
+            Number::Unknown { least, .. } if *least > 0.0 => self.shifts[axis] - (least / number.start()).ln(),
+            _ => FAR_BELOW,
+        };
+        let down = FAR_BELOW.min(room);
+        if down < RAISED || self.at(&moved(-down)) < self.best - AS_HIGH * down / FAR_BELOW {
+            return;
+        }
+        let mut by = 0.0;
+        while by < REACH && self.at(&moved(by + RAISED)) > self.best - LITTLE {
+            by += RAISED;
+        }
+        // What no reading depends on stays as it is.
+        if by < REACH {
+            self.shifts[axis] += by;
+        }
+    }
+
     /// Moves along each group, with smaller and smaller steps.
     fn improve(&mut self, groups: &[Vec<usize>], steps: &[f64]) {
         for step in steps {
@@ -285,70 +332,4 @@ impl<L: Fn(f64, &[f64]) -> f64> Search<'_, L> {
             }
         }
     }
-}
-
-/// The median; of an even number the middle of the two in the middle. 0 without numbers.
-pub fn median(mut numbers: Vec<f64>) -> f64 {
-    numbers.sort_by(f64::total_cmp);
-    match (numbers.len(), numbers.len() / 2) {
-        (0, _) => 0.0,
-        (count, half) if count % 2 == 0 => 0.5 * (numbers[half - 1] + numbers[half]),
-        (_, half) => numbers[half],
-    }
-}
-
-/// Rounds of the search for offsets.
-const ALIGNMENTS: usize = 20;
-/// Values that are farther from the mean than this many of their median distances are left out.
-const FARTHEST: f64 = 6.0;
-
-/// The constant offset of each sensor among `sensors`, from the instants at which several measured. Their median is zero: nothing says what
-/// all have in common. A wild value does not move them. A sensor that never measured together with others has offset zero.
-pub fn offsets(instants: &[Instant], sensors: usize, period: Option<f64>) -> Vec<f64> {
-    let mut found = vec![0.0; sensors];
-    for round in 0..ALIGNMENTS {
-        let mut differences = vec![Vec::new(); sensors];
-        for instant in instants.iter().filter(|instant| instant.values.len() > 1) {
-            let known = || {
-                instant
-                    .values
-                    .iter()
-                    .filter(|(sensor, value)| *sensor < sensors && value.is_finite())
-            };
-            let Some((_, origin)) = known().next() else { continue };
-            let aligned = |(sensor, value): &(usize, f64)| wrapped(value - origin, period) - found[*sensor];
-            let middle = median(known().map(aligned).collect());
-            known().for_each(|one| differences[one.0].push(wrapped(aligned(one) - middle, period)));
-        }
-        let shift = |differences: &Vec<f64>| {
-            let middle = median(differences.clone());
-            let width = FARTHEST * median(differences.iter().map(|one| (one - middle).abs()).collect());
-            let near = || differences.iter().filter(|one| (**one - middle).abs() <= width);
-            near().sum::<f64>() / (near().count() as f64).max(1.0)
-        };
-        let shifts: Vec<f64> = differences.iter().map(shift).collect();
-        found
-            .iter_mut()
-            .zip(&shifts)
-            .for_each(|(offset, shift)| *offset += shift);
-        let common = median(
-            found
-                .iter()
-                .zip(&differences)
-                .filter(|(_, own)| !own.is_empty())
-                .map(|(one, _)| *one)
-                .collect(),
-        );
-        let with_others = differences.iter().map(|own| !own.is_empty());
-        found
-            .iter_mut()
-            .zip(with_others)
-            .for_each(|(offset, moves)| *offset = if moves { *offset - common } else { 0.0 });
-        let largest = shifts.iter().fold(0.0_f64, |most, shift| most.max(shift.abs()));
-        let size = found.iter().fold(0.0_f64, |most, offset| most.max(offset.abs()));
-        if round > 0 && largest <= 1e-6 * size {
-            break;
-        }
-    }
-    found
 }

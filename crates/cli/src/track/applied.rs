@@ -1,0 +1,122 @@
+//! What `fit` found, as a file, and as settings of `track`.
+
+use crate::arguments::{Model, TrackOptions};
+use crate::error::Error;
+use crate::say::say;
+use fewbits_filters::fit::SensorModel;
+use serde::{Deserialize, Serialize};
+
+/// What was found. Other fields of the file are for people.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Found {
+    /// The sensor to which offsets are relative.
+    pub(super) relative_to: String,
+    /// Standard deviation of the level's change per root of a second.
+    pub(super) change: f64,
+    pub(super) time_constant: Option<f64>,
+    pub(super) mean: f64,
+    pub(super) sensors: Vec<Sensor>,
+    /// Name, value and standard error of each parameter that was found; name and reason of each that was not.
+    pub(super) estimates: Vec<(String, f64, f64)>,
+    pub(super) refused: Vec<(String, String)>,
+    pub(super) log_likelihood: f64,
+}
+
+/// A sensor of the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sensor {
+    pub(super) name: String,
+    /// Of bits.
+    pub(super) threshold: Option<f64>,
+    #[serde(flatten)]
+    pub(super) model: SensorModel,
+}
+
+/// What is subtracted from a sensor's values, and by what they are divided.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Correction {
+    pub(super) name: String,
+    bias: f64,
+    slope: f64,
+    gain: f64,
+}
+
+impl Correction {
+    /// The value of a sensor without faults.
+    pub(super) fn of(&self, value: f64, seconds: f64) -> f64 {
+        (value - self.bias - self.slope * seconds) / self.gain
+    }
+}
+
+/// The options with what the file of `--settings` says where they say nothing, and corrections of values. `names`: the sensors of the table, if
+/// they are known before its rows; the file may have others.
+pub(super) fn applied(options: &TrackOptions, names: &[String]) -> Result<(TrackOptions, Vec<Correction>), Error> {
+    let mut options = options.clone();
+    let Some(path) = &options.settings else {
+        return Ok((options, Vec::new()));
+    };
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(Error::io(&name, "read"))?;
+    let found: Found = serde_json::from_str(&text)
+        .map_err(|error| Error::content(&name, format_args!("it is no file of `fewbits fit -o`: {error}")))?;
+    let quoted = |name: &str| {
+        if name.contains([',', '=', '"']) {
+            format!("\"{}\"", name.replace('"', "\"\""))
+        } else {
+            name.to_owned()
+        }
+    };
+    let mut corrections = Vec::new();
+    let (mut noises, mut thresholds) = (Vec::new(), Vec::new());
+    let is_there = |sensor: &&Sensor| names.is_empty() || names.contains(&sensor.name);
+    for sensor in found.sensors.iter().filter(is_there) {
+        let model = &sensor.model;
+        let is_usable = model.noise > 0.0 && model.noise.is_finite() && model.gain != 0.0 && model.gain.is_finite();
+        if !is_usable {
+            return Err(Error::content(&name, format_args!("sensor {}: noise and gain must not be 0", sensor.name)));
+        }
+        noises.push(format!("{}={}", quoted(&sensor.name), model.noise / model.gain.abs()));
+        match sensor.threshold {
+            Some(threshold) => thresholds.push(format!("{}={threshold}", quoted(&sensor.name))),
+            None => corrections.push(Correction {
+                name: sensor.name.clone(),
+                bias: model.bias,
+                slope: model.slope,
+                gain: model.gain,
+            }),
+        }
+        if model.delay != 0.0 {
+            say!("{name}: {} is {} s late, which is not corrected here", sensor.name, model.delay);
+        }
+        if model.walk > 0.0 {
+            say!(
+                "{name}: the offset of {} wanders, which is not followed here: --align finds the present one",
+                sensor.name
+            );
+        }
+    }
+    if options.noise.is_empty() {
+        options.noise = noises.join(",");
+    }
+    if options.threshold.is_empty() {
+        options.threshold = thresholds.join(",");
+    }
+    match found.time_constant {
+        Some(seconds) if options.model == Model::Walk && options.change.is_none() => {
+            let variance = 0.5 * found.change * found.change * seconds;
+            // The deviation from the forecast after a second.
+            let after = (-variance * (-2.0 / seconds).exp_m1()).sqrt();
+            options.model = Model::Returning;
+            options.change = Some(format!("{after}/1s"));
+            options
+                .prior
+                .get_or_insert(format!("{}±{}", found.mean, variance.sqrt()));
+        }
+        None if options.model == Model::Walk && options.change.is_none() => {
+            options.change = Some(format!("{}/1s", found.change));
+        }
+        // Of a model with a slope the change is another number.
+        _ => {}
+    }
+    Ok((options, corrections))
+}

@@ -1,0 +1,191 @@
+//! The task `fit`: calibration from a whole table.
+
+use super::applied::{Found, Sensor};
+use super::rows::{Instant, Instants, Kind};
+use crate::Ending;
+use crate::bounds::PerColumn;
+use crate::error::Error;
+use crate::fit_options::{FitOptions, Sought};
+use crate::numbers::above_zero;
+use crate::output;
+use fewbits_filters::calibration::{self, Reading};
+use fewbits_filters::fit::{Fit, Quantity, Request, fit};
+
+/// Runs the task.
+pub(crate) fn run(options: &FitOptions) -> Result<Ending, Error> {
+    let kind = Kind {
+        by: options.by.clone(),
+        ..Kind::default()
+    };
+    let mut instants = Instants::open(&options.table, &kind)?;
+    let mut rows = Vec::new();
+    while let Some(instant) = instants.next()? {
+        rows.push(instant);
+    }
+    let names = instants.names.clone();
+    let at = |option: &str, name: &String| {
+        let place = names.iter().position(|known| known == name);
+        place.ok_or_else(|| {
+            let problem = format!("{option}: no sensor `{name}`: there are {}", names.join(", "));
+            Error::content(instants.file(), problem)
+        })
+    };
+    let reference = options
+        .reference
+        .as_ref()
+        .map(|name| at("--reference", name))
+        .transpose()?;
+    let bits = options
+        .bits
+        .iter()
+        .map(|name| at("--bits", name))
+        .collect::<Result<Vec<_>, _>>()?;
+    const NOISE: &str = "a standard deviation above 0";
+    let noises = PerColumn::parse(&options.noise, None, |text| above_zero("--noise", text, NOISE).map(Some))?;
+    noises.check(&names, instants.file())?;
+    let has = |sought: Sought| options.find.contains(&sought);
+    let request = Request {
+        reference,
+        gain: has(Sought::Gain),
+        slope: has(Sought::Slope),
+        walk: has(Sought::Walk),
+        delay: has(Sought::Delay),
+        time_constant: has(Sought::TimeConstant),
+        noises: names.iter().map(|name| *noises.of(name)).collect(),
+    };
+    let refused = |source| Error::Refused {
+        what: "the table cannot be fitted",
+        source: Box::new(source),
+    };
+    let readings = readings(&rows, &bits, &names, instants.file())?;
+    let found = fit(&readings, names.len(), &request).map_err(refused)?;
+    let stored = stored(&found, &names, &bits);
+    if let Some(path) = &options.output {
+        output::text(Some(path), &(serde_json::to_string_pretty(&stored)? + "\n"))?;
+    }
+    if options.json {
+        output::json(&stored)?;
+    } else {
+        output::print(&page(&found, &names, &bits, readings.len()))?;
+    }
+    Ok(Ending::Good)
+}
+
+/// Cells as readings; a bit says on which side of zero the measurement is.
+fn readings(
+    rows: &[Instant],
+    bits: &[usize],
+    names: &[String],
+    file: &str,
+) -> Result<Vec<calibration::Instant>, Error> {
+    let reading = |row: u64, sensor: usize, cell: f64| {
+        if !bits.contains(&sensor) {
+            return Ok(Reading::from(cell));
+        }
+        let above = (0.0, f64::INFINITY);
+        let below = (f64::NEG_INFINITY, 0.0);
+        let (lower, upper) = match cell {
+            1.0 => above,
+            0.0 | -1.0 => below,
+            _ => {
+                let problem = format!("row {row}: {cell} of `{}` is no bit: 1, or 0 or -1 is expected", names[sensor]);
+                return Err(Error::content(file, problem));
+            }
+        };
+        Ok(Reading::Within { lower, upper })
+    };
+    let instant = |one: &Instant| {
+        let cells = one.reports.iter();
+        let cells = cells.filter_map(|(sensor, cell)| Some((*sensor, cell.filter(|cell| cell.is_finite())?)));
+        Ok(calibration::Instant {
+            seconds: one.seconds,
+            values: cells
+                .map(|(sensor, cell)| Ok((sensor, reading(one.row, sensor, cell)?)))
+                .collect::<Result<_, Error>>()?,
+        })
+    };
+    rows.iter().map(instant).collect()
+}
+
+fn title(quantity: Quantity, names: &[String]) -> String {
+    let of = |what: &str, sensor: usize| format!("{what} of {}", names[sensor]);
+    match quantity {
+        Quantity::Change => "change of the level per root of a second".to_owned(),
+        Quantity::TimeConstant => "time constant in seconds".to_owned(),
+        Quantity::Mean => "mean of the level".to_owned(),
+        Quantity::Noise(sensor) => of("noise", sensor),
+        Quantity::Bias(sensor) => of("offset", sensor),
+        Quantity::Gain(sensor) => of("gain", sensor),
+        Quantity::Slope(sensor) => of("drift per second", sensor),
+        Quantity::Walk(sensor) => of("random walk of the offset per root of a second", sensor),
+        Quantity::Delay(sensor) => of("delay", sensor),
+        _ => "another parameter".to_owned(),
+    }
+}
+
+fn stored(found: &Fit, names: &[String], bits: &[usize]) -> Found {
+    Found {
+        relative_to: names[found.relative_to].clone(),
+        change: found.model.change,
+        time_constant: found.model.time_constant,
+        mean: found.model.mean,
+        sensors: names
+            .iter()
+            .zip(&found.model.sensors)
+            .enumerate()
+            .map(|(sensor, (name, model))| Sensor {
+                name: name.clone(),
+                threshold: bits.contains(&sensor).then_some(-model.bias),
+                model: *model,
+            })
+            .collect(),
+        estimates: found
+            .estimates
+            .iter()
+            .map(|one| (title(one.quantity, names), one.value, one.standard_error))
+            .collect(),
+        refused: found
+            .refused
+            .iter()
+            .map(|one| (title(one.quantity, names), one.reason.clone()))
+            .collect(),
+        log_likelihood: found.log_likelihood,
+    }
+}
+
+fn page(found: &Fit, names: &[String], bits: &[usize], rows: usize) -> String {
+    let mut text = format!("{rows} rows; offsets are relative to {}\n\n", names[found.relative_to]);
+    text += &format!("{:<50} {:>13} {:>13}\n", "", "value", "error");
+    for one in &found.estimates {
+        let (name, value) = match one.quantity {
+            Quantity::Bias(sensor) if bits.contains(&sensor) => (format!("threshold of {}", names[sensor]), -one.value),
+            quantity => (title(quantity, names), one.value),
+        };
+        text += &format!("{name:<50} {value:>13.6} {:>13.6}\n", one.standard_error);
+    }
+    for one in &found.correlations {
+        let name = format!("correlation of {} and {}", names[one.sensors.0], names[one.sensors.1]);
+        text += &format!("{name:<50} {:>13.6} {:>13.6}\n", one.value, one.standard_error);
+    }
+    text.push('\n');
+    for one in &found.refused {
+        text += &format!("not found: {}: {}\n", title(one.quantity, names), one.reason);
+    }
+    for one in &found.tests {
+        let name = &names[one.sensor];
+        let word = if one.is_passed() {
+            "is explained"
+        } else {
+            "is NOT explained"
+        };
+        text += &format!(
+            "{name} {word}: innovations of mean square {:.2} ({:+.1} deviations from 1), repetition {:+.1} deviations",
+            one.mean_square, one.size, one.repetition
+        );
+        text += &match one.wild {
+            0 => "\n".to_owned(),
+            wild => format!(", {wild} wild values\n"),
+        };
+    }
+    text
+}

@@ -1,0 +1,290 @@
+//! What is found from the first rows: prior, change, noise of each sensor, steps of rounding.
+
+use super::centre::World;
+use super::hints::steepest;
+use super::meaning::Seat;
+use super::rows::{Instant, Said};
+use super::settings::Settings;
+use crate::arguments::Model;
+use crate::error::Error;
+use crate::report::Report;
+use fewbits_filters::calibration::{self, Number, median, wrapped};
+
+/// Ratio of the standard deviation of a normal variable to the median of its distance from its mean.
+const DEVIATION_OF_MEDIAN: f64 = 1.4826;
+/// Standard deviation of rounding to a step, in steps.
+const ROUNDING: f64 = 0.29;
+/// Measurements and process in the first guess: the change is this share of the noise.
+const FIRST_CHANGE: f64 = 0.3;
+/// Median of the absolute value of a standard normal variable.
+const NORMAL_MEDIAN: f64 = 0.6745;
+const DO_NOT_VARY: &str = "the first rows do not vary, so it cannot be found from them";
+/// A sensor is taken to round if its noise with rounding is at most this many steps; its own noise is then at least this many.
+const COARSE: f64 = 0.75;
+const LEAST_OWN: f64 = 0.05;
+/// Values from which a step of rounding is found, at least, and different ones among them.
+const FEWEST_OF_STEP: usize = 50;
+const FEWEST_DIFFERENT: usize = 4;
+/// A model with a slope is suggested if it explains the first rows better by so many nats.
+const SLOPING: f64 = 20.0;
+
+/// What is found from the first rows, and the deviation of rounding, which a noise is not below.
+pub(super) struct Unknown {
+    pub(super) change: bool,
+    pub(super) noise: bool,
+    floor: f64,
+}
+
+/// Finite measurements of one sensor.
+fn values_of(first: &[Instant], sensor: usize) -> Vec<f64> {
+    let all = first.iter().flat_map(|instant| &instant.reports);
+    let own = all.filter(|(other, _)| *other == sensor);
+    own.filter_map(|(_, cell)| cell.filter(|cell| cell.is_finite()))
+        .collect()
+}
+
+/// The first rows as instants of finite values, whatever they mean.
+pub(super) fn values(first: &[Instant], offsets: &[f64]) -> Vec<calibration::Instant> {
+    let offset = |sensor: usize| offsets.get(sensor).copied().unwrap_or(0.0);
+    let of = |instant: &Instant| calibration::Instant {
+        seconds: instant.seconds,
+        values: instant
+            .reports
+            .iter()
+            .filter_map(|(sensor, cell)| {
+                let value = cell.filter(|cell| cell.is_finite())? - offset(*sensor);
+                Some((*sensor, value.into()))
+            })
+            .collect(),
+    };
+    first.iter().map(of).collect()
+}
+
+/// The step to which values are rounded, if there is one. Few different values may all be multiples of a larger step by chance: theirs is at
+/// most that of their decimals.
+fn rounding(values: &[f64]) -> Option<f64> {
+    let step = fewbits_adaptive::own_steps(values).into_iter().reduce(f64::min)?;
+    let mut different: Vec<f64> = Vec::new();
+    for value in values {
+        if !different.contains(value) {
+            different.push(*value);
+        }
+        if different.len() >= FEWEST_DIFFERENT {
+            return Some(step);
+        }
+    }
+    let decimals = (0..=9).map(|decimals| 0.1_f64.powi(decimals)).find(|unit| {
+        let off = |value: &f64| (value / unit - (value / unit).round()).abs();
+        different.iter().all(|value| off(value) < 1e-6)
+    });
+    Some(decimals.map_or(step, |unit| unit.min(step)))
+}
+
+impl Settings {
+    /// Estimates what no option states from the first rows: the prior from their spread, change and noise by maximum likelihood of the
+    /// unquantized values.
+    pub(super) fn fit(&mut self, first: &[Instant], names: &[String]) -> Result<Unknown, Error> {
+        let sensors = names.len();
+        let shifted = |n: usize| {
+            let offset = self.offsets.get(n).copied().unwrap_or(0.0);
+            values_of(first, n)
+                .into_iter()
+                .map(|value| value - offset)
+                .collect::<Vec<f64>>()
+        };
+        let all: Vec<Vec<f64>> = (0..sensors).map(shifted).collect();
+        let flat: Vec<f64> = all.iter().flatten().copied().collect();
+        if flat.is_empty() {
+            return Err(Error::Needed {
+                option: "--prior",
+                reason: "the first rows hold no numbers",
+            });
+        }
+        // A wild value moves neither middle nor spread. If most values are equal, the spread is that of all.
+        let period = self.world.period;
+        let from = |middle: f64| flat.iter().map(move |value| wrapped(value - middle, period));
+        let mean = flat[0] + median(from(flat[0]).collect());
+        let robust = DEVIATION_OF_MEDIAN * median(from(mean).map(f64::abs).collect());
+        let spread = if robust > 0.0 {
+            robust
+        } else {
+            (from(mean).map(|off| off * off).sum::<f64>() / flat.len() as f64).sqrt()
+        };
+        let differences: Vec<f64> = all
+            .iter()
+            .flat_map(|values| values.windows(2).map(|pair| wrapped(pair[1] - pair[0], period).abs()))
+            .collect();
+        // At a constant level the difference of two values has `sqrt(2)` times the deviation of the noise. Jumps of the level hardly move the
+        // median.
+        let typical = median(differences.clone()) / (NORMAL_MEDIAN * std::f64::consts::SQRT_2);
+        let mean_size = differences.iter().sum::<f64>() / (differences.len() as f64).max(1.0);
+        let floor = ROUNDING * rounding(&flat).unwrap_or(0.0);
+        // The median is 0 if most values repeat the one before.
+        let scale = [typical, mean_size, spread].into_iter().find(|size| *size > 0.0);
+        let Some(scale) = scale.map(|scale| scale.max(floor)) else {
+            return Err(Error::Needed {
+                option: if self.noise > 0.0 { "--change" } else { "--noise" },
+                reason: DO_NOT_VARY,
+            });
+        };
+        let (fit_change, fit_noise) = (self.world.change == 0.0, self.noise == 0.0);
+        if self.world.prior.1 == 0.0 {
+            let deviation = if self.world.model == Model::Returning {
+                spread.max(scale)
+            } else {
+                // The level of the first row is not the mean of all.
+                2.0 * spread.max(scale)
+            };
+            self.world.prior = (
+                if self.world.model == Model::Returning {
+                    mean
+                } else {
+                    // Of the first few values one may be wild.
+                    let first: Vec<f64> = values(first, &self.offsets)
+                        .iter()
+                        .flat_map(|instant| &instant.values)
+                        .filter_map(|(_, reading)| reading.value())
+                        .take(3)
+                        .collect();
+                    let origin = first.first().copied().unwrap_or(mean);
+                    origin + median(first.iter().map(|value| wrapped(value - origin, period)).collect())
+                },
+                deviation,
+            );
+        }
+        if fit_noise {
+            self.noise = scale;
+        }
+        if fit_change {
+            self.world.change = FIRST_CHANGE * scale;
+        }
+        self.world.steepest = steepest(&values(first, &self.offsets), sensors, period);
+        let unknown = Unknown {
+            change: fit_change,
+            noise: fit_noise,
+            floor,
+        };
+        if fit_change || fit_noise {
+            self.calibrate(first, names, &unknown)?;
+        }
+        Ok(unknown)
+    }
+
+    /// The step to which a sensor rounds.
+    pub(super) fn step_of(&self, sensor: usize) -> Option<f64> {
+        self.meaning.step.or(self.steps.get(sensor).copied().flatten())
+    }
+
+    /// The first rows with what their cells mean.
+    fn readings(&self, first: &[Instant], names: &[String]) -> Vec<calibration::Instant> {
+        let seats: Vec<Seat> = (0..names.len())
+            .map(|sensor| self.seat_with(sensor, Report::Value, self.noise, None))
+            .collect();
+        let mut last = vec![None; names.len()];
+        let mut reading = |sensor: usize, cell: Option<f64>, said: Said| {
+            let seat = seats.get(sensor)?;
+            let cell = cell.filter(|cell| cell.is_finite()).map(|cell| cell - seat.offset);
+            let found = seat.reading(cell, said, last[sensor])?;
+            last[sensor] = cell.or(last[sensor]);
+            Some((
+                sensor,
+                if found.lower == found.upper {
+                    calibration::Reading::Value {
+                        value: found.lower,
+                        deviation: said.accuracy.filter(|accuracy| *accuracy > 0.0),
+                    }
+                } else {
+                    calibration::Reading::Within {
+                        lower: found.lower,
+                        upper: found.upper,
+                    }
+                },
+            ))
+        };
+        first
+            .iter()
+            .map(|instant| calibration::Instant {
+                seconds: instant.seconds,
+                values: instant
+                    .reports
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(i, (sensor, cell))| {
+                        reading(*sensor, *cell, instant.said.get(i).copied().unwrap_or_default())
+                    })
+                    .collect(),
+            })
+            .collect()
+    }
+
+    /// Finds change and noises as far as no option states them.
+    pub(super) fn calibrate(&mut self, first: &[Instant], names: &[String], unknown: &Unknown) -> Result<(), Error> {
+        let noise = |(sensor, name): (usize, &String)| {
+            let step = self.step_of(sensor);
+            // Where rounding is not a cell, it is part of the noise.
+            let with = |own: f64| if step.is_some() { own } else { own.hypot(unknown.floor) };
+            match self.noises.of(name) {
+                Some(stated) => Number::Known(with(*stated)),
+                None if unknown.noise => Number::Unknown {
+                    guess: self.found.get(sensor).copied().unwrap_or(self.noise),
+                    least: step.map_or(unknown.floor, |step| LEAST_OWN * step),
+                },
+                None => Number::Known(with(self.noise)),
+            }
+        };
+        let noises: Vec<Number> = names.iter().enumerate().map(noise).collect();
+        let change = match unknown.change {
+            true => Number::Unknown {
+                guess: self.world.change,
+                least: 0.0,
+            },
+            false => Number::Known(self.world.change),
+        };
+        let readings = self.readings(first, names);
+        let refused = |source: fewbits_filters::Error| Error::Refused {
+            what: "change and noise cannot be found",
+            source: source.into(),
+        };
+        let found = self
+            .world
+            .calibrate(&readings, change, self.world.change, &noises)
+            .map_err(refused)?;
+        if unknown.change && self.world.model == Model::Walk {
+            // The same with a slope, which is only compared.
+            let sloping = World {
+                model: Model::Velocity,
+                ..self.world
+            };
+            let other = sloping.calibrate(&readings, change, self.world.change, &noises);
+            self.has_slope = other.is_ok_and(|other| other.log_likelihood > found.log_likelihood + SLOPING);
+        }
+        self.world.change = found.change;
+        if unknown.noise {
+            self.noise = median(found.noises.clone());
+            self.found = found.noises;
+        }
+        Ok(())
+    }
+
+    /// Finds which sensors round so coarsely that a value is a cell.
+    pub(super) fn find_steps(&mut self, first: &[Instant], names: &[String]) {
+        let step_of = |sensor: usize| {
+            let values = values_of(first, sensor);
+            let step = rounding(&values)?;
+            let noise = self
+                .noises
+                .of(&names[sensor])
+                .unwrap_or_else(|| self.found.get(sensor).copied().unwrap_or(self.noise));
+            (values.len() >= FEWEST_OF_STEP && noise <= COARSE * step).then_some(step)
+        };
+        let steps: Vec<Option<f64>> = (0..names.len()).map(step_of).collect();
+        for (sensor, step) in steps.iter().enumerate() {
+            // What was found includes the rounding; what was stated does not.
+            if let (Some(step), Some(found)) = (step, self.found.get_mut(sensor)) {
+                let own = (*found * *found - ROUNDING * ROUNDING * step * step).max(0.0).sqrt();
+                *found = own.max(LEAST_OWN * step);
+            }
+        }
+        self.steps = steps;
+    }
+}

@@ -1,0 +1,123 @@
+//! What sensors say of their measurements.
+
+use super::wrapped;
+use crate::Error;
+use fewbits_numerics::error::{finite, positive, refuse};
+use fewbits_numerics::normal::truncated_moments;
+
+/// What a sensor says of its measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reading {
+    /// It is this value.
+    Value {
+        /// The value.
+        value: f64,
+        /// Standard deviation of its noise, if the reading states it. Otherwise it is the sensor's.
+        deviation: Option<f64>,
+    },
+    /// It lies between two ends, of which one may be infinite: a rounded value, one beyond a limit, one that has not changed by much.
+    Within {
+        /// Lower end.
+        lower: f64,
+        /// Upper end.
+        upper: f64,
+    },
+}
+
+impl From<f64> for Reading {
+    fn from(value: f64) -> Self {
+        Self::Value { value, deviation: None }
+    }
+}
+
+impl Reading {
+    /// The value, if it is one.
+    pub fn value(&self) -> Option<f64> {
+        match self {
+            Self::Value { value, .. } => Some(*value),
+            Self::Within { .. } => None,
+        }
+    }
+
+    /// The finite numbers that it states.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
+        let both = match *self {
+            Self::Value { value, .. } => [value, f64::INFINITY],
+            Self::Within { lower, upper } => [lower, upper],
+        };
+        both.into_iter().filter(|number| number.is_finite())
+    }
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        match *self {
+            Self::Value { value, deviation } => {
+                finite("values", value)?;
+                deviation.map_or(Ok(()), |deviation| positive("deviation", deviation).map(|_| ()))?;
+            }
+            Self::Within { lower, upper } => {
+                let is_ordered = lower < upper && (lower.is_finite() || upper.is_finite());
+                if !is_ordered {
+                    return refuse("reading", format!("from {lower} to {upper}"), "ends in order, one of them finite");
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What it says of a measurement, under a prediction of this mean and variance without noise: `ln` of the density or probability, mean and
+    /// variance of the measurement afterwards in the prediction's deviations, noise included, and that variance.
+    pub(crate) fn said(&self, mean: f64, variance: f64, noise: f64, period: Option<f64>) -> Option<Said> {
+        match *self {
+            Self::Value { value, deviation } => {
+                let noise = deviation.unwrap_or(noise);
+                let variance = variance + noise * noise;
+                let score = wrapped(value - mean, period) / variance.sqrt();
+                let log = -0.5 * (score * score + (std::f64::consts::TAU * variance).ln());
+                Some(Said {
+                    log,
+                    score,
+                    left: 0.0,
+                    variance,
+                })
+            }
+            Self::Within { lower, upper } => {
+                let variance = variance + noise * noise;
+                let deviation = variance.sqrt();
+                // An arc of a circle keeps its width.
+                let shift = match (lower.is_finite() && upper.is_finite(), period) {
+                    (true, Some(_)) => {
+                        let middle = 0.5 * (lower + upper);
+                        wrapped(middle - mean, period) - middle
+                    }
+                    _ => -mean,
+                };
+                let found = truncated_moments((lower + shift) / deviation, (upper + shift) / deviation).ok()?;
+                Some(Said {
+                    log: found.log_probability,
+                    score: found.mean,
+                    left: found.variance,
+                    variance,
+                })
+            }
+        }
+    }
+
+    /// Density or probability if it is wild with this probability, and then anywhere in a range.
+    pub(crate) fn wild(&self, share: f64, range: f64) -> f64 {
+        match *self {
+            Self::Value { .. } => share / range,
+            Self::Within { lower, upper } => share * ((upper - lower) / range).min(1.0),
+        }
+    }
+}
+
+/// Moments of a measurement given a reading of it.
+pub(crate) struct Said {
+    /// `ln` of its density or probability.
+    pub(crate) log: f64,
+    /// Mean of the innovation afterwards, and its variance, in the prediction's deviations.
+    pub(crate) score: f64,
+    pub(crate) left: f64,
+    /// Variance of the prediction, noise included.
+    pub(crate) variance: f64,
+}

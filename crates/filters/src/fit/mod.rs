@@ -1,0 +1,304 @@
+//! Calibration: what a table of recorded readings says about its sensors and its level, by maximum likelihood over the filter.
+//!
+//! ```text
+//! level     random walk, or Ornstein-Uhlenbeck (a time constant)
+//! sensor    gain * level(t - delay) + bias + slope * t + walk(t) + noise; a bit says whether that is above zero: its threshold is -bias
+//! p(all readings | parameters) by the moment filter; a reading is wild with probability 1/1000
+//! maximum   by quasi-Newton steps; standard errors from the second derivatives there (observed information)
+//! test      standardised innovations must have mean square one and must not repeat
+//! ```
+//! What the readings cannot tell is refused with the reason, never guessed: nothing says what all sensors have in common, so without a reference
+//! faults are relative to one of the sensors.
+
+mod model;
+mod problem;
+mod search;
+mod tests_of_fit;
+
+pub use model::{LevelModel, SensorModel};
+pub use tests_of_fit::{Correlation, SensorTest};
+
+use crate::Error;
+use crate::calibration::{Instant, median};
+use fewbits_numerics::error::{positive, refuse};
+use model::Scale;
+use problem::Problem;
+use serde::{Deserialize, Serialize};
+
+/// Readings of a sensor from which anything is found, at least.
+const FEWEST: usize = 12;
+
+/// A parameter. Sensors are given by index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Quantity {
+    /// [`LevelModel::change`].
+    Change,
+    /// [`LevelModel::time_constant`].
+    TimeConstant,
+    /// [`LevelModel::mean`].
+    Mean,
+    /// [`SensorModel::noise`].
+    Noise(usize),
+    /// [`SensorModel::bias`]; of a sensor of bits minus its threshold.
+    Bias(usize),
+    /// [`SensorModel::gain`].
+    Gain(usize),
+    /// [`SensorModel::slope`].
+    Slope(usize),
+    /// [`SensorModel::walk`].
+    Walk(usize),
+    /// [`SensorModel::delay`].
+    Delay(usize),
+}
+
+impl Quantity {
+    fn is_positive(self) -> bool {
+        matches!(self, Self::Change | Self::TimeConstant | Self::Noise(_) | Self::Walk(_))
+    }
+}
+
+/// What is looked for, beside change, noises and biases.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Request {
+    /// The sensor that is right: its bias, gain, slope, walk and delay are none.
+    pub reference: Option<usize>,
+    /// Gains.
+    pub gain: bool,
+    /// Linear drifts of the offsets.
+    pub slope: bool,
+    /// Random walks of the offsets.
+    pub walk: bool,
+    /// Delays.
+    pub delay: bool,
+    /// The time in which the level returns to its mean.
+    pub time_constant: bool,
+    /// Noises that are known, by sensor.
+    pub noises: Vec<Option<f64>>,
+}
+
+/// A parameter that was found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Which.
+    pub quantity: Quantity,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+}
+
+/// A parameter that was not found, and why. It has the value of a sensor without that fault.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Refusal {
+    /// Which.
+    pub quantity: Quantity,
+    /// Why.
+    pub reason: String,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Fit {
+    /// The model.
+    pub model: LevelModel,
+    /// The sensor to which biases, gains, slopes and delays are relative: the reference, or one that was chosen.
+    pub relative_to: usize,
+    /// Every parameter that was found.
+    pub estimates: Vec<Estimate>,
+    /// Every parameter that was asked for and not found.
+    pub refused: Vec<Refusal>,
+    /// `ln p` of all readings.
+    pub log_likelihood: f64,
+    /// Tests of the sensors of values.
+    pub tests: Vec<SensorTest>,
+    /// Correlations between the noises of two sensors, with a reference only.
+    pub correlations: Vec<Correlation>,
+}
+
+/// Finds the parameters of a level and `sensors` sensors.
+///
+/// # Errors
+/// If instants are out of order, name a sensor outside `0..sensors`, or have a reading that is not finite; if a known noise is not positive or
+/// the reference no sensor; if there are fewer than 12 readings, or only bits: they leave unit and zero of the level unknown.
+pub fn fit(instants: &[Instant], sensors: usize, request: &Request) -> Result<Fit, Error> {
+    let scale = Scale::of(instants, sensors)?;
+    let series: Vec<Vec<(f64, f64)>> = (0..sensors).map(|sensor| values_of(instants, sensor)).collect();
+    let (relative_to, mut refused) = anchor(&series, instants, request)?;
+    let start = start(&series, instants, &scale, relative_to, request)?;
+    let mut free = vec![Quantity::Change];
+    let reason = |quantity, reason: &str| Refusal {
+        quantity,
+        reason: reason.to_owned(),
+    };
+    for sensor in 0..sensors {
+        let count = instants
+            .iter()
+            .flat_map(|instant| &instant.values)
+            .filter(|one| one.0 == sensor);
+        if count.count() < FEWEST {
+            refused.push(reason(Quantity::Noise(sensor), "it has fewer than 12 readings"));
+            continue;
+        }
+        if is_constant(instants, sensor) {
+            refused.push(reason(Quantity::Bias(sensor), "its readings are all alike"));
+            continue;
+        }
+        if request.noises.get(sensor).copied().flatten().is_none() {
+            free.push(Quantity::Noise(sensor));
+        }
+        if sensor == relative_to {
+            continue;
+        }
+        free.push(Quantity::Bias(sensor));
+        let is_bits = series[sensor].is_empty();
+        for (is_asked, quantity) in [
+            (request.gain, Quantity::Gain(sensor)),
+            (request.slope, Quantity::Slope(sensor)),
+            (request.delay, Quantity::Delay(sensor)),
+        ] {
+            if is_asked && is_bits && matches!(quantity, Quantity::Gain(_)) {
+                refused.push(reason(quantity, "bits tell only the ratio of gain and noise: the gain is taken as 1"));
+            } else if is_asked {
+                free.push(quantity);
+            }
+        }
+    }
+    let mut problem = Problem::new(instants, scale, start, free);
+    problem.solve();
+    if request.time_constant {
+        problem.try_time_constant(&mut refused);
+    }
+    if request.walk {
+        problem.try_walks(relative_to, &mut refused);
+    }
+    let estimates = problem.errors(&mut refused);
+    let (log_likelihood, residuals) = problem.model.log_likelihood(instants)?;
+    let tests = tests_of_fit::of(&residuals);
+    let correlations = request
+        .reference
+        .map_or(Vec::new(), |reference| tests_of_fit::correlations(instants, &problem.model, reference));
+    Ok(Fit {
+        model: problem.model,
+        relative_to,
+        estimates,
+        refused,
+        log_likelihood,
+        tests,
+        correlations,
+    })
+}
+
+fn values_of(instants: &[Instant], sensor: usize) -> Vec<(f64, f64)> {
+    let of = |instant: &Instant| -> Vec<(f64, f64)> {
+        let own = instant.values.iter().filter(|(other, _)| *other == sensor);
+        own.filter_map(|(_, reading)| Some((instant.seconds, reading.value()?)))
+            .collect()
+    };
+    instants.iter().flat_map(of).collect()
+}
+
+fn is_constant(instants: &[Instant], sensor: usize) -> bool {
+    let mut own = instants
+        .iter()
+        .flat_map(|instant| &instant.values)
+        .filter(|(other, _)| *other == sensor);
+    let first = own.next();
+    own.all(|one| Some(one) == first)
+}
+
+/// The sensor to which all else is relative, and what cannot be found therefore.
+fn anchor(series: &[Vec<(f64, f64)>], instants: &[Instant], request: &Request) -> Result<(usize, Vec<Refusal>), Error> {
+    let of_values = |sensor: &usize| series[*sensor].len() >= FEWEST;
+    if let Some(reference) = request.reference {
+        if reference >= series.len() || !of_values(&reference) {
+            return refuse("reference", reference, "a sensor of at least 12 values");
+        }
+        return Ok((reference, Vec::new()));
+    }
+    let Some(first) = (0..series.len())
+        .rev()
+        .filter(of_values)
+        .max_by_key(|sensor| series[*sensor].len())
+    else {
+        if instants.iter().any(|instant| !instant.values.is_empty()) {
+            return refuse(
+                "readings",
+                "no sensor of at least 12 values",
+                "a reference, or a sensor of values: bits alone leave unit and zero of the level unknown",
+            );
+        }
+        return refuse("readings", "none", "at least 12 values of a sensor");
+    };
+    let mut refused = vec![(true, Quantity::Bias(first))];
+    refused.extend([
+        (request.gain, Quantity::Gain(first)),
+        (request.slope, Quantity::Slope(first)),
+        (request.walk, Quantity::Walk(first)),
+        (request.delay, Quantity::Delay(first)),
+    ]);
+    let reason = if series.len() == 1 {
+        "with one sensor and no reference it cannot be told from the level"
+    } else {
+        "nothing says what all sensors have in common: those of the others are relative to this one"
+    };
+    let refused = refused
+        .into_iter()
+        .filter(|(is_asked, _)| *is_asked)
+        .map(|(_, quantity)| Refusal {
+            quantity,
+            reason: reason.to_owned(),
+        });
+    Ok((first, refused.collect()))
+}
+
+/// A first guess.
+fn start(
+    series: &[Vec<(f64, f64)>],
+    instants: &[Instant],
+    scale: &Scale,
+    anchor: usize,
+    request: &Request,
+) -> Result<LevelModel, Error> {
+    let rough = |values: &[(f64, f64)]| {
+        let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1].1 - pair[0].1).abs()).collect();
+        let mean = steps.iter().sum::<f64>() / (steps.len() as f64).max(1.0);
+        let typical = median(steps);
+        // The deviation of a difference, from its median or its mean size.
+        let size = if typical > 0.0 { typical / 0.6745 } else { mean * 1.2533 };
+        let size = size / std::f64::consts::SQRT_2;
+        if size > 0.0 { size } else { 0.1 * scale.spread }
+    };
+    let own = rough(&series[anchor]);
+    let level = median(series[anchor].iter().map(|one| one.1).collect());
+    let mut sensors = Vec::with_capacity(series.len());
+    for (sensor, values) in series.iter().enumerate() {
+        let noise = match request.noises.get(sensor).copied().flatten() {
+            Some(known) => positive("noises", known)?,
+            None if values.is_empty() => 0.3 * scale.spread,
+            None => 0.7 * rough(values),
+        };
+        let mut model = SensorModel::exact(noise);
+        if sensor != anchor {
+            // Of bits, the level is as often above the threshold as below it.
+            let middle = median(values.iter().map(|one| one.1).collect());
+            model.bias = if values.is_empty() { -level } else { middle - level };
+        }
+        sensors.push(model);
+    }
+    let interval = median(
+        instants
+            .windows(2)
+            .map(|pair| pair[1].seconds - pair[0].seconds)
+            .collect(),
+    );
+    let interval = if interval > 0.0 { interval } else { 1.0 };
+    Ok(LevelModel {
+        change: 0.3 * own / interval.sqrt(),
+        time_constant: None,
+        mean: scale.middle,
+        sensors,
+    })
+}

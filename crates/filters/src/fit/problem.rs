@@ -1,0 +1,262 @@
+//! The search for the parameters.
+
+use super::model::{LevelModel, Scale};
+use super::search::{information, maximum};
+use super::{Estimate, Quantity, Refusal};
+use crate::calibration::{Instant, median};
+use nalgebra::{DMatrix, DVector};
+
+/// A walk, and a time constant, is kept if it raises the likelihood by so many nats.
+const WORTH: f64 = 2.0;
+/// Standard errors above these say that a parameter is not determined: of logarithms, and in units of the search.
+const UNDETERMINED_LOG: f64 = 2.0;
+const UNDETERMINED: f64 = 30.0;
+/// Half of the delays that are tried, in half intervals between readings.
+const DELAYS: i32 = 12;
+
+/// The search, in units in which every parameter is about as uncertain.
+pub(super) struct Problem<'a> {
+    instants: &'a [Instant],
+    scale: Scale,
+    pub(super) model: LevelModel,
+    free: Vec<Quantity>,
+    /// Seconds of all readings, and between two.
+    length: f64,
+    interval: f64,
+}
+
+impl<'a> Problem<'a> {
+    pub(super) fn new(instants: &'a [Instant], scale: Scale, model: LevelModel, free: Vec<Quantity>) -> Self {
+        let gaps = instants
+            .windows(2)
+            .map(|pair| pair[1].seconds - pair[0].seconds)
+            .filter(|gap| *gap > 0.0);
+        let interval = median(gaps.collect());
+        let length = instants.last().map_or(0.0, |last| last.seconds - scale.begin);
+        Self {
+            instants,
+            scale,
+            model,
+            free,
+            length: if length > 0.0 { length } else { 1.0 },
+            interval: if interval > 0.0 { interval } else { 1.0 },
+        }
+    }
+
+    /// The unit of a parameter that may have either sign.
+    fn unit(&self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::Bias(sensor) => self.model.sensors[sensor].noise,
+            Quantity::Slope(sensor) => self.model.sensors[sensor].noise / self.length,
+            Quantity::Gain(_) => 0.1,
+            Quantity::Delay(_) => self.interval,
+            _ => self.scale.spread,
+        }
+    }
+
+    fn value(&self, quantity: Quantity) -> f64 {
+        let of = |sensor: usize| &self.model.sensors[sensor];
+        match quantity {
+            Quantity::Change => self.model.change,
+            Quantity::TimeConstant => self.model.time_constant.unwrap_or(0.1 * self.length),
+            Quantity::Mean => self.model.mean,
+            Quantity::Noise(sensor) => of(sensor).noise,
+            Quantity::Bias(sensor) => of(sensor).bias,
+            Quantity::Gain(sensor) => of(sensor).gain,
+            Quantity::Slope(sensor) => of(sensor).slope,
+            Quantity::Walk(sensor) => of(sensor).walk,
+            Quantity::Delay(sensor) => of(sensor).delay,
+        }
+    }
+
+    /// The model at a point of the search, which is zero at the present one.
+    fn at(&self, point: &DVector<f64>) -> LevelModel {
+        let mut model = self.model.clone();
+        for (quantity, off) in self.free.iter().zip(point.iter()) {
+            let before = self.value(*quantity);
+            let value = if quantity.is_positive() {
+                before * off.exp()
+            } else {
+                before + off * self.unit(*quantity)
+            };
+            set(&mut model, *quantity, value);
+        }
+        model
+    }
+
+    fn log_likelihood(&self, model: &LevelModel) -> f64 {
+        let found = if model.check().is_ok() {
+            model.run(self.instants, &self.scale, |_, _| {})
+        } else {
+            None
+        };
+        found.unwrap_or(f64::NEG_INFINITY)
+    }
+
+    /// Climbs from several changes and, where they are asked for, delays.
+    pub(super) fn solve(&mut self) {
+        let change = self.model.change;
+        let by_change = [1e-2, 0.1, 1.0, 10.0].map(|factor| LevelModel {
+            change: factor * change,
+            ..self.model.clone()
+        });
+        self.take_best(by_change.into_iter());
+        for quantity in self.free.clone() {
+            if let Quantity::Delay(sensor) = quantity {
+                let with = |half: i32| {
+                    let mut model = self.model.clone();
+                    model.sensors[sensor].delay = 0.5 * f64::from(half) * self.interval;
+                    model
+                };
+                let all: Vec<LevelModel> = (-DELAYS..=DELAYS).map(with).collect();
+                self.take_best(all.into_iter());
+            }
+        }
+        // Units follow the noises, so the second climb begins in better ones.
+        for _ in 0..2 {
+            self.climb();
+        }
+    }
+
+    fn take_best(&mut self, models: impl Iterator<Item = LevelModel>) {
+        let scored = models.map(|model| (self.log_likelihood(&model), model));
+        if let Some((_, best)) = scored.max_by(|one, other| one.0.total_cmp(&other.0)) {
+            self.model = best;
+        }
+    }
+
+    fn climb(&mut self) -> f64 {
+        let (point, best) = maximum(|point| self.log_likelihood(&self.at(point)), DVector::zeros(self.free.len()));
+        self.model = self.at(&point);
+        best
+    }
+
+    /// Whether the level returns to its mean.
+    pub(super) fn try_time_constant(&mut self, refused: &mut Vec<Refusal>) {
+        let (before, free) = (self.model.clone(), self.free.clone());
+        let wandering = self.log_likelihood(&before);
+        self.free.extend([Quantity::TimeConstant, Quantity::Mean]);
+        let returning = [0.01, 0.03, 0.1, 0.3].map(|share| LevelModel {
+            time_constant: Some(share * self.length),
+            ..before.clone()
+        });
+        self.take_best(returning.into_iter());
+        let found = self.climb();
+        let is_short = self.model.time_constant.is_some_and(|seconds| seconds < self.length);
+        if !is_short || found < wandering + WORTH {
+            (self.model, self.free) = (before, free);
+            refused.push(Refusal {
+                quantity: Quantity::TimeConstant,
+                reason: "a level that only wanders explains the readings as well".to_owned(),
+            });
+        }
+    }
+
+    /// Which offsets wander.
+    pub(super) fn try_walks(&mut self, anchor: usize, refused: &mut Vec<Refusal>) {
+        for sensor in (0..self.model.sensors.len()).filter(|sensor| *sensor != anchor) {
+            if !self.free.contains(&Quantity::Bias(sensor)) {
+                continue;
+            }
+            let (before, free) = (self.model.clone(), self.free.clone());
+            let steady = self.log_likelihood(&before);
+            let whole = before.sensors[sensor].noise / self.length.sqrt();
+            self.free.push(Quantity::Walk(sensor));
+            let wandering = [0.5, 2.0, 8.0].map(|factor| {
+                let mut model = before.clone();
+                model.sensors[sensor].walk = factor * whole;
+                model
+            });
+            self.take_best(wandering.into_iter());
+            if self.climb() < steady + WORTH {
+                (self.model, self.free) = (before, free);
+                refused.push(Refusal {
+                    quantity: Quantity::Walk(sensor),
+                    reason: "an offset that does not wander explains the readings as well".to_owned(),
+                });
+            }
+        }
+    }
+
+    /// Standard errors. Parameters that the readings do not determine are refused, one after the other: the others' errors are those with it
+    /// held where it is.
+    pub(super) fn errors(&self, refused: &mut Vec<Refusal>) -> Vec<Estimate> {
+        // The likelihood has a kink in a delay wherever two readings change places.
+        let step = |quantity: &Quantity| {
+            if matches!(quantity, Quantity::Delay(_)) {
+                0.25
+            } else {
+                1e-2
+            }
+        };
+        let steps: Vec<f64> = self.free.iter().map(step).collect();
+        let origin = DVector::zeros(self.free.len());
+        let found = information(|point| self.log_likelihood(&self.at(point)), &origin, &steps);
+        let is_number = |i: &usize| found.row(*i).iter().all(|one| one.is_finite());
+        let mut left: Vec<usize> = (0..self.free.len()).filter(is_number).collect();
+        let mut deviations = vec![f64::INFINITY; self.free.len()];
+        while !left.is_empty() {
+            let part = DMatrix::from_fn(left.len(), left.len(), |i, j| found[(left[i], left[j])]);
+            let eigen = part.symmetric_eigen();
+            let most = |i: usize| {
+                let quantity = self.free[left[i]];
+                if quantity.is_positive() {
+                    UNDETERMINED_LOG
+                } else {
+                    UNDETERMINED
+                }
+            };
+            let errors: Vec<f64> = (0..left.len())
+                .map(|i| {
+                    let one = |k: usize| eigen.eigenvectors[(i, k)].powi(2) / eigen.eigenvalues[k].max(1e-6);
+                    (0..left.len()).map(one).sum::<f64>().sqrt()
+                })
+                .collect();
+            // The one that exceeds its limit by most.
+            let excess = |i: &usize| errors[*i] / most(*i);
+            let worst = (0..left.len()).max_by(|one, other| excess(one).total_cmp(&excess(other)));
+            let Some(worst) = worst.filter(|worst| excess(worst) > 1.0) else {
+                left.iter().zip(&errors).for_each(|(i, error)| deviations[*i] = *error);
+                break;
+            };
+            deviations[left[worst]] = f64::INFINITY;
+            left.remove(worst);
+        }
+        let mut estimates = Vec::new();
+        for (quantity, deviation) in self.free.iter().zip(deviations) {
+            let value = self.value(*quantity);
+            let unit = if quantity.is_positive() {
+                value
+            } else {
+                self.unit(*quantity)
+            };
+            if deviation.is_finite() {
+                estimates.push(Estimate {
+                    quantity: *quantity,
+                    value,
+                    standard_error: deviation * unit,
+                });
+            } else {
+                refused.push(Refusal {
+                    quantity: *quantity,
+                    reason: format!("the readings do not determine it; taken as {value:.4e}"),
+                });
+            }
+        }
+        estimates
+    }
+}
+
+fn set(model: &mut LevelModel, quantity: Quantity, value: f64) {
+    match quantity {
+        Quantity::Change => model.change = value,
+        Quantity::TimeConstant => model.time_constant = Some(value),
+        Quantity::Mean => model.mean = value,
+        Quantity::Noise(sensor) => model.sensors[sensor].noise = value,
+        Quantity::Bias(sensor) => model.sensors[sensor].bias = value,
+        Quantity::Gain(sensor) => model.sensors[sensor].gain = value,
+        Quantity::Slope(sensor) => model.sensors[sensor].slope = value,
+        Quantity::Walk(sensor) => model.sensors[sensor].walk = value,
+        Quantity::Delay(sensor) => model.sensors[sensor].delay = value,
+    }
+}

@@ -1,0 +1,383 @@
+//! Calibration against the parameters that made the readings.
+
+use fewbits_filters::calibration::{Instant, Reading};
+use fewbits_filters::fit::{Fit, LevelModel, Quantity, Request, SensorModel, fit};
+use fewbits_monte_carlo::Stream;
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+const ROWS: usize = 200;
+
+/// Instants of a world, twice as many as are fitted: sensors of `bits` say whether they are above zero. Sensor 0 reads first.
+fn record(seed: u64, truth: &LevelModel, bits: &[usize], rows: usize) -> Vec<Instant> {
+    let mut rng = Stream::new(seed).named("fit").rng();
+    let mut noise = || rng.sample::<f64, _>(StandardNormal);
+    // The level in steps of a tenth of a second, so that delays are multiples of a step.
+    let steps = 10 * rows + 400;
+    let short = 0.1;
+    let mut level = vec![truth.mean; steps];
+    for k in 1..steps {
+        let before = level[k - 1];
+        level[k] = match truth.time_constant {
+            Some(constant) => {
+                let kept = f64::exp(-short / constant);
+                let settled = 0.5 * truth.change * truth.change * constant;
+                truth.mean + kept * (before - truth.mean) + (settled * (1.0 - kept * kept)).sqrt() * noise()
+            }
+            None => before + truth.change * short.sqrt() * noise(),
+        };
+    }
+    let mut walks = vec![0.0; truth.sensors.len()];
+    (0..rows)
+        .map(|row| {
+            let values = truth.sensors.iter().enumerate().map(|(sensor, own)| {
+                walks[sensor] += own.walk * noise();
+                let late = (own.delay / short).round() as usize;
+                let x = level[200 + 10 * row - late];
+                let value = own.gain * x + own.bias + own.slope * row as f64 + walks[sensor] + own.noise * noise();
+                let reading = match bits.contains(&sensor) {
+                    false => Reading::from(value),
+                    true if value > 0.0 => Reading::Within {
+                        lower: 0.0,
+                        upper: f64::INFINITY,
+                    },
+                    true => Reading::Within {
+                        lower: f64::NEG_INFINITY,
+                        upper: 0.0,
+                    },
+                };
+                (sensor, reading)
+            });
+            Instant {
+                seconds: row as f64,
+                values: values.collect(),
+            }
+        })
+        .collect()
+}
+
+fn walk(change: f64, sensors: Vec<SensorModel>) -> LevelModel {
+    LevelModel {
+        change,
+        time_constant: None,
+        mean: 20.0,
+        sensors,
+    }
+}
+
+fn exact(noise: f64) -> SensorModel {
+    SensorModel::exact(noise)
+}
+
+/// The five kinds of worlds: name, truth, sensors of bits, what is looked for.
+fn kinds() -> Vec<(&'static str, LevelModel, Vec<usize>, Request)> {
+    let biased = |noise: f64, bias: f64| SensorModel { bias, ..exact(noise) };
+    let reference = Request {
+        reference: Some(0),
+        ..Request::default()
+    };
+    vec![
+        (
+            "noises and biases",
+            walk(0.3, vec![exact(0.5), biased(1.5, 2.0), biased(0.8, -1.0)]),
+            vec![],
+            Request::default(),
+        ),
+        (
+            "gain against a reference",
+            walk(
+                1.0,
+                vec![
+                    exact(0.2),
+                    SensorModel {
+                        gain: 1.2,
+                        ..biased(0.6, -3.0)
+                    },
+                ],
+            ),
+            vec![],
+            Request {
+                gain: true,
+                ..reference.clone()
+            },
+        ),
+        (
+            "drifts",
+            walk(
+                0.3,
+                vec![
+                    exact(0.3),
+                    SensorModel {
+                        slope: 0.02,
+                        ..exact(0.5)
+                    },
+                    SensorModel {
+                        walk: 0.15,
+                        ..exact(0.4)
+                    },
+                ],
+            ),
+            vec![],
+            Request {
+                slope: true,
+                walk: true,
+                ..reference.clone()
+            },
+        ),
+        (
+            "a delay",
+            walk(
+                1.0,
+                vec![
+                    exact(0.3),
+                    SensorModel {
+                        delay: 1.5,
+                        ..exact(0.5)
+                    },
+                ],
+            ),
+            vec![],
+            Request {
+                delay: true,
+                ..reference.clone()
+            },
+        ),
+        (
+            "a level that returns, and a threshold",
+            LevelModel {
+                time_constant: Some(8.0),
+                ..walk(1.0, vec![exact(0.4), biased(0.7, -21.0)])
+            },
+            vec![1],
+            Request {
+                time_constant: true,
+                ..Request::default()
+            },
+        ),
+    ]
+}
+
+fn true_value(truth: &LevelModel, quantity: Quantity) -> f64 {
+    match quantity {
+        Quantity::Change => truth.change,
+        Quantity::TimeConstant => truth.time_constant.unwrap(),
+        Quantity::Mean => truth.mean,
+        Quantity::Noise(sensor) => truth.sensors[sensor].noise,
+        Quantity::Bias(sensor) => truth.sensors[sensor].bias,
+        Quantity::Gain(sensor) => truth.sensors[sensor].gain,
+        Quantity::Slope(sensor) => truth.sensors[sensor].slope,
+        Quantity::Walk(sensor) => truth.sensors[sensor].walk,
+        Quantity::Delay(sensor) => truth.sensors[sensor].delay,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Worlds of one kind: how many have held-out readings that are less likely than under the truth by more than one in a hundred, parameters
+/// within two standard errors, and parameters.
+fn measure(name: &str, truth: &LevelModel, bits: &[usize], request: &Request, worlds: u64) -> (u64, usize, usize) {
+    let (mut poor, mut within, mut all, mut failed, mut worst) = (0, 0, 0, 0, 0.0_f64);
+    let mut refused = 0;
+    for seed in 0..worlds {
+        let record = record(seed, truth, bits, 2 * ROWS);
+        let found: Fit = fit(&record[..ROWS], truth.sensors.len(), request).unwrap();
+        // Both know the readings before.
+        let held_out = |model: &LevelModel| {
+            model.log_likelihood(&record).unwrap().0 - model.log_likelihood(&record[..ROWS]).unwrap().0
+        };
+        let (own, best) = (held_out(&found.model), held_out(truth));
+        worst = worst.max(best - own);
+        poor += u64::from(best - own > 0.01 * best.abs());
+        for estimate in &found.estimates {
+            let off = (estimate.value - true_value(truth, estimate.quantity)) / estimate.standard_error;
+            within += usize::from(off.abs() < 2.0);
+            all += 1;
+            if worlds < 4 {
+                println!("  {estimate:?} off {off:.1}");
+            }
+        }
+        refused += found.refused.len();
+        failed += found.tests.iter().filter(|test| !test.is_passed()).count();
+    }
+    println!(
+        "{name}: {poor} of {worlds} poor, at most {worst:.1} nats; {within} of {all} within two standard errors; {failed} tests failed, {refused} refused"
+    );
+    (poor, within, all)
+}
+
+#[test]
+fn parameters_are_found_within_their_errors() {
+    for (name, truth, bits, request) in kinds() {
+        let (_, within, all) = measure(name, &truth, &bits, &request, 12);
+        // 95 in a hundred, less four standard errors of so many.
+        let least = 0.95 - 4.0 * (0.95 * 0.05 / all as f64).sqrt();
+        assert!(within as f64 >= least * all as f64, "{name}: {within} of {all}");
+    }
+}
+
+/// The measurement in full: a hundred worlds of each kind.
+#[test]
+#[ignore = "a minute"]
+fn held_out_readings_are_as_likely_as_under_the_truth() {
+    for (name, truth, bits, request) in kinds() {
+        let (poor, within, all) = measure(name, &truth, &bits, &request, 100);
+        assert!(poor <= 5, "{name}: {poor}");
+        assert!(within as f64 > 0.93 * all as f64, "{name}: {within} of {all}");
+    }
+}
+
+#[test]
+fn what_cannot_be_told_is_refused() {
+    // One sensor and no reference: its bias is that of the level.
+    let alone = walk(
+        0.3,
+        vec![SensorModel {
+            bias: 5.0,
+            ..exact(0.5)
+        }],
+    );
+    let request = Request {
+        gain: true,
+        slope: true,
+        delay: true,
+        walk: true,
+        ..Request::default()
+    };
+    let found = fit(&record(1, &alone, &[], ROWS), 1, &request).unwrap();
+    for quantity in [
+        Quantity::Bias(0),
+        Quantity::Gain(0),
+        Quantity::Slope(0),
+        Quantity::Walk(0),
+        Quantity::Delay(0),
+    ] {
+        assert!(found.refused.iter().any(|one| one.quantity == quantity), "{quantity:?}: {found:?}");
+        assert!(found.estimates.iter().all(|one| one.quantity != quantity), "{quantity:?}: {found:?}");
+    }
+    // Bits alone.
+    let bits = walk(
+        0.3,
+        vec![
+            SensorModel {
+                bias: -20.0,
+                ..exact(0.5)
+            };
+            2
+        ],
+    );
+    let error = fit(&record(1, &bits, &[0, 1], ROWS), 2, &Request::default())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("bits alone leave unit and zero"), "{error}");
+    // A threshold that the level never crosses.
+    let far = walk(
+        0.3,
+        vec![
+            exact(0.5),
+            SensorModel {
+                bias: -500.0,
+                ..exact(0.5)
+            },
+        ],
+    );
+    let found = fit(&record(1, &far, &[1], ROWS), 2, &Request::default()).unwrap();
+    assert!(found.refused.iter().any(|one| one.quantity == Quantity::Bias(1)), "{found:?}");
+    // A level that wanders has no time constant.
+    let found = fit(
+        &record(1, &alone, &[], ROWS),
+        1,
+        &Request {
+            time_constant: true,
+            ..Request::default()
+        },
+    )
+    .unwrap();
+    assert!(found.model.time_constant.is_none_or(|seconds| seconds > 10.0), "{found:?}");
+}
+
+#[test]
+fn shared_noise_is_seen_beside_a_reference() {
+    let truth = walk(0.5, vec![exact(0.01), exact(1.0), exact(1.0)]);
+    let mut rows = record(3, &truth, &[], 400);
+    let mut rng = Stream::new(9).rng();
+    for row in &mut rows {
+        let common = rng.sample::<f64, _>(StandardNormal);
+        for (_, reading) in &mut row.values[1..] {
+            *reading = Reading::from(reading.value().unwrap() + common);
+        }
+    }
+    let found = fit(
+        &rows,
+        3,
+        &Request {
+            reference: Some(0),
+            ..Request::default()
+        },
+    )
+    .unwrap();
+    let one = found.correlations[0];
+    assert!((one.value - 0.5).abs() < 4.0 * one.standard_error, "{one:?}");
+}
+
+#[test]
+fn a_wild_value_and_a_unit_change_nothing() {
+    let (_, truth, _, request) = kinds().swap_remove(0);
+    let rows = record(5, &truth, &[], ROWS);
+    let plain = fit(&rows, 3, &request).unwrap();
+    let mut wild = rows.clone();
+    wild[50].values[0].1 = Reading::from(1000.0);
+    let found = fit(&wild, 3, &request).unwrap();
+    assert!((found.model.sensors[0].noise / plain.model.sensors[0].noise).ln().abs() < 0.1, "{found:?}");
+    for unit in [1e-4, 1e4] {
+        let scaled: Vec<Instant> = rows
+            .iter()
+            .map(|row| Instant {
+                seconds: row.seconds,
+                values: row
+                    .values
+                    .iter()
+                    .map(|(n, one)| (*n, Reading::from(one.value().unwrap() * unit)))
+                    .collect(),
+            })
+            .collect();
+        let found = fit(&scaled, 3, &request).unwrap();
+        for (one, other) in found.estimates.iter().zip(&plain.estimates) {
+            let off = (one.value / unit - other.value).abs();
+            assert!(off < 0.02 * other.standard_error, "{one:?} {other:?}");
+        }
+    }
+}
+
+#[test]
+fn bad_readings_are_refused() {
+    let truth = walk(0.3, vec![exact(0.5)]);
+    let rows = record(1, &truth, &[], 40);
+    assert!(fit(&[], 1, &Request::default()).is_err());
+    assert!(
+        fit(
+            &rows,
+            1,
+            &Request {
+                reference: Some(3),
+                ..Request::default()
+            }
+        )
+        .is_err()
+    );
+    assert!(
+        fit(
+            &rows,
+            1,
+            &Request {
+                noises: vec![Some(-1.0)],
+                ..Request::default()
+            }
+        )
+        .is_err()
+    );
+    let mut wrong = rows.clone();
+    wrong[3].values[0].1 = Reading::from(f64::NAN);
+    assert!(fit(&wrong, 1, &Request::default()).is_err());
+    let mut wrong = rows;
+    wrong.swap(3, 4);
+    assert!(fit(&wrong, 1, &Request::default()).is_err());
+}

@@ -1,0 +1,243 @@
+//! The most probable state near a start, by Gauss-Newton steps.
+//!
+//! ```text
+//! unknown    position, bias, scale; a bias of a single anchor is part of the error of its one range
+//! minimised  sum of (range - expected)^2 / variance + (x - prior mean)^2 / prior variance
+//! evidence   ln N(ranges; expected, J P J' + W), by the determinant lemma; Laplace's approximation
+//! ```
+
+use super::gaussian::Normal;
+use super::rows::{Collected, Rows};
+use super::search::Search;
+
+/// Gauss-Newton steps at most.
+const STEPS: usize = 30;
+/// Most coordinates: three positions, bias and scale.
+const MOST: usize = 5;
+
+type Vector = [f64; MOST];
+type Matrix = [[f64; MOST]; MOST];
+
+/// Cost, information and downhill gradient at a point.
+struct Local {
+    cost: f64,
+    information: Matrix,
+    gradient: Vector,
+}
+
+/// What is minimised.
+struct Problem<'a> {
+    search: &'a Search<'a>,
+    rows: &'a Rows<'a>,
+    /// Variance of each range's error, the bias of its anchor included.
+    variances: Vec<f64>,
+    middle: Vector,
+    prior: Vector,
+    /// Number of coordinates.
+    size: usize,
+}
+
+impl Problem<'_> {
+    fn axes(&self) -> usize {
+        self.size - 2
+    }
+
+    /// The expected range and its gradient.
+    fn expected(&self, x: &Vector, one: &Collected) -> (f64, Vector) {
+        let axes = self.axes();
+        let d = self.search.distance(x, one);
+        let factor = 1.0 + x[axes + 1];
+        let mut gradient = [0.0; MOST];
+        if d > 0.0 {
+            (0..axes).for_each(|i| gradient[i] = factor * (x[i] - one.place[i]) / d);
+        }
+        (gradient[axes], gradient[axes + 1]) = (1.0, d);
+        (factor * d + x[axes], gradient)
+    }
+
+    fn at(&self, x: &Vector) -> Local {
+        let mut found = Local {
+            cost: 0.0,
+            information: [[0.0; MOST]; MOST],
+            gradient: [0.0; MOST],
+        };
+        let mut add = |off: f64, slope: &Vector, variance: f64| {
+            found.cost += off * off / variance;
+            for i in 0..self.size {
+                found.gradient[i] += slope[i] * off / variance;
+                for j in 0..=i {
+                    found.information[i][j] += slope[i] * slope[j] / variance;
+                }
+            }
+        };
+        for (one, variance) in self.rows.ranges.iter().zip(&self.variances) {
+            let (expected, slope) = self.expected(x, one);
+            add(one.range - expected, &slope, *variance);
+        }
+        if let Some(slice) = self.rows.slice {
+            let along: f64 = (0..self.axes()).map(|i| slice.direction[i] * x[i]).sum();
+            let mut slope = [0.0; MOST];
+            slope[..3].copy_from_slice(&slice.direction);
+            (self.axes()..MOST).for_each(|i| slope[i] = 0.0);
+            add(slice.middle - along, &slope, slice.deviation * slice.deviation);
+        }
+        for i in 0..self.size {
+            if self.prior[i] > 0.0 {
+                let off = self.middle[i] - x[i];
+                found.cost += off * off / self.prior[i];
+                found.gradient[i] += off / self.prior[i];
+                found.information[i][i] += 1.0 / self.prior[i];
+            } else {
+                // A coordinate that is known.
+                found.gradient[i] = 0.0;
+                for j in 0..self.size {
+                    found.information[i.max(j)][i.min(j)] = 0.0;
+                }
+                found.information[i][i] = 1.0;
+            }
+        }
+        found
+    }
+}
+
+/// The lower triangular root; `None` if the matrix is not positive definite.
+fn root(matrix: &Matrix, size: usize) -> Option<Matrix> {
+    let mut root = [[0.0; MOST]; MOST];
+    for j in 0..size {
+        let left = matrix[j][j] - root[j][..j].iter().map(|x| x * x).sum::<f64>();
+        if left <= 0.0 || !left.is_finite() {
+            return None;
+        }
+        root[j][j] = left.sqrt();
+        for i in j + 1..size {
+            let known: f64 = (0..j).map(|k| root[i][k] * root[j][k]).sum();
+            root[i][j] = (matrix[i][j] - known) / root[j][j];
+        }
+    }
+    Some(root)
+}
+
+fn solve(root: &Matrix, right: &Vector, size: usize) -> Vector {
+    let mut x = *right;
+    for i in 0..size {
+        let known: f64 = (0..i).map(|k| root[i][k] * x[k]).sum();
+        x[i] = (x[i] - known) / root[i][i];
+    }
+    for i in (0..size).rev() {
+        let known: f64 = (i + 1..size).map(|k| root[k][i] * x[k]).sum();
+        x[i] = (x[i] - known) / root[i][i];
+    }
+    x
+}
+
+/// The most probable state near a start, its covariance there, and the evidence, in a slice of the positions if there is one. `None` if the
+/// information is singular.
+pub(super) fn fit(search: &Search<'_>, start: &[f64], rows: &Rows<'_>, speed: f64, own: f64) -> Option<(Normal, f64)> {
+    let axes = search.known.axes;
+    let size = axes + 2;
+    let (mut middle, mut prior) = ([0.0; MOST], [0.0; MOST]);
+    for i in 0..axes {
+        (middle[i], prior[i]) = (search.known.middle[i], search.known.spreads[i].powi(2));
+    }
+    for (i, (mean, variance)) in search.calibration.into_iter().enumerate() {
+        (middle[axes + i], prior[axes + i]) = (mean, variance);
+    }
+    let problem = Problem {
+        search,
+        rows,
+        variances: rows.deviations.iter().map(|one| one * one + own * own).collect(),
+        middle,
+        prior,
+        size,
+    };
+    let mut x = middle;
+    x[..axes].copy_from_slice(start.get(..axes)?);
+    let mut local = problem.at(&x);
+    for _ in 0..STEPS {
+        let whole = solve(&root(&local.information, size)?, &local.gradient, size);
+        let (mut has_moved, mut share) = (false, 1.0);
+        while share > 1e-4 {
+            let mut next = x;
+            (0..size).for_each(|i| next[i] += share * whole[i]);
+            let found = problem.at(&next);
+            if found.cost < local.cost {
+                has_moved = local.cost - found.cost > 1e-7 * (1.0 + found.cost);
+                (x, local) = (next, found);
+                break;
+            }
+            share *= 0.5;
+        }
+        if !has_moved {
+            break;
+        }
+    }
+    let factor = root(&local.information, size)?;
+    let step = solve(&factor, &local.gradient, size);
+    // Cost at the minimum of the linearised problem.
+    let cost = local.cost - (0..size).map(|i| step[i] * local.gradient[i]).sum::<f64>();
+    let mut log_determinant: f64 = problem.variances.iter().map(|variance| variance.ln()).sum();
+    log_determinant += rows.slice.map_or(0.0, |slice| 2.0 * slice.deviation.ln());
+    for i in 0..size {
+        log_determinant += 2.0 * factor[i][i].ln() + if prior[i] > 0.0 { prior[i].ln() } else { 0.0 };
+    }
+    let count = (rows.ranges.len() + usize::from(rows.slice.is_some())) as f64;
+    let log_evidence = -0.5 * (cost + log_determinant + count * std::f64::consts::TAU.ln());
+    let normal = law(&problem, &x, &factor, speed, own);
+    (normal.is_finite() && log_evidence.is_finite()).then_some((normal, log_evidence))
+}
+
+/// The law of the whole state.
+fn law(problem: &Problem<'_>, x: &Vector, factor: &Matrix, speed: f64, own: f64) -> Normal {
+    let (size, axes) = (problem.size, problem.axes());
+    let n = 2 * axes + 2 + if own > 0.0 { problem.search.anchors } else { 0 };
+    let mut inverse = [[0.0; MOST]; MOST];
+    for (i, column) in inverse.iter_mut().enumerate().take(size) {
+        let mut unit = [0.0; MOST];
+        unit[i] = f64::from(u8::from(problem.prior[i] > 0.0));
+        *column = solve(factor, &unit, size);
+        (0..size)
+            .filter(|j| problem.prior[*j] == 0.0)
+            .for_each(|j| column[j] = 0.0);
+    }
+    // Where a coordinate of the problem is in the state.
+    let place = |i: usize| if i < axes { i } else { axes + i };
+    let (mut mean, mut covariance) = (vec![0.0; n], vec![0.0; n * n]);
+    for i in 0..size {
+        mean[place(i)] = x[i];
+        for j in 0..size {
+            covariance[place(i) * n + place(j)] = 0.5 * (inverse[i][j] + inverse[j][i]);
+        }
+    }
+    (axes..2 * axes).for_each(|i| covariance[i * n + i] = speed * speed);
+    if own > 0.0 {
+        let first = 2 * axes + 2;
+        (first..n).for_each(|i| covariance[i * n + i] = own * own);
+        // Given the state, the bias of an anchor is a share of what its range is off.
+        let shares: Vec<(usize, f64, Vector)> = problem
+            .rows
+            .ranges
+            .iter()
+            .zip(&problem.variances)
+            .map(|(one, variance)| {
+                let (expected, slope) = problem.expected(x, one);
+                let share = own * own / variance;
+                mean[first + one.anchor] = share * (one.range - expected);
+                (first + one.anchor, share, slope)
+            })
+            .collect();
+        for (at, share, slope) in &shares {
+            let mut cross = [0.0; MOST];
+            for i in 0..size {
+                cross[i] = -share * (0..size).map(|j| inverse[i][j] * slope[j]).sum::<f64>();
+                covariance[at * n + place(i)] = cross[i];
+                covariance[place(i) * n + at] = cross[i];
+            }
+            for (other, other_share, other_slope) in &shares {
+                let common: f64 = -other_share * (0..size).map(|i| cross[i] * other_slope[i]).sum::<f64>();
+                let alone = if at == other { own * own * (1.0 - share) } else { 0.0 };
+                covariance[at * n + other] = common + alone;
+            }
+        }
+    }
+    Normal { mean, covariance, axes }
+}
