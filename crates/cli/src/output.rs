@@ -187,7 +187,7 @@ impl Writer {
         let is_json = shape == Shape::Json;
         let first = match schema.time() {
             TimeBase::Numbered => is_json.then_some("row"),
-            _ => Some("time"),
+            _ => Some(schema.time_name()),
         };
         let unit = |name: &String| schema.position(name).ok().map(|i| schema.columns()[i].unit());
         let words = names.iter().map(|name| unit(name).and_then(words::of)).collect();
