@@ -93,8 +93,12 @@ fn attack(count: usize, seed: u64) -> (usize, usize) {
     let (mut parts, mut none) = (0, 0);
     for i in 0..count {
         let (bytes, truth, starts) = &files[i % files.len()];
-        let (other, ..) = &files[(i / files.len() + 1) % files.len()];
+        let (other, _, others) = &files[(i / files.len() + 1) % files.len()];
         let all = damaged(bytes, starts, other, &mut numbers);
+        // Behind the whole header of the other recording its rows are right.
+        if all.starts_with(&other[..others[0]]) {
+            continue;
+        }
         let context = format!("seed {seed}, file {i}");
         if let Ok(mut playback) = Playback::new(Cursor::new(&all)) {
             let (read, errors): (Vec<_>, Vec<_>) = playback.rows().partition(Result::is_ok);
