@@ -26,8 +26,6 @@
 //! | configuration: error bound, circle, refreshes | [`Config`] |
 //! | sensor and receiver | [`Sensor`], [`Receiver`] |
 //! | the bits of one slot, and of a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
-//! | links that lose packets: one lost packet affects only the slots until the next | [`CosetSensor`], [`CosetReceiver`] |
-//! | reports as likelihoods for other filters | [`SlotScheme`] |
 //! | the same number of bits in every slot | [`FixedRate`] |
 //! | choice of `delta` for a bit rate, on a recording | [`best_within`], [`replay`] |
 //!
@@ -47,24 +45,20 @@
 //! (`fewbits-block-codec`), files (`fewbits-record`).
 
 mod config;
-mod coset;
 mod fixed_rate;
 mod packet;
 mod receiver;
 mod report;
-mod scheme;
 mod sensor;
 mod stream;
 mod tuning;
 
 pub use config::Config;
-pub use coset::{CosetConfig, CosetReceiver, CosetSensor, TOLERATED};
 pub use fewbits_core::Error;
 pub use fewbits_node::adaptive::{MODELS, SCALES};
 pub use fixed_rate::{FixedRate, Word};
 pub use packet::Packet;
 pub use receiver::{Receiver, Tracked};
-pub use scheme::{SlotFactor, SlotScheme};
 pub use sensor::{Report, Sensor};
 pub use stream::{Silence, StreamReader, StreamWriter};
 pub use tuning::{Replay, best_within, own_steps, replay};

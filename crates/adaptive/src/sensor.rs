@@ -5,7 +5,7 @@ use crate::packet::Packet;
 use crate::report;
 use crate::stream::StreamWriter;
 use crate::{Error, MODELS};
-use fewbits_node::adaptive::{Encoder, Lattice, Replica, Slot, header};
+use fewbits_node::adaptive::{Encoder, Lattice, Replica};
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
@@ -119,14 +119,5 @@ impl Sensor {
             // The first sample, reduced to the circle if there is one.
             None => Ok(stream.first(Lattice::reduce(&self.config.0, sample))?),
         }
-    }
-
-    /// The sensor's view of the next slot, for [`crate::SlotScheme`].
-    pub(crate) fn ahead(&self, elapsed: u32) -> Option<(Replica, Slot)> {
-        self.encoder.ahead(elapsed)
-    }
-
-    pub(crate) fn next_header(&self) -> fewbits_node::Packet {
-        header(&self.config.0, self.encoder.sequence(), false)
     }
 }

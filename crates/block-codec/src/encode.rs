@@ -179,6 +179,9 @@ impl BlockCodec {
 
     /// The indices (an exception repeats the last one), and the exceptions with their rows.
     pub(crate) fn indices(&self, grid: &Grid, samples: &[f64]) -> (Vec<i64>, Vec<(usize, f64)>) {
+        if let Some(indices) = grid.plain_indices(samples, |value, sample| self.is_within(value, sample)) {
+            return (indices, Vec::new());
+        }
         let mut exceptions = Vec::new();
         let mut indices = Vec::with_capacity(samples.len());
         let mut last = None;

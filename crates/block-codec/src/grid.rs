@@ -9,7 +9,7 @@ const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;
 /// Largest sample of single precision as a decimal integer: beyond that neighbours are the same number.
 const LARGEST_SINGLE_DIGITS: f64 = (1_u64 << 24) as f64;
 /// Integers up to this size are exact doubles.
-const WHOLE: i64 = 1 << 53;
+pub(crate) const WHOLE: i64 = 1 << 53;
 /// Share by which steps are shorter than `2 delta`, so that rounding cannot move a reconstruction out of its bound.
 const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
 /// Largest number of cells of a circle.
@@ -199,7 +199,7 @@ impl Grid {
 
     /// Number of multiples by which the first one of each cell is moved.
     #[inline(always)]
-    fn digits_moved(width: i64, phase: u8) -> i64 {
+    pub(crate) fn digits_moved(width: i64, phase: u8) -> i64 {
         let sixteenths = i128::from(width) * i128::from(phase);
         ((sixteenths + i128::from(PHASES) - 1) >> PHASE_BITS) as i64
     }

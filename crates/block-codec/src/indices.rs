@@ -20,29 +20,62 @@ fn from_pco(error: impl std::fmt::Display) -> Damaged {
     Damaged::new("pco block", error, "what a writer of as many rows wrote")
 }
 
-/// Codes the first index of a block that has no [`Start`](crate::Start).
-fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>) -> Result<i64, Damaged> {
+/// Lengths of first indices from here on say that contexts have the lengths of rests: indices are shorter.
+const WITH_RESTS: u32 = 48;
+/// Least number of rows of blocks whose contexts have the lengths of rests: in shorter ones they do not learn enough.
+pub(crate) const RESTS_ROWS: usize = 1024;
+
+/// Codes the first index of a block that has no [`Start`](crate::Start), and whether contexts have the lengths of rests.
+fn code_first<C: Coder>(coder: &mut C, wanted: Option<i64>, rests: bool) -> Result<(i64, bool), Damaged> {
     let z = wanted.map_or(0, zigzag);
-    let length = coder.raw(u64::from(u64::BITS - z.leading_zeros()), FIRST_LENGTH) as u32;
+    let length = u64::BITS - z.leading_zeros();
+    let told = if rests && length < (1 << FIRST_LENGTH) - WITH_RESTS {
+        length + WITH_RESTS
+    } else {
+        length
+    };
+    let told = coder.raw(u64::from(told), FIRST_LENGTH) as u32;
+    let rests = told >= WITH_RESTS;
+    let length = if rests { told - WITH_RESTS } else { told };
     let first = unzigzag(coder.raw(z, length));
     if first.unsigned_abs() > LARGEST as u64 {
         return Err(Damaged::new("first index", first, "at most 2^46 in size"));
     }
-    Ok(first)
+    Ok((first, rests))
+}
+
+/// How the indices after the first one are coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rest {
+    /// Models, whose contexts have the lengths of rests or not.
+    Models {
+        rests: bool,
+    },
+    Counts,
+}
+
+impl Rest {
+    pub(crate) fn new(by_models: bool, rests: bool) -> Self {
+        if by_models {
+            Self::Models { rests }
+        } else {
+            Self::Counts
+        }
+    }
 }
 
 /// Codes the indices after the first one (on a circle of so many `cells`, if there is one) by models, or by counts with one bit in front. Counts do not use `others`.
 pub(crate) fn code_rest<C: Coder>(
     coder: &mut C,
-    by_models: bool,
+    coding: Rest,
     cells: Option<i64>,
     first: i64,
     wanted: Option<&[i64]>,
     rows: usize,
     others: Option<&Others<'_>>,
 ) -> Result<Vec<i64>, Damaged> {
-    if by_models {
-        let model = Model::new(rows, first, cells, others.is_some());
+    if let Rest::Models { rests } = coding {
+        let model = Model::new(rows, first, cells, others.is_some(), rests);
         return code_all(coder, model, wanted, rows, others);
     }
     // The reader does not know the indices in advance: whether differences of differences are smaller is told.
@@ -62,8 +95,10 @@ pub(crate) fn write_block(
     let coding = if by_models { Coding::Models } else { Coding::Counts };
     write_head(grid, coding, others.is_some(), exceptions, &mut bytes);
     let mut writer = Writer::new(bytes);
-    let first = code_first(&mut writer, Some(indices.first().copied().unwrap_or(0)))?;
-    code_rest(&mut writer, by_models, grid.cells(), first, Some(indices), indices.len(), others)?;
+    let rests = by_models && indices.len() >= RESTS_ROWS;
+    let (first, rests) = code_first(&mut writer, Some(indices.first().copied().unwrap_or(0)), rests)?;
+    let rest = Rest::new(by_models, rests);
+    code_rest(&mut writer, rest, grid.cells(), first, Some(indices), indices.len(), others)?;
     Ok(writer.finish())
 }
 
@@ -76,8 +111,11 @@ pub(crate) fn read_block(
     others: Option<&Others<'_>>,
 ) -> Result<Vec<i64>, Damaged> {
     let mut reader = Reader::new(bytes);
-    let first = code_first(&mut reader, None)?;
-    let indices = code_rest(&mut reader, by_models, grid.cells(), first, None, rows, others)?;
+    let (first, rests) = code_first(&mut reader, None, false)?;
+    if rests && !by_models {
+        return Err(Damaged::new("first index", "too long", "at most 2^46 in size"));
+    }
+    let indices = code_rest(&mut reader, Rest::new(by_models, rests), grid.cells(), first, None, rows, others)?;
     reader.finish()?;
     Ok(indices)
 }

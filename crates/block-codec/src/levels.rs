@@ -14,7 +14,7 @@
 use crate::arithmetic::{Coder, Reader, Writer};
 use crate::counts::{Count, gamma};
 use crate::error::Damaged;
-use crate::indices::code_rest;
+use crate::indices::{Rest, code_rest};
 use crate::rows::Others;
 
 /// Probability, in units of `2^-16`, that numbers are coded by models.
@@ -119,7 +119,7 @@ fn code<C: Coder>(
     let first = wanted.map_or(0, |(_, numbers)| numbers[0] as u64);
     let first = coder.raw(first, u64::BITS - highest.leading_zeros()) as i64;
     let numbers = wanted.map(|(_, numbers)| numbers.as_slice());
-    let numbers = code_rest(coder, by_models, None, first, numbers, rows, others)?;
+    let numbers = code_rest(coder, Rest::new(by_models, false), None, first, numbers, rows, others)?;
     let level = |number: &i64| {
         usize::try_from(*number)
             .ok()

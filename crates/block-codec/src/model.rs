@@ -59,6 +59,9 @@ impl State for Model {
             squares.update(step as f64);
         }
         self.frequencies.add(index, step != 0);
+        if let Some(rests) = &mut self.rests {
+            rests.learn(step);
+        }
         self.past.rotate_right(1);
         self.past[0] = step;
         self.last = index;
@@ -101,8 +104,50 @@ pub(crate) struct Model {
     cells: Option<i64>,
     last: i64,
     past: [i64; PAST],
+    /// Rests of the index; `None` in blocks of earlier writers, whose contexts have none.
+    rests: Option<Rests>,
     slow: f64,
     seen: f64,
+}
+
+/// How long the index has rested, how long it rested before its last step, and whether that step went up.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rests {
+    now: u32,
+    before: u32,
+    up: bool,
+}
+
+impl Rests {
+    #[inline(always)]
+    fn learn(&mut self, step: i64) {
+        if step == 0 {
+            self.now = self.now.saturating_add(1);
+        } else {
+            *self = Self {
+                now: 0,
+                before: self.now,
+                up: step > 0,
+            };
+        }
+    }
+
+    /// A length: exact up to 8, then four classes per doubling.
+    #[inline(always)]
+    fn class(rows: u32) -> u32 {
+        if rows < 8 {
+            return rows;
+        }
+        let power = 31 - rows.leading_zeros();
+        4 * power + (rows >> (power - 2) & 3) - 4
+    }
+
+    /// A fine and a coarse context.
+    #[inline(always)]
+    fn contexts(self) -> (u32, u32) {
+        let now = Self::class(self.now) << 1 | u32::from(self.up);
+        (now | Self::class(self.before) << 9, now)
+    }
 }
 
 #[inline(always)]
@@ -115,8 +160,9 @@ fn less(a: [f32; EXPERTS], b: [f32; EXPERTS]) -> [f32; EXPERTS] {
 }
 
 impl Model {
-    /// The state after the first index of a block of `rows` rows. `cells`: number of points on a circle.
-    pub(crate) fn new(rows: usize, first: i64, cells: Option<i64>, joint: bool) -> Self {
+    /// The state after the first index of a block of `rows` rows. `cells`: number of points on a circle. `rests`: whether contexts have the
+    /// lengths of rests.
+    pub(crate) fn new(rows: usize, first: i64, cells: Option<i64>, joint: bool, rests: bool) -> Self {
         let mut frequencies = Frequencies::new(first, cells);
         frequencies.add(first, true);
         Self {
@@ -128,6 +174,7 @@ impl Model {
             cells,
             last: first,
             past: [0; PAST],
+            rests: rests.then(Rests::default),
             slow: first as f64,
             seen: 1.0,
         }
@@ -171,7 +218,16 @@ impl Model {
         let sizes = size(d0) << 6 | size(d1) << 4 | size(d2) << 2 | size(d3);
         let last = point(self.last).wrapping_mul(0x2545_F491);
         // The last two steps with the offset; the centre; the last index with the offset; rough sizes of four steps.
-        let contexts = [steps | here << 12, point(centre), last ^ here, sizes | k << 8];
+        let mut contexts = [steps | here << 12, point(centre), last ^ here, sizes | k << 8];
+        // Of an index that rests, the last steps say nothing.
+        if let Some(rests) = self.rests
+            && d0 == 0
+            && d1 == 0
+        {
+            let (fine, coarse) = rests.contexts();
+            contexts[0] = 1 << 31 | fine ^ here.wrapping_mul(0x2_0001);
+            contexts[3] = 1 << 30 | coarse ^ here.wrapping_mul(0x2001);
+        }
         // A product with an odd number mixes the highest bits best; the rotation brings them down to where the table is indexed.
         for (context, word) in self.mixer.contexts.iter_mut().zip(contexts) {
             *context = word.wrapping_mul(0x9E37_79B1).rotate_left(13);

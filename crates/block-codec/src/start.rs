@@ -8,7 +8,8 @@
 //! first index less the usual one: zigzag, its high bits by an Elias gamma code, k low bits   decisions as in other blocks
 //! ```
 //!
-//! The start itself: grid (byte: decimals, or 13 line, 14 circle, 16 more if steps follow, 32 more if a phase does), steps (unit and origin as in
+//! The start itself: grid (byte: decimals, or 13 line, 14 circle, 16 more if steps follow, 32 more if a phase does,
+//! 64 more if decimals are rounded to single precision, 128 more if contexts of models have the lengths of rests), steps (unit and origin as in
 //! blocks), phase (byte, as in blocks), usual index (zigzag varint), `k` (byte).
 
 use crate::arithmetic::{Coder, Reader, Writer};
@@ -17,7 +18,7 @@ use crate::counts::gamma;
 use crate::error::Damaged;
 use crate::grid::{DECIMALS, Grid};
 use crate::head::{CIRCLE, LINE};
-use crate::indices::code_rest;
+use crate::indices::{RESTS_ROWS, Rest, code_rest};
 use crate::rows::{LARGEST, Others};
 use crate::{Accuracy, BlockCodec, Effort, Error, check_rows};
 
@@ -36,6 +37,8 @@ const STEPPED: u8 = 16;
 const MOVED: u8 = 32;
 /// Flag beside the grid, together with steps: the samples are rounded to single precision.
 const SINGLE: u8 = 64;
+/// Flag beside the grid: contexts of models have the lengths of rests.
+const RESTS: u8 = 128;
 /// Indices are smaller than `2^47` in zigzag form.
 const MOST_BITS: u8 = 47;
 
@@ -46,6 +49,8 @@ pub struct Start {
     /// First indices are expected about this one, in cells of `2^k`.
     usual: i64,
     k: u8,
+    /// Contexts of models have the lengths of rests.
+    rests: bool,
 }
 
 /// A block made with a [`Start`].
@@ -61,8 +66,10 @@ impl Start {
     /// The bytes that [`BlockCodec::read_start`] reads.
     pub fn to_bytes(&self) -> Vec<u8> {
         let moved = if self.grid.phase() == 0 { 0 } else { MOVED };
+        let rests = if self.rests { RESTS } else { 0 };
         let mut bytes = vec![
             moved
+                | rests
                 | match self.grid {
                     Grid::Decimal { decimals, .. } => decimals,
                     Grid::Stepped { decimals, .. } => decimals | STEPPED,
@@ -114,18 +121,21 @@ impl BlockCodec {
         let usual = indices[indices.len() / 2];
         let sizes: u128 = indices.iter().map(|index| u128::from(zigzag(index - usual))).sum();
         let mean = (sizes / indices.len() as u128) as u64;
+        let rests = samples.len() >= RESTS_ROWS;
         Some(match grid.cells() {
             // On a circle all first indices are equally likely.
             Some(cells) => Start {
                 grid,
                 usual: 0,
                 k: cells.ilog2() as u8,
+                rests,
             },
             // The mean distance is below `2^k`, so the high bits are mostly zero.
             None => Start {
                 grid,
                 usual,
                 k: (u64::BITS - mean.leading_zeros()).min(u32::from(MOST_BITS)) as u8,
+                rests,
             },
         })
     }
@@ -137,7 +147,7 @@ impl BlockCodec {
     pub fn read_start(&self, bytes: &mut &[u8]) -> Result<Start, Error> {
         let mut reader = Bytes(bytes);
         let [head] = reader.array()?;
-        let kind = head & !(MOVED | SINGLE);
+        let kind = head & !(MOVED | SINGLE | RESTS);
         let is_single = head & SINGLE != 0;
         let mut grid = match (kind & !STEPPED, self.accuracy) {
             (0..DECIMALS, _) if !is_single || kind & STEPPED != 0 => {
@@ -158,7 +168,8 @@ impl BlockCodec {
             return Err(Damaged::new("usual index", usual, "at most 2^46 in size").into());
         }
         *bytes = reader.0;
-        Ok(Start { grid, usual, k })
+        let rests = head & RESTS != 0;
+        Ok(Start { grid, usual, k, rests })
     }
 
     /// As [`encode_with`](Self::encode_with), for a reader that has the start of a codec of the same accuracy.
@@ -242,7 +253,7 @@ impl BlockCodec {
     ) -> Result<Vec<i64>, Damaged> {
         let by_models = coder.bit(BY_MODELS, self.effort == Effort::Thorough);
         let first = start.first_index(coder, wanted.and_then(|wanted| wanted.first().copied()))?;
-        code_rest(coder, by_models, start.grid.cells(), first, wanted, rows, others)
+        code_rest(coder, Rest::new(by_models, start.rests), start.grid.cells(), first, wanted, rows, others)
     }
 
     fn started(&self, start: &Start, indices: &[i64], others: Option<&Others<'_>>) -> Result<StartedBlock, Damaged> {

@@ -146,6 +146,23 @@ impl Table {
         Ok(self)
     }
 
+    /// The name of the column of times; `time` if several give it, it is also one of the columns of values, or the table has no names.
+    pub(crate) fn time_name(&self) -> String {
+        let columns = self.table.columns();
+        let name = match self.table.time() {
+            Some(([only], _)) => {
+                let made_up = format!("column_{}", only + 1);
+                columns
+                    .get(*only)
+                    .map(|column| column.name.clone())
+                    .filter(|name| *name != made_up)
+            }
+            _ => None,
+        };
+        name.filter(|name| !self.names.contains(name))
+            .unwrap_or_else(|| "time".to_owned())
+    }
+
     /// The name in the last row read.
     pub(crate) fn label(&self) -> &str {
         self.table.label()

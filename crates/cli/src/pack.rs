@@ -77,7 +77,9 @@ pub(crate) fn schema(table: &TableOptions, options: &BoundOptions) -> Result<(Ta
         .collect();
     let columns = columns?;
     let time = open.time_base(table, survey.as_ref())?;
-    let schema = Schema::new(columns, time).and_then(|schema| schema.with_rows_per_block(options.rows_per_block));
+    let schema = Schema::new(columns, time)
+        .and_then(|schema| schema.with_rows_per_block(options.rows_per_block))
+        .and_then(|schema| schema.with_time_name(open.time_name()));
     let schema = schema.map_err(Error::recording(open.file()))?;
     open.use_words(&schema.columns().iter().collect::<Vec<_>>())?;
     if let Some(survey) = survey.filter(|_| needs_range) {

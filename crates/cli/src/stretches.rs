@@ -74,14 +74,14 @@ fn columns(options: &CatOptions, schema: &Schema, names: Vec<String>) -> Result<
 pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
     let mut ending = Ending::Good;
     let mut found: BTreeMap<i64, Stretch> = BTreeMap::new();
-    let mut head: Option<(TimeBase, u64, Vec<String>)> = None;
+    let mut head: Option<(TimeBase, u64, Vec<String>, String)> = None;
     for file in &options.files {
         let mut playback = recording::open(Path::new(file))?;
         let schema = playback.schema().clone();
         let selection = selection(options, &schema, file)?;
         let names = match &head {
             None => columns(options, &schema, selection.names)?,
-            Some((_, _, names)) => names.clone(),
+            Some((_, _, names, _)) => names.clone(),
         };
         let every = length(every, schema.time())?;
         let unit = |time: TimeBase| match time {
@@ -93,7 +93,7 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
                 return Err(Error::content(file, format!("has other times than {}", options.files[0])));
             }
             Some(_) => {}
-            None => head = Some((schema.time(), every, names.clone())),
+            None => head = Some((schema.time(), every, names.clone(), schema.time_name().to_owned())),
         }
         let wanted: Vec<&str> = names.iter().map(String::as_str).collect();
         playback.columns(&wanted).map_err(Error::recording(file))?;
@@ -120,7 +120,7 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
             }
         }
     }
-    let Some((time, _, names)) = head else {
+    let Some((time, _, names, time_name)) = head else {
         return Ok(ending);
     };
     if options.output.as_deref().is_some_and(is_parquet) {
@@ -134,7 +134,11 @@ pub(crate) fn run(options: &CatOptions, every: &str) -> Result<Ending, Error> {
         .filter(|(kind, asked)| *asked || (none && kind.name == "mean"))
         .map(|(kind, _)| kind)
         .collect();
-    let first = if time == TimeBase::Numbered { "row" } else { "time" };
+    let first = if time == TimeBase::Numbered {
+        "row"
+    } else {
+        time_name.as_str()
+    };
     let of_column = |name: &String| {
         kinds
             .iter()

@@ -125,7 +125,7 @@ impl Cells {
         let unit = |name: &String| schema.position(name).ok().map(|i| schema.columns()[i].unit());
         let first = match schema.time() {
             TimeBase::Numbered => is_numbered.then_some("row"),
-            _ => Some("time"),
+            _ => Some(schema.time_name()),
         };
         Self {
             time: schema.time(),

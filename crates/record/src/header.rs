@@ -6,7 +6,7 @@ use crate::header_column::{push_column, shortened};
 use crate::schema::{Schema, TimeBase, TimeFormat, default_rows};
 use crate::time::Grid;
 pub(crate) use crate::wire::VERSION_5;
-use crate::wire::{checksum, push_varint, zigzag};
+use crate::wire::{checksum, push_text, push_varint, zigzag};
 use fewbits_block_codec::Start;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -227,7 +227,10 @@ impl Header {
         let is_old = self.version == VERSION_5;
         let flag = |given: bool, flag: u8| if given && !is_old { flag } else { 0 };
         let count = self.schema.columns.len();
-        let flags = flag(self.form == Form::Stream, STREAM) | flag(self.origin != 0, ORIGIN) | flag(count > 1, COLUMNS);
+        let flags = flag(self.form == Form::Stream, STREAM)
+            | flag(self.origin != 0, ORIGIN)
+            | flag(count > 1, COLUMNS)
+            | flag(!self.schema.time_name.is_empty(), NAMED);
         match self.schema.time {
             TimeBase::Numbered => body.push(flags),
             TimeBase::Clock {
@@ -242,6 +245,9 @@ impl Header {
                 });
                 body.push(decimals);
                 push_varint(&mut body, tolerance);
+                if flags & NAMED != 0 {
+                    push_text(&mut body, &self.schema.time_name);
+                }
             }
         }
         if is_old || self.origin != 0 {
@@ -274,6 +280,8 @@ impl Header {
 pub(crate) const STREAM: u8 = 0x10;
 pub(crate) const ORIGIN: u8 = 0x20;
 pub(crate) const COLUMNS: u8 = 0x40;
+/// Flag beside the time base: the name of the times follows (else `time`).
+pub(crate) const NAMED: u8 = 0x80;
 /// Flag beside the version: the only block follows.
 pub(crate) const SINGLE: u8 = 0x80;
 

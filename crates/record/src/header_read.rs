@@ -2,11 +2,12 @@
 
 use crate::error::{Damage, Error};
 use crate::header::{
-    COLUMNS, Form, Header, IDENTITY_BYTES, MAGIC, MAGIC_5, MAX_HEADER, ORIGIN, SINGLE, STREAM, VERSION, VERSION_5,
+    COLUMNS, Form, Header, IDENTITY_BYTES, MAGIC, MAGIC_5, MAX_HEADER, NAMED, ORIGIN, SINGLE, STREAM, VERSION,
+    VERSION_5,
 };
 use crate::header_column::read_column;
-use crate::schema::{Schema, TimeBase, TimeFormat, default_rows};
-use crate::wire::{Bytes, CHECK_BYTES, checksum};
+use crate::schema::{Schema, TIME_NAME, TimeBase, TimeFormat, default_rows};
+use crate::wire::{Bytes, CHECK_BYTES, checksum, text};
 use fewbits_block_codec::bytes::Unread;
 use std::ops::Range;
 
@@ -117,7 +118,7 @@ impl Header {
             Form::Stream
         };
         let is_old = length == Length::Version5;
-        let flags = if is_old { 0 } else { STREAM | ORIGIN | COLUMNS };
+        let flags = if is_old { 0 } else { STREAM | ORIGIN | COLUMNS | NAMED };
         let follows = |flag: u8| is_old || kind & flag != 0;
         let format = match kind & !flags {
             0 => None,
@@ -132,6 +133,16 @@ impl Header {
                 decimals: body.byte().map_err(Error::header)?,
                 tolerance: body.varint().map_err(Error::header)?,
                 format,
+            },
+        };
+        let is_named = !is_old && kind & NAMED != 0;
+        let time_name = match (is_named, time) {
+            (false, _) => "",
+            (true, TimeBase::Numbered) => return Err(Error::Header(Damage::Content("name of the times"))),
+            (true, _) => match text(body).map_err(Error::header)? {
+                // What a writer leaves out.
+                "" | TIME_NAME => return Err(Error::Header(Damage::Content("name of the times"))),
+                name => name,
             },
         };
         let origin = if follows(ORIGIN) {
@@ -156,7 +167,9 @@ impl Header {
             starts.push(start);
         }
         let rows_per_block = rows_per_block.unwrap_or(default_rows(columns.len()));
-        let schema = Schema::new(columns, time)?.with_exact_rows(rows_per_block)?;
+        let schema = Schema::new(columns, time)?
+            .with_exact_rows(rows_per_block)?
+            .with_time_name(time_name)?;
         if length == Length::Single && !(1..=rows_per_block).contains(&rows) {
             return Err(Error::Header(Damage::Content("number of rows")));
         }

@@ -141,7 +141,8 @@ impl<R: Read + Seek> Playback<R> {
             return Ok(None);
         }
         let columns = new.into_iter().map(|(column, _)| column).collect();
-        Ok(Some(Schema::new(columns, schema.time)?.with_restored_ticks()))
+        let wider = Schema::new(columns, schema.time)?.with_time_name(schema.time_name())?;
+        Ok(Some(wider.with_restored_ticks()))
     }
 
     /// Writes all rows as a new recording with the schema of [`widened`](Self::widened), and returns the sink. Only a whole recording is

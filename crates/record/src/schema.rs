@@ -240,7 +240,12 @@ pub struct Schema {
     pub(crate) rows_per_block: usize,
     /// Whether a writer moves no tick, although there is a tolerance.
     pub(crate) keeps_ticks: bool,
+    /// Name of the times; empty if it is the usual one.
+    pub(crate) time_name: String,
 }
+
+/// Name of the times of a recording that states none.
+pub(crate) const TIME_NAME: &str = "time";
 
 /// Default number of rows per block, for tables of few columns: a damaged block loses its rows, and larger ones save hardly a bit.
 pub const ROWS_PER_BLOCK: usize = 1 << 16;
@@ -288,7 +293,29 @@ impl Schema {
             time,
             rows_per_block,
             keeps_ticks: false,
+            time_name: String::new(),
         })
+    }
+
+    /// Sets the name of the times, for outputs as tables; it is `time` if none is set. No effect on numbered rows.
+    ///
+    /// # Errors
+    /// If it is longer than 1024 bytes.
+    pub fn with_time_name(self, name: impl Into<String>) -> Result<Self, Error> {
+        let mut time_name = text("name", name.into())?;
+        if time_name == TIME_NAME || self.time == TimeBase::Numbered {
+            time_name.clear();
+        }
+        Ok(Self { time_name, ..self })
+    }
+
+    /// The name of the times.
+    pub fn time_name(&self) -> &str {
+        if self.time_name.is_empty() {
+            TIME_NAME
+        } else {
+            &self.time_name
+        }
     }
 
     /// Declares that ticks were restored from a recording with this tolerance: a recorder returns them exactly, so that the stated

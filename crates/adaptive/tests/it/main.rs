@@ -7,12 +7,10 @@ mod allocation;
 mod bank;
 #[path = "../../../block-codec/tests/it/common.rs"]
 mod common;
-mod cosets;
 mod damage;
 mod guarantee;
 mod loss;
 mod recording;
 mod replicas;
-mod scheme;
 mod tuning;
 mod wild;

@@ -39,7 +39,7 @@ fn times_come_back_as_the_times_they_are() {
         ("1700000000.123456", "1700000000.123456"),
         ("9:42", "34920"),
     ] {
-        assert_eq!(round_trip(&format!("when,x\n{cell},1.5\n"), &["--time", "exact"]), format!("time,x\n{back},1.5\n"));
+        assert_eq!(round_trip(&format!("when,x\n{cell},1.5\n"), &["--time", "exact"]), format!("when,x\n{back},1.5\n"));
     }
     // A tolerance is one of the times, not of their milliseconds.
     let rows: String = (0..50)

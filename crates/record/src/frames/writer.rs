@@ -42,6 +42,8 @@ impl FrameWriter {
     pub fn new(mut schema: Schema, max_bytes: usize) -> Result<Self, Error> {
         let columns = schema.columns.len();
         schema.rows_per_block = schema.rows_per_block.min(max_rows(columns)).min(MAX_ROWS);
+        // Receivers that print name the times as they like.
+        schema.time_name.clear();
         // Origin and step of rows take at most 18 bytes more than those of no rows.
         let header = Header::new(schema.clone(), &[], vec![0.0; columns]).to_bytes().len() + 32 + MAX_START * columns;
         let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);

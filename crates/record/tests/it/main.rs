@@ -6,6 +6,7 @@ mod aggregates;
 mod appending;
 #[cfg(feature = "arrow")]
 mod arrow;
+mod attacks;
 mod bounds;
 mod common;
 mod damage;

@@ -1,7 +1,8 @@
 //! Ticks: on a grid, uneven and exact, within a tolerance, at the ends of what a tick can be.
 
 use crate::common::{Numbers, read};
-use fewbits_record::{Bound, Column, Recorder, Schema, TimeBase, TimeFormat};
+use fewbits_record::{Bound, Column, Playback, Recorder, Schema, TimeBase, TimeFormat};
+use std::io::Cursor;
 
 fn restored(ticks: &[i64], tolerance: u64) -> (usize, Vec<i64>) {
     let time = TimeBase::Clock {
@@ -70,4 +71,42 @@ fn small_tolerance_costs_no_more_than_exact_times() {
         assert!(bytes <= exact + 8, "{tolerance}: {bytes} bytes, exact {exact}");
         assert_eq!(restored, seconds);
     }
+}
+
+/// Times keep their own name, in a recording of one block and of several; frames do not carry it.
+#[test]
+fn times_keep_their_name() {
+    let time = TimeBase::Clock {
+        decimals: 0,
+        tolerance: 0,
+        format: TimeFormat::Utc,
+    };
+    let column = Column::new("x", Bound::Absolute(0.1)).unwrap();
+    let schema = Schema::new(vec![column], time).unwrap();
+    assert_eq!(schema.time_name(), "time");
+    let written = |schema: &Schema| {
+        let mut recorder = Recorder::new(Vec::new(), schema.clone()).with_identity(7);
+        (0..100).for_each(|i| recorder.push(60 * i, &[Some(i as f64)]).unwrap());
+        recorder.finish().unwrap()
+    };
+    for rows in [1 << 16, 16] {
+        let schema = schema.clone().with_rows_per_block(rows).unwrap();
+        let named = schema.clone().with_time_name("Datum").unwrap();
+        let bytes = written(&named);
+        let mut playback = Playback::new(Cursor::new(&bytes)).unwrap();
+        assert_eq!((playback.schema(), playback.schema().time_name()), (&named, "Datum"));
+        assert_eq!(playback.rows().filter(Result::is_ok).count(), 100);
+        let wider = Playback::new(Cursor::new(&bytes))
+            .unwrap()
+            .widened(&[Some(Bound::Absolute(1.0))])
+            .unwrap();
+        assert_eq!(wider.unwrap().time_name(), "Datum");
+        // The usual name is not stored.
+        let usual = schema.clone().with_time_name("time").unwrap();
+        assert_eq!(written(&usual), written(&schema));
+        assert_eq!(bytes.len(), written(&schema).len() + "Datum".len() + 1);
+    }
+    assert!(schema.clone().with_time_name("n".repeat(1025)).is_err());
+    let rows = Schema::new(vec![Column::new("x", Bound::Lossless).unwrap()], TimeBase::Numbered).unwrap();
+    assert_eq!(rows.with_time_name("Datum").unwrap().time_name(), "time");
 }
