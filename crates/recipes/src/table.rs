@@ -1,6 +1,6 @@
 //! A table as rows of a recording: ticks, cells as doubles, units. What no double holds is refused with the cell's place.
 
-use crate::error::{Error, Failure};
+use crate::error::Failure;
 use crate::source::{Batch, Source};
 use crate::{times, words};
 use fewbits_record::TimeBase;
