@@ -46,6 +46,9 @@ impl Selection {
     }
 }
 
+/// Takes the tick and the cells of a row.
+pub type Row<'a> = dyn FnMut(i64, &[Option<f64>]) -> Result<(), Failure> + 'a;
+
 /// Gives the selected rows of blocks to `row`: tick and cells. A damaged block goes to `damaged`, and the blocks behind it are read.
 /// Returns the number of rows.
 ///
@@ -54,7 +57,7 @@ impl Selection {
 pub fn rows(
     blocks: impl Iterator<Item = Result<Block, fewbits_record::Error>>,
     selection: &Selection,
-    row: &mut dyn FnMut(i64, &[Option<f64>]) -> Result<(), Failure>,
+    row: &mut Row<'_>,
     damaged: &mut dyn FnMut(&fewbits_record::Error),
     watch: &mut Watch<'_>,
 ) -> Result<u64, Error> {
