@@ -168,7 +168,7 @@ fn true_value(truth: &LevelModel, quantity: Quantity) -> f64 {
         Quantity::Slope(sensor) => truth.sensors[sensor].slope,
         Quantity::Walk(sensor) => truth.sensors[sensor].walk,
         Quantity::Delay(sensor) => truth.sensors[sensor].delay,
-        other => panic!("{other:?}"),
+        other => unreachable!("{other:?}"),
     }
 }
 
