@@ -22,9 +22,9 @@ const DO_NOT_VARY: &str = "the first rows do not vary, so it cannot be found fro
 /// A sensor is taken to round if its noise with rounding is at most this many steps; its own noise is then at least this many.
 const COARSE: f64 = 0.75;
 const LEAST_OWN: f64 = 0.05;
-/// Values from which a step of rounding is found, at least, and different ones among them.
+/// Values from which a step of rounding is found, at least, and changes from one to the next among them.
 const FEWEST_OF_STEP: usize = 50;
-const FEWEST_DIFFERENT: usize = 4;
+const FEWEST_CHANGES: usize = 4;
 /// A model with a slope is suggested if it explains the first rows better by so many nats.
 const SLOPING: f64 = 20.0;
 
@@ -60,22 +60,16 @@ pub(super) fn values(first: &[Instant], offsets: &[f64]) -> Vec<calibration::Ins
     first.iter().map(of).collect()
 }
 
-/// The step to which values are rounded, if there is one. Few different values may all be multiples of a larger step by chance: theirs is at
-/// most that of their decimals.
+/// The step to which values are rounded, if there is one. Values that hardly ever change may all be multiples of a larger step by chance:
+/// theirs is at most that of their decimals.
 fn rounding(values: &[f64]) -> Option<f64> {
     let step = fewbits_adaptive::own_steps(values).into_iter().reduce(f64::min)?;
-    let mut different: Vec<f64> = Vec::new();
-    for value in values {
-        if !different.contains(value) {
-            different.push(*value);
-        }
-        if different.len() >= FEWEST_DIFFERENT {
-            return Some(step);
-        }
+    if values.windows(2).filter(|pair| pair[0] != pair[1]).count() >= FEWEST_CHANGES {
+        return Some(step);
     }
     let decimals = (0..=9).map(|decimals| 0.1_f64.powi(decimals)).find(|unit| {
         let off = |value: &f64| (value / unit - (value / unit).round()).abs();
-        different.iter().all(|value| off(value) < 1e-6)
+        values.iter().all(|value| off(value) < 1e-6)
     });
     Some(decimals.map_or(step, |unit| unit.min(step)))
 }

@@ -25,6 +25,7 @@ mod tables;
 mod track;
 mod track_faults;
 mod track_meanings;
+mod track_random;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

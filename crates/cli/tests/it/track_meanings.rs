@@ -176,10 +176,9 @@ fn summary(table: &str, options: &[&str]) -> String {
     text(&crate::fewbits(folder.path(), &words, table.as_bytes()).stderr)
 }
 
-/// A thermometer that sends on change: with the width said, noise and change are found from silence too; without it the summary says so.
-#[test]
-fn values_that_come_on_change() {
-    let mut numbers = Numbers(5);
+/// A thermometer that sends on change.
+fn on_change(seed: u64) -> (String, Vec<f64>) {
+    let mut numbers = Numbers(seed);
     let truth = walk(&mut numbers, 2000, 20.0, 0.05);
     let (mut table, mut last) = ("time,temp\n".to_owned(), None);
     for (row, level) in truth.iter().enumerate() {
@@ -192,8 +191,23 @@ fn values_that_come_on_change() {
             table += &format!("{},\n", 60 * row);
         }
     }
-    let (error, held) = against(&table, &truth, &["--silent-within", "0.5"]);
-    assert!(error < 0.3 && held > 0.85, "{error} {held}");
+    (table, truth)
+}
+
+/// With the width said, noise and change are found from silence too; without it the summary says so. A Gaussian belief within a cell of ten
+/// deviations is an approximation: its bands of 95 % hold less.
+#[test]
+fn values_that_come_on_change() {
+    let (mut errors, mut shares) = (0.0, 0.0);
+    for seed in 5..11 {
+        let (table, truth) = on_change(seed);
+        let (error, held) = against(&table, &truth, &["--silent-within", "0.5"]);
+        println!("{seed}: {error} {held}");
+        errors += error / 6.0;
+        shares += held / 6.0;
+    }
+    assert!(errors < 0.23 && shares > 0.8, "{errors} {shares}");
+    let (table, _) = on_change(5);
     assert!(summary(&table, &[]).contains("--silent-within 0.5"));
     assert!(!summary(&table, &["--silent-within", "0.5"]).contains("if it sends on change"));
 }

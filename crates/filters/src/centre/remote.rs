@@ -218,9 +218,7 @@ where
 
     fn test_of(&self, slot: &Slot, predicted: &Gaussian<D>) -> Option<ReportTest> {
         let usual = RemoteSensor::value_variance(self, predicted)?;
-        let own = self
-            .tests
-            .and_then(|tests| slot.observation.received().and_then(|bits| tests(bits)));
+        let own = self.tests.and_then(|tests| slot.observation.received().and_then(tests));
         Some(match own {
             None => ReportTest::Value(usual),
             Some(ReportTest::Value(noise)) => {

@@ -80,7 +80,7 @@ pub(super) fn correlations(instants: &[Instant], model: &LevelModel, reference: 
         } else {
             0.0
         };
-        (seconds >= before.0).then(|| before.1 + share * (after.1 - before.1))
+        (seconds >= before.0).then_some(before.1 + share * (after.1 - before.1))
     };
     let count = model.sensors.len();
     let off = |instant: &Instant| -> Vec<Option<f64>> {

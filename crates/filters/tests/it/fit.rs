@@ -168,7 +168,7 @@ fn true_value(truth: &LevelModel, quantity: Quantity) -> f64 {
         Quantity::Slope(sensor) => truth.sensors[sensor].slope,
         Quantity::Walk(sensor) => truth.sensors[sensor].walk,
         Quantity::Delay(sensor) => truth.sensors[sensor].delay,
-        other => panic!("{other:?}"),
+        other => unreachable!("{other:?}"),
     }
 }
 
@@ -214,13 +214,18 @@ fn parameters_are_found_within_their_errors() {
     }
 }
 
-/// The measurement in full: a hundred worlds of each kind.
+/// The measurement in full: a hundred worlds of each kind. The parameters that are likeliest for some rows lose, on as many new ones, half a nat for
+/// each parameter on average, with a variance of three halves for each: six parameters lose more than one in a hundred of the likelihood of
+/// these rows in seven worlds of a hundred. Twelve are two standard errors more.
 #[test]
 #[ignore = "a minute"]
 fn held_out_readings_are_as_likely_as_under_the_truth() {
-    for (name, truth, bits, request) in kinds() {
-        let (poor, within, all) = measure(name, &truth, &bits, &request, 100);
-        assert!(poor <= 5, "{name}: {poor}");
+    let measured: Vec<_> = kinds()
+        .into_iter()
+        .map(|(name, truth, bits, request)| (name, measure(name, &truth, &bits, &request, 100)))
+        .collect();
+    for (name, (poor, within, all)) in measured {
+        assert!(poor <= 12, "{name}: {poor}");
         assert!(within as f64 > 0.93 * all as f64, "{name}: {within} of {all}");
     }
 }
