@@ -192,7 +192,7 @@ pub(crate) struct ReceiveOptions {
     pub(crate) baud: u32,
     /// Messages of other programs instead of frames: readings as rows `time,name,value,unit`.
     #[arg(long, value_enum, conflicts_with_all = ["udp", "serial"])]
-    pub(crate) format: Option<crate::link::messages::Format>,
+    pub(crate) format: Option<crate::link::format::Format>,
     /// With `--format`: read the messages on this topic of a broker, as `mqtt://user:password@host/application/+/device/+/event/up`.
     #[arg(long, value_name = "MQTT", requires = "format", conflicts_with = "file")]
     pub(crate) mqtt: Option<String>,

@@ -72,6 +72,21 @@ impl<'a> Place<'a> {
     }
 }
 
+/// Broker and name of the fleet of Home Assistant in `mqtt://[user:password@]host[:port]/fleet`.
+pub(crate) fn home_assistant(text: &str) -> Result<(&str, &str), String> {
+    let parts = text.strip_prefix("mqtt://").and_then(|rest| rest.split_once('/'));
+    match parts.filter(|(broker, fleet)| !(broker.is_empty() || fleet.is_empty())) {
+        Some(_) if cfg!(not(feature = "mqtt")) => Err(format!("home_assistant: {NO_MQTT}")),
+        Some(parts) => Ok(parts),
+        None => {
+            let expected = "mqtt://[user:password@]host[:port]/fleet";
+            Err(format!("home_assistant is {}: expected {expected}", shown(text)))
+        }
+    }
+}
+
+pub(crate) const NO_MQTT: &str = "this program was built without MQTT: build it with `--features mqtt`";
+
 /// The text without user and password, for messages: what stands before the last `@` is left out.
 pub(crate) fn shown(text: &str) -> String {
     let (kind, rest) = text.split_once("://").map_or(("", text), |(kind, rest)| (kind, rest));

@@ -197,7 +197,7 @@ impl Configuration {
             check_prior(model.coordinates(), prior, faults);
         }
         let home_assistant = faults.take::<String>(&mut table, "home_assistant");
-        if let Some(Err(fault)) = home_assistant.as_deref().map(super::home::parts) {
+        if let Some(Err(fault)) = home_assistant.as_deref().map(crate::place::home_assistant) {
             faults.add(fault);
         }
         let coordinates = faults

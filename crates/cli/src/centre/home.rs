@@ -5,21 +5,6 @@ use crate::error::Error;
 use fewbits_link::Step;
 use fewbits_link::doors::home_assistant::Fleet;
 
-/// Broker and name of the fleet in `mqtt://[user:password@]host[:port]/fleet`.
-pub(super) fn parts(text: &str) -> Result<(&str, &str), String> {
-    let parts = text.strip_prefix("mqtt://").and_then(|rest| rest.split_once('/'));
-    match parts.filter(|(broker, fleet)| !(broker.is_empty() || fleet.is_empty())) {
-        Some(_) if cfg!(not(feature = "mqtt")) => Err(NOT_BUILT.to_owned()),
-        Some(parts) => Ok(parts),
-        None => {
-            let expected = "mqtt://[user:password@]host[:port]/fleet";
-            Err(format!("home_assistant is {}: expected {expected}", crate::place::shown(text)))
-        }
-    }
-}
-
-const NOT_BUILT: &str = "home_assistant: this program was built without MQTT: build it with `--features mqtt`";
-
 #[cfg(feature = "mqtt")]
 type Broker = fewbits_link::mqtt::Messages;
 
@@ -42,7 +27,7 @@ impl Broker {
 
 #[cfg(not(feature = "mqtt"))]
 fn connect(_: &str) -> Result<Broker, Error> {
-    Err(Error::content("home_assistant", NOT_BUILT))
+    Err(Error::content("home_assistant", crate::place::NO_MQTT))
 }
 
 /// A fleet at the broker of Home Assistant.
@@ -57,7 +42,8 @@ impl Home {
         let Some(text) = &given.home_assistant else {
             return Ok(None);
         };
-        let (broker, fleet) = parts(text).map_err(|error| Error::content("home_assistant", error))?;
+        let (broker, fleet) =
+            crate::place::home_assistant(text).map_err(|error| Error::content("home_assistant", error))?;
         let named = |i: usize| match given.coordinates.get(i) {
             Some(coordinate) => (coordinate.name.clone(), coordinate.unit.clone()),
             None => (format!("estimate {i}"), String::new()),

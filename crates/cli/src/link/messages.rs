@@ -1,6 +1,7 @@
 //! `fewbits receive --format`: readings in the messages of other programs, as rows `time,name,value,unit`, which `fewbits track --by name`
 //! reads.
 
+use super::format::Format;
 use crate::Ending;
 use crate::arguments::ReceiveOptions;
 use crate::error::Error;
@@ -13,17 +14,6 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Longest message that is read, in bytes.
 const MAX_MESSAGE: u64 = 1 << 24;
-
-/// Format of messages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Format {
-    /// Uplinks of ChirpStack or The Things Stack as JSON, one per line, with payloads in Cayenne LPP; with `--sensor` payloads are frames.
-    Lorawan,
-    /// Lists of SenML (RFC 8428) in JSON, one per line.
-    Senml,
-    /// One list of SenML in CBOR.
-    SenmlCbor,
-}
 
 /// Messages, one after the other.
 type Source = Box<dyn FnMut() -> std::io::Result<Option<Vec<u8>>>>;
@@ -100,7 +90,7 @@ fn source(options: &ReceiveOptions, format: Format) -> Result<(Source, String), 
     #[cfg(not(feature = "mqtt"))]
     if let Some(place) = &options.mqtt {
         let shown = crate::place::shown(place);
-        return Err(Error::content(&shown, "this program was built without MQTT: build it with `--features mqtt`"));
+        return Err(Error::content(&shown, crate::place::NO_MQTT));
     }
     let (stream, name) = recording::stream(&options.file)?;
     let name = name.to_owned();

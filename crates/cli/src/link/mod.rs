@@ -1,5 +1,6 @@
 //! Frames of links to rows.
 
-pub(crate) mod messages;
+pub(crate) mod format;
+mod messages;
 pub(crate) mod receive;
 mod tables;

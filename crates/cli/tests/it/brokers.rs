@@ -1,23 +1,14 @@
 //! Messages of other programs at a stock broker (mosquitto). Says so and passes where it is missing.
 
 use crate::fleet::{free_place, key, measuring, written};
-use crate::{start, text};
+use crate::{Running, start, text};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// A broker at this place; `None` if there is none on this machine.
-fn broker(folder: &Path, place: &str) -> Option<Ended> {
+fn broker(folder: &Path, place: &str) -> Option<Running> {
     let (_, port) = place.rsplit_once(':').unwrap();
     let path = format!("{}:/usr/sbin:/usr/local/sbin", std::env::var("PATH").unwrap_or_default());
     std::fs::write(folder.join("broker.conf"), format!("listener {port} 127.0.0.1\nallow_anonymous true\n")).unwrap();
@@ -30,7 +21,7 @@ fn broker(folder: &Path, place: &str) -> Option<Ended> {
         println!("skipped: mosquitto is not installed");
         return None;
     };
-    let child = Ended(child);
+    let child = Running::new(child);
     while std::net::TcpStream::connect(place).is_err() {
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -103,8 +94,8 @@ fn home_assistant_discovers_estimate_band_and_sensors() {
         "home_assistant = \"mqtt://{place}/plant\"\ncoordinates = [{{ name = \"level\", unit = \"m\" }}]\n[[sensor]]\nnumber = 1"
     );
     std::fs::write(&path, content.replacen("[[sensor]]\nnumber = 1", &lines, 1)).unwrap();
-    let centre = Ended(start(folder.path(), &["centre", "centre.toml"]));
-    let _sensors = measuring(folder.path()).map(Ended);
+    let centre = Running::new(start(folder.path(), &["centre", "centre.toml"]));
+    let _sensors = measuring(folder.path());
     // The discovery is kept by the broker for those who come later.
     let mut seen = published(&place, "homeassistant/#");
     let configs: Vec<_> = (0..3).map(|_| seen.next().unwrap()).collect();
@@ -132,7 +123,8 @@ fn uplinks_are_read_at_the_broker() {
         return;
     };
     let from = format!("mqtt://{place}/application/+/device/+/event/up");
-    let mut receiver = start(folder.path(), &["receive", "--format", "lorawan", "--mqtt", &from, "--timeout", "20s"]);
+    let mut receiver =
+        Running::new(start(folder.path(), &["receive", "--format", "lorawan", "--mqtt", &from, "--timeout", "20s"]));
     let mut said = BufReader::new(receiver.stderr.take().unwrap()).lines();
     assert!(said.next().unwrap().unwrap().contains("listening at mqtt://"));
     let content = "{\"time\":\"2026-03-01T12:00:00Z\",\"deviceInfo\":{\"devEui\":\"0101010101010101\"},\"fPort\":2,\"data\":\"A2cBEAVnAP8=\"}";
@@ -140,7 +132,6 @@ fn uplinks_are_read_at_the_broker() {
     let mut rows = BufReader::new(receiver.stdout.take().unwrap()).lines();
     let row = rows.nth(1).unwrap().unwrap();
     assert_eq!(row, "2026-03-01T12:00:00Z,0101010101010101/3/temperature,27.2,°C");
-    drop(Ended(receiver));
 }
 
 #[test]

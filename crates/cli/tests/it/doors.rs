@@ -1,7 +1,7 @@
 //! Messages of other programs in and out of the command, and a centre that is handed over.
 
 use crate::fleet::{free_place, key, measuring, rows, written};
-use crate::{fewbits, good, refused, start, text};
+use crate::{Running, fewbits, good, refused, start, text};
 use std::process::Command;
 
 /// Bytes in base64, by the program of the system: independent of the library's own.
@@ -89,7 +89,7 @@ fn a_centre_is_handed_over_without_losing_a_report() {
             .replace("period = 0.04", "period = 0.6");
         std::fs::write(&path, content).unwrap();
     }
-    let mut centre = start(folder.path(), &["centre", "centre.toml"]);
+    let mut centre = Running::new(start(folder.path(), &["centre", "centre.toml"]));
     let sensors = measuring(folder.path());
     let (mut all, mut first_with_both) = (Vec::new(), None);
     for _ in 0..3 {
@@ -99,8 +99,8 @@ fn a_centre_is_handed_over_without_losing_a_report() {
             .status()
             .unwrap();
         assert!(signal.success());
-        let output = centre.wait_with_output().unwrap();
-        centre = start(folder.path(), &["centre", "centre.toml"]);
+        let output = centre.output();
+        centre = Running::new(start(folder.path(), &["centre", "centre.toml"]));
         let said = text(&output.stderr);
         assert!(output.status.success() && said.contains("stopping after this slot"), "{said}");
         all.extend(rows(text(&output.stdout).lines()));

@@ -1,10 +1,9 @@
 //! A centre and its sensors as processes.
 
-use super::{fewbits, start, text};
+use super::{Running, fewbits, start, text};
 use std::io::{BufRead, BufReader, Write};
 use std::net::UdpSocket;
 use std::path::Path;
-use std::process::Child;
 
 /// Slot, reports, mean.
 pub(crate) type Row = (u64, u32, f64);
@@ -42,9 +41,9 @@ pub(crate) fn written(folder: &Path, place: &str, second: &str) {
 
 /// Runs the centre for some slots while both sensors measure 5 and 5.2 in turn.
 fn run(folder: &Path, slots: &str) -> Vec<Row> {
-    let centre = start(folder, &["centre", "centre.toml", "--slots", slots]);
+    let centre = Running::new(start(folder, &["centre", "centre.toml", "--slots", slots]));
     let sensors = measuring(folder);
-    let output = centre.wait_with_output().unwrap();
+    let output = centre.output();
     ended(sensors);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     rows(String::from_utf8(output.stdout).unwrap().lines())
@@ -52,7 +51,7 @@ fn run(folder: &Path, slots: &str) -> Vec<Row> {
 
 /// The same until the rows so far are enough, however many slots that takes on a busy machine: half a minute at most.
 fn run_until(folder: &Path, is_enough: impl Fn(&[Row]) -> bool) -> Vec<Row> {
-    let mut centre = start(folder, &["centre", "centre.toml", "--slots", "750"]);
+    let mut centre = Running::new(start(folder, &["centre", "centre.toml", "--slots", "750"]));
     let sensors = measuring(folder);
     let mut lines = Vec::new();
     for line in BufReader::new(centre.stdout.take().unwrap()).lines() {
@@ -67,7 +66,7 @@ fn run_until(folder: &Path, is_enough: impl Fn(&[Row]) -> bool) -> Vec<Row> {
     rows(lines.iter().map(String::as_str))
 }
 
-fn ended(sensors: [Child; 2]) {
+fn ended(sensors: [Running; 2]) {
     for mut sensor in sensors {
         let _ = sensor.kill();
         sensor.wait().unwrap();
@@ -75,13 +74,13 @@ fn ended(sensors: [Child; 2]) {
 }
 
 /// Both sensors at work.
-pub(crate) fn measuring(folder: &Path) -> [Child; 2] {
+pub(crate) fn measuring(folder: &Path) -> [Running; 2] {
     ["sensor1.toml", "sensor2.toml"].map(|file| sensor(folder, file))
 }
 
 /// A sensor at work.
-pub(crate) fn sensor(folder: &Path, file: &str) -> Child {
-    let mut child = start(folder, &["sensor", file]);
+pub(crate) fn sensor(folder: &Path, file: &str) -> Running {
+    let mut child = Running::new(start(folder, &["sensor", file]));
     let samples = "value\n".to_owned() + &"5.0\n5.2\n".repeat(800);
     child.stdin.take().unwrap().write_all(samples.as_bytes()).unwrap();
     child
@@ -294,7 +293,7 @@ fn fleet_begins_with_one_command() {
             .unwrap()
             .replace("192.168.1.5:7070", &place);
         private(&path, &sensor);
-        let mut child = start(folder.path(), &["sensor", file]);
+        let mut child = Running::new(start(folder.path(), &["sensor", file]));
         child
             .stdin
             .take()
@@ -327,7 +326,7 @@ fn fleet_begins_with_one_command() {
 fn second_centre_on_one_state_is_refused_and_nothing_else_is_silent() {
     let folder = tempfile::tempdir().unwrap();
     written(folder.path(), &free_place(), &key('b'));
-    let mut first = start(folder.path(), &["centre", "centre.toml"]);
+    let mut first = Running::new(start(folder.path(), &["centre", "centre.toml"]));
     while !folder.path().join("centre.state").exists() {
         assert!(first.try_wait().unwrap().is_none());
         std::thread::sleep(std::time::Duration::from_millis(20));
@@ -341,10 +340,10 @@ fn second_centre_on_one_state_is_refused_and_nothing_else_is_silent() {
     let said = text(&alone.stderr);
     assert!(alone.status.code() == Some(1) && said.contains("no report in the first 10 slots"), "{said}");
     // A sensor whose centre does not run says so.
-    let mut sensor = start(folder.path(), &["sensor", "sensor1.toml"]);
+    let mut sensor = Running::new(start(folder.path(), &["sensor", "sensor1.toml"]));
     sensor.stdin.take().unwrap().write_all(&b"1\n".repeat(10)).unwrap();
     std::thread::sleep(std::time::Duration::from_millis(10_500));
     sensor.kill().unwrap();
-    let said = text(&sensor.wait_with_output().unwrap().stderr);
+    let said = text(&sensor.output().stderr);
     assert!(said.contains("no answer from 127.0.0.1:"), "{said}");
 }

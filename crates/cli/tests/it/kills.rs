@@ -3,12 +3,11 @@
 //! `FEWBITS_KILLS` is the number of kills; `.ci/kills` runs them at full number.
 
 use crate::fleet::{Row, free_place, key, measuring, rows, sensor, written};
-use crate::{fewbits, folder, good, start, text};
+use crate::{Running, fewbits, folder, good, start, text};
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader};
 use std::net::{SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
-use std::process::Child;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -120,14 +119,14 @@ impl Eavesdropper {
 /// A centre and the rows that all its lives have written.
 struct Centre {
     folder: PathBuf,
-    child: Child,
+    child: Running,
     lives: Arc<Mutex<Vec<Vec<String>>>>,
     readers: Vec<std::thread::JoinHandle<()>>,
 }
 
 impl Centre {
     fn new(folder: &Path) -> Self {
-        let child = start(folder, &["centre", "centre.toml"]);
+        let child = Running::new(start(folder, &["centre", "centre.toml"]));
         let mut centre = Self {
             folder: folder.to_owned(),
             child,
@@ -158,7 +157,7 @@ impl Centre {
     }
 
     fn again(&mut self) {
-        self.child = start(&self.folder, &["centre", "centre.toml"]);
+        self.child = Running::new(start(&self.folder, &["centre", "centre.toml"]));
         self.read();
     }
 

@@ -44,6 +44,43 @@ fn start(folder: &Path, words: &[&str]) -> Child {
         .unwrap()
 }
 
+/// A process that ends with its test, also with one that fails.
+struct Running(Option<Child>);
+
+impl Running {
+    fn new(child: Child) -> Self {
+        Self(Some(child))
+    }
+
+    /// Waits for the end of the process.
+    fn output(mut self) -> Output {
+        self.0.take().unwrap().wait_with_output().unwrap()
+    }
+}
+
+impl std::ops::Deref for Running {
+    type Target = Child;
+
+    fn deref(&self) -> &Child {
+        self.0.as_ref().unwrap()
+    }
+}
+
+impl std::ops::DerefMut for Running {
+    fn deref_mut(&mut self) -> &mut Child {
+        self.0.as_mut().unwrap()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.0 {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
 /// The first `count` lines that a process writes, which is then ended; those there are if none comes for a minute. However slow the
 /// machine is, the same lines.
 fn first_lines(mut child: Child, count: usize) -> Vec<String> {
