@@ -1,7 +1,7 @@
 //! What is found from the first rows: prior, change, noise of each sensor, steps of rounding.
 
 use super::centre::World;
-use super::hints::steepest;
+use super::first::{steepest, values, values_of};
 use super::meaning::Seat;
 use super::rows::{Instant, Said};
 use super::settings::Settings;
@@ -33,31 +33,6 @@ pub(super) struct Unknown {
     pub(super) change: bool,
     pub(super) noise: bool,
     floor: f64,
-}
-
-/// Finite measurements of one sensor.
-fn values_of(first: &[Instant], sensor: usize) -> Vec<f64> {
-    let all = first.iter().flat_map(|instant| &instant.reports);
-    let own = all.filter(|(other, _)| *other == sensor);
-    own.filter_map(|(_, cell)| cell.filter(|cell| cell.is_finite()))
-        .collect()
-}
-
-/// The first rows as instants of finite values, whatever they mean.
-pub(super) fn values(first: &[Instant], offsets: &[f64]) -> Vec<calibration::Instant> {
-    let offset = |sensor: usize| offsets.get(sensor).copied().unwrap_or(0.0);
-    let of = |instant: &Instant| calibration::Instant {
-        seconds: instant.seconds,
-        values: instant
-            .reports
-            .iter()
-            .filter_map(|(sensor, cell)| {
-                let value = cell.filter(|cell| cell.is_finite())? - offset(*sensor);
-                Some((*sensor, value.into()))
-            })
-            .collect(),
-    };
-    first.iter().map(of).collect()
 }
 
 /// The step to which values are rounded, if there is one. Values that hardly ever change may all be multiples of a larger step by chance:

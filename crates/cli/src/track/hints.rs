@@ -1,9 +1,8 @@
 //! What the first rows of a table suggest that no option says.
 
 use super::rows::Instant;
-use super::settings::Settings;
 use crate::arguments::{Model, TrackOptions};
-use fewbits_filters::calibration::{self, median, wrapped};
+use fewbits_filters::calibration::median;
 
 /// Periods of angles and their like.
 const PERIODS: [f64; 4] = [360.0, std::f64::consts::TAU, 400.0, 24.0];
@@ -14,31 +13,16 @@ const FEWEST: usize = 3;
 const EMPTY: f64 = 0.5;
 /// An offset is told if it is this many of the sensor's deviations.
 const LARGE: f64 = 1.0;
-/// The deviation of an unknown slope in multiples of the slopes between values that are an eighth of the first rows apart.
-const STEEP: f64 = 3.0;
-
-/// A deviation for the slope per second before the first row: what the first rows do over an eighth of their length.
-pub(super) fn steepest(first: &[calibration::Instant], sensors: usize, period: Option<f64>) -> f64 {
-    let of = |sensor: usize| {
-        let own: Vec<(f64, f64)> = first
-            .iter()
-            .flat_map(|instant| instant.values.iter().map(|one| (instant.seconds, one)))
-            .filter(|(_, (other, _))| *other == sensor)
-            .filter_map(|(seconds, (_, reading))| Some((seconds, reading.value()?)))
-            .collect();
-        // Whole turns would be lost over many values.
-        let apart = if period.is_some() { 1 } else { (own.len() / 8).max(1) };
-        own.iter()
-            .zip(own.iter().skip(apart))
-            .filter(|(one, other)| other.0 > one.0)
-            .map(|(one, other)| (wrapped(other.1 - one.1, period) / (other.0 - one.0)).abs())
-            .collect::<Vec<f64>>()
-    };
-    STEEP * median((0..sensors).flat_map(of).collect())
-}
 
 /// Hints, a line each.
-pub(super) fn hints(options: &TrackOptions, first: &[Instant], names: &[String], settings: &Settings) -> Vec<String> {
+/// `noises` and `offsets`: of each sensor. `has_slope`: a slope explains the first rows far better.
+pub(super) fn hints(
+    options: &TrackOptions,
+    first: &[Instant],
+    names: &[String],
+    (noises, offsets): (&[f64], &[f64]),
+    has_slope: bool,
+) -> Vec<String> {
     let mut lines = Vec::new();
     if options.reports {
         return lines;
@@ -62,7 +46,7 @@ pub(super) fn hints(options: &TrackOptions, first: &[Instant], names: &[String],
         let silent = (cells.len() - values.len()) as f64;
         let least = steps.iter().fold(f64::INFINITY, |least, step| least.min(*step));
         let typical = median(steps.clone());
-        if settings.meaning.silent_within.is_none()
+        if options.silent_within.is_none()
             && values.len() >= FEWEST
             && silent > EMPTY * cells.len() as f64
             && least > 0.5 * typical
@@ -75,15 +59,15 @@ pub(super) fn hints(options: &TrackOptions, first: &[Instant], names: &[String],
             ));
         }
     }
-    let large = |(sensor, offset): (usize, &f64)| offset.abs() > LARGE * settings.seat(sensor, &names[sensor]).noise;
-    if names.len() == 2 && settings.offsets.iter().enumerate().any(large) {
-        let apart = (settings.offsets[0] - settings.offsets[1]).abs();
+    let large = |(sensor, offset): (usize, &f64)| offset.abs() > LARGE * noises[sensor];
+    if names.len() == 2 && offsets.iter().enumerate().any(large) {
+        let apart = (offsets[0] - offsets[1]).abs();
         lines.push(format!(
             "the two sensors are {apart:.3} apart, and nothing says which is right: the level is taken to be in the middle, and may be {:.3} off",
             0.5 * apart
         ));
     }
-    if options.model == Model::Walk && settings.has_slope {
+    if options.model == Model::Walk && has_slope {
         lines.push("the first rows have a slope: --model velocity explains them far better".to_owned());
     }
     lines

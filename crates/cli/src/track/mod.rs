@@ -7,6 +7,7 @@
 //! | `centre` | the centre of a level |
 //! | `meaning` | what the cells of a sensor mean |
 //! | `settings` | what options and first rows say |
+//! | `first` | values of the first rows |
 //! | `found` | what is found from the first rows |
 //! | `hints` | what the first rows suggest that no option says |
 //! | `rhythm` | silence in a table of single reports |
@@ -18,6 +19,7 @@
 
 mod applied;
 mod centre;
+mod first;
 mod fit;
 mod found;
 mod hints;

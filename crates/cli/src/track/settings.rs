@@ -1,7 +1,7 @@
 //! Settings of the level and its sensors, from options and first rows.
 
 use super::centre::World;
-use super::found::values;
+use super::first::values;
 use super::hints::hints;
 use super::meaning::{Meaning, Seat};
 use super::rows::{Instant, Instants};
@@ -242,7 +242,14 @@ impl Settings {
         if options.learning.is_none() && has_cells {
             settings.world.is_learning = false;
         }
-        settings.hints = hints(options, &first, &instants.names, &settings);
+        let noises: Vec<f64> = instants
+            .names
+            .iter()
+            .enumerate()
+            .map(|(sensor, name)| settings.seat(sensor, name).noise)
+            .collect();
+        let apart = (noises.as_slice(), settings.offsets.as_slice());
+        settings.hints = hints(options, &first, &instants.names, apart, settings.has_slope);
         Ok(settings)
     }
 

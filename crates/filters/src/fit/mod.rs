@@ -11,11 +11,13 @@
 //! faults are relative to one of the sensors.
 
 mod model;
+mod parameters;
 mod problem;
 mod search;
 mod tests_of_fit;
 
 pub use model::{LevelModel, SensorModel};
+pub use parameters::{Estimate, Quantity, Refusal};
 pub use tests_of_fit::{Correlation, SensorTest};
 
 use crate::Error;
@@ -27,37 +29,6 @@ use serde::{Deserialize, Serialize};
 
 /// Readings of a sensor from which anything is found, at least.
 const FEWEST: usize = 12;
-
-/// A parameter. Sensors are given by index.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Quantity {
-    /// [`LevelModel::change`].
-    Change,
-    /// [`LevelModel::time_constant`].
-    TimeConstant,
-    /// [`LevelModel::mean`].
-    Mean,
-    /// [`SensorModel::noise`].
-    Noise(usize),
-    /// [`SensorModel::bias`]; of a sensor of bits minus its threshold.
-    Bias(usize),
-    /// [`SensorModel::gain`].
-    Gain(usize),
-    /// [`SensorModel::slope`].
-    Slope(usize),
-    /// [`SensorModel::walk`].
-    Walk(usize),
-    /// [`SensorModel::delay`].
-    Delay(usize),
-}
-
-impl Quantity {
-    fn is_positive(self) -> bool {
-        matches!(self, Self::Change | Self::TimeConstant | Self::Noise(_) | Self::Walk(_))
-    }
-}
 
 /// What is looked for, beside change, noises and biases.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -76,26 +47,6 @@ pub struct Request {
     pub time_constant: bool,
     /// Noises that are known, by sensor.
     pub noises: Vec<Option<f64>>,
-}
-
-/// A parameter that was found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Which.
-    pub quantity: Quantity,
-    /// Its value.
-    pub value: f64,
-    /// Its standard error.
-    pub standard_error: f64,
-}
-
-/// A parameter that was not found, and why. It has the value of a sensor without that fault.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Refusal {
-    /// Which.
-    pub quantity: Quantity,
-    /// Why.
-    pub reason: String,
 }
 
 /// What was found.

@@ -1,8 +1,8 @@
 //! The search for the parameters.
 
 use super::model::{LevelModel, Scale};
+use super::parameters::{Estimate, Quantity, Refusal};
 use super::search::{information, maximum};
-use super::{Estimate, Quantity, Refusal};
 use crate::calibration::{Instant, median};
 use nalgebra::{DMatrix, DVector};
 

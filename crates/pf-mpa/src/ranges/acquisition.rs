@@ -13,9 +13,10 @@
 //! is decided by the prior of scale and bias alone, so both are kept while both are probable.
 
 use super::bank::Hypothesis;
+use super::fit::{Calibration, Search};
 use super::gaussian::Normal;
 use super::rows::Collected;
-use super::search::{Calibration, Found, Search};
+use super::search::Found;
 use super::settings::Known;
 
 /// Sets and places that become hypotheses at most, and by how many nats they may be worse than the best.

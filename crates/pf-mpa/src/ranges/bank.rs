@@ -1,10 +1,9 @@
 //! A hypothesis about the target: a bank of filters that differ in speed and noise, and how likely each anchor measures rightly.
 
+use super::arrived::Arrived;
 use super::gaussian::{Normal, Predicted, Step, merged};
 use super::settings::Known;
 use crate::Error;
-use crate::quantized::RangeReference;
-use fewbits_numerics::normal;
 
 /// Probability per range that the speed changes: once in a few minutes. The noise is a property of the radio and changes less often.
 const SPEED_CHANGES: f64 = 0.003;
@@ -22,81 +21,6 @@ const SCORE_KEPT: f64 = 0.9;
 /// Share of a range's evidence that stays in the recent evidence, and by how many nats that of two hypotheses may differ without deciding.
 const RECALLED: f64 = 0.98;
 const UNDECIDED: f64 = 6.0;
-/// Mean squared error of a normal variable of unit variance given its level: 1, 2, 3, 4 bits.
-const DISTORTION: [f64; 4] = [0.363, 0.119, 0.037, 0.012];
-
-/// What arrived: a range in full, or the level of its innovation.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Arrived {
-    Value(f64),
-    /// The first range of an instant whose clock is unknown: it tells the clock, and nothing of the anchor.
-    First(f64),
-    Level {
-        level: usize,
-        levels: usize,
-        reference: RangeReference,
-    },
-}
-
-impl Arrived {
-    /// Density or probability of what arrived if the range does not depend on the distance.
-    fn stray(&self, width: f64) -> f64 {
-        match self {
-            Self::Value(_) | Self::First(_) => 1.0 / width,
-            Self::Level {
-                level,
-                levels,
-                reference,
-            } => {
-                let inner = (2.0 * reference.half_width / width).min(1.0) / *levels as f64;
-                if *level == 0 || level + 1 == *levels {
-                    0.5 * (1.0 - (*levels - 2) as f64 * inner)
-                } else {
-                    inner
-                }
-            }
-        }
-    }
-
-    /// Density or probability of what arrived for a range of these moments; mean and variance of the noise-free range afterwards; and the
-    /// innovation in its own deviations, with variance one.
-    fn right(&self, predicted: &Predicted, noise: f64) -> Result<(f64, f64, f64, f64), Error> {
-        let total = predicted.variance + noise * noise;
-        let deviation = total.sqrt();
-        let gain = predicted.variance / total;
-        let (density, mean, left, score) = match self {
-            Self::Value(value) | Self::First(value) => {
-                let score = (value - predicted.mean) / deviation;
-                (normal::pdf(score) / deviation, score, 0.0, score)
-            }
-            Self::Level {
-                level,
-                levels,
-                reference,
-            } => {
-                let cell = reference.nominal_cell(*level, *levels)?;
-                let edge = |edge: f64| (edge - predicted.mean) / deviation;
-                let lower = if *level == 0 {
-                    f64::NEG_INFINITY
-                } else {
-                    edge(cell.lower())
-                };
-                let upper = if level + 1 == *levels {
-                    f64::INFINITY
-                } else {
-                    edge(cell.upper())
-                };
-                let moments = normal::truncated_moments(lower, upper)?;
-                let bits = (levels.ilog2() as usize).clamp(1, DISTORTION.len());
-                let score = moments.mean / (1.0 - DISTORTION[bits - 1]).sqrt();
-                (moments.log_probability.exp(), moments.mean, moments.variance, score)
-            }
-        };
-        let after = predicted.mean + gain * deviation * mean;
-        Ok((density, after, predicted.variance * (1.0 - gain) + predicted.variance * gain * left, score))
-    }
-}
-
 /// One explanation of all ranges so far.
 #[derive(Debug)]
 pub(super) struct Hypothesis {

@@ -8,7 +8,34 @@
 
 use super::gaussian::Normal;
 use super::rows::{Collected, Rows};
-use super::search::Search;
+use super::settings::Known;
+
+/// What is known of bias and scale: mean and variance of each.
+pub(super) type Calibration = [(f64, f64); 2];
+
+/// What is known before the ranges.
+#[derive(Clone, Copy)]
+pub(super) struct Search<'a> {
+    pub(super) known: &'a Known,
+    pub(super) calibration: Calibration,
+    pub(super) anchors: usize,
+}
+
+impl Search<'_> {
+    pub(super) fn axes(&self) -> usize {
+        self.known.axes
+    }
+
+    pub(super) fn distance(&self, point: &[f64], one: &Collected) -> f64 {
+        let squares: f64 = (0..self.axes()).map(|i| (point[i] - one.place[i]).powi(2)).sum();
+        let above = if self.axes() == 2 {
+            one.place[2] - self.known.level
+        } else {
+            0.0
+        };
+        (squares + above * above).sqrt()
+    }
+}
 
 /// Gauss-Newton steps at most.
 const STEPS: usize = 30;

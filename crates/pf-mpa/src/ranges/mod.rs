@@ -14,6 +14,7 @@
 //! ```
 
 mod acquisition;
+mod arrived;
 mod bank;
 mod estimate;
 mod fit;
@@ -31,30 +32,22 @@ use crate::loading::optimal_loading;
 use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::RangeNoise;
 use acquisition::hypotheses;
-use bank::{Arrived, Hypothesis};
+use arrived::Arrived;
+use bank::Hypothesis;
 use fewbits_core::Gaussian;
 use fewbits_numerics::error::{finite, refuse, within};
+use fit::Calibration;
 use gaussian::Step;
 use nalgebra::Vector3;
-use odds::{drop_improbable, merge_same, shares_of};
+use odds::{count_contradictions, drop_improbable, is_lost, merge_same, shares_of, uncertainty_of_noise};
 use rows::Collected;
-use search::Calibration;
 use settings::Known;
 use std::collections::BTreeMap;
 
 /// Ranges between two searches for hypotheses that have become the same.
 const COMPARED: usize = 8;
-/// The track is lost if fewer than this share of the latest ranges agree.
-const AGREEMENT: f64 = 0.35;
-/// Or if for so many ranges of each anchor those that do not contradict the others are too few for a place.
-const CONTRADICTED: usize = 5;
-/// Or if the misfit of levels is this many deviations: about once in a hundred thousand ranges.
-const MISFIT: f64 = 4.3;
 /// Added to the variances of bias and scale when the track is lost, as a share of those before the first range.
 const LOST_SHARE: f64 = 0.04;
-/// The edge between the two levels of a single bit lies beside the expected range by as many of its deviations as the `ln` of the noise is
-/// uncertain, at most so many: a bit about the expected range says nothing about the noise.
-const ASIDE: f64 = 0.8;
 /// Bits of a range that is sent in full.
 const FULL_BITS: usize = 32;
 
@@ -205,7 +198,7 @@ impl RangeTracker {
         let mut next = std::mem::take(&mut self.next);
         next.clone_from(&self.hypotheses);
         let lost = match self.track(&mut next, if is_new { elapsed } else { 0.0 }, is_new, anchor, range) {
-            Ok(()) => self.is_lost(&next),
+            Ok(()) => is_lost(&next, self.travel != Travel::Full),
             // The range has probability zero under every hypothesis, even as an outlier.
             Err(Error::Impossible) => true,
             Err(error) => return Err(error),
@@ -310,7 +303,10 @@ impl RangeTracker {
                 let levels = 1_usize << bits;
                 let variance = (square - mean * mean).max(f64::MIN_POSITIVE);
                 let aside = if bits == 1 {
-                    self.aside(next, &shares) * variance.sqrt()
+                    // Not the same side for an anchor each time.
+                    let is_above = (self.pushed + self.pushed / self.places.len()).is_multiple_of(2);
+                    let size = uncertainty_of_noise(&known.noises, next, &shares) * variance.sqrt();
+                    if is_above { size } else { -size }
                 } else {
                     0.0
                 };
@@ -349,13 +345,7 @@ impl RangeTracker {
             }
         });
         // Anchors that send ranges, but contradict each other so much that those that are left do not determine the position.
-        let is_heard = |other: usize| last - heard[other] <= known.silence;
-        let enough = known.axes + 1;
-        let are_enough = (0..heard.len()).filter(|other| is_heard(*other)).count() >= enough;
-        for one in next.iter_mut() {
-            let is_short = are_enough && one.usable(is_heard) < enough;
-            one.contradicted = if is_short { one.contradicted + 1 } else { 0 };
-        }
+        count_contradictions(next, known.axes + 1, |other| last - heard[other] <= known.silence);
         if is_undecided {
             next.iter_mut().for_each(|one| one.fall_behind(best));
         }
@@ -367,46 +357,6 @@ impl RangeTracker {
             merge_same(next);
         }
         Ok(())
-    }
-
-    /// By how many deviations of the expected range the edge of a single bit lies beside it: above and below in turn.
-    fn aside(&self, hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
-        let noises = &self.known.noises;
-        let (mut mean, mut square) = (0.0, 0.0);
-        for (one, share) in hypotheses.iter().zip(shares) {
-            for (i, weight) in one.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                let log = noises[i % noises.len()].ln();
-                mean += share * weight * log;
-                square += share * weight * log * log;
-            }
-        }
-        let size = (square - mean * mean).max(0.0).sqrt().min(ASIDE);
-        // Not the same side for an anchor each time.
-        if (self.pushed + self.pushed / self.places.len()).is_multiple_of(2) {
-            size
-        } else {
-            -size
-        }
-    }
-
-    fn is_lost(&self, hypotheses: &[Hypothesis]) -> bool {
-        let shares = shares_of(hypotheses);
-        let agreement: f64 = hypotheses
-            .iter()
-            .zip(&shares)
-            .map(|(one, share)| share * one.agreement)
-            .sum();
-        let contradicted: f64 = hypotheses
-            .iter()
-            .zip(&shares)
-            .filter(|(one, _)| one.contradicted > CONTRADICTED * self.places.len())
-            .map(|(_, share)| share)
-            .sum();
-        let misfit = match self.travel {
-            Travel::Full => 0.0,
-            Travel::Bits(_) => hypotheses.iter().map(Hypothesis::misfit).fold(f64::INFINITY, f64::min),
-        };
-        agreement < AGREEMENT || misfit > MISFIT || contradicted > 0.5
     }
 
     fn shares(&self) -> Vec<f64> {

@@ -7,6 +7,16 @@ use super::gaussian::Normal;
 /// A hypothesis is dropped if its probability is less than this share of the best one's.
 const DROPPED: f64 = 1e-5;
 
+/// The track is lost if fewer than this share of the latest ranges agree.
+const AGREEMENT: f64 = 0.35;
+/// Or if for so many ranges of each anchor those that do not contradict the others are too few for a place.
+const CONTRADICTED: usize = 5;
+/// Or if the misfit of levels is this many deviations: about once in a hundred thousand ranges.
+const MISFIT: f64 = 4.3;
+/// The edge between the two levels of a single bit lies beside the expected range by as many of its deviations as the `ln` of the noise is
+/// uncertain, at most so many: a bit about the expected range says nothing about the noise.
+const ASIDE: f64 = 0.8;
+
 /// Probabilities of hypotheses.
 pub(super) fn shares_of(hypotheses: &[Hypothesis]) -> Vec<f64> {
     let best = hypotheses
@@ -51,4 +61,46 @@ pub(super) fn merge_same(hypotheses: &mut Vec<Hypothesis>) {
 fn is_near(a: &Normal, b: &Normal) -> bool {
     let close = |i: usize| (a.mean[i] - b.mean[i]).powi(2) <= 0.1 * a.variance(i).min(b.variance(i));
     is_same(a, b) && (0..a.axes).chain([a.bias(), a.scale()]).all(close)
+}
+
+/// Counts the ranges in a row for which anchors send ranges, but contradict each other so much that those that are left are not `enough`.
+pub(super) fn count_contradictions(hypotheses: &mut [Hypothesis], enough: usize, is_heard: impl Fn(usize) -> bool) {
+    for one in hypotheses {
+        let heard = (0..one.good.len()).filter(|anchor| is_heard(*anchor)).count();
+        let is_short = heard >= enough && one.usable(&is_heard) < enough;
+        one.contradicted = if is_short { one.contradicted + 1 } else { 0 };
+    }
+}
+
+/// Whether the ranges show that no hypothesis is right.
+pub(super) fn is_lost(hypotheses: &[Hypothesis], are_levels: bool) -> bool {
+    let shares = shares_of(hypotheses);
+    let sum = |of: &dyn Fn(&Hypothesis) -> f64| {
+        hypotheses
+            .iter()
+            .zip(&shares)
+            .map(|(one, share)| share * of(one))
+            .sum::<f64>()
+    };
+    let agreement = sum(&|one| one.agreement);
+    let contradicted = sum(&|one| f64::from(u8::from(one.contradicted > CONTRADICTED * one.good.len())));
+    let misfit = if are_levels {
+        hypotheses.iter().map(Hypothesis::misfit).fold(f64::INFINITY, f64::min)
+    } else {
+        0.0
+    };
+    agreement < AGREEMENT || misfit > MISFIT || contradicted > 0.5
+}
+
+/// The deviation of `ln` of the noise over all filters, at most [`ASIDE`].
+pub(super) fn uncertainty_of_noise(noises: &[f64], hypotheses: &[Hypothesis], shares: &[f64]) -> f64 {
+    let (mut mean, mut square) = (0.0, 0.0);
+    for (one, share) in hypotheses.iter().zip(shares) {
+        for (i, weight) in one.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            let log = noises[i % noises.len()].ln();
+            mean += share * weight * log;
+            square += share * weight * log * log;
+        }
+    }
+    (square - mean * mean).max(0.0).sqrt().min(ASIDE)
 }

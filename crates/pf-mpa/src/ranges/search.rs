@@ -1,9 +1,8 @@
 //! Places that explain a set of ranges: the grid of positions, and the filters of a place.
 
-use super::fit::fit;
+use super::fit::{Search, fit};
 use super::gaussian::Normal;
 use super::rows::{Collected, Rows, Slice};
-use super::settings::Known;
 use nalgebra::DMatrix;
 
 /// Grid: nodes to either side of the middle, and from one to the next in deviations of the prior, for two coordinates and for three.
@@ -13,17 +12,6 @@ const MAXIMA: usize = 4;
 /// Slices to either side of the middle at most, and by how many nats one may be worse than the best.
 const SLICES: i32 = 8;
 const NEGLIGIBLE_SLICE: f64 = 6.0;
-
-/// What is known of bias and scale: mean and variance of each.
-pub(super) type Calibration = [(f64, f64); 2];
-
-/// What is known before the ranges.
-#[derive(Clone, Copy)]
-pub(super) struct Search<'a> {
-    pub(super) known: &'a Known,
-    pub(super) calibration: Calibration,
-    pub(super) anchors: usize,
-}
 
 /// A place that explains some of the ranges.
 #[derive(Clone)]
@@ -38,20 +26,6 @@ pub(super) struct Found {
 }
 
 impl Search<'_> {
-    fn axes(&self) -> usize {
-        self.known.axes
-    }
-
-    pub(super) fn distance(&self, point: &[f64], one: &Collected) -> f64 {
-        let squares: f64 = (0..self.axes()).map(|i| (point[i] - one.place[i]).powi(2)).sum();
-        let above = if self.axes() == 2 {
-            one.place[2] - self.known.level
-        } else {
-            0.0
-        };
-        (squares + above * above).sqrt()
-    }
-
     /// `ln p(position, ranges)` up to a constant, with bias and scale integrated out one range after the other.
     fn at(&self, point: &[f64; 3], ranges: &[Collected], variance: f64) -> f64 {
         let [(bias, bias_variance), (scale, scale_variance)] = self.calibration;
