@@ -10,8 +10,6 @@ use fewbits_multi_target::{Birth, Tracker};
 pub(super) const STEPS: usize = 40;
 /// Side of the field.
 const SIDE: f64 = 100.0;
-/// Deviation of a range.
-const NOISE: f64 = 5.0;
 /// Probability that a sensor reports a target.
 pub(super) const DETECTION: f64 = 0.9;
 /// Expected false reports of a sensor in a step.
@@ -96,15 +94,15 @@ pub(super) struct Moment {
     pub(super) ranges: Vec<Vec<f64>>,
 }
 
-/// The sensors of all worlds.
-pub(super) fn sensors() -> Result<Vec<AutoSensing<Range, 1>>, Error> {
-    let sensor = |place| Ok(AutoSensing::new(Range(place), Matrix1::new(NOISE * NOISE))?);
+/// The sensors of all worlds, with this deviation of a range.
+pub(super) fn sensors(noise: f64) -> Result<Vec<AutoSensing<Range, 1>>, Error> {
+    let sensor = |place| Ok(AutoSensing::new(Range(place), Matrix1::new(noise * noise))?);
     SENSORS.map(sensor).into_iter().collect()
 }
 
 /// A run of the scenario.
-pub(super) fn draw(scenario: Scenario, stream: Stream) -> Result<Vec<Moment>, Error> {
-    let (mut rng, motion, sensors) = (stream.named("truth").rng(), motion()?, sensors()?);
+pub(super) fn draw(scenario: Scenario, noise: f64, stream: Stream) -> Result<Vec<Moment>, Error> {
+    let (mut rng, motion, sensors) = (stream.named("truth").rng(), motion()?, sensors(noise)?);
     let mut targets = Vec::new();
     for (place, times) in scenario.targets() {
         targets.push((Scenario::spread(place)?.sample(&mut rng), times));
@@ -143,31 +141,51 @@ pub(super) fn draw(scenario: Scenario, stream: Stream) -> Result<Vec<Moment>, Er
 pub(super) enum Reporting {
     /// The range.
     Full,
-    /// The index of one of `2^bits` cells that a target anywhere in the field is equally likely to be in.
-    Cells(Vec<Vec<f64>>),
+    /// The index of one of `2^bits` cells: the edges of each sensor in even and in odd steps.
+    Cells(Vec<[Vec<f64>; 2]>),
 }
 
 impl Reporting {
-    pub(super) fn new(bits: u32) -> Self {
+    /// Cells for targets that may be anywhere in the field: their density is the cube root of that of the range, which for many cells has
+    /// the least distortion (Panter and Dite 1951). In odd steps the edges lie half a cell beside those of even ones, so that no target
+    /// stays in the middle of a wide cell.
+    pub(super) fn cells(bits: u32) -> Self {
         let edges = |place: &[f64; 2]| {
-            const NODES: usize = 200;
+            const NODES: usize = 100;
             let at = |i: usize| (i as f64 + 0.5) * SIDE / NODES as f64;
-            let mut ranges: Vec<f64> = (0..NODES * NODES)
-                .map(|i| (at(i / NODES) - place[0]).hypot(at(i % NODES) - place[1]))
-                .collect();
-            ranges.sort_by(f64::total_cmp);
-            let cells = 1_usize << bits;
-            (1..cells).map(|i| ranges[i * ranges.len() / cells]).collect()
+            // How often a range lies in each metre, and the cumulative cube root.
+            let mut counts = vec![0.0; FARTHEST as usize];
+            for i in 0..NODES * NODES {
+                let range = (at(i / NODES) - place[0]).hypot(at(i % NODES) - place[1]);
+                if let Some(count) = counts.get_mut(range as usize) {
+                    *count += 1.0;
+                }
+            }
+            let mut sums = vec![0.0];
+            for count in counts {
+                sums.push(sums[sums.len() - 1] + f64::cbrt(count));
+            }
+            let cells = f64::from(1_u32 << bits);
+            let edge = |share: f64| {
+                let wanted = share * sums[sums.len() - 1];
+                let above = sums.partition_point(|sum| *sum < wanted).max(1);
+                above as f64 - (sums[above] - wanted) / (sums[above] - sums[above - 1])
+            };
+            [-0.25, 0.25].map(|shift| {
+                (1..1_u32 << bits)
+                    .map(|k| edge((f64::from(k) + shift) / cells))
+                    .collect()
+            })
         };
         Self::Cells(SENSORS.iter().map(edges).collect())
     }
 
-    /// The factor of a report of a sensor, and the intensity of false reports at it.
-    pub(super) fn report(&self, sensor: usize, range: f64) -> Result<(Scalar, f64), Error> {
+    /// The factor of a report of a sensor in a step, and the intensity of false reports at it.
+    pub(super) fn report(&self, step: usize, sensor: usize, range: f64, noise: f64) -> Result<(Scalar, f64), Error> {
         match self {
-            Self::Full => Ok((Value::scalar(range, NOISE * NOISE)?.into(), FALSE / FARTHEST)),
+            Self::Full => Ok((Value::scalar(range, noise * noise)?.into(), FALSE / FARTHEST)),
             Self::Cells(edges) => {
-                let edges = &edges[sensor];
+                let edges = &edges[sensor][step % 2];
                 let index = edges.partition_point(|edge| *edge <= range);
                 let lower = if index == 0 {
                     f64::NEG_INFINITY
@@ -176,7 +194,7 @@ impl Reporting {
                 };
                 let upper = edges.get(index).copied().unwrap_or(f64::INFINITY);
                 let share = (upper.min(FARTHEST) - lower.max(0.0)) / FARTHEST;
-                let factor = InCell::certain(Cell::new(lower, upper)?, NOISE * NOISE)?;
+                let factor = InCell::certain(Cell::new(lower, upper)?, noise * noise)?;
                 Ok((factor.into(), FALSE * share))
             }
         }
