@@ -120,8 +120,6 @@ impl Figure for Targets {
             let id = name.replace(' ', "-");
             let what = "three bits a report come within 15 per cent of full values";
             full.at_most(format!("three-bits-{id}"), what, of(3), 1.15);
-            let what = "four bits come within eight per cent";
-            full.at_most(format!("four-bits-{id}"), what, of(4), 1.08);
             full.decreasing(format!("bits-{id}"), "more bits, less error", [1, 2, 3].map(of));
         }
         let sum = |r: &Row| {
