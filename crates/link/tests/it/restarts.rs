@@ -339,9 +339,7 @@ fn estimator_state_in_json_goes_on() {
     let json = serde_json::to_vec(&(Some(4_u64), 5_u64, before.centre().state())).unwrap();
     let bits = 8 * json.len();
     let mut after = mixed(Reports::Signs, 0.05);
-    after
-        .restore(&BitString::from_bytes(json, bits).unwrap())
-        .unwrap();
+    after.restore(&BitString::from_bytes(json, bits).unwrap()).unwrap();
     assert_eq!((after.estimate(), after.state().unwrap()), (before.estimate(), before.state().unwrap()));
     let compact = before.state().unwrap();
     let mut again = mixed(Reports::Signs, 0.05);
