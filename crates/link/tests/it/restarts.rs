@@ -339,14 +339,12 @@ fn estimator_state_in_json_goes_on() {
     let json = serde_json::to_vec(&(Some(4_u64), 5_u64, before.centre().state())).unwrap();
     let bits = 8 * json.len();
     let mut after = mixed(Reports::Signs, 0.05);
-    after
-        .restore(&fewbits_core::BitString::from_bytes(json, bits).unwrap())
-        .unwrap();
+    after.restore(&BitString::from_bytes(json, bits).unwrap()).unwrap();
     assert_eq!((after.estimate(), after.state().unwrap()), (before.estimate(), before.state().unwrap()));
     let compact = before.state().unwrap();
     let mut again = mixed(Reports::Signs, 0.05);
     again.restore(&compact).unwrap();
     assert_eq!(again.state().unwrap(), compact);
-    let cut = fewbits_core::BitString::from_bytes(compact.bytes()[..9].to_vec(), 72).unwrap();
+    let cut = BitString::from_bytes(compact.bytes()[..9].to_vec(), 72).unwrap();
     assert!(again.restore(&cut).is_err() && again.state().unwrap() == compact);
 }
