@@ -216,7 +216,7 @@ pub(crate) fn write(
 }
 
 pub(crate) fn opened(path: &Path) -> Outcome<Playback<BufReader<File>>> {
-    Ok(Playback::new(BufReader::new(File::open(path)?))?)
+    Ok(Playback::opened(BufReader::new(File::open(path)?), path)?)
 }
 
 /// Bits per sample that each column would need, at several bounds.

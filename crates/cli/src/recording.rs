@@ -23,13 +23,13 @@ pub(crate) fn stream(file: &str) -> Result<(Box<dyn Read + Send>, &str), Error> 
 /// Opens a recording with random access. A pipe has none: its bytes are kept in memory.
 pub(crate) fn open(path: &Path) -> Result<Playback<Box<dyn ReadSeek>>, Error> {
     let name = path.display().to_string();
-    let source: Box<dyn ReadSeek> = if is_regular(&name) {
-        Box::new(File::open(path).map_err(Error::io(&name, "open"))?)
-    } else {
-        let (mut stream, file) = stream(&name)?;
-        let mut bytes = Vec::new();
-        stream.read_to_end(&mut bytes).map_err(Error::io(file, "read"))?;
-        Box::new(Cursor::new(bytes))
-    };
+    if is_regular(&name) {
+        let source: Box<dyn ReadSeek> = Box::new(File::open(path).map_err(Error::io(&name, "open"))?);
+        return Playback::opened(source, path).map_err(Error::recording(&name));
+    }
+    let (mut stream, file) = stream(&name)?;
+    let mut bytes = Vec::new();
+    stream.read_to_end(&mut bytes).map_err(Error::io(file, "read"))?;
+    let source: Box<dyn ReadSeek> = Box::new(Cursor::new(bytes));
     Playback::new(source).map_err(Error::recording(&name))
 }

@@ -75,9 +75,19 @@ impl Playback<File> {
     /// As [`new`](Self::new).
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let mut playback = Self::new(File::open(path).map_err(Error::io("open"))?)?;
+        Self::opened(File::open(path).map_err(Error::io("open"))?, path)
+    }
+}
+
+impl<R: Read + Seek> Playback<R> {
+    /// Opens a source of the bytes of this file, such as a buffer before it. If an append to the file did not end, it is read as it was before.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn opened(source: R, path: impl AsRef<Path>) -> Result<Self, Error> {
+        let mut playback = Self::new(source)?;
         if !matches!(playback.index, Index::Whole(_) | Index::NotNeeded)
-            && let Some((offset, _)) = append::kept(path)
+            && let Some((offset, _)) = append::kept(path.as_ref())
             && (playback.span.0..=playback.span.1).contains(&offset)
         {
             playback.index = Index::NotNeeded;
@@ -85,9 +95,7 @@ impl Playback<File> {
         }
         Ok(playback)
     }
-}
 
-impl<R: Read + Seek> Playback<R> {
     /// Opens a recording in any source with random access.
     ///
     /// # Errors
