@@ -45,7 +45,7 @@ fn long_tables_become_wide_in_every_command() {
     good(path, &words, b"");
     let back = text(&good(path, &["unpack", "h.fewb"], b""));
     let lines: Vec<&str> = back.lines().collect();
-    assert_eq!((lines.len(), lines[0]), (61, "time,sensor.t,switch.fan,sensor.p"));
+    assert_eq!((lines.len(), lines[0]), (61, "last_changed,sensor.t,switch.fan,sensor.p"));
     assert!(
         lines[2].starts_with("2024-03-05T00:02:00Z,") && lines[2].ends_with(",0,") && lines[1].ends_with(",1,1000"),
         "{back}"
