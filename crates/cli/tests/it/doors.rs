@@ -78,6 +78,7 @@ fn senml_is_rows() {
 
 /// A centre that is asked to end does so after the step of its slot, which is stored; the next process goes on with the next slot.
 #[test]
+#[ignore = "slots of the wall clock: a busy machine is late by itself; `.ci/kills` runs it"]
 fn a_centre_is_handed_over_without_losing_a_report() {
     let folder = tempfile::tempdir().unwrap();
     written(folder.path(), &free_place(), &key('b'));

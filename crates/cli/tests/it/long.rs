@@ -86,7 +86,7 @@ fn long_tables_become_wide_in_every_command() {
     good(path, &[&words[..], &by].concat(), b"");
     let back = text(&good(path, &["unpack", "n.fewb"], b""));
     assert!(
-        back.starts_with("time,sensor.t,switch.fan,sensor.p\n") && back.lines().nth(5).unwrap().ends_with(','),
+        back.starts_with("last_changed,sensor.t,switch.fan,sensor.p\n") && back.lines().nth(5).unwrap().ends_with(','),
         "{back}"
     );
     let bad = long().replacen("1050,", "10.5.0,", 1);
