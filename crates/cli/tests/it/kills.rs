@@ -238,6 +238,8 @@ fn killed_centre_and_sensors_go_on_beside_replays() {
         .sum();
     println!("{kills} kills, {} rows, {datagrams} datagrams, {refused} refused", rows.len());
     let mut last: Option<&(Row, String)> = None;
+    // Sensors may start late on a busy machine.
+    let first = rows.iter().find(|((_, reports, _), _)| *reports == 2).unwrap().0.0;
     for row in &rows {
         let ((slot, reports, mean), line) = row;
         assert!(*reports <= 2);
@@ -247,7 +249,7 @@ fn killed_centre_and_sensors_go_on_beside_replays() {
             assert!(*slot > before.0 || *slot == before.0 && same(line) == same(text), "{line} after {text}");
         }
         // 5 and 5.2 in turn.
-        if *slot > rows[0].0.0 + 25 {
+        if *slot > first + 25 {
             assert!((mean - 5.1).abs() < 0.8, "{line}");
         }
         last = Some(row);
@@ -255,8 +257,7 @@ fn killed_centre_and_sensors_go_on_beside_replays() {
     assert!(refused > 0);
 }
 
-/// Rows of a recording. It is whole, or a writer was killed between the last block and the end: then all rows are there, the missing end is
-/// said, and the next writer writes it.
+/// Rows of a recording, and whether it has its end.
 fn count(folder: &Path, file: &str) -> (u64, bool) {
     let output = fewbits(folder, &["info", file, "--json"], b"");
     let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
