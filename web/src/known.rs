@@ -14,6 +14,7 @@ pub(crate) struct Rows {
     pub(crate) batch: Batch,
     pub(crate) columns: Vec<Known>,
     pub(crate) time: TimeBase,
+    pub(crate) time_name: String,
     pub(crate) found: Found,
 }
 

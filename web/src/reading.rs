@@ -134,9 +134,12 @@ fn of_table(mut table: Table, survey: &Survey, said: &Said, left_out: Vec<(Strin
         let (column, profile) = (&table.columns()[*i], &survey.columns[*i]);
         known(column, unit, profile, cells)
     });
+    let columns: Vec<Known> = known.collect();
+    let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
     Ok(Rows {
-        columns: known.collect(),
+        columns,
         time,
+        time_name: times::name(table, &names),
         found: found(table, survey, said, left_out),
         batch: rows,
     })

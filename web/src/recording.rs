@@ -83,6 +83,7 @@ pub(crate) fn read(bytes: Bytes) -> Result<Rows, String> {
     Ok(Rows {
         columns: columns.collect(),
         time: schema.time(),
+        time_name: schema.time_name().to_owned(),
         found,
         batch,
     })

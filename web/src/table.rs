@@ -83,7 +83,9 @@ impl Opened {
     /// A recording within these bounds, with the bytes of `fewbits pack --bound`. `identity`: random bits, which a recording of several blocks
     /// holds.
     pub fn pack(&mut self, bound: &str, effort: Effort, identity: u32) -> Result<Vec<u8>, String> {
-        let schema = Schema::new(self.columns(bound)?, self.rows.time).map_err(text)?;
+        let schema = Schema::new(self.columns(bound)?, self.rows.time)
+            .and_then(|schema| schema.with_time_name(&self.rows.time_name))
+            .map_err(text)?;
         let bytes = packed(&self.rows.batch, schema.clone(), effort, identity)?;
         if let ([column], TimeBase::Numbered) = (schema.columns(), self.rows.time) {
             self.alone

@@ -146,21 +146,9 @@ impl Table {
         Ok(self)
     }
 
-    /// The name of the column of times; `time` if several give it, it is also one of the columns of values, or the table has no names.
+    /// [`fewbits_recipes::times::name`] of the columns of values.
     pub(crate) fn time_name(&self) -> String {
-        let columns = self.table.columns();
-        let name = match self.table.time() {
-            Some(([only], _)) => {
-                let made_up = format!("column_{}", only + 1);
-                columns
-                    .get(*only)
-                    .map(|column| column.name.clone())
-                    .filter(|name| *name != made_up)
-            }
-            _ => None,
-        };
-        name.filter(|name| !self.names.contains(name))
-            .unwrap_or_else(|| "time".to_owned())
+        fewbits_recipes::times::name(&self.table, &self.names)
     }
 
     /// The name in the last row read.

@@ -1,7 +1,7 @@
 //! Times of tables as ticks of recordings, and ticks as text.
 
 use fewbits_record::{TimeBase, TimeFormat};
-use fewbits_table::{Dialect, Scale, Time};
+use fewbits_table::{Dialect, Scale, Table, Time};
 
 /// Decimals of a tick for UTC, and for tables that cannot be read twice.
 pub const NANOSECONDS: u8 = 9;
@@ -110,6 +110,21 @@ pub fn base(scale: Scale, first: Option<Time>, decimals: Option<u8>, nanoseconds
         tolerance: (nanoseconds / tick).saturating_sub(1),
         format,
     }
+}
+
+/// The name of a table's column of times beside columns of values of these names; `time` if several columns give it, it is also one of the
+/// columns of values, or the table has no names.
+pub fn name(table: &Table, values: &[String]) -> String {
+    let name = match table.time() {
+        Some(([only], _)) => {
+            let made_up = format!("column_{}", only + 1);
+            let column = table.columns().get(*only);
+            column.map(|column| column.name.clone()).filter(|name| *name != made_up)
+        }
+        _ => None,
+    };
+    name.filter(|name| !values.contains(name))
+        .unwrap_or_else(|| "time".to_owned())
 }
 
 /// The tick of a time of a table; `None` if rows are numbered.
