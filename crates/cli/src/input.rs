@@ -148,7 +148,7 @@ impl Table {
 
     /// [`fewbits_recipes::times::name`] of the columns of values.
     pub(crate) fn time_name(&self) -> String {
-        fewbits_recipes::times::name(&self.table, &self.names)
+        times::name(&self.table, &self.names)
     }
 
     /// The name in the last row read.

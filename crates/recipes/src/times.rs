@@ -54,7 +54,7 @@ pub fn tick(text: &str, time: TimeBase) -> Result<i64, Problem> {
     };
     let line = format!("{text}\n");
     let open = || {
-        let mut table = fewbits_table::Table::open(std::io::Cursor::new(line), &said)?;
+        let mut table = Table::open(std::io::Cursor::new(line), &said)?;
         let mut batch = fewbits_table::Batch::default();
         let found = table.time().map(|(_, scale)| scale);
         table.read(&mut batch, 1)?;
