@@ -5,13 +5,16 @@ use crate::worlds::sensors;
 use fewbits_link::{Output, Station, Step, Store, Udp, run_station};
 use std::io::Write;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const FOLDER: &str = "FEWBITS_LINK_TEST_FOLDER";
 const ADDRESS: &str = "FEWBITS_LINK_TEST_ADDRESS";
+/// So many reports come before the first kill.
+const REPORTS: usize = 50;
 
 /// The process that is killed: a centre that writes each step to a journal. Does nothing unless the test below starts it.
 #[test]
@@ -55,33 +58,9 @@ fn centre_process() {
     .unwrap();
 }
 
-fn kill(times: u64) {
-    let folder = tempfile::tempdir().unwrap();
-    // A port that was free a moment ago.
-    let address = Udp::bind("127.0.0.1:0").unwrap().address();
-    let stop = Arc::new(AtomicBool::new(false));
-    let threads = sensors(Reports::Signs, address, &stop, &Default::default());
-    for i in 0..times {
-        let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "stops::centre_process", "--nocapture"])
-            .env(FOLDER, folder.path())
-            .env(ADDRESS, address.to_string())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        // Sensors say where they are once a second; afterwards the store knows.
-        let first = if i == 0 { 1_300_000 } else { 0 };
-        std::thread::sleep(Duration::from_micros(first + 150_000 + 7_919 * (i * i % 31)));
-        // SIGKILL.
-        child.kill().unwrap();
-        child.wait().unwrap();
-    }
-    stop.store(true, Ordering::Relaxed);
-    for thread in threads {
-        thread.join().unwrap();
-    }
-    // A line that was cut off is written again by the next process, from the store.
-    let text = std::fs::read_to_string(folder.path().join("journal")).unwrap();
+/// The steps of all processes so far. A line that was cut off is written again by the next process, from the store.
+fn journal(folder: &Path) -> Vec<Step> {
+    let text = std::fs::read_to_string(folder.join("journal")).unwrap_or_default();
     let mut steps: Vec<Step> = Vec::new();
     for line in text.lines() {
         let Ok(step) = serde_json::from_str::<Step>(line) else {
@@ -95,13 +74,55 @@ fn kill(times: u64) {
             }
         }
     }
-    let received = steps
-        .iter()
-        .flat_map(|step| &step.observed)
+    steps
+}
+
+fn received(steps: &[Step]) -> usize {
+    let observed = steps.iter().flat_map(|step| &step.observed);
+    observed
         .filter(|o| matches!(o, fewbits_core::Observation::Received(_)))
-        .count();
+        .count()
+}
+
+fn kill(times: u64) {
+    let mut steps = Vec::new();
+    let folder = tempfile::tempdir().unwrap();
+    // A port that was free a moment ago.
+    let address = Udp::bind("127.0.0.1:0").unwrap().address();
+    let stop = Arc::new(AtomicBool::new(false));
+    let threads = sensors(Reports::Signs, address, &stop, &Default::default());
+    for i in 0..times {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "stops::centre_process", "--nocapture"])
+            .env(FOLDER, folder.path())
+            .env(ADDRESS, address.to_string())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        // The first lives until reports have come, every other until it has written a step: a busy machine may take long over either.
+        let (least_steps, least_reports) = match steps.len() {
+            0 => (1, REPORTS),
+            before => (before + 1, 0),
+        };
+        let began = Instant::now();
+        while steps.len() < least_steps || received(&steps) < least_reports {
+            assert!(began.elapsed() < Duration::from_secs(60), "process {i} wrote {} steps", steps.len());
+            std::thread::sleep(Duration::from_millis(10));
+            steps = journal(folder.path());
+        }
+        std::thread::sleep(Duration::from_micros(100_000 + 7_919 * (i * i % 31)));
+        // SIGKILL.
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    stop.store(true, Ordering::Relaxed);
+    for thread in threads {
+        thread.join().unwrap();
+    }
+    steps = journal(folder.path());
+    let received = received(&steps);
     println!("killed {times} times: {} steps, {received} reports", steps.len());
-    assert!(steps.len() as u64 > times && received > steps.len());
+    assert!(steps.len() as u64 > times && received >= REPORTS);
     assert_replayed(&mut receiver(Reports::Signs, 0.05), &steps);
 }
 
