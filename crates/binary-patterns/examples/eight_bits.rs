@@ -1,7 +1,7 @@
 //! Eight one-bit sensors about a uniform unknown: the best linear patterns, then breakpoints off the grid.
 
 use fewbits_binary_patterns::search::{LinearSearch, free_breakpoints_of_masks};
-use fewbits_binary_patterns::{CellGrid, Decoder, Source, bounds, linear_pattern};
+use fewbits_binary_patterns::{CellGrid, Source, bounds, linear_pattern};
 use fewbits_core::Observation;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("  {:.4?}", sensor.quantizer().breakpoints());
     }
 
-    let table = bank.table(Decoder::Mmse)?;
+    let table = bank.table()?;
     let mut seen = [true, false, true, true, false, true, true, false].map(Observation::Received);
     println!("estimate {:.4}", table.decode(&seen)?);
     seen[3] = Observation::Lost;

@@ -12,7 +12,7 @@
 //!
 //! ```
 //! use fewbits_binary_patterns::search::LinearSearch;
-//! use fewbits_binary_patterns::{Decoder, CellGrid, Source, bounds};
+//! use fewbits_binary_patterns::{CellGrid, Source, bounds};
 //! let source = Source::uniform(1.0)?;
 //! let noise = source.noise_deviation(18.2)?;
 //! let search = LinearSearch::with_deviation(source, CellGrid::uniform(1.0, 3)?, noise, 8)?;
@@ -20,7 +20,7 @@
 //! assert_eq!(best.masks, [2, 2, 3, 3, 3, 3, 4, 6]);
 //! let bank = search.bank(&best.masks)?;
 //! assert!(bounds::optimal_weight_van_trees(&bank)? < best.mse);
-//! let table = bank.table(Decoder::Mmse)?;                      // what the fusion centre stores
+//! let table = bank.table()?;                                    // what the fusion centre stores
 //! assert!(table.estimate(&[true; 8])?.abs() < 1.0);
 //! # Ok::<(), fewbits_binary_patterns::Error>(())
 //! ```
@@ -40,7 +40,6 @@ mod observation;
 mod patterns;
 pub mod search;
 
-pub use decoding::decoder::Decoder;
 pub use decoding::table::LookupTable;
 pub use fewbits_quantizers::Error;
 pub use observation::bank::{Bank, IMPOSSIBLE};

@@ -1,7 +1,8 @@
 //! Design criteria, computed as sums over joint outcomes.
 
 use crate::error::{Error, refuse};
-use crate::observation_model::{Feature, ObservationModel};
+use crate::observation_model::ObservationModel;
+use crate::outcomes::Feature;
 use serde::{Deserialize, Serialize};
 
 /// Smaller probabilities are treated as zero inside a logarithm.

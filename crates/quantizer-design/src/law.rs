@@ -1,9 +1,8 @@
 //! Probabilities of one group's reports, and their derivatives with respect to its breakpoints.
 
-use crate::compositions::Compositions;
 use crate::error::Error;
-use crate::moments::{Table, moments};
-use crate::observation_model::Feature;
+use crate::outcomes::counts::Compositions;
+use crate::outcomes::{Feature, Table, cell_probabilities, for_each_log, moments};
 use crate::system::{SensorGroup, System};
 use fewbits_numerics::{kernels, normal};
 
@@ -13,9 +12,10 @@ pub struct Active<'a> {
     pub(crate) index: usize,
     pub(crate) group: &'a SensorGroup,
     pub(crate) compositions: Compositions,
-    /// Mean of a sensor's sample at each node, and its standard deviation there.
-    pub(crate) means: Vec<f64>,
-    pub(crate) deviation: f64,
+    /// Mean of a sensor's sample at each node.
+    pub means: Vec<f64>,
+    /// The standard deviation.
+    pub deviation: f64,
     /// `c[i][t]`: derivative of the probability of symbol `t` with respect to breakpoint `i`, divided by the density of the sample there.
     pub exchange: Vec<Vec<f64>>,
 }
@@ -63,55 +63,43 @@ impl<'a> Active<'a> {
     }
 
     /// The breakpoints of the group in the system.
-    pub(crate) fn breakpoints(&self) -> &'a [f64] {
+    pub fn breakpoints(&self) -> &'a [f64] {
         self.group.quantizer().breakpoints()
     }
 
     /// Probability of each cell at each node.
-    pub(crate) fn cells(&self, b: &[f64]) -> Vec<Vec<f64>> {
+    pub(crate) fn cells(&self, b: &[f64]) -> Table {
         cell_probabilities(&self.means, self.deviation, b)
     }
 
     /// Probability of each received symbol at each node.
-    pub fn symbols(&self, b: &[f64]) -> Vec<f64> {
-        let nodes = self.means.len();
-        let mut symbols = vec![0.0; self.compositions.parts * nodes];
-        for (cell, column) in self.cells(b).iter().enumerate() {
-            for (t, row) in symbols.chunks_exact_mut(nodes).enumerate() {
-                let p = self.group.cell_transition(t, cell);
-                if p != 0.0 {
-                    row.iter_mut().zip(column).for_each(|(r, c)| *r += p * c);
-                }
-            }
-        }
-        symbols
+    pub fn symbols(&self, b: &[f64]) -> Table {
+        let of = |t: usize, cell: usize| self.group.cell_transition(t, cell);
+        self.cells(b).mixed(self.compositions.parts, of)
     }
 
-    /// Logarithms of the symbols' probabilities at each node, one row per symbol.
-    fn log_symbols(&self, b: &[f64]) -> Vec<Vec<f64>> {
-        let edge = |i: usize| b.get(i).copied().unwrap_or(f64::INFINITY);
-        let lower = |cell: usize| if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
-        (0..self.compositions.parts)
-            .map(|t| {
-                let law = |m: &f64| {
-                    let cells = (0..=b.len()).map(|cell| {
-                        let inside =
-                            normal::log_interval((lower(cell) - m) / self.deviation, (edge(cell) - m) / self.deviation);
-                        inside + self.group.cell_transition(t, cell).ln()
-                    });
-                    kernels::log_sum_exp(&cells.collect::<Vec<_>>())
-                };
-                self.means.iter().map(law).collect()
-            })
-            .collect()
+    /// Logarithms of the symbols' probabilities at each node.
+    fn log_symbols(&self) -> Table {
+        let edges: Vec<f64> = self.breakpoints().iter().copied().chain([f64::INFINITY]).collect();
+        let mut values = Vec::with_capacity(self.compositions.parts * self.means.len());
+        for t in 0..self.compositions.parts {
+            values.extend(self.means.iter().map(|m| {
+                let mut low = f64::NEG_INFINITY;
+                let cells = edges.iter().enumerate().map(|(cell, edge)| {
+                    let high = (edge - m) / self.deviation;
+                    let inside = normal::log_interval(std::mem::replace(&mut low, high), high);
+                    inside + self.group.cell_transition(t, cell).ln()
+                });
+                kernels::log_sum_exp(&cells.collect::<Vec<_>>())
+            }));
+        }
+        Table::new(values, self.means.len())
     }
 
     /// Report probabilities of the whole group, and the symbol probabilities of one sensor.
-    pub(crate) fn reports(&self, b: &[f64]) -> (Table, Vec<f64>) {
-        let nodes = self.means.len();
+    pub fn reports(&self, b: &[f64]) -> (Table, Table) {
         let symbols = self.symbols(b);
-        let reports = self.compositions.probabilities(&symbols, nodes).swap_remove(0);
-        (Table::new(reports, nodes), symbols)
+        (self.compositions.probabilities(&symbols).swap_remove(0), symbols)
     }
 
     /// Density of the sample at each breakpoint, and its derivative, at every node.
@@ -130,10 +118,10 @@ impl<'a> Active<'a> {
     }
 
     /// The tables that enter the node sums as factors.
-    pub(crate) fn slots(&self, symbols: &[f64], densities: &[Vec<f64>], slopes: &[Vec<f64>]) -> Slots {
+    pub(crate) fn slots(&self, symbols: &Table, densities: &[Vec<f64>], slopes: &[Vec<f64>]) -> Slots {
         let nodes = self.means.len();
-        let mut levels = self.compositions.probabilities(symbols, nodes).into_iter();
-        let reports = [(); 3].map(|()| Table::new(levels.next().unwrap_or_default(), nodes));
+        let mut levels = self.compositions.probabilities(symbols).into_iter();
+        let reports = [(); 3].map(|()| levels.next().unwrap_or(Table::new(Vec::new(), nodes)));
         // Products of two densities move the reports of two sensors, so a single sensor has none.
         let mut pairs = Vec::new();
         if self.compositions.total >= 2 {
@@ -152,25 +140,10 @@ impl<'a> Active<'a> {
     }
 }
 
-/// Probability of each cell between breakpoints, for normal samples of these means; one list per cell.
-pub(crate) fn cell_probabilities(means: &[f64], deviation: f64, breakpoints: &[f64]) -> Vec<Vec<f64>> {
-    let standardised = |edge: f64| -> Vec<f64> { means.iter().map(|m| (edge - m) / deviation).collect() };
-    let mut lower = standardised(f64::NEG_INFINITY);
-    let edges = breakpoints.iter().copied().chain([f64::INFINITY]);
-    edges
-        .map(|edge| {
-            let upper = standardised(edge);
-            let mut inside = std::mem::replace(&mut lower, upper.clone());
-            kernels::interval(&mut inside, &upper);
-            inside
-        })
-        .collect()
-}
-
 /// `sum_node mass sum_t P_t ln P_t` of one sensor.
-pub(crate) fn negative_entropy(symbols: &[f64], mass: &[f64]) -> f64 {
+pub(crate) fn negative_entropy(symbols: &Table, mass: &[f64]) -> f64 {
     symbols
-        .chunks_exact(mass.len())
+        .iter()
         .map(|row| {
             row.iter()
                 .zip(mass)
@@ -214,45 +187,34 @@ impl Reports {
 pub(crate) fn symbol_tables(system: &System) -> Result<Vec<Table>, Error> {
     let of = |g| {
         let entry = Active::new(system, g)?;
-        Ok(Table::new(entry.symbols(entry.breakpoints()), entry.means.len()))
+        Ok(entry.symbols(entry.breakpoints()))
     };
     (0..system.groups().len()).map(of).collect()
 }
 
 /// `ln P(outcome | x_k)` for every joint outcome, outcomes by values. It stays accurate if the probabilities underflow.
-pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
+///
+/// # Errors
+/// [`Error::TooLarge`] if there are more outcomes than the system allows.
+pub fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
     system.check_outcomes()?;
+    let tables = (0..system.groups().len())
+        .map(|index| {
+            Ok(Active::new(system, index)?
+                .log_symbols()
+                .of_log_counts(system.groups()[index].sensors().len()))
+        })
+        .collect::<Result<Vec<Table>, Error>>()?;
     let model = system.model();
-    let nodes = model.nodes();
-    let mut joint = vec![vec![0.0; nodes]];
-    for index in 0..system.groups().len() {
-        let entry = Active::new(system, index)?;
-        let symbols = entry.log_symbols(entry.breakpoints());
-        let rows: Vec<Vec<f64>> = entry
-            .compositions
-            .vectors
-            .iter()
-            .zip(&entry.compositions.log_multiplicity)
-            .map(|(counts, multiplicity)| {
-                let mut row = vec![*multiplicity; nodes];
-                for (n, symbol) in counts.iter().zip(&symbols).filter(|(n, _)| **n > 0) {
-                    row.iter_mut().zip(symbol).for_each(|(r, s)| *r += *n as f64 * s);
-                }
-                row
-            })
-            .collect();
-        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x + y).collect();
-        joint = joint.iter().flat_map(|a| rows.iter().map(move |b| sum(a, b))).collect();
-    }
-    // With correlated noise each value is a mixture over nodes: log-sum-exp over the nodes of the value.
-    let mut out = Vec::with_capacity(joint.len() * model.values.len());
-    for row in &joint {
+    let mut out = Vec::new();
+    for_each_log(&tables.iter().collect::<Vec<_>>(), &vec![0.0; model.nodes()], |_, row| {
+        // With correlated noise each value is a mixture over nodes: log-sum-exp over the nodes of the value.
         for feature in &model.given {
             let logs = row[feature.start..].iter().zip(&feature.weights);
             let terms: Vec<f64> = logs.filter(|(_, w)| **w > 0.0).map(|(l, w)| l + w.ln()).collect();
             out.push(kernels::log_sum_exp(&terms));
         }
-    }
+    });
     Ok(out)
 }
 

@@ -25,6 +25,7 @@
 //! | [`design`] | local design for given numbers of levels by Newton's method: all sensors at once, or one after the other |
 //! | [`decoder`], [`table`] | the posterior of the unknown, decisions and tests |
 //! | [`bounds`] | bounds for every design |
+//! | [`outcomes`] | the engine: joint outcomes of exchangeable sensors on quadrature nodes |
 //!
 //! Design rule: **every criterion is computed exactly, not by simulation.** Given the unknown (and a shared noise
 //! factor) the sensors are independent, so the probability of a joint outcome is a one-dimensional sum of products of
@@ -64,30 +65,26 @@
 pub mod engine {
     pub use crate::criterion::LOG_FLOOR;
     pub use crate::deadline::Deadline;
-    pub use crate::gains::{LevelGains, interval_values, single_sensor};
-    pub use crate::law::Active;
-    pub use crate::moments::dot;
+    pub use crate::law::{Active, log_likelihoods};
     pub use crate::newton::{Objective, Stationary, climb};
+    pub use crate::problem::Problem;
 }
 
 pub mod bounds;
 pub mod decoder;
 pub mod design;
 pub mod observation_model;
+pub mod outcomes;
 pub mod solve;
 pub mod system;
 pub mod table;
 
-mod axis;
-mod compositions;
 mod criterion;
 mod deadline;
 mod derivatives;
 mod error;
 mod evaluate;
-mod gains;
 mod law;
-mod moments;
 mod newton;
 mod problem;
 

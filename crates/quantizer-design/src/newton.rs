@@ -146,9 +146,19 @@ pub fn climb(
     newton: &Newton,
     deadline: Deadline,
 ) -> Result<Stationary, Error> {
+    ascend(objective, &mut start.to_vec(), scale, newton, deadline)
+}
+
+/// As [`climb`], from `b`, which is the last point afterwards, also if the iteration did not converge.
+pub(crate) fn ascend(
+    objective: &impl Objective,
+    b: &mut Vec<f64>,
+    scale: f64,
+    newton: &Newton,
+    deadline: Deadline,
+) -> Result<Stationary, Error> {
     newton.check()?;
     let blocks = objective.blocks();
-    let mut b = start.to_vec();
     // Counts evaluations without derivatives; those with derivatives equal the iterations.
     let mut values = 0;
     let mut last_step = f64::INFINITY;
@@ -157,7 +167,7 @@ pub fn climb(
         if deadline.is_over() {
             return Err(not_converged(iteration - 1, last_step));
         }
-        let here = objective.derivatives(&b);
+        let here = objective.derivatives(b);
         let unit = objective.unit(here.value);
         let eigen = SymmetricEigen::new(here.hessian);
         let along = eigen.eigenvectors.transpose() * &here.gradient;
@@ -183,11 +193,11 @@ pub fn climb(
                 last_step = f64::INFINITY;
                 let top = eigen.eigenvectors.column(eigen.eigenvalues.imax());
                 let off = top * (0.05 * scale / top.amax());
-                b = moved(&b, &off, &blocks, |_| true).ok_or_else(|| not_converged(iteration, longest))?;
+                *b = moved(b, &off, &blocks, |_| true).ok_or_else(|| not_converged(iteration, longest))?;
                 continue;
             }
             return Ok(Stationary {
-                point: b,
+                point: b.clone(),
                 value: here.value,
                 largest_curvature,
                 certificate,
@@ -197,11 +207,11 @@ pub fn climb(
         }
         last_step = longest;
         let floor = here.value - SLACK * unit;
-        let accepted = moved(&b, &step, &blocks, |trial| {
+        let accepted = moved(b, &step, &blocks, |trial| {
             values += usize::from(!trusted);
             trusted || objective.value(trial) >= floor
         });
-        b = accepted.ok_or_else(|| not_converged(iteration, longest))?;
+        *b = accepted.ok_or_else(|| not_converged(iteration, longest))?;
     }
     Err(not_converged(newton.max_iterations, last_step))
 }

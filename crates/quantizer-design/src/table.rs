@@ -1,10 +1,10 @@
 //! The table of joint outcomes of a system, for inspection and for decisions.
 
-use crate::compositions::rank;
 use crate::criterion::most_probable;
 use crate::error::{Error, refuse};
 use crate::law::Reports;
 use crate::observation_model::ObservationModel;
+use crate::outcomes::counts::rank;
 use crate::system::System;
 use fewbits_numerics::error::entries;
 

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use fewbits_core::Link;
-use fewbits_quantizer_design::solve::Watch;
+use fewbits_quantizer_design::solve::{MAX_BITS, Watch};
 use fewbits_quantizer_design::{Adc, AllowedCells, BitBudget, Noise, ObservationModel, Prior, Request, Solutions};
 use std::time::Duration;
 
@@ -81,10 +81,8 @@ impl Task {
 }
 
 /// Number of different values up to which a sample is taken to be points of mass, and how often each must occur on average.
-const MOST_POINTS: usize = 16;
-const LEAST_TIMES: usize = 8;
-/// Bits of the longest word whose cells the search improves.
-const LONGEST_WORD: u32 = 6;
+const MAX_POINTS: usize = 16;
+const MIN_TIMES: usize = 8;
 
 /// Breakpoints of a sensor, and the word of each cell.
 type WordedCells = (Vec<f64>, Vec<usize>);
@@ -102,7 +100,7 @@ impl Task {
         let mut points: Vec<(f64, f64)> = values.iter().copied().zip(probabilities.iter().copied()).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let cells = |sensor: usize| {
-            let bits = bits(sensor).filter(|bits| (1..=LONGEST_WORD).contains(bits))?;
+            let bits = bits(sensor).filter(|bits| (1..=MAX_BITS).contains(bits))?;
             let breakpoints = parted(&points, 1 << bits);
             // Neighbours differ in one bit.
             let words = (0..=breakpoints.len()).map(|cell| cell ^ (cell >> 1)).collect();
@@ -224,11 +222,11 @@ pub fn prior_of(sample: &[f64]) -> Result<Prior, Error> {
             Some((known, count)) if *known == value => *count += 1,
             _ => points.push((value, 1)),
         }
-        if points.len() > MOST_POINTS {
+        if points.len() > MAX_POINTS {
             break;
         }
     }
-    let are_points = (2..=MOST_POINTS).contains(&points.len()) && sample.len() >= LEAST_TIMES * points.len();
+    let are_points = (2..=MAX_POINTS).contains(&points.len()) && sample.len() >= MIN_TIMES * points.len();
     if are_points && sample.iter().all(|value| value.is_finite()) {
         let shares = points
             .iter()

@@ -2,11 +2,12 @@
 
 use crate::Error;
 use fewbits_binary_patterns::{
-    Bank, BinaryQuantizer, CellGrid, IMPOSSIBLE, Nodes, PatternSensor, Source, Threshold, gray_basis, linear_pattern,
+    Bank, BinaryQuantizer, CellGrid, Nodes, PatternSensor, Source, Threshold, gray_basis, linear_pattern,
 };
 use fewbits_core::Observation;
 use fewbits_numerics::error::{entries, positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_quantizer_design::outcomes::{Feature, Table, explained, moments};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of sensors: there are `2^N` cells.
@@ -29,8 +30,8 @@ pub struct CodedSensors {
     quantizers: Vec<BinaryQuantizer>,
     /// Nodes on `[0, V]`, since the code is symmetric except for its first bit.
     pub(crate) nodes: Nodes,
-    /// `[P0, P1]` at the nodes: `[bit][sensor][value]`.
-    pub(crate) probability: Vec<Vec<[Vec<f64>; 2]>>,
+    /// Probabilities of the bit's two values at the nodes: `[bit][sensor]`.
+    pub(crate) probability: Vec<Vec<Table>>,
 }
 
 /// The stored form of [`CodedSensors`].
@@ -97,18 +98,13 @@ impl CodedSensors {
         // The problem is symmetric about zero: half of the axis is used with twice the weight.
         let mut nodes = Nodes::adapted(&source, 0.0, half_width, &thresholds, PANEL, gauss_legendre::<12>());
         nodes.w.iter_mut().for_each(|w| *w *= 2.0);
-        let probability: Vec<Vec<[Vec<f64>; 2]>> = quantizers
-            .iter()
-            .map(|quantizer| {
-                noise_deviations
-                    .iter()
-                    .map(|&noise| {
-                        let p = quantizer.probabilities_at(&nodes.x, noise);
-                        [p.iter().map(|p| p[0]).collect(), p.iter().map(|p| p[1]).collect()]
-                    })
-                    .collect()
-            })
-            .collect();
+        let of = |q: &BinaryQuantizer| {
+            noise_deviations
+                .iter()
+                .map(|noise| q.probabilities_at(&nodes.x, *noise))
+                .collect()
+        };
+        let probability = quantizers.iter().map(of).collect();
         Ok(Self {
             source,
             half_width,
@@ -159,39 +155,20 @@ impl CodedSensors {
     /// If the assignment is not a permutation.
     pub fn mmse(&self, assignment: &[usize]) -> Result<f64, Error> {
         check_permutation(assignment, self.sensors())?;
-        let mut levels = vec![self.nodes.w.clone(); self.sensors()];
-        // The nodes cover one side, with the weight of both.
-        levels[0].iter_mut().for_each(|w| *w *= 0.5);
-        Ok(self.source.variance() - self.explained(assignment, 1, &mut levels))
+        // The first bit last, so that its two values are neighbours.
+        let tables: Vec<&Table> = (1..self.sensors())
+            .chain([0])
+            .map(|bit| &self.probability[bit][assignment[bit]])
+            .collect();
+        let sums = moments(&tables, &self.features());
+        Ok(self.source.variance() - sums.chunks_exact(4).map(explained_by_pair).sum::<f64>())
     }
 
-    /// `sum M1^2/M0` over the outcomes of the bits from `bit` on, given `w p(x) P(bits 1, ..., bit - 1|x)`. Bit 0 is processed last.
-    ///
-    /// Reflecting `x` inverts bit 0 and no other, so its two values are mirror images, and one side of the axis is enough.
-    fn explained(&self, assignment: &[usize], bit: usize, levels: &mut [Vec<f64>]) -> f64 {
-        let (own, below) = levels.split_at_mut(1);
-        if bit == assignment.len() {
-            let [zero, one] = &self.probability[0][assignment[0]];
-            let (mut mass, mut moment) = (0.0, 0.0);
-            for (((w, x), zero), one) in own[0].iter().zip(&self.nodes.x).zip(zero).zip(one) {
-                mass += w * (zero + one);
-                moment += w * x * (zero - one);
-            }
-            // The first bit is the sign; both of its outcomes explain the same variance.
-            return if mass > IMPOSSIBLE {
-                2.0 * moment * moment / mass
-            } else {
-                0.0
-            };
-        }
-        let mut explained = 0.0;
-        for p in &self.probability[bit][assignment[bit]] {
-            for ((child, w), p) in below[0].iter_mut().zip(&own[0]).zip(p) {
-                *child = w * p;
-            }
-            explained += self.explained(assignment, bit + 1, below);
-        }
-        explained
+    /// Weights of probability and first moment. The nodes cover one side, with the weight of both.
+    pub(crate) fn features(&self) -> [Feature; 2] {
+        let mass: Vec<f64> = self.nodes.w.iter().map(|w| 0.5 * w).collect();
+        let moment = mass.iter().zip(&self.nodes.x).map(|(w, x)| w * x).collect();
+        [Feature::of_all(mass), Feature::of_all(moment)]
     }
 
     /// Exact error of the decoder that reads the Gray bits as a cell index and returns the cell's centre. Takes `O(N)` per node.
@@ -240,7 +217,8 @@ impl CodedSensors {
     /// One step of the recursion of [`centre_mse`](Self::centre_mse).
     #[inline]
     pub(crate) fn push_bit(&self, bit: usize, sensor: usize, (m1, m2): &Moments, next: &mut Moments) {
-        let [p0, p1] = &self.probability[bit][sensor];
+        let p = &self.probability[bit][sensor];
+        let (p0, p1) = (p.row(0), p.row(1));
         let from = m1.iter().zip(m2).zip(p0.iter().zip(p1));
         for (((m1, m2), (p0, p1)), (next1, next2)) in from.zip(next.0.iter_mut().zip(&mut next.1)) {
             *next2 = 0.25 + 0.5 * m1 + 0.25 * m2;
@@ -256,6 +234,12 @@ impl CodedSensors {
         }
         sum
     }
+}
+
+/// What an outcome of the other bits explains, given probability and first moment with the first bit 0 and with it 1, from one side of the
+/// axis. Reflecting `x` inverts the first bit and no other, so the two values are mirror images and explain the same.
+pub(crate) fn explained_by_pair(sums: &[f64]) -> f64 {
+    2.0 * explained(sums[0] + sums[2], sums[1] - sums[3])
 }
 
 /// An error if `assignment` is not a permutation of `0..size`.

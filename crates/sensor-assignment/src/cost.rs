@@ -61,7 +61,7 @@ pub fn pair_costs(sensors: &CodedSensors) -> CostMatrix {
 }
 
 /// One entry of [`pair_costs`].
-pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
+fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
     let (bits, v) = (sensors.sensors(), sensors.half_width());
     let quantizer = &sensors.quantizers()[bit];
     let noise = sensors.noise_deviations()[sensor];
@@ -90,8 +90,8 @@ pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
     let probabilities = quantizer.probabilities_at(&points, noise);
     let cost: f64 = weights
         .iter()
-        .zip(&probabilities)
-        .map(|((wrong, w), p)| w * p[*wrong])
+        .enumerate()
+        .map(|(i, (wrong, w))| w * probabilities.row(*wrong)[i])
         .sum();
     cost / v
 }

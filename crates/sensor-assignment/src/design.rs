@@ -8,14 +8,11 @@ use fewbits_core::Link;
 use fewbits_quantizer_design::{AllowedCells, BitBudget, ObservationModel, Request};
 
 /// Breakpoints of a sensor, and the word of each cell.
-pub type BitCells = (Vec<f64>, Vec<usize>);
+type BitCells = (Vec<f64>, Vec<usize>);
 
 /// For each sensor, breakpoints and words of the Gray bit that it sends in the best linear assignment, for a
 /// uniform unknown with the prior's mean and variance.
-///
-/// # Errors
-/// If there are more than 16 sensors.
-pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
+fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
     let half_width = 3f64.sqrt() * model.prior().deviation();
     let deviations: Vec<f64> = (0..model.sensors()).map(|n| model.noise().deviation(n)).collect();
     let sensors = CodedSensors::with_deviations(half_width, &deviations)?;
@@ -30,8 +27,8 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
     Ok(cells)
 }
 
-/// A request for the estimate from one bit per sensor, with [`bit_cells`] as an additional start. Set further options on it
-/// and run it.
+/// A request for the estimate from one bit per sensor. An additional start is the Gray bit that each sensor sends in the best linear
+/// assignment for a uniform unknown of the prior's mean and variance. Set further options on the request and run it.
 ///
 /// ```
 /// use fewbits_core::Link;
@@ -44,7 +41,7 @@ pub fn bit_cells(model: &ObservationModel) -> Result<Vec<BitCells>, Error> {
 /// ```
 ///
 /// # Errors
-/// As [`bit_cells`].
+/// If there are more than 16 sensors.
 pub fn bit_per_sensor(model: ObservationModel, link: Link) -> Result<Request<'static>, Error> {
     let cells = bit_cells(&model)?;
     Request::estimation(model, BitBudget::Each(1), link)

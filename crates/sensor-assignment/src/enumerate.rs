@@ -1,10 +1,10 @@
 //! Errors of all assignments for small `N`, and local search for larger `N`.
 
 use super::CodedSensors;
-use super::coded::Moments;
+use super::coded::{Moments, explained_by_pair};
 use crate::Error;
-use fewbits_binary_patterns::IMPOSSIBLE;
 use fewbits_numerics::error::refuse;
+use fewbits_quantizer_design::outcomes::Table;
 use nalgebra::DMatrix;
 
 /// Largest number of sensors for enumeration; 10! is 3.6 million.
@@ -172,61 +172,57 @@ fn centre_tree(
 /// All orders of some sensors over consecutive bits.
 struct Half {
     orders: Vec<Vec<usize>>,
-    /// `P(outcome|x)`: one row per order and outcome, one column per node.
-    rows: DMatrix<f64>,
+    /// `P(outcome|x)`: one column per order and outcome, one row per node.
+    columns: DMatrix<f64>,
 }
 
 impl Half {
-    fn new(sensors: &CodedSensors, members: &[usize], first_bit: usize) -> Self {
-        let mut orders = Vec::new();
-        for_permutations(members.len(), |p| orders.push(p.iter().map(|&i| members[i]).collect::<Vec<_>>()));
-        let outcomes = 1usize << members.len();
-        let rows = DMatrix::from_fn(orders.len() * outcomes, sensors.nodes.len(), |row, node| {
-            let (order, outcome) = (&orders[row / outcomes], row % outcomes);
-            order
-                .iter()
-                .enumerate()
-                .map(|(at, &sensor)| sensors.probability[first_bit + at][sensor][outcome >> at & 1][node])
-                .product()
+    fn new(sensors: &CodedSensors, members: &[usize], bits: std::ops::Range<usize>) -> Self {
+        let (mut orders, mut values) = (Vec::new(), Vec::new());
+        let nodes = sensors.nodes.len();
+        for_permutations(members.len(), |p| {
+            let order: Vec<usize> = p.iter().map(|&i| members[i]).collect();
+            let own = bits
+                .clone()
+                .zip(&order)
+                .map(|(bit, &sensor)| &sensors.probability[bit][sensor]);
+            values.extend_from_slice(
+                own.fold(Table::new(vec![1.0; nodes], nodes), |all, own| all.outer(own))
+                    .values(),
+            );
+            orders.push(order);
         });
-        Self { orders, rows }
+        let columns = DMatrix::from_vec(nodes, values.len() / nodes, values);
+        Self { orders, columns }
     }
 }
 
 fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
     let n = sensors.sensors();
     let coarse_bits = n.div_ceil(2);
-    let (coarse, fine) = (1usize << coarse_bits, 1usize << (n - coarse_bits));
-    let nodes = &sensors.nodes;
+    // Outcomes of the first half that differ in the first bit are as far apart as the rest has outcomes.
+    let (apart, fine) = (1usize << (coarse_bits - 1), 1usize << (n - coarse_bits));
     let variance = sensors.half_width() * sensors.half_width() / 3.0;
+    let features = sensors.features();
     for members in (0u32..1 << n).filter(|m| m.count_ones() as usize == coarse_bits) {
         let (chosen, others): (Vec<usize>, Vec<usize>) = (0..n).partition(|s| members >> s & 1 == 1);
-        let first = Half::new(sensors, &chosen, 0);
-        let second = Half::new(sensors, &others, coarse_bits);
-        let mut weighted = second.rows.transpose();
-        for (mut row, w) in weighted.row_iter_mut().zip(&nodes.w) {
-            // The nodes cover one side, with the weight of both.
-            row *= 0.5 * w;
-        }
-        // Probabilities of all joint outcomes and, below, their first moments: a row for each of the first half, a column for the second.
-        let mass = &first.rows * &weighted;
-        for (mut row, x) in weighted.row_iter_mut().zip(&nodes.x) {
-            row *= *x;
-        }
-        let moment = &first.rows * &weighted;
+        let first = Half::new(sensors, &chosen, 0..coarse_bits);
+        let second = Half::new(sensors, &others, coarse_bits..n);
+        // Probabilities and first moments of all joint outcomes: a row for each of the first half, a column for the second.
+        let [mass, moment] = features.each_ref().map(|feature| {
+            let mut weighted = first.columns.clone();
+            for (mut row, w) in weighted.row_iter_mut().zip(feature.weights()) {
+                row *= *w;
+            }
+            weighted.transpose() * &second.columns
+        });
         for (i, head) in first.orders.iter().enumerate() {
             for (j, tail) in second.orders.iter().enumerate() {
                 let mut explained = 0.0;
-                for a in (0..coarse).step_by(2) {
-                    for b in 0..fine {
-                        // Reflection inverts the first bit only, so outcomes a and a + 1 are mirror images of each other.
-                        let (at, image) = (i * coarse + a, i * coarse + a + 1);
-                        let to = j * fine + b;
-                        let m0 = mass[(at, to)] + mass[(image, to)];
-                        let m1 = moment[(at, to)] - moment[(image, to)];
-                        if m0 > IMPOSSIBLE {
-                            explained += 2.0 * m1 * m1 / m0;
-                        }
+                for a in 2 * i * apart..(2 * i + 1) * apart {
+                    for b in j * fine..(j + 1) * fine {
+                        let at = [(a, b), (a + apart, b)];
+                        explained += explained_by_pair(&[mass[at[0]], moment[at[0]], mass[at[1]], moment[at[1]]]);
                     }
                 }
                 let assignment: Vec<usize> = head.iter().chain(tail).copied().collect();

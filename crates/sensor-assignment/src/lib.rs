@@ -34,8 +34,8 @@ mod linear;
 mod setup;
 
 pub use coded::CodedSensors;
-pub use cost::{bit_error, flipped_estimate, pair_cost, pair_costs, quantization_error};
-pub use design::{BitCells, bit_cells, bit_per_sensor};
+pub use cost::{bit_error, flipped_estimate, pair_costs, quantization_error};
+pub use design::bit_per_sensor;
 pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, exchange};
 pub use fewbits_quantizer_design::Error;
 pub use linear::{CostMatrix, DualCertificate};

@@ -2,12 +2,12 @@
 
 use fewbits_binary_patterns::Error;
 use fewbits_binary_patterns::Nodes;
-use fewbits_binary_patterns::engine::CountTable;
 use fewbits_binary_patterns::engine::Kind;
 use fewbits_binary_patterns::engine::bits_in_range;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source, linear_pattern, natural_basis};
 use fewbits_numerics::error::{positive, refuse};
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_quantizer_design::outcomes::Table;
 
 /// The allocation of sensors to binary digits, for a uniform source.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,7 +117,7 @@ impl Luo {
 /// Probabilities that the majority of `count` bits is 0 and 1.
 fn votes(p: [f64; 2], count: usize) -> [f64; 2] {
     let mut votes = [0.0; 2];
-    for (k, row) in CountTable::from_probabilities(&[p], count).rows.iter().enumerate() {
+    for (k, row) in Table::new(p.to_vec(), 1).of_counts(count).iter().enumerate() {
         match (2 * k).cmp(&count) {
             std::cmp::Ordering::Less => votes[0] += row[0],
             std::cmp::Ordering::Greater => votes[1] += row[0],

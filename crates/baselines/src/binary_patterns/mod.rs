@@ -2,11 +2,16 @@
 //! recommended designs are in [`search`](fewbits_binary_patterns::search). All errors are computed exactly.
 
 mod adaptive;
+pub mod count;
+mod decoders;
+mod information;
 mod luo;
 mod multi_threshold;
 mod strategies;
 
 pub use adaptive::{AdaptiveErrors, AdaptiveRule, adaptive, bounded_mle};
+pub use decoders::Decoder;
+pub use information::printed_crlb;
 pub use luo::{Luo, LuoErrors};
 pub use multi_threshold::{MultiThreshold, multi_threshold_bound};
 pub use strategies::{by_information, tile};

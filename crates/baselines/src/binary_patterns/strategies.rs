@@ -1,7 +1,7 @@
 //! The thesis's substitutes for an exhaustive search.
 
+use super::information::mean_information;
 use fewbits_binary_patterns::Error;
-use fewbits_binary_patterns::bounds::mean_information;
 use fewbits_binary_patterns::engine::{grid_bits, sensors_of};
 use fewbits_binary_patterns::{Bank, CellGrid, Mask, Source};
 use fewbits_numerics::error::refuse;

@@ -16,8 +16,9 @@
 //! change. That objective is negative in common cases and depends on the unit of `x`, so mutual information
 //! is used here (errata). Edges are found by root search; decisions cell by cell on a fixed grid of `y` stop up to 10 % short.
 
+use super::gains::{LevelGains, single_sensor};
 use fewbits_numerics::newton;
-use fewbits_quantizer_design::engine::{LevelGains, dot, single_sensor};
+use fewbits_quantizer_design::outcomes::dot;
 use fewbits_quantizer_design::{AllowedCells, Criterion, Error, System};
 use fewbits_quantizers::Quantizer;
 

@@ -14,8 +14,9 @@
 //! all its quantizers, since the best cells are then intervals of the likelihood ratio. It is no global optimum for several sensors
 //! together: if their noise is correlated, there are many coordinate-wise optima.
 
+use super::gains::single_sensor;
 use fewbits_numerics::error::refuse;
-use fewbits_quantizer_design::engine::{interval_values, single_sensor};
+use fewbits_quantizer_design::engine::Problem;
 use fewbits_quantizer_design::{Criterion, Error, System};
 use fewbits_quantizers::Quantizer;
 
@@ -44,7 +45,8 @@ pub fn best_contiguous(
     }
     // Candidates must satisfy the same conditions as the breakpoints of a quantizer.
     Quantizer::new(candidates.to_vec())?;
-    let (cells, constant) = interval_values(system, group, criterion, candidates)?;
+    let problem = Problem::new(system, criterion, &[group])?;
+    let (cells, constant) = (problem.cell_values(candidates), problem.constant());
     let edges = candidates.len() + 2;
     let worth = |a: usize, b: usize| cells[a * edges + b];
 

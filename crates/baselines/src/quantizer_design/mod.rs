@@ -11,6 +11,7 @@
 
 mod alternating;
 mod dynamic_programme;
+mod gains;
 mod index_assignment;
 mod separation;
 mod symmetry;

@@ -98,7 +98,7 @@ struct Separated<'a> {
 
 impl Separated<'_> {
     fn distributions(&self, b: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        self.sensor.symbols(b).chunks_exact(2).map(|p| (p[0], p[1])).unzip()
+        self.sensor.symbols(b).iter().map(|p| (p[0], p[1])).unzip()
     }
 }
 
@@ -117,7 +117,7 @@ impl Objective for Separated<'_> {
         let n = b.len();
         let mut gradient = DVector::zeros(n);
         let mut hessian = DMatrix::zeros(n, n);
-        for (t, p) in self.sensor.symbols(b).chunks_exact(2).enumerate() {
+        for (t, p) in self.sensor.symbols(b).iter().enumerate() {
             let (slope, bend) = self.distance.bend(p[0], p[1]);
             for i in 0..n {
                 let c = self.sensor.exchange[i][t];

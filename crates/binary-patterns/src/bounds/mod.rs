@@ -1,11 +1,10 @@
-//! Lower bounds on the error of schemes with `N` bits, and one printed formula that is no bound.
+//! Lower bounds on the error of schemes with `N` bits.
 //!
 //! | quantity | function | valid for |
 //! |---|---|---|
 //! | optimal-weight van Trees bound of given sensors | [`optimal_weight_van_trees`] | every bank, both sources |
 //! | remote rate-distortion bound, `N` observations and bits | [`network_rate_distortion`] | every scheme |
 //! | exact centralised bound | [`centralised_bound`] | every scheme; the tightest of those for every scheme |
-//! | equation 5.13, "CRLB" | [`printed_crlb`] | Gaussian source only |
 //! | equations 5.12 and B.1 as printed | [`RemoteDistortion`] of one observation | one sensor only |
 
 mod centralised;
@@ -15,40 +14,3 @@ mod van_trees;
 pub use centralised::{centralised_bound, centralised_bound_of_levels};
 pub use rate_distortion::{ConditionalMean, RemoteDistortion, network_rate_distortion, remote_distortion};
 pub use van_trees::optimal_weight_van_trees;
-
-use crate::Bank;
-use crate::Error;
-use crate::observation::source::{Kind, Nodes};
-use fewbits_numerics::error::refuse;
-use fewbits_numerics::quadrature::gauss_legendre;
-
-/// Width of quadrature panels in noise standard deviations; the integrand, a quotient, is less smooth than the probabilities.
-const INFORMATION_PANEL: f64 = 0.5;
-
-/// Mean Fisher information `E[J(X)]` of the bits about the source.
-pub fn mean_information(bank: &Bank) -> f64 {
-    let reach = bank.source().reach();
-    Nodes::adapted(bank.source(), -reach, reach, &bank.thresholds(), INFORMATION_PANEL, gauss_legendre::<12>())
-        .expectation(|x| bank.fisher_information(x))
-}
-
-/// Equation 5.13: `1/(E[J] + J2)` with `J2 = 1/sigma_x^2` for a Gaussian source and 0 for a uniform one.
-///
-/// For a Gaussian source this is the van Trees bound with constant weight, hence valid. The density of a uniform source
-/// does not vanish at `+-V`, so with `J2 = 0` it is no bound, and the mean squared error can be smaller (three Gray
-/// bits at 0 dB: 0.198 against 0.382; erratum `binary-7`). It is provided because the thesis ranks patterns by it.
-///
-/// # Errors
-/// If the information is zero to machine precision, so that the quotient is not finite.
-pub fn printed_crlb(bank: &Bank) -> Result<f64, Error> {
-    let prior = match bank.source().kind() {
-        Kind::Uniform { .. } => 0.0,
-        Kind::Gaussian { deviation } => 1.0 / (deviation * deviation),
-    };
-    let information = mean_information(bank) + prior;
-    if information > 0.0 && (1.0 / information).is_finite() {
-        Ok(1.0 / information)
-    } else {
-        refuse("information", information, "information above 0")
-    }
-}

@@ -1,5 +1,6 @@
 //! Estimates for every outcome of a bank, as a table.
 
+use super::sums::squared_error;
 use crate::observation::source::Nodes;
 use crate::{Bank, Error};
 use fewbits_core::Observation;
@@ -13,8 +14,8 @@ const MAX_TABLE_SENSORS: usize = 24;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredTable")]
 pub struct LookupTable {
-    pub(crate) bank: Bank,
-    pub(crate) estimates: Vec<f64>,
+    bank: Bank,
+    estimates: Vec<f64>,
 }
 
 /// The stored form of [`LookupTable`].
@@ -29,13 +30,30 @@ impl TryFrom<StoredTable> for LookupTable {
     type Error = Error;
 
     fn try_from(StoredTable { bank, estimates }: StoredTable) -> Result<Self, Error> {
-        all_finite("estimates", &estimates)?;
-        entries("estimates", estimates.len(), bank.checked_outcomes()?)?;
-        Ok(LookupTable { bank, estimates })
+        LookupTable::new(bank, estimates)
     }
 }
 
 impl LookupTable {
+    /// The table of these estimates, one per outcome in the order of [`Bank::for_outcomes`].
+    ///
+    /// # Errors
+    /// If there are more than `2^26` outcomes, not one estimate per outcome, or one is not finite.
+    pub fn new(bank: Bank, estimates: Vec<f64>) -> Result<Self, Error> {
+        all_finite("estimates", &estimates)?;
+        entries("estimates", estimates.len(), bank.checked_outcomes()?)?;
+        Ok(Self { bank, estimates })
+    }
+
+    /// Exact mean squared error of the estimates.
+    pub fn mse(&self) -> f64 {
+        let nodes = self.bank.fine_nodes();
+        let mut error = 0.0;
+        self.bank
+            .for_outcomes(&nodes, |index, w| error += squared_error(w, &nodes.x, self.estimates[index]));
+        error
+    }
+
     /// The estimate from one observation per sensor. The sensors always report, so a missing bit carries no information. If one is missing,
     /// the estimate is the posterior mean given the others, for every decoder.
     ///
@@ -109,7 +127,7 @@ impl LookupTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BinaryQuantizer, Decoder, Source};
+    use crate::{BinaryQuantizer, Source};
 
     #[test]
     fn a_missing_bit_leaves_the_posterior_of_the_others() {
@@ -118,8 +136,8 @@ mod tests {
         let bank = |quantizers: Vec<BinaryQuantizer>| {
             Bank::homogeneous_with_deviation(Source::uniform(1.0).unwrap(), quantizers, 0.2).unwrap()
         };
-        let table = bank(all.clone()).table(Decoder::Mmse).unwrap();
-        let others = bank(all[..2].to_vec()).table(Decoder::Mmse).unwrap();
+        let table = bank(all.clone()).table().unwrap();
+        let others = bank(all[..2].to_vec()).table().unwrap();
         for bits in [[false, true], [true, true], [true, false]] {
             let mut seen = bits.map(Observation::Received).to_vec();
             seen.push(Observation::Lost);
@@ -139,8 +157,9 @@ mod tests {
         let quantizers = [vec![0.0], vec![-0.5, 0.5], vec![0.25]].map(|edges| BinaryQuantizer::new(edges).unwrap());
         let source = Source::uniform(1.0).unwrap();
         let bank = Bank::homogeneous_with_deviation(source, quantizers.to_vec(), 0.2).unwrap();
-        for decoder in [Decoder::Mmse, Decoder::ContinuousMap] {
-            let table = bank.table(decoder).unwrap();
+        let means = bank.table().unwrap();
+        let others = LookupTable::new(bank.clone(), means.estimates.iter().map(|e| 0.9 * e).collect()).unwrap();
+        for table in [means, others] {
             let mut average = 0.0;
             for word in 0..8 {
                 let bits = [word & 4 != 0, word & 2 != 0, word & 1 != 0];
@@ -159,7 +178,7 @@ mod tests {
                 assert_eq!(estimate, table.estimate(&bits).unwrap());
                 average += probability * error;
             }
-            let mse = bank.mse(decoder).unwrap();
+            let mse = table.mse();
             assert!((average / mse - 1.0).abs() < 1e-6, "{average} for {mse}");
         }
     }

@@ -2,9 +2,9 @@
 
 use crate::observation::source::{Nodes, Threshold};
 use crate::{BinaryQuantizer, Error, PatternSensor, Source};
-use fewbits_numerics::binomial;
 use fewbits_numerics::error::{at_least_one, entries};
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_quantizer_design::outcomes::{Table, for_each};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of outcomes that may be enumerated.
@@ -31,9 +31,9 @@ pub struct Bank {
 
 /// A group of exchangeable sensors.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Exchangeable {
-    pub sensor: PatternSensor,
-    pub count: usize,
+struct Exchangeable {
+    sensor: PatternSensor,
+    count: usize,
 }
 
 /// The stored form of [`Bank`].
@@ -119,8 +119,10 @@ impl Bank {
         &self.groups[self.membership[n]].sensor
     }
 
-    pub(crate) fn groups(&self) -> &[Exchangeable] {
-        &self.groups
+    /// One sensor of each group of exchangeable ones, and their number.
+    #[doc(hidden)]
+    pub fn groups(&self) -> impl ExactSizeIterator<Item = (&PatternSensor, usize)> {
+        self.groups.iter().map(|g| (&g.sensor, g.count))
     }
 
     /// Number of outcomes, `prod (count + 1)` over the groups; larger numbers are returned as `u128::MAX`.
@@ -130,18 +132,12 @@ impl Bank {
             .fold(1u128, |product, g| product.saturating_mul(g.count as u128 + 1))
     }
 
-    pub(crate) fn checked_outcomes(&self) -> Result<usize, Error> {
+    /// Number of outcomes; an error if there are too many to enumerate.
+    #[doc(hidden)]
+    pub fn checked_outcomes(&self) -> Result<usize, Error> {
         let outcomes = self.outcomes();
         Error::at_most("the table of outcomes", outcomes, MAX_OUTCOMES)?;
         Ok(outcomes as usize)
-    }
-
-    /// Smallest noise in the bank.
-    pub(crate) fn finest_noise(&self) -> f64 {
-        self.groups
-            .iter()
-            .map(|g| g.sensor.noise_deviation())
-            .fold(f64::INFINITY, f64::min)
     }
 
     /// Fisher information about `x` in all bits, `sum_n P1'^2 / (P0 P1)`.
@@ -159,7 +155,8 @@ impl Bank {
     }
 
     /// The same nodes for a part of the support.
-    pub(crate) fn nodes_between(&self, from: f64, to: f64) -> Nodes {
+    #[doc(hidden)]
+    pub fn nodes_between(&self, from: f64, to: f64) -> Nodes {
         Nodes::adapted(&self.source, from, to, &self.thresholds(), PANEL, gauss_legendre::<12>())
     }
 
@@ -173,18 +170,15 @@ impl Bank {
     }
 
     /// Enumerates all outcomes. `visit` gets the index of the counts (last group fastest) and `w p(x) P(outcome|x)` at the nodes.
-    pub fn for_outcomes(&self, nodes: &Nodes, mut visit: impl FnMut(usize, &[f64])) {
-        let table_of = |g: &Exchangeable| {
-            let p = g
-                .sensor
-                .quantizer()
-                .probabilities_at(&nodes.x, g.sensor.noise_deviation());
-            CountTable::from_probabilities(&p, g.count)
+    pub fn for_outcomes(&self, nodes: &Nodes, visit: impl FnMut(usize, &[f64])) {
+        let counts = |g: &Exchangeable| {
+            let quantizer = g.sensor.quantizer();
+            quantizer
+                .probabilities_at(&nodes.x, g.sensor.noise_deviation())
+                .of_counts(g.count)
         };
-        let tables: Vec<CountTable> = self.groups.iter().map(table_of).collect();
-        let mut levels = vec![vec![0.0; nodes.len()]; tables.len() + 1];
-        levels[0].copy_from_slice(&nodes.w);
-        descend(&tables, &mut levels, 0, &mut visit);
+        let tables: Vec<Table> = self.groups.iter().map(counts).collect();
+        for_each(&tables.iter().collect::<Vec<_>>(), &nodes.w, visit);
     }
 
     /// Index of the counts of a bit string; an error if its length is not the number of sensors.
@@ -200,67 +194,6 @@ impl Bank {
             .zip(&counts)
             .fold(0, |index, (g, k)| index * (g.count + 1) + k))
     }
-
-    /// Number of sensors that report 1 in each group, for an index of [`Self::for_outcomes`].
-    pub(crate) fn counts_at(&self, mut index: usize, counts: &mut Vec<usize>) {
-        counts.clear();
-        for g in self.groups.iter().rev() {
-            counts.push(index % (g.count + 1));
-            index /= g.count + 1;
-        }
-        counts.reverse();
-    }
-}
-
-fn descend(tables: &[CountTable], levels: &mut [Vec<f64>], index: usize, visit: &mut impl FnMut(usize, &[f64])) {
-    let Some((table, rest)) = tables.split_first() else {
-        visit(index, &levels[0]);
-        return;
-    };
-    for (k, row) in table.rows.iter().enumerate() {
-        let (parent, below) = levels.split_at_mut(1);
-        for ((child, w), p) in below[0].iter_mut().zip(&parent[0]).zip(row) {
-            *child = w * p;
-        }
-        descend(rest, below, index * table.rows.len() + k, visit);
-    }
-}
-
-/// `rows[k][i] = C(m, k) P1(x_i)^k P0(x_i)^(m-k)`.
-pub struct CountTable {
-    /// One row per count, one entry per node.
-    pub rows: Vec<Vec<f64>>,
-}
-
-/// For larger groups the binomial probabilities are computed in logarithms, so that powers and coefficients do not overflow.
-const LOG_COUNT: usize = 60;
-
-impl CountTable {
-    /// The table of `count` sensors whose bits have the probabilities `p` at the nodes.
-    pub fn from_probabilities(p: &[[f64; 2]], count: usize) -> Self {
-        // Row `k`: the probability that `k` of the sensors report 1.
-        let log_choose = binomial::log_row(count);
-        let rows = (0..=count)
-            .map(|k| {
-                let choose = log_choose[k].exp().round();
-                p.iter()
-                    .map(|&[p0, p1]| {
-                        if count <= LOG_COUNT {
-                            choose * p1.powi(k as i32) * p0.powi((count - k) as i32)
-                        } else {
-                            (log_choose[k] + times_log(k, p1) + times_log(count - k, p0)).exp()
-                        }
-                    })
-                    .collect()
-            })
-            .collect();
-        Self { rows }
-    }
-}
-
-/// `n ln p` with `0 ln 0 = 0`.
-fn times_log(n: usize, p: f64) -> f64 {
-    if n == 0 { 0.0 } else { n as f64 * p.ln() }
 }
 
 #[cfg(test)]
@@ -289,21 +222,6 @@ mod tests {
         assert_relative_eq!(total, 1.0, max_relative = 1e-13);
         assert_eq!(bank.index_of(&[true, false, true, true, false]).unwrap(), 2 * 3 + 1);
         assert!(bank.index_of(&[true]).is_err());
-        let mut counts = Vec::new();
-        bank.counts_at(7, &mut counts);
-        assert_eq!(counts, [2, 1]);
-    }
-
-    #[test]
-    fn binomials_stay_exact_and_finite() {
-        let p = [[0.75, 0.25], [0.0, 1.0], [1.0, 0.0]];
-        for count in [3, 50, 60, 61, 3000] {
-            let table = CountTable::from_probabilities(&p, count);
-            for i in 0..p.len() {
-                let sum: f64 = table.rows.iter().map(|row| row[i]).sum();
-                assert_relative_eq!(sum, 1.0, max_relative = 1e-9);
-            }
-        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::Error;
 use fewbits_numerics::error::{finite, positive, refuse};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::Rule;
+use fewbits_quantizer_design::Prior;
 use serde::{Deserialize, Serialize};
 
 /// A Gaussian source is integrated over this many standard deviations to either side; the rest is below `1e-18`.
@@ -28,6 +29,18 @@ impl TryFrom<Kind> for Source {
     fn try_from(kind: Kind) -> Result<Self, Error> {
         match kind {
             Kind::Uniform { half_width } => Self::uniform(half_width),
+            Kind::Gaussian { deviation } => Self::gaussian_with_deviation(deviation),
+        }
+    }
+}
+
+impl TryFrom<&Source> for Prior {
+    type Error = Error;
+
+    /// The same distribution, as the prior of a joint design.
+    fn try_from(source: &Source) -> Result<Self, Error> {
+        match source.kind {
+            Kind::Uniform { half_width } => Self::uniform(-half_width, half_width),
             Kind::Gaussian { deviation } => Self::gaussian_with_deviation(deviation),
         }
     }

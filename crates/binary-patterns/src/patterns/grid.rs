@@ -108,7 +108,8 @@ impl CellGrid {
     }
 
     /// Limits of cell `l`, restricted to the support of the source; `None` if the two do not overlap.
-    pub(crate) fn support(&self, cell: usize, source: &Source) -> Option<(f64, f64)> {
+    #[doc(hidden)]
+    pub fn support(&self, cell: usize, source: &Source) -> Option<(f64, f64)> {
         let reach = source.reach();
         let low = if cell == 0 {
             -reach

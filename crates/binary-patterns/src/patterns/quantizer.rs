@@ -2,8 +2,8 @@
 
 use crate::{CellGrid, Error};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::kernels;
 use fewbits_numerics::normal::{interval, log_interval, pdf};
+use fewbits_quantizer_design::outcomes::{Table, cell_probabilities};
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
@@ -60,20 +60,10 @@ impl BinaryQuantizer {
         mass
     }
 
-    /// [`probabilities`](Self::probabilities) at many points, in vector registers.
-    pub fn probabilities_at(&self, points: &[f64], noise_deviation: f64) -> Vec<[f64; 2]> {
-        let mut mass = vec![[0.0; 2]; points.len()];
-        let (mut edges, mut inside) = (vec![f64::NEG_INFINITY; points.len()], vec![0.0; points.len()]);
-        for (cell, t) in self.breakpoints().iter().copied().chain([f64::INFINITY]).enumerate() {
-            inside.copy_from_slice(&edges);
-            edges
-                .iter_mut()
-                .zip(points)
-                .for_each(|(edge, x)| *edge = (t - x) / noise_deviation);
-            kernels::interval(&mut inside, &edges);
-            mass.iter_mut().zip(&inside).for_each(|(mass, p)| mass[cell % 2] += p);
-        }
-        mass
+    /// [`probabilities`](Self::probabilities) at many points: a row for bit 0 and one for bit 1, a column per point.
+    pub fn probabilities_at(&self, points: &[f64], noise_deviation: f64) -> Table {
+        let cells = cell_probabilities(points, noise_deviation, self.breakpoints());
+        cells.mixed(2, |bit, cell| f64::from(cell % 2 == bit))
     }
 
     /// `[ln P(0|x), ln P(1|x)]`, finite for every finite `x`.
@@ -146,8 +136,10 @@ mod tests {
         let points: Vec<f64> = (-300..300).map(|i| 0.37 * f64::from(i)).collect();
         for noise in [1e-2, 0.7, 30.0] {
             let one_by_one: Vec<_> = points.iter().map(|x| quantizer.probabilities(*x, noise)).collect();
-            for (many, one) in quantizer.probabilities_at(&points, noise).iter().zip(&one_by_one) {
-                assert!((0..2).all(|bit| (many[bit] - one[bit]).abs() <= 1e-15 * one[bit] + f64::MIN_POSITIVE));
+            let many = quantizer.probabilities_at(&points, noise);
+            for (i, one) in one_by_one.iter().enumerate() {
+                let off = |bit: usize| (many.row(bit)[i] - one[bit]).abs();
+                assert!((0..2).all(|bit| off(bit) <= 1e-15 * one[bit] + f64::MIN_POSITIVE));
             }
         }
     }

@@ -2,11 +2,12 @@
 
 use super::outcomes::{Candidates, Outcomes};
 use crate::Error;
-use crate::observation::bank::{CountTable, MAX_OUTCOMES};
+use crate::observation::bank::MAX_OUTCOMES;
 use crate::{Bank, BinaryQuantizer, CellGrid, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive, refuse};
+use fewbits_quantizer_design::outcomes::Table;
 use nalgebra::DMatrix;
 use rand::RngExt;
 
@@ -151,8 +152,8 @@ struct Kernel<'a> {
     candidates: Candidates,
     /// Index of each sensor's noise among the distinct noises.
     class: Vec<usize>,
-    /// `[P0, P1]` of every noise class and candidate.
-    p: Vec<Vec<Vec<[f64; 2]>>>,
+    /// Probabilities of the bits for every noise class and candidate.
+    p: Vec<Vec<Table>>,
     /// For each noise class, a matrix with rows (candidate, bit, moment).
     products: Vec<DMatrix<f64>>,
 }
@@ -172,21 +173,17 @@ impl<'a> Kernel<'a> {
             .collect();
         // Tabulate every candidate's bit probabilities for each distinct noise, and their rows of the matrix product.
         let candidates = Candidates::new(&descent.source, &descent.candidates, &noises);
-        let of_noise = |noise: &f64| -> Vec<Vec<[f64; 2]>> {
+        let of_noise = |noise: &f64| -> Vec<Table> {
             let quantizers = descent.candidates.iter();
             quantizers
                 .map(|q| q.probabilities_at(&candidates.nodes.x, *noise))
                 .collect()
         };
-        let p: Vec<Vec<Vec<[f64; 2]>>> = noises.iter().map(of_noise).collect();
-        let product = |p: &Vec<Vec<[f64; 2]>>| {
-            let single: Vec<CountTable> = p.iter().map(|p| CountTable::from_probabilities(p, 1)).collect();
-            candidates.integrands(single.iter())
-        };
+        let p: Vec<Vec<Table>> = noises.iter().map(of_noise).collect();
         Self {
             descent,
             class,
-            products: p.iter().map(product).collect(),
+            products: p.iter().map(|p| candidates.integrands(p.iter())).collect(),
             p,
             candidates,
         }
@@ -238,8 +235,7 @@ impl<'a> Kernel<'a> {
         Error::at_most("the table of outcomes", outcomes, MAX_OUTCOMES)?;
         let mut others = Outcomes::new(&self.candidates.nodes.w);
         for (class, c, count) in groups {
-            let table = CountTable::from_probabilities(&self.p[class][c], count);
-            others = others.with(&table, self.candidates.flips[c]);
+            others = others.with(&self.p[class][c].of_counts(count), self.candidates.flips[c]);
         }
         let product = &self.products[self.class[n]];
         let sums = others.integrals(product);

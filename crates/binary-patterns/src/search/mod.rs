@@ -10,7 +10,6 @@
 mod descent;
 mod exhaustive;
 mod free;
-mod lbfgs;
 mod outcomes;
 
 pub use descent::{Descended, Descent};

@@ -1,9 +1,9 @@
 //! Probabilities of quantizers and joint outcomes at the nodes of a search.
 
-use crate::observation::bank::{CountTable, IMPOSSIBLE};
 use crate::observation::source::{Nodes, Threshold};
 use crate::{BinaryQuantizer, Source};
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_quantizer_design::outcomes::{Table, explained};
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, Matrix, Storage};
 
 /// Width of quadrature panels in a search, in noise standard deviations; errors of about `1e-10`.
@@ -11,8 +11,8 @@ pub(crate) const SEARCH_PANEL: f64 = 1.6;
 
 /// All outcomes of some groups of exchangeable sensors, at the nodes of a search.
 pub(crate) struct Outcomes {
-    /// `w p(x) P(outcome|x)`, one contiguous column per outcome.
-    pub(crate) w: Vec<f64>,
+    /// `w p(x) P(outcome|x)`, one row per outcome.
+    pub(crate) w: Table,
     /// For each outcome, the index of the one with the same probability under `-x`; used only if the problem is symmetric.
     pub(crate) mirror: Vec<usize>,
 }
@@ -21,24 +21,23 @@ impl Outcomes {
     /// The state before any sensor has reported.
     pub(crate) fn new(weights: &[f64]) -> Self {
         Self {
-            w: weights.to_vec(),
+            w: Table::new(weights.to_vec(), weights.len()),
             mirror: vec![0],
         }
     }
 
     /// Adds a group; `flips` says whether the reflection of `x` inverts its bits.
-    pub(crate) fn with(&self, group: &CountTable, flips: bool) -> Self {
-        let counts = group.rows.len();
-        let nodes = self.w.len() / self.mirror.len();
-        let mut w = Vec::with_capacity(self.w.len() * counts);
-        let mut mirror = Vec::with_capacity(self.mirror.len() * counts);
-        for (column, &image) in self.w.chunks_exact(nodes).zip(&self.mirror) {
-            for (k, row) in group.rows.iter().enumerate() {
-                w.extend(column.iter().zip(row).map(|(w, p)| w * p));
-                mirror.push(image * counts + if flips { counts - 1 - k } else { k });
-            }
+    pub(crate) fn with(&self, group: &Table, flips: bool) -> Self {
+        let counts = group.rows();
+        let image = |k: usize| if flips { counts - 1 - k } else { k };
+        let images = self
+            .mirror
+            .iter()
+            .flat_map(|m| (0..counts).map(move |k| m * counts + image(k)));
+        Self {
+            mirror: images.collect(),
+            w: self.w.outer(group),
         }
-        Self { w, mirror }
     }
 
     /// Integrals of every row of `functions` (values at the nodes) against every outcome: `functions x outcomes`, stored outcome by
@@ -46,7 +45,7 @@ impl Outcomes {
     pub(crate) fn integrals<S: Storage<f64, Dyn, Dyn>>(&self, functions: &Matrix<f64, Dyn, Dyn, S>) -> Vec<f64> {
         let (rows, outcomes) = (functions.nrows(), self.mirror.len());
         let mut sums = vec![0.0; rows * outcomes];
-        let w = DMatrixView::from_slice(&self.w, functions.ncols(), outcomes);
+        let w = DMatrixView::from_slice(self.w.values(), functions.ncols(), outcomes);
         DMatrixViewMut::from_slice(&mut sums, rows, outcomes).gemm(1.0, functions, &w, 0.0);
         sums
     }
@@ -85,8 +84,8 @@ impl Candidates {
     }
 
     /// For every table and count, two rows: the probability at the nodes, and the same times `x`.
-    pub(crate) fn integrands<'t>(&self, tables: impl Iterator<Item = &'t CountTable>) -> DMatrix<f64> {
-        let rows: Vec<&Vec<f64>> = tables.flat_map(|t| &t.rows).collect();
+    pub(crate) fn integrands<'t>(&self, tables: impl Iterator<Item = &'t Table>) -> DMatrix<f64> {
+        let rows: Vec<&[f64]> = tables.flat_map(Table::iter).collect();
         DMatrix::from_fn(2 * rows.len(), self.nodes.len(), |row, at| {
             let p = rows[row / 2][at];
             if row % 2 == 0 { p } else { p * self.nodes.x[at] }
@@ -103,7 +102,7 @@ impl Candidates {
         count: usize,
         candidate: usize,
     ) -> f64 {
-        let mut explained = 0.0;
+        let mut total = 0.0;
         for (outcome, &image) in outcomes.mirror.iter().enumerate() {
             for k in 0..=count {
                 let at = |outcome: usize, k: usize| outcome * rows + first + 2 * k;
@@ -116,11 +115,9 @@ impl Candidates {
                     mass += sums[there];
                     moment -= sums[there + 1];
                 }
-                if mass > IMPOSSIBLE {
-                    explained += moment * moment / mass;
-                }
+                total += explained(mass, moment);
             }
         }
-        explained
+        total
     }
 }

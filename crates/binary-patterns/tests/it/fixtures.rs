@@ -3,14 +3,15 @@
 use crate::entry::{Entry, check};
 use fewbits_baselines::binary_patterns::by_information;
 use fewbits_baselines::binary_patterns::{
-    AdaptiveErrors, AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound,
+    AdaptiveErrors, AdaptiveRule, Decoder, Luo, adaptive, count as printed_count, fixed_threshold,
+    multi_threshold_bound, printed_crlb,
 };
 use fewbits_binary_patterns::bounds::{
-    centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
+    centralised_bound, network_rate_distortion, optimal_weight_van_trees, remote_distortion,
 };
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet, free_breakpoints};
 use fewbits_binary_patterns::{
-    Bank, CellGrid, Decoder, Mask, Pattern, PatternSensor, Source, count, gray_basis, linear_pattern, natural_basis,
+    Bank, CellGrid, Mask, Pattern, PatternSensor, Source, count, gray_basis, linear_pattern, natural_basis,
 };
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -122,11 +123,11 @@ fn counts() {
         let sensors = e.inputs["N"].as_u64().unwrap_or(0) as usize;
         let name = e.id.split('.').nth(1).unwrap();
         let count = match name {
-            "omega1" => count::unordered_bases(bits),
-            "omega2_print" => count::printed_pattern_sets(bits, sensors),
+            "omega1" => printed_count::unordered_bases(bits),
+            "omega2_print" => printed_count::printed_pattern_sets(bits, sensors),
             "multisets" => count::full_rank_multisets(bits, sensors),
-            "labelings" => count::bijective_labelings(bits),
-            "labelings_mod_reflection" => count::bijective_labelings_up_to_reflection(bits),
+            "labelings" => printed_count::bijective_labelings(bits),
+            "labelings_mod_reflection" => printed_count::bijective_labelings_up_to_reflection(bits),
             "triples" => count::multisets(Pattern::all(8).unwrap().len() as u128, 3),
             other => panic!("unknown count {other}"),
         };
@@ -156,7 +157,7 @@ fn table_5_1() {
                 .iter()
                 .position(|s| s.masks == PRINTED_51)
                 .unwrap() as f64,
-            "t51.printed.dmap" => printed.mse(Decoder::DiscreteMap(&grid(3))).unwrap(),
+            "t51.printed.dmap" => Decoder::DiscreteMap(&grid(3)).mse(&printed).unwrap(),
             "t51.dmap_best.dmap" => {
                 // The best of all sets under this decoder; ties to the printed digits are not expected.
                 let best = search
@@ -164,10 +165,8 @@ fn table_5_1() {
                     .unwrap()
                     .iter()
                     .map(|set| MaskSet {
-                        mse: search
-                            .bank(&set.masks)
-                            .unwrap()
-                            .mse(Decoder::DiscreteMap(&grid(3)))
+                        mse: Decoder::DiscreteMap(&grid(3))
+                            .mse(&search.bank(&set.masks).unwrap())
                             .unwrap(),
                         masks: set.masks.clone(),
                     })
@@ -333,8 +332,8 @@ fn figure_5_8(e: &Entry) -> f64 {
     let parts: Vec<&str> = e.id.split('.').collect();
     match (parts[2], parts[3]) {
         ("mmse", _) => bank.mmse().unwrap(),
-        ("dmap", _) => bank.mse(Decoder::DiscreteMap(&grid)).unwrap(),
-        ("cmap", _) => bank.mse(Decoder::ContinuousMap).unwrap(),
+        ("dmap", _) => Decoder::DiscreteMap(&grid).mse(&bank).unwrap(),
+        ("cmap", _) => Decoder::ContinuousMap.mse(&bank).unwrap(),
         ("crlb", _) => printed_crlb(&bank).unwrap(),
         ("vt", _) => optimal_weight_van_trees(&bank).unwrap(),
         ("central8", _) => centralised_bound(&source, noise, 3).unwrap(),

@@ -2,7 +2,7 @@
 
 use fewbits_baselines::binary_patterns::bounded_mle;
 use fewbits_binary_patterns::bounds::{centralised_bound, remote_distortion};
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, Decoder, PatternSensor, Source};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, CellGrid, PatternSensor, Source};
 use fewbits_core::{Link, Observation, Scheme, factor::Factor, laws::wild};
 use proptest::prelude::*;
 
@@ -73,10 +73,10 @@ proptest! {
             let Ok(quantizer) = BinaryQuantizer::new(breakpoints) else { continue };
             let Ok(bank) = Bank::homogeneous_with_deviation(source, vec![quantizer; count], x[1]) else { continue };
             let seen: Vec<_> = (0..count).map(|i| if i == 0 { Observation::Received(true) } else { Observation::Nothing }).collect();
-            for number in [bank.mmse(), bank.mse(Decoder::Mmse), bank.posterior_mean(&seen), bank.posterior_squared_error(&seen, x[5])].into_iter().flatten() {
+            for number in [bank.mmse(), bank.table().map(|table| table.mse()), bank.posterior_mean(&seen), bank.posterior_squared_error(&seen, x[5])].into_iter().flatten() {
                 prop_assert!(!number.is_nan(), "{:?} {:?}", x, number);
             }
-            if let Ok(table) = bank.table(Decoder::Mmse) {
+            if let Ok(table) = bank.table() {
                 for number in [table.decode(&seen), table.conditional_error(x[5]).map(|e| e.0 + e.1)].into_iter().flatten() {
                     prop_assert!(!number.is_nan(), "{:?} {:?}", x, number);
                 }

@@ -2,7 +2,7 @@
 
 use super::{ERROR, SNR, Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
-use fewbits_binary_patterns::bounds::printed_crlb;
+use fewbits_baselines::binary_patterns::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 
 pub struct PrintedBounds;

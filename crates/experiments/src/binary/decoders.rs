@@ -2,10 +2,11 @@
 
 use super::{ERROR, SNR, Scene, each, sweep, swept};
 use crate::prelude::*;
+use fewbits_baselines::binary_patterns::{Decoder, printed_crlb};
 use fewbits_binary_patterns::bounds::{
-    centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
+    centralised_bound, network_rate_distortion, optimal_weight_van_trees, remote_distortion,
 };
-use fewbits_binary_patterns::{Decoder, gray_basis};
+use fewbits_binary_patterns::gray_basis;
 
 pub struct Decoders;
 
@@ -50,11 +51,11 @@ fn row(source: &'static str, snr_db: f64) -> Result<Row, Error> {
     Ok(Row {
         source,
         snr_db,
-        mmse: bank.mse(Decoder::Mmse)?,
-        cmap: bank.mse(Decoder::ContinuousMap)?,
-        dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
-        dmap_print: bank.mse(Decoder::PrintedDiscreteMap(&scene.grid))?,
-        dmap_exact: bank.mse(Decoder::ExactDivisionMap(&scene.grid))?,
+        mmse: Decoder::Mmse.mse(&bank)?,
+        cmap: Decoder::ContinuousMap.mse(&bank)?,
+        dmap: Decoder::DiscreteMap(&scene.grid).mse(&bank)?,
+        dmap_print: Decoder::PrintedDiscreteMap(&scene.grid).mse(&bank)?,
+        dmap_exact: Decoder::ExactDivisionMap(&scene.grid).mse(&bank)?,
         crlb: printed_crlb(&bank)?,
         vt: optimal_weight_van_trees(&bank)?,
         rd_print: remote_distortion(&scene.source, scene.noise)?.at(3.0)?,

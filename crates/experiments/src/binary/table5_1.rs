@@ -2,9 +2,11 @@
 
 use super::{Scene, pattern, pattern_panel};
 use crate::prelude::*;
-use fewbits_binary_patterns::bounds::{optimal_weight_van_trees, printed_crlb};
+use fewbits_baselines::binary_patterns::{Decoder, count, printed_crlb};
+use fewbits_binary_patterns::Mask;
+use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
+use fewbits_binary_patterns::count::full_rank_multisets;
 use fewbits_binary_patterns::search::MaskSet;
-use fewbits_binary_patterns::{Decoder, Mask, count};
 
 pub struct Table;
 
@@ -62,7 +64,7 @@ impl Figure for Table {
         let search = scene.search(p.printed.len())?;
         let ranking = search.ranking()?;
         let other = parallel::try_map(&ranking, |set| {
-            Ok::<_, Error>(search.bank(&set.masks)?.mse(Decoder::DiscreteMap(&scene.grid))?)
+            Ok::<_, Error>(Decoder::DiscreteMap(&scene.grid).mse(&search.bank(&set.masks)?)?)
         })?;
         let listed = ranking.iter().zip(&other).map(|(set, mse_dmap)| Listed {
             masks: joined(&set.masks, " "),
@@ -82,9 +84,9 @@ impl Figure for Table {
             Ok(Set {
                 set,
                 masks: joined(masks, " "),
-                mse_mmse: bank.mse(Decoder::Mmse)?,
-                mse_dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
-                mse_exact_dmap: bank.mse(Decoder::ExactDivisionMap(&scene.grid))?,
+                mse_mmse: Decoder::Mmse.mse(&bank)?,
+                mse_dmap: Decoder::DiscreteMap(&scene.grid).mse(&bank)?,
+                mse_exact_dmap: Decoder::ExactDivisionMap(&scene.grid).mse(&bank)?,
                 crlb: printed_crlb(&bank)?,
                 van_trees: optimal_weight_van_trees(&bank)?,
                 rank: place(&ranking, masks),
@@ -101,7 +103,7 @@ impl Figure for Table {
                 bits,
                 sensors,
                 printed: count::printed_pattern_sets(bits, sensors)? as f64,
-                exact: count::full_rank_multisets(bits, sensors)? as f64,
+                exact: full_rank_multisets(bits, sensors)? as f64,
                 with_gray: count::forced_basis_sets(bits, sensors)? as f64,
             })
         };

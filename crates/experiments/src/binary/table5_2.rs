@@ -2,7 +2,8 @@
 
 use super::{Scene, each, pattern, pattern_panel, sweep};
 use crate::prelude::*;
-use fewbits_binary_patterns::{Decoder, Pattern, check_separation, count, mask_of};
+use fewbits_baselines::binary_patterns::{Decoder, count};
+use fewbits_binary_patterns::{Pattern, check_separation, mask_of};
 
 pub struct Table;
 
@@ -75,7 +76,7 @@ fn labelings() -> Result<Vec<[Pattern; 3]>, Error> {
 fn over_gray(snr_db: f64, printed: &[Pattern]) -> Result<OverGray, Error> {
     let scene = Scene::gaussian(snr_db)?;
     let (ours, gray) = (scene.pattern_bank(printed)?, scene.bank(&[4, 6, 3])?);
-    let ratio = |decoder| Ok::<_, Error>(ours.mse(decoder)? / gray.mse(decoder)?);
+    let ratio = |decoder: Decoder<'_>| Ok::<_, Error>(decoder.mse(&ours)? / decoder.mse(&gray)?);
     Ok(OverGray {
         snr_db,
         mmse: ratio(Decoder::Mmse)?,
@@ -109,7 +110,7 @@ impl Figure for Table {
                 patterns: joined(&patterns, " "),
                 linear: patterns.iter().filter(|p| mask_of(p).is_some()).count(),
                 mse_mmse,
-                mse_dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
+                mse_dmap: Decoder::DiscreteMap(&scene.grid).mse(&bank)?,
                 rank: check_separation(&patterns).is_ok().then(better),
             })
         };

@@ -5,7 +5,7 @@ use super::worlds::{COEFFICIENT, Entry, PROCESS, SENSORS, World, member};
 use crate::prelude::Error;
 use fewbits_baselines::cfwmd::centre::CensoringEstimator;
 use fewbits_baselines::dymbo::centre::{ParallelEstimator, ScalarEstimator};
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, PatternSensor, Source};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{FullValue, Gaussian, LinearDynamics, Link, SensorNode};
@@ -137,7 +137,7 @@ pub fn of_scalar(world: &World<1, Ar1>) -> Result<Vec<Entry>, Error> {
     let edges: [&[f64]; SENSORS] = [&[0.0], &[-1.0, 1.0], &[0.0], &[-1.5, 0.0, 1.5]];
     let sensors = edges.into_iter().map(sensor).collect::<Result<Vec<_>, _>>()?;
     let source = Source::gaussian_with_deviation(deviation)?;
-    let bank = Bank::new(source, sensors.clone()).and_then(|bank| bank.table(Decoder::Mmse));
+    let bank = Bank::new(source, sensors.clone()).and_then(|bank| bank.table());
     let patterns = LookUp::of_patterns(SENSORS, bank?, deviation * deviation)?;
     all.push(world.of_estimator(("patterns-table", "K=4".to_owned()), untold(2), patterns, each(sensors)));
     Ok(all)

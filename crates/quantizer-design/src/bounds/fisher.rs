@@ -21,7 +21,7 @@ pub fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
     for g in 0..system.groups().len() {
         let entry = Active::new(system, g)?;
         let densities = entry.densities(entry.breakpoints()).0;
-        for (t, p) in entry.symbols(entry.breakpoints()).chunks_exact(nodes).enumerate() {
+        for (t, p) in entry.symbols(entry.breakpoints()).iter().enumerate() {
             for (k, total) in information.iter_mut().enumerate() {
                 // Raising x by an amount has the same effect as lowering all breakpoints by it.
                 let slope: f64 = entry.exchange.iter().zip(&densities).map(|(c, d)| c[t] * d[k]).sum();

@@ -2,8 +2,8 @@
 
 use crate::error::{Error, refuse};
 use crate::law::{Reports, symbol_tables};
-use crate::moments::{Table, dot};
-use crate::observation_model::{Feature, ObservationModel};
+use crate::observation_model::ObservationModel;
+use crate::outcomes::{Feature, Table, dot};
 use crate::system::System;
 use crate::table::{JointTable, Layout};
 use fewbits_core::Observation;

@@ -4,7 +4,7 @@ use super::apart::{Opposed, halved, opposed};
 use crate::criterion::Criterion;
 use crate::deadline::Deadline;
 use crate::error::{Error, refuse};
-use crate::newton::{AtSaddle, Certificate, Newton, Objective, climb};
+use crate::newton::{AtSaddle, Certificate, Newton, Objective, ascend, climb};
 use crate::problem::Problem;
 use crate::system::System;
 use fewbits_monte_carlo::Stream;
@@ -74,6 +74,20 @@ impl Design {
 /// [`Error::TooLarge`] and [`Error::Argument`] as [`System::value`].
 pub fn joint(system: &System, criterion: Criterion, newton: &Newton) -> Result<Design, Error> {
     joint_until(system, criterion, newton, Deadline::NEVER)
+}
+
+/// The system with the breakpoints that Newton's method reaches: those of [`joint`] if it converges, otherwise the best until then.
+///
+/// # Errors
+/// [`Error::TooLarge`] and [`Error::Argument`] as [`System::value`].
+pub fn improved(system: &System, criterion: Criterion, newton: &Newton) -> Result<System, Error> {
+    let all: Vec<usize> = (0..system.groups().len()).collect();
+    let problem = Problem::new(system, criterion, &all)?;
+    let mut point = problem.start();
+    match ascend(&problem, &mut point, breakpoint_scale(system, &all), newton, Deadline::NEVER) {
+        Ok(_) | Err(Error::NotConverged { .. }) => problem.system_at(&point),
+        Err(error) => Err(error),
+    }
 }
 
 /// As [`joint`]; [`Error::NotConverged`] if the time limit is reached first.

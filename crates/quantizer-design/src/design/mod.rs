@@ -4,4 +4,4 @@ mod apart;
 mod joint;
 
 pub(crate) use joint::joint_until;
-pub use joint::{Design, Scope, greedy, joint, multi_start, random_starts};
+pub use joint::{Design, Scope, greedy, improved, joint, multi_start, random_starts};

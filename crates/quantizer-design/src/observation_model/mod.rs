@@ -20,6 +20,7 @@ pub(crate) use resolution::Resolution;
 pub use sample::SampleFit;
 
 use crate::error::{Error, refuse};
+use crate::outcomes::Feature;
 use fewbits_numerics::normal;
 use nodes::PRIOR_STEP;
 use resolution::{NODE_LIMIT, grid, too_fine};
@@ -32,19 +33,6 @@ const FACTOR_REACH: f64 = 8.5;
 const ENTROPY_STEP: f64 = 0.2;
 /// The same for products of cell probabilities of two sensors, which are entire functions. With more sensors they are sharper.
 const PRODUCT_STEP: f64 = 0.4;
-
-/// Weights on a range of nodes: a linear functional of functions on the nodes.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Feature {
-    pub(crate) start: usize,
-    pub(crate) weights: Vec<f64>,
-}
-
-impl Feature {
-    pub(crate) fn of_all(weights: Vec<f64>) -> Self {
-        Self { start: 0, weights }
-    }
-}
 
 /// The prior of the unknown and the noise of all sensors, on quadrature nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -247,6 +235,12 @@ impl ObservationModel {
                 .collect(),
             deviation,
         )
+    }
+
+    /// `P(node | x_k)` for every value, for sums over nodes.
+    #[doc(hidden)]
+    pub fn given(&self) -> &[Feature] {
+        &self.given
     }
 
     /// Whether two sensors have the same noise.

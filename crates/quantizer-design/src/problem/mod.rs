@@ -16,18 +16,18 @@
 mod cells;
 mod second_order;
 
-use crate::axis::Axis;
 use crate::criterion::{Criterion, Scored};
 use crate::derivatives::Derivatives;
 use crate::error::Error;
 use crate::law::{Active, Slots, negative_entropy, sums};
-use crate::moments::{Table, dot, moments};
 use crate::newton::{Objective, split};
+use crate::outcomes::axis::Axis;
+use crate::outcomes::{Table, dot, moments};
 use crate::system::System;
 
 /// A criterion (signed so that larger is better) as a function of the breakpoints of the active groups.
 #[derive(Debug, Clone)]
-pub(crate) struct Problem<'a> {
+pub struct Problem<'a> {
     system: &'a System,
     scored: Scored,
     active: Vec<Active<'a>>,
@@ -71,7 +71,10 @@ impl Objective for Problem<'_> {
 
 impl<'a> Problem<'a> {
     /// The criterion over the breakpoints of the groups `active` (increasing indices, possibly none).
-    pub(crate) fn new(system: &'a System, criterion: Criterion, active: &[usize]) -> Result<Self, Error> {
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] for too many outcomes; [`Error::Argument`] if the criterion does not fit the prior.
+    pub fn new(system: &'a System, criterion: Criterion, active: &[usize]) -> Result<Self, Error> {
         system.check_outcomes()?;
         let model = system.model();
         let scored = Scored::new(criterion, model)?;
@@ -118,8 +121,8 @@ impl<'a> Problem<'a> {
     pub(crate) fn rarest_cell(&self, b: &[f64]) -> Option<(usize, usize, f64)> {
         let mass = &self.system.model().mass.weights;
         let cells = self.groups_at(b).into_iter().flat_map(|(a, b)| {
-            let cells = a.cells(b).into_iter().enumerate();
-            cells.map(move |(cell, p)| (a.index, cell, dot(&p, mass)))
+            let cells = a.cells(b);
+            (0..cells.rows()).map(move |cell| (a.index, cell, dot(cells.row(cell), mass)))
         });
         cells.min_by(|x, y| x.2.total_cmp(&y.2))
     }
@@ -134,7 +137,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Part of the criterion that does not depend on the active groups.
-    pub(crate) fn constant(&self) -> f64 {
+    pub fn constant(&self) -> f64 {
         self.constant + self.offset()
     }
 
@@ -143,7 +146,7 @@ impl<'a> Problem<'a> {
         self.scored.offset()
     }
 
-    fn entropy_share(&self, a: &Active<'_>, symbols: &[f64]) -> f64 {
+    fn entropy_share(&self, a: &Active<'_>, symbols: &Table) -> f64 {
         if self.scored.has_separable_entropy() {
             a.group.sensors().len() as f64 * negative_entropy(symbols, &self.system.model().mass.weights)
         } else {

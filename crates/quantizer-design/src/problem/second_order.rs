@@ -1,11 +1,11 @@
 //! Gradients and Hessians of a criterion.
 
 use super::{Problem, Slot};
-use crate::axis::{Axis, reduce, scatter, slice};
 use crate::criterion::LOG_FLOOR;
 use crate::derivatives::Derivatives;
 use crate::law::Active;
-use crate::moments::dot;
+use crate::outcomes::axis::{Axis, reduce, scatter, slice};
+use crate::outcomes::{Table, dot};
 use nalgebra::{DMatrix, DVector};
 
 impl Problem<'_> {
@@ -134,7 +134,7 @@ impl Problem<'_> {
     fn entropy_derivatives(
         &self,
         a: &Active<'_>,
-        symbols: &[f64],
+        symbols: &Table,
         densities: &[Vec<f64>],
         slopes: &[Vec<f64>],
     ) -> Derivatives {
@@ -148,7 +148,7 @@ impl Problem<'_> {
         for i in 0..n {
             worth.fill(0.0);
             for (t, c) in a.exchange[i].iter().enumerate().filter(|(_, c)| **c != 0.0) {
-                let p = &symbols[t * nodes..(t + 1) * nodes];
+                let p = symbols.row(t);
                 worth
                     .iter_mut()
                     .zip(p)
@@ -164,8 +164,7 @@ impl Problem<'_> {
                     if c * d == 0.0 {
                         continue;
                     }
-                    for k in 0..nodes {
-                        let p = symbols[t * nodes + k];
+                    for (k, p) in symbols.row(t).iter().copied().enumerate() {
                         if p > LOG_FLOOR {
                             term += c * d * mass[k] * densities[i][k] * (densities[j][k] / p);
                         }

@@ -3,7 +3,7 @@
 use super::solution::Solution;
 use crate::error::{Error, refuse};
 use crate::law::symbol_tables;
-use crate::moments::{Table, dot, moments};
+use crate::outcomes::{Table, dot, moments};
 use fewbits_numerics::error::entries;
 use nalgebra::{DMatrix, DVector};
 

@@ -7,10 +7,11 @@
 use crate::criterion::{Criterion, LOG_FLOOR, Scored};
 use crate::deadline::Deadline;
 use crate::error::Error;
-use crate::law::{cell_probabilities, negative_entropy};
-use crate::moments::{Table, dot, moments_until};
-use crate::observation_model::{Feature, ObservationModel, Resolution};
+use crate::law::negative_entropy;
+use crate::observation_model::{ObservationModel, Resolution};
+use crate::outcomes::{Feature, Table, add_scaled, cell_probabilities, dot, moments_until};
 use fewbits_numerics::kernels;
+use fewbits_quantizers::Channel;
 
 /// Half-width of the table of a sample, in its standard deviations.
 pub(super) const REACH: f64 = 4.5;
@@ -19,30 +20,11 @@ const PLACES: usize = 400;
 /// Assumed number of sweeps over the cells of a sensor per block, for estimates of the work.
 const SWEEPS: f64 = 5.0;
 
-/// Transition probabilities from sent words to received symbols, one row per symbol.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct WordLaw {
-    pub(super) words: usize,
-    pub(super) outputs: usize,
-    pub(super) transition: Vec<f64>,
-}
-
-impl WordLaw {
-    fn probability(&self, output: usize, word: usize) -> f64 {
-        self.transition[output * self.words + word]
-    }
-
-    /// Moments of the outcome "symbol `output` received", from the moments of each word, if word `w` is sent as `renamed[w]`.
-    fn mix(&self, output: usize, words: &[f64], renamed: &[usize], outcome: &mut [f64]) {
-        outcome.fill(0.0);
-        for (moments, word) in words.chunks_exact(outcome.len()).zip(renamed) {
-            add_scaled(outcome, self.probability(output, *word), moments);
-        }
-    }
-
-    /// Every word is sent as itself.
-    fn unchanged(&self) -> Vec<usize> {
-        (0..self.words).collect()
+/// Moments of the outcome "symbol `output` received", from the moments of each word, if word `w` is sent as `renamed[w]`.
+fn mix(law: &Channel, output: usize, words: &[f64], renamed: &[usize], outcome: &mut [f64]) {
+    outcome.fill(0.0);
+    for (moments, word) in words.chunks_exact(outcome.len()).zip(renamed) {
+        add_scaled(outcome, law.probability(output, *word), moments);
     }
 }
 
@@ -69,7 +51,8 @@ pub(super) type Words = Vec<usize>;
 pub(super) struct Landscape {
     scenarios: Vec<Scenario>,
     scored: Scored,
-    pub(super) laws: Vec<WordLaw>,
+    /// The channel from the words of each sensor to the received symbols.
+    pub(super) laws: Vec<Channel>,
     samples: Vec<Sample>,
 }
 
@@ -133,7 +116,7 @@ impl Landscape {
     pub(super) fn new(
         models: &[(f64, &ObservationModel)],
         criterion: Criterion,
-        laws: Vec<WordLaw>,
+        laws: Vec<Channel>,
         resolution: Resolution,
     ) -> Result<Self, Error> {
         let coarse = models
@@ -181,14 +164,14 @@ impl Landscape {
 
     /// Multiplications of one round over the sensors: their blocks, and the sweeps over cells and words.
     pub(super) fn work(&self, grid: usize) -> f64 {
-        let outcomes: f64 = self.laws.iter().map(|l| l.outputs as f64).product();
+        let outcomes: f64 = self.laws.iter().map(|l| l.outputs() as f64).product();
         let nodes: f64 = self
             .scenarios
             .iter()
             .map(|s| s.features.iter().map(|f| f.weights.len() as f64).sum::<f64>())
             .sum();
-        let sweeps = |l: &WordLaw| SWEEPS * (l.outputs * self.width()) as f64;
-        let block = |l: &WordLaw| outcomes / l.outputs as f64 * grid as f64 * (nodes + sweeps(l));
+        let sweeps = |l: &Channel| SWEEPS * (l.outputs() * self.width()) as f64;
+        let block = |l: &Channel| outcomes / l.outputs() as f64 * grid as f64 * (nodes + sweeps(l));
         self.laws.iter().map(block).sum()
     }
 
@@ -196,7 +179,7 @@ impl Landscape {
     pub(super) fn grid(&self, sensor: usize, edges: Vec<f64>) -> Grid {
         let cells = self.scenarios.iter().map(|scenario| {
             let (means, deviation) = scenario.model.sample_law(sensor);
-            Table::new(cell_probabilities(&means, deviation, &edges).concat(), means.len())
+            cell_probabilities(&means, deviation, &edges)
         });
         Grid {
             cells: cells.collect(),
@@ -220,18 +203,8 @@ impl Landscape {
     /// As [`symbols`](Self::symbols), in one scenario, given the probabilities of the grid's cells.
     fn symbols_in(&self, cells: &Table, sensor: usize, words: &[usize]) -> Table {
         let law = &self.laws[sensor];
-        let nodes = cells.nodes;
-        let mut levels = vec![0.0; law.words * nodes];
-        for (c, word) in words.iter().enumerate() {
-            add_scaled(&mut levels[word * nodes..(word + 1) * nodes], 1.0, cells.row(c));
-        }
-        let mut symbols = vec![0.0; law.outputs * nodes];
-        for (t, row) in symbols.chunks_exact_mut(nodes).enumerate() {
-            for (w, level) in levels.chunks_exact(nodes).enumerate() {
-                add_scaled(row, law.probability(t, w), level);
-            }
-        }
-        Table::new(symbols, nodes)
+        let levels = cells.mixed(law.inputs(), |w, c| f64::from(words[c] == w));
+        levels.mixed(law.outputs(), |t, w| law.probability(t, w))
     }
 
     /// The block of a sensor, given the symbols of all sensors (its own are not used); `None` if the time limit is reached first.
@@ -268,13 +241,13 @@ impl Landscape {
     /// The signed criterion, without constants and without the other sensors' part of the conditional entropy.
     pub(super) fn value(&self, block: &Block, grid: &Grid, words: &[usize]) -> f64 {
         let levels = self.levels(block, words);
-        let unchanged = self.laws[block.sensor].unchanged();
+        let unchanged: Words = (0..self.laws[block.sensor].inputs()).collect();
         self.value_of_levels(block, grid, &levels, words, &unchanged)
     }
 
     /// Moments of each word: `[other][word][feature]`.
     pub(super) fn levels(&self, block: &Block, words: &[usize]) -> Vec<f64> {
-        let (width, count) = (self.width(), self.laws[block.sensor].words);
+        let (width, count) = (self.width(), self.laws[block.sensor].inputs());
         let mut levels = vec![0.0; block.others * count * width];
         for other in 0..block.others {
             for (c, word) in words.iter().enumerate() {
@@ -299,9 +272,9 @@ impl Landscape {
         let mut outcome = vec![0.0; self.width()];
         let mut value = 0.0;
         // For every outcome of the other sensors, the link mixes the words to symbols, and each symbol has its value.
-        for other in levels.chunks_exact(law.words * self.width()) {
-            for t in 0..law.outputs {
-                law.mix(t, other, renamed, &mut outcome);
+        for other in levels.chunks_exact(law.inputs() * self.width()) {
+            for t in 0..law.outputs() {
+                mix(law, t, other, renamed, &mut outcome);
                 value += self.scored.value(&outcome, 0.0);
             }
         }
@@ -314,7 +287,7 @@ impl Landscape {
 
     /// Contribution of a sensor's symbols to the conditional entropy.
     fn own_entropy(&self, symbols: &Table) -> f64 {
-        negative_entropy(&symbols.values, &self.scenarios[0].model.mass.weights)
+        negative_entropy(symbols, &self.scenarios[0].model.mass.weights)
     }
 
     /// The value of a whole design; `None` if the time limit is reached first.
@@ -342,15 +315,15 @@ impl Landscape {
     /// Gain of each word for each grid cell, for a fixed decoder: `[cell][word]`.
     pub(super) fn worth(&self, block: &Block, grid: &Grid, words: &[usize]) -> Vec<f64> {
         let law = &self.laws[block.sensor];
-        let (width, count, outputs) = (self.width(), law.words, law.outputs);
+        let (width, count, outputs) = (self.width(), law.inputs(), law.outputs());
         let levels = self.levels(block, words);
         let mut per_symbol = vec![0.0; block.cells * outputs];
-        let unchanged = law.unchanged();
+        let unchanged: Words = (0..count).collect();
         let (mut outcome, mut slopes) = (vec![0.0; width], vec![0.0; outputs * width]);
         let cells = block.moments.chunks_exact(block.cells * width);
         for (own, cells) in levels.chunks_exact(count * width).zip(cells) {
             for (t, slope) in slopes.chunks_exact_mut(width).enumerate() {
-                law.mix(t, own, &unchanged, &mut outcome);
+                mix(law, t, own, &unchanged, &mut outcome);
                 // For a fixed decoder the criterion is linear in the outcome, and its slope gives the gain of a cell for each symbol.
                 self.scored.slope(&outcome, 0.0, slope);
             }
@@ -383,11 +356,5 @@ impl Landscape {
             }
         }
         worth
-    }
-}
-
-fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
-    if factor != 0.0 {
-        to.iter_mut().zip(from).for_each(|(t, f)| *t += factor * f);
     }
 }

@@ -1,6 +1,6 @@
 //! The sensors that take part in a design, their cells and words, and the system that they form.
 
-use super::landscape::{WordLaw, Words};
+use super::landscape::Words;
 use crate::error::Error;
 use crate::observation_model::ObservationModel;
 use crate::system::{SensorGroup, System};
@@ -29,21 +29,19 @@ impl Participant {
             .collect()
     }
 
-    /// Transition probabilities from words to received symbols: the words, and one more symbol "missing" if the link can lose words.
-    pub(super) fn law(&self) -> WordLaw {
-        let words = 1usize << self.bits;
+    /// The channel from words to received symbols: the words, and one more symbol "missing" if the link can lose words.
+    pub(super) fn law(&self) -> Result<Channel, Error> {
+        let words = 1u64 << self.bits;
+        let received = |t: u64| {
+            let arrives = |w: u64| self.link.arrival() * self.link.word_probability(w, t, self.bits);
+            (0..words).map(arrives).collect()
+        };
+        let mut rows: Vec<Vec<f64>> = (0..words).map(received).collect();
         let missing = missing(&self.link);
-        let arrives = |t: usize, w: usize| self.link.word_probability(w as u64, t as u64, self.bits);
-        let received = (0..words * words).map(|at| self.link.arrival() * arrives(at / words, at % words));
-        let mut transition: Vec<f64> = received.collect();
         if missing > 0.0 {
-            transition.resize(words * (words + 1), missing);
+            rows.push(vec![missing; words as usize]);
         }
-        WordLaw {
-            words,
-            outputs: transition.len() / words,
-            transition,
-        }
+        Channel::from_rows(&rows)
     }
 }
 
@@ -121,15 +119,16 @@ pub(super) fn system_of(
     cells: &[WordedCells],
     apart: bool,
 ) -> Result<System, Error> {
+    let laws = participants
+        .iter()
+        .map(Participant::law)
+        .collect::<Result<Vec<_>, _>>()?;
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for n in 0..participants.len() {
         // Sensors of equal design, link and noise form a group, whose outcomes are counts.
         let alike = groups.iter_mut().find(|group| {
             let first = group[0];
-            !apart
-                && cells[first] == cells[n]
-                && participants[first].law() == participants[n].law()
-                && model.interchangeable(first, n)
+            !apart && cells[first] == cells[n] && laws[first] == laws[n] && model.interchangeable(first, n)
         });
         match alike {
             Some(group) => group.push(n),
@@ -137,18 +136,14 @@ pub(super) fn system_of(
         }
     }
     let groups = groups.into_iter().map(|sensors| {
-        let (quantizer, channel) = parts_of(model, &participants[sensors[0]], &cells[sensors[0]])?;
+        let (quantizer, channel) = parts_of(model, &laws[sensors[0]], &cells[sensors[0]])?;
         SensorGroup::new(quantizer, channel, sensors)
     });
     System::new(model.clone(), groups.collect::<Result<_, _>>()?)
 }
 
 /// Quantizer and channel of one sensor. A sensor with a single cell gets a second cell with the same word.
-fn parts_of(
-    model: &ObservationModel,
-    participant: &Participant,
-    cells: &WordedCells,
-) -> Result<(Quantizer, Channel), Error> {
+fn parts_of(model: &ObservationModel, law: &Channel, cells: &WordedCells) -> Result<(Quantizer, Channel), Error> {
     let mut used: Vec<usize> = Vec::new();
     let mut labels: Vec<usize> = Vec::new();
     for word in &cells.words {
@@ -164,11 +159,7 @@ fn parts_of(
         used.push(used[0]);
         (labels, breakpoints) = (vec![0, 1], vec![model.sample_mean()]);
     }
-    let law = participant.law();
-    let rows: Vec<Vec<f64>> = law
-        .transition
-        .chunks_exact(law.words)
-        .map(|row| used.iter().map(|w| row[*w]).collect())
-        .collect();
+    let rows = (0..law.outputs()).map(|t| used.iter().map(|w| law.probability(t, *w)).collect());
+    let rows: Vec<Vec<f64>> = rows.collect();
     Ok((Quantizer::with_labels(breakpoints, labels)?, Channel::from_rows(&rows)?))
 }

@@ -1,7 +1,7 @@
 //! Designs for priors and noise that are not known exactly.
 
 use super::control::Control;
-use super::landscape::{Grid, Landscape, WordLaw};
+use super::landscape::{Grid, Landscape};
 use super::participant::{Participant, WordedCells};
 use super::request::Request;
 use super::search::{cells_of, climb, grid_with, refine, spacing};
@@ -165,7 +165,10 @@ pub fn minimax(
         .map(|[mean, deviation, noise]| varied(&centre, mean, 1.0 + deviation, 1.0 + noise))
         .collect::<Result<Vec<_>, _>>()?;
     let participants = nominal.participants();
-    let laws: Vec<WordLaw> = participants.iter().map(Participant::law).collect();
+    let laws = participants
+        .iter()
+        .map(Participant::law)
+        .collect::<Result<Vec<_>, _>>()?;
     let mut weights = vec![1.0 / models.len() as f64; models.len()];
     let weighted: Vec<(f64, &ObservationModel)> = weights.iter().copied().zip(&models).collect();
     let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws, Resolution::COARSE)?;

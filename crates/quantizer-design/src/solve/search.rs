@@ -21,7 +21,7 @@ use super::landscape::{Block, Grid, Landscape, REACH, Words};
 use super::participant::WordedCells;
 use crate::criterion::AllowedCells;
 use crate::deadline::Deadline;
-use crate::moments::Table;
+use crate::outcomes::Table;
 use fewbits_monte_carlo::Stream;
 use rand::RngExt;
 
@@ -102,7 +102,7 @@ pub(super) fn random_start(
     stream: Stream,
 ) -> Words {
     let mut rng = stream.rng();
-    let all = landscape.laws[sensor].words;
+    let all = landscape.laws[sensor].inputs();
     let count = rng.random_range((all / 2).max(2)..=all);
     let mut words: Vec<usize> = (0..all).collect();
     for i in (1..all).rev() {
@@ -287,7 +287,7 @@ impl Sensor<'_> {
     }
 
     fn best_words(&self, worth: &[f64]) -> Words {
-        let count = self.landscape.laws[self.block.sensor].words;
+        let count = self.landscape.laws[self.block.sensor].inputs();
         let rows = worth.chunks_exact(count).zip(&self.words);
         rows.map(|(row, own)| (0..count).fold(*own, |best, w| if row[w] > row[best] { w } else { best }))
             .collect()
@@ -295,7 +295,7 @@ impl Sensor<'_> {
 
     /// The best intervals with the words in their present order and at most one unused word inserted.
     fn best_intervals(&self, worth: &[f64]) -> Words {
-        let count = self.landscape.laws[self.block.sensor].words;
+        let count = self.landscape.laws[self.block.sensor].inputs();
         let order = WordedCells::of(&self.grid.edges, &self.words).words;
         let (mut best, mut words) = in_order(worth, count, &order);
         for unused in (0..count).filter(|w| !order.contains(w)) {
@@ -313,13 +313,13 @@ impl Sensor<'_> {
 
     fn exchange_work(&self) -> f64 {
         let law = &self.landscape.laws[self.block.sensor];
-        let pairs = (law.words * law.words) as f64 / 2.0;
-        pairs * (law.outputs * law.words) as f64 * (self.block.others * self.landscape.width()) as f64
+        let pairs = (law.inputs() * law.inputs()) as f64 / 2.0;
+        pairs * (law.outputs() * law.inputs()) as f64 * (self.block.others * self.landscape.width()) as f64
     }
 
     /// Exchanges two words if that is better, for all pairs.
     fn exchange_words(&mut self) {
-        let count = self.landscape.laws[self.block.sensor].words;
+        let count = self.landscape.laws[self.block.sensor].inputs();
         for _ in 0..MAX_SWEEPS {
             let levels = self.landscape.levels(self.block, &self.words);
             let used: Vec<bool> = (0..count).map(|w| self.words.contains(&w)).collect();

@@ -1,7 +1,7 @@
 //! The search over all sensors: single sensors first, then all together from several starts, then finer grids.
 
 use super::control::{Control, Stage};
-use super::landscape::{Grid, Landscape, WordLaw, Words};
+use super::landscape::{Grid, Landscape, Words};
 use super::participant::{Participant, WordedCells, gray, natural, plain, system_of};
 use super::polish;
 use super::search::{Point, best_of, cells_of, climb, gray_walk, grid_with, random_start, refine, spacing, start};
@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::observation_model::{ObservationModel, Resolution};
 use crate::system::OUTCOME_LIMIT;
 use fewbits_monte_carlo::Stream;
+use fewbits_quantizers::Channel;
 
 /// The joint search is left out if one round over the sensors needs more multiplications than this.
 const MAX_JOINT_WORK: f64 = 2e10;
@@ -60,10 +61,13 @@ pub(super) struct Search<'a> {
 impl Search<'_> {
     pub(super) fn run(&self, control: &mut Control<'_>) -> Result<Searched, Error> {
         let (model, participants) = (self.model, self.participants);
-        let laws: Vec<WordLaw> = participants.iter().map(Participant::law).collect();
+        let laws = participants
+            .iter()
+            .map(Participant::law)
+            .collect::<Result<Vec<_>, _>>()?;
         let singles = self.single_sensors(&laws, control)?;
         let mut first = singles.iter().map(|s| s[0].clone()).collect::<Vec<_>>();
-        let outcomes: f64 = laws.iter().map(|l| l.outputs as f64).product();
+        let outcomes: f64 = laws.iter().map(|l| l.outputs() as f64).product();
         if outcomes > OUTCOME_LIMIT as f64 {
             return Ok(Searched {
                 designs: vec![first],
@@ -90,7 +94,7 @@ impl Search<'_> {
             landscape = Landscape::new(&[(1.0, model)], self.criterion, laws, Resolution::ROUGH)?;
             work = landscape.work(largest(&cells));
             // If only few local searches are possible, the first one starts from the best design available.
-            first = self.best_at_hand(&rough, first, control)?;
+            first = self.best_at_hand(&rough, first, outcomes, control)?;
             search.given = self.given.or(Some(&first));
         }
         let points = if work > MAX_JOINT_WORK {
@@ -133,10 +137,10 @@ impl Search<'_> {
         &self,
         rough: &ObservationModel,
         design: Vec<WordedCells>,
+        outcomes: f64,
         control: &mut Control<'_>,
     ) -> Result<Vec<WordedCells>, Error> {
         let [gray, natural] = [gray, natural].map(|word| plain(self.model, self.participants, word));
-        let outcomes = self.participants.iter().map(|p| p.law().outputs as f64).product();
         let work = polish::evaluation_work(rough, self.criterion, outcomes);
         let mut best = (f64::NEG_INFINITY, design.clone());
         for cells in [design, gray?, natural?] {
@@ -224,7 +228,7 @@ impl Search<'_> {
     }
 
     /// The best designs of every sensor alone, best first.
-    fn single_sensors(&self, laws: &[WordLaw], control: &mut Control<'_>) -> Result<Vec<Vec<WordedCells>>, Error> {
+    fn single_sensors(&self, laws: &[Channel], control: &mut Control<'_>) -> Result<Vec<Vec<WordedCells>>, Error> {
         let (model, participants) = (self.model, self.participants);
         // The decision of a single sensor needs few levels only. Beside other sensors the information of its word matters.
         let criterion = match self.criterion {
@@ -278,7 +282,7 @@ impl Search<'_> {
             }
             1 | 2 => single_start(landscape, n, &grids[n], self.participants[n].bits, kind - 1, self.shape),
             5 => random_start(landscape, n, &grids[n], self.shape, stream(n, i)),
-            _ => start(landscape, n, &grids[n], &gray_walk(landscape.laws[n].words, stream(n, i))),
+            _ => start(landscape, n, &grids[n], &gray_walk(landscape.laws[n].inputs(), stream(n, i))),
         };
         (0..grids.len())
             .map(|n| match i {

@@ -1,7 +1,7 @@
 //! Groups of sensors with the same design.
 
-use crate::compositions::count;
 use crate::error::{Error, refuse};
+use crate::outcomes::counts::count;
 use fewbits_quantizers::{Channel, Quantizer};
 use serde::{Deserialize, Serialize};
 

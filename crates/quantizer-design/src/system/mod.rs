@@ -4,9 +4,9 @@ mod group;
 
 pub use group::SensorGroup;
 
-use crate::compositions::count;
 use crate::error::{Error, refuse};
 use crate::observation_model::ObservationModel;
+use crate::outcomes::counts::count;
 use fewbits_numerics::error::entries;
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
@@ -178,7 +178,7 @@ impl System {
     }
 
     /// Largest number of joint outcomes that a computation may enumerate.
-    pub fn outcome_limit(&self) -> u64 {
+    pub(crate) fn outcome_limit(&self) -> u64 {
         self.outcome_limit
     }
 

@@ -381,3 +381,15 @@ fn impossible_requests_are_named() {
         assert!(design.value.is_finite());
     }
 }
+
+/// The probabilities of single reports of so many sensors are below the smallest number; those of their counts are not.
+#[test]
+fn more_equal_sensors_have_less_error() {
+    let error = |sensors: usize| {
+        let model = ObservationModel::gaussian_with_deviations(1.0, &vec![1.0; sensors]).unwrap();
+        let system = System::identical(model, Quantizer::new(vec![0.0]).unwrap()).unwrap();
+        system.value(MSE).unwrap()
+    };
+    let errors = [10, 60, 61, 500, 1200].map(error);
+    assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
+}

@@ -1,6 +1,6 @@
 //! Random models, and multi-start Nelder-Mead on them.
 
-use super::nelder_mead::{Stopwatch, minimise};
+use super::nelder_mead::minimise;
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
 use fewbits_quantizer_design::solve::{BitBudget, Request, Solution, Solutions};
@@ -8,6 +8,7 @@ use fewbits_quantizer_design::{
     Channel, Criterion, Error, Labelling, Noise, ObservationModel, Prior, Quantizer, System, lloyd_max,
 };
 use rand::RngExt;
+use std::cell::Cell;
 use std::time::Duration;
 
 /// A model with its task.
@@ -61,20 +62,13 @@ pub fn task(i: u64, scale: f64, max_sensors: usize, max_bits: u32) -> Result<Tas
     })
 }
 
-/// Designs, and the processor time that they took.
-pub struct Found {
-    pub solutions: Solutions,
-    pub time: Duration,
-}
-
 impl Task {
     /// Squared error of a design on the full nodes.
     pub fn exact(&self, solution: &Solution) -> Result<f64, Error> {
         System::new(self.model.clone(), solution.system().groups().to_vec())?.value(Criterion::MeanSquaredError)
     }
 
-    pub fn solve(&self, limit: Option<Duration>) -> Result<Found, Box<dyn std::error::Error>> {
-        let watch = Stopwatch::start();
+    pub fn solve(&self, limit: Option<Duration>) -> Result<Solutions, Box<dyn std::error::Error>> {
         let mut request = Request::estimation(
             self.model.clone(),
             BitBudget::PerSensor(self.bits.clone()),
@@ -83,17 +77,14 @@ impl Task {
         if let Some(limit) = limit {
             request = request.with_time_limit(limit);
         }
-        Ok(Found {
-            solutions: request.run()?,
-            time: watch.elapsed(),
-        })
+        Ok(request.run()?)
     }
 
-    /// Least squared error that Nelder-Mead finds in the given processor time, from Lloyd-Max cells and random ones, with Gray and natural
-    /// words in turn.
-    pub fn nelder_mead(&self, time: Duration) -> Result<f64, Error> {
-        let watch = Stopwatch::start();
-        let is_over = || watch.elapsed() >= time;
+    /// Least squared error that Nelder-Mead finds until `is_over` holds of the number of its evaluations, from Lloyd-Max cells and random
+    /// ones, with Gray and natural words in turn.
+    pub fn nelder_mead(&self, is_over: &dyn Fn(usize) -> bool) -> Result<f64, Error> {
+        let evaluations = Cell::new(0);
+        let is_over = || is_over(evaluations.get());
         let mut best = f64::INFINITY;
         for start in 0.. {
             let mut rng = Stream::new(7).named("nelder-mead").indexed(start).rng();
@@ -119,6 +110,7 @@ impl Task {
             }
             let system = System::distinct(self.model.clone(), quantizers, channels)?;
             let mut error = |b: &[f64]| {
+                evaluations.set(evaluations.get() + 1);
                 let mut rest = b;
                 let own = self.bits.iter().map(|bits| {
                     let (head, tail) = rest.split_at((1 << bits) - 1);

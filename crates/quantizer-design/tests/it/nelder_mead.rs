@@ -1,37 +1,7 @@
 //! The simplex search of Nelder and Mead (1965), as a reference that knows nothing of quantizers.
 
-use std::time::{Duration, Instant};
-
-/// A span of time that the thread spends on the processor, or on the clock where the system does not tell.
-pub struct Stopwatch {
-    clock: Instant,
-    processor: Option<Duration>,
-}
-
-impl Stopwatch {
-    pub fn start() -> Self {
-        Self {
-            clock: Instant::now(),
-            processor: on_processor(),
-        }
-    }
-
-    pub fn elapsed(&self) -> Duration {
-        match (self.processor, on_processor()) {
-            (Some(start), Some(end)) => end.saturating_sub(start),
-            _ => self.clock.elapsed(),
-        }
-    }
-}
-
-/// Time of this thread on the processor so far.
-fn on_processor() -> Option<Duration> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    text.split(' ').next()?.parse().ok().map(Duration::from_nanos)
-}
-
-/// The least value found from `start` with first steps of size `step`, until the simplex is small or the time is
-/// over.
+/// The least value found from `start` with first steps of size `step`, until the simplex is small or the
+/// search is over.
 pub fn minimise(f: &mut dyn FnMut(&[f64]) -> f64, start: &[f64], step: f64, is_over: &dyn Fn() -> bool) -> f64 {
     let n = start.len();
     let mut simplex: Vec<(f64, Vec<f64>)> = vec![(f(start), start.to_vec())];

@@ -108,7 +108,7 @@ mod tests {
         let gray = gray_basis(3).unwrap();
         let all = search(3, 5, 4.0).ranking().unwrap();
         let forced = search(3, 5, 4.0).with_forced(&gray).unwrap().ranking().unwrap();
-        assert_eq!(forced.len() as u128, crate::patterns::count::forced_basis_sets(3, 5).unwrap());
+        assert_eq!(forced.len() as u128, crate::count::multisets(7, 2).unwrap());
         let expected = all.iter().find(|s| gray.iter().all(|g| s.masks.contains(g))).unwrap();
         assert_eq!(forced[0].masks, expected.masks);
         assert_relative_eq!(forced[0].mse, expected.mse, max_relative = 1e-12);

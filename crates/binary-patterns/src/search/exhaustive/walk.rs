@@ -1,10 +1,10 @@
 //! Search through the tree of all multisets of masks.
 
 use super::setting::{LinearSearch, MaskSet};
-use crate::observation::bank::CountTable;
 use crate::patterns::linear::Span;
 use crate::search::outcomes::{Candidates, Outcomes};
 use crate::{BinaryQuantizer, Error, Mask, linear_pattern};
+use fewbits_quantizer_design::outcomes::Table;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -65,7 +65,7 @@ pub(super) struct Walk<'a> {
     pub(super) candidates: Candidates,
     variance: f64,
     /// `tables[j][m - 1]`: probabilities of the counts of `m` sensors with mask `j + 1`.
-    tables: Vec<Vec<CountTable>>,
+    tables: Vec<Vec<Table>>,
     /// `leaves[r - 1]`: the integrands of all masks for `r` remaining sensors.
     leaves: Vec<DMatrix<f64>>,
     /// Number of sensors whose masks are required, from mask `j + 1` on.
@@ -81,10 +81,9 @@ impl<'a> Walk<'a> {
         let candidates = Candidates::new(&search.source, &quantizers, &[search.noise_deviation]);
         let tables_of = |quantizer: &BinaryQuantizer| {
             let p = quantizer.probabilities_at(&candidates.nodes.x, search.noise_deviation);
-            let counts = 1..=search.sensors;
-            counts.map(|count| CountTable::from_probabilities(&p, count)).collect()
+            (1..=search.sensors).map(|count| p.of_counts(count)).collect()
         };
-        let tables: Vec<Vec<CountTable>> = quantizers.iter().map(tables_of).collect();
+        let tables: Vec<Vec<Table>> = quantizers.iter().map(tables_of).collect();
         let leaves = (0..search.sensors)
             .map(|r| candidates.integrands(tables.iter().map(|t| &t[r])))
             .collect();

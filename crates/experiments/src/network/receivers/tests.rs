@@ -3,7 +3,7 @@
 use super::{Followers, LookUp, each};
 use fewbits_adaptive::{Config, Receiver as Following, Sensor};
 use fewbits_baselines::over_bits::{Estimator, OverBits};
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, PatternSensor, Source};
 use fewbits_core::factor::InCell;
 use fewbits_core::{Cell, Dynamics, Gaussian, Observation, Sensing, SensorNode};
 use fewbits_filters::{assumed_density, kalman};
@@ -93,7 +93,7 @@ fn patterns_have_the_variance_given_the_bits() {
     let variance = 2.0;
     let sensor = PatternSensor::with_deviation(BinaryQuantizer::new(vec![0.0]).unwrap(), 1.0).unwrap();
     let source = Source::gaussian_with_deviation(f64::sqrt(variance)).unwrap();
-    let table = Bank::new(source, vec![sensor]).unwrap().table(Decoder::Mmse).unwrap();
+    let table = Bank::new(source, vec![sensor]).unwrap().table().unwrap();
     let patterns = LookUp::of_patterns(1, table, variance).unwrap();
     let predicted = patterns.predict(1, &patterns.start()).unwrap();
     assert!((predicted.covariance()[0] - variance).abs() < 1e-12);

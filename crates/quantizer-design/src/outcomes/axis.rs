@@ -3,7 +3,7 @@
 //! A table holds a few moments for every joint outcome. The axis of a group runs over its count vectors. If a breakpoint moves, one report
 //! may change from one symbol to another. This relates a table over `N` reports to one over `N - 1`.
 
-use crate::compositions::Compositions;
+use super::counts::Compositions;
 
 /// Position of one group's axis in a table of joint outcomes: products of the sizes of the axes before and after it.
 #[derive(Clone, Copy)]

@@ -3,14 +3,11 @@
 //! For fixed scores of the decoder every criterion is linear in the sensor's decisions. The best level for a sample `y`
 //! is then the one with the largest of a few functions `D_z(y)`. The alternating algorithm uses this.
 
-use crate::criterion::{Criterion, LOG_FLOOR, Scored};
-use crate::error::{Error, refuse};
-use crate::law::{Active, log_likelihoods};
-use crate::moments::{Table, moments};
-use crate::observation_model::ObservationModel;
-use crate::problem::Problem;
-use crate::system::{SensorGroup, System};
-use fewbits_quantizers::Channel;
+use fewbits_numerics::error::refuse;
+use fewbits_quantizer_design::engine::{Active, LOG_FLOOR, Problem, log_likelihoods};
+use fewbits_quantizer_design::outcomes::{Table, moments};
+use fewbits_quantizer_design::system::SensorGroup;
+use fewbits_quantizer_design::{Channel, Criterion, Error, ObservationModel, System};
 
 /// Stands for the logarithm of probability zero. It is finite, so that a weight of zero removes it.
 const LOG_IMPOSSIBLE: f64 = -1e12;
@@ -20,10 +17,10 @@ const LOG_IMPOSSIBLE: f64 = -1e12;
 /// # Errors
 /// If there is no such group, or it has several sensors.
 pub fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Error> {
-    let entry = system.group(group)?;
-    match entry.sensors().len() {
-        1 => Ok(entry),
-        n => refuse("group", format!("{n} sensors"), "a group of a single sensor"),
+    match system.groups().get(group) {
+        Some(entry) if entry.sensors().len() == 1 => Ok(entry),
+        Some(entry) => refuse("group", format!("{} sensors", entry.sensors().len()), "a group of a single sensor"),
+        None => refuse("group", group, format!("a number below {}", system.groups().len())),
     }
 }
 
@@ -45,26 +42,27 @@ impl LevelGains {
     /// If the group is not a single sensor, there are too many outcomes, or the criterion does not fit the prior.
     pub fn new(system: &System, group: usize, criterion: Criterion) -> Result<Self, Error> {
         let entry = single_sensor(system, group)?;
-        system.check_outcomes()?;
-        Scored::new(criterion, system.model())?;
+        // Refuses a criterion that does not fit the prior, and too many outcomes.
+        Problem::new(system, criterion, &[])?;
         let (model, own) = (system.model(), Active::new(system, group)?);
         // Joint report probabilities of the other groups.
-        let nodes = model.nodes();
-        let mut others = Table::new(vec![1.0; nodes], nodes);
+        let nodes = own.means.len();
+        let (mut others, mut inner) = (Table::new(vec![1.0; nodes], nodes), 1);
         for index in (0..system.groups().len()).filter(|index| *index != group) {
             let other = Active::new(system, index)?;
-            others = others.outer(&other.reports(other.breakpoints()).0);
+            let reports = other.reports(other.breakpoints()).0;
+            inner *= if index > group { reports.rows() } else { 1 };
+            others = others.outer(&reports);
         }
-        let (channel, values) = (entry.channel(), model.values.len());
-        let (outputs, inner) = (channel.outputs(), system.groups()[group + 1..].iter().map(|g| g.outcomes() as usize));
-        let inner: usize = inner.product();
+        let (channel, values) = (entry.channel(), model.values().len());
+        let outputs = channel.outputs();
         // Log likelihoods, and the index of an outcome in their table.
-        let (logs, is_by_group) = if model.is_discrete() {
+        let (logs, is_by_group) = if model.prior().is_discrete() {
             // If hypotheses are far apart, the probability of a wrong symbol underflows, but its logarithm is needed.
             (log_likelihoods(system)?, true)
         } else {
-            let symbols = Table::new(own.symbols(own.breakpoints()), nodes);
-            let likelihood = moments(&[&others, &symbols], &model.given);
+            let symbols = own.symbols(own.breakpoints());
+            let likelihood = moments(&[&others, &symbols], model.given());
             (likelihood.iter().map(|q| q.max(LOG_FLOOR).ln()).collect(), false)
         };
         let gains = level_gains(model, criterion, &others, channel, |at| {
@@ -74,27 +72,11 @@ impl LevelGains {
             &logs[outcome * values..(outcome + 1) * values]
         });
         Ok(Self {
-            gains: (0..gains.rows()).map(|z| gains.row(z).to_vec()).collect(),
+            gains: gains.iter().map(<[f64]>::to_vec).collect(),
             means: own.means,
             deviation: own.deviation,
         })
     }
-}
-
-/// The contribution to the criterion of every interval between two of the edges `-inf, candidates, inf` of the single sensor in
-/// `group`, ideal channel: entry `a * edges + b` for the interval from edge `a` to edge `b`. Second, the part of the criterion that does
-/// not depend on the sensor.
-///
-/// # Errors
-/// If there are too many outcomes or the criterion does not fit the prior.
-pub fn interval_values(
-    system: &System,
-    group: usize,
-    criterion: Criterion,
-    candidates: &[f64],
-) -> Result<(Vec<f64>, f64), Error> {
-    let problem = Problem::new(system, criterion, &[group])?;
-    Ok((problem.cell_values(candidates), problem.constant()))
 }
 
 /// `lambda_z(node) = sum_k w_k P(node | x_k) sum_t' P(t' | node) sum_t C[t, z] score(t', t, x_k)`, levels by nodes.
@@ -109,7 +91,7 @@ fn level_gains<'a>(
     channel: &Channel,
     log_likelihood: impl Fn(usize) -> &'a [f64],
 ) -> Table {
-    let (nodes, values) = (model.nodes(), model.values.len());
+    let (nodes, values) = (others.nodes(), model.values().len());
     let mut per_symbol = vec![0.0; channel.outputs() * nodes];
     let mut score = vec![0.0; values];
     for at in 0..others.rows() * channel.outputs() {
@@ -117,24 +99,20 @@ fn level_gains<'a>(
         scores(model, criterion, log_likelihood(at), &mut score);
         let reports = others.row(other);
         let out = &mut per_symbol[symbol * nodes..(symbol + 1) * nodes];
-        for ((feature, w), s) in model.given.iter().zip(&model.weights).zip(&score) {
+        for ((feature, w), s) in model.given().iter().zip(model.weights()).zip(&score) {
             let factor = w * s;
-            for (i, p) in feature.weights.iter().enumerate() {
-                out[feature.start + i] += factor * p * reports[feature.start + i];
+            let range = feature.start()..feature.start() + feature.weights().len();
+            for ((out, p), report) in out[range.clone()]
+                .iter_mut()
+                .zip(feature.weights())
+                .zip(&reports[range])
+            {
+                *out += factor * p * report;
             }
         }
     }
     // The gain of a level is the mean gain of the symbols into which the channel turns it.
-    let mut gains = vec![0.0; channel.inputs() * nodes];
-    for (z, row) in gains.chunks_exact_mut(nodes).enumerate() {
-        for (t, symbol) in per_symbol.chunks_exact(nodes).enumerate() {
-            let c = channel.probability(t, z);
-            if c != 0.0 {
-                row.iter_mut().zip(symbol).for_each(|(r, s)| *r += c * s);
-            }
-        }
-    }
-    Table::new(gains, nodes)
+    Table::new(per_symbol, nodes).mixed(channel.inputs(), |z, t| channel.probability(t, z))
 }
 
 /// Score of the decoder for one outcome, for each value of the unknown.
@@ -148,7 +126,7 @@ fn scores(model: &ObservationModel, criterion: Criterion, log_likelihood: &[f64]
     }
     let relative = |l: &f64| (l - largest).exp();
     let total: f64 = model
-        .weights
+        .weights()
         .iter()
         .zip(log_likelihood)
         .map(|(w, l)| w * relative(l))
@@ -161,15 +139,17 @@ fn scores(model: &ObservationModel, criterion: Criterion, log_likelihood: &[f64]
             }
         }
         Criterion::MeanSquaredError => {
-            let terms = model.weights.iter().zip(&model.values).zip(log_likelihood);
-            let moment: f64 = terms.map(|((w, x), l)| w * (x - model.mean) * relative(l)).sum();
-            let mean = model.mean + if total > 0.0 { moment / total } else { 0.0 };
-            for (o, x) in out.iter_mut().zip(&model.values) {
+            let terms = model.weights().iter().zip(model.values()).zip(log_likelihood);
+            let moment: f64 = terms
+                .map(|((w, x), l)| w * (x - model.sample_mean()) * relative(l))
+                .sum();
+            let mean = model.sample_mean() + if total > 0.0 { moment / total } else { 0.0 };
+            for (o, x) in out.iter_mut().zip(model.values()) {
                 *o = -(x - mean) * (x - mean);
             }
         }
         Criterion::BayesError => {
-            let joint = |k: usize| model.weights[k].ln() + log_likelihood[k];
+            let joint = |k: usize| model.weights()[k].ln() + log_likelihood[k];
             let best = (1..out.len()).fold(0, |best, k| if joint(k) > joint(best) { k } else { best });
             for (k, o) in out.iter_mut().enumerate() {
                 *o = if k == best { 0.0 } else { -1.0 };
