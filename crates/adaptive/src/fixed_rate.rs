@@ -1,7 +1,7 @@
 //! A scheme with the same small number of bits in every slot.
 
 use crate::Error;
-use fewbits_core::factor::InCell;
+use fewbits_core::factor::Levels;
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Gaussian, Message, Observed};
 use fewbits_filters::{Imm, ImmBelief, ImmWorkspace};
 use fewbits_models::{LinearGaussian, LinearSensor};
@@ -23,7 +23,7 @@ const TURNS: usize = 4;
 ///
 /// Both ends run one interacting-multiple-model filter ([`Imm`]) of random walks and decaying velocities at scales
 /// `unit 4^-2 .. unit 4^2`. The cells have equal probability under its prediction. With one bit the threshold alternates between the
-/// quantiles one half, one tenth and nine tenths, because the median alone does not reveal the scale. A word is an [`InCell`] factor, and
+/// quantiles one half, one tenth and nine tenths, because the median alone does not reveal the scale. A word is a [`Levels`] factor, and
 /// the estimate is the filter's mean. There is no error bound: the scheme is for links that carry a fixed number of bits. On different
 /// machines the states may differ in the last digit; words then still have the same meaning. A deserialized scheme continues with the
 /// same bits.
@@ -225,7 +225,7 @@ impl FixedRate {
         let lower = i.checked_sub(1).and_then(|i| edges.get(i)).copied();
         let upper = edges.get(i).copied();
         let cell = Cell::new(lower.unwrap_or(f64::NEG_INFINITY), upper.unwrap_or(f64::INFINITY))?;
-        let observed = Observed::new(self.sensor, InCell::certain(cell, self.noise_variance)?);
+        let observed = Observed::new(self.sensor, Levels::certain(cell, self.noise_variance)?);
         self.filter
             .update_in_place(&mut predicted, &observed, &mut self.workspace)?;
         self.belief = predicted;

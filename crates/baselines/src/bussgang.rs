@@ -43,7 +43,7 @@ pub fn update<const D: usize, const M: usize>(
 #[cfg(test)]
 mod tests {
     use super::update;
-    use fewbits_core::factor::InCell;
+    use fewbits_core::factor::Levels;
     use fewbits_core::{Gaussian, Link, Sign, assumed_density};
     use nalgebra::{Matrix1, Matrix2, RowVector2, Vector1, Vector2};
 
@@ -58,7 +58,7 @@ mod tests {
         for sign in [Sign::Above, Sign::Below] {
             let found = update(&prior(), &row, &Matrix1::new(0.7), &Vector1::new(sign.value())).unwrap();
             let at = (row * prior().mean())[0];
-            let factor = InCell::sign(sign, at, 0.7, &Link::default()).unwrap();
+            let factor = Levels::sign(sign, at, 0.7, &Link::default()).unwrap();
             let (exact, _) = assumed_density::update(&prior(), &row, &factor).unwrap();
             assert!((found.mean() - exact.mean()).amax() < 1e-12);
             assert!((found.covariance() - exact.covariance()).amax() < 1e-12);

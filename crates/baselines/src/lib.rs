@@ -8,7 +8,7 @@
 //! | [`binary_patterns`] | other ways to send one bit per sensor, and substitutes for a search |
 //! | [`bussgang`] | signs of several sensors, by the linear estimator |
 //! | [`cfwmd`] | silence ignored, a random trigger, and withheld measurements imputed |
-//! | [`diffusive`] | Tierney and Kadane's ratios, and cumulants |
+//! | [`diffusive`] | polynomial Gaussians, particles and Laplace as messages; Tierney and Kadane's ratios, and cumulants |
 //! | [`dymbo`] | how normal the posterior of one bit is; successive bits of one sample |
 //! | [`handoff`] | bounds of the error after several hand-overs |
 //! | [`mixture_codec`] | the paper's reductions |

@@ -4,8 +4,8 @@ use crate::Error;
 use crate::ellipsoid::{EllipsoidMoments, GaussianInEllipsoid};
 use crate::rule::CensoringRule;
 use fewbits_core::columns::{lengths_agree, state_at};
-use fewbits_core::factor::{Constant, InCell, Partition, Product, Repeated, Scalar, Value, add_mapped};
-use fewbits_core::number::Levels;
+use fewbits_core::factor::{Levels, Product, Repeated, Value, add_mapped};
+use fewbits_core::number;
 use fewbits_core::{Cell, Columns, Factor, Gaussian, Link, Tilted};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::linalg::symmetrised;
@@ -178,14 +178,12 @@ pub struct MissingReports {
 /// | observation | scalar | vector |
 /// |---|---|---|
 /// | a value | [`Value`] | [`Value`] |
-/// | a value in fixed format | the cell of its level outside the interval of silence, [`InCell`] or [`Partition`] | |
-/// | nothing | [`InCell`]: the interval of silence, mixed with the loss of the link | an [`Ellipsoid`](crate::ellipsoid::Ellipsoid), mixed with the loss |
-/// | a report known to be lost | [`Partition`]: outside the interval of silence | outside the ellipsoid |
+/// | a value in fixed format | the cell of its level outside the interval of silence, [`Levels`] | |
+/// | nothing | [`Levels`]: the interval of silence, mixed with the loss of the link | an [`Ellipsoid`](crate::ellipsoid::Ellipsoid), mixed with the loss |
+/// | a report known to be lost | [`Levels`]: outside the interval of silence | outside the ellipsoid |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Censored<const M: usize> {
     kind: Kind<M>,
-    /// Added to every log likelihood.
-    log_scale: f64,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -197,10 +195,9 @@ enum Kind<const M: usize> {
 }
 
 impl<const M: usize> Censored<M> {
-    fn scalar(factor: Scalar) -> Self {
+    fn scalar(factor: Levels) -> Self {
         Self {
-            kind: Kind::Scalar(Product::from_iter([factor])),
-            log_scale: 0.0,
+            kind: Kind::Scalar(Product::from_iter([factor.into()])),
         }
     }
 
@@ -209,7 +206,7 @@ impl<const M: usize> Censored<M> {
     /// # Errors
     /// If `probability` is outside `[0, 1]`.
     pub fn constant(probability: f64) -> Result<Self, ArgumentError> {
-        Ok(Self::scalar(Constant::new(probability)?.into()))
+        Ok(Self::scalar(Levels::constant(probability)?))
     }
 
     /// The measurement itself, which arrives with probability `arrival`.
@@ -218,8 +215,7 @@ impl<const M: usize> Censored<M> {
     /// If a number is not finite or `R` not positive definite.
     pub fn value(value: &SVector<f64, M>, noise: &SMatrix<f64, M, M>, arrival: f64) -> Result<Self, ArgumentError> {
         Ok(Self {
-            kind: Kind::Value(Value::new(*value, *noise)?),
-            log_scale: arrival.ln(),
+            kind: Kind::Value(Value::new(*value, *noise)?.times_exp(arrival.ln())?),
         })
     }
 
@@ -232,12 +228,13 @@ impl<const M: usize> Censored<M> {
         let count = at_least_one("values", values.len())? as f64;
         let mean = values.iter().sum::<SVector<f64, M>>() / count;
         // The factor of the mean has the right shape. Its constant follows from both forms at one point, `m = mean`.
-        let mut all = Self::value(&mean, &(noise / count), 1.0)?;
+        let joint = Value::new(mean, noise / count)?;
         let single = Value::new(mean, *noise)?;
         let separate: f64 = values.iter().map(|z| single.log_likelihood(z)).sum();
-        let Kind::Value(joint) = &all.kind else { return Ok(all) };
-        all.log_scale = separate - joint.log_likelihood(&mean) + count * arrival.ln();
-        Ok(all)
+        let log_scale = separate - joint.log_likelihood(&mean) + count * arrival.ln();
+        Ok(Self {
+            kind: Kind::Value(joint.times_exp(log_scale)?),
+        })
     }
 
     /// Nothing arrived from `count` identical sensors. Each is silent by `rule` about `prediction`; its noise covariance is `R = noise`.
@@ -279,7 +276,6 @@ impl<const M: usize> Censored<M> {
             };
             return Ok(Self {
                 kind: Kind::Ellipsoid(Box::new(EllipsoidMissing::new(rule, prediction, noise, kind)?)),
-                log_scale: 0.0,
             });
         }
         fewbits_numerics::error::finite("prediction", prediction[0])?;
@@ -289,22 +285,21 @@ impl<const M: usize> Censored<M> {
         let mut product = Product::new();
         if reports.nothing > 0 {
             let factor = match cell {
-                Some(cell) => InCell::silence(cell, noise[(0, 0)], link)?.into(),
-                None => Constant::new(link.loss())?.into(),
+                Some(cell) => Levels::silence(cell, noise[(0, 0)], link)?,
+                None => Levels::constant(link.loss())?,
             };
-            product.push_repeated(Repeated::new(factor, reports.nothing)?);
+            product.push_repeated(Repeated::new(factor.into(), reports.nothing)?);
         }
         if reports.lost > 0 {
             let scale = link.lost_given_sent();
             let factor = match cell {
-                Some(cell) => Scalar::outside(&cell, noise[(0, 0)], scale)?,
-                None => Constant::new(scale)?.into(),
+                Some(cell) => Levels::outside(&cell, noise[(0, 0)], scale)?,
+                None => Levels::constant(scale)?,
             };
-            product.push_repeated(Repeated::new(factor, reports.lost)?);
+            product.push_repeated(Repeated::new(factor.into(), reports.lost)?);
         }
         Ok(Self {
             kind: Kind::Scalar(product),
-            log_scale: 0.0,
         })
     }
 
@@ -315,7 +310,7 @@ impl<const M: usize> Censored<M> {
     /// If a number is not finite, or the level's cell lies within the interval of silence.
     pub fn level(
         value: f64,
-        levels: &Levels,
+        levels: &number::Levels,
         rule: &CensoringRule<M>,
         prediction: f64,
         noise_variance: f64,
@@ -326,18 +321,18 @@ impl<const M: usize> Censored<M> {
         // The cell without the interval of silence consists of two pieces, one or none.
         let below = Cell::new(cell.lower(), cell.upper().min(low));
         let above = Cell::new(cell.lower().max(high), cell.upper());
-        let factor: Scalar = match (below, above) {
+        let factor = match (below, above) {
             // The rule censors nothing: the whole cell can have been sent.
-            _ if low >= high => InCell::new(cell, noise_variance, 0.0, arrival)?.into(),
+            _ if low >= high => Levels::new(cell, noise_variance, 0.0, arrival)?,
             (Ok(below), Ok(above)) => {
                 let edges = [below.lower(), below.upper(), above.lower(), above.upper()];
                 let shares = [0.0, arrival, 0.0, arrival, 0.0];
-                let inner = edges.iter().filter(|e| e.is_finite()).copied().collect();
+                let inner: Vec<f64> = edges.iter().filter(|e| e.is_finite()).copied().collect();
                 let from = usize::from(!edges[0].is_finite());
                 let to = shares.len() - usize::from(!edges[3].is_finite());
-                Partition::new(inner, shares[from..to].to_vec(), noise_variance)?.into()
+                Levels::partition(&inner, &shares[from..to], noise_variance)?
             }
-            (Ok(one), Err(_)) | (Err(_), Ok(one)) => InCell::new(one, noise_variance, 0.0, arrival)?.into(),
+            (Ok(one), Err(_)) | (Err(_), Ok(one)) => Levels::new(one, noise_variance, 0.0, arrival)?,
             (Err(_), Err(_)) => {
                 return Err(ArgumentError::new(
                     "report",
@@ -352,20 +347,16 @@ impl<const M: usize> Censored<M> {
 
 impl<const M: usize> Factor<M> for Censored<M> {
     fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
-        self.log_scale
-            + match &self.kind {
-                Kind::Value(factor) => factor.log_likelihood(m),
-                Kind::Ellipsoid(factor) => factor.log_likelihood(m),
-                Kind::Scalar(factor) => factor.log_likelihood(&[m[0]].into()),
-            }
+        match &self.kind {
+            Kind::Value(factor) => factor.log_likelihood(m),
+            Kind::Ellipsoid(factor) => factor.log_likelihood(m),
+            Kind::Scalar(factor) => factor.log_likelihood(&[m[0]].into()),
+        }
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
         if !lengths_agree(means, log_weights) {
             return;
-        }
-        if self.log_scale != 0.0 {
-            log_weights.iter_mut().for_each(|w| *w += self.log_scale);
         }
         match &self.kind {
             Kind::Value(factor) => factor.add_log_likelihoods(means, log_weights),
@@ -375,7 +366,7 @@ impl<const M: usize> Factor<M> for Censored<M> {
     }
 
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
-        let mut tilted = match &self.kind {
+        match &self.kind {
             Kind::Value(factor) => factor.tilted(prior),
             Kind::Ellipsoid(factor) => factor.tilted(prior),
             Kind::Scalar(factor) if M == 1 => {
@@ -389,12 +380,6 @@ impl<const M: usize> Factor<M> for Censored<M> {
             }
             // A factor without a component is a constant: it changes only the evidence.
             Kind::Scalar(factor) => Tilted::unchanged(prior, factor.log_likelihood(&[prior.mean()[0]].into())),
-        }?;
-        tilted.log_evidence += self.log_scale;
-        if !tilted.log_evidence.is_finite() {
-            let what = "the evidence of a censored value";
-            return Err(Error::unlikely_or_no_number(tilted.log_evidence, what));
         }
-        Ok(tilted)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p fewbits-core --example what_a_bit_is_worth`
 
-use fewbits_core::factor::{Factor, InCell};
+use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Message, Sign};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bit = Sign::of(0.8, 0.0)?;
     println!("a report of {} bit; the variance was 1", bit.to_bits(&())?.bits());
     for crossover in [0.0, 0.05, 0.2, 0.5] {
-        let factor = InCell::sign(bit, 0.0, 0.25, &Link::flipping(crossover)?)?;
+        let factor = Levels::sign(bit, 0.0, 0.25, &Link::flipping(crossover)?)?;
         let posterior = factor.tilted(&prior)?;
         println!(
             "inverted with probability {crossover:4}: mean {:6.3}, variance {:6.3}, probability {:.2}",

@@ -22,7 +22,7 @@
 //! parameter that must be integrated out) implements [`Likelihood`] itself.
 //!
 //! ```
-//! use fewbits_core::factor::{Factor, InCell};
+//! use fewbits_core::factor::{Factor, Levels};
 //! use fewbits_core::{Gaussian, Link, Message, Sign};
 //!
 //! // The sensor compares its sample with the broadcast prediction and reports one bit.
@@ -31,7 +31,7 @@
 //! assert_eq!(bit.to_bits(&())?.bits(), 1);
 //!
 //! // One bit in twenty arrives inverted. The factor says what the bit means; the posterior follows.
-//! let factor = InCell::sign(bit, prediction, noise_variance, &Link::flipping(0.05)?)?;
+//! let factor = Levels::sign(bit, prediction, noise_variance, &Link::flipping(0.05)?)?;
 //! let posterior = factor.tilted(&Gaussian::scalar(prediction, 1.0)?)?;
 //! assert!((posterior.log_evidence - 0.5_f64.ln()).abs() < 1e-12);
 //! assert!(posterior.mean[0] > prediction && posterior.covariance[0] < 1.0);
@@ -55,11 +55,13 @@ pub mod laws;
 pub mod likelihood;
 pub mod measurement_noise;
 pub mod message;
+pub mod noise;
 pub mod number;
 pub mod observation;
 pub mod observed;
 pub mod on_axes;
 pub mod points;
+pub mod quantized;
 pub mod scheme;
 pub mod sensing;
 pub mod sensor_node;
@@ -74,15 +76,17 @@ pub use error::Error;
 pub use evolution::Evolution;
 pub use factor::{Factor, Tilted};
 pub use fewbits_numerics::ArgumentError;
-pub use full_value::{FullValue, SentValue};
+pub use full_value::FullValue;
 pub use gaussian::{FactoredGaussian, Gaussian};
 pub use likelihood::{Evidence, Likelihood, LinearScalar};
 pub use measurement_noise::MeasurementNoise;
 pub use message::Message;
+pub use noise::{Noise, RangeNoise};
 pub use number::{NumberFormat, RoundedGaussian};
 pub use observation::{Link, Observation};
 pub use observed::Observed;
 pub use on_axes::OnAxes;
+pub use quantized::Quantized;
 pub use scheme::{Deterministic, Scheme};
 pub use sensing::{LinearSensing, Sensing};
 pub use sensor_node::{SchemeNode, SensorNode};

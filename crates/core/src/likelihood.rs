@@ -77,7 +77,7 @@ pub trait Likelihood<const D: usize>: Send + Sync {
         true
     }
 
-    /// The likelihood as a scalar factor of a linear measurement times a constant. Filters that impute measurements need it. `None` if
+    /// The likelihood as a scalar factor of a linear measurement. Filters that impute measurements need it. `None` if
     /// the sensor is not linear about `state`, or the factor is of another kind.
     fn as_linear_scalar(&self, _state: &SVector<f64, D>) -> Option<LinearScalar<D>> {
         None
@@ -102,7 +102,7 @@ impl Evidence {
     }
 }
 
-/// The likelihood `exp(log_scale) factor(h x)`, where the factor is that of a measurement `z = h x + w`, `w ~ N(0, r)`.
+/// The likelihood `factor(h x)`, where the factor is that of a measurement `z = h x + w`, `w ~ N(0, r)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearScalar<const D: usize> {
     /// Direction `h`.
@@ -111,8 +111,6 @@ pub struct LinearScalar<const D: usize> {
     pub noise_covariance: SMatrix<f64, 1, 1>,
     /// What was observed of `z`.
     pub factor: Scalar,
-    /// Logarithm of the constant that multiplies the factor.
-    pub log_scale: f64,
 }
 
 impl<const D: usize, L: Likelihood<D> + ?Sized> Likelihood<D> for &L {
@@ -278,8 +276,8 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
 
     fn as_constant(&self) -> Option<f64> {
         match self.factor.as_scalar()? {
-            (Scalar::Constant(factor), log_scale) => Some(factor.probability().ln() + log_scale),
-            _ => None,
+            Scalar::Levels(factor) => factor.as_constant(),
+            Scalar::Value(_) => None,
         }
     }
 
@@ -289,7 +287,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
     }
 
     fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<LinearScalar<D>> {
-        let (factor, log_scale) = self.factor.as_scalar().filter(|_| M == 1)?;
+        let factor = self.factor.as_scalar().filter(|_| M == 1)?;
         let jacobian = self.sensing.jacobian(state);
         let matrix = SMatrix::<f64, 1, D>::from_fn(|_, d| jacobian[(0, d)]);
         let (mean, noise) = (self.sensing.mean(state)[0], self.sensing.noise_covariance_at(state)[(0, 0)]);
@@ -300,7 +298,6 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
             matrix,
             noise_covariance: [[noise]].into(),
             factor,
-            log_scale,
         })
     }
 }

@@ -1,9 +1,9 @@
 //! The position that fits the samples best, without the posterior.
 
 use crate::SourceLikelihood;
-use crate::belief::SearchBox;
 use crate::density::{CellTarget, lattice, split};
 use crate::fit::Fit;
+use crate::search_box::SearchBox;
 use crate::target::Target;
 use nalgebra::Vector2;
 

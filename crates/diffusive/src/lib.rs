@@ -9,7 +9,7 @@
 //! | what sensors sample, and in which medium | [`SourceSensor`], any [`SourceModel`](fewbits_models::SourceModel) |
 //! | likelihood of the samples for a position, the rate integrated out | [`SourceLikelihood`], [`RateModel`], [`RateSums`] |
 //! | exact posterior of the position | [`Posterior`]: cells, refined until evidence and determinant have converged |
-//! | form of the messages: samples, a Gaussian, a mixture, polynomial Gaussians | [`Form`], [`project`] |
+//! | form of the messages: samples, a Gaussian, a mixture, or one that another crate adds | [`Form`], [`project`], [`form`] |
 //! | messages as bits | [`message`]: the next node knows only what it decodes |
 //! | choice of the next node | [`SelectionRule`], [`Selector`], [`information`] |
 //! | whether the model fits the samples | [`Fit`], [`Status::Misfit`] |
@@ -61,36 +61,50 @@
 //! Not here: several sources, sources that start and stop at unknown times, the medium itself
 //! ([`fewbits_models::diffusion`]), losses and delays of the radio (`fewbits-network`).
 
+mod added_density;
 mod belief;
 mod best_fit;
 mod chain;
 pub mod density;
 mod envelope;
 mod fit;
+pub mod form;
 pub mod information;
 mod likelihood;
 pub mod message;
 mod model_grid;
+mod packed;
 mod posterior;
 mod project;
 mod rate;
 mod record;
+mod search_box;
 mod select;
 mod sensor;
 mod target;
 mod walk;
 
-pub use belief::{JointBelief, PositionBelief, Prior, SearchBox, SentBelief};
+pub use belief::{JointBelief, PositionBelief, Prior, SentBelief, Travelling};
 pub use chain::{Action, Next, Outcome, Search, SearchField, SearchState, Status, Step};
 pub use envelope::Envelope;
 pub use fewbits_core::Error;
 pub use fit::Fit;
+pub use form::Form;
 pub use likelihood::SourceLikelihood;
 pub use model_grid::ModelGrid;
 pub use posterior::Posterior;
-pub use project::{Form, Travelling, project};
+pub use project::project;
 pub use rate::{RateModel, RateRange, RateSums};
 pub use record::Record;
+pub use search_box::SearchBox;
 pub use select::{SelectionRule, Selector};
 pub use sensor::SourceSensor;
 pub use walk::SourceChain;
+
+/// What `fewbits-baselines` needs of messages for its own forms.
+#[doc(hidden)]
+pub mod engine {
+    pub use crate::form::{check_components, gaussian_scalars};
+    pub use crate::message::{push_gaussian, read_gaussian};
+    pub use crate::search_box::bounds;
+}

@@ -1,9 +1,10 @@
 //! Messages between nodes: raw records or a belief, as bits.
 
-use crate::belief::SentBelief;
-use crate::density::Lpg;
+pub use crate::packed::PackedBelief;
+
+use crate::belief::{SentBelief, Travelling};
 use crate::fit::Fit;
-use crate::project::{COUNT_BITS, Travelling, gaussian_scalars, lpg_scalars};
+use crate::form::{COUNT_BITS, Form, MAX_COUNT, gaussian_scalars};
 use crate::{Error, Record, SourceSensor};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_densities::{Component, Mixture};
@@ -124,23 +125,6 @@ pub enum Packet {
     Belief(PackedBelief),
 }
 
-/// A belief as numbers, before encoding.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PackedBelief {
-    /// Number of components.
-    pub components: usize,
-    /// Degree of the polynomials; `None` for a mixture.
-    pub degree: Option<usize>,
-    /// Whether the rate is the third coordinate.
-    pub with_rate: bool,
-    /// Weights (of a mixture, all but the first), means and lower Cholesky factors, coefficients.
-    pub numbers: Vec<f64>,
-    /// Sum of squared residuals so far, rounded to single precision.
-    pub chi_squared: f64,
-    /// Number of samples in that sum.
-    pub samples: usize,
-}
-
 /// Bits of the number of records of a message.
 pub(crate) const RECORD_COUNT_BITS: u32 = 10;
 /// Bits of the number of samples so far; a larger number is sent as the largest.
@@ -161,13 +145,13 @@ impl Packet {
         let round = |numbers: Vec<f64>| -> Result<Vec<f64>, ArgumentError> {
             numbers.into_iter().map(|x| wire.numbers.rounded(x)).collect()
         };
-        let (components, degree, numbers) = match belief {
+        let (components, code, numbers) = match belief {
             Travelling::Position(belief) => numbers_of(belief),
             Travelling::WithRate(belief) => numbers_of(belief),
         };
         Ok(Self::Belief(PackedBelief {
             components,
-            degree,
+            code,
             with_rate: matches!(belief, Travelling::WithRate(_)),
             numbers: round(numbers)?,
             // A sum beyond single precision is sent as the largest number: both lead to refusal.
@@ -179,13 +163,14 @@ impl Packet {
     /// The belief that a packet of numbers holds, and the fit so far; `None` for raw records.
     ///
     /// # Errors
-    /// If the numbers are not a valid belief.
-    pub fn belief(&self) -> Result<Option<(Travelling, Fit)>, Error> {
+    /// If the numbers are not a valid belief of this form.
+    pub fn belief(&self, form: Form) -> Result<Option<(Travelling, Fit)>, Error> {
         let Self::Belief(packed) = self else { return Ok(None) };
-        let belief = if packed.with_rate {
-            Travelling::WithRate(belief_of(packed)?)
-        } else {
-            Travelling::Position(belief_of(packed)?)
+        let belief = match (packed.code, form) {
+            (Some(code), Form::Other(form)) => form.0.read(packed, code)?,
+            (Some(code), _) => return refuse("message", format!("code {code}"), "a mixture"),
+            (None, _) if packed.with_rate => Travelling::WithRate(SentBelief::Mixture(mixture_of(packed)?)),
+            (None, _) => Travelling::Position(SentBelief::Mixture(mixture_of(packed)?)),
         };
         let fit = Fit {
             chi_squared: non_negative("chi_squared", packed.chi_squared)?,
@@ -198,6 +183,8 @@ impl Packet {
 /// Format that both ends of a link agree on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contract {
+    /// Form of the beliefs.
+    pub form: Form,
     /// Encoding of beliefs and records.
     pub wire: Wire,
     /// Standard deviation of the sensors' noise.
@@ -209,8 +196,8 @@ pub struct Contract {
 impl Message for Packet {
     type Format = Contract;
 
-    /// One bit for the kind. Raw: the number of records (10 bits), and of each its index and samples. Belief: components and degree
-    /// (5 bits each, 31 for none), one bit for the rate, the numbers, and the fit so far (32 bits for the sum, 16 for the samples).
+    /// One bit for the kind. Raw: the number of records (10 bits), and of each its index and samples. Belief: components and the code
+    /// of another form (5 bits each, 31 for a mixture), one bit for the rate, the numbers, and the fit so far (32 bits for the sum, 16 for the samples).
     fn encode(&self, format: &Contract, writer: &mut BitWriter) -> Result<(), CodecError> {
         match self {
             Self::Raw(records) => {
@@ -227,8 +214,7 @@ impl Message for Packet {
             Self::Belief(belief) => {
                 writer.write_bit(true);
                 writer.write(belief.components as u64, COUNT_BITS)?;
-                // 31 stands for a mixture without polynomials.
-                writer.write(belief.degree.map_or(31, |d| d as u64), COUNT_BITS)?;
+                writer.write(belief.code.unwrap_or(MAX_COUNT) as u64, COUNT_BITS)?;
                 writer.write_bit(belief.with_rate);
                 for number in &belief.numbers {
                     format.wire.numbers.write(*number, writer)?;
@@ -255,19 +241,20 @@ impl Message for Packet {
             return Ok(Self::Raw(records));
         }
         let components = reader.read(COUNT_BITS)? as usize;
-        let degree = Some(reader.read(COUNT_BITS)? as usize).filter(|d| *d != 31);
+        let code = Some(reader.read(COUNT_BITS)? as usize).filter(|code| *code != MAX_COUNT);
         let with_rate = reader.read_bit()?;
-        let count = match degree {
-            Some(degree) => components * lpg_scalars(degree, with_rate),
+        let count = match (code, format.form) {
+            (Some(code), Form::Other(form)) => form.0.numbers(components, code, with_rate),
+            (Some(code), _) => return Err(CodecError::invalid("code", code, "31, a mixture")),
             // The first weight is not sent: they sum to one.
-            None => (components * (1 + gaussian_scalars(with_rate))).saturating_sub(1),
+            (None, _) => (components * (1 + gaussian_scalars(with_rate))).saturating_sub(1),
         };
         let numbers = (0..count)
             .map(|_| format.wire.numbers.read(reader))
             .collect::<Result<_, _>>()?;
         Ok(Self::Belief(PackedBelief {
             components,
-            degree,
+            code,
             with_rate,
             numbers,
             chi_squared: NumberFormat::Single.read(reader)?,
@@ -284,7 +271,7 @@ fn invalid(error: Error) -> CodecError {
     }
 }
 
-/// Number of components, degree and numbers of a belief.
+/// Number of components, code and numbers of a belief.
 fn numbers_of<const D: usize>(belief: &SentBelief<D>) -> (usize, Option<usize>, Vec<f64>) {
     let mut numbers = Vec::new();
     match belief {
@@ -293,48 +280,36 @@ fn numbers_of<const D: usize>(belief: &SentBelief<D>) -> (usize, Option<usize>, 
             mixture.components().iter().for_each(|c| push_gaussian(c, &mut numbers));
             (mixture.len(), None, numbers)
         }
-        SentBelief::Lpg(lpg) => {
-            lpg.gaussians().for_each(|c| push_gaussian(c, &mut numbers));
-            lpg.coefficients().for_each(|list| numbers.extend_from_slice(list));
-            (lpg.gaussians().count(), Some(lpg.degree()), numbers)
+        SentBelief::Other(density) => {
+            let (components, code, numbers) = density.numbers();
+            (components, Some(code), numbers)
         }
     }
 }
 
-fn belief_of<const D: usize>(packed: &PackedBelief) -> Result<SentBelief<D>, Error> {
-    let (count, degree, numbers) = (packed.components, packed.degree, &packed.numbers);
-    // A mixture sends all weights but the first; a series has none.
-    let weights = degree.map_or(count.saturating_sub(1), |_| 0).min(numbers.len());
-    let (weights, rest) = numbers.split_at(weights);
-    let size = gaussian_scalars(D == 3);
-    let (gaussians, coefficients) = rest.split_at(size.saturating_mul(count).min(rest.len()));
+fn mixture_of<const D: usize>(packed: &PackedBelief) -> Result<Mixture<D>, Error> {
+    let (count, numbers) = (packed.components, &packed.numbers);
+    let (weights, gaussians) = numbers.split_at(count.saturating_sub(1).min(numbers.len()));
     let first = (1.0 - weights.iter().sum::<f64>()).max(0.0);
-    let weights = std::iter::once(first)
-        .chain(weights.iter().copied())
-        .chain(std::iter::repeat(1.0));
-    let gaussians = gaussians.chunks(size).zip(weights);
-    let gaussians: Vec<Component<D>> = gaussians
-        .map(|(chunk, weight)| read_gaussian(weight, chunk))
-        .collect::<Result<_, _>>()?;
-    Ok(match degree {
-        None => SentBelief::Mixture(Mixture::new(gaussians)?),
-        Some(degree) => {
-            let lists = coefficients
-                .chunks(lpg_scalars(degree, D == 3) - size)
-                .map(<[f64]>::to_vec);
-            SentBelief::Lpg(Lpg::new(&gaussians, degree, &lists.collect::<Vec<_>>())?)
-        }
-    })
+    let weights = std::iter::once(first).chain(weights.iter().copied());
+    let gaussians = gaussians.chunks(gaussian_scalars(D == 3)).zip(weights);
+    let components = gaussians.map(|(chunk, weight)| read_gaussian(weight, chunk));
+    Mixture::new(components.collect::<Result<_, _>>()?)
 }
 
-fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {
+/// Appends the numbers of a Gaussian: its mean and its lower Cholesky factor, row by row.
+pub fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {
     numbers.extend(c.mean().iter());
     for i in 0..D {
         numbers.extend((0..=i).map(|j| c.factor().lower[(i, j)]));
     }
 }
 
-fn read_gaussian<const D: usize>(weight: f64, numbers: &[f64]) -> Result<Component<D>, Error> {
+/// The Gaussian of these numbers.
+///
+/// # Errors
+/// If the numbers are too many or few, or no Gaussian.
+pub fn read_gaussian<const D: usize>(weight: f64, numbers: &[f64]) -> Result<Component<D>, Error> {
     entries("numbers", numbers.len(), gaussian_scalars(D == 3))?;
     let (mean, mut rest) = numbers.split_at(D);
     let mut lower = SMatrix::<f64, D, D>::zeros();

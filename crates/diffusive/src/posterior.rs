@@ -1,11 +1,13 @@
 //! The exact posterior of one update, over cells.
 
-use crate::belief::{Prior, SearchBox};
-use crate::density::{CellOptions, Cells, Clumps};
+use crate::belief::Prior;
+use crate::density::{CellOptions, Cells};
 use crate::fit::Fit;
+use crate::search_box::SearchBox;
 use crate::target::Target;
 use crate::{Error, SourceLikelihood};
 use fewbits_core::{Belief, Gaussian};
+use fewbits_mixture_codec::Clumps;
 use nalgebra::{Vector2, Vector3};
 
 /// Posterior over cells. If the rate is unknown and part of the belief, it has the rate's moments in each cell.
@@ -69,7 +71,7 @@ impl Posterior {
     /// If `count` is zero.
     pub fn clumps(&self, count: usize) -> Result<Clumps<2>, Error> {
         let clumps = Clumps::new(&self.cells.columns(), &[&[], &[]], self.cells.weights(), count)?;
-        let least = self.least_variance();
+        let least = self.min_variance();
         clumps.with_min_variances(Vector2::new(least, least))
     }
 
@@ -88,13 +90,13 @@ impl Posterior {
             }
         };
         let clumps = Clumps::new(&[x, y, mean], &[&[], &[], spread], self.cells.weights(), count)?;
-        let least = self.least_variance();
+        let least = self.min_variance();
         clumps.with_min_variances(Vector3::new(least, least, 0.0))
     }
 
     /// The square of half a cell. A narrower ridge would not have let the evidence converge. For Gaussians at least this wide, sums
     /// over cells exceed integrals by at most 3 per cent.
-    fn least_variance(&self) -> f64 {
+    fn min_variance(&self) -> f64 {
         0.25 * self.cells.width() * self.cells.width()
     }
 

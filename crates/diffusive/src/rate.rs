@@ -102,7 +102,7 @@ impl RateModel {
     }
 
     /// A rate to start an iteration from.
-    pub(crate) fn typical(&self) -> f64 {
+    pub fn typical(&self) -> f64 {
         self.range().middle()
     }
 

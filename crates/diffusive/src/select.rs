@@ -1,10 +1,10 @@
 //! Choice of the next node.
 
-use crate::density::{Clump, Clumps};
 use crate::information::{Predictions, half_log_det_plus_one, information_at};
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceSensor};
 use fewbits_core::Gaussian;
+use fewbits_mixture_codec::{Clump, Clumps};
 use fewbits_models::Receptor;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 use serde::{Deserialize, Serialize};

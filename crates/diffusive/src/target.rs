@@ -1,7 +1,7 @@
 //! The product of a belief and the likelihood of records, evaluated on cells.
 
 use crate::belief::{JointBelief, PositionBelief, Prior};
-use crate::density::{CellTarget, Cells, Slice};
+use crate::density::{CellTarget, Cells};
 use crate::rate::{Intervals, RateModel, RateRange, RateSums, cut_normal, ends_about};
 use crate::{Error, SourceLikelihood};
 use fewbits_core::Columns;
@@ -78,7 +78,7 @@ impl<'a> Target<'a> {
                         .map(|c| Lobe::new(c.weight(), *c.mean(), *c.covariance())),
                 );
             }
-            Prior::Position(PositionBelief::Lpg(_)) | Prior::WithRate(JointBelief::Lpg(_), _) => {}
+            Prior::Position(PositionBelief::Other(_)) | Prior::WithRate(JointBelief::Other(_), _) => {}
             Prior::WithRate(JointBelief::Mixture(mixture), _) => {
                 for c in mixture.components() {
                     let s = c.covariance();
@@ -134,15 +134,13 @@ impl<'a> Target<'a> {
     pub(crate) fn rates_and_fit(&self, cells: &Cells<2>) -> (Option<RateMoments>, f64) {
         let [x, y] = cells.columns();
         let (mut means, mut variances, mut chi_squared) = (Vec::new(), Vec::new(), 0.0);
-        let mut slice = Slice::default();
         for ((x, y), weight) in x.iter().zip(y).zip(cells.weights()) {
             let at = Vector2::new(*x, *y);
             let sums = self.likelihood.sums(&at);
             let rate = match (self.prior, self.likelihood.rate()) {
-                (Prior::WithRate(JointBelief::Lpg(lpg), range), _) => {
-                    lpg.slice(&at, 0.0, &mut slice);
+                (Prior::WithRate(JointBelief::Other(density), range), _) => {
                     let sums = [sums.response, sums.correlation, sums.energy];
-                    let moments = slice.tilted(sums, [range.low(), range.high()]);
+                    let moments = density.rate(&at, 0.0, sums, [range.low(), range.high()]);
                     (moments.mean, moments.variance)
                 }
                 (Prior::WithRate(_, range), _) => self.rate_of_mixture(&at, &sums, range),
@@ -241,8 +239,8 @@ impl CellTarget<2> for Target<'_> {
                 let (own, wide) = (&mut own[..count], &mut wide[..count]);
                 for i in 0..count {
                     (own[i], wide[i]) = match self.prior {
-                        Prior::Position(PositionBelief::Lpg(lpg)) => {
-                            lpg.log_density_and_bound(&at(i), half_width, &mut scratch)
+                        Prior::Position(PositionBelief::Other(density)) => {
+                            density.log_density_and_bound(&at(i), half_width, &mut scratch)
                         }
                         _ => log_mixture(&self.lobes, &precisions, &at(i)),
                     };
@@ -308,13 +306,12 @@ impl Target<'_> {
             }
         }
         let all: Vec<usize> = (0..count).collect();
-        let mut slice = Slice::default();
-        let mut evaluate = |cells: &[usize], which: usize, sums: &[[f64; 3]], out: &mut [f64]| match belief {
+        let evaluate = |cells: &[usize], which: usize, sums: &[[f64; 3]], out: &mut [f64]| match belief {
             JointBelief::Mixture(_) => self.log_sums(cells, &at, precisions, (which, sums), range, out),
-            JointBelief::Lpg(lpg) => {
+            JointBelief::Other(density) => {
+                let (half, range) = (if which == 1 { half } else { 0.0 }, [range.low(), range.high()]);
                 for i in cells {
-                    lpg.slice(&at(*i), if which == 1 { half } else { 0.0 }, &mut slice);
-                    out[*i] = slice.tilted(sums[*i], [range.low(), range.high()]).log_mass;
+                    out[*i] = density.rate(&at(*i), half, sums[*i], range).log_mass;
                 }
             }
         };

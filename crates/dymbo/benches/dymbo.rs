@@ -4,7 +4,7 @@
 
 use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_baselines::dymbo::SignFilter;
-use fewbits_core::factor::{Factor, InCell};
+use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
 use fewbits_dymbo::{CellIndex, CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
 use fewbits_models::{ScalarSensor, constant_velocity_2d};
@@ -54,7 +54,7 @@ fn predict_and_word_of_3(bencher: Bencher) {
 #[divan::bench(args = [0.3, 1.6, 11.0])]
 fn bit_update_any_threshold(bencher: Bencher, threshold: f64) {
     let prior = scalar().1;
-    let factor = || InCell::sign(Sign::Above, black_box(threshold), 1.0, &Link::PERFECT).unwrap();
+    let factor = || Levels::sign(Sign::Above, black_box(threshold), 1.0, &Link::PERFECT).unwrap();
     bencher.bench(|| factor().tilted(black_box(&prior)));
 }
 
@@ -63,7 +63,7 @@ fn bit_update_noisy_link(bencher: Bencher) {
     let prior = scalar().1;
     let link = Link::flipping(0.1).unwrap();
     bencher.bench(|| {
-        InCell::sign(Sign::Above, black_box(1.6), 1.0, &link)
+        Levels::sign(Sign::Above, black_box(1.6), 1.0, &link)
             .unwrap()
             .tilted(black_box(&prior))
     });
@@ -75,7 +75,7 @@ fn cell_update_unit_cell(bencher: Bencher, lower: f64) {
     let prior = scalar().1;
     let cell = Cell::new(lower, lower + 1.0).unwrap();
     bencher.bench(|| {
-        InCell::certain(*black_box(&cell), 1.0)
+        Levels::certain(*black_box(&cell), 1.0)
             .unwrap()
             .tilted(black_box(&prior))
     });

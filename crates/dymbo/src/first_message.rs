@@ -2,14 +2,9 @@
 
 use crate::Error;
 use crate::plant::scalar;
-use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::rand::Rng;
-use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Deterministic, Factor, Gaussian, Link, MeasurementNoise, Message,
-    Observation, Scheme,
-};
+use fewbits_core::factor::Levels;
+use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Message, Noise, Quantized};
 use fewbits_numerics::error::{ArgumentError, finite, positive, refuse, within};
-use nalgebra::{Matrix1, Vector1};
 use serde::{Deserialize, Serialize};
 
 /// The first message: the integer multiple of the resolution that is nearest to the sample.
@@ -119,6 +114,10 @@ impl RoundedSample {
         (-half, half - 1)
     }
 
+    fn twos_complement(&self, multiple: i64) -> u64 {
+        multiple as u64 & ((1 << self.bits) - 1)
+    }
+
     /// The multiple for a measurement.
     ///
     /// # Errors
@@ -169,54 +168,55 @@ impl RoundedSample {
     /// # Errors
     /// [`Error::Impossible`] if the message has probability zero under the prior.
     pub fn belief_with_prior(&self, message: Multiple, prior: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
-        let factor = self.factor(&(), &Observation::Received(message), &Link::PERFECT)?;
-        let posterior = factor.tilted(prior)?;
+        let posterior = Levels::certain(self.cell(message)?, self.noise_variance)?.tilted(prior)?;
         Ok(scalar(posterior.mean[0], posterior.covariance[0]))
     }
 }
 
-impl MeasurementNoise<1> for RoundedSample {
-    fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
-        Matrix1::new(self.noise_variance)
-    }
-}
-
-impl Deterministic<1> for RoundedSample {}
-
-impl Scheme<1> for RoundedSample {
-    type State = ();
+impl Quantized for RoundedSample {
     type Feedback = ();
     type Report = Multiple;
-    type Factor = Scalar;
 
-    fn feedback_format(&self) {}
+    fn format_of_feedback(&self) {}
 
-    fn report_format(&self) -> u32 {
+    fn format_of_report(&self) -> u32 {
         self.bits
     }
 
-    fn encode(&self, _: &mut dyn Rng, (): &mut (), z: &Vector1<f64>, (): &()) -> Result<Option<Multiple>, Error> {
-        Ok(Some(self.round(z[0])?))
+    fn measurement_noise(&self) -> Noise {
+        self.noise_variance.into()
     }
 
-    /// Over a link that inverts bits only words of up to 12 bits are accepted.
-    fn factor(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, Error> {
-        let Observation::Received(multiple) = observation else {
-            return Ok(Constant::of_delivery(observation, link).into());
-        };
-        let cell = self.cell(*multiple)?;
-        if link.crossover() == 0.0 {
-            return Ok(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into());
-        }
+    fn report_of(&self, measurement: f64, (): &()) -> Result<Multiple, Error> {
+        Ok(self.round(measurement)?)
+    }
+
+    /// Refuses words of more than 12 bits.
+    fn edges(&self, (): &()) -> Result<Vec<f64>, Error> {
         if self.bits > MAX_NOISY_BITS {
             return refuse("bits", self.bits, "words of at most 12 bits over a link that inverts bits");
         }
         let (least, most) = self.range();
-        let edges = (least..most).map(|k| self.resolution * (k as f64 + 0.5)).collect();
-        // Two's complement of `bits` bits, as the words travel.
-        let word = |k: i64| k as u64 & ((1 << self.bits) - 1);
-        let given = link.received_given_words((least..=most).map(word), word(multiple.0), self.bits)?;
-        Ok(Partition::new(edges, given, self.noise_variance)?.into())
+        Ok((least..most).map(|k| self.resolution * (k as f64 + 0.5)).collect())
+    }
+
+    /// Two's complement of `bits` bits, as the words travel.
+    fn words(&self) -> impl Iterator<Item = u64> {
+        let (least, most) = self.range();
+        (least..=most).map(move |k| self.twos_complement(k))
+    }
+
+    fn word_of(&self, multiple: &Multiple) -> Result<u64, Error> {
+        self.cell(*multiple)?;
+        Ok(self.twos_complement(multiple.0))
+    }
+
+    fn word_bits(&self) -> u32 {
+        self.bits
+    }
+
+    fn only_cell(&self, multiple: &Multiple, (): &()) -> Result<Option<Cell>, Error> {
+        Ok(Some(self.cell(*multiple)?))
     }
 }
 

@@ -1,15 +1,10 @@
 //! Several bits per sample: the index of the quantizer cell of the normalised innovation.
 
 use crate::Error;
-use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::rand::Rng;
-use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Deterministic, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
-    Observation, Scheme,
-};
+use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Gaussian, Message, Noise, NumberFormat, Quantized};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
-use nalgebra::{Matrix1, Vector1, Vector2};
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 /// What the fusion centre broadcasts to sensors that report several bits.
@@ -141,7 +136,7 @@ impl InnovationWord {
     /// # Errors
     /// If the index is beyond the last cell, the prediction is not a valid one, or its mean is so large that the cell's ends coincide.
     pub fn cell(&self, index: CellIndex, prediction: &Prediction) -> Result<Cell, ArgumentError> {
-        let (edges, at) = (self.edges(prediction)?, self.index(index)?);
+        let (edges, at) = (self.centred(prediction)?, self.index(index)?);
         let lower = if at == 0 { f64::NEG_INFINITY } else { edges[at - 1] };
         Cell::new(lower, edges.get(at).copied().unwrap_or(f64::INFINITY))
     }
@@ -155,7 +150,7 @@ impl InnovationWord {
         Err(ArgumentError::new("index", index.0, format!("a cell index below {}", 1 << self.bits)))
     }
 
-    fn edges(&self, prediction: &Prediction) -> Result<Vec<f64>, ArgumentError> {
+    fn centred(&self, prediction: &Prediction) -> Result<Vec<f64>, ArgumentError> {
         finite("prediction", prediction.mean)?;
         positive("deviation", prediction.deviation)?;
         let edges = self.quantizer.breakpoints().iter();
@@ -163,56 +158,45 @@ impl InnovationWord {
     }
 }
 
-impl MeasurementNoise<1> for InnovationWord {
-    fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
-        Matrix1::new(self.noise_variance)
-    }
-}
-
-impl Deterministic<1> for InnovationWord {}
-
-impl Scheme<1> for InnovationWord {
-    type State = ();
+impl Quantized for InnovationWord {
     type Feedback = Prediction;
     type Report = CellIndex;
-    type Factor = Scalar;
 
-    fn feedback_format(&self) -> NumberFormat {
+    fn format_of_feedback(&self) -> NumberFormat {
         NumberFormat::Double
     }
 
-    fn report_format(&self) -> u32 {
+    fn format_of_report(&self) -> u32 {
         self.bits
     }
 
-    #[inline]
-    fn encode(
-        &self,
-        _: &mut dyn Rng,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        prediction: &Prediction,
-    ) -> Result<Option<CellIndex>, Error> {
-        Ok(Some(self.word(measurement[0], prediction)?))
+    fn measurement_noise(&self) -> Noise {
+        self.noise_variance.into()
     }
 
-    fn factor(
-        &self,
-        prediction: &Prediction,
-        observation: &Observation<CellIndex>,
-        link: &Link,
-    ) -> Result<Scalar, Error> {
-        let edges = self.edges(prediction)?;
-        let Observation::Received(word) = observation else {
-            return Ok(Constant::of_delivery(observation, link).into());
-        };
-        if link.crossover() == 0.0 {
-            let cell = self.cell(*word, prediction)?;
-            return Ok(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into());
-        }
-        let received = self.index(*word)? as u64;
-        let given = link.received_given_words(0..=edges.len() as u64, received, self.bits)?;
-        Ok(Partition::new(edges, given, self.noise_variance)?.into())
+    #[inline]
+    fn report_of(&self, measurement: f64, prediction: &Prediction) -> Result<CellIndex, Error> {
+        Ok(self.word(measurement, prediction)?)
+    }
+
+    fn edges(&self, prediction: &Prediction) -> Result<Vec<f64>, Error> {
+        Ok(self.centred(prediction)?)
+    }
+
+    fn words(&self) -> impl Iterator<Item = u64> {
+        0..1_u64 << self.bits
+    }
+
+    fn word_of(&self, index: &CellIndex) -> Result<u64, Error> {
+        Ok(self.index(*index)? as u64)
+    }
+
+    fn word_bits(&self) -> u32 {
+        self.bits
+    }
+
+    fn only_cell(&self, index: &CellIndex, prediction: &Prediction) -> Result<Option<Cell>, Error> {
+        Ok(Some(self.cell(*index, prediction)?))
     }
 }
 

@@ -8,7 +8,7 @@
 use crate::filter::{Report, StepInfo};
 use crate::plant::{innovation_gain, scalar};
 use crate::{Error, ScalarPlant};
-use fewbits_core::factor::{InCell, Product, Scalar};
+use fewbits_core::factor::{Levels, Product, Scalar};
 use fewbits_core::{Factor, Gaussian, Link, Observation, Sign};
 use fewbits_numerics::binomial::log_row;
 use fewbits_numerics::error::{ArgumentError, within};
@@ -166,7 +166,7 @@ impl ParallelFilter {
         // A missing bit tells nothing about the state, but the probability of its loss enters the likelihood.
         let missing = observations.iter().filter(|o| o.received().is_none());
         let missing: f64 = missing.map(|observation| self.link.delivery(observation).ln()).sum();
-        let factor = |bit: &Sign| InCell::sign(*bit, mean, self.plant.measurement_variance(), &self.link);
+        let factor = |bit: &Sign| Levels::sign(*bit, mean, self.plant.measurement_variance(), &self.link);
         if bits > 0 {
             self.link.of_received()?;
         }

@@ -1,7 +1,7 @@
 //! One bit per sample: is the sample at or above the broadcast threshold?
 
 use crate::{Error, ScalarPlant};
-use fewbits_core::factor::{Constant, InCell, Scalar};
+use fewbits_core::factor::{Constant, Levels, Scalar};
 use fewbits_core::rand::Rng;
 use fewbits_core::{Deterministic, Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
@@ -110,7 +110,7 @@ impl Scheme<1> for SignBit {
         match observation {
             Observation::Received(bit) => {
                 link.of_received()?;
-                Ok(InCell::sign(*bit, *threshold, self.noise_variance, link)?.into())
+                Ok(Levels::sign(*bit, *threshold, self.noise_variance, link)?.into())
             }
             missing => Ok(Constant::of_delivery(missing, link).into()),
         }

@@ -6,7 +6,7 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher, black_box};
-use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::factor::{Levels, Scalar, Value};
 use fewbits_core::{Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sign};
 use fewbits_densities::Particles;
 use fewbits_filters::{BootstrapFilter, Resampling, ResamplingRule, Schedule};
@@ -64,12 +64,12 @@ fn bench_steps<const D: usize>(
 #[divan::bench(args = ["value", "sign", "noisy sign", "cell"])]
 fn step_ar1(bencher: Bencher<'_, '_>, observed: &str) {
     let dynamics = Ar1::new(0.95, 1.0).unwrap();
-    let sign = |link| InCell::sign(Sign::Above, 0.4, 1.0, &link).unwrap();
+    let sign = |link| Levels::sign(Sign::Above, 0.4, 1.0, &link).unwrap();
     let factor: Scalar = match observed {
         "value" => Value::scalar(0.4, 1.0).unwrap().into(),
         "sign" => sign(Link::PERFECT).into(),
         "noisy sign" => sign(Link::flipping(0.05).unwrap()).into(),
-        _ => InCell::certain(Cell::new(0.0, 1.3).unwrap(), 1.0).unwrap().into(),
+        _ => Levels::certain(Cell::new(0.0, 1.3).unwrap(), 1.0).unwrap().into(),
     };
     let observed = Observed::new(LinearSensor::direct(1.0).unwrap(), factor);
     bench_steps(bencher, &dynamics, &observed, Gaussian::scalar(0.0, 4.0).unwrap());

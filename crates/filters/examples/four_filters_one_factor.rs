@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p fewbits-filters --example four_filters_one_factor`
 
-use fewbits_core::factor::{Constant, InCell, Scalar};
+use fewbits_core::factor::{Constant, Levels, Scalar};
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
     BootstrapFilter, MomentFilter, PointMasses, RaoBlackwellised, ResamplingRule, StateFilter, UniformGrid,
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let threshold = dynamics.mean(gaussian.mean())[0];
         let bit = Sign::of(sensor.sample(&mut rng, &state)[0], threshold)?;
         let factor: Scalar = match link.transmit(&mut rng, Some(&bit), &())?.received() {
-            Some(bit) => InCell::sign(*bit, threshold, sensor.noise_variance(), &link)?.into(),
+            Some(bit) => Levels::sign(*bit, threshold, sensor.noise_variance(), &link)?.into(),
             None => Constant::new(link.loss())?.into(),
         };
         let observed = Observed::new(sensor, factor);

@@ -103,12 +103,10 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
         log_weights.clear();
         log_weights.resize(belief.means().len(), 0.0);
         // Impute one measurement per observation, one after the other; each adds to the log weights.
-        let log_scale: f64 = scalars.iter().map(|one| one.log_scale).sum();
         for LinearScalar {
             matrix,
             noise_covariance,
             factor,
-            ..
         } in scalars
         {
             let imputation = Imputation::new(factor);
@@ -125,8 +123,7 @@ impl<const D: usize> StateFilter<D> for RaoBlackwellised<D> {
         })?;
         // Everything has succeeded: the new belief replaces the old one.
         std::mem::swap(belief, next);
-        let log_likelihood = info.log_likelihood + log_scale;
-        Ok(Info { log_likelihood, ..info })
+        Ok(info)
     }
 
     /// Of more than 500 particles, 500 of equal weight.
@@ -193,7 +190,8 @@ const MAX_TESTED: usize = 500;
 
 /// How measurements are drawn for a scalar factor.
 enum Imputation {
-    Value(f64),
+    /// The value, and the logarithm of the constant that multiplies its density.
+    Value(f64, f64),
     /// `p(observed | z)` as a piecewise constant function.
     Pieces(Vec<(Cell, f64)>),
 }
@@ -201,15 +199,18 @@ enum Imputation {
 impl Imputation {
     fn new(factor: Scalar) -> Self {
         match factor {
-            Scalar::Value(value) => Self::Value(value.value()[0]),
-            other => Self::Pieces(other.pieces()),
+            Scalar::Value(value) => Self::Value(value.value()[0], value.log_scale()),
+            Scalar::Levels(levels) => Self::Pieces(levels.pieces()),
         }
     }
 
     /// A drawn measurement, and the logarithm of the probability (density) of the observation.
     fn draw<R: Rng + ?Sized>(&self, rng: &mut R, predicted: f64, deviation: f64) -> (f64, f64) {
         match self {
-            Self::Value(value) => (*value, normal::log_pdf((value - predicted) / deviation) - deviation.ln()),
+            Self::Value(value, log_scale) => {
+                let log = normal::log_pdf((value - predicted) / deviation) - deviation.ln();
+                (*value, log + log_scale)
+            }
             Self::Pieces(pieces) => {
                 let total = log_shares(pieces, predicted, deviation).collect::<LogSum>().value();
                 if total == f64::NEG_INFINITY {

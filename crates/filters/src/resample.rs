@@ -1,9 +1,9 @@
 //! Resampling: replaces weighted particles by equally weighted ones.
 
 use crate::Error;
-use fewbits_densities::Particles;
+use fewbits_densities::{Particles, systematic_into};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::kernels::{sum, vectorised};
+use fewbits_numerics::kernels::sum;
 use rand::{Rng, RngExt};
 use rand_distr::Open01;
 use serde::{Deserialize, Serialize};
@@ -91,7 +91,10 @@ impl Resampling {
         let count = ancestors.len();
         let step = total / count as f64;
         match self {
-            Self::Systematic => systematic(rng.sample(Open01), &weights[..=last], total, ancestors),
+            Self::Systematic => {
+                let uniform: f64 = rng.sample(Open01);
+                systematic_into(&weights[..=last], total, 1.0 - uniform, ancestors);
+            }
             Self::Stratified => pick(weights, last, ancestors, |m| (m as f64 + rng.random::<f64>()) * step),
             Self::Multinomial => {
                 let mut points = OrderedUniforms::new(count);
@@ -164,123 +167,6 @@ impl ResamplingRule {
                 .ancestors_of_normalised(rng, belief.weights(), ancestors);
         }
         is_due
-    }
-}
-
-/// Weights that [`systematic`] processes together.
-const BLOCK: usize = 128;
-/// Neighbours whose cumulative sums are computed together.
-const GROUP: usize = 8;
-/// Entries whose running maximum [`fill_up`] computes together.
-const LANES: usize = 16;
-/// `2^52`: added to a number below it, it leaves the nearest integer in the mantissa.
-const INTEGERS: f64 = 4_503_599_627_370_496.0;
-/// `1.5 * 2^52`: the same for numbers that may be below zero.
-const ROUNDER: f64 = 1.5 * INTEGERS;
-/// All bits set where the element that many places before is in the same group.
-const SAME_GROUP: [[u64; BLOCK]; 3] = [same_group(1), same_group(2), same_group(4)];
-
-const fn same_group(back: usize) -> [u64; BLOCK] {
-    let mut mask = [0; BLOCK];
-    let mut j = 0;
-    while j < BLOCK {
-        mask[j] = if j % GROUP >= back { u64::MAX } else { 0 };
-        j += 1;
-    }
-    mask
-}
-
-/// The integer nearest to `x` in `0..=2^51`.
-#[inline(always)]
-fn integer(x: f64) -> u64 {
-    (x + INTEGERS).to_bits() - INTEGERS.to_bits()
-}
-
-/// Systematic resampling without a branch that depends on the weights. Particle `i` gets the places from
-/// `round(places_per_weight * cumulative_{i-1} + offset - 1/2)` up to the same expression with `cumulative_i`.
-///
-/// The weights are converted to integers of 51 bits first. Their cumulative sums are exact in any order, so they can be computed in
-/// parallel, never decrease, and stay equal at a weight of zero. Each particle writes its index at its first place; one without a
-/// place is overwritten by the next. A running maximum then fills the places between.
-fn systematic(offset: f64, weights: &[f64], total: f64, ancestors: &mut [u32]) {
-    let scale = 0.5 * INTEGERS / total;
-    vectorised(
-        #[inline(always)]
-        || {
-            let mut whole = 0;
-            for weight in weights {
-                whole += integer(*weight * scale);
-            }
-            let per_weight = ancestors.len() as f64 / whole as f64;
-            ancestors.fill(0);
-            let (mut carry, mut index, mut first) = (0, 0, 0_u32);
-            for weights in weights.chunks(BLOCK) {
-                let mut sums = [0; GROUP + BLOCK];
-                for (sum, weight) in sums[GROUP..].iter_mut().zip(weights) {
-                    *sum = integer(*weight * scale);
-                }
-                add_before::<1>(&mut sums, &SAME_GROUP[0]);
-                add_before::<2>(&mut sums, &SAME_GROUP[1]);
-                add_before::<4>(&mut sums, &SAME_GROUP[2]);
-                let mut firsts = [0_u32; BLOCK];
-                for (firsts, sums) in firsts.chunks_exact_mut(GROUP).zip(sums[GROUP..].chunks_exact(GROUP)) {
-                    for j in 0..GROUP {
-                        let cumulative = f64::from_bits((carry + sums[j]) | INTEGERS.to_bits()) - INTEGERS;
-                        firsts[j] = (cumulative * per_weight + (offset - 0.5) + ROUNDER).to_bits() as u32;
-                    }
-                    carry += sums[GROUP - 1];
-                }
-                for next in &firsts[..weights.len()] {
-                    // The last particles may have their first place beyond the end.
-                    if let Some(place) = ancestors.get_mut(first as usize) {
-                        *place = index;
-                    }
-                    (index, first) = (index + 1, *next);
-                }
-            }
-            fill_up(ancestors);
-        },
-    );
-}
-
-/// Replaces every entry by the largest up to its place.
-#[inline(always)]
-fn fill_up(entries: &mut [u32]) {
-    let mut so_far = 0;
-    let mut chunks = entries.chunks_exact_mut(LANES);
-    for chunk in &mut chunks {
-        let mut rising = [0; LANES];
-        rising.copy_from_slice(chunk);
-        rising = raised::<1>(rising);
-        rising = raised::<2>(rising);
-        rising = raised::<4>(rising);
-        rising = raised::<8>(rising);
-        for j in 0..LANES {
-            chunk[j] = rising[j].max(so_far);
-        }
-        so_far = so_far.max(rising[LANES - 1]);
-    }
-    for entry in chunks.into_remainder() {
-        so_far = so_far.max(*entry);
-        *entry = so_far;
-    }
-}
-
-/// The larger of each entry and the entry `BACK` places before.
-#[inline(always)]
-fn raised<const BACK: usize>(x: [u32; LANES]) -> [u32; LANES] {
-    std::array::from_fn(
-        #[inline(always)]
-        |j| if j >= BACK { x[j].max(x[j - BACK]) } else { x[j] },
-    )
-}
-
-/// Adds to each sum the one `BACK` places before, within its group.
-#[inline(always)]
-fn add_before<const BACK: usize>(sums: &mut [u64; GROUP + BLOCK], same_group: &[u64; BLOCK]) {
-    let before = *sums;
-    for j in 0..BLOCK {
-        sums[GROUP + j] += before[GROUP + j - BACK] & same_group[j];
     }
 }
 

@@ -7,6 +7,7 @@
 //! | task | use |
 //! |---|---|
 //! | few Gaussians for an estimate | [`Reduction`]; [`Reduction::default`] is the recommended method |
+//! | few Gaussians for weighted points or cells | [`Clumps`], [`MixtureFit`] |
 //! | the message, as bits | [`wire::CodedMixture`] under a [`wire::WireFormat`] that both ends know |
 //! | the best message within a number of bits | [`wire::RateControl`] |
 //! | the difference between two densities, estimated at points | [`plug_in`] |
@@ -43,5 +44,5 @@ pub use divergence::{plug_in, quadrature};
 pub use fewbits_core::Error;
 pub use reduction::cut::{Criterion, Cut, NodeErrors};
 pub use reduction::merge::MergeCost;
-pub use reduction::{Reduction, cut, merge, refine};
+pub use reduction::{Clump, Clumps, MixtureFit, Reduction, cut, merge, refine};
 pub use tree::{Split, Tree};

@@ -1,9 +1,8 @@
 //! Fisher information of a range and of its level.
 
 use crate::Error;
-use crate::factor::log_inside;
 use crate::quantized::RangeReference;
-use crate::sensor::RangeNoise;
+use fewbits_core::{Cell, RangeNoise};
 use fewbits_numerics::error::positive;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::normal;
@@ -57,7 +56,8 @@ pub fn level_information(
         };
         let change: f64 = upper.1 - lower.1;
         if change != 0.0 {
-            sum += (2.0 * change.abs().ln() - log_inside(lower.0, upper.0, distance, sigma)).exp();
+            let inside = Cell::new(lower.0, upper.0)?.log_probability(distance, sigma);
+            sum += (2.0 * change.abs().ln() - inside).exp();
         }
         lower = upper;
     }

@@ -3,7 +3,7 @@
 //! Sensors at known places measure their distance to a target. The noise may grow with the distance. Each sends the level of a quantizer of
 //! a few bits.
 //!
-//! **The likelihood of a level is in closed form** ([`RangeFactor`]). As a function of the position it is
+//! **The likelihood of a level is in closed form** ([`Levels`](fewbits_core::factor::Levels)). As a function of the position it is
 //! `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))` at the *hypothesised* distance `d`. It needs no kernel, no weights and no
 //! Jacobian, and every filter of the library accepts it. The recommended filter is [`GridFilter`]: it multiplies a Gaussian belief with all
 //! factors on a grid of 15 x 15 nodes about the posterior and returns the Gaussian of the same moments. It uses no random numbers. Its
@@ -12,7 +12,7 @@
 //!
 //! | task | item |
 //! |---|---|
-//! | sensor, noise, quantizer, likelihood of a level | [`RangeSensor`], [`RangeNoise`], [`QuantizedRange`], [`RangeFactor`] |
+//! | sensor, noise, quantizer, likelihood of a level | [`RangeSensor`], [`RangeNoise`], [`QuantizedRange`], [`Levels`](fewbits_core::factor::Levels) |
 //! | cells about the expected range, as wide as its uncertainty | [`RangeReference::about`] with [`optimal_loading`] |
 //! | the recommended tracker | [`GridOnAxes`](fewbits_filters::GridOnAxes) in a [`FusionCentre`](fewbits_filters::centre::FusionCentre) |
 //! | recorded ranges with bias, outliers, missing anchors, unknown speed and start | [`RangeTracker`] |
@@ -56,18 +56,16 @@
 //! Not here: radio, energy and delays (`fewbits-network`); several targets.
 
 mod bound;
-mod factor;
 mod loading;
 mod quantized;
 mod ranges;
 mod sensor;
 
 pub use bound::{level_information, range_information};
-pub use factor::RangeFactor;
-pub use fewbits_core::Error;
+pub use fewbits_core::{Error, RangeNoise};
 pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
 pub use loading::optimal_loading;
-pub use quantized::{IntervalRule, QuantizedRange, RangeReference};
+pub use quantized::{QuantizedRange, RangeReference};
 pub use ranges::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};
-pub use sensor::{RangeNoise, RangeSensor};
+pub use sensor::RangeSensor;
 pub use {nalgebra, rand};

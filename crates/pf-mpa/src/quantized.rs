@@ -1,17 +1,14 @@
 //! The sensor's half of a quantized range, and the likelihood of its levels.
 
 use crate::Error;
-use crate::factor::RangeFactor;
-use crate::sensor::RangeNoise;
-use fewbits_core::rand::Rng;
+use fewbits_core::factor::Levels;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Deterministic, Gaussian, Link, MeasurementNoise, Message, NumberFormat,
-    Observation, Scheme,
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Message, Noise, NumberFormat, Quantized, RangeNoise,
 };
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_quantizers::{Labelling, Symbol};
-use nalgebra::{Matrix1, Vector1, Vector2};
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 /// Where the cells of a quantized range lie: `L` equal cells on `centre +- half_width`. The first and the last extend to
@@ -41,7 +38,7 @@ impl RangeReference {
         fewbits_node::edge(q as u32, levels as u32, self.centre, self.half_width)
     }
 
-    pub(crate) fn check(&self) -> Result<(), ArgumentError> {
+    fn check(&self) -> Result<(), ArgumentError> {
         finite("centre", self.centre)?;
         positive("half_width", self.half_width).map(|_| ())
     }
@@ -104,18 +101,6 @@ pub struct QuantizedRange {
     noise: RangeNoise,
     /// Number format of a broadcast reference.
     format: NumberFormat,
-    interval: IntervalRule,
-}
-
-/// The finite interval from which message passing draws for a received level.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum IntervalRule {
-    /// The cell: `centre + half_width (q -+ Delta / 2)`.
-    #[default]
-    Correct,
-    /// Equation 3.18 as printed, `centre (1 + q -+ Delta / 2)`: scaled by the range and not by its innovation (erratum `mpa-1`).
-    Printed,
 }
 
 impl QuantizedRange {
@@ -128,14 +113,7 @@ impl QuantizedRange {
             labelling: Labelling::natural(levels)?,
             noise,
             format: NumberFormat::Single,
-            interval: IntervalRule::Correct,
         })
-    }
-
-    /// The same sensor with another interval for message passing. Factors use the true cell.
-    #[must_use]
-    pub fn with_interval(self, interval: IntervalRule) -> Self {
-        Self { interval, ..self }
     }
 
     /// The same sensor with other code words, such as a Gray code.
@@ -174,82 +152,66 @@ impl QuantizedRange {
         Ok(Symbol(level as usize))
     }
 
-    /// The likelihood of a level that arrived without inverted bits. `share` is the probability of arrival.
-    fn cell_factor(&self, level: usize, reference: &RangeReference, share: f64) -> Result<RangeFactor, ArgumentError> {
-        let (levels, nominal) = (self.levels(), reference.nominal_cell(level, self.levels())?);
-        let lower = if level == 0 { f64::NEG_INFINITY } else { nominal.lower() };
-        let upper = if level + 1 == levels {
-            f64::INFINITY
-        } else {
-            nominal.upper()
-        };
-        let drawn_from = match self.interval {
-            IntervalRule::Correct => [nominal.lower(), nominal.upper()],
-            IntervalRule::Printed => [level, level + 1].map(|q| reference.centre * 2.0 * q as f64 / levels as f64),
-        };
-        RangeFactor::in_cell(Cell::new(lower, upper)?, drawn_from, share, self.noise)
+    /// The cell of a level, the first and the last unbounded.
+    ///
+    /// # Errors
+    /// If there is no such level, or the reference is not valid.
+    pub fn cell(&self, level: Symbol, reference: &RangeReference) -> Result<Cell, ArgumentError> {
+        let nominal = reference.nominal_cell(level.0, self.levels())?;
+        let (is_first, is_last) = (level.0 == 0, level.0 + 1 == self.levels());
+        let lower = if is_first { f64::NEG_INFINITY } else { nominal.lower() };
+        Cell::new(lower, if is_last { f64::INFINITY } else { nominal.upper() })
     }
 
     /// The likelihood of a received level over a perfect link.
     ///
     /// # Errors
-    /// If there is no such level, or the reference is not valid.
-    pub fn received(&self, level: Symbol, reference: &RangeReference) -> Result<RangeFactor, ArgumentError> {
-        self.cell_factor(level.0, reference, 1.0)
+    /// As [`QuantizedRange::cell`].
+    pub fn received(&self, level: Symbol, reference: &RangeReference) -> Result<Levels, ArgumentError> {
+        Levels::certain(self.cell(level, reference)?, self.noise)
     }
 }
 
-impl MeasurementNoise<1> for QuantizedRange {
-    fn noise_covariance_at(&self, range: &Vector1<f64>) -> Matrix1<f64> {
-        let deviation = self.noise.deviation(range[0]);
-        Matrix1::new(deviation * deviation)
-    }
-}
-
-impl Deterministic<1> for QuantizedRange {}
-
-impl Scheme<1> for QuantizedRange {
-    type State = ();
+impl Quantized for QuantizedRange {
     type Feedback = RangeReference;
     type Report = Symbol;
-    type Factor = RangeFactor;
 
-    fn feedback_format(&self) -> NumberFormat {
+    fn format_of_feedback(&self) -> NumberFormat {
         self.format
     }
 
-    fn report_format(&self) -> Labelling {
+    fn format_of_report(&self) -> Labelling {
         self.labelling.clone()
     }
 
-    fn encode(
-        &self,
-        _: &mut dyn Rng,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        reference: &RangeReference,
-    ) -> Result<Option<Symbol>, Error> {
-        Ok(Some(self.level(measurement[0], reference)?))
+    fn measurement_noise(&self) -> Noise {
+        self.noise.into()
     }
 
-    fn factor(
-        &self,
-        reference: &RangeReference,
-        observation: &Observation<Symbol>,
-        link: &Link,
-    ) -> Result<RangeFactor, Error> {
-        let symbol = match observation {
-            Observation::Received(symbol) => *symbol,
-            missing => return Ok(RangeFactor::constant(link.delivery(missing), self.noise)?),
-        };
-        if link.crossover() == 0.0 {
-            return Ok(self.cell_factor(symbol.0, reference, link.of_received()?)?);
-        }
+    fn report_of(&self, range: f64, reference: &RangeReference) -> Result<Symbol, Error> {
+        Ok(self.level(range, reference)?)
+    }
+
+    fn edges(&self, reference: &RangeReference) -> Result<Vec<f64>, Error> {
         reference.check()?;
-        // Inverted bits: the mixture over all levels, each with the probability that its word became the received one.
-        let (levels, given) = (self.levels(), self.labelling.given_levels(symbol, link)?);
-        let edges = (0..=levels).map(|q| reference.edge(q, levels)).collect();
-        Ok(RangeFactor::levels(edges, given, self.noise))
+        let levels = self.levels();
+        Ok((1..levels).map(|q| reference.edge(q, levels)).collect())
+    }
+
+    fn words(&self) -> impl Iterator<Item = u64> {
+        self.labelling.level_words()
+    }
+
+    fn word_of(&self, level: &Symbol) -> Result<u64, Error> {
+        self.labelling.word_of(*level)
+    }
+
+    fn word_bits(&self) -> u32 {
+        self.labelling.bits()
+    }
+
+    fn only_cell(&self, level: &Symbol, reference: &RangeReference) -> Result<Option<Cell>, Error> {
+        Ok(Some(self.cell(*level, reference)?))
     }
 }
 

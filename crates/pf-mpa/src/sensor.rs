@@ -2,102 +2,13 @@
 
 use crate::Error;
 use fewbits_core::columns::measurements_agree;
-use fewbits_core::{Columns, ColumnsMut, OnAxes, Sensing};
-use fewbits_numerics::error::refuse;
-use fewbits_numerics::error::{all_finite, finite, non_negative};
+use fewbits_core::{Columns, ColumnsMut, OnAxes, RangeNoise, Sensing};
+use fewbits_numerics::error::all_finite;
 use fewbits_numerics::kernels::vectorised;
 use nalgebra::{Matrix1, RowVector2, Vector1, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
-
-/// Noise of a range: variance `s0^2 + (d / c)^2` at distance `d`. The papers use `s0 = 0`: a constant signal-to-noise ratio.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored")]
-pub struct RangeNoise {
-    constant: f64,
-    relative: f64,
-}
-
-/// The stored form of [`RangeNoise`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    constant: f64,
-    relative: f64,
-}
-
-impl TryFrom<Stored> for RangeNoise {
-    type Error = Error;
-
-    fn try_from(parts: Stored) -> Result<Self, Error> {
-        RangeNoise::new(parts.constant, parts.relative)
-    }
-}
-
-impl RangeNoise {
-    /// Standard deviation `constant` (length) at distance 0. The other part grows as `relative` = `1 / c` times the distance.
-    ///
-    /// # Errors
-    /// If one is negative or not finite, or both are zero.
-    pub fn new(constant: f64, relative: f64) -> Result<Self, Error> {
-        non_negative("constant", constant)?;
-        non_negative("relative", relative)?;
-        if constant == 0.0 && relative == 0.0 {
-            return refuse("noise", "zero at every distance", "a standard deviation above 0");
-        }
-        Ok(Self { constant, relative })
-    }
-
-    /// A constant ratio `d^2 / sigma^2` of the powers of range and noise, in decibels: `sigma = d / 10^(SNR / 20)`.
-    ///
-    /// # Errors
-    /// If the ratio is not finite, or the resulting deviation is not.
-    pub fn from_snr_db(snr_db: f64) -> Result<Self, Error> {
-        Self::new(0.0, 10.0_f64.powf(-finite("snr_db", snr_db)? / 20.0))
-    }
-
-    /// The same standard deviation at every distance.
-    ///
-    /// # Errors
-    /// If `deviation` is not positive.
-    pub fn constant(deviation: f64) -> Result<Self, Error> {
-        Self::new(deviation, 0.0)
-    }
-
-    /// Standard deviation at distance `d`. It is positive also for `d <= 0`.
-    #[inline(always)]
-    pub fn deviation(&self, distance: f64) -> f64 {
-        let relative = (self.relative * distance).abs();
-        let deviation = if self.constant == 0.0 {
-            relative
-        } else if self.relative == 0.0 {
-            self.constant
-        } else {
-            (self.constant * self.constant + relative * relative).sqrt()
-        };
-        if deviation > f64::MIN_POSITIVE {
-            deviation.min(f64::MAX)
-        } else {
-            f64::MIN_POSITIVE
-        }
-    }
-
-    /// Derivative of the standard deviation with respect to the distance.
-    pub fn slope(&self, distance: f64) -> f64 {
-        self.relative * (self.relative * distance / self.deviation(distance))
-    }
-
-    /// Standard deviation at distance 0, the constant part.
-    pub fn at_sensor(&self) -> f64 {
-        self.constant
-    }
-
-    /// Growth `1 / c` of the standard deviation with the distance.
-    pub fn relative(&self) -> f64 {
-        self.relative
-    }
-}
 
 /// A range sensor at a fixed place: `z = |p - n| + v`, `v` of the given [`RangeNoise`]. Its state is a position of two coordinates. For
 /// a larger state, [`RangeSensor::on_axes`] says which coordinates are the position.

@@ -1,8 +1,8 @@
 //! The binary word of each level, and the message that carries it.
 
 use crate::error::{Error, refuse};
+use fewbits_core::Message;
 use fewbits_core::bits::{BitReader, BitWriter, CodecError};
-use fewbits_core::{Link, Message};
 use serde::{Deserialize, Serialize};
 
 /// Largest number of bits of a word.
@@ -125,7 +125,7 @@ impl Labelling {
     }
 
     /// Whether every word is used.
-    pub fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.levels == self.words.len()
     }
 
@@ -139,16 +139,20 @@ impl Labelling {
         self.symbols[word as usize & (self.symbols.len() - 1)] as usize
     }
 
-    /// `p(symbol arrives | level i)` over `link`, one entry per level.
+    /// Word of a symbol that may be received.
     ///
     /// # Errors
-    /// If there is no such symbol; [`Impossible`](fewbits_core::Error::Impossible) if nothing arrives over the link.
-    pub fn given_levels(&self, symbol: Symbol, link: &Link) -> Result<Vec<f64>, fewbits_core::Error> {
-        let Some(received) = self.word(symbol.0) else {
-            return refuse("symbol", symbol.0, format!("a symbol below {}", self.symbols()));
-        };
-        let sent = self.words[..self.levels].iter().copied().map(u64::from);
-        link.received_given_words(sent, received.into(), self.bits)
+    /// If there is no such symbol.
+    pub fn word_of(&self, symbol: Symbol) -> Result<u64, fewbits_core::Error> {
+        match self.word(symbol.0) {
+            Some(word) => Ok(word.into()),
+            None => refuse("symbol", symbol.0, format!("a symbol below {}", self.symbols())),
+        }
+    }
+
+    /// Words of the levels.
+    pub fn level_words(&self) -> impl Iterator<Item = u64> + '_ {
+        self.words[..self.levels].iter().copied().map(u64::from)
     }
 }
 

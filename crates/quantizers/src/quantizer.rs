@@ -4,7 +4,7 @@ use crate::channel::Channel;
 use crate::density::edges;
 use crate::error::{Error, refuse};
 use fewbits_core::Cell;
-use fewbits_core::factor::{Constant, Partition, Scalar};
+use fewbits_core::factor::{Constant, Levels, Scalar};
 use fewbits_numerics::error::{all_finite, entries, finite, positive};
 use fewbits_numerics::{ArgumentError, normal};
 use serde::{Deserialize, Serialize};
@@ -209,7 +209,7 @@ impl Quantizer {
         if given_cell.iter().all(|p| *p == 0.0) {
             return Ok(Constant::new(0.0)?.into());
         }
-        Ok(Partition::new(self.breakpoints.clone(), given_cell, noise_variance)?.into())
+        Ok(Levels::partition(&self.breakpoints, &given_cell, noise_variance)?.into())
     }
 
     /// Lower and upper edge of cell `i`, infinite at the ends.

@@ -4,16 +4,13 @@ use crate::error::Error;
 use crate::labelling::{Labelling, Symbol};
 use crate::quantizer::Quantizer;
 use crate::refuse;
-use fewbits_core::factor::{Constant, Scalar};
-use fewbits_core::nalgebra::{SMatrix, SVector};
-use fewbits_core::rand::Rng;
-use fewbits_core::{Deterministic, Link, MeasurementNoise, Observation, Scheme};
+use fewbits_core::{Noise, Quantized};
 use fewbits_numerics::error::positive;
 use serde::{Deserialize, Serialize};
 
-/// A sensor that reports the level of its scalar sample in every slot, as a [`Scheme`] that every filter accepts.
+/// A sensor that reports the level of its scalar sample in every slot, as a [`Scheme`](fewbits_core::Scheme) that every filter accepts.
 ///
-/// Over a [`Link`] of crossover `e` each bit of the word is inverted with probability `e`. A word without a level is a symbol
+/// Over a [`Link`](fewbits_core::Link) of crossover `e` each bit of the word is inverted with probability `e`. A word without a level is a symbol
 /// too, so every received word decodes. The sensor is never silent, so a missing report does not depend on the sample.
 ///
 /// ```
@@ -87,42 +84,38 @@ impl QuantizingSensor {
     }
 }
 
-impl MeasurementNoise<1> for QuantizingSensor {
-    fn noise_covariance_at(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
-        [[self.noise_variance]].into()
-    }
-}
-
-impl Deterministic<1> for QuantizingSensor {}
-
-impl Scheme<1> for QuantizingSensor {
-    type State = ();
+impl Quantized for QuantizingSensor {
     type Feedback = ();
     type Report = Symbol;
-    type Factor = Scalar;
 
-    fn feedback_format(&self) {}
+    fn format_of_feedback(&self) {}
 
-    fn report_format(&self) -> Labelling {
+    fn format_of_report(&self) -> Labelling {
         self.labelling.clone()
     }
 
-    fn encode(
-        &self,
-        _: &mut dyn Rng,
-        (): &mut (),
-        measurement: &SVector<f64, 1>,
-        (): &(),
-    ) -> Result<Option<Symbol>, fewbits_core::Error> {
-        Ok(Some(Symbol(self.quantizer.encode(measurement[0])?)))
+    fn measurement_noise(&self) -> Noise {
+        self.noise_variance.into()
     }
 
-    fn factor(&self, (): &(), observation: &Observation<Symbol>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
-        let symbol = match observation {
-            Observation::Received(symbol) => *symbol,
-            missing => return Ok(Constant::of_delivery(missing, link).into()),
-        };
-        let given = self.labelling.given_levels(symbol, link)?;
-        Ok(self.quantizer.factor_of(self.noise_variance, |level| given[level])?)
+    fn report_of(&self, measurement: f64, (): &()) -> Result<Symbol, fewbits_core::Error> {
+        Ok(Symbol(self.quantizer.encode(measurement)?))
+    }
+
+    fn edges(&self, (): &()) -> Result<Vec<f64>, fewbits_core::Error> {
+        Ok(self.quantizer.breakpoints().to_vec())
+    }
+
+    fn words(&self) -> impl Iterator<Item = u64> {
+        let labels = self.quantizer.labels().iter();
+        labels.map(move |level| self.labelling.word(*level).unwrap_or_default().into())
+    }
+
+    fn word_of(&self, symbol: &Symbol) -> Result<u64, fewbits_core::Error> {
+        self.labelling.word_of(*symbol)
+    }
+
+    fn word_bits(&self) -> u32 {
+        self.labelling.bits()
     }
 }

@@ -8,11 +8,11 @@
 //! ```
 //! All but half-lines are densities of the reading.
 
-use fewbits_core::factor::{Constant, Factor, InCell, Scalar, Tilted, Value};
+use fewbits_core::factor::{Constant, Levels, Scalar, Value};
 use fewbits_core::rand::Rng;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Deterministic, Error, Gaussian, Link, MeasurementNoise, Message,
-    NumberFormat, Observation, Scheme,
+    BitReader, BitWriter, Cell, CodecError, Deterministic, Error, Link, MeasurementNoise, Message, NumberFormat,
+    Observation, Scheme,
 };
 use fewbits_numerics::error::{finite, positive, refuse};
 use nalgebra::{Matrix1, Vector1, Vector3};
@@ -102,49 +102,13 @@ impl MeasurementNoise<1> for Stating {
     }
 }
 
-/// What a reading says, as a density.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Statement {
-    cell: Option<InCell>,
-    value: Option<Value<1>>,
-    log_factor: f64,
-}
-
-impl Factor<1> for Statement {
-    fn log_likelihood(&self, m: &Vector1<f64>) -> f64 {
-        let cell = self.cell.map_or(0.0, |cell| cell.log_probability(m[0]));
-        self.log_factor + cell + self.value.map_or(0.0, |value| value.log_likelihood(m))
-    }
-
-    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
-        let own = match (self.cell, self.value) {
-            (Some(cell), _) => Factor::tilted(&cell, prior)?,
-            (None, Some(value)) => value.tilted(prior)?,
-            (None, None) => return Tilted::unchanged(prior, self.log_factor),
-        };
-        Ok(Tilted {
-            log_evidence: own.log_evidence + self.log_factor,
-            ..own
-        })
-    }
-
-    fn as_scalar(&self) -> Option<(Scalar, f64)> {
-        let scalar = match (self.cell, self.value) {
-            (Some(cell), _) => Scalar::InCell(cell),
-            (None, Some(value)) => Scalar::Value(value),
-            (None, None) => Constant::ONE.into(),
-        };
-        Some((scalar, self.log_factor))
-    }
-}
-
 impl Deterministic<1> for Stating {}
 
 impl Scheme<1> for Stating {
     type State = ();
     type Feedback = ();
     type Report = StatedReading;
-    type Factor = Statement;
+    type Factor = Scalar;
 
     fn feedback_format(&self) {}
 
@@ -163,13 +127,10 @@ impl Scheme<1> for Stating {
         Ok(Some(StatedReading::value(value, self.usual_variance.sqrt())))
     }
 
-    fn factor(&self, (): &(), observation: &Observation<StatedReading>, link: &Link) -> Result<Statement, Error> {
+    /// What a reading says, as a density.
+    fn factor(&self, (): &(), observation: &Observation<StatedReading>, link: &Link) -> Result<Scalar, Error> {
         let Observation::Received(reading) = observation else {
-            return Ok(Statement {
-                cell: None,
-                value: None,
-                log_factor: link.delivery(observation).ln(),
-            });
+            return Ok(Constant::of_delivery(observation, link).into());
         };
         let StatedReading {
             lower,
@@ -180,26 +141,15 @@ impl Scheme<1> for Stating {
         let arrival = link.of_received()?.ln();
         if lower == upper {
             let value = Value::scalar(finite("reading", lower)?, variance)?;
-            return Ok(Statement {
-                cell: None,
-                value: Some(value),
-                log_factor: arrival,
-            });
+            return Ok(value.times_exp(arrival)?.into());
         }
         if lower.is_nan() || upper.is_nan() || lower > upper {
             return refuse("reading", format!("from {lower} to {upper}"), "ends in order");
         }
         // A half-line has no width: its reading is a probability.
-        let width = StatedReading {
-            lower,
-            upper,
-            deviation,
-        }
-        .width();
-        Ok(Statement {
-            cell: Some(InCell::certain(Cell::new(lower, upper)?, variance)?),
-            value: None,
-            log_factor: arrival - width.ln(),
-        })
+        let density = arrival - reading.width().ln();
+        Ok(Levels::certain(Cell::new(lower, upper)?, variance)?
+            .times_exp(density)?
+            .into())
     }
 }

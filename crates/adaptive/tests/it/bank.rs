@@ -1,7 +1,7 @@
 //! The closed form against the general filter.
 
 use fewbits_adaptive::{Config, MODELS, SCALES, Sensor};
-use fewbits_core::factor::InCell;
+use fewbits_core::factor::Levels;
 use fewbits_core::{Cell, Gaussian, Observed};
 use fewbits_filters::{Imm, ImmBelief, ImmWorkspace};
 use fewbits_models::{LinearGaussian, LinearSensor};
@@ -35,7 +35,7 @@ fn the_bank_believes_what_the_general_filter_believes() {
         for n in 1..400 {
             sensor.encode(signal(f64::from(n))).unwrap();
             let j = (sensor.reconstruction().unwrap() - first).round();
-            let factor = InCell::certain(Cell::new(j - 0.5, j + 0.5).unwrap(), 0.15 * 0.15).unwrap();
+            let factor = Levels::certain(Cell::new(j - 0.5, j + 0.5).unwrap(), 0.15 * 0.15).unwrap();
             filter.predict_in_place(&mut belief, &mut workspace).unwrap();
             let observed = Observed::new(matrix, factor);
             filter.update_in_place(&mut belief, &observed, &mut workspace).unwrap();

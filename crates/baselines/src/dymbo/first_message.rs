@@ -1,6 +1,6 @@
 //! What a first message is worth: its mean squared error, the variance that it leaves, and its entropy.
 
-use fewbits_core::factor::InCell;
+use fewbits_core::factor::Levels;
 use fewbits_core::{Factor, Gaussian, MeasurementNoise};
 use fewbits_dymbo::{Error, Multiple, RoundedSample};
 use fewbits_numerics::error::ArgumentError;
@@ -40,7 +40,7 @@ pub fn first_message_value(scheme: &RoundedSample, prior: &Gaussian<1>) -> Resul
     let mean = prior.mean()[0];
     let mut value = FirstMessageValue::default();
     for k in scheme.round(mean - reach)?.0..=scheme.round(mean + reach)?.0 {
-        let posterior = InCell::certain(scheme.cell(Multiple(k))?, r)?.tilted(prior)?;
+        let posterior = Levels::certain(scheme.cell(Multiple(k))?, r)?.tilted(prior)?;
         let probability = posterior.log_evidence.exp();
         value.expected_variance += probability * posterior.covariance[0];
         value.entropy_bits -= probability * posterior.log_evidence / std::f64::consts::LN_2;

@@ -1,6 +1,6 @@
 //! How far the posterior of one bit is from the normal density of the same moments.
 
-use fewbits_core::factor::{Factor, InCell};
+use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Sign};
 use fewbits_dymbo::Error;
 use fewbits_numerics::error::positive;
@@ -26,7 +26,7 @@ const REFINEMENTS: usize = 60;
 pub fn distance_from_normal(prior_variance: f64, measurement_variance: f64) -> Result<f64, Error> {
     let s = positive("prior_variance", prior_variance)?.sqrt();
     let prior = Gaussian::scalar(0.0, prior_variance)?;
-    let posterior = InCell::sign(Sign::Above, 0.0, measurement_variance, &Link::PERFECT)?.tilted(&prior)?;
+    let posterior = Levels::sign(Sign::Above, 0.0, measurement_variance, &Link::PERFECT)?.tilted(&prior)?;
     let (mean, variance) = (posterior.mean[0], posterior.covariance[0]);
     let difference = |theta: f64| {
         let exact = posterior_density(theta, &prior, measurement_variance, Sign::Above);
@@ -53,7 +53,7 @@ pub fn distance_from_normal(prior_variance: f64, measurement_variance: f64) -> R
 #[cfg(test)]
 mod tests {
     use super::{distance_from_normal, posterior_density};
-    use fewbits_core::factor::{Factor, InCell};
+    use fewbits_core::factor::{Factor, Levels};
     use fewbits_core::{Gaussian, Link, Sign};
     use fewbits_numerics::quadrature::gauss_legendre;
 
@@ -64,7 +64,7 @@ mod tests {
             let moment = |k: i32| {
                 gauss_legendre::<64>().composite(-12.0, 13.0, 4, |t| t.powi(k) * posterior_density(t, &prior, 0.3, bit))
             };
-            let posterior = InCell::sign(bit, 0.5, 0.3, &Link::PERFECT)
+            let posterior = Levels::sign(bit, 0.5, 0.3, &Link::PERFECT)
                 .unwrap()
                 .tilted(&prior)
                 .unwrap();

@@ -5,7 +5,7 @@
 //! the Dymbo estimate and the posterior mean is the filter's excess. Their sum is the filter's mean squared error.
 //! [`chain`](fewbits_dymbo::chain) computes it independently; the two agree to 13 digits.
 
-use fewbits_core::factor::InCell;
+use fewbits_core::factor::Levels;
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
 use fewbits_dymbo::{DymboFilter, Error, ScalarFilter, ScalarPlant};
 use fewbits_filters::{PointMass, PointMassFilter, UniformGrid};
@@ -57,7 +57,7 @@ pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) ->
         filter,
         exact: PointMassFilter::new(plant.dynamics(), grid)?,
     };
-    let cell = InCell::certain(Cell::new(-0.5 * tau, 0.5 * tau)?, plant.measurement_variance())?;
+    let cell = Levels::certain(Cell::new(-0.5 * tau, 0.5 * tau)?, plant.measurement_variance())?;
     let density = PointMass::new(grid, |x| cell.log_probability(x))?;
     let mut levels = vec![TreeLevel::default(); depth];
     walk.descend(&start, &density, 1.0, &mut levels)?;
@@ -89,7 +89,7 @@ impl Walk {
         for bit in [Sign::Above, Sign::Below].into_iter().take(if first { 1 } else { 2 }) {
             let mut exact = ahead.clone();
             let r = self.filter.plant().measurement_variance();
-            let factor = InCell::sign(bit, threshold, r, &Link::PERFECT)?;
+            let factor = Levels::sign(bit, threshold, r, &Link::PERFECT)?;
             let log_evidence = exact.update_with(|x| factor.log_probability(x))?;
             let weight = if first { 1.0 } else { weight * log_evidence.exp() };
             let posterior = self.filter.update(&predicted, &Observation::Received(bit))?.0;

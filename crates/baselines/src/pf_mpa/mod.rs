@@ -9,6 +9,7 @@
 //! | draws from products of messages; convergence of Gibbs sweeps over their labels | [`ProductSampler`]; [`LabelChain`] |
 //! | two targets, measurements in unknown order | [`association`] |
 //! | the manoeuvring target and its chain; how nodes compute the same cells | [`Target`], [`WithManoeuvre`], [`AccelerationChain`]; [`Encoder`] |
+//! | what a sensor reported, with the interval from which messages are drawn | [`RangeFactor`], [`IntervalRule`] |
 //! | the other trackers: linearised, particles and draws | [`Linearised`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
 //! | bounds; which sensor leads, what it hands over, in bits | [`CramerRao`]; [`leader`] |
 //! | factor graphs, sum-product over finite alphabets | [`graph`] |
@@ -27,6 +28,7 @@ mod message;
 mod message_passing;
 pub mod product;
 mod product_sampler;
+mod range_factor;
 mod rao_blackwell;
 mod ring;
 mod target;
@@ -41,6 +43,7 @@ pub use linearised::{Linearised, QuantizationNoise, Velocity};
 pub use message::{DynamicsWeight, KernelRule, Ring, RingWeight, kernel_error};
 pub use message_passing::{MessagePassing, MessageWorkspace};
 pub use product_sampler::ProductSampler;
+pub use range_factor::{IntervalRule, RangeFactor};
 pub use rao_blackwell::{RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
 pub use ring::RingBias;
 pub use target::{Manoeuvres, Target, WithManoeuvre};

@@ -1,12 +1,12 @@
 //! The traits of the trackers of this crate, and the network of sensors that they use.
 
 use crate::pf_mpa::encoder::Encoder;
+use crate::pf_mpa::range_factor::{IntervalRule, RangeFactor};
 use crate::pf_mpa::target::{Manoeuvres, Target};
 use fewbits_core::{Gaussian, Observed};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::error::refuse;
 use fewbits_pf_mpa::Error;
-use fewbits_pf_mpa::RangeFactor;
 use fewbits_pf_mpa::RangeSensor;
 use fewbits_pf_mpa::{QuantizedRange, RangeReference};
 use nalgebra::Vector2;
@@ -188,6 +188,7 @@ pub struct Network {
     sensors: Vec<RangeSensor>,
     scheme: QuantizedRange,
     encoder: Encoder,
+    interval: IntervalRule,
 }
 
 impl Network {
@@ -205,7 +206,14 @@ impl Network {
             sensors: sensors.collect::<Result<_, _>>()?,
             scheme,
             encoder,
+            interval: IntervalRule::Correct,
         })
+    }
+
+    /// The same network with another interval for message passing. Likelihoods use the true cell.
+    #[must_use]
+    pub fn with_interval(self, interval: IntervalRule) -> Self {
+        Self { interval, ..self }
     }
 
     /// The sensors.
@@ -216,11 +224,6 @@ impl Network {
     /// The quantizer of all sensors.
     pub fn scheme(&self) -> &QuantizedRange {
         &self.scheme
-    }
-
-    /// Bits of the reports of all sensors in one step.
-    pub fn report_bits(&self) -> usize {
-        self.sensors.len() * self.scheme.bits() as usize
     }
 
     /// Draws a range from every sensor to a target at `(x, y)`.
@@ -267,7 +270,8 @@ impl Network {
                 .zip(self.references(target, k, previous)?)
                 .map(|((s, z), reference)| {
                     let level = self.scheme.level(*z, &reference)?;
-                    Ok(Observed::new(*s, self.scheme.received(level, &reference)?))
+                    let factor = RangeFactor::level(&self.scheme, level, &reference, self.interval)?;
+                    Ok(Observed::new(*s, factor))
                 })
                 .collect(),
         }

@@ -6,7 +6,7 @@ use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::factor::{Levels, Scalar, Value};
 use fewbits_core::{
     Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, Sensing,
 };
@@ -108,8 +108,8 @@ fn the_joint_likelihood_is_the_product_of_the_single_ones() {
         .iter()
         .map(|o| match o {
             Observation::Received(z) => (Value::scalar(z[0], 1.0).unwrap().into(), 0.9_f64.ln()),
-            Observation::Nothing => (InCell::silence(cell, 1.0, &link).unwrap().into(), 0.0),
-            Observation::Lost => (Scalar::outside(&cell, 1.0, 1.0).unwrap(), 0.0),
+            Observation::Nothing => (Levels::silence(cell, 1.0, &link).unwrap().into(), 0.0),
+            Observation::Lost => (Levels::outside(&cell, 1.0, 1.0).unwrap().into(), 0.0),
         })
         .collect();
     let x: Vec<f64> = (0..1000).map(|i| i as f64 * 0.02 - 9.0).collect();
@@ -190,7 +190,7 @@ fn the_three_centres_agree_over_a_run() {
         for observation in &observations {
             let what: Scalar = match observation {
                 Observation::Received(z) => Value::scalar(z[0], 1.0).unwrap().into(),
-                _ => InCell::certain(cell, 1.0).unwrap().into(),
+                _ => Levels::certain(cell, 1.0).unwrap().into(),
             };
             mixture
                 .update(&mut rng, &mut rao, &[&Observed::new(sensor, what)])

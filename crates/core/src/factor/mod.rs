@@ -7,24 +7,21 @@
 //! | factor | type |
 //! |---|---|
 //! | a value in Gaussian noise | [`Value`] |
-//! | a measurement known to lie in a cell, mixed with a constant: sign bits, quantizer cells, silence, over lossy and flipping links | [`InCell`] |
-//! | a symbol through any discrete channel: a probability for each cell of a partition | [`Partition`] |
+//! | cells with weights and a constant: sign bits, quantizer cells, silence, symbols, over lossy and flipping links | [`Levels`] |
 //! | an observation that does not depend on `m` | [`Constant`] |
-//! | any of the four above | [`Scalar`] |
+//! | any of the three above, of a scalar | [`Scalar`] |
 //! | a factor of a report that may be an outlier | [`Robust`] |
 //! | several observations of one `m` | [`Product`], [`Repeated`] |
 
-mod cell;
+mod levels;
 mod moments;
-mod partition;
 mod product;
 mod robust;
 mod scalar;
 mod value;
 
-pub use cell::InCell;
+pub use levels::Levels;
 pub use moments::{Feature, tilted_by_quadrature};
-pub use partition::Partition;
 pub use product::{Product, Repeated};
 pub use robust::Robust;
 pub use scalar::{Constant, Scalar};
@@ -64,9 +61,8 @@ pub trait Factor<const M: usize>: Send + Sync {
     /// is not finite; [`Error::NotConverged`] if a quadrature does not reach its accuracy.
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error>;
 
-    /// This factor as a [`Scalar`] and the logarithm of a constant that multiplies it; `None` if it is no such product. Filters that impute
-    /// measurements call it.
-    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+    /// This factor as a [`Scalar`]; `None` if it is none. Filters that impute measurements call it.
+    fn as_scalar(&self) -> Option<Scalar> {
         None
     }
 }
@@ -154,7 +150,7 @@ impl<const M: usize, F: Factor<M> + ?Sized> Factor<M> for &F {
         (**self).tilted(prior)
     }
 
-    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+    fn as_scalar(&self) -> Option<Scalar> {
         (**self).as_scalar()
     }
 }

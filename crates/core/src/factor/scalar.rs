@@ -1,8 +1,7 @@
 //! The likelihood of any observation of a scalar measurement.
 
 use super::moments::Feature;
-use super::{Factor, InCell, Partition, Tilted, Value};
-use crate::cell::Cell;
+use super::{Factor, Levels, Tilted, Value};
 use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
@@ -55,72 +54,22 @@ impl<const M: usize> Factor<M> for Constant {
         Tilted::unchanged(prior, self.probability.ln())
     }
 
-    fn as_scalar(&self) -> Option<(Scalar, f64)> {
-        Some(((*self).into(), 0.0))
+    fn as_scalar(&self) -> Option<Scalar> {
+        Some((*self).into())
     }
 }
 
 /// Any factor of a scalar measurement in Gaussian noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum Scalar {
     /// The measurement itself was observed.
     Value(Value<1>),
-    /// The measurement is in a cell.
-    InCell(InCell),
-    /// Each cell of a partition has a probability.
-    Partition(Partition),
-    /// The observation does not depend on the measurement.
-    Constant(Constant),
+    /// A piecewise constant likelihood of the noisy measurement: cells, silence, symbols, losses.
+    Levels(Levels),
 }
 
 impl Scalar {
-    /// `p(observation | m) = p P(m + n outside cell)`: a known loss from a sensor that is silent if and only if its measurement lies
-    /// in `cell`, with `p` the link's [`lost_given_sent`](crate::Link::lost_given_sent). Impossible if `cell` is the whole line.
-    ///
-    /// # Errors
-    /// If `r` is not positive or `p` is outside `(0, 1]`.
-    pub fn outside(cell: &Cell, noise_variance: f64, p: f64) -> Result<Self, ArgumentError> {
-        let lower = (cell.lower() > f64::NEG_INFINITY).then_some(cell.lower());
-        let upper = (cell.upper() < f64::INFINITY).then_some(cell.upper());
-        let (edges, given_cell) = match (lower, upper) {
-            (None, None) => return Ok(Constant::new(0.0)?.into()),
-            (Some(lower), None) => (vec![lower], vec![p, 0.0]),
-            (None, Some(upper)) => (vec![upper], vec![0.0, p]),
-            (Some(lower), Some(upper)) => (vec![lower, upper], vec![p, 0.0, p]),
-        };
-        Ok(Partition::new(edges, given_cell, noise_variance)?.into())
-    }
-
-    /// `p(observation | measurement)` as a piecewise constant function of the noisy measurement: cells with their
-    /// probabilities, those of probability zero left out. Empty for a [`Value`], which is a point.
-    pub fn pieces(&self) -> Vec<(Cell, f64)> {
-        let whole = (f64::NEG_INFINITY, f64::INFINITY);
-        let (edges, shares) = match self {
-            Self::Value(_) => return Vec::new(),
-            Self::Constant(factor) => (vec![whole.0, whole.1], vec![factor.probability]),
-            Self::InCell(factor) => (
-                vec![whole.0, factor.cell().lower(), factor.cell().upper(), whole.1],
-                vec![factor.floor(), factor.floor() + factor.share(), factor.floor()],
-            ),
-            Self::Partition(factor) => (
-                [whole.0]
-                    .into_iter()
-                    .chain(factor.edges().iter().copied())
-                    .chain([whole.1])
-                    .collect(),
-                factor.given_cell().to_vec(),
-            ),
-        };
-        // Cells that cannot have caused the observation are left out.
-        let ends = edges.windows(2).map(|pair| Cell::new(pair[0], pair[1]));
-        ends.zip(shares)
-            .filter_map(|(cell, p)| Some((cell.ok()?, p)))
-            .filter(|(_, p)| *p > 0.0)
-            .collect()
-    }
-
     /// The places where the likelihood changes.
     pub(crate) fn features(&self) -> Vec<Feature> {
         match self {
@@ -128,16 +77,7 @@ impl Scalar {
                 location: value.value()[0],
                 width: value.noise_covariance()[0].sqrt(),
             }],
-            Self::InCell(factor) => [factor.cell().lower(), factor.cell().upper()]
-                .into_iter()
-                .filter(|edge| edge.is_finite())
-                .map(|location| Feature {
-                    location,
-                    width: factor.noise_variance().sqrt(),
-                })
-                .collect(),
-            Self::Partition(factor) => factor.features().collect(),
-            Self::Constant(_) => Vec::new(),
+            Self::Levels(factor) => factor.features(),
         }
     }
 }
@@ -146,9 +86,7 @@ macro_rules! delegate {
     ($self:expr, $factor:ident => $call:expr) => {
         match $self {
             Scalar::Value($factor) => $call,
-            Scalar::InCell($factor) => $call,
-            Scalar::Partition($factor) => $call,
-            Scalar::Constant($factor) => $call,
+            Scalar::Levels($factor) => $call,
         }
     };
 }
@@ -168,19 +106,28 @@ impl Factor<1> for Scalar {
         delegate!(self, factor => factor.tilted(prior))
     }
 
-    fn as_scalar(&self) -> Option<(Scalar, f64)> {
-        Some((self.clone(), 0.0))
+    fn as_scalar(&self) -> Option<Scalar> {
+        match self {
+            Self::Value(value) => value.as_scalar(),
+            Self::Levels(levels) => levels.as_scalar(),
+        }
     }
 }
 
-macro_rules! from {
-    ($($factor:ty => $kind:ident),+) => {$(
-        impl From<$factor> for Scalar {
-            fn from(factor: $factor) -> Self {
-                Self::$kind(factor)
-            }
-        }
-    )+};
+impl From<Value<1>> for Scalar {
+    fn from(factor: Value<1>) -> Self {
+        Self::Value(factor)
+    }
 }
 
-from!(Value<1> => Value, InCell => InCell, Partition => Partition, Constant => Constant);
+impl From<Levels> for Scalar {
+    fn from(factor: Levels) -> Self {
+        Self::Levels(factor)
+    }
+}
+
+impl From<Constant> for Scalar {
+    fn from(factor: Constant) -> Self {
+        Self::Levels(Levels::of_probability(factor.probability))
+    }
+}

@@ -4,16 +4,27 @@ use super::{Factor, Scalar, Tilted};
 use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::{FactoredGaussian, Gaussian};
-use fewbits_numerics::error::{ArgumentError, all_finite};
+use fewbits_numerics::error::{ArgumentError, all_finite, finite};
 use fewbits_numerics::kernels::vectorised;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// The measurement itself, `z ~ N(m, R)`. With it, the assumed-density update is the Kalman filter.
+/// The measurement itself, `z ~ N(m, R)`, times a constant such as the probability that it arrives. With it, the assumed-density update is
+/// the Kalman filter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Gaussian<M>", into = "Gaussian<M>")]
+#[serde(try_from = "Parts<M>", into = "Parts<M>")]
 pub struct Value<const M: usize> {
     noise: FactoredGaussian<M>,
+    log_scale: f64,
+}
+
+/// The stored form of [`Value`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parts<const M: usize> {
+    noise: Gaussian<M>,
+    #[serde(default, with = "fewbits_numerics::stored")]
+    log_scale: f64,
 }
 
 impl<const M: usize> Value<M> {
@@ -29,12 +40,26 @@ impl<const M: usize> Value<M> {
                 name: "noise_covariance",
                 ..error
             })?;
-        Ok(Self { noise })
+        Ok(Self { noise, log_scale: 0.0 })
+    }
+
+    /// The same, with `log` added to every log likelihood.
+    ///
+    /// # Errors
+    /// If it is not finite.
+    pub fn times_exp(self, log: f64) -> Result<Self, ArgumentError> {
+        let log_scale = finite("log", self.log_scale + log)?;
+        Ok(Self { log_scale, ..self })
     }
 
     /// Observed value `z`.
     pub fn value(&self) -> &SVector<f64, M> {
         self.noise.mean()
+    }
+
+    /// Logarithm of the constant that multiplies the density.
+    pub fn log_scale(&self) -> f64 {
+        self.log_scale
     }
 
     /// Noise covariance `R`.
@@ -54,24 +79,27 @@ impl Value<1> {
     }
 }
 
-impl<const M: usize> From<Value<M>> for Gaussian<M> {
+impl<const M: usize> From<Value<M>> for Parts<M> {
     fn from(value: Value<M>) -> Self {
-        *value.noise.gaussian()
+        Self {
+            noise: *value.noise.gaussian(),
+            log_scale: value.log_scale,
+        }
     }
 }
 
-impl<const M: usize> TryFrom<Gaussian<M>> for Value<M> {
+impl<const M: usize> TryFrom<Parts<M>> for Value<M> {
     type Error = ArgumentError;
 
-    fn try_from(noise: Gaussian<M>) -> Result<Self, ArgumentError> {
-        Self::new(*noise.mean(), *noise.covariance())
+    fn try_from(parts: Parts<M>) -> Result<Self, ArgumentError> {
+        Self::new(*parts.noise.mean(), *parts.noise.covariance())?.times_exp(parts.log_scale)
     }
 }
 
 impl<const M: usize> Factor<M> for Value<M> {
     #[inline]
     fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
-        self.noise.log_pdf(m)
+        self.log_scale + self.noise.log_pdf(m)
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
@@ -82,7 +110,7 @@ impl<const M: usize> Factor<M> for Value<M> {
         // Variances below 1e-308 are subnormal and have lost precision.
         if M == 1 && half_precision.is_finite() {
             // A plain quadratic without branches, so that the loop vectorises.
-            let (value, constant) = (self.value()[0], self.noise.log_peak());
+            let (value, constant) = (self.value()[0], self.noise.log_peak() + self.log_scale);
             vectorised(
                 #[inline(always)]
                 || {
@@ -93,13 +121,16 @@ impl<const M: usize> Factor<M> for Value<M> {
             );
         } else {
             self.noise.add_log_pdfs(means, log_weights);
+            log_weights
+                .iter_mut()
+                .for_each(|log_weight| *log_weight += self.log_scale);
         }
     }
 
-    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+    fn as_scalar(&self) -> Option<Scalar> {
         let variance = self.noise_covariance().iter().next().filter(|_| M == 1)?;
-        let one = Value::scalar(self.value()[0], *variance).ok()?;
-        Some((one.into(), 0.0))
+        let one = Value::scalar(self.value()[0], *variance).and_then(|one| one.times_exp(self.log_scale));
+        Some(one.ok()?.into())
     }
 
     /// `S = V + R`, gain `K = V S^-1`: mean `mu + K (z - mu)`, covariance `(I - K) V (I - K)' + K R K'`, evidence
@@ -115,6 +146,7 @@ impl<const M: usize> Factor<M> for Value<M> {
         let log_root_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
         let squared = innovation.dot(&factor.solve(&innovation));
         let log_evidence = -0.5 * squared - log_root_determinant - M as f64 * fewbits_numerics::normal::LN_SQRT_2PI;
+        let log_evidence = log_evidence + self.log_scale;
         let mean = prior.mean() + gain * innovation;
         // Joseph form: stays positive semidefinite under rounding.
         let covariance = keep * spread * keep.transpose() + gain * noise * gain.transpose();

@@ -1,17 +1,15 @@
 //! The laws of factors, on every one, and what was once wrong.
 
-use fewbits_core::factor::{
-    Constant, Factor, Feature, InCell, Partition, Product, Repeated, Scalar, Value, tilted_by_quadrature,
-};
+use fewbits_core::factor::{Constant, Factor, Feature, Levels, Product, Repeated, Scalar, Value, tilted_by_quadrature};
 use fewbits_core::laws::{factor, likelihood};
-use fewbits_core::{Cell, Error, Gaussian, Link, Observed, Sensing, Sign};
+use fewbits_core::{Cell, Error, Gaussian, Link, Noise, Observed, RangeNoise, Sensing, Sign};
 use fewbits_numerics::normal;
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
 use proptest::prelude::*;
 use rand::Rng;
 
-fn silence(half_width: f64, noise: f64, loss: f64) -> InCell {
-    InCell::silence(Cell::new(-half_width, half_width).unwrap(), noise, &Link::lossy(loss).unwrap()).unwrap()
+fn silence(half_width: f64, noise: f64, loss: f64) -> Levels {
+    Levels::silence(Cell::new(-half_width, half_width).unwrap(), noise, &Link::lossy(loss).unwrap()).unwrap()
 }
 
 /// One of each kind, at unit scale.
@@ -19,12 +17,12 @@ fn kinds() -> Vec<Scalar> {
     let link = Link::new(0.2, 0.1).unwrap();
     vec![
         Value::scalar(0.4, 0.7).unwrap().into(),
-        InCell::sign(Sign::Above, 0.3, 0.5, &Link::PERFECT).unwrap().into(),
-        InCell::sign(Sign::Below, 0.3, 0.5, &link).unwrap().into(),
-        InCell::certain(Cell::new(-0.2, 0.9).unwrap(), 0.5).unwrap().into(),
+        Levels::sign(Sign::Above, 0.3, 0.5, &Link::PERFECT).unwrap().into(),
+        Levels::sign(Sign::Below, 0.3, 0.5, &link).unwrap().into(),
+        Levels::certain(Cell::new(-0.2, 0.9).unwrap(), 0.5).unwrap().into(),
         silence(0.8, 0.5, 0.25).into(),
         silence(0.8, 0.5, 0.0).into(),
-        Partition::new(vec![-1.0, 0.3, 1.2], vec![0.1, 0.7, 0.0, 0.7], 0.4)
+        Levels::partition(&[-1.0, 0.3, 1.2], &[0.1, 0.7, 0.0, 0.7], 0.4)
             .unwrap()
             .into(),
         Constant::new(0.3).unwrap().into(),
@@ -100,14 +98,14 @@ fn what_is_out_of_reach_of_the_numbers_is_impossible_and_not_nan() {
 #[test]
 fn bad_numbers_are_refused_by_name() {
     let cell = Cell::new(-1.0, 1.0).unwrap();
-    assert_eq!(InCell::certain(cell, 0.0).unwrap_err().name, "noise_variance");
-    assert_eq!(InCell::new(cell, 1.0, -0.1, 0.5).unwrap_err().name, "floor");
-    assert_eq!(InCell::new(cell, 1.0, 0.6, 0.6).unwrap_err().name, "floor + share");
+    assert_eq!(Levels::certain(cell, 0.0).unwrap_err().name, "noise_variance");
+    assert_eq!(Levels::new(cell, 1.0, -0.1, 0.5).unwrap_err().name, "floor");
+    assert_eq!(Levels::new(cell, 1.0, 0.6, 0.6).unwrap_err().name, "floor + weight");
     assert_eq!(Value::scalar(f64::NAN, 1.0).unwrap_err().name, "value");
     assert_eq!(Value::scalar(0.0, -1.0).unwrap_err().name, "noise_variance");
-    assert!(Partition::new(vec![0.0, 0.0], vec![1.0, 0.0, 0.0], 1.0).is_err());
-    assert!(Partition::new(vec![0.0], vec![1.0], 1.0).is_err());
-    assert!(Partition::new(vec![], vec![0.0], 1.0).is_err());
+    assert!(Levels::partition(&[0.0, 0.0], &[1.0, 0.0, 0.0], 1.0).is_err());
+    assert!(Levels::partition(&[0.0], &[1.0], 1.0).is_err());
+    assert!(Levels::partition(&[], &[0.0], 1.0).is_err());
     assert!(Link::new(1.1, 0.0).is_err() && Link::new(0.0, 0.6).is_err() && Link::new(f64::NAN, 0.0).is_err());
     assert!(serde_json::from_str::<Link>(r#"{"loss":2,"crossover":0}"#).is_err());
     assert!(serde_json::from_str::<Link>(r#"{"loss":0.6,"erasure":0.6,"crossover":0}"#).is_err());
@@ -191,7 +189,7 @@ fn sweeps_over_wide_and_narrow_cells_are_the_scalar() {
     let means: Vec<_> = (0..301).map(|i| Vector1::new(0.3 * f64::from(i) - 45.0)).collect();
     for (width, floor) in [(0.4, 0.0), (0.4, 0.1), (1.0, 0.0), (1.5, 0.0), (1.5, 0.1)] {
         let cell = Cell::new(0.2, 0.2 + width).unwrap();
-        factor::sweep_is_scalar(&InCell::new(cell, 1.0, floor, 0.8).unwrap(), &means).unwrap();
+        factor::sweep_is_scalar(&Levels::new(cell, 1.0, floor, 0.8).unwrap(), &means).unwrap();
     }
 }
 
@@ -205,7 +203,7 @@ proptest! {
         let variance = ln_variance.exp();
         let tilt = |s: f64| {
             let cell = Cell::new(-half * s, half * s).unwrap();
-            let factor = InCell::silence(cell, s * s, &Link::lossy(loss).unwrap()).unwrap();
+            let factor = Levels::silence(cell, s * s, &Link::lossy(loss).unwrap()).unwrap();
             Repeated::new(factor.into(), count).unwrap().tilted(&Gaussian::scalar(mean * s, variance * s * s).unwrap()).unwrap()
         };
         let (one, other) = (tilt(1.0), tilt(scale));
@@ -222,7 +220,7 @@ proptest! {
         mean in -300.0..300.0_f64, ln_variance in -12.0..12.0_f64, threshold in -30.0..30.0_f64, ln_noise in -6.0..6.0_f64,
     ) {
         let prior = Gaussian::scalar(mean, ln_variance.exp()).unwrap();
-        let bit = InCell::sign(Sign::Above, threshold, ln_noise.exp(), &Link::PERFECT).unwrap();
+        let bit = Levels::sign(Sign::Above, threshold, ln_noise.exp(), &Link::PERFECT).unwrap();
         let closed = bit.tilted(&prior).unwrap();
         // A constant beside it forces quadrature.
         let product: Product = [bit.into(), Constant::ONE.into()].into_iter().collect();
@@ -258,14 +256,16 @@ fn quadrature_finds_what_nobody_told_it() {
 
 #[test]
 fn what_goes_into_a_factor_comes_out() {
-    let cells = Partition::new(vec![-1.0, 0.3], vec![0.1, 0.7, 0.2], 0.4).unwrap();
-    assert_eq!((cells.edges(), cells.given_cell()), (&[-1.0, 0.3][..], &[0.1, 0.7, 0.2][..]));
-    assert_eq!(cells.noise_variance(), 0.4);
+    let cells = Levels::partition(&[-1.0, 0.3], &[0.1, 0.7, 0.2], 0.4).unwrap();
+    let cell = |lower, upper| Cell::new(lower, upper).unwrap();
+    let (below, above) = (cell(f64::NEG_INFINITY, -1.0), cell(0.3, f64::INFINITY));
+    assert_eq!(cells.pieces(), [(below, 0.1), (cell(-1.0, 0.3), 0.7), (above, 0.2)]);
+    assert_eq!(cells.noise(), &Noise::Variance(0.4));
     assert_eq!((Constant::new(0.3).unwrap().probability(), Constant::ONE.probability()), (0.3, 1.0));
-    let inside = InCell::new(Cell::new(-0.2, 0.9).unwrap(), 0.5, 0.1, 0.7).unwrap();
-    assert_eq!((inside.cell().lower(), inside.cell().upper()), (-0.2, 0.9));
-    assert_eq!((inside.noise_variance(), inside.floor(), inside.share()), (0.5, 0.1, 0.7));
-    let twice = Repeated::new(inside.into(), 2).unwrap();
+    let inside = Levels::new(cell(-0.2, 0.9), 0.5, 0.1, 0.7).unwrap();
+    let (below, above) = (cell(f64::NEG_INFINITY, -0.2), cell(0.9, f64::INFINITY));
+    assert_eq!(inside.pieces(), [(below, 0.1), (cell(-0.2, 0.9), 0.1 + 0.7), (above, 0.1)]);
+    let twice = Repeated::new(inside.clone().into(), 2).unwrap();
     assert_eq!((twice.factor(), twice.count()), (&Scalar::from(inside), 2));
 }
 
@@ -282,7 +282,7 @@ fn a_cell_out_of_reach_is_blamed_on_the_floor() {
 /// Where every cell that matters is far away the logarithm still is that of the nearest one.
 #[test]
 fn a_partition_far_away_is_its_nearest_cell() {
-    let cells = Partition::new(vec![-1.0, 0.3, 1.2], vec![0.1, 0.7, 0.0, 0.0], 0.4).unwrap();
+    let cells = Levels::partition(&[-1.0, 0.3, 1.2], &[0.1, 0.7, 0.0, 0.0], 0.4).unwrap();
     for m in [20.0, 45.0, 300.0] {
         let want = 0.7_f64.ln() + normal::log_interval((-1.0 - m) / 0.4_f64.sqrt(), (0.3 - m) / 0.4_f64.sqrt());
         assert!((cells.log_probability(m) - want).abs() < 1e-14 * want.abs(), "{m}");
@@ -292,19 +292,19 @@ fn a_partition_far_away_is_its_nearest_cell() {
         let want = 0.1 * p(f64::NEG_INFINITY, -1.0) + 0.7 * p(-1.0, 0.3);
         assert!((cells.log_probability(m) - want.ln()).abs() < 1e-14, "{m}");
     }
-    let sure = Partition::new(vec![-1.0, 0.3], vec![1.0, 0.99, 1.0], 0.4).unwrap();
+    let sure = Levels::partition(&[-1.0, 0.3], &[1.0, 0.99, 1.0], 0.4).unwrap();
     assert_eq!(sure.log_probability(60.0), 0.0);
 }
 
 /// Defect: a NaN particle had the likelihood 1 under a partition, alone and in a sweep.
 #[test]
 fn a_nan_particle_never_gains_weight() {
-    let partition = Partition::new(vec![-1.0, 1.0], vec![0.2, 0.0, 0.7], 0.5).unwrap();
+    let partition = Levels::partition(&[-1.0, 1.0], &[0.2, 0.0, 0.7], 0.5).unwrap();
     assert!(partition.log_probability(f64::NAN).is_nan());
     let mut logs = [0.0; 3];
     partition.add_log_likelihoods(&[&[0.0, f64::NAN, 50.0]], &mut logs);
     assert!(logs[0] < 0.0 && logs[1].is_nan() && (logs[2] - 0.7_f64.ln()).abs() < 1e-12);
-    let everywhere = Partition::new(vec![0.0], vec![0.5, 0.5], 1.0).unwrap();
+    let everywhere = Levels::partition(&[0.0], &[0.5, 0.5], 1.0).unwrap();
     factor::is_a_number(&everywhere, &points()).unwrap();
     factor::sweep_is_scalar(&everywhere, &points()).unwrap();
 }
@@ -338,4 +338,64 @@ fn feature_without_width_is_integrated() {
     };
     let tilted = tilted_by_quadrature(&prior, [step], half_line).unwrap();
     assert!((tilted.log_evidence - normal::log_cdf(-7.0)).abs() < 1e-6, "{tilted:?}");
+}
+
+/// Cells, floors and constants in noise of one variance and in noise that grows with the measurement.
+fn levels(noise: Noise) -> Vec<Levels> {
+    let cell = |lower, upper| Cell::new(lower, upper).unwrap();
+    let (above, inside) = (cell(4.0, f64::INFINITY), cell(3.0, 5.5));
+    vec![
+        Levels::certain(inside, noise).unwrap(),
+        Levels::certain(above, noise).unwrap(),
+        Levels::new(cell(f64::NEG_INFINITY, 4.0), noise, 0.0, 0.4).unwrap(),
+        Levels::new(inside, noise, 0.2, 0.7).unwrap(),
+        Levels::certain(inside, noise).unwrap().times_exp(1.7).unwrap(),
+        Levels::new(above, noise, 0.2, 0.7).unwrap().times_exp(-0.3).unwrap(),
+        Levels::outside(&inside, noise, 0.9).unwrap(),
+        Levels::partition(&[2.0, 4.0, 7.0], &[0.1, 0.6, 0.0, 0.3], noise)
+            .unwrap()
+            .times_exp(0.4)
+            .unwrap(),
+        Levels::new(inside, noise, 0.3, 0.0).unwrap(),
+    ]
+}
+
+#[test]
+fn levels_obey_the_laws_in_every_noise() {
+    let noises = [
+        Noise::Variance(0.4),
+        RangeNoise::constant(0.6).unwrap().into(),
+        RangeNoise::from_snr_db(20.0).unwrap().into(),
+        RangeNoise::new(0.2, 0.05).unwrap().into(),
+    ];
+    for noise in noises {
+        for own in levels(noise) {
+            let at = [-1e9, -1.0, 0.0, 1e-9, 0.1, 2.0, 5.2, 40.0, 1e9].map(Vector1::new);
+            factor::is_a_number(&own, &at).unwrap();
+            factor::sweep_is_scalar(&own, &at[1..8]).unwrap();
+            let prior = Gaussian::scalar(5.0, 0.4).unwrap();
+            factor::tilted_is_quadrature(&own, &prior, 4.9, 60_001, 1e-8).unwrap();
+            let json = serde_json::to_string(&own).unwrap();
+            assert_eq!(serde_json::from_str::<Levels>(&json).unwrap(), own, "{json}");
+            // The pieces are the likelihood without noise.
+            let exact: f64 = own
+                .pieces()
+                .iter()
+                .map(|(cell, p)| p * cell.log_probability(4.4, noise.variance(4.4).sqrt()).exp())
+                .sum();
+            assert!((own.log_probability(4.4) - exact.ln()).abs() < 1e-13, "{own:?}");
+        }
+    }
+}
+
+#[test]
+fn stored_levels_are_checked() {
+    let good = Levels::partition(&[2.0, 4.0], &[0.1, 0.6, 0.0], 0.5).unwrap();
+    let json = serde_json::to_string(&good).unwrap();
+    assert!(serde_json::from_str::<Levels>(&json).is_ok());
+    for (from, to) in [("0.6", "0.1"), ("0.6", "1.6"), ("0.5", "-0.5"), ("2.0", "3.0")] {
+        let changed = json.replacen(from, to, 1);
+        assert_ne!(changed, json);
+        assert!(serde_json::from_str::<Levels>(&changed).is_err(), "{changed}");
+    }
 }

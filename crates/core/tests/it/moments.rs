@@ -1,6 +1,6 @@
 //! Moments by quadrature: what they cost and how good they are, where the posterior is plain and where it is not.
 
-use fewbits_core::factor::{Factor, Feature, InCell, Partition, Scalar, Value, tilted_by_quadrature};
+use fewbits_core::factor::{Factor, Feature, Levels, Scalar, Value, tilted_by_quadrature};
 use fewbits_core::{Cell, Error, Gaussian, Link, Sign};
 use std::cell::Cell as Counter;
 
@@ -39,13 +39,13 @@ fn brute_force(mean: f64, variance: f64, observed: &Observed, (low, high): (f64,
 }
 
 fn bit(sign: Sign, threshold: f64, noise: f64) -> Scalar {
-    InCell::sign(sign, threshold, noise * noise, &Link::PERFECT)
+    Levels::sign(sign, threshold, noise * noise, &Link::PERFECT)
         .unwrap()
         .into()
 }
 
 fn cell(lower: f64, upper: f64, noise: f64, loss: f64) -> Scalar {
-    InCell::silence(Cell::new(lower, upper).unwrap(), noise * noise, &Link::lossy(loss).unwrap())
+    Levels::silence(Cell::new(lower, upper).unwrap(), noise * noise, &Link::lossy(loss).unwrap())
         .unwrap()
         .into()
 }
@@ -54,18 +54,18 @@ fn cell(lower: f64, upper: f64, noise: f64, loss: f64) -> Scalar {
 fn features(observed: &Observed) -> Vec<Feature> {
     let edges = |factor: &Scalar| match factor {
         Scalar::Value(value) => vec![(value.value()[0], value.noise_covariance()[0])],
-        Scalar::InCell(inside) => {
-            vec![
-                (inside.cell().lower(), inside.noise_variance()),
-                (inside.cell().upper(), inside.noise_variance()),
-            ]
+        Scalar::Levels(levels) => {
+            let pieces = levels.pieces();
+            let mut edges: Vec<f64> = pieces
+                .iter()
+                .flat_map(|(cell, _)| [cell.lower(), cell.upper()])
+                .collect();
+            edges.dedup();
+            edges
+                .into_iter()
+                .map(|edge| (edge, levels.noise().variance(edge)))
+                .collect()
         }
-        Scalar::Partition(cells) => cells
-            .edges()
-            .iter()
-            .map(|edge| (*edge, cells.noise_variance()))
-            .collect(),
-        _ => Vec::new(),
     };
     let all = observed.iter().flat_map(|(factor, _)| edges(factor));
     all.filter(|(at, _)| at.is_finite())
@@ -83,9 +83,10 @@ fn moments_are_right_and_cheap() {
     type Case = (f64, f64, Observed, (f64, f64), usize);
     let once = |factor: Scalar| vec![(factor, 1.0)];
     let value = |at, variance| Scalar::from(Value::scalar(at, variance).unwrap());
-    let cells = |edges, given, variance| Scalar::from(Partition::new(edges, given, variance).unwrap());
-    let two_modes = cells(vec![-9.0, 8.9], vec![0.6, 0.0, 0.7], 0.04);
-    let comb = cells(vec![-2.0, -1.5, 1.7, 2.0], vec![0.6, 0.0, 0.7, 0.1, 1.0], 0.0025);
+    let cells =
+        |edges: &[f64], given: &[f64], variance: f64| Scalar::from(Levels::partition(edges, given, variance).unwrap());
+    let two_modes = cells(&[-9.0, 8.9], &[0.6, 0.0, 0.7], 0.04);
+    let comb = cells(&[-2.0, -1.5, 1.7, 2.0], &[0.6, 0.0, 0.7, 0.1, 1.0], 0.0025);
     let cases: Vec<Case> = vec![
         // The trapezoid rule: as wide as the prior, finer, at the limit; a feature far out; a narrow posterior.
         (0.4, 1.5, once(bit(Above, 1.1, 1.7)), (-15.0, 16.0), 40),

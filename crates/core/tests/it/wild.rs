@@ -1,7 +1,7 @@
 //! Wild arguments: every constructor and step of this crate returns numbers or an error.
 
-use fewbits_core::factor::{Constant, Factor, InCell, Partition, Product, Repeated, Robust, Scalar, Tilted, Value};
-use fewbits_core::number::Levels;
+use fewbits_core::factor::{Constant, Factor, Levels, Product, Repeated, Robust, Scalar, Tilted, Value};
+use fewbits_core::number;
 use fewbits_core::{BitString, Cell, Gaussian, Link, NumberFormat, Observation, Sign};
 use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
 use proptest::prelude::*;
@@ -43,17 +43,17 @@ proptest! {
         let resolved = |m: f64| (x[7] - x[5]).abs() > 1e-6 * (m.abs() + x[5].abs() + x[7].abs());
         let sign = if above { Sign::Above } else { Sign::Below };
         let mut all: Vec<Scalar> = Vec::new();
-        all.extend(InCell::sign(sign, x[5], x[6], &link).map(Scalar::from));
+        all.extend(Levels::sign(sign, x[5], x[6], &link).map(Scalar::from));
         all.extend(Value::scalar(x[5], x[6]).map(Scalar::from));
         all.extend(Constant::new(x[2]).map(Scalar::from));
         all.push(Constant::of_delivery(&Observation::<Sign>::Lost, &link).into());
         if let Ok(cell) = Cell::new(x[5], x[7]) {
-            all.extend(InCell::silence(cell, x[6], &link).map(Scalar::from));
-            all.extend(InCell::new(cell, x[6], x[2], x[4]).map(Scalar::from));
-            all.extend(Scalar::outside(&cell, x[6], link.lost_given_sent()));
+            all.extend(Levels::silence(cell, x[6], &link).map(Scalar::from));
+            all.extend(Levels::new(cell, x[6], x[2], x[4]).map(Scalar::from));
+            all.extend(Levels::outside(&cell, x[6], link.lost_given_sent()).map(Scalar::from));
             prop_assert!(!cell.log_probability(x[0], x[6].abs()).eq(&f64::INFINITY));
         }
-        all.extend(Partition::new(vec![x[5], x[7]], vec![x[2], 0.5, x[4]], x[6]).map(Scalar::from));
+        all.extend(Levels::partition(&[x[5], x[7]], &[x[2], 0.5, x[4]], x[6]).map(Scalar::from));
         for factor in &all {
             check(factor, [x[3]], prior.as_ref(), resolved(x[3]));
             check(factor, [x[7]], prior.as_ref(), resolved(x[7]));
@@ -63,7 +63,9 @@ proptest! {
             if let Ok(repeated) = Repeated::new(factor.clone(), count) {
                 check(&repeated, [x[3]], prior.as_ref(), resolved(x[3]));
             }
-            let _ = factor.pieces();
+            if let Scalar::Levels(levels) = factor {
+                let _ = levels.pieces();
+            }
         }
         check(&all.into_iter().collect::<Product>(), [x[3]], prior.as_ref(), resolved(x[3]));
     }
@@ -96,7 +98,7 @@ proptest! {
 
     #[test]
     fn formats_of_wild_numbers_are_refused_or_hold_numbers(x in prop::array::uniform3(wild()), bits in 0..70_u32, bytes in prop::collection::vec(any::<u8>(), 0..20), length in any::<usize>()) {
-        if let Ok(levels) = Levels::new(x[0], x[1], bits) {
+        if let Ok(levels) = number::Levels::new(x[0], x[1], bits) {
             if let Ok(rounded) = NumberFormat::Fixed(levels).rounded(x[2]) {
                 prop_assert!(rounded.is_finite() && rounded >= x[0] && rounded <= x[1]);
             }

@@ -2,10 +2,12 @@
 
 mod gaussian_cloud;
 mod stored;
+mod systematic;
 pub(crate) mod weights;
 
 pub use gaussian_cloud::GaussianCloud;
-pub use weights::{Categorical, normalise_log_weights, systematic};
+pub use systematic::{systematic, systematic_into};
+pub use weights::{Categorical, normalise_log_weights};
 
 use crate::Error;
 use fewbits_core::columns::state_at;

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::kernels::{exp_minus, largest_number, sum, vectorised};
+use fewbits_numerics::kernels::{exp_minus, largest_number, vectorised};
 use rand::{Rng, RngExt};
 
 /// Draws indices with probability proportional to weights, by cumulative sums: `O(n)` to prepare, `O(log n)` per draw.
@@ -39,22 +39,6 @@ impl Categorical {
         let point = rng.random::<f64>() * self.sums.last().copied().unwrap_or(0.0);
         self.sums.partition_point(|sum| *sum <= point).min(self.last)
     }
-}
-
-/// Indices of `count` systematic draws from `weights`: index `i` occurs `count w_i / sum w` times, rounded up or down. Draw `j` is at
-/// `(j + offset) / count` of the cumulative weight; `offset` is uniform in `[0, 1)` for random draws, or 1/2 for a deterministic selection.
-pub fn systematic(weights: &[f64], count: usize, offset: f64) -> Vec<usize> {
-    let total: f64 = sum(weights);
-    let (mut i, mut cumulative) = (0, weights.first().copied().unwrap_or(0.0));
-    let next = |k: usize| {
-        let level = (k as f64 + offset) / count as f64 * total;
-        while level >= cumulative && i + 1 < weights.len() {
-            i += 1;
-            cumulative += weights[i];
-        }
-        i
-    };
-    (0..count).map(next).collect()
 }
 
 /// Copies the rows with the chosen indices to `out`.

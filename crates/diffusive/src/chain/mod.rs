@@ -10,18 +10,18 @@ pub use field::SearchField;
 pub use outcome::{Action, Next, Outcome, Status, Step};
 pub use state::SearchState;
 
-use crate::belief::{PositionBelief, SearchBox};
+use crate::belief::Travelling;
 use crate::density::CellOptions;
-use crate::density::laplace::Peak;
 use crate::fit::Fit;
+use crate::form::{Form, Update};
 use crate::message::{Packet, Wire};
 use crate::posterior::Posterior;
-use crate::project::{Form, Travelling, project};
+use crate::project::project;
+use crate::search_box::SearchBox;
 use crate::select::{SelectionRule, Selector};
-use crate::{Error, RateModel, Record, SourceLikelihood};
+use crate::{Error, RateModel};
 use alternatives::{log_evidence, mixed, mixed_fit, most_probable};
 use fewbits_core::{Gaussian, Message};
-use fewbits_densities::Mixture;
 use fewbits_numerics::error::{at_least_one, entries, positive, refuse, within};
 use nalgebra::Vector2;
 use outcome::failure;
@@ -200,7 +200,7 @@ impl Search {
         let contract = self.contract(field);
         let message = packet.to_bits(&contract)?;
         let (packet, bits) = (Packet::from_bits(&contract, &message)?, message.bits());
-        state.received = match packet.belief() {
+        state.received = match packet.belief(self.form) {
             Ok(decoded) => decoded,
             Err(error) => {
                 return Ok(Next::end(state, Some(updated), Status::Undecodable).because(error));
@@ -298,11 +298,15 @@ impl Search {
         state: &SearchState,
         before: Option<&Travelling>,
     ) -> Result<Option<Travelling>, Error> {
-        let Some(belief) = project(posterior, self.form, &self.rate)? else {
-            return Ok(None);
+        let Form::Other(form) = self.form else {
+            return project(posterior, self.form, &self.rate);
         };
         let records = state.records();
-        Ok(Some(self.peak(belief, posterior, &records[records.len() - 1], before)?))
+        let update = Update {
+            record: &records[records.len() - 1],
+            prior: before.map_or(self.prior, Travelling::gaussian),
+        };
+        form.0.project(posterior, &self.rate, Some(&update)).map(Some)
     }
 
     /// The status of a search that ends here for the given reason.
@@ -313,36 +317,6 @@ impl Search {
             Status::Misfit
         } else {
             reason
-        }
-    }
-
-    /// For the Laplace form: mode and curvature instead of the moments, if the posterior has a peak.
-    fn peak(
-        &self,
-        moments: Travelling,
-        posterior: &Posterior,
-        last: &Record,
-        before: Option<&Travelling>,
-    ) -> Result<Travelling, Error> {
-        let (Form::Laplace, Travelling::Position(_)) = (self.form, &moments) else {
-            return Ok(moments);
-        };
-        let likelihood = SourceLikelihood::new(vec![last.clone()], self.rate)?;
-        let prior = before.map_or(self.prior, Travelling::gaussian).factored()?;
-        let log = |x: &Vector2<f64>| prior.log_pdf(x) + fewbits_core::Likelihood::log_likelihood(&likelihood, x);
-        // The mode among the cells.
-        let best = posterior
-            .cells
-            .weights()
-            .iter()
-            .enumerate()
-            .max_by(|a, b| a.1.total_cmp(b.1))
-            .map_or(0, |(i, _)| i);
-        let [x, y] = posterior.cells.columns();
-        let scale = Vector2::repeat(posterior.cells.width());
-        match Peak::climb(&log, &Vector2::new(x[best], y[best]), &scale) {
-            Ok(peak) => Ok(Travelling::Position(PositionBelief::Mixture(Mixture::single(&peak.gaussian())?))),
-            Err(_) => Ok(moments),
         }
     }
 

@@ -3,9 +3,10 @@
 use super::Search;
 use super::alternatives::{Alternative, most_probable};
 use super::field::SearchField;
+use crate::belief::Travelling;
 use crate::fit::Fit;
+use crate::form::Form;
 use crate::message::{Contract, Packet, RECORD_COUNT_BITS};
-use crate::project::{Form, Travelling};
 use crate::{Error, Record};
 use fewbits_core::{BitReader, BitString, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_numerics::error::refuse;
@@ -124,7 +125,7 @@ impl Search {
                 let route = (0..count).map(|_| Ok(reader.read(self.wire.index_bits)? as usize));
                 state.route = route.collect::<Result<_, CodecError>>()?;
                 self.check_route(field, &state.route)?;
-                state.received = packet.belief()?;
+                state.received = packet.belief(self.form)?;
             }
         }
         let compared = state.route.len().min(self.compared_determinants());
@@ -151,6 +152,7 @@ impl Search {
 
     pub(super) fn contract(&self, field: &SearchField) -> Contract {
         Contract {
+            form: self.form,
             wire: self.wire,
             noise: field.models().noise(),
             samples: field.models().instants().len(),

@@ -3,10 +3,10 @@
 use super::Search;
 use super::alternatives::{Alternative, EXCLUDED};
 use super::outcome::{Status, failure};
-use crate::belief::{PositionBelief, Prior, SearchBox};
+use crate::belief::{PositionBelief, Prior, Travelling};
 use crate::best_fit::best_fit;
 use crate::posterior::Posterior;
-use crate::project::Travelling;
+use crate::search_box::SearchBox;
 use crate::target::Target;
 use crate::{Error, RateModel, SourceLikelihood};
 use fewbits_densities::Mixture;

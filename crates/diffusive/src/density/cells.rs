@@ -34,7 +34,7 @@ pub struct CellOptions {
     /// ... and the determinant of the covariance changes by less than this share.
     pub determinant_tolerance: f64,
     /// Largest number of cells.
-    pub most_cells: usize,
+    pub max_cells: usize,
 }
 
 impl Default for CellOptions {
@@ -44,7 +44,7 @@ impl Default for CellOptions {
             evidence_tolerance: 5e-3,
             width: 0.8,
             determinant_tolerance: 0.02,
-            most_cells: 2_000_000,
+            max_cells: 2_000_000,
         }
     }
 }
@@ -82,7 +82,7 @@ fn too_many(cells: usize) -> Error {
     Error::Unresolved {
         value: cells as f64,
         unit: "cells needed",
-        expected: "at most `most_cells`",
+        expected: "at most `max_cells`",
     }
 }
 
@@ -107,7 +107,7 @@ impl<const D: usize> Cells<D> {
             longest = longest.max(positive("upper - lower", upper[d] - lower[d])?);
         }
         let mut width = longest / per_axis as f64;
-        let mut centres = lattice(&lower, &upper, width, options.most_cells)?;
+        let mut centres = lattice(&lower, &upper, width, options.max_cells)?;
         let (mut logs, mut scores, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         let mut before: Option<(f64, f64)> = None;
         let mut evaluations = 0;
@@ -163,7 +163,7 @@ impl<const D: usize> Cells<D> {
             let threshold = best_score - options.keep;
             // Count before allocating: a density that is too thin is refused without using the memory.
             let kept = scores.iter().filter(|score| **score > threshold).count();
-            if kept << D > options.most_cells {
+            if kept << D > options.max_cells {
                 return Err(too_many(kept << D));
             }
             let kept = (0..scores.len()).filter(|i| scores[*i] > threshold);
@@ -222,8 +222,13 @@ impl<const D: usize> Cells<D> {
     pub fn kl_to(&self, other: &impl Density<D>) -> f64 {
         let mut logs = vec![0.0; self.len()];
         other.add_log_densities(&self.columns(), &mut logs);
+        self.kl_to_logs(&logs)
+    }
+
+    /// As [`Cells::kl_to`], from the log density of the other at the centre of each cell.
+    pub fn kl_to_logs(&self, logs: &[f64]) -> f64 {
         let volume = D as f64 * self.width.ln();
-        let terms = self.weights.iter().zip(&self.log_weights).zip(&logs);
+        let terms = self.weights.iter().zip(&self.log_weights).zip(logs);
         terms.map(|((w, own), theirs)| w * (own - volume - theirs)).sum()
     }
 

@@ -1,16 +1,16 @@
 //! Arguments that make no sense, and data that do not fit.
 
 use super::{RULES, field, joint, posterior_of, sensor};
+use fewbits_baselines::diffusive::polynomials::{hermite, multi_indices};
+use fewbits_baselines::diffusive::{LAPLACE, Lpg, Peak, lpg, particles};
 use fewbits_core::Gaussian;
 use fewbits_densities::Component;
-use fewbits_diffusive::density::laplace::Peak;
-use fewbits_diffusive::density::polynomials::{hermite, multi_indices};
-use fewbits_diffusive::density::{Clumps, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
     Form, Prior, RateModel, RateRange, RateSums, Record, Search, SearchBox, SearchField, SourceLikelihood,
     SourceSensor, Status,
 };
+use fewbits_mixture_codec::{Clumps, MixtureFit};
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -119,18 +119,7 @@ fn runs_refuse_what_they_cannot_do() {
     assert!(run(search(|_| ()), 0, vec![f64::NAN; 5]).is_err());
     assert!(run(search(|s| s.max_nodes = 0), 0, vec![0.0; 5]).is_err());
     assert!(run(search(|s| s.form = Form::Mixture(0)), 0, vec![0.0; 5]).is_err());
-    for form in [
-        Form::Particles(25),
-        Form::Laplace,
-        Form::Lpg {
-            components: 0,
-            degree: 5,
-        },
-        Form::Lpg {
-            components: 2,
-            degree: 21,
-        },
-    ] {
+    for form in [particles::<25>(), LAPLACE, lpg::<0, 5>(), lpg::<2, 21>()] {
         let mut search = search(|_| ());
         search.form = form;
         assert!(run(search, 0, vec![0.0; 5]).is_err(), "{form:?}");
@@ -147,14 +136,10 @@ fn absurd_samples() {
     let graph = Graph::within(field_of.positions(), 25.0).unwrap();
     let nodes = SearchField::new(sensor(1.0, false), field_of, graph).unwrap();
     let all = [0.0, -1.0, 1e-9, 1e-3, 1.0, 1e6, 1e150];
-    let lpg = Form::Lpg {
-        components: 2,
-        degree: 1,
-    };
     for (form, levels) in [
         (Form::Raw, &all[..]),
         (Form::Mixture(4), &all),
-        (lpg, &[-1.0, 1e-3, 1e150]),
+        (lpg::<2, 1>(), &[-1.0, 1e-3, 1e150]),
     ] {
         for &level in levels {
             let mut search = Search::new(&Vector2::new(44.0, 52.0), 50.0, field(1.0), joint(), 1e-5).unwrap();

@@ -129,7 +129,7 @@ fn cells_of_a_normal_have_its_moments_and_divergences() {
     // Too few cells allowed at the start, and after the first splitting.
     for most in [200, 600] {
         let mut few = options;
-        few.most_cells = most;
+        few.max_cells = most;
         let error = Cells::cover(&target, lower, upper, 20, &few).unwrap_err();
         assert!(
             most == 200 || matches!(error, Error::Unresolved { value, .. } if value > 600.0 && value % 4.0 == 0.0),

@@ -1,6 +1,7 @@
 //! Goodness of fit: right models are kept, wrong ones refused, and what is decoded is used.
 
 use super::{field, joint, sensor};
+use fewbits_baselines::diffusive::{lpg, particles};
 use fewbits_core::NumberFormat;
 use fewbits_diffusive::message::{SampleCode, Wire};
 use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Search, SearchBox, SearchField, Status};
@@ -42,7 +43,7 @@ fn refused(
         let outcome = run(seed, &truth, |search| {
             (search.form, search.search, search.max_nodes) = (form, within, 12);
             // Particles carry no rate.
-            if matches!(form, Form::Particles(_)) {
+            if form == particles::<25>() {
                 search.rate = RateModel::Known(1.0);
             }
         });
@@ -86,12 +87,12 @@ fn right_model_is_not_refused() {
 fn error_rates(forms: &[(Form, u64)]) {
     for (form, right) in forms.iter().copied() {
         // Particles are told the rate 1.
-        let right_model = |seed| match form {
-            Form::Particles(_) => Truth {
+        let right_model = |seed| match form == particles::<25>() {
+            true => Truth {
                 rate: 1.0,
                 ..anywhere(seed)
             },
-            _ => anywhere(seed),
+            false => anywhere(seed),
         };
         let (refusals, _, _) = refused(form, right_model, field(1.0), 0..right);
         let rate = |_| Truth {
@@ -122,17 +123,13 @@ fn error_rates_of_mixtures() {
 #[test]
 #[ignore = "180 searches: minutes of one core"]
 fn error_rates_of_records_and_particles() {
-    error_rates(&[(Form::Raw, 60), (Form::Particles(25), 40)]);
+    error_rates(&[(Form::Raw, 60), (particles::<25>(), 40)]);
 }
 
 #[test]
 #[ignore = "180 searches: minutes of one core"]
 fn error_rates_of_single_gaussians_and_series() {
-    let lpg = Form::Lpg {
-        components: 2,
-        degree: 5,
-    };
-    error_rates(&[(Form::Gaussian, 60), (lpg, 40)]);
+    error_rates(&[(Form::Gaussian, 60), (lpg::<2, 5>(), 40)]);
 }
 
 /// No source inside the box explains what such a source causes.

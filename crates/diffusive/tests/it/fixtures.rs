@@ -1,11 +1,10 @@
 //! Reference values, computed by an independent program.
 
 use crate::diffusion_entries::{beginning_with, number};
-use fewbits_baselines::diffusive::cumulant_laplace;
+use fewbits_baselines::diffusive::polynomials::{gaussian_moment, hermite, multi_indices};
+use fewbits_baselines::diffusive::{Peak, cumulant_laplace};
 use fewbits_core::{Belief, Gaussian, Likelihood};
 use fewbits_diffusive::density::CellOptions;
-use fewbits_diffusive::density::laplace::Peak;
-use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite, multi_indices};
 use fewbits_diffusive::information::{Predictions, Unknown, fisher_information};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, RateSums, SearchBox, SourceLikelihood, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
@@ -86,7 +85,7 @@ fn hermite_polynomials_and_moments() {
             .iter()
             .map(|t| ([t[0][0].as_u64().unwrap() as usize, t[0][1].as_u64().unwrap() as usize], t[1].as_f64().unwrap()))
             .collect();
-        let m = fewbits_diffusive::density::polynomials::series_moments(&mean, &sigma, &terms).unwrap();
+        let m = fewbits_baselines::diffusive::polynomials::series_moments(&mean, &sigma, &terms).unwrap();
         let c = m.covariance;
         check(&e, &[m.mass, m.mean[0], m.mean[1], c[(0, 0)], c[(0, 1)], c[(1, 0)], c[(1, 1)]]);
     }

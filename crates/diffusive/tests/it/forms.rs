@@ -2,14 +2,14 @@
 
 use super::searches::run;
 use super::{joint, sensor};
+use fewbits_baselines::diffusive::polynomials::{hermite, multi_indices};
+use fewbits_baselines::diffusive::{Peak, lpg, particles};
 use fewbits_core::{Density, Gaussian, Likelihood};
-use fewbits_diffusive::density::MixtureFit;
-use fewbits_diffusive::density::laplace::Peak;
-use fewbits_diffusive::density::polynomials::{hermite, multi_indices};
 use fewbits_diffusive::{
     Form, Outcome, PositionBelief, Posterior, RateModel, SelectionRule, Selector, SourceLikelihood, Status, Travelling,
     project,
 };
+use fewbits_mixture_codec::MixtureFit;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Vector2};
 
 const DEPLOYMENTS: u64 = 12;
@@ -27,7 +27,11 @@ fn exact(seed: u64, nodes: usize) -> Option<(Posterior, Outcome)> {
 fn divergence(posterior: &Posterior, form: Form) -> f64 {
     match project(posterior, form, &RateModel::Known(1.0)).unwrap() {
         Some(Travelling::Position(PositionBelief::Mixture(mixture))) => posterior.cells.kl_to(&mixture),
-        Some(Travelling::Position(PositionBelief::Lpg(lpg))) => posterior.cells.kl_to(&lpg),
+        Some(Travelling::Position(other)) => {
+            let [x, y] = posterior.cells.columns();
+            let logs = x.iter().zip(y).map(|(x, y)| other.log_density(&Vector2::new(*x, *y)));
+            posterior.cells.kl_to_logs(&logs.collect::<Vec<_>>())
+        }
         _ => 0.0,
     }
 }
@@ -160,17 +164,13 @@ fn median(values: &[f64]) -> (f64, f64) {
 #[test]
 fn divergences_of_forms_are_those_of_another_program() {
     const UNKNOWN: f64 = f64::NAN;
-    let lpg = Form::Lpg {
-        components: 2,
-        degree: 5,
-    };
     let forms = [
         Form::Gaussian,
         Form::Mixture(2),
         Form::Mixture(4),
         Form::Mixture(8),
-        lpg,
-        Form::Particles(25),
+        lpg::<2, 5>(),
+        particles::<25>(),
     ];
     let known = [
         [1.25, UNKNOWN, 0.34, 0.054, 0.82, 1.0, UNKNOWN],

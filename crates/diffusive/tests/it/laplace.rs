@@ -1,8 +1,7 @@
 //! Gaussians from a peak against closed forms, in every unit.
 
-use fewbits_baselines::diffusive::{cumulant_laplace, tierney_kadane};
+use fewbits_baselines::diffusive::{Peak, cumulant_laplace, tierney_kadane};
 use fewbits_diffusive::Error;
-use fewbits_diffusive::density::laplace::Peak;
 use nalgebra::{Matrix2, Vector1, Vector2};
 use std::f64::consts::TAU;
 

@@ -1,9 +1,10 @@
 //! The laws of the library's words, on every implementation here.
 
 use super::{field, joint, posterior_of, sensor};
+use fewbits_baselines::diffusive::{Lpg, lpg, lpg_of_position, lpg_with_rate};
 use fewbits_core::laws::likelihood::sweep_is_scalar;
 use fewbits_core::{Belief, Density, Gaussian, Likelihood, laws};
-use fewbits_diffusive::density::{CellOptions, Lpg};
+use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{
     Form, JointBelief, PositionBelief, Posterior, Prior, RateModel, RateRange, RateSums, SourceLikelihood,
     SourceSensor, Travelling, project,
@@ -152,17 +153,7 @@ fn cells_and_polynomial_gaussians_are_beliefs() {
     let posterior = posterior(RateModel::Known(1.0), 2);
     let mut rng = Pcg64Mcg::seed_from_u64(9);
     laws::belief::samples_have_the_moments(&posterior.cells, &mut rng, 20_000).unwrap();
-    let Some(Travelling::Position(PositionBelief::Lpg(lpg))) = project(
-        &posterior,
-        Form::Lpg {
-            components: 2,
-            degree: 5,
-        },
-        &RateModel::Known(1.0),
-    )
-    .unwrap() else {
-        panic!("polynomial Gaussians were asked for");
-    };
+    let lpg = lpg_of_position(&posterior, 2, 5).unwrap().belief;
     laws::belief::samples_have_the_moments(&lpg, &mut rng, 20_000).unwrap();
     let wide = Gaussian::new(lpg.mean(), lpg.covariance() * 4.0)
         .unwrap()
@@ -187,7 +178,7 @@ fn projections() {
     let gaussians = known
         .clumps(200)
         .unwrap()
-        .fit(&fewbits_diffusive::density::MixtureFit::new(4).unwrap())
+        .fit(&fewbits_mixture_codec::MixtureFit::new(4).unwrap())
         .unwrap();
     let mut before = f64::INFINITY;
     for degree in [0, 2, 4, 6] {
@@ -219,16 +210,11 @@ fn one_update_after_another_is_both_at_once() {
 fn polynomial_gaussians_over_position_and_rate() {
     let RateModel::Joint(range) = joint() else { return };
     let exact = posterior(joint(), 3);
-    let form = Form::Lpg {
-        components: 2,
-        degree: 4,
-    };
+    let form = lpg::<2, 4>();
     let Some(Travelling::WithRate(belief)) = project(&exact, form, &joint()).unwrap() else {
         panic!("a belief over position and rate was asked for");
     };
-    let JointBelief::Lpg(lpg) = &belief else {
-        panic!("polynomial Gaussians were asked for");
-    };
+    let lpg = &lpg_with_rate(&exact, 2, 4, &joint()).unwrap().belief;
     // A fit keeps where the belief is.
     let (sent, own) = (belief.position(), exact.gaussian());
     let scale = own.covariance().diagonal().map(f64::sqrt);

@@ -10,7 +10,6 @@
 mod any_model;
 mod attacks;
 mod cells;
-mod clumps;
 #[path = "../../../models/tests/it/diffusion_entries.rs"]
 mod diffusion_entries;
 mod envelopes;

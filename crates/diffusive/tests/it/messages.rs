@@ -1,6 +1,7 @@
 //! What travels, as bits.
 
 use super::{joint, posterior_of, sensor};
+use fewbits_baselines::diffusive::{lpg, particles};
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
 use fewbits_core::{BitString, Gaussian, Message, NumberFormat};
 use fewbits_diffusive::message::{Contract, Packet, SampleCode, Wire};
@@ -8,13 +9,14 @@ use fewbits_diffusive::{Fit, Form, Posterior, Prior, RateModel, SourceLikelihood
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 
-fn contract(numbers: NumberFormat) -> Contract {
+fn contract(form: Form, numbers: NumberFormat) -> Contract {
     let wire = Wire {
         numbers,
         samples: Some(SampleCode { bits: 9, step: 1.0 }),
         index_bits: 9,
     };
     Contract {
+        form,
         wire,
         noise: 8e-6,
         samples: 5,
@@ -37,27 +39,15 @@ fn posterior(rate: RateModel) -> (Posterior, SourceLikelihood) {
 #[test]
 fn beliefs_arrive_as_they_were_sent() {
     for numbers in [NumberFormat::Double, NumberFormat::Single] {
-        let format = contract(numbers);
         for (form, rate) in [
             (Form::Gaussian, joint()),
             (Form::Mixture(4), joint()),
             (Form::Mixture(3), RateModel::Known(1.0)),
-            (
-                Form::Lpg {
-                    components: 2,
-                    degree: 5,
-                },
-                RateModel::Known(1.0),
-            ),
-            (
-                Form::Lpg {
-                    components: 2,
-                    degree: 3,
-                },
-                joint(),
-            ),
-            (Form::Particles(25), RateModel::Known(1.0)),
+            (lpg::<2, 5>(), RateModel::Known(1.0)),
+            (lpg::<2, 3>(), joint()),
+            (particles::<25>(), RateModel::Known(1.0)),
         ] {
+            let format = contract(form, numbers);
             let (posterior, likelihood) = posterior(rate);
             let sent = project(&posterior, form, &rate).unwrap().unwrap();
             let fit = Fit {
@@ -66,7 +56,7 @@ fn beliefs_arrive_as_they_were_sent() {
             };
             let packet = Packet::belief_of(&sent, &fit, &format.wire).unwrap();
             let bits = round_trip(&packet, &format).unwrap();
-            let (received, arrived) = packet.belief().unwrap().unwrap();
+            let (received, arrived) = packet.belief(form).unwrap().unwrap();
             assert_eq!(arrived, fit);
             let received = received.gaussian();
             let tolerance = if numbers == NumberFormat::Double { 1e-9 } else { 1e-4 };
@@ -75,15 +65,10 @@ fn beliefs_arrive_as_they_were_sent() {
             assert!(off < 10.0 * tolerance * sent.gaussian().covariance().amax(), "{form:?} {off}");
             // Kind, components, degree, rate: 12 bits before the numbers; the fit: 48 after them.
             let count = (bits - 60) / numbers.bits() as usize;
-            match form {
-                Form::Gaussian | Form::Mixture(_) | Form::Particles(_) => assert_eq!(Some(count), form.scalars(&rate)),
-                // Mean, covariance and polynomials, norm included: one component may be all there is.
-                Form::Lpg { .. } => {
-                    let own = form.scalars(&rate).unwrap();
-                    assert!(count == own || 2 * count == own, "{count} {own}");
-                }
-                _ => {}
-            }
+            let own = form.scalars(&rate).unwrap();
+            // Of two polynomial Gaussians one may be all there is.
+            let is_series = [lpg::<2, 5>(), lpg::<2, 3>()].contains(&form);
+            assert!(count == own || is_series && 2 * count == own, "{form:?} {count} {own}");
         }
     }
 }
@@ -91,7 +76,7 @@ fn beliefs_arrive_as_they_were_sent() {
 #[test]
 fn raw_records_cost_what_they_should() {
     let (_, likelihood) = posterior(joint());
-    let format = contract(NumberFormat::Single);
+    let format = contract(Form::Raw, NumberFormat::Single);
     let quantised: Vec<_> = likelihood
         .records()
         .iter()
@@ -106,7 +91,7 @@ fn raw_records_cost_what_they_should() {
     let packet = Packet::raw(&quantised, &[17, 301]);
     // One bit, a count of ten bits, and 54 bits a node.
     assert_eq!(round_trip(&packet, &format).unwrap(), 11 + 2 * 54);
-    assert_eq!(packet.belief().unwrap(), None);
+    assert_eq!(packet.belief(Form::Raw).unwrap(), None);
     // What arrives is what was quantised, to the bit.
     let bits = packet.to_bits(&format).unwrap();
     assert_eq!(Packet::from_bits(&format, &bits).unwrap(), packet);
@@ -118,10 +103,13 @@ proptest! {
         let bits = (bytes.len() * 8).saturating_sub(cut);
         let string = BitString::from_bytes(bytes, bits).unwrap();
         for numbers in [NumberFormat::Double, NumberFormat::Single] {
-            prop_assert!(decoding_is_total::<Packet>(&string, &contract(numbers)));
-            if let Ok(packet) = Packet::decode(&contract(numbers), &mut fewbits_core::BitReader::new(&string)) {
-                // A belief or an error, never a panic.
-                let _ = packet.belief();
+            for form in [Form::Raw, Form::Gaussian, lpg::<2, 5>(), particles::<25>()] {
+                let contract = contract(form, numbers);
+                prop_assert!(decoding_is_total::<Packet>(&string, &contract));
+                if let Ok(packet) = Packet::decode(&contract, &mut fewbits_core::BitReader::new(&string)) {
+                    // A belief or an error, never a panic.
+                    let _ = packet.belief(form);
+                }
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Whole searches.
 
 use super::{RULES, field, joint, sensor};
+use fewbits_baselines::diffusive::{lpg, particles};
 use fewbits_diffusive::message::{SampleCode, Wire};
 use fewbits_diffusive::{
     Envelope, Form, Outcome, RateModel, Search, SearchField, SelectionRule, Selector, SourceLikelihood, Status,
@@ -39,25 +40,9 @@ fn every_form_and_rule_finds_the_source() {
         (Form::Raw, joint(), SelectionRule::MutualInformation, true),
         (Form::Mixture(4), joint(), SelectionRule::CramerRao, false),
         (Form::Mixture(4), joint(), SelectionRule::Covariance, false),
-        (
-            Form::Lpg {
-                components: 2,
-                degree: 5,
-            },
-            RateModel::Known(1.0),
-            SelectionRule::Mahalanobis,
-            false,
-        ),
-        (
-            Form::Lpg {
-                components: 2,
-                degree: 5,
-            },
-            joint(),
-            SelectionRule::PairwiseInformation,
-            false,
-        ),
-        (Form::Particles(25), RateModel::Known(1.0), SelectionRule::MutualInformation, false),
+        (lpg::<2, 5>(), RateModel::Known(1.0), SelectionRule::Mahalanobis, false),
+        (lpg::<2, 5>(), joint(), SelectionRule::PairwiseInformation, false),
+        (particles::<25>(), RateModel::Known(1.0), SelectionRule::MutualInformation, false),
     ] {
         let outcome = run(3, 1.0, windy, 300, |search| {
             (search.form, search.rate, search.rule) = (form, rate, rule);

@@ -1,9 +1,12 @@
 //! Polynomial Gaussians against closed forms.
 
+use fewbits_baselines::diffusive::Lpg;
+use fewbits_baselines::diffusive::polynomials::{
+    gaussian_moment, hermite, hermite_terms, multi_indices, series_moments,
+};
 use fewbits_core::{Belief, Columns, Density};
 use fewbits_densities::{Component, Mixture};
-use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite, hermite_terms, multi_indices, series_moments};
-use fewbits_diffusive::density::{CellOptions, CellTarget, Cells, Lpg};
+use fewbits_diffusive::density::{CellOptions, CellTarget, Cells};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Complex, Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use rand::RngExt;
@@ -92,7 +95,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// A fit `s` of a root `r` is a multiple of its projection: `int basis r = affinity int basis s` for every basis function, and
 /// `int s r` is the affinity. `root` are points with their `r` times volume.
 fn is_the_projection<const D: usize>(
-    fit: &fewbits_diffusive::density::LpgFit<D>,
+    fit: &fewbits_baselines::diffusive::LpgFit<D>,
     about: &[Component<D>],
     root: &[(SVector<f64, D>, f64)],
     (half, step): (i32, f64),

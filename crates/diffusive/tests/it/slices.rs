@@ -1,8 +1,9 @@
 //! Series over a plane and one more coordinate, against quadrature and closed forms.
 
+use fewbits_baselines::diffusive::{Lpg, Slice};
 use fewbits_core::{Belief, Columns, Density};
 use fewbits_densities::Component;
-use fewbits_diffusive::density::{CellOptions, CellTarget, Cells, Lpg, Slice};
+use fewbits_diffusive::density::{CellOptions, CellTarget, Cells};
 use fewbits_numerics::quadrature::Rule;
 use nalgebra::{Matrix3, Vector2, Vector3};
 

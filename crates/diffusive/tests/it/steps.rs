@@ -1,6 +1,7 @@
 //! A search as its nodes make it: each decodes a message, makes one step and encodes what it sends on.
 
 use super::{field, joint, sensor};
+use fewbits_baselines::diffusive::{LAPLACE, lpg, particles};
 use fewbits_core::BitString;
 use fewbits_diffusive::message::{SampleCode, Wire};
 use fewbits_diffusive::{
@@ -11,10 +12,7 @@ use fewbits_protocol::Leader;
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::Vector2;
 
-const LPG: Form = Form::Lpg {
-    components: 2,
-    degree: 3,
-};
+const LPG: Form = lpg::<2, 3>();
 
 struct Place {
     nodes: SearchField,
@@ -80,8 +78,8 @@ fn every_form_travels_through_its_messages() {
         (Form::Mixture(4), joint()),
         (Form::Mixture(3), RateModel::Known(1.0)),
         (LPG, RateModel::Known(1.0)),
-        (Form::Particles(25), RateModel::Known(1.0)),
-        (Form::Laplace, RateModel::Known(1.0)),
+        (particles::<25>(), RateModel::Known(1.0)),
+        (LAPLACE, RateModel::Known(1.0)),
     ] {
         let search = search(&place, form, rate);
         let (outcome, (steps, status, messages)) = (alone(&search, &place), by_messages(&search, &place));
@@ -182,11 +180,8 @@ fn limits_of_messages_are_refused_at_the_start() {
         matches!(failed, Err(Error::Argument(_)))
     };
     assert!(refused(|s| s.form = Form::Mixture(32)));
-    assert!(refused(|s| s.form = Form::Particles(32)));
-    assert!(refused(|s| s.form = Form::Lpg {
-        components: 32,
-        degree: 2
-    }));
+    assert!(refused(|s| s.form = particles::<32>()));
+    assert!(refused(|s| s.form = lpg::<32, 2>()));
     assert!(refused(|s| s.wire.index_bits = 5));
     assert!(refused(|s| s.wire.index_bits = 33));
     assert!(refused(|s| s.wire.samples = Some(SampleCode { bits: 33, step: 1.0 })));

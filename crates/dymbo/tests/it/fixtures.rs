@@ -6,7 +6,7 @@
 use fewbits_baselines::dymbo::SignFilter;
 use fewbits_baselines::dymbo::first_message::{first_message_mse, first_message_value};
 use fewbits_baselines::dymbo::{iterated, skew_normal, tree};
-use fewbits_core::factor::{Factor, InCell};
+use fewbits_core::factor::{Factor, Levels};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::chain::{self, TransientStep};
 use fewbits_dymbo::{
@@ -120,12 +120,12 @@ fn compute(entry: &Entry<'_>) -> Option<Vec<f64>> {
         "bit_update" => {
             let bit = Sign::try_from(entry.number("b") as i32).unwrap();
             let link = Link::flipping(entry.number("eps")).unwrap();
-            let factor = InCell::sign(bit, entry.number("tau"), entry.number("sigma2"), &link).unwrap();
+            let factor = Levels::sign(bit, entry.number("tau"), entry.number("sigma2"), &link).unwrap();
             Some(posterior(entry, &factor))
         }
         "cell_update" => {
             let cell = fewbits_core::Cell::new(entry.number("lo"), entry.number("hi")).unwrap();
-            Some(posterior(entry, &InCell::certain(cell, entry.number("sigma2")).unwrap()))
+            Some(posterior(entry, &Levels::certain(cell, entry.number("sigma2")).unwrap()))
         }
         "eta" => Some(vec![sign_bit::expected_information(entry.number("z"), &Link::PERFECT).unwrap()]),
         "lloyd_max" => {
@@ -205,7 +205,7 @@ fn compute(entry: &Entry<'_>) -> Option<Vec<f64>> {
     }
 }
 
-fn posterior(entry: &Entry<'_>, factor: &InCell) -> Vec<f64> {
+fn posterior(entry: &Entry<'_>, factor: &Levels) -> Vec<f64> {
     let prior = Gaussian::scalar(entry.number("mu"), entry.number("P")).unwrap();
     let after = factor.tilted(&prior).unwrap();
     vec![after.mean[0], after.covariance[0]]
@@ -351,7 +351,7 @@ fn regress_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
             filter.threshold(&belief)
         };
         let bit = Sign::of(*sample, threshold).unwrap();
-        let factor = InCell::sign(bit, threshold, r, &Link::PERFECT).unwrap();
+        let factor = Levels::sign(bit, threshold, r, &Link::PERFECT).unwrap();
         belief = if printed {
             let predicted = filter.predict(&belief);
             assumed_density::update(&predicted, &[[1.0]].into(), &factor).unwrap().0

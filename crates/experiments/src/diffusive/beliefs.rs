@@ -3,8 +3,8 @@
 use super::common::{B, CHAINS, LPG, Scheme, Settings};
 use crate::prelude::*;
 use fewbits_core::Density;
-use fewbits_diffusive::density::{Clumps, MixtureFit};
 use fewbits_diffusive::{Form, PositionBelief, Posterior, RateModel, Travelling, project};
+use fewbits_mixture_codec::{Clumps, MixtureFit};
 
 /// Only the position is approximated here.
 const POSITION_ONLY: RateModel = RateModel::Known(1.0);
@@ -16,7 +16,11 @@ fn divergence(posterior: &Posterior, form: Form) -> Result<f64, Error> {
     };
     let kl = match &belief {
         PositionBelief::Mixture(mixture) => posterior.cells.kl_to(mixture),
-        PositionBelief::Lpg(lpg) => posterior.cells.kl_to(lpg),
+        other => {
+            let [x, y] = posterior.cells.columns();
+            let logs = x.iter().zip(y).map(|(x, y)| other.log_density(&Vector2::new(*x, *y)));
+            posterior.cells.kl_to_logs(&logs.collect::<Vec<_>>())
+        }
     };
     Ok(kl)
 }

@@ -1,6 +1,7 @@
 //! What the figures of this system share: the two examples, networks, searches, and statistics of many searches.
 
 use crate::prelude::*;
+use fewbits_baselines::diffusive::{LAPLACE, lpg, particles};
 use fewbits_diffusive::message::Wire;
 use fewbits_diffusive::{
     Form, Outcome, RateModel, RateRange, Search, SearchBox, SearchField, SelectionRule, SourceSensor, Status,
@@ -22,15 +23,9 @@ pub(super) const RATE: f64 = 1.0;
 const MARGIN: f64 = 20.0;
 
 /// The polynomial Gaussians of the paper: two, of degree 5.
-pub(super) const LPG: Form = Form::Lpg {
-    components: 2,
-    degree: 5,
-};
+pub(super) const LPG: Form = lpg::<2, 5>();
 /// One of them.
-const ONE_LPG: Form = Form::Lpg {
-    components: 1,
-    degree: 5,
-};
+const ONE_LPG: Form = lpg::<1, 5>();
 
 parameters! {
     /// Settings of every search.
@@ -128,8 +123,8 @@ const KINDS: [(&str, Form, Option<SelectionRule>, usize); 11] = [
     ("gaussian-9", Form::Gaussian, None, 3),
     ("lpg-2x5", LPG, None, 4),
     ("lpg-1x5", ONE_LPG, None, 5),
-    ("particles-25", Form::Particles(25), None, 6),
-    ("mode and curvature", Form::Laplace, None, 8),
+    ("particles-25", particles::<25>(), None, 6),
+    ("mode and curvature", LAPLACE, None, 8),
     ("information", Form::Mixture(4), Some(SelectionRule::MutualInformation), 0),
     ("covariance", Form::Mixture(4), Some(SelectionRule::Covariance), 1),
     ("mahalanobis", Form::Mixture(4), Some(SelectionRule::Mahalanobis), 2),

@@ -1,7 +1,7 @@
 //! Table I: Hermite polynomials of two variables.
 
 use crate::prelude::*;
-use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite_terms, multi_indices};
+use fewbits_baselines::diffusive::polynomials::{gaussian_moment, hermite_terms, multi_indices};
 
 parameters! {
     pub struct Parameters {

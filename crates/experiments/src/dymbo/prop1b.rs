@@ -3,7 +3,7 @@
 use crate::prelude::*;
 use fewbits_baselines::dymbo::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_core::Sign;
-use fewbits_core::factor::{Factor, InCell};
+use fewbits_core::factor::{Factor, Levels};
 use fewbits_numerics::normal::log_pdf_with;
 
 parameters! {
@@ -53,7 +53,7 @@ impl Figure for PosteriorShape {
             })
         };
         let noise = p.sigma.iter().copied().fold(f64::INFINITY, f64::min).powi(2);
-        let after = InCell::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?.tilted(&prior)?;
+        let after = Levels::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?.tilted(&prior)?;
         let density = |i: i32| {
             let theta = p.sigma_theta * f64::from(i) / 50.0;
             Density {

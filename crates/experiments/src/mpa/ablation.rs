@@ -4,9 +4,9 @@ use super::scores::{self, Row, agree, ladder, mse};
 use super::sweeps::SPEED;
 use super::world::{Method, Point};
 use crate::prelude::*;
+use fewbits_baselines::pf_mpa::IntervalRule;
 use fewbits_baselines::pf_mpa::Velocity;
 use fewbits_baselines::pf_mpa::{DynamicsWeight, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight};
-use fewbits_pf_mpa::IntervalRule;
 
 parameters! {
     pub struct Parameters {

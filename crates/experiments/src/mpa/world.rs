@@ -3,12 +3,12 @@
 use crate::prelude::*;
 use fewbits_baselines::pf_mpa::{DynamicsWeight, KernelRule, MessagePassing, Ring, RingWeight};
 use fewbits_baselines::pf_mpa::{
-    Encoder, GuidedGaussian, Linearised, Network, POSITION, Ranged, RaoBlackwellGuided, Reports, Target, Tracker,
-    Velocity, WithManoeuvre,
+    Encoder, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, Ranged, RaoBlackwellGuided, Reports, Target,
+    Tracker, Velocity, WithManoeuvre,
 };
 use fewbits_core::Observed;
 use fewbits_filters::{BootstrapFilter, ResamplingRule};
-use fewbits_pf_mpa::{GridFilter, IntervalRule, QuantizedRange, RangeNoise, RangeSensor};
+use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise, RangeSensor};
 
 /// Steps of a trajectory.
 pub(super) const STEPS: usize = 25;
@@ -280,7 +280,7 @@ impl Point {
     pub(super) fn network(&self) -> Result<Network, Error> {
         let noise = RangeNoise::from_snr_db(self.snr_db)?;
         let scheme = QuantizedRange::new(self.levels, noise)?;
-        Ok(Network::new(&self.sensors, scheme.with_interval(self.interval), self.encoder)?)
+        Ok(Network::new(&self.sensors, scheme, self.encoder)?.with_interval(self.interval))
     }
 }
 

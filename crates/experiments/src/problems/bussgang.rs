@@ -3,7 +3,7 @@
 use super::models::Lorenz;
 use crate::prelude::*;
 use fewbits_baselines::bussgang;
-use fewbits_core::factor::{InCell, Value};
+use fewbits_core::factor::{Levels, Value};
 use fewbits_core::{GaussianDynamics, Observed, OnAxes, Sign, assumed_density};
 use fewbits_models::{AutoDynamics, Flow, LinearSensor};
 use nalgebra::Matrix3;
@@ -54,7 +54,7 @@ fn run(dynamics: &dyn GaussianDynamics<3>, variance: f64, stream: Stream) -> Res
         let asked = *moments.mean();
         for axis in 0..3 {
             let sensor = OnAxes::new(LinearSensor::direct(variance)?, [axis])?;
-            let bit = InCell::sign(Sign::of(z[axis], asked[axis])?, asked[axis], variance, &Link::default())?;
+            let bit = Levels::sign(Sign::of(z[axis], asked[axis])?, asked[axis], variance, &Link::default())?;
             *moments = assumed_density::update_through(moments, &Observed::new(sensor, bit))?.0;
         }
         *full = assumed_density::update_through(full, &Observed::new(all, Value::new(z, noise)?))?.0;

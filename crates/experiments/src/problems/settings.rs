@@ -2,7 +2,7 @@
 
 use super::models::{Duffing, Fall, Growth, Lorenz, Measure, Pendulum, Straight, Turning, VanDerPol};
 use crate::prelude::*;
-use fewbits_core::factor::{InCell, Scalar};
+use fewbits_core::factor::{Levels, Scalar};
 use fewbits_core::{Cell, GaussianDynamics, Likelihood, Observed};
 use fewbits_filters::{
     BootstrapFilter, EnsembleFilter, GridFilter, GridOnAxes, MomentFilter, ResamplingRule, SigmaPointFilter,
@@ -81,7 +81,7 @@ impl<const D: usize, const K: usize> Problem<D, K> {
             let mean = belief.mean();
             let mut reports: Vec<Observed<AutoSensing<Measure, 1>, Scalar, 1>> = Vec::new();
             for (sensor, noise, z) in seen {
-                let factor = InCell::certain(cell(sensor.mean(&mean)[0], *noise, *z)?, *noise)?;
+                let factor = Levels::certain(cell(sensor.mean(&mean)[0], *noise, *z)?, *noise)?;
                 reports.push(Observed::new(*sensor, factor.into()));
             }
             let reports: Vec<&dyn Likelihood<D>> = reports.iter().map(|one| one as _).collect();

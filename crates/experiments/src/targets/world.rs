@@ -1,7 +1,7 @@
 //! Worlds of several targets among range sensors, and what the sensors report.
 
 use crate::prelude::*;
-use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::factor::{Levels, Scalar, Value};
 use fewbits_core::{Cell, Observed};
 use fewbits_models::{AutoSensing, Differentiable, LinearGaussian, Number, constant_velocity_2d};
 use fewbits_multi_target::{Birth, Tracker};
@@ -194,7 +194,7 @@ impl Reporting {
                 };
                 let upper = edges.get(index).copied().unwrap_or(f64::INFINITY);
                 let share = (upper.min(FARTHEST) - lower.max(0.0)) / FARTHEST;
-                let factor = InCell::certain(Cell::new(lower, upper)?, noise * noise)?;
+                let factor = Levels::certain(Cell::new(lower, upper)?, noise * noise)?;
                 Ok((factor.into(), FALSE * share))
             }
         }

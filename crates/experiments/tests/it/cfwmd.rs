@@ -5,7 +5,7 @@ use super::assert_agrees;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::{Budget, threshold};
-use fewbits_core::factor::{self, InCell, Scalar};
+use fewbits_core::factor::{self, Levels, Scalar};
 use fewbits_core::{Cell, Dynamics, Gaussian, Link, Observed, Sensing};
 use fewbits_densities::GaussianCloud;
 use fewbits_experiments::schema::Value;
@@ -101,7 +101,7 @@ fn run(particles: usize, stream: Stream) -> [f64; 3] {
         let (observations, sent) = network.transmit(&mut rng, &rules, &broadcast, &measurements).unwrap();
         belief = if particles > 0 {
             let c = rules[0].half_width();
-            let silence = InCell::certain(Cell::new(broadcast[0] - c, broadcast[0] + c).unwrap(), 1.0).unwrap();
+            let silence = Levels::certain(Cell::new(broadcast[0] - c, broadcast[0] + c).unwrap(), 1.0).unwrap();
             for observation in &observations {
                 let factor = match observation.received() {
                     Some(z) => Scalar::from(factor::Value::scalar(z[0], 1.0).unwrap()),

@@ -4,7 +4,7 @@ use super::{assert_agrees, assert_agrees_if_known, exact, trials};
 use fewbits_baselines::dymbo::SignFilter;
 use fewbits_baselines::dymbo::first_message::first_message_value;
 use fewbits_baselines::dymbo::gap::{SmoothedGap, Twin, exact_filter};
-use fewbits_core::factor::InCell;
+use fewbits_core::factor::Levels;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing, Sign};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, ParallelFilter, RoundedSample, ScalarFilter, ScalarPlant, chain, filtered_variance,
@@ -306,7 +306,7 @@ fn vector_run<const M: usize>(filter: &Filter<M>, at_once: bool, start: Gaussian
             let threshold = filter.threshold(if at_once { &ahead } else { &belief }, i).unwrap();
             let bit = Sign::of(sample, threshold).unwrap();
             observations[i] = Observation::Received(bit);
-            let factor = InCell::sign(bit, threshold, sensor.noise_variance(), &Link::PERFECT).unwrap();
+            let factor = Levels::sign(bit, threshold, sensor.noise_variance(), &Link::PERFECT).unwrap();
             for cloud in &mut clouds {
                 exact
                     .update(&mut rng, cloud, &[&Observed::new(*sensor, factor)])

@@ -1,6 +1,6 @@
 //! One scheme, two-sided bits over a link that loses and inverts, through every filter of the contract.
 
-use fewbits_core::factor::{Constant, Partition, Scalar, Value};
+use fewbits_core::factor::{Constant, Levels, Scalar, Value};
 use fewbits_core::rand::Rng;
 use fewbits_core::{
     Belief, Deterministic, Dynamics, Error as CoreError, Evolution, Gaussian, Likelihood, Link, NumberFormat,
@@ -59,7 +59,7 @@ impl Scheme<1> for TwoSided {
         }
         let edges = vec![prediction - self.reach, prediction + self.reach];
         let given_cell = vec![given(Sign::Above), given(Sign::Below), given(Sign::Above)];
-        Ok(Partition::new(edges, given_cell, NOISE)?.into())
+        Ok(Levels::partition(&edges, &given_cell, NOISE)?.into())
     }
 }
 

@@ -1,6 +1,6 @@
 //! Law of every filter: what is impossible is an error of one name, and leaves the belief as it was, to the last bit.
 
-use fewbits_core::factor::{Constant, InCell, Scalar};
+use fewbits_core::factor::{Constant, Levels, Scalar};
 use fewbits_core::{Cell, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
     BootstrapFilter, Error, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, Resampling,
@@ -29,7 +29,7 @@ fn nevers<const D: usize>() -> [Observed<LinearSensor<D, 1>, Scalar, 1>; 2] {
     let cell = Cell::new(1e200, 2e200).unwrap();
     [
         Observed::new(direct(), Constant::new(0.0).unwrap().into()),
-        Observed::new(direct(), InCell::certain(cell, 1.0).unwrap().into()),
+        Observed::new(direct(), Levels::certain(cell, 1.0).unwrap().into()),
     ]
 }
 

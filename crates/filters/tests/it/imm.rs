@@ -1,6 +1,6 @@
 //! The interacting-multiple-model filter against exact enumeration, one model, and invariances.
 
-use fewbits_core::factor::{Factor, InCell, Value};
+use fewbits_core::factor::{Factor, Levels, Value};
 use fewbits_core::nalgebra::{Matrix1, Vector1};
 use fewbits_core::{Belief, Cell, Gaussian, GaussianDynamics, LinearDynamics, Observed, Sensing, Sign, laws};
 use fewbits_filters::{Error, Imm, ImmBelief, ImmWorkspace, assumed_density, kalman};
@@ -39,7 +39,7 @@ fn one_model_is_the_assumed_density_filter() {
     for n in 0..50 {
         let z = (f64::from(n) * 0.7).sin();
         let sign = Sign::of(z, 0.1).unwrap();
-        let factor = InCell::sign(sign, 0.1, 0.5, &fewbits_core::Link::PERFECT).unwrap();
+        let factor = Levels::sign(sign, 0.1, 0.5, &fewbits_core::Link::PERFECT).unwrap();
         let observed = Observed::new(sensor, factor);
         let (next, info) = assumed_density::step(&dynamics, &single, &observed).unwrap();
         let (mixture, imm) = step(&filter, &belief, &observed).unwrap();
@@ -125,7 +125,7 @@ fn nothing_depends_on_the_unit() {
         for n in 0..60 {
             let edge = unit * (f64::from(n) * 0.4).sin();
             let cell = Cell::new(edge, edge + unit).unwrap();
-            let observed = Observed::new(sensor, InCell::certain(cell, 0.2 * unit * unit).unwrap());
+            let observed = Observed::new(sensor, Levels::certain(cell, 0.2 * unit * unit).unwrap());
             belief = step(&filter, &belief, &observed).unwrap().0;
         }
         (belief.probabilities()[0], belief.mean()[0] / unit)

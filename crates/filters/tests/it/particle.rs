@@ -1,6 +1,6 @@
 //! Particle filters against the exact Kalman and grid filters.
 
-use fewbits_core::factor::{Constant, InCell, Scalar, Value};
+use fewbits_core::factor::{Constant, Levels, Scalar, Value};
 use fewbits_core::{
     Belief, BitString, Cell, Dynamics, FullValue, Gaussian, Likelihood, Link, Message, NumberFormat, Observation,
     Observed, Sensing, Sign,
@@ -211,7 +211,7 @@ fn sign_bits_through_a_noisy_link_run_through_the_filter() {
     let link = Link::flipping(0.1).unwrap();
     against_the_grid(|k| {
         let sign = if k % 3 == 0 { Sign::Below } else { Sign::Above };
-        InCell::sign(sign, 0.3 * k as f64 - 1.0, NOISE, &link).unwrap().into()
+        Levels::sign(sign, 0.3 * k as f64 - 1.0, NOISE, &link).unwrap().into()
     });
 }
 
@@ -219,7 +219,7 @@ fn sign_bits_through_a_noisy_link_run_through_the_filter() {
 fn quantizer_cells_run_through_the_filter() {
     against_the_grid(|k| {
         let cell = Cell::new(k as f64 * 0.4 - 1.0, k as f64 * 0.4 - 0.2).unwrap();
-        InCell::certain(cell, NOISE).unwrap().into()
+        Levels::certain(cell, NOISE).unwrap().into()
     });
 }
 
@@ -230,7 +230,7 @@ fn censored_silence_and_loss_run_through_the_filter() {
         1 => Constant::ONE.into(),
         _ => {
             let link = Link::lossy(0.2 * (k % 2) as f64).unwrap();
-            InCell::silence(Cell::new(-0.2, 1.6).unwrap(), NOISE, &link)
+            Levels::silence(Cell::new(-0.2, 1.6).unwrap(), NOISE, &link)
                 .unwrap()
                 .into()
         }

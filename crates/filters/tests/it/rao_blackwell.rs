@@ -1,6 +1,6 @@
 //! The Rao-Blackwellised filter against the Kalman and the grid filter.
 
-use fewbits_core::factor::{Constant, InCell, Scalar, Value};
+use fewbits_core::factor::{Constant, Levels, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Link, Observed, Sign};
 use fewbits_filters::{GaussianCloud, RaoBlackwellised, Resampling, ResamplingRule, Schedule, StateFilter, kalman};
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
@@ -35,12 +35,12 @@ fn bits_cells_silence_and_loss_agree_with_the_grid() {
     let cell = Cell::new(-1.0, 0.5).unwrap();
     let sign = |sign, threshold, crossover| {
         let link = Link::flipping(crossover).unwrap();
-        Scalar::from(InCell::sign(sign, threshold, 0.49, &link).unwrap())
+        Scalar::from(Levels::sign(sign, threshold, 0.49, &link).unwrap())
     };
-    let silence = |loss| Scalar::from(InCell::silence(cell, 0.49, &Link::lossy(loss).unwrap()).unwrap());
+    let silence = |loss| Scalar::from(Levels::silence(cell, 0.49, &Link::lossy(loss).unwrap()).unwrap());
     let sequence = [
         sign(Sign::Above, 0.4, 0.2),
-        InCell::certain(Cell::new(1.0, 1.5).unwrap(), 0.49).unwrap().into(),
+        Levels::certain(Cell::new(1.0, 1.5).unwrap(), 0.49).unwrap().into(),
         silence(0.0),
         Constant::ONE.into(),
         silence(0.3),

@@ -1,6 +1,6 @@
 //! Filters that work with points, against closed forms, the Kalman filter and each other.
 
-use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::factor::{Levels, Scalar, Value};
 use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sensing, Sign, laws};
 use fewbits_filters::{
     EnsembleFilter, Error, MomentFilter, Particles, RootGaussian, SigmaPointFilter, StateFilter, kalman,
@@ -77,8 +77,8 @@ fn with_few_bits_and_linear_models_they_are_the_moment_filter() {
         let (mut exact, mut belief) = (prior, filter.start(&mut rng, &prior).unwrap());
         for (k, z) in positions(1.0).into_iter().enumerate() {
             let threshold = exact.mean()[0];
-            let bit = Scalar::from(InCell::sign(Sign::of(z, threshold).unwrap(), threshold, 0.5, &link).unwrap());
-            let cell = Scalar::from(InCell::certain(Cell::new(z.floor(), z.floor() + 1.0).unwrap(), 0.5).unwrap());
+            let bit = Scalar::from(Levels::sign(Sign::of(z, threshold).unwrap(), threshold, 0.5, &link).unwrap());
+            let cell = Scalar::from(Levels::certain(Cell::new(z.floor(), z.floor() + 1.0).unwrap(), 0.5).unwrap());
             let report = Observed::new(sensor, if k % 2 == 0 { bit } else { cell });
             let (next, info) = MomentFilter.step(&mut rng, &dynamics, &exact, &[&report]).unwrap();
             exact = next;
@@ -188,12 +188,12 @@ fn moved_points_obey_the_law() {
     let sensor = LinearSensor::new(Matrix2::new(1.0, 0.3, -0.5, 2.0), Matrix2::new(1.0, 0.2, 0.2, 0.5)).unwrap();
     let pair = Observed::new(sensor, Value::new(Vector2::new(0.4, -2.0), Matrix2::new(1.0, 0.2, 0.2, 0.5)).unwrap());
     let single = LinearSensor::scalar(Vector2::new(1.0, -0.7), 0.25).unwrap();
-    let bit = Observed::new(single, InCell::sign(Sign::Above, 0.8, 0.25, &Link::flipping(0.1).unwrap()).unwrap());
+    let bit = Observed::new(single, Levels::sign(Sign::Above, 0.8, 0.25, &Link::flipping(0.1).unwrap()).unwrap());
     for scale in [1e-3, 1.0] {
         let columns = [[0.1, 0.9, -0.7, 2.0, 0.3], [1.0, -0.4, 0.2, 0.6, -1.1]].map(|c| c.map(|x| x * scale).to_vec());
         laws::likelihood::points_have_the_moments(&pair, &columns).unwrap();
         laws::likelihood::points_have_the_moments(&bit, &columns).unwrap();
-        laws::likelihood::points_have_the_moments(&vec![bit; 3], &columns).unwrap();
+        laws::likelihood::points_have_the_moments(&vec![bit.clone(); 3], &columns).unwrap();
     }
     // All points in one place: the measurement is known, and nothing moves.
     laws::likelihood::points_have_the_moments(&pair, &[vec![1.0; 4], vec![2.0; 4]]).unwrap();

@@ -1,7 +1,7 @@
 //! What is stored as text comes back to the bit whatever the parser of numbers does: no float stands as a number.
 
-use fewbits_core::factor::{InCell, Partition, Scalar, Value};
-use fewbits_core::number::Levels;
+use fewbits_core::factor::{Levels, Scalar, Value};
+use fewbits_core::number;
 use fewbits_core::{Cell, Gaussian, Link};
 use fewbits_densities::{GaussianCloud, KernelEstimate, Mixture, Particles, PointMass, UniformGrid};
 use fewbits_filters::ImmBelief;
@@ -45,12 +45,12 @@ fn beliefs_factors_and_models_are_stored_without_floats() {
                 .with_erasure(0.1 + x[1] / 30.0)
                 .unwrap(),
         );
-        check(&Levels::new(x[0], x[0] + 1.0 / 3.0, 5).unwrap());
+        check(&number::Levels::new(x[0], x[0] + 1.0 / 3.0, 5).unwrap());
         let cell = Cell::new(x[5], f64::INFINITY).unwrap();
         check(&cell);
-        check(&Scalar::from(InCell::new(cell, 1.0 + x[0].abs(), 0.1, 0.7).unwrap()));
+        check(&Scalar::from(Levels::new(cell, 1.0 + x[0].abs(), 0.1, 0.7).unwrap()));
         check(&Scalar::from(Value::scalar(x[0], 1.0 / 3.0).unwrap()));
-        check(&Scalar::from(Partition::new(vec![x[0]], vec![0.1, 0.9], 1.0 / 7.0).unwrap()));
+        check(&Scalar::from(Levels::partition(&[x[0]], &[0.1, 0.9], 1.0 / 7.0).unwrap()));
         let columns = [x[..4].to_vec(), x[4..].to_vec()];
         let cloud = Particles::new(columns, &[0.0, -0.1, x[0], f64::NEG_INFINITY]).unwrap();
         check(&cloud);

@@ -1,6 +1,6 @@
 //! Wild arguments: every step returns a belief of numbers or an error, and an error leaves the belief as it was.
 
-use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::factor::{Levels, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Likelihood, Link, Observed};
 use fewbits_filters::{
     BootstrapFilter, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, ResamplingRule,
@@ -34,8 +34,8 @@ fn factors(x: &[f64]) -> Vec<Scalar> {
     all.extend(Value::scalar(x[0], x[1]).map(Scalar::from));
     let link = Link::lossy(x[2]).unwrap_or(Link::PERFECT);
     if let Ok(cell) = Cell::new(x[0], x[3]) {
-        all.extend(InCell::silence(cell, x[1], &link).map(Scalar::from));
-        all.extend(Scalar::outside(&cell, x[1], 1.0));
+        all.extend(Levels::silence(cell, x[1], &link).map(Scalar::from));
+        all.extend(Levels::outside(&cell, x[1], 1.0).map(Scalar::from));
     }
     all
 }

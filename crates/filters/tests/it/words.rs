@@ -1,6 +1,6 @@
 //! A sensor with three words in two bits: the fourth does not decode.
 
-use fewbits_core::factor::{Partition, Scalar};
+use fewbits_core::factor::{Levels, Scalar};
 use fewbits_core::{
     BitReader, BitString, BitWriter, CodecError, Dynamics, Gaussian, Link, MeasurementNoise, Message, Observation,
     Scheme,
@@ -71,7 +71,7 @@ impl Scheme<1> for ThreeCells {
             // The sensor speaks at every slot.
             Observation::Lost => [1.0; 3],
         };
-        Ok(Partition::new(EDGES.to_vec(), given.to_vec(), 1.0)?.into())
+        Ok(Levels::partition(&EDGES, &given, 1.0)?.into())
     }
 }
 

@@ -1,9 +1,14 @@
 //! Reductions of a kernel estimate to a mixture of few components: the recommended one and those of the paper.
 
+mod clumps;
 pub mod cut;
+mod em;
 pub mod merge;
+mod mixture_fit;
 mod refine;
 
+pub use clumps::{Clump, Clumps};
+pub use mixture_fit::MixtureFit;
 pub use refine::refine;
 
 use crate::Error;

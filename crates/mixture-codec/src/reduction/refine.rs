@@ -2,12 +2,10 @@
 
 use crate::Error;
 use crate::divergence::plug_in::Cubature;
+use crate::reduction::em::{Limits, Points, step};
 use fewbits_densities::{Component, KernelEstimate, Mixture};
-use fewbits_numerics::eigen::raised;
-use fewbits_numerics::kernels::scalar::power_of_half;
-use fewbits_numerics::kernels::{LANES, folded, vectorised};
 use fewbits_numerics::linalg::symmetrised;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 /// Improves a mixture as an approximation of a kernel estimate by `iterations` steps of expectation-maximisation. The data are the
 /// cubature points of every kernel. Each step lowers the KL between the distribution of these points and the mixture.
@@ -30,7 +28,7 @@ pub fn refine<const D: usize>(
     iterations: usize,
     rule: Cubature,
 ) -> Result<Mixture<D>, Error> {
-    let points = Points::new(estimate, rule);
+    let points = cubature(estimate, rule);
     let origin = estimate.particles().mean();
     let white = estimate.kernel_factor();
     // In coordinates in which the kernel's covariance is the identity.
@@ -44,8 +42,12 @@ pub fn refine<const D: usize>(
             Component::new(c.weight(), mean, symmetrised(&covariance))
         })
         .collect::<Result<_, _>>()?;
+    let limits = Limits {
+        variances: SVector::repeat(1.0),
+        weight: f64::MIN_POSITIVE,
+    };
     for _ in 0..iterations {
-        step(&points, &mut parts)?;
+        step(&points, &mut parts, &limits, false)?;
     }
     let back = parts.iter().map(|p| {
         let covariance = white.lower * p.covariance() * white.lower.transpose();
@@ -54,193 +56,18 @@ pub fn refine<const D: usize>(
     Mixture::new(back.collect::<Result<_, _>>()?)
 }
 
-/// Number of points that are processed together, so that their data stay in the first-level cache.
-const BLOCK: usize = 32;
-/// If the shares of a point sum to less, they are computed again relative to the largest.
-const TINY: f64 = 1e-250;
-
-/// The cubature points of all kernels in whitened coordinates, in blocks. The last block is filled up with points of weight
-/// zero.
-struct Points<const D: usize> {
-    blocks: Vec<([[f64; BLOCK]; D], [f64; BLOCK])>,
-}
-
-impl<const D: usize> Points<D> {
-    fn new(estimate: &KernelEstimate<D>, rule: Cubature) -> Self {
-        let weights = estimate.particles().weights();
-        let kept: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
-        let white = estimate.whitened_centres();
-        let offsets = rule.points::<D>();
-        let all: Vec<(SVector<f64, D>, f64)> = offsets
-            .iter()
-            .flat_map(|(z, share)| {
-                kept.iter()
-                    .map(move |i| (SVector::from_fn(|d, _| white[d][*i] + z[d]), weights[*i] * share))
-            })
-            .collect();
-        let blocks = all.chunks(BLOCK).map(|chunk| {
-            let at = |j: usize| chunk[j.min(chunk.len() - 1)].0;
-            let columns = std::array::from_fn(|d| std::array::from_fn(|j| at(j)[d]));
-            (columns, std::array::from_fn(|j| chunk.get(j).map_or(0.0, |point| point.1)))
-        });
-        Self {
-            blocks: blocks.collect(),
-        }
-    }
-}
-
-/// `log2(w / sqrt(det S))`, the logarithm of a component's peak up to a constant.
-fn height<const D: usize>(part: &Component<D>) -> f64 {
-    (part.weight().ln() - part.factor().half_log_det) * std::f64::consts::LOG2_E
-}
-
-/// Sums over a component's shares of the points, about its mean before the step: total, first and second moments.
-struct Sums<const D: usize> {
-    share: [f64; LANES],
-    first: [[f64; LANES]; D],
-    second: [[[f64; LANES]; D]; D],
-}
-
-impl<const D: usize> Sums<D> {
-    const ZERO: Self = Self {
-        share: [0.0; LANES],
-        first: [[0.0; LANES]; D],
-        second: [[[0.0; LANES]; D]; D],
-    };
-
-    #[inline(always)]
-    fn add(&mut self, shares: &[f64; BLOCK], gaps: &[[f64; BLOCK]; D]) {
-        for c in 0..BLOCK / LANES {
-            for j in 0..LANES {
-                let i = c * LANES + j;
-                self.share[j] += shares[i];
-                for a in 0..D {
-                    let weighted = shares[i] * gaps[a][i];
-                    self.first[a][j] += weighted;
-                    for b in 0..=a {
-                        self.second[a][b][j] += weighted * gaps[b][i];
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// One step of expectation-maximisation.
-fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Component<D>>) -> Result<(), Error> {
-    let heights: Vec<f64> = parts.iter().map(height).collect();
-    let top = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let mut sums: Vec<Sums<D>> = parts.iter().map(|_| Sums::ZERO).collect();
-    let mut gaps = vec![[[0.0; BLOCK]; D]; parts.len()];
-    let mut shares = vec![[0.0; BLOCK]; parts.len()];
-    vectorised(
-        #[inline(always)]
-        || {
-            for (columns, weights) in &points.blocks {
-                let mut total = [0.0; BLOCK];
-                for (((part, height), gaps), shares) in parts.iter().zip(&heights).zip(&mut gaps).zip(&mut shares) {
-                    exponents(part, top - height, columns, gaps, shares);
-                    for j in 0..BLOCK {
-                        shares[j] = power_of_half(shares[j]);
-                    }
-                    for j in 0..BLOCK {
-                        total[j] += shares[j];
-                    }
-                }
-                // Far from all components the densities underflow. Such points are computed relative to their own largest term.
-                if total.iter().any(|t| *t < TINY) {
-                    far_shares(parts, &heights, columns, &mut gaps, &mut shares, &mut total);
-                }
-                let mut scale = [0.0; BLOCK];
-                for j in 0..BLOCK {
-                    scale[j] = weights[j] / total[j];
-                }
-                for ((sums, gaps), shares) in sums.iter_mut().zip(&gaps).zip(&mut shares) {
-                    for j in 0..BLOCK {
-                        shares[j] *= scale[j];
-                    }
-                    sums.add(shares, gaps);
-                }
-            }
-        },
-    );
-    // A component without weight is dropped.
-    let mut next = Vec::with_capacity(parts.len());
-    for (part, sums) in parts.iter().zip(&sums) {
-        if folded(sums.share) > f64::MIN_POSITIVE {
-            next.push(moments(part, sums)?);
-        }
-    }
-    *parts = next;
-    Ok(())
-}
-
-/// Writes the differences from a component's mean, and `below - log2` of the component's density times its weight, unnormalised.
-#[inline(always)]
-fn exponents<const D: usize>(
-    part: &Component<D>,
-    below: f64,
-    columns: &[[f64; BLOCK]; D],
-    gaps: &mut [[f64; BLOCK]; D],
-    out: &mut [f64; BLOCK],
-) {
-    // With this factor `z' z` is the exponent of the Gaussian as a power of one half.
-    let scale = (0.5 * std::f64::consts::LOG2_E).sqrt();
-    let whitener = part.factor().whitener * scale;
-    for d in 0..D {
-        for j in 0..BLOCK {
-            gaps[d][j] = columns[d][j] - part.mean()[d];
-        }
-    }
-    *out = [below; BLOCK];
-    for a in 0..D {
-        for j in 0..BLOCK {
-            let mut z = 0.0;
-            for b in 0..=a {
-                z += whitener[(a, b)] * gaps[b][j];
-            }
-            out[j] += z * z;
-        }
-    }
-}
-
-/// The shares in a block with points far from every component: relative to the largest share of each point.
-#[cold]
-#[inline(never)]
-fn far_shares<const D: usize>(
-    parts: &[Component<D>],
-    heights: &[f64],
-    columns: &[[f64; BLOCK]; D],
-    gaps: &mut [[[f64; BLOCK]; D]],
-    shares: &mut [[f64; BLOCK]],
-    total: &mut [f64; BLOCK],
-) {
-    let top = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    for (((part, height), gaps), shares) in parts.iter().zip(heights).zip(gaps).zip(shares.iter_mut()) {
-        exponents(part, top - height, columns, gaps, shares);
-    }
-    *total = [0.0; BLOCK];
-    for j in 0..BLOCK {
-        let least = shares.iter().map(|s| s[j]).fold(f64::INFINITY, f64::min);
-        for share in shares.iter_mut() {
-            share[j] = power_of_half(share[j] - least);
-            total[j] += share[j];
-        }
-    }
-}
-
-/// Weight, mean and covariance from the sums, with the lower limit of the eigenvalues.
-fn moments<const D: usize>(part: &Component<D>, sums: &Sums<D>) -> Result<Component<D>, Error> {
-    let weight = folded(sums.share);
-    let shift = SVector::<f64, D>::from_fn(|d, _| folded(sums.first[d]) / weight);
-    let mut covariance = SMatrix::<f64, D, D>::zeros();
-    for a in 0..D {
-        for b in 0..=a {
-            let entry = folded(sums.second[a][b]) / weight - shift[a] * shift[b];
-            covariance[(a, b)] = entry;
-            covariance[(b, a)] = entry;
-        }
-    }
-    let covariance = raised(covariance, &SVector::repeat(1.0));
-    Component::new(weight, part.mean() + shift, covariance)
+/// The cubature points of all kernels in whitened coordinates.
+fn cubature<const D: usize>(estimate: &KernelEstimate<D>, rule: Cubature) -> Points<D> {
+    let weights = estimate.particles().weights();
+    let kept: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
+    let white = estimate.whitened_centres();
+    let offsets = rule.points::<D>();
+    let all: Vec<(SVector<f64, D>, f64)> = offsets
+        .iter()
+        .flat_map(|(z, share)| {
+            kept.iter()
+                .map(move |i| (SVector::from_fn(|d, _| white[d][*i] + z[d]), weights[*i] * share))
+        })
+        .collect();
+    Points::new(&all)
 }

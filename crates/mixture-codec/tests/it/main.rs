@@ -3,6 +3,7 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod clumps;
 #[path = "../../../densities/tests/it/common.rs"]
 mod common;
 mod fixtures;

@@ -1,7 +1,7 @@
 //! Covariances of Gaussian densities, factored once: Cholesky factor, whitener, determinant.
 
 use crate::error::{ArgumentError, all_finite};
-use crate::linalg::agree;
+use crate::linear_algebra::symmetry::agree;
 use nalgebra::{SMatrix, SVector};
 
 /// A squared pivot of the correlation matrix below this counts as singular.

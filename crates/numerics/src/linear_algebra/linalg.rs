@@ -1,12 +1,12 @@
 //! Functions of small covariance matrices that nalgebra does not have.
 
 use crate::error::{self, ArgumentError};
+use crate::linear_algebra::factored::Factored;
+use crate::linear_algebra::symmetry::agree;
 use nalgebra::{ArrayStorage, Cholesky, Const, SMatrix, SVector};
 
 /// Pivots below this multiple of the variance of their own coordinate count as zero.
 const SEMIDEFINITE_TOLERANCE: f64 = 1e-12;
-/// Asymmetries above this multiple of the product of the standard deviations of row and column are refused.
-const SYMMETRY_TOLERANCE: f64 = 1e-9;
 
 /// `(m + m')/2`.
 pub fn symmetrised<const D: usize>(m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
@@ -60,12 +60,6 @@ pub fn congruence_of<const M: usize, const D: usize>(
     out
 }
 
-/// Whether the entries `(i, j)` and `(j, i)` agree to rounding, relative to the standard deviations of their row and column. All tests of
-/// symmetry use this function. A tolerance relative to the largest entry would miss an asymmetry among coordinates of small units.
-pub(crate) fn agree(below: f64, above: f64, row: f64, column: f64) -> bool {
-    (below / row / column - above / row / column).abs() <= SYMMETRY_TOLERANCE
-}
-
 /// A symmetric positive definite matrix, made symmetric to the last bit, with its lower Cholesky factor. Draws with the factor and
 /// densities with the matrix then use the same covariance.
 ///
@@ -75,20 +69,7 @@ pub fn definite_factor<const D: usize>(
     name: &'static str,
     m: &SMatrix<f64, D, D>,
 ) -> Result<(SMatrix<f64, D, D>, SMatrix<f64, D, D>), ArgumentError> {
-    error::all_finite(name, m.as_slice())?;
-    let indefinite = || ArgumentError::new(name, format!("{m:?}"), "a symmetric positive definite matrix");
-    let deviations: SVector<f64, D> = m.diagonal().map(f64::sqrt);
-    for i in 0..D {
-        for j in 0..i {
-            if !agree(m[(i, j)], m[(j, i)], deviations[i], deviations[j]) {
-                return Err(indefinite());
-            }
-        }
-    }
-    let matrix = symmetrised(m);
-    let lower = Cholesky::new(matrix).ok_or_else(indefinite)?.unpack();
-    error::all_finite(name, lower.as_slice())?;
-    Ok((matrix, lower))
+    Ok((symmetrised(m), Factored::new(name, m)?.lower))
 }
 
 /// A square root `S` with `S S' = m` of a symmetric positive **semi**definite matrix, by Cholesky with diagonal pivoting.

@@ -3,4 +3,5 @@
 pub mod eigen;
 pub mod factored;
 pub mod linalg;
+mod symmetry;
 pub mod tridiagonal;

@@ -1,11 +1,11 @@
 //! The grid that adapts: consistent from blunt to sharp ranges, exact where something exact exists, an error where it cannot follow.
 
-use fewbits_baselines::pf_mpa::Ranged;
+use fewbits_baselines::pf_mpa::{IntervalRule, RangeFactor, Ranged};
 use fewbits_core::Error;
 use fewbits_core::{Gaussian, Likelihood, Observed};
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_pf_mpa::{
-    GridFilter, GridWorkspace, QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor, optimal_loading,
+    GridFilter, GridWorkspace, QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading,
 };
 use nalgebra::{Matrix2, Vector2};
 
@@ -39,7 +39,8 @@ fn levels(prior: &Gaussian<2>, snr_db: f64, bits: u32, loading: f64, trial: u64)
         };
         let range = sensor.measure(&mut rng, sensor.distance(truth[0], truth[1]));
         let level = scheme.level(range, &reference).unwrap();
-        Observed::new(sensor, scheme.received(level, &reference).unwrap())
+        let factor = RangeFactor::level(&scheme, level, &reference, IntervalRule::Correct).unwrap();
+        Observed::new(sensor, factor)
     });
     (truth, reports.into())
 }

@@ -1,6 +1,7 @@
 //! The laws of schemes, factors and likelihoods, on the quantized range.
 
-use fewbits_core::factor::Factor;
+use fewbits_baselines::pf_mpa::RangeFactor;
+use fewbits_core::factor::{Factor, Scalar};
 use fewbits_core::laws::{factor, likelihood, message, scheme};
 use fewbits_core::{
     Belief, Dynamics, Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, Scheme, Sensing,
@@ -8,7 +9,7 @@ use fewbits_core::{
 use fewbits_filters::{BootstrapFilter, MomentFilter, ResamplingRule, StateFilter};
 use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::{QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor};
+use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizers::{Labelling, Symbol};
 use nalgebra::{Vector1, Vector2, Vector4};
 
@@ -62,17 +63,18 @@ fn schemes_obey_their_laws() {
     }
 }
 
-fn factors(scale: f64, noise: RangeNoise) -> Vec<RangeFactor> {
+fn factors(scale: f64, noise: RangeNoise) -> Vec<Box<dyn Factor<1>>> {
     let range = QuantizedRange::new(4, noise).unwrap();
     let link = Link::new(0.1, 0.05).unwrap();
     let of = |observation, link: &Link| range.factor(&reference(scale), &observation, link).unwrap();
-    let mut all: Vec<RangeFactor> = (0..4)
+    let mut all: Vec<Scalar> = (0..4)
         .map(|q| of(Observation::Received(Symbol(q)), &Link::PERFECT))
         .collect();
     all.push(of(Observation::Received(Symbol(2)), &link));
     all.push(of(Observation::Received(Symbol(0)), &link));
     all.push(of(Observation::Nothing, &link));
-    all.push(RangeFactor::value(5.5 * scale, noise).unwrap());
+    let mut all: Vec<Box<dyn Factor<1>>> = all.into_iter().map(|one| Box::new(one) as _).collect();
+    all.push(Box::new(RangeFactor::value(5.5 * scale, noise).unwrap()));
     all
 }
 
@@ -80,7 +82,8 @@ fn factors(scale: f64, noise: RangeNoise) -> Vec<RangeFactor> {
 fn factors_obey_their_laws() {
     for scale in [1e-4, 1.0, 1e4] {
         for noise in noises(scale) {
-            for own in factors(scale, noise) {
+            for own in &factors(scale, noise) {
+                let own = &**own;
                 let at = [-1e9, -1.0, 0.0, 1e-9, 0.1, 2.0, 5.2, 40.0, 1e9].map(|m| Vector1::new(m * scale));
                 factor::is_a_number(&own, &at).unwrap();
                 factor::sweep_is_scalar(&own, &at[1..8]).unwrap();

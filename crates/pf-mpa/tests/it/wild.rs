@@ -3,15 +3,16 @@
 use fewbits_baselines::pf_mpa::association::{AssociationRule, separation, update};
 use fewbits_baselines::pf_mpa::leader::elect;
 use fewbits_baselines::pf_mpa::{
-    AccelerationChain, Encoder, GuidedGaussian, Linearised, Network, RaoBlackwellGuided, Reports, Target, Tracker,
+    AccelerationChain, Encoder, GuidedGaussian, IntervalRule, Linearised, Network, RangeFactor, RaoBlackwellGuided,
+    Reports, Target, Tracker,
 };
 use fewbits_baselines::pf_mpa::{MessagePassing, RingBias, kernel_error};
+use fewbits_core::factor::Scalar;
 use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::wild;
 use fewbits_pf_mpa::{
-    GridFilter, QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor, level_information,
-    range_information,
+    GridFilter, QuantizedRange, RangeNoise, RangeReference, RangeSensor, level_information, range_information,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
 use proptest::prelude::*;
@@ -32,7 +33,7 @@ fn noise(x: [f64; 2]) -> RangeNoise {
     .unwrap_or_else(|| RangeNoise::constant(0.1).unwrap())
 }
 
-fn check(factor: &RangeFactor, at: f64, prior: Option<&Gaussian<1>>) {
+fn check<F: Factor<1> + std::fmt::Debug>(factor: &F, at: f64, prior: Option<&Gaussian<1>>) {
     let log = factor.log_likelihood(&[at].into());
     assert!(!at.is_finite() || at < 0.0 || !log.is_nan() && log < f64::INFINITY, "{factor:?} at {at}: {log}");
     if let Some(prior) = prior
@@ -43,12 +44,6 @@ fn check(factor: &RangeFactor, at: f64, prior: Option<&Gaussian<1>>) {
             "{factor:?} {prior:?}: {tilted:?}"
         );
     }
-    assert!(
-        factor
-            .reconstruction()
-            .is_none_or(|(m, v)| m.is_finite() && !v.is_nan()),
-        "{factor:?}"
-    );
 }
 
 proptest! {
@@ -59,11 +54,14 @@ proptest! {
         let prior = Gaussian::scalar(x[3], x[4]).ok();
         let reference = RangeReference { centre: x[5], half_width: x[6] };
         let link = Link::new(x[7], x[8]).and_then(|link| link.with_erasure(x[9])).unwrap_or(Link::PERFECT);
-        let mut factors: Vec<RangeFactor> = [RangeFactor::value(x[10], noise), RangeFactor::constant(x[9], noise)].into_iter().flatten().collect();
+        let mut factors: Vec<Scalar> = Vec::new();
+        let mut reports: Vec<RangeFactor> = RangeFactor::value(x[10], noise).into_iter().collect();
         if let Ok(scheme) = QuantizedRange::new(levels, noise) {
             let told = scheme.level(x[10], &reference);
             prop_assert!(told.is_ok_and(|level| level.0 < levels) || scheme.level(x[10], &reference).is_err());
-            factors.extend(scheme.received(fewbits_quantizers::Symbol(level), &reference));
+            for rule in [IntervalRule::Correct, IntervalRule::Printed] {
+                reports.extend(RangeFactor::level(&scheme, fewbits_quantizers::Symbol(level), &reference, rule));
+            }
             for seen in [Observation::Received(fewbits_quantizers::Symbol(level)), Observation::Nothing, Observation::Lost] {
                 factors.extend(scheme.factor(&reference, &seen, &link));
             }
@@ -71,6 +69,12 @@ proptest! {
         for factor in &factors {
             check(factor, x[11], prior.as_ref());
             check(factor, 5.0, prior.as_ref());
+        }
+        for report in &reports {
+            check(report, x[11], prior.as_ref());
+            check(report, 5.0, prior.as_ref());
+            let reconstructed = report.reconstruction();
+            prop_assert!(reconstructed.is_none_or(|(m, v)| m.is_finite() && !v.is_nan()), "{:?}", report);
         }
         if let Ok(sensor) = RangeSensor::new(Vector2::new(x[0], x[1]), noise) && x[2].is_finite() && x[3].is_finite() {
             prop_assert!(sensor.distance(x[2], x[3]) >= 0.0 && sensor.direction(x[2], x[3]).iter().all(|u| !u.is_nan()), "{:?} {:?}", sensor, x);

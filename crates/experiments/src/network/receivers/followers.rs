@@ -2,7 +2,7 @@
 
 use fewbits_adaptive::{Config, Packet, Receiver, Sensor};
 use fewbits_baselines::over_bits::{Estimator, moments};
-use fewbits_core::factor::InCell;
+use fewbits_core::factor::Levels;
 use fewbits_core::{
     BitReader, BitString, BitWriter, Cell, CodecError, Gaussian, LinearDynamics, Message, Observation, Observed,
     Sensing, SensorNode,
@@ -127,7 +127,7 @@ where
                 continue;
             };
             let cell = Cell::new(value - self.config.delta(), value + self.config.delta())?;
-            let observed = Observed::new(sensor.clone(), InCell::new(cell, self.noise_variance, 0.0, 1.0)?);
+            let observed = Observed::new(sensor.clone(), Levels::new(cell, self.noise_variance, 0.0, 1.0)?);
             belief.state = assumed_density::update_through(&belief.state, &observed)?.0;
         }
         Ok(belief)

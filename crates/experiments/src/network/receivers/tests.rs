@@ -4,7 +4,7 @@ use super::{Followers, LookUp, each};
 use fewbits_adaptive::{Config, Receiver as Following, Sensor};
 use fewbits_baselines::over_bits::{Estimator, OverBits};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, PatternSensor, Source};
-use fewbits_core::factor::InCell;
+use fewbits_core::factor::Levels;
 use fewbits_core::{Cell, Dynamics, Gaussian, Observation, Sensing, SensorNode};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor};
@@ -135,7 +135,7 @@ fn followed_signals_give_what_they_give_alone() {
             sent += packet.as_ref().map_or(0, |packet| packet.bits() as u64);
             let value = receiver.receive(&packet.into()).unwrap().value.unwrap();
             assert!((value - z[0]).abs() <= 0.7);
-            let factor = InCell::new(Cell::new(value - 0.7, value + 0.7).unwrap(), 1.0, 0.0, 1.0).unwrap();
+            let factor = Levels::new(Cell::new(value - 0.7, value + 0.7).unwrap(), 1.0, 0.0, 1.0).unwrap();
             belief = assumed_density::update(&belief, direct().matrix(), &factor).unwrap().0;
         }
         belief.mean()[0]

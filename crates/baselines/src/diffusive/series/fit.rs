@@ -2,10 +2,10 @@
 
 use super::basis::hermite_products;
 use super::{Lpg, Term};
-use crate::Error;
-use crate::density::Cells;
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
+use fewbits_diffusive::Error;
+use fewbits_diffusive::density::Cells;
 use fewbits_numerics::error::refuse;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

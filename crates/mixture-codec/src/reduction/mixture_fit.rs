@@ -1,12 +1,12 @@
 //! Gaussian mixtures fitted to clumps by expectation-maximisation.
 
 use super::clumps::{Clump, Clumps};
+use super::em::{Limits, Points, step};
 use crate::Error;
 use fewbits_core::Columns;
 use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::eigen::raised;
 use fewbits_numerics::error::{at_least_one, within};
-use nalgebra::{Cholesky, SMatrix, SVector};
 
 /// Settings of [`Clumps::fit`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,8 +46,8 @@ impl MixtureFit {
     }
 }
 
-/// Shares this many nats below the largest are negligible (`exp(-40)` is 4e-18).
-const NEGLIGIBLE_NATS: f64 = 40.0;
+/// A component of less weight has no share of any clump.
+const MIN_SHARE: f64 = 1e-12;
 
 impl<const D: usize> Clumps<D> {
     /// A Gaussian mixture of the same mean and covariance, by expectation-maximisation over the clumps.
@@ -58,27 +58,35 @@ impl<const D: usize> Clumps<D> {
     /// # Errors
     /// If the total covariance is singular.
     pub fn fit(&self, options: &MixtureFit) -> Result<Mixture<D>, Error> {
-        let whole = *self.gaussian().covariance();
-        let mut components = self.start(options.components);
+        // This floor keeps a component from shrinking to a single clump. It is below the resolution of the belief.
+        let limits = Limits {
+            variances: (self.gaussian().covariance().diagonal() * 1e-9).sup(&self.least),
+            weight: MIN_SHARE,
+        };
+        let centres: Vec<_> = self.clumps.iter().map(|c| (c.mean, c.weight)).collect();
+        let spreads: Vec<_> = self.clumps.iter().map(|c| c.covariance).collect();
+        let points = Points::new(&centres).with_spreads(&spreads);
+        let start = self.start(options.components).into_iter();
+        let of = |c: Clump<D>| Component::new(c.weight, c.mean, raised(c.covariance, &limits.variances));
+        let mut components = start.map(of).collect::<Result<Vec<_>, _>>()?;
         loop {
-            let fitted = self.improve(components, &whole, options);
-            let least = fitted
-                .iter()
-                .enumerate()
-                .min_by(|a, b| a.1.weight.total_cmp(&b.1.weight))
-                .map(|(at, c)| (at, c.weight));
+            let mut before = f64::NEG_INFINITY;
+            for _ in 0..options.iterations {
+                let mean_log = step(&points, &mut components, &limits, true)?;
+                // Stop: the mean log density rose by at most `tolerance` nats.
+                let gained = mean_log - before;
+                if gained <= options.tolerance || gained.is_nan() {
+                    break;
+                }
+                before = mean_log;
+            }
+            let weights = components.iter().map(Component::weight).enumerate();
             // A component of little weight is removed, and the others are fitted again.
-            match least {
-                Some((at, weight)) if weight < options.min_weight && fitted.len() > 1 => {
-                    components = fitted;
+            match weights.min_by(|a, b| a.1.total_cmp(&b.1)) {
+                Some((at, weight)) if weight < options.min_weight && components.len() > 1 => {
                     components.swap_remove(at);
                 }
-                _ => {
-                    let parts = fitted
-                        .into_iter()
-                        .map(|c| Component::new(c.weight, c.mean, c.covariance));
-                    return Mixture::new(parts.collect::<Result<_, _>>()?);
-                }
+                _ => return Mixture::new(components),
             }
         }
     }
@@ -93,126 +101,12 @@ impl<const D: usize> Clumps<D> {
             Err(_) => self.clumps.clone(),
         }
     }
-
-    fn improve(&self, start: Vec<Clump<D>>, whole: &SMatrix<f64, D, D>, options: &MixtureFit) -> Vec<Clump<D>> {
-        // This floor keeps a component from shrinking to a single clump. It is below the resolution of the belief.
-        let floor = (whole.diagonal() * 1e-9).sup(&self.least);
-        let mut components = start;
-        for c in &mut components {
-            c.covariance = raised(c.covariance, &floor);
-        }
-        let mut before = f64::NEG_INFINITY;
-        let mut logs = vec![0.0; components.len()];
-        for _ in 0..options.iterations {
-            let prepared: Vec<_> = components.iter().map(Prepared::new).collect();
-            let mut sums: Vec<Sums<D>> = components.iter().map(|_| Sums::default()).collect();
-            let mut mean_log = 0.0;
-            // E step: divide each clump among the components in proportion to weight times exp(expected log density).
-            // The largest logarithm is subtracted first, so that `exp` cannot overflow.
-            for clump in &self.clumps {
-                let mut best = f64::NEG_INFINITY;
-                for (log, p) in logs.iter_mut().zip(&prepared) {
-                    *log = p.as_ref().map_or(f64::NEG_INFINITY, |p| p.expected_log(clump));
-                    best = best.max(*log);
-                }
-                let mut total = 0.0;
-                for log in &mut logs {
-                    *log = if *log > best - NEGLIGIBLE_NATS {
-                        (*log - best).exp()
-                    } else {
-                        0.0
-                    };
-                    total += *log;
-                }
-                mean_log += clump.weight * (best + total.ln());
-                for (share, s) in logs.iter().zip(&mut sums) {
-                    if *share > 0.0 {
-                        s.add(clump, clump.weight * share / total);
-                    }
-                }
-            }
-            // M step: each component takes the moments of its shares. A component without weight is dropped.
-            components = sums.iter().filter_map(|s| s.clump(&floor)).collect();
-            logs.truncate(components.len());
-            // Stop: the mean log density rose by at most `tolerance` nats.
-            let gained = mean_log - before;
-            if gained <= options.tolerance || gained.is_nan() {
-                break;
-            }
-            before = mean_log;
-        }
-        components
-    }
-}
-
-/// A component ready to be evaluated.
-struct Prepared<const D: usize> {
-    mean: SVector<f64, D>,
-    precision: SMatrix<f64, D, D>,
-    log_scale: f64,
-}
-
-impl<const D: usize> Prepared<D> {
-    fn new(c: &Clump<D>) -> Option<Self> {
-        let factor = Cholesky::new(c.covariance)?;
-        let half_log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
-        Some(Self {
-            mean: c.mean,
-            precision: factor.inverse(),
-            log_scale: c.weight.ln() - half_log_determinant,
-        })
-    }
-
-    /// Expected log density over the clump, up to a constant.
-    #[inline]
-    fn expected_log(&self, clump: &Clump<D>) -> f64 {
-        let d = clump.mean - self.mean;
-        self.log_scale - 0.5 * (d.dot(&(self.precision * d)) + self.precision.dot(&clump.covariance))
-    }
-}
-
-struct Sums<const D: usize> {
-    weight: f64,
-    first: SVector<f64, D>,
-    second: SMatrix<f64, D, D>,
-    origin: Option<SVector<f64, D>>,
-}
-
-impl<const D: usize> Default for Sums<D> {
-    fn default() -> Self {
-        Self {
-            weight: 0.0,
-            first: SVector::zeros(),
-            second: SMatrix::zeros(),
-            origin: None,
-        }
-    }
-}
-
-impl<const D: usize> Sums<D> {
-    #[inline]
-    fn add(&mut self, clump: &Clump<D>, weight: f64) {
-        // Second moments about the first clump added: about a far origin they would cancel.
-        let d = clump.mean - *self.origin.get_or_insert(clump.mean);
-        self.weight += weight;
-        self.first += d * weight;
-        self.second += (d * d.transpose() + clump.covariance) * weight;
-    }
-
-    fn clump(&self, floor: &SVector<f64, D>) -> Option<Clump<D>> {
-        let origin = self.origin?;
-        let mean = self.first / self.weight;
-        (self.weight > 1e-12).then(|| Clump {
-            weight: self.weight,
-            mean: origin + mean,
-            covariance: raised(self.second / self.weight - mean * mean.transpose(), floor),
-        })
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{SMatrix, SVector};
 
     /// One step of expectation-maximisation as the textbooks have it, and the mean log density before it.
     fn step(clumps: &[Clump<2>], components: &[Clump<2>]) -> (Vec<Clump<2>>, f64) {

@@ -47,7 +47,7 @@ impl<const D: usize> Clumps<D> {
         if columns.iter().any(|c| c.len() != weights.len())
             || spread.iter().any(|c| !c.is_empty() && c.len() != weights.len())
         {
-            return refuse("columns", "of different lengths", "one number a weight");
+            return refuse("columns", "of different lengths", "columns of equal length, one entry per weight");
         }
         let mut order: Vec<u32> = Vec::with_capacity(weights.len());
         let mut total = 0.0;
@@ -99,7 +99,7 @@ impl<const D: usize> Clumps<D> {
     }
 
     /// The same clumps with other weights, one for each, of any positive sum.
-    pub(crate) fn reweighted(&self, weights: &[f64]) -> Self {
+    pub fn reweighted(&self, weights: &[f64]) -> Self {
         let (mut other, total) = (self.clone(), weights.iter().sum::<f64>());
         let pairs = other.clumps.iter_mut().zip(weights);
         pairs.for_each(|(clump, weight)| clump.weight = weight / total);

@@ -1,7 +1,7 @@
 //! A Gaussian from the peak of a density: mode and Hessian.
 
-use crate::Error;
 use fewbits_core::Gaussian;
+use fewbits_diffusive::Error;
 use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::error::{all_finite, positive};
 use nalgebra::{SMatrix, SVector};

@@ -6,13 +6,13 @@ pub mod polynomials;
 mod three_dimensions;
 
 pub use fit::LpgFit;
-pub use three_dimensions::{Slice, SliceMoments};
+pub use three_dimensions::Slice;
 
-use crate::Error;
 use basis::{gauss_hermite, hermite_products};
 use fewbits_core::columns::{change_each, state_at};
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Component;
+use fewbits_diffusive::Error;
 use fewbits_numerics::LogSum;
 use fewbits_numerics::error::{all_finite, at_least_one, refuse};
 use fewbits_numerics::normal::LN_SQRT_2PI;

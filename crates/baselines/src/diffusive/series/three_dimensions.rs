@@ -4,10 +4,11 @@ use super::basis::{LANES, gauss_hermite, row_of_polynomials, sums_of_polynomials
 use super::fit::{LpgFit, NEGLIGIBLE};
 use super::polynomials::{MAX_DEGREE, check_degree};
 use super::{Lpg, Term};
-use crate::Error;
-use crate::density::Cells;
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
+use fewbits_diffusive::Error;
+use fewbits_diffusive::density::Cells;
+use fewbits_diffusive::form::SliceMoments;
 use fewbits_numerics::error::refuse;
 use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::quadrature::gauss_legendre;
@@ -31,17 +32,6 @@ struct SliceTerm {
     centre: f64,
     deviation: f64,
     coefficients: [f64; MAX_DEGREE + 1],
-}
-
-/// Integral, mean and variance of a slice times a likelihood.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SliceMoments {
-    /// Logarithm of the integral.
-    pub log_mass: f64,
-    /// Mean.
-    pub mean: f64,
-    /// Variance.
-    pub variance: f64,
 }
 
 /// Half width, in standard deviations, beyond which a Gaussian times a polynomial is negligible.

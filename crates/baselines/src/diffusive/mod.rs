@@ -1,8 +1,23 @@
-//! Gaussians from the peak of a density beyond mode and Hessian: Tierney and Kadane's ratios, and cumulants.
+//! Other forms of the belief of a source, and Gaussians from the peak of a density: mode and Hessian, Tierney and Kadane's ratios, cumulants.
+//!
+//! | form of messages | item |
+//! |---|---|
+//! | polynomial Gaussians of the paper, in square-root form | [`lpg`], [`Lpg`] |
+//! | equally weighted points with one kernel | [`particles`] |
+//! | mode and inverse curvature | [`LAPLACE`], [`Peak`] |
+//!
+//! [`polynomials`] has the Hermite polynomials and the plain series of the paper.
+
+mod forms;
+mod laplace;
+mod series;
+
+pub use forms::{LAPLACE, lpg, lpg_of_position, lpg_with_rate, particles};
+pub use laplace::Peak;
+pub use series::{Lpg, LpgFit, Slice, polynomials};
 
 use fewbits_core::Gaussian;
 use fewbits_diffusive::Error;
-use fewbits_diffusive::density::laplace::Peak;
 use nalgebra::{SMatrix, SVector};
 
 /// Tilt of the differences of `Lambda`, in inverse standard deviations: their truncation error is of the order of its square, and

@@ -1,6 +1,6 @@
 //! Hermite polynomials of several variables.
 
-use crate::Error;
+use fewbits_diffusive::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::refuse;
 use nalgebra::SMatrix;
