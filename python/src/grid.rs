@@ -3,7 +3,7 @@
 use crate::callbacks::{Likelihoods, returned, rising};
 use crate::error::{Outcome, refused};
 use crate::table::{Given, Table, doubles};
-use fewbits_filters::{Error, PointMass, PointMassFilter, UniformGrid};
+use fewbits_filters::{Error, PointMass, TransitionKernel, UniformGrid};
 use fewbits_numerics::kernels::largest_number;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -30,7 +30,7 @@ pub(crate) struct GridFilter {
     likelihoods: Likelihoods,
     belief: PointMass,
     /// The kernel of the last step, and its seconds.
-    kernel: Option<(f64, PointMassFilter)>,
+    kernel: Option<(f64, TransitionKernel)>,
 }
 
 #[pymethods]
@@ -178,7 +178,7 @@ pub(crate) fn dt_of(second: f64, before: f64) -> f64 {
 
 impl GridFilter {
     /// The kernel over `dt` seconds.
-    fn moved(&self, py: Python<'_>, dt: f64) -> Outcome<PointMassFilter> {
+    fn moved(&self, py: Python<'_>, dt: f64) -> Outcome<TransitionKernel> {
         let points = self.belief.density().len();
         let mean = self.mean.bind(py).call1((self.nodes(py), dt))?;
         let mean = returned("mean", "node", &mean, points)?;
@@ -193,6 +193,6 @@ impl GridFilter {
         };
         let moved: Vec<(f64, f64)> = mean.as_array().iter().copied().zip(deviations).collect();
         let grid = *self.belief.grid();
-        Ok(py.detach(|| PointMassFilter::from_transitions(grid, &moved))?)
+        Ok(py.detach(|| TransitionKernel::from_transitions(grid, &moved))?)
     }
 }

@@ -6,7 +6,7 @@ use fewbits::densities::Mixture;
 use fewbits::diffusive::{Action, RateModel, RateRange, Search, SearchBox, SearchField, SourceSensor};
 use fewbits::dymbo::{DymboFilter, ScalarFilter, ScalarPlant, SignBit};
 use fewbits::filters::centre::{FusionCentre, Reporting, Slot};
-use fewbits::filters::{BootstrapFilter, GridFilter, GridOnAxes, MomentFilter, ResamplingRule, StateFilter};
+use fewbits::filters::{BootstrapFilter, GridFilter, MomentFilter, ResamplingRule, StateFilter};
 use fewbits::handoff::{Coded, HandoffFilter};
 use fewbits::link::FusionReceiver;
 use fewbits::mixture_codec::Reduction;
@@ -150,7 +150,7 @@ fn ranged<F: StateFilter<4>>(filter: F) -> FusionCentre<4, F> {
 #[test]
 fn a_range_becomes_a_level_and_a_belief_on_a_grid() {
     const PARTICLES: usize = 40_000;
-    let grid = ranged(GridOnAxes::new(GridFilter::default(), PLANE_POSITION).unwrap()).estimate();
+    let grid = ranged(GridFilter::new(PLANE_POSITION).unwrap()).estimate();
     let cloud = ranged(BootstrapFilter::new(ResamplingRule::default(), PARTICLES).unwrap()).estimate();
     for axis in PLANE_POSITION {
         let deviation = grid.covariance()[(axis, axis)].sqrt();

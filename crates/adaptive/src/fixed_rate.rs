@@ -3,11 +3,12 @@
 use crate::Error;
 use fewbits_core::factor::Levels;
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Gaussian, Message, Observed};
-use fewbits_filters::{Imm, ImmBelief, ImmWorkspace};
+use fewbits_filters::{Imm, ImmBelief, MomentFilter, StateFilter, Switching};
 use fewbits_models::{LinearGaussian, LinearSensor};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::{normal, stored};
 use nalgebra::{Matrix2, Vector1, Vector2};
+use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
 
 /// Per-slot factors of the velocities; zero is the random walk.
@@ -46,12 +47,17 @@ pub struct FixedRate {
     bits: u32,
     unit: f64,
     noise_variance: f64,
-    filter: Imm<LinearGaussian<2, 1>>,
+    models: Switching<LinearGaussian<2, 1>>,
+    filter: Imm<2, MomentFilter>,
     sensor: LinearSensor<2, 1>,
     belief: ImmBelief<2>,
-    workspace: ImmWorkspace<2>,
     /// Number of slots so far, modulo [`TURNS`].
     turn: usize,
+}
+
+/// The filter of moments draws nothing, so both ends agree.
+fn no_draws() -> Pcg64Mcg {
+    Pcg64Mcg::new(0)
 }
 
 /// A word of a [`FixedRate`] scheme: the index of the cell, counted from the lowest.
@@ -116,9 +122,9 @@ impl FixedRate {
             unit,
             noise_variance: noise * noise,
             belief: ImmBelief::agreed(&prior, models.len())?,
-            filter: Imm::switching(models, SWITCHING)?,
+            filter: Imm::new(MomentFilter, vec![1.0; models.len()], SWITCHING)?,
+            models: Switching::new(models)?,
             sensor: LinearSensor::scalar(Vector2::new(1.0, 0.0), noise * noise)?,
-            workspace: ImmWorkspace::default(),
             turn: 0,
         })
     }
@@ -177,7 +183,7 @@ impl FixedRate {
 
     fn predicted(&mut self) -> Result<ImmBelief<2>, Error> {
         let mut next = self.belief.clone();
-        self.filter.predict_in_place(&mut next, &mut self.workspace)?;
+        self.filter.predict(&mut no_draws(), &self.models, &mut next)?;
         Ok(next)
     }
 
@@ -226,8 +232,7 @@ impl FixedRate {
         let upper = edges.get(i).copied();
         let cell = Cell::new(lower.unwrap_or(f64::NEG_INFINITY), upper.unwrap_or(f64::INFINITY))?;
         let observed = Observed::new(self.sensor, Levels::certain(cell, self.noise_variance)?);
-        self.filter
-            .update_in_place(&mut predicted, &observed, &mut self.workspace)?;
+        self.filter.update(&mut no_draws(), &mut predicted, &[&observed])?;
         self.belief = predicted;
         self.turn = (self.turn + 1) % TURNS;
         Ok(())

@@ -65,6 +65,42 @@ pub trait GaussianDynamics<const D: usize>: Dynamics<D> {
     }
 }
 
+impl<const D: usize, G: Dynamics<D> + ?Sized> Dynamics<D> for Box<G> {
+    fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, D> {
+        (**self).mean(state)
+    }
+
+    fn propagate(&self, rng: &mut dyn Rng, state: &SVector<f64, D>) -> SVector<f64, D> {
+        (**self).propagate(rng, state)
+    }
+
+    fn propagate_columns(&self, rng: &mut dyn Rng, states: ColumnsMut<'_, D>) {
+        (**self).propagate_columns(rng, states);
+    }
+}
+
+impl<const D: usize, G: GaussianDynamics<D> + ?Sized> GaussianDynamics<D> for Box<G> {
+    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        (**self).jacobian(state)
+    }
+
+    fn noise_covariance_at(&self, state: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        (**self).noise_covariance_at(state)
+    }
+
+    fn predict(&self, belief: &Gaussian<D>, noise_scale: f64) -> Gaussian<D> {
+        (**self).predict(belief, noise_scale)
+    }
+
+    fn propagate_columns_scaled(&self, rng: &mut dyn Rng, noise_scale: f64, states: ColumnsMut<'_, D>) {
+        (**self).propagate_columns_scaled(rng, noise_scale, states);
+    }
+
+    fn modes(&self) -> Vec<ScaledNoise<'_, D>> {
+        (**self).modes()
+    }
+}
+
 /// Dynamics with the covariance of their process noise multiplied by a factor.
 #[derive(Clone, Copy)]
 pub struct ScaledNoise<'a, const D: usize> {

@@ -16,3 +16,9 @@ pub trait Evolution<const D: usize>: Send + Sync {
     /// If the time is negative or not finite, or so long that a number overflows.
     fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError>;
 }
+
+impl<const D: usize, E: Evolution<D> + ?Sized> Evolution<D> for Box<E> {
+    fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError> {
+        (**self).over(seconds)
+    }
+}

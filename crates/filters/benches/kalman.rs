@@ -4,7 +4,7 @@
 
 use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::Gaussian;
-use fewbits_filters::{PointMass, PointMassFilter, UniformGrid, kalman};
+use fewbits_filters::{PointMass, TransitionKernel, UniformGrid, kalman};
 use fewbits_models::{Ar1, LinearSensor, ScalarSensor, constant_velocity_1d, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector1, Vector2, Vector4};
@@ -46,12 +46,11 @@ fn constant_velocity_plane(bencher: Bencher) {
 #[divan::bench(sample_size = 16)]
 fn point_mass_100_nodes(bencher: Bencher) {
     let filter =
-        PointMassFilter::new(&Ar1::new(0.9, 0.5).unwrap(), UniformGrid::symmetric(14.0, 0.28).unwrap()).unwrap();
+        TransitionKernel::new(&Ar1::new(0.9, 0.5).unwrap(), UniformGrid::symmetric(14.0, 0.28).unwrap()).unwrap();
     let belief = PointMass::normal(*filter.grid(), 0.0, 1.0).unwrap();
-    let mut next = belief.clone();
     let likelihood: Vec<f64> = filter.grid().nodes().map(|x| (-0.5 * x * x).exp()).collect();
     bencher.bench_local(|| {
-        filter.predict_into(black_box(&belief), &mut next).unwrap();
+        let mut next = filter.predict(black_box(&belief)).unwrap();
         next.reweight(&likelihood)
     });
 }

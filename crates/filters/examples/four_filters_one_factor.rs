@@ -5,7 +5,7 @@
 use fewbits_core::factor::{Constant, Levels, Scalar};
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
-    BootstrapFilter, MomentFilter, PointMasses, RaoBlackwellised, ResamplingRule, StateFilter, UniformGrid,
+    BootstrapFilter, MomentFilter, PointMassFilter, RaoBlackwellised, ResamplingRule, StateFilter, UniformGrid,
 };
 use fewbits_models::{Ar1, LinearSensor};
 use rand::SeedableRng;
@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let prior = Gaussian::scalar(0.0, dynamics.stationary_variance()?)?;
     let mut rng = Pcg64Mcg::seed_from_u64(1);
     let mut state = prior.sample(&mut rng);
-    let mut exact = PointMasses::new(UniformGrid::symmetric(10.0, 0.1)?);
+    let mut exact = PointMassFilter::new(UniformGrid::symmetric(10.0, 0.1)?);
     let mut bootstrap = BootstrapFilter::new(ResamplingRule::default(), 2000)?;
     let mut imputing = RaoBlackwellised::new(ResamplingRule::default(), 200)?;
     let (mut gaussian, mut grid) = (prior, exact.start(&mut rng, &prior)?);

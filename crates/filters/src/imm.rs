@@ -1,153 +1,198 @@
-//! The interacting-multiple-model (IMM) filter: one of several models holds at a time; any factor.
+//! The interacting-multiple-model (IMM) filter: one of several models holds at a time.
 
-use crate::{Error, assumed_density};
-use fewbits_core::columns::change_each;
-use fewbits_core::{Belief, ColumnsMut, Factor, Gaussian, GaussianDynamics, Observed, Sensing};
-use fewbits_densities::Categorical;
-use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities, within};
-use nalgebra::{SMatrix, SVector};
+use crate::Error;
+use crate::contract::{Info, StateFilter};
+use crate::imm_belief::{ImmBelief, check_moments, moments};
+use fewbits_core::{Gaussian, GaussianDynamics, Likelihood, ScaledNoise};
+use fewbits_numerics::LogSum;
+use fewbits_numerics::error::{ArgumentError, at_least_one, positive, probabilities, refuse, within};
 use rand::Rng;
-use serde::{Deserialize, Serialize};
 
-/// A filter for dynamics that follow one of several models at a time and switch between them as a Markov chain.
+/// A filter for dynamics that follow one of several models at a time and switch between them as a Markov chain. Each model has a filter with
+/// a Gaussian belief, and a probability.
 ///
-/// Each model has a Gaussian belief and a probability. The steps of a slot (Blom and Bar-Shalom 1988; the measurement update is that of
-/// [`assumed_density`], so the observation may be a value, a sign bit, a cell or silence: any [`Factor`]):
+/// The steps of a slot (Blom and Bar-Shalom 1988; the observation may be a value, a sign bit, a cell or silence, as the filters take it):
 ///
 /// ```text
 /// c_j = sum_i w_i T_ij                              predicted probability of model j
 /// mean_j, P_j = moments of sum_i (w_i T_ij / c_j) N(mean_i, P_i)             mixing
-/// predict each with its model; update each with the factor: evidence L_j = p(observation | j, past)
-/// w_j = c_j L_j / sum;   p(observation | past) = sum_j c_j L_j
+/// predict each with its model; update each with the observations: evidence L_j = p(observations | j, past)
+/// w_j = c_j L_j / sum;   p(observations | past) = sum_j c_j L_j
 /// ```
 ///
-/// With one model it is the assumed-density filter. Without mixing (`T` the identity) it is a bank of independent filters, whose
-/// probabilities are exact Bayes factors. The approximation is that the mixture over `K^n` histories is kept as `K` Gaussians.
+/// The models are the [`modes`](GaussianDynamics::modes) of the dynamics, those of a [`Switching`](crate::Switching). Dynamics of one model
+/// are the same for all filters but for the scale of the process noise: a bank that finds it. With one model it is the filter itself. Without
+/// switching it is a bank of independent filters, whose probabilities are exact Bayes factors. The approximation is that the mixture over
+/// `K^n` histories is kept as `K` Gaussians. A step costs as much as one step of each filter.
+///
+/// Scales multiply the covariance of the process noise: 4 doubles its deviation. Choose neighbours that differ by a factor of 4 or less. A
+/// centre's own [noise scale](crate::centre::FusionCentre::noise_scale) multiplies all of them. Without switching the bank converges to one
+/// scale. Words of 2 bits and more identify the scale by their evidence. A single bit whose threshold is the prediction of the only filter has
+/// probability 1/2 for every scale, so it does not (use [`NoiseLearning`](crate::centre::NoiseLearning)). In a bank its threshold differs
+/// from the predictions of the other filters, which gives a little information.
+///
+/// ```
+/// use fewbits_core::{Gaussian, GaussianDynamics, Likelihood};
+/// use fewbits_filters::{Imm, MomentFilter, StateFilter};
+/// let mut bank = Imm::new(MomentFilter, vec![0.25, 1.0, 4.0], 1e-3)?;
+/// let belief = bank.start(&mut rand_pcg::Pcg64Mcg::new(1), &Gaussian::scalar(0.0, 1.0)?)?;
+/// assert!((bank.scale(&belief) - 1.0).abs() < 1e-12); // nothing is known yet
+/// # Ok::<(), fewbits_filters::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Imm<G> {
-    models: Vec<G>,
+pub struct Imm<const D: usize, F> {
+    filters: Vec<F>,
+    scales: Vec<f64>,
     /// `T_ij = p(next model j | model i)`, row by row.
     transition: Vec<f64>,
-}
-
-/// The belief of an [`Imm`]: a Gaussian and a probability for each model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored<D>")]
-pub struct ImmBelief<const D: usize> {
-    #[serde(with = "fewbits_numerics::stored")]
-    probabilities: Vec<f64>,
-    modes: Vec<Gaussian<D>>,
-}
-
-/// The stored form of [`ImmBelief`].
-#[derive(Deserialize)]
-#[serde(rename = "ImmBelief")]
-#[serde(deny_unknown_fields)]
-struct Stored<const D: usize> {
-    #[serde(with = "fewbits_numerics::stored")]
-    probabilities: Vec<f64>,
-    modes: Vec<Gaussian<D>>,
-}
-
-impl<const D: usize> TryFrom<Stored<D>> for ImmBelief<D> {
-    type Error = ArgumentError;
-
-    fn try_from(parts: Stored<D>) -> Result<Self, ArgumentError> {
-        ImmBelief::new(parts.probabilities, parts.modes)
-    }
-}
-
-impl<const D: usize> ImmBelief<D> {
-    /// A belief with a probability and a Gaussian for each model.
-    ///
-    /// # Errors
-    /// If the two lists differ in length, or the probabilities do not sum to one.
-    pub fn new(probabilities_: Vec<f64>, modes: Vec<Gaussian<D>>) -> Result<Self, ArgumentError> {
-        probabilities("probabilities", &probabilities_)?;
-        if modes.len() != probabilities_.len() {
-            let expected = format!("{}, one for each probability", probabilities_.len());
-            return Err(ArgumentError::new("modes", format!("{} Gaussians", modes.len()), expected));
-        }
-        Ok(Self {
-            probabilities: probabilities_,
-            modes,
-        })
-    }
-
-    /// A belief of `count` models with equal probability and the same Gaussian.
-    ///
-    /// # Errors
-    /// If `count` is 0.
-    pub fn agreed(belief: &Gaussian<D>, count: usize) -> Result<Self, ArgumentError> {
-        at_least_one("count", count)?;
-        Ok(Self {
-            probabilities: vec![1.0 / count as f64; count],
-            modes: vec![*belief; count],
-        })
-    }
-
-    /// Probability of each model.
-    pub fn probabilities(&self) -> &[f64] {
-        &self.probabilities
-    }
-
-    /// The Gaussian of each model.
-    pub fn modes(&self) -> &[Gaussian<D>] {
-        &self.modes
-    }
-
-    /// The Gaussian of the same mean and covariance as the mixture.
-    pub fn moment_matched(&self) -> Gaussian<D> {
-        moments(self.probabilities.iter().copied().zip(&self.modes))
-    }
-}
-
-/// Mean and covariance of a mixture whose weights sum to one. The covariance of the means is computed as a sum of squares.
-pub(crate) fn moments<'a, const D: usize>(parts: impl Iterator<Item = (f64, &'a Gaussian<D>)> + Clone) -> Gaussian<D> {
-    let mean = parts.clone().fold(SVector::zeros(), |sum, (w, g)| sum + g.mean() * w);
-    let covariance = parts.fold(SMatrix::zeros(), |sum, (w, g)| {
-        let d = g.mean() - mean;
-        sum + (g.covariance() + d * d.transpose()) * w
-    });
-    Gaussian::from_trusted_parts(mean, covariance)
-}
-
-/// The models' beliefs may be so far apart that the covariance of all together overflows.
-fn check_moments<const D: usize>(modes: &[Gaussian<D>]) -> Result<(), Error> {
-    let size = |mode: &Gaussian<D>| mode.mean().norm_squared() + mode.covariance().trace();
-    // No distance of two means is larger than twice the larger of their norms.
-    match (4.0 * modes.iter().map(size).sum::<f64>()).is_finite() {
-        true => Ok(()),
-        false => Err(Error::NotANumber {
-            what: "the moments of all models together",
-        }),
-    }
-}
-
-impl<const D: usize> Belief<D> for ImmBelief<D> {
-    fn mean(&self) -> SVector<f64, D> {
-        *self.moment_matched().mean()
-    }
-
-    fn covariance(&self) -> SMatrix<f64, D, D> {
-        *self.moment_matched().covariance()
-    }
-
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
-        let modes = Categorical::new(&self.probabilities);
-        change_each(states, |_| self.modes[modes.draw(rng)].sample(rng));
-    }
+    workspace: Workspace<D>,
 }
 
 /// Buffers reused from step to step.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct ImmWorkspace<const D: usize> {
+struct Workspace<const D: usize> {
     modes: Vec<Gaussian<D>>,
     probabilities: Vec<f64>,
 }
 
+impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> Imm<D, F> {
+    /// A filter like `filter` for each of these scales of the process-noise covariance; 1 for a model that holds as stated. In each step, with
+    /// probability `switching`, the model is drawn anew uniformly from all.
+    ///
+    /// # Errors
+    /// If there is no scale, one is not above 0, or `switching` is outside `[0, 1]`.
+    pub fn new(filter: F, scales: Vec<f64>, switching: f64) -> Result<Self, Error>
+    where
+        F: Clone,
+    {
+        let transition = evenly(scales.len(), switching)?;
+        Self::checked(vec![filter; scales.len()], scales, transition)
+    }
+
+    /// A bank of these filters, each with its scale of the process-noise covariance: they may differ in more than the scale. In each
+    /// step they change by the probabilities `transition[i][j] = p(next j | i)`.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), or if the matrix is not square of their number, or a row does not sum to one.
+    pub fn of(filters: Vec<(F, f64)>, transition: &[Vec<f64>]) -> Result<Self, Error> {
+        let transition = by_rows(filters.len(), transition)?;
+        let (filters, scales) = filters.into_iter().unzip();
+        Self::checked(filters, scales, transition)
+    }
+
+    fn checked(filters: Vec<F>, scales: Vec<f64>, transition: Vec<f64>) -> Result<Self, Error> {
+        at_least_one("scales", scales.len())?;
+        for scale in &scales {
+            positive("scales", *scale)?;
+        }
+        Ok(Self {
+            filters,
+            transition,
+            scales,
+            workspace: Workspace::default(),
+        })
+    }
+
+    /// The filters, in the order of the belief's modes.
+    pub fn filters(&self) -> &[F] {
+        &self.filters
+    }
+
+    fn check(&self, belief: &ImmBelief<D>) -> Result<(), ArgumentError> {
+        if belief.modes().len() == self.filters.len() {
+            return Ok(());
+        }
+        let expected = format!("{}, as many as the filter has", self.filters.len());
+        Err(ArgumentError::new("belief", format!("of {} models", belief.modes().len()), expected))
+    }
+
+    fn starts(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Vec<Gaussian<D>>, Error> {
+        self.filters.iter_mut().map(|filter| filter.start(rng, prior)).collect()
+    }
+
+    /// The estimated scale: the geometric mean of the scales, weighted by the modes' probabilities.
+    pub fn scale(&self, belief: &ImmBelief<D>) -> f64 {
+        let pairs = self.scales.iter().zip(belief.probabilities());
+        pairs.map(|(scale, p)| p * scale.ln()).sum::<f64>().exp()
+    }
+}
+
+impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for Imm<D, F> {
+    type Belief = ImmBelief<D>;
+
+    fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<ImmBelief<D>, Error> {
+        let even = vec![1.0 / self.filters.len() as f64; self.filters.len()];
+        Ok(ImmBelief::new(even, self.starts(rng, prior)?)?)
+    }
+
+    fn restart(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>, lost: &ImmBelief<D>) -> Result<ImmBelief<D>, Error> {
+        Ok(ImmBelief::new(lost.probabilities().to_vec(), self.starts(rng, prior)?)?)
+    }
+
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        dynamics: &dyn GaussianDynamics<D>,
+        belief: &mut ImmBelief<D>,
+    ) -> Result<(), Error> {
+        self.check(belief)?;
+        let Self {
+            filters,
+            scales,
+            transition,
+            workspace,
+        } = self;
+        let modes = dynamics.modes();
+        if !(modes.is_empty() || modes.len() == scales.len()) {
+            return refuse(
+                "dynamics",
+                format!("{} modes", modes.len()),
+                format!("{}, one for each scale", scales.len()),
+            );
+        }
+        mix(belief, transition, workspace, |j, mixed| {
+            let mut moved = *mixed;
+            let own = modes.get(j).copied().unwrap_or_else(|| ScaledNoise::new(dynamics, 1.0));
+            filters[j].predict(rng, &own.times(scales[j]), &mut moved)?;
+            Ok(moved)
+        })
+    }
+
+    fn update(
+        &mut self,
+        rng: &mut dyn Rng,
+        belief: &mut ImmBelief<D>,
+        observed: &[&dyn Likelihood<D>],
+    ) -> Result<Info, Error> {
+        self.check(belief)?;
+        let Self { filters, workspace, .. } = self;
+        let log_likelihood = weigh(belief, workspace, |j, mode| {
+            let mut next = *mode;
+            let info = filters[j].update(rng, &mut next, observed)?;
+            Ok((next, info.log_likelihood))
+        })?;
+        Ok(Info::new(log_likelihood))
+    }
+
+    fn mixture(&self, belief: &ImmBelief<D>) -> Option<Vec<(f64, Gaussian<D>)>> {
+        let mut all = Vec::new();
+        for ((filter, mode), probability) in self.filters.iter().zip(belief.modes()).zip(belief.probabilities()) {
+            let log = probability.ln();
+            // Filters of moments have the law of their Gaussian.
+            if filter.of_moments(mode).is_some() {
+                all.push((log, *mode));
+                continue;
+            }
+            let parts = filter.mixture(mode)?;
+            let total = parts.iter().map(|(log, _)| *log).collect::<LogSum>().value();
+            all.extend(parts.into_iter().map(|(part, gaussian)| (log + part - total, gaussian)));
+        }
+        Some(all)
+    }
+}
+
 /// Transition probabilities, row by row: with probability `switching` the next model is drawn uniformly from all models, else it stays.
-pub(crate) fn evenly(models: usize, switching: f64) -> Result<Vec<f64>, ArgumentError> {
+fn evenly(models: usize, switching: f64) -> Result<Vec<f64>, ArgumentError> {
     within("switching", switching, 0.0, 1.0)?;
     let entry = |at: usize| {
         let stays = if at / models == at % models {
@@ -161,7 +206,7 @@ pub(crate) fn evenly(models: usize, switching: f64) -> Result<Vec<f64>, Argument
 }
 
 /// A matrix of transition probabilities, row by row.
-pub(crate) fn by_rows(models: usize, transition: &[Vec<f64>]) -> Result<Vec<f64>, ArgumentError> {
+fn by_rows(models: usize, transition: &[Vec<f64>]) -> Result<Vec<f64>, ArgumentError> {
     if transition.len() != models || transition.iter().any(|row| row.len() != models) {
         let rows: Vec<usize> = transition.iter().map(Vec::len).collect();
         let expected = format!("{0} rows of {0}", models);
@@ -173,84 +218,11 @@ pub(crate) fn by_rows(models: usize, transition: &[Vec<f64>]) -> Result<Vec<f64>
     Ok(transition.concat())
 }
 
-impl<G> Imm<G> {
-    /// The filter with transition probabilities `transition[i][j] = p(next model j | model i)`.
-    ///
-    /// # Errors
-    /// If there is no model, the matrix is not square of their number, or a row does not sum to one.
-    pub fn new(models: Vec<G>, transition: &[Vec<f64>]) -> Result<Self, ArgumentError> {
-        at_least_one("models", models.len())?;
-        Ok(Self {
-            transition: by_rows(models.len(), transition)?,
-            models,
-        })
-    }
-
-    /// The filter whose model, with probability `switching` in each slot, is drawn anew uniformly from all models.
-    ///
-    /// # Errors
-    /// If there is no model, or `switching` is outside `[0, 1]`.
-    pub fn switching(models: Vec<G>, switching: f64) -> Result<Self, ArgumentError> {
-        at_least_one("models", models.len())?;
-        Ok(Self {
-            transition: evenly(models.len(), switching)?,
-            models,
-        })
-    }
-
-    /// The models.
-    pub fn models(&self) -> &[G] {
-        &self.models
-    }
-
-    fn check<const D: usize>(&self, belief: &ImmBelief<D>) -> Result<(), ArgumentError> {
-        if belief.modes.len() == self.models.len() {
-            return Ok(());
-        }
-        let expected = format!("{}, as many as the filter has", self.models.len());
-        Err(ArgumentError::new("belief", format!("of {} models", belief.modes.len()), expected))
-    }
-
-    /// Mixing and time update.
-    ///
-    /// # Errors
-    /// If the belief has another number of models.
-    pub fn predict_in_place<const D: usize>(
-        &self,
-        belief: &mut ImmBelief<D>,
-        workspace: &mut ImmWorkspace<D>,
-    ) -> Result<(), Error>
-    where
-        G: GaussianDynamics<D>,
-    {
-        self.check(belief)?;
-        mix(belief, &self.transition, workspace, |j, mixed| Ok(assumed_density::predict(&self.models[j], mixed)))
-    }
-
-    /// Measurement update; returns `ln p(observation | past)`.
-    ///
-    /// # Errors
-    /// [`Error::Impossible`] if the observation has probability zero under every model; the belief is then unchanged.
-    /// If it is impossible under some models only, these keep their Gaussian and get probability zero.
-    pub fn update_in_place<const D: usize, const M: usize>(
-        &self,
-        belief: &mut ImmBelief<D>,
-        observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
-        workspace: &mut ImmWorkspace<D>,
-    ) -> Result<f64, Error> {
-        self.check(belief)?;
-        weigh(belief, workspace, |_, mode| {
-            let (next, info) = assumed_density::update_through(mode, observed)?;
-            Ok((next, info.log_likelihood))
-        })
-    }
-}
-
 /// Mixes the modes by `transition` (row by row) and predicts each: `predict(j, mixed)` is the time update of model `j`.
-pub(crate) fn mix<const D: usize>(
+fn mix<const D: usize>(
     belief: &mut ImmBelief<D>,
     transition: &[f64],
-    workspace: &mut ImmWorkspace<D>,
+    workspace: &mut Workspace<D>,
     mut predict: impl FnMut(usize, &Gaussian<D>) -> Result<Gaussian<D>, Error>,
 ) -> Result<(), Error> {
     let n = belief.modes.len();
@@ -277,9 +249,9 @@ pub(crate) fn mix<const D: usize>(
 
 /// Updates each mode and multiplies its probability by its evidence; returns `ln p(observation | past)`. A mode under which the observation
 /// is impossible keeps its Gaussian and gets probability zero.
-pub(crate) fn weigh<const D: usize>(
+fn weigh<const D: usize>(
     belief: &mut ImmBelief<D>,
-    workspace: &mut ImmWorkspace<D>,
+    workspace: &mut Workspace<D>,
     mut update: impl FnMut(usize, &Gaussian<D>) -> Result<(Gaussian<D>, f64), Error>,
 ) -> Result<f64, Error> {
     workspace.modes.clear();

@@ -9,13 +9,13 @@
 //! | a Gaussian belief and any factor | [`MomentFilter`] | [`assumed_density`] |
 //! | a Gaussian belief and curved models | [`SigmaPointFilter`] (unscented, cubature; square-root form), [`EnsembleFilter`] | [`RootGaussian`] |
 //! | linear Gaussian filtering of values | [`MomentFilter`] | [`kalman`] (Joseph form) |
-//! | a Gaussian belief and any likelihood of a few coordinates | [`GridOnAxes`] | [`GridFilter`] (a grid that follows the posterior) |
+//! | a Gaussian belief and any likelihood of a few coordinates | [`GridFilter`] (a grid that follows the posterior) | |
 //! | any dynamics, any likelihood | [`BootstrapFilter`], [`GuidedFilter`] | [`ResamplingRule`], [`Resampling`] |
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) | [`impute`] |
-//! | several models, one at a time | [`NoiseBank`], [`Switching`] | [`Imm`] (interacting multiple models, any factor) |
-//! | the exact answer for a scalar | [`PointMasses`] | [`PointMassFilter`] (one model on a grid, with a smoother) |
+//! | several models, one at a time | [`Imm`] (interacting multiple models) | [`Switching`] (their dynamics) |
+//! | the exact answer for a scalar | [`PointMassFilter`] | [`TransitionKernel`] (its time update) |
 //! | the exact answer for a few numbers | | [`LatticeFilter`] (independent noise on each) |
-//! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`PointMassFilter::smooth`] (a grid) |
+//! | smoothing | | [`smoother`] (Gaussian beliefs: Rauch-Tung-Striebel), [`backward_simulation`] (particles), [`TransitionKernel::smooth`] (a grid) |
 //! | calibration of sensors and level from recorded readings | [`fit`] (maximum likelihood), [`calibration`] (noises and change alone) | |
 //! | the steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) | |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) | |
@@ -46,9 +46,9 @@ pub mod fit;
 mod grid_filter;
 mod guided;
 mod imm;
+mod imm_belief;
 pub mod kalman;
 mod lattice;
-mod noise_bank;
 mod particle;
 mod point_mass;
 mod rao_blackwell;
@@ -58,6 +58,7 @@ mod sigma_points;
 pub mod smoother;
 mod steady_state;
 mod switching;
+mod transition_kernel;
 
 pub use backward_simulation::backward_simulation;
 pub use contract::{Info, MomentFilter, Points, StateFilter};
@@ -65,13 +66,13 @@ pub use ensemble::EnsembleFilter;
 pub use fewbits_core::Error;
 pub use fewbits_core::{Evidence, LinearScalar, assumed_density};
 pub use fewbits_densities::{GaussianCloud, Lattice, Particles, PointMass, UniformGrid};
-pub use grid_filter::{GridFilter, GridInfo, GridOnAxes, GridWorkspace};
+pub use grid_filter::GridFilter;
 pub use guided::{GuidedFilter, GuidedParticles};
-pub use imm::{Imm, ImmBelief, ImmWorkspace};
+pub use imm::Imm;
+pub use imm_belief::ImmBelief;
 pub use lattice::LatticeFilter;
-pub use noise_bank::NoiseBank;
 pub use particle::BootstrapFilter;
-pub use point_mass::{PointMassFilter, PointMasses};
+pub use point_mass::PointMassFilter;
 pub use rao_blackwell::{RaoBlackwellised, impute};
 pub use resample::{Resampling, ResamplingRule, Schedule};
 pub use root_gaussian::RootGaussian;
@@ -79,4 +80,5 @@ pub use sigma_points::SigmaPointFilter;
 pub use smoother::scalar_fixed_lag_variance;
 pub use steady_state::{ScalarSteadyState, SteadyState, scalar_steady_state, steady_state};
 pub use switching::Switching;
+pub use transition_kernel::TransitionKernel;
 pub use {nalgebra, rand};

@@ -1,39 +1,37 @@
 //! Dynamics that follow one of several models at a time.
 
 use crate::Error;
-use crate::imm::moments;
+use crate::imm_belief::moments;
 use fewbits_core::{ColumnsMut, Dynamics, Evolution, Gaussian, GaussianDynamics, ScaledNoise};
 use fewbits_numerics::error::{ArgumentError, at_least_one};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 
-/// Dynamics that follow one of several models at a time. With a [`NoiseBank`](crate::NoiseBank) it gives an interacting-multiple-model
-/// filter over any time interval. A filter of one model sees the mixture of all models with equal weights.
-pub struct Switching<const D: usize>(Vec<Box<dyn Evolution<D>>>);
+/// Dynamics that follow one of several models at a time: models over any time ([`Evolution`]), or over one step. With an [`Imm`](crate::Imm)
+/// they give an interacting-multiple-model filter. A filter of one model sees the mixture of all models with equal weights, since nothing
+/// here says which one holds; an `Imm` uses the single [`modes`](GaussianDynamics::modes) instead.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Switching<E>(Vec<E>);
 
-impl<const D: usize> Switching<D> {
+impl<E> Switching<E> {
     /// Dynamics of these models.
     ///
     /// # Errors
     /// If there is no model.
-    pub fn new(models: Vec<Box<dyn Evolution<D>>>) -> Result<Self, Error> {
+    pub fn new(models: Vec<E>) -> Result<Self, Error> {
         at_least_one("models", models.len())?;
         Ok(Self(models))
     }
 }
 
-impl<const D: usize> Evolution<D> for Switching<D> {
+impl<const D: usize, E: Evolution<D>> Evolution<D> for Switching<E> {
     fn over(&self, seconds: f64) -> Result<Box<dyn GaussianDynamics<D> + '_>, ArgumentError> {
         let modes = self.0.iter().map(|model| model.over(seconds));
-        Ok(Box::new(SwitchingStep(modes.collect::<Result<_, _>>()?)))
+        Ok(Box::new(Switching(modes.collect::<Result<Vec<_>, _>>()?)))
     }
 }
 
-/// The models over a fixed time. Nothing here says which model holds, so all have equal weights. A `NoiseBank` uses the single `modes`
-/// instead.
-struct SwitchingStep<'a, const D: usize>(Vec<Box<dyn GaussianDynamics<D> + 'a>>);
-
-impl<const D: usize> Dynamics<D> for SwitchingStep<'_, D> {
+impl<const D: usize, G: GaussianDynamics<D>> Dynamics<D> for Switching<G> {
     fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, D> {
         let sum = self
             .0
@@ -51,7 +49,7 @@ impl<const D: usize> Dynamics<D> for SwitchingStep<'_, D> {
     }
 }
 
-impl<const D: usize> GaussianDynamics<D> for SwitchingStep<'_, D> {
+impl<const D: usize, G: GaussianDynamics<D>> GaussianDynamics<D> for Switching<G> {
     fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, D, D> {
         let sum = self
             .0
@@ -81,6 +79,6 @@ impl<const D: usize> GaussianDynamics<D> for SwitchingStep<'_, D> {
     }
 
     fn modes(&self) -> Vec<ScaledNoise<'_, D>> {
-        self.0.iter().map(|model| ScaledNoise::new(&**model, 1.0)).collect()
+        self.0.iter().map(|model| ScaledNoise::new(model, 1.0)).collect()
     }
 }

@@ -4,7 +4,9 @@
 
 use divan::{AllocProfiler, Bencher};
 use fewbits_baselines::pf_mpa::MessagePassing;
-use fewbits_baselines::pf_mpa::{Encoder, GuidedGaussian, Linearised, Network, Ranged, Reports, Target, Tracker};
+use fewbits_baselines::pf_mpa::{
+    Encoder, GuidedGaussian, Linearised, Network, POSITION, Ranged, Reports, Target, Tracker,
+};
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise};
@@ -60,7 +62,7 @@ fn step<T: Tracker>(bencher: Bencher, tracker: &T) {
 
 #[divan::bench]
 fn grid_15(bencher: Bencher) {
-    step(bencher, &GridFilter::default());
+    step(bencher, &GridFilter::new(POSITION).unwrap());
 }
 
 #[divan::bench]

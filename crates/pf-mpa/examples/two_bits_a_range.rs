@@ -1,7 +1,6 @@
 //! Five sensors send two bits each per step; a grid of 15 x 15 follows the target.
 
 use fewbits_core::{Dynamics, Gaussian, Link, SchemeNode, SensorNode};
-use fewbits_filters::GridOnAxes;
 use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
 use fewbits_models::{ContinuousLinear, PLANE_POSITION};
 use fewbits_monte_carlo::Stream;
@@ -16,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut truth = Vector4::new(13.0, 0.0, 17.0, -0.6); // [x, x velocity, y, y velocity]
     let prior = Gaussian::new(truth, Matrix4::from_diagonal(&Vector4::new(0.04, 0.01, 0.04, 0.01)))?;
     let mut rng = Stream::new(1).rng();
-    let filter = GridOnAxes::new(GridFilter::default(), PLANE_POSITION)?;
+    let filter = GridFilter::new(PLANE_POSITION)?;
     let mut centre = FusionCentre::new(&mut rng, world, filter, &prior)?;
     for (number, place) in (0..).zip(places) {
         let sensor = RangeSensor::new(place.into(), noise)?.on_axes::<4>(PLANE_POSITION)?;

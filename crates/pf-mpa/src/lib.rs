@@ -14,13 +14,12 @@
 //! |---|---|
 //! | sensor, noise, quantizer, likelihood of a level | [`RangeSensor`], [`RangeNoise`], [`QuantizedRange`], [`Levels`](fewbits_core::factor::Levels) |
 //! | cells about the expected range, as wide as its uncertainty | [`RangeReference::about`] with [`optimal_loading`] |
-//! | the recommended tracker | [`GridOnAxes`](fewbits_filters::GridOnAxes) in a [`FusionCentre`](fewbits_filters::centre::FusionCentre) |
+//! | the recommended tracker | [`GridFilter`] in a [`FusionCentre`](fewbits_filters::centre::FusionCentre) |
 //! | recorded ranges with bias, outliers, missing anchors, unknown speed and start | [`RangeTracker`] |
 //! | information of a range and of a level | [`range_information`], [`level_information`] |
 //!
 //! ```
 //! use fewbits_core::{Gaussian, Link, SchemeNode, SensorNode};
-//! use fewbits_filters::GridOnAxes;
 //! use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
 //! use fewbits_models::{ContinuousLinear, PLANE_POSITION};
 //! use fewbits_monte_carlo::Stream;
@@ -31,7 +30,7 @@
 //! let scheme = QuantizedRange::new(4, noise)?;
 //! let prior = Gaussian::new(Vector4::new(9.0, 0.0, 9.0, 0.5), Matrix4::identity() * 0.1)?;
 //! let (mut rng, world) = (Stream::new(1).rng(), ContinuousLinear::nearly_constant_velocity_2d(0.02)?);
-//! let filter = GridOnAxes::new(GridFilter::default(), PLANE_POSITION)?;
+//! let filter = GridFilter::new(PLANE_POSITION)?;
 //! let mut centre = FusionCentre::new(&mut rng, world, filter, &prior)?;
 //! let places = [[4.0, 4.0], [16.0, 4.0], [10.0, 16.0]];
 //! for (number, place) in (0..).zip(places) {
@@ -63,7 +62,7 @@ mod sensor;
 
 pub use bound::{level_information, range_information};
 pub use fewbits_core::{Error, RangeNoise};
-pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
+pub use fewbits_filters::GridFilter;
 pub use loading::optimal_loading;
 pub use quantized::{QuantizedRange, RangeReference};
 pub use ranges::{Height, RangeEstimate, RangeSettings, RangeTracker, Travel};

@@ -3,8 +3,9 @@
 use fewbits_adaptive::{Config, MODELS, SCALES, Sensor};
 use fewbits_core::factor::Levels;
 use fewbits_core::{Cell, Gaussian, Observed};
-use fewbits_filters::{Imm, ImmBelief, ImmWorkspace};
+use fewbits_filters::{Imm, MomentFilter, StateFilter, Switching};
 use fewbits_models::{LinearGaussian, LinearSensor};
+use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Vector1, Vector2};
 
 /// The bank finds the same model as exact truncated-normal updates of the same models on the same cells.
@@ -19,7 +20,9 @@ fn the_bank_believes_what_the_general_filter_believes() {
         }
     }
     assert_eq!(models.len(), MODELS);
-    let filter = Imm::switching(models, 0.005).unwrap();
+    let models = Switching::new(models).unwrap();
+    let mut filter = Imm::new(MomentFilter, vec![1.0; MODELS], 0.005).unwrap();
+    let mut rng = Stream::new(1).rng();
     let signals: [fn(f64) -> f64; 3] = [
         |n| 30.0 * (0.07 * n).sin(),
         |n| 3.0 * (n * 12.9898).sin() + 2.0 * (n * 78.233).sin(),
@@ -28,7 +31,7 @@ fn the_bank_believes_what_the_general_filter_believes() {
     for signal in signals {
         let mut sensor = Sensor::new(Config::new(0.5).unwrap());
         let start = Gaussian::new(Vector2::zeros(), Matrix2::new(0.1, 0.0, 0.0, 0.0)).unwrap();
-        let (mut belief, mut workspace) = (ImmBelief::agreed(&start, MODELS).unwrap(), ImmWorkspace::default());
+        let mut belief = filter.start(&mut rng, &start).unwrap();
         let matrix = LinearSensor::scalar(Vector2::new(1.0, 0.0), 0.15 * 0.15).unwrap();
         let first = signal(0.0);
         sensor.encode(first).unwrap();
@@ -36,9 +39,9 @@ fn the_bank_believes_what_the_general_filter_believes() {
             sensor.encode(signal(f64::from(n))).unwrap();
             let j = (sensor.reconstruction().unwrap() - first).round();
             let factor = Levels::certain(Cell::new(j - 0.5, j + 0.5).unwrap(), 0.15 * 0.15).unwrap();
-            filter.predict_in_place(&mut belief, &mut workspace).unwrap();
+            filter.predict(&mut rng, &models, &mut belief).unwrap();
             let observed = Observed::new(matrix, factor);
-            filter.update_in_place(&mut belief, &observed, &mut workspace).unwrap();
+            filter.update(&mut rng, &mut belief, &[&observed]).unwrap();
         }
         let ours = sensor.model_weights();
         let family = |weights: &[f64], f: usize| weights[f * SCALES..(f + 1) * SCALES].iter().sum::<f64>();

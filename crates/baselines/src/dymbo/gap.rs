@@ -2,7 +2,7 @@
 
 use fewbits_core::{Belief, Dynamics, Factor, Gaussian, Observation, Scheme, Sensing};
 use fewbits_dymbo::{Error, ScalarFilter, ScalarPlant};
-use fewbits_filters::{PointMass, PointMassFilter, UniformGrid, smoother::smooth_step};
+use fewbits_filters::{PointMass, TransitionKernel, UniformGrid, smoother::smooth_step};
 use nalgebra::Vector1;
 use rand::Rng;
 use std::f64::consts::FRAC_2_PI;
@@ -16,17 +16,17 @@ const REACH: f64 = 8.5;
 ///
 /// # Errors
 /// If the plant is unstable, or its process noise too small for a grid.
-pub fn exact_filter(plant: &ScalarPlant, steps: usize) -> Result<PointMassFilter, Error> {
+pub fn exact_filter(plant: &ScalarPlant, steps: usize) -> Result<TransitionKernel, Error> {
     let widest = super::widest_variance(plant, plant.steady_state(FRAC_2_PI)?.filtered_variance, steps)?;
     let spacing = SPACING * plant.process_variance().min(plant.measurement_variance()).sqrt();
-    PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(REACH * widest.sqrt(), spacing)?)
+    TransitionKernel::new(plant.dynamics(), UniformGrid::symmetric(REACH * widest.sqrt(), spacing)?)
 }
 
 /// One simulated run: the true state, the filter's belief, and the exact density given the same reports.
 #[derive(Debug, Clone)]
 pub struct Twin<'a, F> {
     filter: F,
-    exact: &'a PointMassFilter,
+    exact: &'a TransitionKernel,
     nodes: Vec<f64>,
     state: Vector1<f64>,
     belief: Gaussian<1>,
@@ -39,7 +39,7 @@ impl<'a, F: ScalarFilter> Twin<'a, F> {
     ///
     /// # Errors
     /// If the filter has no steady state.
-    pub fn new<R: Rng>(rng: &mut R, filter: F, exact: &'a PointMassFilter) -> Result<Self, Error> {
+    pub fn new<R: Rng>(rng: &mut R, filter: F, exact: &'a TransitionKernel) -> Result<Self, Error> {
         let variance = filter.plant().steady_state(filter.information())?.filtered_variance;
         let belief = Gaussian::scalar(0.0, variance)?;
         let nodes: Vec<f64> = exact.grid().nodes().collect();

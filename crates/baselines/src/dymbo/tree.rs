@@ -8,7 +8,7 @@
 use fewbits_core::factor::Levels;
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
 use fewbits_dymbo::{DymboFilter, Error, ScalarFilter, ScalarPlant};
-use fewbits_filters::{PointMass, PointMassFilter, UniformGrid};
+use fewbits_filters::{PointMass, TransitionKernel, UniformGrid};
 use fewbits_numerics::error::{ArgumentError, positive};
 
 /// Averages over all bit strings of one length.
@@ -55,7 +55,7 @@ pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) ->
     let grid = UniformGrid::symmetric(half_width, SPACING * positive("process_variance", finest)?)?;
     let walk = Walk {
         filter,
-        exact: PointMassFilter::new(plant.dynamics(), grid)?,
+        exact: TransitionKernel::new(plant.dynamics(), grid)?,
     };
     let cell = Levels::certain(Cell::new(-0.5 * tau, 0.5 * tau)?, plant.measurement_variance())?;
     let density = PointMass::new(grid, |x| cell.log_probability(x))?;
@@ -66,7 +66,7 @@ pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) ->
 
 struct Walk {
     filter: DymboFilter,
-    exact: PointMassFilter,
+    exact: TransitionKernel,
 }
 
 impl Walk {

@@ -3,7 +3,7 @@
 use crate::pf_mpa::chain::AccelerationChain;
 use fewbits_core::{Dynamics, Gaussian};
 use fewbits_densities::Particles;
-use fewbits_filters::Imm;
+use fewbits_filters::{Imm, MomentFilter, Switching};
 use fewbits_models::{AffineGaussian, LinearGaussian};
 use fewbits_numerics::error::{non_negative, positive};
 use fewbits_pf_mpa::Error;
@@ -124,12 +124,16 @@ impl Target {
     ///
     /// # Errors
     /// As [`motion`](Self::motion).
-    pub fn modes(&self, k: usize) -> Result<Imm<AffineGaussian<4>>, Error> {
+    pub fn modes(&self, k: usize) -> Result<(Switching<AffineGaussian<4>>, Imm<4, MomentFilter>), Error> {
         let (values, axis) = (self.chain.values(), self.chain.transition(k));
         let pairs = || (0..9).map(|mode| (mode / 3, mode % 3));
         let models = pairs().map(|(x, y)| self.pushed(&Vector2::new(values[x], values[y]), 0.0));
         let row = |(x, y): (usize, usize)| pairs().map(|(to_x, to_y)| axis[x][to_x] * axis[y][to_y]).collect();
-        Ok(Imm::new(models.collect::<Result<_, _>>()?, &pairs().map(row).collect::<Vec<Vec<f64>>>())?)
+        let transition: Vec<Vec<f64>> = pairs().map(row).collect();
+        Ok((
+            Switching::new(models.collect::<Result<_, _>>()?)?,
+            Imm::of(vec![(MomentFilter, 1.0); 9], &transition)?,
+        ))
     }
 
     /// Mean and variance of the acceleration that acts on step `k`.
@@ -269,7 +273,7 @@ impl Dynamics<6> for WithManoeuvre {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fewbits_filters::{ImmBelief, assumed_density};
+    use fewbits_filters::{ImmBelief, StateFilter, assumed_density};
     use fewbits_monte_carlo::Stream;
 
     #[test]
@@ -307,13 +311,10 @@ mod tests {
     fn modes_have_the_moments_of_the_target() {
         let target = Target::printed().unwrap();
         let start = Gaussian::new(Vector4::new(1.0, 2.0, 0.5, -0.5), Matrix4::identity() * 0.04).unwrap();
-        let (mut belief, mut workspace) = (ImmBelief::agreed(&start, 9).unwrap(), Default::default());
+        let (mut belief, mut rng) = (ImmBelief::agreed(&start, 9).unwrap(), Stream::new(1).rng());
         for k in 0..4 {
-            target
-                .modes(k)
-                .unwrap()
-                .predict_in_place(&mut belief, &mut workspace)
-                .unwrap();
+            let (models, mut filter) = target.modes(k).unwrap();
+            filter.predict(&mut rng, &models, &mut belief).unwrap();
             let law = target.chain().law(k);
             for (mode, p) in belief.probabilities().iter().enumerate() {
                 assert!((p - law[mode / 3] * law[mode % 3]).abs() < 1e-14, "{k} {mode}");

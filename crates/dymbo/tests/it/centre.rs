@@ -5,9 +5,7 @@ use fewbits_core::{
 };
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, NoiseLearning, RemoteSensor, Reporting, Slot};
-use fewbits_filters::{
-    BootstrapFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, Particles, ResamplingRule, StateFilter,
-};
+use fewbits_filters::{BootstrapFilter, Error, GridFilter, Imm, MomentFilter, Particles, ResamplingRule, StateFilter};
 use fewbits_models::{ContinuousLinear, LinearSensor, PLANE_POSITION};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix4, Vector1, Vector4};
@@ -214,7 +212,7 @@ fn words_tell_the_process_noise_by_evidence() {
     let scales = vec![1.0 / 9.0, 1.0 / 3.0, 1.0, 3.0, 9.0];
     let mut weight = Moments::default();
     for seed in 0..10 {
-        let bank = NoiseBank::new(MomentFilter, scales.clone(), 1e-3).unwrap();
+        let bank = Imm::new(MomentFilter, scales.clone(), 1e-3).unwrap();
         // The stated noise is nine times too small: the largest scale is right.
         let mut run = Scalar::new(Kind::Word, 1, [0.95, 0.2, 1.0], 0.2 / 9.0, bank, seed);
         for k in 0..1500 {
@@ -346,7 +344,7 @@ fn three_kinds<F: StateFilter<4>>(filter: F) -> f64 {
 #[test]
 fn three_kinds_of_sensor_share_every_filter() {
     let moment = three_kinds(MomentFilter);
-    let grid = three_kinds(GridOnAxes::<4, 2>::new(GridFilter::default(), PLANE_POSITION).unwrap());
+    let grid = three_kinds(GridFilter::<4, 2>::new(PLANE_POSITION).unwrap());
     let cloud = three_kinds(BootstrapFilter::new(ResamplingRule::default(), 20_000).unwrap());
     println!("RMS error: moments {moment:.3}, grid {grid:.3}, particles {cloud:.3}");
     for error in [moment, grid, cloud] {
@@ -357,7 +355,7 @@ fn three_kinds_of_sensor_share_every_filter() {
 #[test]
 fn axes_that_a_grid_does_not_have_are_refused() {
     // The position is on axes 0 and 2; a grid over 0 and 1 would quietly read a velocity.
-    let mut plane = Plane::new(GridOnAxes::<4, 2>::new(GridFilter::default(), [0, 1]).unwrap(), 3);
+    let mut plane = Plane::new(GridFilter::<4, 2>::new([0, 1]).unwrap(), 3);
     let before = plane.centre.estimate();
     let slots = plane.observe(1);
     let predicted = plane.centre.estimate();

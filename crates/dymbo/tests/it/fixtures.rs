@@ -14,7 +14,7 @@ use fewbits_dymbo::{
     filtered_variance, sign_bit, steady,
 };
 use fewbits_filters::{
-    PointMass, PointMassFilter, UniformGrid, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
+    PointMass, TransitionKernel, UniformGrid, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
 };
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_quantizers::lloyd_max::gaussian_table;
@@ -341,7 +341,7 @@ fn regress_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let first = scheme
         .factor(&(), &Observation::Received(message), &Link::PERFECT)
         .unwrap();
-    let exact = PointMassFilter::new(plant.dynamics(), UniformGrid::symmetric(16.0, 0.05).unwrap()).unwrap();
+    let exact = TransitionKernel::new(plant.dynamics(), UniformGrid::symmetric(16.0, 0.05).unwrap()).unwrap();
     let mut density = PointMass::new(*exact.grid(), |theta| first.log_likelihood(&[theta].into())).unwrap();
     let (mut bits, mut means, mut exact_moments) = (vec![], vec![belief.mean()[0]], vec![]);
     for sample in &x[1..] {

@@ -202,7 +202,7 @@ impl Method {
         let all = under(Reports::Levels);
         match self {
             Self::Linear(l, reports) => track(l, under(*reports), &mut rng),
-            Self::Grid(n) => track(&GridFilter::new(*n)?, all, &mut rng),
+            Self::Grid(n) => track(&GridFilter::new(POSITION)?.with_nodes(*n)?, all, &mut rng),
             Self::Guided(n) => track(&GuidedGaussian::new(*n)?, all, &mut rng),
             Self::RaoBlackwell(n) => track(&RaoBlackwellGuided::new(*n)?, all, &mut rng),
             Self::Messages(m) => track(m, all, &mut rng),

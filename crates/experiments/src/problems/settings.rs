@@ -5,8 +5,7 @@ use crate::prelude::*;
 use fewbits_core::factor::{Levels, Scalar};
 use fewbits_core::{Cell, GaussianDynamics, Likelihood, Observed};
 use fewbits_filters::{
-    BootstrapFilter, EnsembleFilter, GridFilter, GridOnAxes, MomentFilter, ResamplingRule, SigmaPointFilter,
-    StateFilter,
+    BootstrapFilter, EnsembleFilter, GridFilter, MomentFilter, ResamplingRule, SigmaPointFilter, StateFilter,
 };
 use fewbits_models::{AutoDynamics, AutoSensing, Flow};
 
@@ -105,7 +104,7 @@ impl<const D: usize, const K: usize> Problem<D, K> {
             self.error(MomentFilter, &run, of("moments"))?,
             self.error(SigmaPointFilter::unscented(kappa)?, &run, of("points"))?,
             self.error(EnsembleFilter::new(MEMBERS)?.with_inflation(1.01)?, &run, of("ensemble"))?,
-            self.error(GridOnAxes::new(GridFilter::default(), self.axes)?, &run, of("grid"))?,
+            self.error(GridFilter::new(self.axes)?, &run, of("grid"))?,
             self.error(BootstrapFilter::new(ResamplingRule::default(), PARTICLES)?, &run, of("particles"))?,
         ])
     }

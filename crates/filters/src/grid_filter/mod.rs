@@ -6,20 +6,21 @@
 //! Not for beliefs that are not Gaussian ([`PointMassFilter`](crate::PointMassFilter)), nor for more than
 //! about three observed coordinates ([`BootstrapFilter`](crate::BootstrapFilter)).
 
-mod on_axes;
+mod filter;
 mod pass;
 mod region;
 
-pub use on_axes::GridOnAxes;
+pub use filter::GridFilter;
 
 use crate::Error;
-use fewbits_core::{Gaussian, Likelihood, OnAxes};
-use fewbits_numerics::error::{at_least_one, refuse, within};
+use fewbits_core::{Gaussian, Likelihood};
+use fewbits_numerics::error::{refuse, within};
 use fewbits_numerics::linalg::{congruence, symmetrised};
 use nalgebra::{Cholesky, SMatrix, SVector};
 use region::{Piece, Region};
-use serde::{Deserialize, Serialize};
 
+/// Default number of nodes on each axis.
+const NODES: usize = 15;
 /// Default extent of a grid to each side, in standard deviations.
 const REACH: f64 = 4.0;
 /// Moments from fewer nodes per deviation of the posterior are not accepted. For a Gaussian one node per deviation is enough for exact
@@ -37,61 +38,19 @@ const MAX_REFINED_NODES: usize = 60_000;
 /// Largest number of grids of one update. Each pass narrows the grid by a factor of about two, so a likelihood that is 10^6 times narrower
 /// than the prior takes about 20 passes; the rest is for several modes and for curved ridges.
 const MAX_PASSES: usize = 200;
-/// Parts of the posterior with less than this fraction of the evidence need not be resolved.
-const NEGLIGIBLE_SHARE: f64 = 1e-3;
 /// A part is dropped before it is resolved if its log evidence is below that of a resolved part by more than this.
 const DROPPED: f64 = 14.0;
 
-/// An assumed-density filter whose moments are computed on a grid over the `K` coordinates on which the likelihood depends.
-///
-/// ```text
-/// m, L L'     mean and covariance of those coordinates;  u = L^-1 (x - m) is standard normal
-/// grid:       centre c, orthogonal axes with deviations d;  n^K nodes over +-reach deviations;  first c = 0, d = 1
-/// pass:       w = exp(b (ln N(u; 0, I) + ln p(observed | x)));  b = 1 if w then has at least 3^K effective nodes,
-///             otherwise the b that gives about 3^K;  moments of u under w
-///             done if b = 1, the posterior has 1.5 nodes per deviation and lies inside the grid
-///             otherwise: next grid along the principal axes of these moments, over +-reach of its deviations
-/// split:      if layers of nodes across the longest axis are empty between two modes: a grid for each side
-/// refine:     if the grid no longer narrows (a curved ridge): twice as many nodes on each axis
-/// the other coordinates follow by regression on the K
-/// ```
-/// The filter is deterministic: no random numbers. Nodes that receive the same reports have the same belief to the last bit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored")]
-pub struct GridFilter {
+/// The settings of [`GridFilter`], and its update of a likelihood of `K` coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Grid {
     nodes: usize,
     reach: f64,
-}
-
-/// The stored form of [`GridFilter`].
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    nodes: usize,
-    reach: f64,
-}
-
-impl TryFrom<Stored> for GridFilter {
-    type Error = Error;
-
-    fn try_from(parts: Stored) -> Result<Self, Error> {
-        GridFilter::with_nodes_and_reach(parts.nodes, parts.reach)
-    }
-}
-
-impl Default for GridFilter {
-    /// 15 nodes on each axis.
-    fn default() -> Self {
-        Self {
-            nodes: 15,
-            reach: REACH,
-        }
-    }
 }
 
 /// Buffers of a grid, reused from step to step.
 #[derive(Debug, Clone)]
-pub struct GridWorkspace<const K: usize> {
+struct Workspace<const K: usize> {
     columns: [Vec<f64>; K],
     logs: Vec<f64>,
     tempered: Vec<f64>,
@@ -101,7 +60,7 @@ pub struct GridWorkspace<const K: usize> {
     pieces: Vec<Piece<K>>,
 }
 
-impl<const K: usize> Default for GridWorkspace<K> {
+impl<const K: usize> Default for Workspace<K> {
     fn default() -> Self {
         Self {
             columns: std::array::from_fn(|_| Vec::new()),
@@ -115,42 +74,8 @@ impl<const K: usize> Default for GridWorkspace<K> {
     }
 }
 
-/// Results of an update other than the new belief.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct GridInfo {
-    /// `ln p(observed | past)`.
-    pub log_likelihood: f64,
-    /// Nodes per standard deviation of the posterior: the smallest over its principal axes and over its parts.
-    pub nodes_per_deviation: f64,
-    /// Number of grids that were evaluated.
-    pub passes: usize,
-    /// Number of parts into which the posterior was split; 1 if it has no separated modes.
-    pub parts: usize,
-}
-
-impl GridFilter {
-    /// A filter with `nodes` nodes per axis, over 4 standard deviations to each side.
-    ///
-    /// Fewer than 14 are replaced by 14: they would be fewer than 1.6 nodes per deviation, too few for discontinuous posteriors.
-    ///
-    /// # Errors
-    /// If `nodes` is not in 5 to 1001.
-    pub fn new(nodes: usize) -> Result<Self, Error> {
-        Self::with_nodes_and_reach(nodes, REACH)
-    }
-
-    /// The same filter over `reach` standard deviations to each side. With many nodes, 7 deviations leave the moments exact to rounding.
-    ///
-    /// If this gives fewer than 1.6 nodes per deviation, the number of nodes is raised to it.
-    ///
-    /// # Errors
-    /// If `reach` is not in 2 to 10.
-    pub fn with_reach(self, reach: f64) -> Result<Self, Error> {
-        Self::with_nodes_and_reach(self.nodes, reach)
-    }
-
-    fn with_nodes_and_reach(nodes: usize, reach: f64) -> Result<Self, Error> {
+impl Grid {
+    fn new(nodes: usize, reach: f64) -> Result<Self, Error> {
         within("reach", reach, 2.0, 10.0)?;
         let fewest = (2.0 * reach * NOMINAL_NODES_PER_DEVIATION + 1.0).ceil() as usize;
         if !(MIN_NODES..=1001).contains(&nodes) {
@@ -162,25 +87,19 @@ impl GridFilter {
         })
     }
 
-    /// Nodes on each axis.
-    pub fn nodes(&self) -> usize {
-        self.nodes
-    }
-
-    /// Measurement update for a likelihood of `K` coordinates. `axes` lists these coordinates of the state, in the order in which the
-    /// likelihood reads them.
+    /// Measurement update for a likelihood of `K` coordinates, and `ln p(observed | past)`. `axes` lists these coordinates of the state, in
+    /// the order in which the likelihood reads them.
     ///
     /// [`Error::Impossible`] if the observation has probability zero under the prediction, or one that underflows;
     /// [`Error::Unresolved`] if the posterior has fewer than 1.5 nodes per deviation; an argument error if `axes` are not different
     /// coordinates of the state, their covariance is singular, or the likelihood is NaN at every node.
-    pub fn update<const D: usize, const K: usize>(
+    fn update<const D: usize, const K: usize>(
         &self,
         predicted: &Gaussian<D>,
         axes: [usize; K],
         observed: &(impl Likelihood<K> + ?Sized),
-        workspace: &mut GridWorkspace<K>,
-    ) -> Result<(Gaussian<D>, GridInfo), Error> {
-        check_axes::<D, K>(&axes)?;
+        workspace: &mut Workspace<K>,
+    ) -> Result<(Gaussian<D>, f64), Error> {
         let origin = SVector::<f64, K>::from_fn(|i, _| predicted.mean()[axes[i]]);
         let covariance = SMatrix::<f64, K, K>::from_fn(|i, j| predicted.covariance()[(axes[i], axes[j])]);
         let Some(factor) = Cholesky::new(covariance) else {
@@ -190,7 +109,7 @@ impl GridFilter {
             origin,
             lower: factor.l(),
         };
-        let (posterior, info) = self.posterior(&prior, observed, workspace)?;
+        let (posterior, log_likelihood) = self.posterior(&prior, observed, workspace)?;
 
         // Regression of all coordinates on the observed ones: P_{:K} P_K^-1. The residual covariance is computed as a sum of positive
         // terms.
@@ -208,7 +127,7 @@ impl GridFilter {
         if !updated.is_finite() {
             return Err(Error::Impossible);
         }
-        Ok((updated, info))
+        Ok((updated, log_likelihood))
     }
 
     /// Evaluates grids until all parts of the posterior are resolved, and combines their moments.
@@ -216,8 +135,8 @@ impl GridFilter {
         &self,
         prior: &Prior<K>,
         observed: &(impl Likelihood<K> + ?Sized),
-        workspace: &mut GridWorkspace<K>,
-    ) -> Result<(Moments<K>, GridInfo), Error> {
+        workspace: &mut Workspace<K>,
+    ) -> Result<(Moments<K>, f64), Error> {
         workspace.pieces.clear();
         workspace.regions.clear();
         workspace.regions.push(Region::whole(self.nodes));
@@ -263,22 +182,12 @@ impl GridFilter {
                 .map(|piece| (piece, (piece.log_evidence - peak).exp()))
         };
         let total: f64 = shares().map(|(_, share)| share).sum();
-        let resolution = shares()
-            .filter(|(_, share)| *share > NEGLIGIBLE_SHARE * total)
-            .map(|(piece, _)| piece.nodes_per_deviation)
-            .fold(f64::INFINITY, f64::min);
         let mean = shares().fold(SVector::zeros(), |sum, (piece, share)| sum + piece.mean * (share / total));
         let covariance = shares().fold(SMatrix::zeros(), |sum, (piece, share)| {
             let offset = piece.mean - mean;
             sum + (piece.covariance + offset * offset.transpose()) * (share / total)
         });
-        let info = GridInfo {
-            log_likelihood: peak + total.ln(),
-            nodes_per_deviation: resolution,
-            passes,
-            parts: workspace.pieces.len(),
-        };
-        Ok((Moments { mean, covariance }, info))
+        Ok((Moments { mean, covariance }, peak + total.ln()))
     }
 }
 
@@ -300,11 +209,4 @@ struct Prior<const K: usize> {
 struct Moments<const K: usize> {
     mean: SVector<f64, K>,
     covariance: SMatrix<f64, K, K>,
-}
-
-/// Returns an error unless `axes` are `K` different coordinates of a state of `D`.
-fn check_axes<const D: usize, const K: usize>(axes: &[usize; K]) -> Result<(), Error> {
-    at_least_one("axes", K)?;
-    OnAxes::<(), D, K>::new((), *axes)?;
-    Ok(())
 }

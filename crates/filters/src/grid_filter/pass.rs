@@ -1,7 +1,7 @@
 //! Evaluation of one grid: weights of its nodes, tempered if too few have weight, and the moments under these weights.
 
 use super::region::{Piece, Region};
-use super::{GridFilter, GridWorkspace, MAX_NODES, MAX_REFINED_NODES, MIN_NODES_PER_DEVIATION, Prior};
+use super::{Grid, MAX_NODES, MAX_REFINED_NODES, MIN_NODES_PER_DEVIATION, Prior, Workspace};
 use crate::Error;
 use fewbits_core::Likelihood;
 use fewbits_numerics::eigen::symmetric_eigen;
@@ -112,22 +112,21 @@ impl<const K: usize> Found<K> {
             },
             mean,
             covariance,
-            nodes_per_deviation: self.nodes_per_deviation(),
         }
     }
 }
 
-impl GridFilter {
+impl Grid {
     /// Evaluates one grid. `None` if the observation has probability zero at all nodes.
     pub(super) fn pass<const K: usize>(
         &self,
         prior: &Prior<K>,
         region: &Region<K>,
         observed: &(impl Likelihood<K> + ?Sized),
-        workspace: &mut GridWorkspace<K>,
+        workspace: &mut Workspace<K>,
     ) -> Result<Option<Found<K>>, Error> {
         let count = self.resize(region.nodes, workspace)?;
-        let GridWorkspace {
+        let Workspace {
             columns,
             logs,
             tempered,
@@ -254,7 +253,7 @@ impl GridFilter {
     }
 
     /// Sets the buffers to `nodes` per axis; returns the total number of nodes.
-    fn resize<const K: usize>(&self, nodes: usize, workspace: &mut GridWorkspace<K>) -> Result<usize, Error> {
+    fn resize<const K: usize>(&self, nodes: usize, workspace: &mut Workspace<K>) -> Result<usize, Error> {
         let Some(count) = nodes.checked_pow(K as u32).filter(|n| *n <= MAX_NODES) else {
             return refuse("nodes", format!("{nodes}^{K}"), format!("at most {MAX_NODES} nodes"));
         };

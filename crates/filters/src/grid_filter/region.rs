@@ -47,7 +47,6 @@ pub(super) struct Piece<const K: usize> {
     pub log_evidence: f64,
     pub mean: SVector<f64, K>,
     pub covariance: SMatrix<f64, K, K>,
-    pub nodes_per_deviation: f64,
 }
 
 impl<const K: usize> Region<K> {

@@ -7,8 +7,8 @@ use fewbits_core::{
     Observation, Observed, Scheme, Sensing, Sign, laws,
 };
 use fewbits_filters::{
-    BootstrapFilter, Error, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, PointMasses,
-    RaoBlackwellised, ResamplingRule, StateFilter, Switching, UniformGrid, assumed_density,
+    BootstrapFilter, Error, GridFilter, GuidedFilter, Imm, MomentFilter, PointMassFilter, RaoBlackwellised,
+    ResamplingRule, StateFilter, Switching, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -111,7 +111,7 @@ fn run<F: StateFilter<1>>(mut filter: F) -> [f64; 3] {
 
 #[test]
 fn every_filter_agrees_with_the_grid() {
-    let exact = run(PointMasses::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
+    let exact = run(PointMassFilter::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
     let agree = |name: &str, found: [f64; 3], slack: f64| {
         let off: [f64; 3] = std::array::from_fn(|i| found[i] - exact[i]);
         assert!(off.iter().all(|d| d.abs() < slack), "{name}: {off:?}");
@@ -121,10 +121,7 @@ fn every_filter_agrees_with_the_grid() {
     agree("guided", run(GuidedFilter::new(filter, 20_000).unwrap()), 0.15);
     agree("Rao-Blackwellised", run(RaoBlackwellised::new(filter, 20_000).unwrap()), 0.15);
     // Two-sided bits make beliefs of two peaks, which a Gaussian blurs: it stays near the evidence.
-    for blurred in [
-        run(MomentFilter),
-        run(GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap()),
-    ] {
+    for blurred in [run(MomentFilter), run(GridFilter::<1, 1>::new([0]).unwrap())] {
         assert!((blurred[2] - exact[2]).abs() < 1.0, "{}", blurred[2] - exact[2]);
     }
 }
@@ -149,12 +146,12 @@ where
 fn what_is_impossible_leaves_every_belief_as_it_was() {
     let filter = ResamplingRule::default();
     refused(MomentFilter);
-    refused(GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap());
-    refused(PointMasses::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
+    refused(GridFilter::<1, 1>::new([0]).unwrap());
+    refused(PointMassFilter::new(UniformGrid::symmetric(12.0, 0.1).unwrap()));
     refused(BootstrapFilter::new(filter, 50).unwrap());
     refused(GuidedFilter::new(filter, 50).unwrap());
     refused(RaoBlackwellised::new(filter, 50).unwrap());
-    refused(NoiseBank::new(MomentFilter, vec![1.0, 2.0], 0.1).unwrap());
+    refused(Imm::new(MomentFilter, vec![1.0, 2.0], 0.1).unwrap());
 }
 
 #[test]
@@ -162,8 +159,8 @@ fn a_bank_of_equal_filters_is_that_of_one_and_odd_matrices_are_refused() {
     let scales = [0.5, 2.0];
     let filters = || scales.map(|scale| (MomentFilter, scale)).to_vec();
     // An even switch of probability .1 between two: .05 to the other.
-    let mut own = NoiseBank::<1, MomentFilter>::of(filters(), &[vec![0.95, 0.05], vec![0.05, 0.95]]).unwrap();
-    let mut same = NoiseBank::<1, _>::new(MomentFilter, scales.to_vec(), 0.1).unwrap();
+    let mut own = Imm::<1, MomentFilter>::of(filters(), &[vec![0.95, 0.05], vec![0.05, 0.95]]).unwrap();
+    let mut same = Imm::<1, _>::new(MomentFilter, scales.to_vec(), 0.1).unwrap();
     let (mut rng, prior) = (Stream::new(3).rng(), Gaussian::scalar(0.0, 1.0).unwrap());
     let (sensor, world) =
         (LinearSensor::direct(0.1).unwrap(), ContinuousLinear::ornstein_uhlenbeck(0.0, 2.0, 1.0).unwrap());
@@ -186,9 +183,9 @@ fn a_bank_of_equal_filters_is_that_of_one_and_odd_matrices_are_refused() {
         vec![vec![0.5, 0.6], vec![0.5, 0.5]],
         vec![vec![1.0, 0.0], vec![1.0]],
     ] {
-        assert!(NoiseBank::<1, MomentFilter>::of(filters(), &transition).is_err(), "{transition:?}");
+        assert!(Imm::<1, MomentFilter>::of(filters(), &transition).is_err(), "{transition:?}");
     }
-    assert!(NoiseBank::<1, MomentFilter>::of(Vec::new(), &[]).is_err());
+    assert!(Imm::<1, MomentFilter>::of(Vec::new(), &[]).is_err());
 }
 
 /// A quick and a slow world: the bank of both is the interacting-multiple-model filter, here without switching a bank of two Kalman
@@ -198,7 +195,7 @@ fn a_bank_over_switching_worlds_weighs_them_by_evidence() {
     let worlds = [5.0, 0.5].map(|tau| ContinuousLinear::ornstein_uhlenbeck(0.0, tau, 1.0).unwrap());
     let both = worlds.map(|world| Box::new(world) as Box<dyn Evolution<1>>);
     let switching = Switching::new(both.into()).unwrap();
-    let mut filter = NoiseBank::new(MomentFilter, vec![1.0; 2], 0.0).unwrap();
+    let mut filter = Imm::new(MomentFilter, vec![1.0; 2], 0.0).unwrap();
     let (mut rng, sensor) = (Stream::new(2).rng(), LinearSensor::direct(0.1).unwrap());
     let start = Gaussian::scalar(0.0, 1.0).unwrap();
     let mut belief = filter.start(&mut rng, &start).unwrap();
@@ -219,7 +216,7 @@ fn a_bank_over_switching_worlds_weighs_them_by_evidence() {
     assert!((belief.probabilities()[0] - weight).abs() < 1e-9, "{} {weight}", belief.probabilities()[0]);
     assert!((belief.modes()[1].mean() - alone[1].0.mean()).amax() < 1e-9);
     assert!(
-        NoiseBank::new(MomentFilter, vec![1.0; 3], 0.0)
+        Imm::new(MomentFilter, vec![1.0; 3], 0.0)
             .unwrap()
             .step(
                 &mut rng,

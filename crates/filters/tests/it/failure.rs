@@ -3,8 +3,8 @@
 use fewbits_core::factor::{Constant, Levels, Scalar};
 use fewbits_core::{Cell, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
-    BootstrapFilter, Error, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, Resampling,
-    ResamplingRule, Schedule, StateFilter, UniformGrid, assumed_density,
+    BootstrapFilter, Error, GaussianCloud, Particles, PointMass, RaoBlackwellised, Resampling, ResamplingRule,
+    Schedule, StateFilter, TransitionKernel, UniformGrid, assumed_density,
 };
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -85,11 +85,11 @@ fn the_rao_blackwellised_filter() {
 #[test]
 fn the_grid_filters() {
     let grid = UniformGrid::symmetric(10.0, 0.25).unwrap();
-    let filter = PointMassFilter::new(&Ar1::new(0.9, 1.0).unwrap(), grid).unwrap();
+    let filter = TransitionKernel::new(&Ar1::new(0.9, 1.0).unwrap(), grid).unwrap();
     let before = PointMass::normal(grid, 0.3, 2.0).unwrap();
     let mut belief = before.clone();
     for never in &nevers::<1>() {
-        impossible(filter.step(&belief, never));
+        impossible(filter.predict(&belief).and_then(|mut next| next.update(never)));
         impossible(belief.update(never));
     }
     no_number(belief.update_with(|_| f64::NAN));

@@ -2,21 +2,37 @@
 
 use fewbits_core::factor::{Factor, Levels, Value};
 use fewbits_core::nalgebra::{Matrix1, Vector1};
-use fewbits_core::{Belief, Cell, Gaussian, GaussianDynamics, LinearDynamics, Observed, Sensing, Sign, laws};
-use fewbits_filters::{Error, Imm, ImmBelief, ImmWorkspace, assumed_density, kalman};
+use fewbits_core::{Belief, Cell, Gaussian, Observed, Sensing, Sign, laws};
+use fewbits_filters::{Error, Imm, ImmBelief, MomentFilter, StateFilter, Switching, assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
 
+/// Models, and the filter of moments for each.
+struct Models(Switching<Ar1>, Imm<1, MomentFilter>);
+
+/// With `switching` the model is drawn anew uniformly.
+fn switching(models: Vec<Ar1>, switching: f64) -> Models {
+    let filter = Imm::new(MomentFilter, vec![1.0; models.len()], switching).unwrap();
+    Models(Switching::new(models).unwrap(), filter)
+}
+
+/// With these probabilities of transition.
+fn chain(models: Vec<Ar1>, transition: &[Vec<f64>]) -> Result<Models, Error> {
+    let filter = Imm::of(vec![(MomentFilter, 1.0); models.len()], transition)?;
+    Ok(Models(Switching::new(models)?, filter))
+}
+
 /// One slot: the next belief and `ln p(observation | past)`.
-fn step<const D: usize>(
-    filter: &Imm<impl GaussianDynamics<D>>,
-    belief: &ImmBelief<D>,
-    observed: &Observed<impl Sensing<D, 1>, impl Factor<1>, 1>,
-) -> Result<(ImmBelief<D>, f64), Error> {
-    let (mut next, mut workspace) = (belief.clone(), ImmWorkspace::default());
-    filter.predict_in_place(&mut next, &mut workspace)?;
-    let log_likelihood = filter.update_in_place(&mut next, observed, &mut workspace)?;
-    Ok((next, log_likelihood))
+fn step(
+    models: &Models,
+    belief: &ImmBelief<1>,
+    observed: &Observed<impl Sensing<1, 1>, impl Factor<1>, 1>,
+) -> Result<(ImmBelief<1>, f64), Error> {
+    let Models(motion, filter) = models;
+    let (next, info) = filter
+        .clone()
+        .step(&mut Stream::new(9).rng(), motion, belief, &[observed])?;
+    Ok((next, info.log_likelihood))
 }
 
 fn value(z: f64, r: f64) -> Value<1> {
@@ -32,7 +48,7 @@ fn models() -> Vec<Ar1> {
 #[test]
 fn one_model_is_the_assumed_density_filter() {
     let dynamics = Ar1::new(0.9, 0.3).unwrap();
-    let filter = Imm::new(vec![dynamics], &[vec![1.0]]).unwrap();
+    let filter = chain(vec![dynamics], &[vec![1.0]]).unwrap();
     let mut single = Gaussian::scalar(0.5, 2.0).unwrap();
     let mut belief = ImmBelief::agreed(&single, 1).unwrap();
     let sensor = LinearSensor::direct(0.5).unwrap();
@@ -54,7 +70,7 @@ fn one_model_is_the_assumed_density_filter() {
 #[test]
 fn without_switching_probabilities_are_bayes_factors() {
     let (models, sensor) = (models(), LinearSensor::direct(0.4).unwrap());
-    let filter = Imm::switching(models.clone(), 0.0).unwrap();
+    let filter = switching(models.clone(), 0.0);
     let start = Gaussian::scalar(0.0, 1.0).unwrap();
     let mut belief = ImmBelief::agreed(&start, 3).unwrap();
     let mut alone: Vec<(Gaussian<1>, f64)> = vec![(start, 0.0); 3];
@@ -84,7 +100,7 @@ fn without_switching_probabilities_are_bayes_factors() {
 fn switching_agrees_with_enumerated_histories() {
     let (models, sensor) = (models(), LinearSensor::direct(0.4).unwrap());
     let transition = [vec![0.8, 0.1, 0.1], vec![0.2, 0.7, 0.1], vec![0.05, 0.05, 0.9]];
-    let filter = Imm::new(models.clone(), &transition).unwrap();
+    let filter = chain(models.clone(), &transition).unwrap();
     let start = Gaussian::scalar(0.3, 1.0).unwrap();
     let weights = [0.2, 0.5, 0.3];
     let first = ImmBelief::new(weights.to_vec(), vec![start; 3]).unwrap();
@@ -119,7 +135,7 @@ fn switching_agrees_with_enumerated_histories() {
 fn nothing_depends_on_the_unit() {
     let run = |unit: f64| {
         let models = [(0.9, 0.1), (0.5, 1.0)].map(|(a, q)| Ar1::new(a, q * unit * unit).unwrap());
-        let filter = Imm::switching(models.to_vec(), 0.05).unwrap();
+        let filter = switching(models.to_vec(), 0.05);
         let sensor = LinearSensor::direct(0.2 * unit * unit).unwrap();
         let mut belief = ImmBelief::agreed(&Gaussian::scalar(0.0, unit * unit).unwrap(), 2).unwrap();
         for n in 0..60 {
@@ -146,11 +162,14 @@ fn beliefs_obey_the_laws_and_failures_change_nothing() {
     assert_eq!(serde_json::from_str::<ImmBelief<1>>(&stored).unwrap(), belief);
     assert!(serde_json::from_str::<ImmBelief<1>>(&stored.replace("0.3", "0.9")).is_err());
 
-    let filter = Imm::switching(models()[..2].to_vec(), 0.1).unwrap();
+    let filter = switching(models()[..2].to_vec(), 0.1);
     let sensor = LinearSensor::direct(1.0).unwrap();
     let mut after = belief.clone();
     let impossible = Observed::new(sensor, value(f64::MAX, 1e-300));
-    let outcome = filter.update_in_place(&mut after, &impossible, &mut Default::default());
+    let outcome = filter
+        .1
+        .clone()
+        .update(&mut Stream::new(9).rng(), &mut after, &[&impossible]);
     assert_eq!(outcome, Err(Error::Impossible));
     assert_eq!(after, belief);
     let three = ImmBelief::agreed(&modes[0], 3).unwrap();
@@ -161,8 +180,16 @@ fn beliefs_obey_the_laws_and_failures_change_nothing() {
             .contains("models")
     );
     for bad in [vec![vec![0.5, 0.6], vec![0.5, 0.5]], vec![vec![1.0]]] {
-        assert!(Imm::new(models()[..2].to_vec(), &bad).is_err());
+        assert!(chain(models()[..2].to_vec(), &bad).is_err());
     }
-    assert!(Imm::<Ar1>::switching(Vec::new(), 0.1).is_err());
-    assert!(filter.models()[0].transition()[0] > 0.0);
+    // A belief of another number of models is refused by both halves.
+    let fit = Observed::new(sensor, value(0.0, 1.0));
+    assert!(
+        filter
+            .1
+            .clone()
+            .update(&mut Stream::new(9).rng(), &mut three.clone(), &[&fit])
+            .is_err()
+    );
+    assert!(Imm::<1, _>::new(MomentFilter, Vec::new(), 0.1).is_err() && Switching::<Ar1>::new(Vec::new()).is_err());
 }

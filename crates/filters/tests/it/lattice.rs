@@ -1,6 +1,6 @@
 //! The filter on a lattice against Kalman's and the scalar filter.
 
-use fewbits_filters::{Error, Lattice, LatticeFilter, PointMass, PointMassFilter, UniformGrid};
+use fewbits_filters::{Error, Lattice, LatticeFilter, PointMass, TransitionKernel, UniformGrid};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 
@@ -49,7 +49,7 @@ fn a_linear_model_is_kalmans() {
 fn one_axis_is_the_scalar_filter() {
     let grid = UniformGrid::new(-6.0, 6.0, 0.1).unwrap();
     let moved: Vec<(f64, f64)> = grid.nodes().map(|x| (x.sin(), 0.3 + 0.1 * x.cos())).collect();
-    let line = PointMassFilter::from_transitions(grid, &moved).unwrap();
+    let line = TransitionKernel::from_transitions(grid, &moved).unwrap();
     let (mut a, mut b) =
         (PointMass::normal(grid, 0.5, 1.0).unwrap(), Lattice::normal(vec![grid], &[0.5], &[1.0]).unwrap());
     let (means, deviations) = moved.into_iter().unzip();
@@ -85,7 +85,7 @@ fn three_independent_axes_are_three_lines() {
         let (mean, deviation) = ([0.0, 0.5, 1.0][axis], [0.8, 0.9, 1.0][axis]);
         let line = PointMass::normal(grid, mean, deviation * deviation).unwrap();
         let moved: Vec<(f64, f64)> = grid.nodes().map(|x| (x, 1.2 * grid.spacing())).collect();
-        let line = PointMassFilter::from_transitions(grid, &moved)
+        let line = TransitionKernel::from_transitions(grid, &moved)
             .unwrap()
             .predict(&line)
             .unwrap();

@@ -24,16 +24,17 @@ mod wild;
 mod words;
 
 use fewbits_core::Likelihood;
-use fewbits_filters::{PointMass, PointMassFilter, UniformGrid};
+use fewbits_filters::{PointMass, TransitionKernel, UniformGrid};
 use fewbits_models::Ar1;
 
 /// The posterior of a scalar state after all observations, and their log likelihood, by the exact filter on a grid. The prior is normal.
 fn on_a_grid(dynamics: &Ar1, [mean, variance]: [f64; 2], observed: &[impl Likelihood<1>]) -> (PointMass, f64) {
     let grid = UniformGrid::new(-12.0, 12.0, 0.02).unwrap();
-    let filter = PointMassFilter::new(dynamics, grid).unwrap();
+    let filter = TransitionKernel::new(dynamics, grid).unwrap();
     let start = (PointMass::normal(grid, mean, variance).unwrap(), 0.0);
     observed.iter().fold(start, |(belief, evidence), one| {
-        let (next, increment) = filter.step(&belief, one).unwrap();
+        let mut next = filter.predict(&belief).unwrap();
+        let increment = next.update(one).unwrap();
         (next, evidence + increment)
     })
 }

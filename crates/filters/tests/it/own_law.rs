@@ -4,7 +4,7 @@
 use crate::centre::{noise, slot, world};
 use fewbits_core::{Dynamics, FullValue, Gaussian, Link, Sensing};
 use fewbits_filters::centre::{Event, FusionCentre, Reporting};
-use fewbits_filters::{GridFilter, GridOnAxes, MomentFilter, NoiseBank, PointMasses, StateFilter, UniformGrid};
+use fewbits_filters::{GridFilter, Imm, MomentFilter, PointMassFilter, StateFilter, UniformGrid};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::Vector1;
@@ -41,7 +41,7 @@ fn an_exact_filter_raises_no_more_false_alarms_than_stated() {
     let mut rng = Stream::new(12).rng();
     let grid = UniformGrid::new(-8.0, 8.0, 0.08).unwrap();
     let prior = Gaussian::scalar(0.0, 0.2 / (1.0 - 0.95 * 0.95)).unwrap();
-    let filter = PointMasses::new(grid);
+    let filter = PointMassFilter::new(grid);
     let mut centre = FusionCentre::new(&mut rng, world(), filter, &prior).unwrap();
     for number in 0..2 {
         centre
@@ -73,7 +73,7 @@ fn an_exact_filter_raises_no_more_false_alarms_than_stated() {
 fn a_bank_raises_no_more_false_alarms_than_stated() {
     let (mut rng, scales, switching) = (Stream::new(13).rng(), [0.02, 6.0], 0.05);
     let prior = Gaussian::scalar(0.0, 0.2 / (1.0 - 0.95 * 0.95)).unwrap();
-    let bank = NoiseBank::new(MomentFilter, scales.to_vec(), switching).unwrap();
+    let bank = Imm::new(MomentFilter, scales.to_vec(), switching).unwrap();
     let mut centre = FusionCentre::new(&mut rng, world(), bank, &prior).unwrap();
     for number in 0..2 {
         let sensing = LinearSensor::direct(0.01).unwrap();
@@ -135,15 +135,15 @@ fn are_as_stated([lost, excluded, rejected]: [u32; 3]) {
 /// Defect: a grid over a Gaussian was judged by the sensor linearised at the mean, where this one has no slope.
 #[test]
 fn a_grid_over_a_gaussian_raises_no_more_false_alarms_than_stated() {
-    are_as_stated(alarms(GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap(), &[1.0], 4000));
+    are_as_stated(alarms(GridFilter::<1, 1>::new([0]).unwrap(), &[1.0], 4000));
 }
 
 /// Defect: a bank was judged by its own law if its filters were of moments only.
 #[test]
 fn a_bank_of_grids_raises_no_more_false_alarms_than_stated() {
     let scales = [0.1, 2.0];
-    let grid = GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap();
+    let grid = GridFilter::<1, 1>::new([0]).unwrap();
     // Each instant has a scale of its own.
-    let bank = NoiseBank::new(grid, scales.to_vec(), 1.0).unwrap();
+    let bank = Imm::new(grid, scales.to_vec(), 1.0).unwrap();
     are_as_stated(alarms(bank, &scales, 4000));
 }

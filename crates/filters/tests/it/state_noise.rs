@@ -1,7 +1,7 @@
 //! Dynamics whose noise grows with the state: the grid filter against the exact moments.
 
 use fewbits_core::{Dynamics, GaussianDynamics};
-use fewbits_filters::{PointMass, PointMassFilter, UniformGrid};
+use fewbits_filters::{PointMass, TransitionKernel, UniformGrid};
 use nalgebra::{Matrix1, Vector1};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -38,7 +38,7 @@ impl GaussianDynamics<1> for Swelling {
 
 #[test]
 fn a_grid_moves_with_noise_of_its_own_at_every_node() {
-    let filter = PointMassFilter::new(&Swelling, UniformGrid::symmetric(20.0, 0.1).unwrap()).unwrap();
+    let filter = TransitionKernel::new(&Swelling, UniformGrid::symmetric(20.0, 0.1).unwrap()).unwrap();
     let belief = PointMass::normal(*filter.grid(), 2.0, 1.5).unwrap();
     let moved = filter.predict(&belief).unwrap();
     // E x' = 1 and E x'^2 = E [x^2 / 4 + 1/2 + x^2 / 5] = 1/2 + 0.45 (1.5 + 4).

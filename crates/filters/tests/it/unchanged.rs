@@ -4,8 +4,8 @@
 use fewbits_core::{BitString, FullValue, Gaussian, Link, Message, NumberFormat, Observation, OnAxes};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, Health, NoiseLearning, Reporting, Slot};
 use fewbits_filters::{
-    BootstrapFilter, GridFilter, GridOnAxes, MomentFilter, NoiseBank, PointMasses, RaoBlackwellised, ResamplingRule,
-    StateFilter, UniformGrid,
+    BootstrapFilter, GridFilter, Imm, MomentFilter, PointMassFilter, RaoBlackwellised, ResamplingRule, StateFilter,
+    UniformGrid,
 };
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
@@ -112,11 +112,11 @@ proptest! {
     #[test]
     fn a_call_that_fails_leaves_the_centre_as_it_was(seed in any::<u64>()) {
         stays("moments", MomentFilter, seed);
-        stays("masses", PointMasses::new(grid()), seed);
-        stays("grid", GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap(), seed);
+        stays("masses", PointMassFilter::new(grid()), seed);
+        stays("grid", GridFilter::<1, 1>::new([0]).unwrap(), seed);
         stays("bootstrap", BootstrapFilter::new(particles(), 50).unwrap(), seed);
         stays("cloud", RaoBlackwellised::new(particles(), 30).unwrap(), seed);
-        stays("bank", NoiseBank::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap(), seed);
+        stays("bank", Imm::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap(), seed);
     }
 }
 
@@ -171,9 +171,9 @@ where
 #[test]
 fn a_centre_stored_between_prediction_and_update_goes_on_with_the_same_bits() {
     goes_on("moments", || MomentFilter);
-    goes_on("masses", || PointMasses::new(grid()));
-    goes_on("grid", || GridOnAxes::<1, 1>::new(GridFilter::default(), [0]).unwrap());
+    goes_on("masses", || PointMassFilter::new(grid()));
+    goes_on("grid", || GridFilter::<1, 1>::new([0]).unwrap());
     goes_on("bootstrap", || BootstrapFilter::new(particles(), 200).unwrap());
     goes_on("cloud", || RaoBlackwellised::new(particles(), 100).unwrap());
-    goes_on("bank", || NoiseBank::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap());
+    goes_on("bank", || Imm::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap());
 }

@@ -3,8 +3,8 @@
 use fewbits_core::factor::{Levels, Scalar, Value};
 use fewbits_core::{Cell, Gaussian, Likelihood, Link, Observed};
 use fewbits_filters::{
-    BootstrapFilter, GaussianCloud, Particles, PointMass, PointMassFilter, RaoBlackwellised, ResamplingRule,
-    StateFilter, UniformGrid,
+    BootstrapFilter, GaussianCloud, Particles, PointMass, RaoBlackwellised, ResamplingRule, StateFilter,
+    TransitionKernel, UniformGrid,
 };
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, ContinuousLinear, LinearSensor, ReceivedPower};
@@ -108,7 +108,7 @@ proptest! {
                 Err(_) => prop_assert_eq!(&density, &grid_before),
             }
         }
-        if let Ok(filter) = PointMassFilter::new(&dynamics, grid)
+        if let Ok(filter) = TransitionKernel::new(&dynamics, grid)
             && let Ok(predicted) = filter.predict(&grid_before)
         {
             prop_assert!(predicted.mean().is_finite() && predicted.variance().is_finite());

@@ -6,7 +6,7 @@ use fewbits_core::{
     Scheme,
 };
 use fewbits_filters::centre::{Event, FusionCentre, Reporting, Slot};
-use fewbits_filters::{MomentFilter, PointMasses, RaoBlackwellised, ResamplingRule, StateFilter, UniformGrid};
+use fewbits_filters::{MomentFilter, PointMassFilter, RaoBlackwellised, ResamplingRule, StateFilter, UniformGrid};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, Vector1};
@@ -114,7 +114,7 @@ fn a_word_that_does_not_decode_is_no_word_of_the_sensor() {
     // Stated: one in 10^6 of 9000, 1800 and 1800 observations.
     assert_eq!(exclusions(|| MomentFilter, 5), 0);
     let grid = UniformGrid::symmetric(6.0, 0.1).unwrap();
-    assert_eq!(exclusions(|| PointMasses::new(grid), 1), 0);
+    assert_eq!(exclusions(|| PointMassFilter::new(grid), 1), 0);
     let particles = ResamplingRule::default();
     assert_eq!(exclusions(|| RaoBlackwellised::new(particles, 50).unwrap(), 1), 0);
 }

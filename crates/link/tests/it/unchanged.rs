@@ -4,9 +4,7 @@
 use crate::pairs::pairs;
 use fewbits_core::{BitString, Evolution, Gaussian, Observation, SensorNode};
 use fewbits_filters::centre::{FusionCentre, Health, NoiseLearning, Slot};
-use fewbits_filters::{
-    BootstrapFilter, GridFilter, GridOnAxes, GuidedFilter, MomentFilter, NoiseBank, ResamplingRule, StateFilter,
-};
+use fewbits_filters::{BootstrapFilter, GridFilter, GuidedFilter, Imm, MomentFilter, ResamplingRule, StateFilter};
 use fewbits_models::ContinuousLinear;
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix4, Vector4};
@@ -117,14 +115,14 @@ fn failed_calls_leave_a_centre_of_all_schemes_as_it_was() {
     let mut add = |found: [usize; 3]| failures.iter_mut().zip(found).for_each(|(all, one)| *all += one);
     for seed in 0..12 {
         add(stays("moments", MomentFilter, seed));
-        add(stays("bank", NoiseBank::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap(), seed));
+        add(stays("bank", Imm::new(MomentFilter, vec![0.25, 1.0, 4.0], 0.05).unwrap(), seed));
         if seed % 3 == 0 {
             let rule = ResamplingRule::default();
             add(stays("bootstrap", BootstrapFilter::new(rule, 40).unwrap(), seed));
             add(stays("guided", GuidedFilter::new(rule, 40).unwrap(), seed));
         }
         if seed % 6 == 0 {
-            add(stays("grid", GridOnAxes::<4, 2>::new(GridFilter::default(), [0, 2]).unwrap(), seed));
+            add(stays("grid", GridFilter::<4, 2>::new([0, 2]).unwrap(), seed));
         }
     }
     println!("failed calls: {failures:?}");

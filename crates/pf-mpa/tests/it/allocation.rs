@@ -3,7 +3,7 @@
 use allocation_counter::measure;
 use fewbits_baselines::pf_mpa::MessagePassing;
 use fewbits_baselines::pf_mpa::{
-    Encoder, GuidedGaussian, Linearised, Network, RaoBlackwellGuided, Reports, Target, Tracker,
+    Encoder, GuidedGaussian, Linearised, Network, POSITION, RaoBlackwellGuided, Reports, Target, Tracker,
 };
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
@@ -40,7 +40,7 @@ fn allocates_nothing<T: Tracker>(name: &str, tracker: &T) {
 fn a_step_allocates_nothing() {
     // The counter counts.
     assert_eq!(measure(|| drop(black_box(vec![0_u8; 64]))).count_total, 1);
-    allocates_nothing("grid", &GridFilter::default());
+    allocates_nothing("grid", &GridFilter::new(POSITION).unwrap());
     allocates_nothing("improved", &MessagePassing::improved(40).unwrap());
     allocates_nothing("published", &MessagePassing::published(40).unwrap());
     allocates_nothing("message passing", &Linearised::MESSAGE_PASSING);

@@ -7,9 +7,9 @@ use fewbits_baselines::pf_mpa::{
 use fewbits_baselines::pf_mpa::{MessagePassing, ProductSampler};
 use fewbits_core::{Error, Gaussian, Observed};
 use fewbits_densities::Particles;
-use fewbits_filters::{BootstrapFilter, ResamplingRule};
+use fewbits_filters::{BootstrapFilter, ResamplingRule, StateFilter};
 use fewbits_monte_carlo::Stream;
-use fewbits_pf_mpa::{GridFilter, GridWorkspace, QuantizedRange, RangeNoise, RangeReference, RangeSensor};
+use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, Vector2, Vector4};
 
@@ -66,7 +66,7 @@ fn unit_free<T: Tracker>(tracker: &T, tolerance: f64) {
 fn no_tracker_depends_on_the_unit() {
     unit_free(&Linearised::EKF, 1e-9);
     unit_free(&Linearised::MESSAGE_PASSING_TRANSFER, 1e-9);
-    unit_free(&GridFilter::default(), 1e-9);
+    unit_free(&GridFilter::new(POSITION).unwrap(), 1e-9);
     unit_free(&GuidedGaussian::new(20).unwrap(), 1e-6);
     unit_free(&RaoBlackwellGuided::new(100).unwrap(), 1e-6);
     unit_free(&MessagePassing::improved(20).unwrap(), 1e-6);
@@ -112,8 +112,9 @@ fn a_failed_step_leaves_the_belief_as_it_was() {
         assert_eq!(belief, before);
     }
     // A known position has no grid.
-    let known = Gaussian::known(Vector4::zeros()).unwrap();
-    let grid = GridFilter::default().update(&known, [0, 1], observed.as_slice(), &mut GridWorkspace::default());
+    let known = Gaussian::known(Vector2::zeros()).unwrap();
+    let mut filter = GridFilter::<2, 2>::new(POSITION).unwrap();
+    let grid = filter.update(&mut rng, &mut known.clone(), &[&observed]);
     assert!(matches!(grid, Err(Error::Argument(_))));
 }
 
@@ -126,9 +127,8 @@ fn what_contradicts_everything_falls_back_and_says_so() {
         .observe(&target, 0, &prior(1.0), &[0.1, 60.0, 0.1, 60.0, 0.1], Reports::Levels)
         .unwrap();
     let mut rng = Stream::new(3).rng();
-    let (belief, info) = GridFilter::default()
-        .step(&mut rng, &target, 0, &prior(1.0), &observed)
-        .unwrap();
+    let (belief, info) =
+        Tracker::step(&GridFilter::new(POSITION).unwrap(), &mut rng, &target, 0, &prior(1.0), &observed).unwrap();
     assert_eq!(info.fallbacks, 1);
     assert!(belief.mean().iter().all(|x| x.is_finite()));
     let (_, info) = GuidedGaussian::new(5)
@@ -154,7 +154,7 @@ fn settings_are_checked() {
     let twice = [Vector2::zeros(), Vector2::zeros()];
     let error = Network::new(&twice, scheme, encoder).unwrap_err().to_string();
     assert!(error.contains("different places"), "{error}");
-    assert!(GridFilter::new(2).is_err() && GuidedGaussian::new(1).is_err());
+    assert!(GridFilter::<4, 2>::new(POSITION).unwrap().with_nodes(2).is_err() && GuidedGaussian::new(1).is_err());
     assert!(RaoBlackwellGuided::new(0).is_err());
     let mut broken = MessagePassing::improved(2).unwrap();
     broken.particles = 1;
@@ -181,7 +181,7 @@ fn every_kind_of_bad_input_is_a_typed_error() {
         ("one particle", MessagePassing::improved(1).is_err() && MessagePassing::published(1).is_err()),
         ("no particle", RaoBlackwellGuided::new(0).is_err()),
         ("one draw", GuidedGaussian::new(1).is_err()),
-        ("two nodes", GridFilter::new(2).is_err()),
+        ("two nodes", GridFilter::<4, 2>::new(POSITION).unwrap().with_nodes(2).is_err()),
         ("one level", QuantizedRange::new(1, noise).is_err() && QuantizedRange::new(0, noise).is_err()),
         (
             "speed",

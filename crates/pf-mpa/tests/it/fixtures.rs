@@ -4,16 +4,16 @@ use fewbits_baselines::pf_mpa::association::{self, AssociationRule, tanh_rule};
 use fewbits_baselines::pf_mpa::leader::StepBits;
 use fewbits_baselines::pf_mpa::product;
 use fewbits_baselines::pf_mpa::{
-    AccelerationChain, CramerRao, Encoder, Linearised, Manoeuvres, Network, Normalisation, Reports, Target, Tracker,
-    position_information,
+    AccelerationChain, CramerRao, Encoder, Linearised, Manoeuvres, Network, Normalisation, POSITION, Ranged, Reports,
+    Target, Tracker, position_information,
 };
 use fewbits_baselines::pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
 use fewbits_core::factor::Factor;
-use fewbits_core::{Gaussian, NumberFormat};
+use fewbits_core::{Gaussian, NumberFormat, Observed};
 use fewbits_densities::{Bandwidth, BandwidthRule, Component, Mixture};
-use fewbits_pf_mpa::{
-    GridFilter, GridWorkspace, QuantizedRange, RangeNoise, RangeReference, level_information, range_information,
-};
+use fewbits_filters::StateFilter;
+use fewbits_monte_carlo::Stream;
+use fewbits_pf_mpa::{GridFilter, QuantizedRange, RangeNoise, RangeReference, level_information, range_information};
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, SMatrix, SVector, Vector1, Vector2, Vector4};
 use serde_json::Value;
@@ -158,7 +158,7 @@ fn run<T: Tracker>(tracker: &T, input: &Value, reports: Reports) -> Vec<f64> {
         Matrix4::from_diagonal(&Vector4::new(0.04, 0.04, 0.01, 0.01)),
     )
     .unwrap();
-    let mut rng = fewbits_monte_carlo::Stream::new(1).rng();
+    let mut rng = Stream::new(1).rng();
     let mut belief = tracker.start(&mut rng, &target, &prior).unwrap();
     let c = 10.0_f64.powf(number(&input["snr_db"]) / 20.0);
     let mut squares = 0.0;
@@ -213,10 +213,12 @@ fn one_step(entry: &Value) {
     let observed = network.observe(&target, 0, &prior, &ranges, Reports::Levels).unwrap();
     let predicted = target.predict(&prior, 0, Manoeuvres::AsNoise);
     let found = |nodes: usize, reach: f64| {
-        let filter = GridFilter::new(nodes).unwrap().with_reach(reach).unwrap();
-        let observed = observed.as_slice();
-        let (belief, info) = filter
-            .update(&predicted, [0, 1], observed, &mut GridWorkspace::default())
+        let filter = GridFilter::new(POSITION).unwrap().with_nodes(nodes).unwrap();
+        let (mut filter, mut belief) = (filter.with_reach(reach).unwrap(), predicted);
+        let in_state = |one: &Ranged| Observed::new(one.sensing.on_axes::<4>(POSITION).unwrap(), one.factor.clone());
+        let observed: Vec<_> = observed.iter().map(in_state).collect();
+        let info = filter
+            .update(&mut Stream::new(9).rng(), &mut belief, &[&observed])
             .unwrap();
         let mut found = vec![info.log_likelihood];
         found.extend(belief.mean().iter());
@@ -346,7 +348,7 @@ fn one(entry: &Value) {
         }
         ["run", _, "ADF"] => {
             // The other program's grid ends at 4 deviations of the prediction, too: part of the definition of its numbers.
-            check(entry, &run(&GridFilter::new(401).unwrap(), input, Reports::Levels));
+            check(entry, &run(&GridFilter::new(POSITION).unwrap().with_nodes(401).unwrap(), input, Reports::Levels));
         }
         ["bits", ..] => {
             let format = NumberFormat::Single;

@@ -3,8 +3,8 @@
 use fewbits_baselines::pf_mpa::association::{AssociationRule, separation, update};
 use fewbits_baselines::pf_mpa::leader::elect;
 use fewbits_baselines::pf_mpa::{
-    AccelerationChain, Encoder, GuidedGaussian, IntervalRule, Linearised, Network, RangeFactor, RaoBlackwellGuided,
-    Reports, Target, Tracker,
+    AccelerationChain, Encoder, GuidedGaussian, IntervalRule, Linearised, Network, POSITION, RangeFactor,
+    RaoBlackwellGuided, Reports, Target, Tracker,
 };
 use fewbits_baselines::pf_mpa::{MessagePassing, RingBias, kernel_error};
 use fewbits_core::factor::Scalar;
@@ -151,7 +151,7 @@ proptest! {
         let Ok(observed) = network.observe(&target, 1, &prior, &x[12..15], reports) else { return Ok(()) };
         step(&Linearised::EKF, &target, &prior, &observed)?;
         step(&Linearised::MESSAGE_PASSING_TRANSFER, &target, &prior, &observed)?;
-        step(&GridFilter::default(), &target, &prior, &observed)?;
+        step(&GridFilter::new(POSITION).unwrap(), &target, &prior, &observed)?;
         step(&GuidedGaussian::new(20).unwrap(), &target, &prior, &observed)?;
         step(&MessagePassing::improved(20).unwrap(), &target, &prior, &observed)?;
         step(&RaoBlackwellGuided::new(20).unwrap(), &target, &prior, &observed)?;

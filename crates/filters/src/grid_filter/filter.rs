@@ -1,10 +1,10 @@
-//! The grid filter under the receiver's contract: all observations of one instant jointly.
+//! The filter: settings, and all observations of one instant jointly.
 
-use super::{GridFilter, GridWorkspace, check_axes};
+use super::{Grid, NODES, REACH, Workspace};
 use crate::Error;
 use crate::contract::{Info, StateFilter};
-use fewbits_core::{Columns, Gaussian, GaussianDynamics, Likelihood};
-use fewbits_numerics::error::refuse;
+use fewbits_core::{Columns, Gaussian, GaussianDynamics, Likelihood, OnAxes};
+use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::linalg::congruence;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::Rng;
@@ -16,26 +16,71 @@ const PARTS: [(usize, f64); 3] = [(97, 6.0), (25, 6.0), (13, 5.0)];
 /// `2 exp(-2 pi^2 s^2 (1 - s^2) / d^2)` for each axis: 1e-4, 4e-4 and 4e-3 for one, two and three axes.
 const PART_DEVIATION: f64 = 0.7;
 
-/// [`GridFilter`] over the coordinates `axes` of the state. Processes all observations of one instant jointly, without linearisation.
+/// A filter with a Gaussian belief whose moments are computed on a grid over the `K` coordinates `axes`, on which the likelihoods depend. It
+/// processes all observations of one instant jointly, without linearisation.
+///
+/// ```text
+/// m, L L'     mean and covariance of those coordinates;  u = L^-1 (x - m) is standard normal
+/// grid:       centre c, orthogonal axes with deviations d;  n^K nodes over +-reach deviations;  first c = 0, d = 1
+/// pass:       w = exp(b (ln N(u; 0, I) + ln p(observed | x)));  b = 1 if w then has at least 3^K effective nodes,
+///             otherwise the b that gives about 3^K;  moments of u under w
+///             done if b = 1, the posterior has 1.5 nodes per deviation and lies inside the grid
+///             otherwise: next grid along the principal axes of these moments, over +-reach of its deviations
+/// split:      if layers of nodes across the longest axis are empty between two modes: a grid for each side
+/// refine:     if the grid no longer narrows (a curved ridge): twice as many nodes on each axis
+/// the other coordinates follow by regression on the K
+/// ```
+/// The filter is deterministic: no random numbers. Nodes that receive the same reports have the same belief to the last bit.
+///
+/// An update fails with [`Error::Impossible`] if the observations have probability zero under the belief, or one that underflows, with
+/// [`Error::Unresolved`] if the posterior has fewer than 1.5 nodes per deviation, and with an argument error if a likelihood depends on a
+/// coordinate outside `axes`, the covariance of `axes` is singular, or the likelihood is NaN at every node.
 #[derive(Debug, Clone)]
-pub struct GridOnAxes<const D: usize, const K: usize> {
-    grid: GridFilter,
+pub struct GridFilter<const D: usize, const K: usize> {
+    grid: Grid,
     axes: [usize; K],
-    workspace: GridWorkspace<K>,
+    workspace: Workspace<K>,
 }
 
-impl<const D: usize, const K: usize> GridOnAxes<D, K> {
-    /// The filter for likelihoods that depend only on the coordinates `axes`.
+impl<const D: usize, const K: usize> GridFilter<D, K> {
+    /// The filter for likelihoods that depend only on the coordinates `axes`, with 15 nodes on each axis over 4 standard deviations to each
+    /// side.
     ///
     /// # Errors
     /// If `axes` are not different coordinates of a state of `D`.
-    pub fn new(grid: GridFilter, axes: [usize; K]) -> Result<Self, Error> {
-        check_axes::<D, K>(&axes)?;
+    pub fn new(axes: [usize; K]) -> Result<Self, Error> {
+        at_least_one("axes", K)?;
+        OnAxes::<(), D, K>::new((), axes)?;
         Ok(Self {
-            grid,
+            grid: Grid::new(NODES, REACH)?,
             axes,
-            workspace: GridWorkspace::default(),
+            workspace: Workspace::default(),
         })
+    }
+
+    /// The same filter with `nodes` nodes on each axis. Fewer than give 1.6 nodes per deviation (14 over 4 deviations to each side) are raised
+    /// to that number: they would be too few for discontinuous posteriors.
+    ///
+    /// # Errors
+    /// If `nodes` is not in 5 to 1001.
+    pub fn with_nodes(self, nodes: usize) -> Result<Self, Error> {
+        let grid = Grid::new(nodes, self.grid.reach)?;
+        Ok(Self { grid, ..self })
+    }
+
+    /// The same filter over `reach` standard deviations to each side. With many nodes, 7 deviations leave the moments exact to rounding.
+    /// The number of nodes is raised as in [`with_nodes`](Self::with_nodes).
+    ///
+    /// # Errors
+    /// If `reach` is not in 2 to 10.
+    pub fn with_reach(self, reach: f64) -> Result<Self, Error> {
+        let grid = Grid::new(self.grid.nodes, reach)?;
+        Ok(Self { grid, ..self })
+    }
+
+    /// Nodes on each axis.
+    pub fn nodes(&self) -> usize {
+        self.grid.nodes
     }
 }
 
@@ -75,7 +120,7 @@ impl<const D: usize, const K: usize> Likelihood<K> for OnPlane<'_, D, K> {
     }
 }
 
-impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
+impl<const D: usize, const K: usize> StateFilter<D> for GridFilter<D, K> {
     type Belief = Gaussian<D>;
 
     fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Gaussian<D>, Error> {
@@ -92,7 +137,6 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
         Ok(())
     }
 
-    /// An error if a likelihood depends on a coordinate outside `axes`.
     fn update(
         &mut self,
         _: &mut dyn Rng,
@@ -115,9 +159,9 @@ impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
             axes: self.axes,
             state: *belief.mean(),
         };
-        let (next, info) = self.grid.update(belief, self.axes, &joint, &mut self.workspace)?;
+        let (next, log_likelihood) = self.grid.update(belief, self.axes, &joint, &mut self.workspace)?;
         *belief = next;
-        Ok(Info::new(info.log_likelihood))
+        Ok(Info::new(log_likelihood))
     }
 
     fn mixture(&self, belief: &Gaussian<D>) -> Option<Vec<(f64, Gaussian<D>)>> {
